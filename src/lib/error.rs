@@ -1,0 +1,102 @@
+//! One error type; its variants are named for whoever must act.
+
+use std::io;
+
+/// What went wrong, and whose move it is.
+///
+/// The text names the file first, then what is wrong, then what to do; a program puts its own name before it.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The command line asks for something that cannot be (exit status 2).
+    #[error("{0}")]
+    Usage(String),
+
+    /// The disk, a directory or a pipe refuses.
+    #[error("{file}: cannot {action}: {}", reason(source))]
+    Disk {
+        /// The file as the user named it.
+        file: String,
+        /// What was tried: `open`, `read`, `write` …
+        action: &'static str,
+        /// What the system answered.
+        source: io::Error,
+    },
+
+    /// The program that wrote the file made something that cannot be read here.
+    #[error("{file}: {problem}")]
+    Format {
+        /// The file as the user named it.
+        file: String,
+        /// What is wrong with it and what to do.
+        problem: String,
+    },
+
+    /// The programs were run in an order that makes no sense.
+    #[error("{file}: {problem}; run `{first}` first")]
+    Order {
+        /// The file as the user named it.
+        file: String,
+        /// What the file holds and what was wanted.
+        problem: String,
+        /// The program that should come first.
+        first: &'static str,
+    },
+
+    /// The metadata lacks a key that the program needs.
+    #[error("{file}: the metadata has no `{key}`; give {option}")]
+    MissingKey {
+        /// The file as the user named it.
+        file: String,
+        /// The key that is missing.
+        key: &'static str,
+        /// The option that supplies it.
+        option: &'static str,
+    },
+
+    /// The data are too few, undetermined or out of range.
+    #[error("{0}")]
+    Data(String),
+
+    /// Whoever read our output has closed the pipe: no error, the program ends quietly.
+    #[error("the output pipe was closed")]
+    ClosedPipe,
+}
+
+/// A result with the project's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An [`Error::Format`] about `file`.
+    pub fn format(file: &str, problem: impl Into<String>) -> Self {
+        Self::Format { file: file.into(), problem: problem.into() }
+    }
+
+    /// An [`Error::Disk`] about `file`, or [`Error::ClosedPipe`] where that is what happened.
+    pub fn disk(file: &str, action: &'static str, source: io::Error) -> Self {
+        if source.kind() == io::ErrorKind::BrokenPipe {
+            return Self::ClosedPipe;
+        }
+        if action == "read" && source.kind() == io::ErrorKind::UnexpectedEof {
+            return Self::format(file, "the file ends before its last row; it was cut short");
+        }
+        Self::Disk { file: file.into(), action, source }
+    }
+
+    /// The exit status that a program ends with.
+    pub fn exit_status(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::ClosedPipe => 0,
+            _ => 1,
+        }
+    }
+}
+
+/// The system's reason without Rust's `(os error N)`.
+fn reason(source: &io::Error) -> String {
+    let text = source.to_string();
+    match text.find(" (os error") {
+        Some(end) => text[..end].to_lowercase(),
+        None => text,
+    }
+}

@@ -1,0 +1,219 @@
+//! A frame is a geometry and rows of samples; a band is some of its rows.
+//!
+//! Samples are `f32`, laid out as `[row][channel][column]`: each row of each channel is one contiguous slice.
+
+use crate::units::{Any, Quantity};
+use std::marker::PhantomData;
+
+/// Size, place and channels of a frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Geometry {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Column and row, on the sensor, of the frame's first sample. A crop keeps it, so that the colour filter array
+    /// and the noise of each photosite stay true.
+    pub origin: [i32; 2],
+    /// Channel names in the order of the samples.
+    pub channels: Vec<String>,
+}
+
+impl Geometry {
+    /// A frame at the sensor's corner.
+    pub fn new(width: usize, height: usize, channels: &[&str]) -> Self {
+        let channels = channels.iter().map(|name| (*name).to_owned()).collect();
+        Self { width, height, origin: [0, 0], channels }
+    }
+
+    /// The same place with other channels.
+    pub fn with_channels(&self, channels: &[&str]) -> Self {
+        Self { origin: self.origin, ..Self::new(self.width, self.height, channels) }
+    }
+
+    /// Samples in one row of all channels.
+    pub fn row_samples(&self) -> usize {
+        self.width * self.channels.len()
+    }
+
+    /// Rows of a band that holds about [`BAND_BYTES`], a multiple of `step`, at least one step.
+    pub fn band_rows(&self, step: usize) -> usize {
+        let fitting = BAND_BYTES / (self.row_samples() * size_of::<f32>()).max(1);
+        (fitting / step * step).max(step).min(self.height.max(1))
+    }
+}
+
+/// The size that a band aims at: a few of them fit a level-2 cache, and the memory of a program stays a few of them.
+pub const BAND_BYTES: usize = 1 << 20;
+
+/// Some rows of a frame, of quantity `Q`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Band<Q> {
+    /// The frame's row that is the band's first.
+    pub first_row: usize,
+    /// Columns.
+    pub width: usize,
+    /// Number of channels.
+    pub channels: usize,
+    /// Samples, `[row][channel][column]`.
+    pub samples: Vec<f32>,
+    quantity: PhantomData<Q>,
+}
+
+impl<Q: Quantity> Band<Q> {
+    /// A band of `rows` rows of zeros.
+    pub fn zeros(first_row: usize, rows: usize, width: usize, channels: usize) -> Self {
+        Self::from_samples(first_row, width, channels, vec![0.0; rows * width * channels])
+    }
+
+    /// A band around samples laid out as `[row][channel][column]`.
+    pub fn from_samples(
+        first_row: usize,
+        width: usize,
+        channels: usize,
+        samples: Vec<f32>,
+    ) -> Self {
+        assert!(width * channels > 0 && samples.len().is_multiple_of(width * channels));
+        Self { first_row, width, channels, samples, quantity: PhantomData }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.samples.len() / (self.width * self.channels)
+    }
+
+    /// One channel of the band's row `row` (counted within the band).
+    pub fn row(&self, row: usize, channel: usize) -> &[f32] {
+        let start = (row * self.channels + channel) * self.width;
+        &self.samples[start..start + self.width]
+    }
+
+    /// The band as another quantity: for the one place that has read in the metadata what the samples are.
+    pub fn assume<P: Quantity>(self) -> Band<P> {
+        Band::from_samples(self.first_row, self.width, self.channels, self.samples)
+    }
+}
+
+/// The rows of a frame that a stage can see: those it makes, and a halo above and below.
+#[derive(Debug, Clone, Copy)]
+pub struct Window<'a, Q = Any> {
+    frame_height: usize,
+    first_row: usize,
+    width: usize,
+    channels: usize,
+    samples: &'a [f32],
+    quantity: PhantomData<Q>,
+}
+
+impl<'a, Q: Quantity> Window<'a, Q> {
+    /// A window on `samples`, whose first row is the frame's row `first_row`.
+    pub fn new(
+        frame_height: usize,
+        first_row: usize,
+        width: usize,
+        channels: usize,
+        samples: &'a [f32],
+    ) -> Self {
+        assert!(samples.len().is_multiple_of(width * channels));
+        Self { frame_height, first_row, width, channels, samples, quantity: PhantomData }
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Number of channels.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// One channel of the frame's row `y`; rows beyond the frame are mirrored as [`mirror`] says.
+    pub fn row(&self, y: isize, channel: usize) -> &'a [f32] {
+        let y = mirror(y, self.frame_height);
+        let start = ((y - self.first_row) * self.channels + channel) * self.width;
+        &self.samples[start..start + self.width]
+    }
+
+    /// All channels of the frame's row `y`, one after another.
+    pub fn rows_of_all_channels(&self, y: usize) -> &'a [f32] {
+        let start = (y - self.first_row) * self.channels * self.width;
+        &self.samples[start..start + self.channels * self.width]
+    }
+}
+
+/// The rows that a stage fills in.
+#[derive(Debug)]
+pub struct Rows<'a, Q = Any> {
+    /// The frame's row that comes first.
+    pub first_row: usize,
+    width: usize,
+    channels: usize,
+    samples: &'a mut [f32],
+    quantity: PhantomData<Q>,
+}
+
+impl<'a, Q: Quantity> Rows<'a, Q> {
+    /// Rows on `samples`, the first being the frame's row `first_row`.
+    pub fn new(first_row: usize, width: usize, channels: usize, samples: &'a mut [f32]) -> Self {
+        assert!(samples.len().is_multiple_of(width * channels));
+        Self { first_row, width, channels, samples, quantity: PhantomData }
+    }
+
+    /// The frame's rows that are to be filled.
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.first_row..self.first_row + self.samples.len() / (self.width * self.channels)
+    }
+
+    /// One channel of the frame's row `y`.
+    pub fn row(&mut self, y: usize, channel: usize) -> &mut [f32] {
+        let start = ((y - self.first_row) * self.channels + channel) * self.width;
+        &mut self.samples[start..start + self.width]
+    }
+
+    /// The three channels of the frame's row `y`.
+    ///
+    /// # Panics
+    ///
+    /// When the rows do not have three channels.
+    pub fn three(&mut self, y: usize) -> [&mut [f32]; 3] {
+        assert_eq!(self.channels, 3);
+        let start = (y - self.first_row) * 3 * self.width;
+        let row = &mut self.samples[start..start + 3 * self.width];
+        let (first, rest) = row.split_at_mut(self.width);
+        let (second, third) = rest.split_at_mut(self.width);
+        [first, second, third]
+    }
+}
+
+/// Mirrors an index into `0..length` without repeating the edge: …2 1 | 0 1 2…, which keeps the phase of a colour
+/// filter array whose period is 2.
+pub fn mirror(index: isize, length: usize) -> usize {
+    if length == 1 {
+        return 0;
+    }
+    let period = 2 * (length - 1);
+    let folded = index.unsigned_abs() % period;
+    if folded < length { folded } else { period - folded }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mirroring_does_not_repeat_the_edge() {
+        let seen: Vec<usize> = (-5..9).map(|i| mirror(i, 4)).collect();
+        assert_eq!(seen, [1, 2, 3, 2, 1, 0, 1, 2, 3, 2, 1, 0, 1, 2]);
+        assert_eq!((-3..4).map(|i| mirror(i, 2)).collect::<Vec<_>>(), [1, 0, 1, 0, 1, 0, 1]);
+        assert_eq!(mirror(-7, 1), 0);
+    }
+
+    #[test]
+    fn bands_hold_about_a_megabyte_in_whole_steps() {
+        let frame = Geometry::new(30_000, 2_000, &["R", "G", "B"]);
+        assert_eq!(frame.band_rows(1), 2);
+        assert_eq!(frame.band_rows(32), 32);
+        assert_eq!(Geometry::new(10, 7, &["Y"]).band_rows(16), 7);
+    }
+}

@@ -1,0 +1,221 @@
+//! Constants of nature, conversions of units, and the quantities that samples can be in.
+//!
+//! Wavelengths are in nm, spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, areas in cm², charge in electrons, luminance in
+//! cd m⁻². Every conversion stands here; a bare power of ten elsewhere is a defect.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Planck constant h in J s (exact, SI 2019).
+pub const PLANCK_J_S: f64 = 6.626_070_15e-34;
+/// Speed of light c in m s⁻¹ (exact).
+pub const LIGHT_M_PER_S: f64 = 299_792_458.0;
+/// Boltzmann constant k in J K⁻¹ (exact, SI 2019).
+pub const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
+/// Elementary charge in C (exact, SI 2019).
+pub const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
+/// Boltzmann constant in eV K⁻¹.
+pub const BOLTZMANN_EV_PER_K: f64 = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C;
+/// Maximum luminous efficacy K_m in lm W⁻¹.
+pub const LUMINOUS_EFFICACY_LM_PER_W: f64 = 683.0;
+/// Metres in a nanometre.
+pub const M_PER_NM: f64 = 1e-9;
+/// Centimetres in a micrometre.
+pub const CM_PER_UM: f64 = 1e-4;
+/// Millimetres in a micrometre.
+pub const MM_PER_UM: f64 = 1e-3;
+/// Square centimetres in a square metre.
+pub const CM2_PER_M2: f64 = 1e4;
+
+/// The unit in which a file gives spectral radiance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+pub enum RadianceUnit {
+    /// W cm⁻² sr⁻¹ nm⁻¹, ours.
+    #[default]
+    #[serde(rename = "W cm-2 sr-1 nm-1")]
+    WPerCm2SrNm,
+    /// W m⁻² sr⁻¹ nm⁻¹.
+    #[serde(rename = "W m-2 sr-1 nm-1")]
+    WPerM2SrNm,
+    /// mW m⁻² sr⁻¹ nm⁻¹.
+    #[serde(rename = "mW m-2 sr-1 nm-1")]
+    MwPerM2SrNm,
+    /// W m⁻² sr⁻¹ µm⁻¹.
+    #[serde(rename = "W m-2 sr-1 um-1")]
+    WPerM2SrUm,
+    /// µW cm⁻² sr⁻¹ nm⁻¹.
+    #[serde(rename = "uW cm-2 sr-1 nm-1")]
+    UwPerCm2SrNm,
+}
+
+impl RadianceUnit {
+    /// All units, in the order in which help lists them.
+    pub const ALL: [Self; 5] = [
+        Self::WPerCm2SrNm,
+        Self::WPerM2SrNm,
+        Self::MwPerM2SrNm,
+        Self::WPerM2SrUm,
+        Self::UwPerCm2SrNm,
+    ];
+
+    /// What one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
+    pub fn in_w_per_cm2_sr_nm(self) -> f64 {
+        match self {
+            Self::WPerCm2SrNm => 1.0,
+            Self::WPerM2SrNm => 1.0 / CM2_PER_M2,
+            Self::MwPerM2SrNm | Self::WPerM2SrUm => 1e-3 / CM2_PER_M2,
+            Self::UwPerCm2SrNm => 1e-6,
+        }
+    }
+
+    /// The name used in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::WPerCm2SrNm => "W cm-2 sr-1 nm-1",
+            Self::WPerM2SrNm => "W m-2 sr-1 nm-1",
+            Self::MwPerM2SrNm => "mW m-2 sr-1 nm-1",
+            Self::WPerM2SrUm => "W m-2 sr-1 um-1",
+            Self::UwPerCm2SrNm => "uW cm-2 sr-1 nm-1",
+        }
+    }
+
+    /// Reads a unit as people write it: `W cm-2 sr-1 nm-1`, `W.m^-2.sr^-1.nm^-1`, `W/m2/sr/nm`, `µW/cm2/sr/nm`.
+    pub fn parse(text: &str) -> Option<Self> {
+        // Squeezes every spelling into the form `W/cm2/sr/nm`.
+        let mut squeezed = String::new();
+        for factor in text
+            .replace(['µ', 'μ'], "u")
+            .split([' ', '.', '/', '*'])
+            .filter(|part| !part.is_empty())
+        {
+            let factor = factor.replace('^', "");
+            let factor = factor.trim_end_matches("-1").replace("-2", "2");
+            if !squeezed.is_empty() {
+                squeezed.push('/');
+            }
+            squeezed.push_str(&factor);
+        }
+        Self::ALL.into_iter().find(|unit| {
+            let [power, area] = match unit {
+                Self::WPerCm2SrNm => ["W", "cm2"],
+                Self::WPerM2SrNm | Self::WPerM2SrUm => ["W", "m2"],
+                Self::MwPerM2SrNm => ["mW", "m2"],
+                Self::UwPerCm2SrNm => ["uW", "cm2"],
+            };
+            let length = if *unit == Self::WPerM2SrUm { "um" } else { "nm" };
+            squeezed == format!("{power}/{area}/sr/{length}")
+        })
+    }
+}
+
+/// What the samples of a frame are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum QuantityKind {
+    /// Nothing is known about the samples: another program's file without metadata.
+    #[default]
+    Unspecified,
+    /// Spectral radiance, one channel per wavelength.
+    SpectralRadiance,
+    /// Expected signal electrons of each photosite, without noise and without dark signal.
+    ExpectedElectrons,
+    /// Electrons of one noisy exposure.
+    Electrons,
+    /// Codes of the analogue-to-digital converter, or values on that scale (signed, fractional once the black level
+    /// is off).
+    Adu,
+    /// Absolute CIE XYZ; Y in cd m⁻².
+    Xyz,
+    /// CIE chromaticities x, y and luminance Y in cd m⁻².
+    Xyy,
+    /// CIE 1976 L*a*b*.
+    Lab,
+    /// sRGB encoded for viewing, 0…1.
+    Srgb,
+}
+
+impl QuantityKind {
+    /// The unit of the samples, in ASCII.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Unspecified => "unspecified",
+            Self::SpectralRadiance => RadianceUnit::WPerCm2SrNm.name(),
+            Self::ExpectedElectrons | Self::Electrons => "e-",
+            Self::Adu => "ADU",
+            Self::Xyz => "cd m-2",
+            Self::Xyy => "1, 1, cd m-2",
+            Self::Lab | Self::Srgb => "1",
+        }
+    }
+
+    /// The names by which reports call the three planes.
+    pub fn plane_names(self) -> [&'static str; 3] {
+        match self {
+            Self::Xyz => ["X", "Y", "Z"],
+            Self::Xyy => ["x", "y", "Y"],
+            Self::Lab => ["L", "a", "b"],
+            _ => ["R", "G", "B"],
+        }
+    }
+}
+
+impl fmt::Display for QuantityKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Unspecified => "samples of unknown quantity",
+            Self::SpectralRadiance => "spectral radiance",
+            Self::ExpectedElectrons => "expected electrons",
+            Self::Electrons => "electrons",
+            Self::Adu => "ADU",
+            Self::Xyz => "XYZ",
+            Self::Xyy => "xyY",
+            Self::Lab => "L*a*b*",
+            Self::Srgb => "sRGB",
+        })
+    }
+}
+
+/// A quantity as a type, so that a [`crate::frame::Band`] of one cannot enter a function that takes another.
+pub trait Quantity: Copy + Send + Sync + 'static {}
+
+macro_rules! quantities {
+    ($($(#[$doc:meta])* $name:ident),* $(,)?) => {
+        $($(#[$doc])* #[derive(Debug, Clone, Copy)] pub struct $name; impl Quantity for $name {})*
+    };
+}
+
+quantities! {
+    /// Spectral radiance.
+    Radiance,
+    /// Expected signal electrons, free of noise.
+    ExpectedElectrons,
+    /// Electrons of an exposure.
+    Electrons,
+    /// Codes of the converter.
+    Adu,
+    /// CIE XYZ, or a space derived from it.
+    Tristimulus,
+    /// Whatever the file holds: for stages that only move or count samples.
+    Any,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radiance_units_are_read_as_people_write_them() {
+        for unit in RadianceUnit::ALL {
+            assert_eq!(RadianceUnit::parse(unit.name()), Some(unit), "{}", unit.name());
+        }
+        assert_eq!(RadianceUnit::parse("W.m^-2.sr^-1.nm^-1"), Some(RadianceUnit::WPerM2SrNm));
+        assert_eq!(RadianceUnit::parse("µW/cm2/sr/nm"), Some(RadianceUnit::UwPerCm2SrNm));
+        assert_eq!(RadianceUnit::parse("W/m2/sr"), None);
+    }
+
+    #[test]
+    fn one_milliwatt_per_micrometre_is_one_watt_per_nanometre_apart_by_area_only() {
+        // 1 W m⁻² sr⁻¹ µm⁻¹ = 10⁻³ W m⁻² sr⁻¹ nm⁻¹ = 10⁻⁷ W cm⁻² sr⁻¹ nm⁻¹
+        assert!((RadianceUnit::WPerM2SrUm.in_w_per_cm2_sr_nm() / 1e-7 - 1.0).abs() < 1e-15);
+    }
+}
