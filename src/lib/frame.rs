@@ -38,7 +38,9 @@ impl Geometry {
 
     /// Rows of a band that holds about [`BAND_BYTES`], a multiple of `step`, at least one step.
     pub fn band_rows(&self, step: usize) -> usize {
-        let fitting = BAND_BYTES / (self.row_samples() * size_of::<f32>()).max(1);
+        let row_bytes = (self.row_samples() * size_of::<f32>()).max(1);
+        // Wide frames get at least 8 rows, so that a halo of 3 does not double the work, while 8 MiB hold them.
+        let fitting = (BAND_BYTES / row_bytes).max((8 * BAND_BYTES / row_bytes).min(8));
         (fitting / step * step).max(step).min(self.height.max(1))
     }
 }
@@ -128,6 +130,11 @@ impl<'a, Q: Quantity> Window<'a, Q> {
         self.channels
     }
 
+    /// Rows of the whole frame.
+    pub fn frame_height(&self) -> usize {
+        self.frame_height
+    }
+
     /// One channel of the frame's row `y`; rows beyond the frame are mirrored as [`mirror`] says.
     pub fn row(&self, y: isize, channel: usize) -> &'a [f32] {
         let y = mirror(y, self.frame_height);
@@ -186,6 +193,12 @@ impl<'a, Q: Quantity> Rows<'a, Q> {
     }
 }
 
+/// Rounds a double to the nearest sample.
+#[expect(clippy::cast_possible_truncation, reason = "the one place where double results become 32-bit samples")]
+pub fn to_sample(value: f64) -> f32 {
+    value as f32
+}
+
 /// Mirrors an index into `0..length` without repeating the edge: …2 1 | 0 1 2…, which keeps the phase of a colour
 /// filter array whose period is 2.
 pub fn mirror(index: isize, length: usize) -> usize {
@@ -212,7 +225,7 @@ mod tests {
     #[test]
     fn bands_hold_about_a_megabyte_in_whole_steps() {
         let frame = Geometry::new(30_000, 2_000, &["R", "G", "B"]);
-        assert_eq!(frame.band_rows(1), 2);
+        assert_eq!(frame.band_rows(1), 8);
         assert_eq!(frame.band_rows(32), 32);
         assert_eq!(Geometry::new(10, 7, &["Y"]).band_rows(16), 7);
     }

@@ -1,1 +1,3 @@
-//! Files.
+//! Files: bytes to frames and back.
+
+pub mod exr;

@@ -1,0 +1,465 @@
+//! Demosaicking: the two classes that each photosite did not measure, from its neighbours [HP2005, App. A].
+//!
+//! One file a method. Each works on a tile: some rows of the CFA plane as doubles, black level removed, edges mirrored
+//! without repeating the edge sample, which keeps the phase of the filter array.
+
+mod bilinear;
+mod effective_color;
+mod smooth_hue;
+
+use crate::cfa::{CfaPattern, Class};
+use crate::error::Result;
+use crate::frame::{Rows, Window, mirror, to_sample};
+use crate::metadata::{DemosaicRecord, FrameHeader};
+use crate::stage::{Counts, Stage};
+use crate::units::{Any, QuantityKind};
+
+/// A way to interpolate the missing classes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Bilinear interpolation (BI) of each class by itself.
+    Bilinear,
+    /// Smooth hue transition interpolation (SHTI), of the ratios R/G and B/G [Cok1987].
+    SmoothHue,
+    /// Effective colour interpolation (ECI), of the differences G − R and G − B [PeiTam2003].
+    EffectiveColor,
+}
+
+impl Method {
+    /// All methods.
+    pub const ALL: [Self; 3] = [Self::Bilinear, Self::SmoothHue, Self::EffectiveColor];
+
+    /// Short and long name.
+    pub fn names(self) -> [&'static str; 2] {
+        match self {
+            Self::Bilinear => ["bi", "bilinear"],
+            Self::SmoothHue => ["shti", "smooth-hue"],
+            Self::EffectiveColor => ["eci", "effective-color"],
+        }
+    }
+
+    /// Rows and columns on each side that an interpolated value depends on.
+    pub fn reach(self) -> usize {
+        match self {
+            Self::Bilinear => 1,
+            Self::SmoothHue => 2,
+            Self::EffectiveColor => 3,
+        }
+    }
+}
+
+/// What is subtracted before interpolation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Black {
+    /// What the metadata says: bias plus mean dark signal.
+    Auto,
+    /// Nothing.
+    None,
+    /// A level in the unit of the samples.
+    Level(f64),
+}
+
+impl Black {
+    /// The level for a frame; zero where the metadata knows of none.
+    pub fn level(self, frame: &FrameHeader) -> f64 {
+        let metadata = &frame.metadata;
+        match self {
+            Self::Level(level) => level,
+            Self::None => 0.0,
+            Self::Auto => match metadata.quantity {
+                QuantityKind::Electrons => metadata.dark_signal_e.unwrap_or(0.0),
+                QuantityKind::ExpectedElectrons => 0.0,
+                _ => metadata.black_level_adu.unwrap_or(0.0),
+            },
+        }
+    }
+}
+
+/// Interpolates the classes that each photosite of a CFA plane did not measure; values stay signed.
+#[derive(Debug, Clone)]
+pub struct Demosaic {
+    header: FrameHeader,
+    pattern: CfaPattern,
+    method: Method,
+    black: f64,
+}
+
+impl Demosaic {
+    /// The demosaicking of `input`; `pattern` counts where the metadata names none.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Order`](crate::error::Error::Order) unless the frame is one plane of photosites;
+    /// [`Error::MissingKey`](crate::error::Error::MissingKey) when nothing gives a pattern; a format error below 2×2.
+    pub fn new(input: &FrameHeader, method: Method, black: Black, pattern: Option<CfaPattern>) -> Result<Self> {
+        let metadata = &input.metadata;
+        let holds = input.holds();
+        if metadata.demosaic.is_some() {
+            return Err(input.refuse(format!("it holds {holds}; demosaicking is done once")));
+        }
+        if input.geometry.channels.len() != 1 {
+            return Err(input.out_of_order(format!("it holds {holds}, not a CFA plane"), "mosaic"));
+        }
+        let (width, height) = (input.geometry.width, input.geometry.height);
+        if width < 2 || height < 2 {
+            return Err(input.refuse(format!(
+                "a CFA plane of {width}x{height} lacks whole classes; demosaicking needs at least 2x2"
+            )));
+        }
+        let cfa =
+            pattern.or(metadata.cfa).ok_or_else(|| input.missing("cfa", "--pattern rggb|bggr|grbg|gbrg"))?;
+        let level = black.level(input);
+        let quantity = match metadata.quantity {
+            QuantityKind::Unspecified => QuantityKind::Adu,
+            known => known,
+        };
+        let mut made = metadata.becoming(quantity);
+        made.cfa = None;
+        made.demosaic = Some(DemosaicRecord { method: method.names()[0].into(), cfa, black: level });
+        match quantity {
+            QuantityKind::Adu => {
+                made.white_level_adu = made.white_level_adu.map(|white| white - level);
+                made.black_level_adu = Some(black_left(metadata.black_level_adu, level));
+            }
+            _ => made.dark_signal_e = metadata.dark_signal_e.map(|dark| black_left(Some(dark), level)),
+        }
+        let geometry = input.geometry.with_channels(&["R", "G", "B"]);
+        let header = FrameHeader { geometry, metadata: made, name: input.name.clone() };
+        Ok(Self { header, pattern: cfa, method, black: level })
+    }
+
+    /// The head of the demosaicked frame, to add to.
+    pub fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.header
+    }
+}
+
+/// What no light reads once `subtracted` is off; a frame of unknown black counts as black-free after a subtraction.
+fn black_left(before: Option<f64>, subtracted: f64) -> f64 {
+    before.map_or(0.0, |black| black - subtracted)
+}
+
+impl Stage for Demosaic {
+    type Input = Any;
+    type Output = Any;
+
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn reach(&self) -> usize {
+        self.method.reach()
+    }
+
+    fn apply(&self, input: Window<'_>, mut output: Rows<'_>) -> Counts {
+        let tile = Tile::new(&input, &output, self.reach(), self.black, |y| {
+            self.pattern.row_classes(self.header.geometry.origin, y)
+        });
+        match self.method {
+            Method::Bilinear => bilinear::interpolate(&tile, &mut output),
+            Method::SmoothHue => smooth_hue::interpolate(&tile, &mut output),
+            Method::EffectiveColor => effective_color::interpolate(&tile, &mut output),
+        }
+    }
+}
+
+/// Rows of one plane as doubles with a margin of mirrored samples on every side.
+struct Tile {
+    /// The frame's row that comes first, margin included.
+    first_row: isize,
+    margin: usize,
+    width: usize,
+    samples: Vec<f64>,
+    /// For each row, the classes of the frame's even and odd columns.
+    classes: Vec<[Class; 2]>,
+}
+
+/// One row of a plane, indexed by the frame's column, which may lie in the margin.
+#[derive(Clone, Copy)]
+struct Line<'a> {
+    samples: &'a [f64],
+    margin: usize,
+}
+
+impl Line<'_> {
+    #[inline(always)]
+    fn at(&self, x: isize) -> f64 {
+        self.samples[x.wrapping_add_unsigned(self.margin).cast_unsigned()]
+    }
+
+    /// Mean of the samples on either side.
+    #[inline(always)]
+    fn sides(&self, x: isize) -> f64 {
+        (self.at(x - 1) + self.at(x + 1)) / 2.0
+    }
+}
+
+impl Tile {
+    fn new(
+        input: &Window<'_>,
+        output: &Rows<'_>,
+        reach: usize,
+        black: f64,
+        classes: impl Fn(usize) -> [Class; 2],
+    ) -> Self {
+        let (rows, width) = (output.range(), input.width());
+        let first_row = rows.start.cast_signed() - reach.cast_signed();
+        let last_row = rows.end.cast_signed() + reach.cast_signed();
+        let height = input.frame_height();
+        let mut tile = Self::empty(first_row, (last_row - first_row).cast_unsigned(), reach, width);
+        for (index, y) in (first_row..last_row).enumerate() {
+            let from = input.row(y, 0);
+            let line = tile.line_mut(index);
+            for (sample, &value) in line[reach..reach + width].iter_mut().zip(from) {
+                *sample = f64::from(value) - black;
+            }
+            for x in 1..=reach {
+                line[reach - x] = line[reach + mirror(-x.cast_signed(), width)];
+                line[reach + width - 1 + x] = line[reach + mirror((width - 1 + x).cast_signed(), width)];
+            }
+            tile.classes.push(classes(mirror(y, height)));
+        }
+        tile
+    }
+
+    /// Rows of zeros without classes.
+    fn empty(first_row: isize, rows: usize, margin: usize, width: usize) -> Self {
+        let samples = vec![0.0; rows * (width + 2 * margin)];
+        Self { first_row, margin, width, samples, classes: Vec::with_capacity(rows) }
+    }
+
+    fn line_mut(&mut self, index: usize) -> &mut [f64] {
+        let stride = self.width + 2 * self.margin;
+        &mut self.samples[index * stride..(index + 1) * stride]
+    }
+
+    /// The frame's row `y`, which may lie in the margin.
+    fn line(&self, y: isize) -> Line<'_> {
+        let stride = self.width + 2 * self.margin;
+        let index = (y - self.first_row).cast_unsigned();
+        Line { samples: &self.samples[index * stride..(index + 1) * stride], margin: self.margin }
+    }
+
+    /// The class of the photosite at the frame's column `x` and row `y`.
+    fn class(&self, x: isize, y: isize) -> Class {
+        self.classes[(y - self.first_row).cast_unsigned()][usize::from(x & 1 != 0)]
+    }
+
+    /// Where row `y` has its chrominance, red or blue: the class, and the parity of its columns.
+    fn chrominance(&self, y: isize) -> (Class, isize) {
+        match self.class(0, y) {
+            Class::Green => (self.class(1, y), 1),
+            class => (class, 0),
+        }
+    }
+
+    /// Makes a plane of the same place from a function of the photosite, `inner` rows and columns narrower.
+    fn derive(&self, inner: usize, mut row: impl FnMut(isize, &mut [f64])) -> Self {
+        let margin = self.margin - inner;
+        let rows = self.classes.len() - 2 * inner;
+        let first_row = self.first_row + inner.cast_signed();
+        let mut derived = Self::empty(first_row, rows, margin, self.width);
+        for index in 0..rows {
+            row(first_row + index.cast_signed(), derived.line_mut(index));
+        }
+        derived.classes.extend_from_slice(&self.classes[inner..inner + rows]);
+        derived
+    }
+
+    /// The columns of a derived plane's lines, first to last.
+    fn columns(&self, inner: usize) -> std::ops::Range<isize> {
+        let margin = (self.margin - inner).cast_signed();
+        -margin..self.width.cast_signed() + margin
+    }
+}
+
+/// Interpolates red and blue in a domain of hues, as SHTI and ECI both do.
+///
+/// `green` holds green everywhere, `hue` the hue of each chrominance photosite; `restore(green, hue)` is the value that
+/// a hue stands for. A value that is not finite although its samples are is replaced by the bilinear one and counted.
+fn restore_from_hues(
+    tile: &Tile,
+    green: &Tile,
+    hue: &Tile,
+    output: &mut Rows<'_>,
+    restore: impl Fn(f64, f64) -> f64,
+) -> Counts {
+    let mut counts = Counts::default();
+    for y in output.range() {
+        let row = y.cast_signed();
+        let (class, parity) = tile.chrominance(row);
+        let other = if class == Class::Red { Class::Blue } else { Class::Red };
+        let [cfa, cfa_above, cfa_below] = [row, row - 1, row + 1].map(|y| tile.line(y));
+        let [hues, above, below] = [row, row - 1, row + 1].map(|y| hue.line(y));
+        let greens = green.line(row);
+        let mut planes = output.three(y);
+        let vertical = |above: Line<'_>, below: Line<'_>, x| (above.at(x) + below.at(x)) / 2.0;
+        let diagonal = |above: Line<'_>, below: Line<'_>, x| (above.sides(x) + below.sides(x)) / 2.0;
+        for index in 0..tile.width {
+            let x = index.cast_signed();
+            let green = greens.at(x);
+            let (own, opposite) = if x & 1 == parity {
+                (cfa.at(x), restore(green, diagonal(above, below, x)))
+            } else {
+                (restore(green, hues.sides(x)), restore(green, vertical(above, below, x)))
+            };
+            let mut keep = |class: Class, value: f64, bilinear: &dyn Fn() -> f64| {
+                let mut sample = to_sample(value);
+                if !sample.is_finite() {
+                    sample = to_sample(bilinear());
+                    counts.undefined_hue += u64::from(sample.is_finite());
+                }
+                planes[class as usize][index] = sample;
+            };
+            keep(class, own, &|| cfa.sides(x));
+            keep(other, opposite, &|| {
+                if x & 1 == parity { diagonal(cfa_above, cfa_below, x) } else { vertical(cfa_above, cfa_below, x) }
+            });
+            planes[Class::Green as usize][index] = to_sample(green);
+        }
+    }
+    counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+    use crate::stage::MemoryFrame;
+
+    fn plane(width: usize, height: usize, pattern: CfaPattern, f: impl Fn(usize, usize, Class) -> f32) -> MemoryFrame {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some(pattern);
+        let header = FrameHeader { name: "test".into(), geometry: Geometry::new(width, height, &["Y"]), metadata };
+        let sites = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let samples = sites.map(|(x, y)| f(x, y, pattern.class(x as i64, y as i64))).collect();
+        MemoryFrame::new(header, samples)
+    }
+
+    fn demosaicked(frame: &MemoryFrame, method: Method) -> (MemoryFrame, Counts) {
+        frame.through(&Demosaic::new(&frame.header, method, Black::Auto, None).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn flat_stays_flat_at_every_phase_and_size() {
+        let level = |class| [300.0, 500.0, 900.0][class as usize];
+        for method in Method::ALL {
+            for pattern in CfaPattern::ALL {
+                for (width, height) in [(2, 2), (3, 5), (8, 7)] {
+                    let (made, counts) =
+                        demosaicked(&plane(width, height, pattern, |_, _, class| level(class)), method);
+                    for row in made.samples.chunks(3 * width) {
+                        for (class, samples) in Class::ALL.iter().zip(row.chunks(width)) {
+                            assert!(samples.iter().all(|&s| (s - level(*class)).abs() < 1e-3), "{method:?} {pattern}");
+                        }
+                    }
+                    assert_eq!(counts, Counts::default());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn measured_sites_are_kept() {
+        let value = |x: usize, y: usize| ((x * 31 + y * 17) % 101) as f32;
+        for method in Method::ALL {
+            let (made, _) = demosaicked(&plane(9, 8, CfaPattern::Gbrg, |x, y, _| value(x, y) + 1.0), method);
+            for y in 0..8 {
+                for x in 0..9 {
+                    let class = CfaPattern::Gbrg.class(x as i64, y as i64) as usize;
+                    assert_eq!(made.samples[(y * 3 + class) * 9 + x], value(x, y) + 1.0);
+                }
+            }
+        }
+    }
+
+    /// BI and ECI are exact on planes that are linear in position, away from the mirrored edges; SHTI is where the
+    /// hues are constant.
+    #[test]
+    fn linear_ramps_are_restored() {
+        let ramp = |class: Class, x: usize, y: usize| {
+            (1.0 + f64::from(class as u8)) * (100.0 + 3.0 * x as f64 - 2.0 * y as f64)
+        };
+        let frame = plane(16, 14, CfaPattern::Grbg, |x, y, class| to_sample(ramp(class, x, y)));
+        for method in Method::ALL {
+            let (made, _) = demosaicked(&frame, method);
+            for y in 3..11 {
+                for x in 3..13 {
+                    for class in Class::ALL {
+                        let sample = f64::from(made.samples[(y * 3 + class as usize) * 16 + x]);
+                        assert!((sample - ramp(class, x, y)).abs() < 1e-4, "{method:?} {class:?} {x} {y} {sample}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// The worked examples of Appendix A, at the positions that it names (rows and columns from 1, B at 4,3).
+    #[test]
+    fn appendix_a_is_followed_with_its_misprints_mended() {
+        // B at (row 4, column 3): rows even blue in odd columns, so the corner (1, 1) is G, (1, 2) R: grbg.
+        let site = |row: usize, column: usize| f64::from((row * 7919 + column * 104_729) as u32 % 997) + 500.0;
+        let frame = plane(7, 8, CfaPattern::Grbg, |x, y, _| to_sample(site(y + 1, x + 1)));
+        let at = |made: &MemoryFrame, class: Class, row: usize, column: usize| {
+            f64::from(made.samples[((row - 1) * 3 + class as usize) * 7 + column - 1])
+        };
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-4 * b.abs(), "{a} {b}");
+        let v = site;
+
+        let (bi, _) = demosaicked(&frame, Method::Bilinear);
+        near(at(&bi, Class::Green, 4, 3), (v(3, 3) + v(4, 4) + v(5, 3) + v(4, 2)) / 4.0);
+        near(at(&bi, Class::Red, 4, 3), (v(3, 2) + v(3, 4) + v(5, 4) + v(5, 2)) / 4.0);
+
+        let green = |r: usize, c: usize| (v(r - 1, c) + v(r + 1, c) + v(r, c - 1) + v(r, c + 1)) / 4.0;
+        let ratio = |r: usize, c: usize| v(r, c) / green(r, c);
+        let (shti, _) = demosaicked(&frame, Method::SmoothHue);
+        near(at(&shti, Class::Blue, 4, 4), v(4, 4) * (ratio(4, 3) + ratio(4, 5)) / 2.0);
+        near(
+            at(&shti, Class::Blue, 3, 4),
+            green(3, 4) * (ratio(2, 3) + ratio(2, 5) + ratio(4, 5) + ratio(4, 3)) / 4.0,
+        );
+
+        let (eci, _) = demosaicked(&frame, Method::EffectiveColor);
+        let k_up = |r: usize, c: usize| v(r, c) - (v(r - 1, c) + v(r + 1, c)) / 2.0;
+        let k_side = |r: usize, c: usize| v(r, c) - (v(r, c - 1) + v(r, c + 1)) / 2.0;
+        let full = |r: usize, c: usize| {
+            v(r, c) + (k_up(r - 1, c) + k_up(r + 1, c) + k_side(r, c - 1) + k_side(r, c + 1)) / 4.0
+        };
+        near(at(&eci, Class::Green, 3, 4), full(3, 4));
+        let k = |r: usize, c: usize| full(r, c) - v(r, c);
+        near(at(&eci, Class::Red, 4, 4), v(4, 4) - (k(3, 4) + k(5, 4)) / 2.0);
+        near(at(&eci, Class::Blue, 5, 4), full(5, 4) - (k(4, 5) + k(6, 5) + k(6, 3) + k(4, 3)) / 4.0);
+    }
+
+    #[test]
+    fn a_green_of_zero_never_gives_infinity() {
+        let frame =
+            plane(12, 10, CfaPattern::Rggb, |x, _, class| if class == Class::Green { 0.0 } else { 5.0 + x as f32 });
+        let (made, counts) = demosaicked(&frame, Method::SmoothHue);
+        assert!(made.samples.iter().all(|s| s.is_finite()));
+        assert!(counts.undefined_hue > 0);
+    }
+
+    #[test]
+    fn the_black_level_comes_off_first() {
+        let mut frame = plane(6, 6, CfaPattern::Rggb, |_, _, _| 1757.25);
+        frame.header.metadata.black_level_adu = Some(1757.25);
+        for method in Method::ALL {
+            let (made, _) = demosaicked(&frame, method);
+            assert!(made.samples.iter().all(|&s| s == 0.0));
+            assert_eq!(made.header.metadata.black_level_adu, Some(0.0));
+        }
+    }
+
+    #[test]
+    fn three_planes_are_sent_to_mosaic_first() {
+        let header = FrameHeader {
+            name: "e.exr".into(),
+            geometry: Geometry::new(4, 4, &["R", "G", "B"]),
+            metadata: Metadata::new(QuantityKind::Electrons),
+        };
+        let message = Demosaic::new(&header, Method::Bilinear, Black::Auto, None).unwrap_err().to_string();
+        assert!(message.contains("e.exr") && message.contains("run `mosaic` first"), "{message}");
+    }
+}

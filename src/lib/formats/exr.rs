@@ -1,0 +1,734 @@
+//! OpenEXR: scanline files written, scanline and tiled files read, in bands, from files and from pipes.
+//!
+//! The crate `exr` parses headers and (de)compresses blocks; the order of reading and writing is ours, so that rows
+//! stream by and a pipe needs no seek.
+
+use crate::error::{Error, Result};
+use crate::frame::{Geometry, to_sample};
+use exr::block::UncompressedBlock;
+use exr::block::chunk::{Chunk, CompressedBlock};
+use exr::compression::Compression;
+use exr::error::Error as ExrError;
+use exr::math::Vec2;
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, ChannelList, Chromaticities, IntegerBounds, LineOrder, SampleType, Text,
+};
+use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
+use exr::meta::{BlockDescription, MetaData, Requirements, magic_number};
+use half::f16;
+use rayon::prelude::*;
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+
+/// The string attribute that holds the metadata.
+const METADATA_ATTRIBUTE: &str = "cyanometer";
+/// A block (a tile, or the scanlines that are compressed together) may take this much memory, not more.
+const MAX_BLOCK_BYTES: usize = 1 << 30;
+/// All headers of a file may take this much.
+const MAX_HEADER_BYTES: u64 = 64 << 20;
+/// A row of blocks below this size is compressed in parallel with others; larger ones one at a time, to save memory.
+const PARALLEL_BLOCK_BYTES: usize = 4 << 20;
+
+/// How samples are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExrSamples {
+    /// 32-bit float.
+    F32,
+    /// 16-bit float.
+    F16,
+}
+
+/// How blocks are compressed, all without loss.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExrCompression {
+    /// Not at all: the only way down a pipe.
+    None,
+    /// Run lengths.
+    Rle,
+    /// Deflate, row by row.
+    Zips,
+    /// Deflate, 16 rows at a time.
+    Zip,
+    /// Wavelets, 32 rows at a time: best on noise.
+    Piz,
+}
+
+/// Chromaticities (x, y) of the three primaries and of white.
+pub type Primaries = [[f64; 2]; 4];
+
+/// Attributes that other software understands, and ours.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ExrTags {
+    /// The metadata, YAML.
+    pub metadata: Option<String>,
+    /// `software`.
+    pub software: Option<String>,
+    /// `expTime` in s.
+    pub exposure_s: Option<f64>,
+    /// `aperture`, the f-number.
+    pub f_number: Option<f64>,
+    /// `whiteLuminance` in cd m⁻².
+    pub white_luminance: Option<f64>,
+    /// `chromaticities`.
+    pub primaries: Option<Primaries>,
+    /// `emissiveUnits` of a spectral image.
+    pub emissive_units: Option<String>,
+}
+
+/// Reads a part of an EXR file or stream.
+pub struct ExrReader {
+    input: Input,
+    name: String,
+    meta: MetaData,
+    part: usize,
+    geometry: Geometry,
+    tags: ExrTags,
+    /// For each channel of the geometry, its place in the file's list.
+    order: Vec<usize>,
+    stored_as: &'static str,
+    rows_read: usize,
+    /// Decoded rows that were not asked for yet.
+    ahead: Vec<f32>,
+}
+
+enum Input {
+    /// Blocks come as they come.
+    Pipe(Box<dyn Read>),
+    /// Blocks are found by the offset table; `position` is where the reader stands.
+    File { reader: BufReader<File>, position: u64, length: u64, offsets: Vec<u64> },
+}
+
+impl ExrReader {
+    /// Opens part `part` of a file.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for what is damaged or not supported, naming it.
+    pub fn open(file: File, name: &str, part: usize) -> Result<Self> {
+        let length = file.metadata().map_err(|e| Error::disk(name, "read", e))?.len();
+        let mut reader = BufReader::with_capacity(1 << 16, file);
+        let meta = read_meta(&mut reader, name)?;
+        let (order, geometry, tags, stored_as) = describe(&meta, part, name)?;
+        let mut offsets = Vec::new();
+        for (index, header) in meta.headers.iter().enumerate() {
+            // An entry takes 8 bytes, and its block at least 8 more.
+            if header.chunk_count as u64 > length / 16 {
+                return Err(cut_short(name));
+            }
+            let table = read_table(&mut reader, header.chunk_count, name)?;
+            if index == part {
+                offsets = table;
+            }
+        }
+        let position = reader.stream_position().map_err(|e| Error::disk(name, "read", e))?;
+        let input = Input::File { reader, position, length, offsets };
+        let reader =
+            Self { input, name: name.into(), meta, part, geometry, tags, order, stored_as, rows_read: 0, ahead: vec![] };
+        reader.check_offsets()?;
+        Ok(reader)
+    }
+
+    /// Opens a stream that cannot seek: scanlines in increasing order, a single part.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for what is damaged, not supported, or needs a seek.
+    pub fn stream(mut input: Box<dyn Read>, name: &str) -> Result<Self> {
+        let meta = read_meta(&mut input, name)?;
+        let (order, geometry, tags, stored_as) = describe(&meta, 0, name)?;
+        read_table(&mut input, meta.headers[0].chunk_count, name)?;
+        let input = Input::Pipe(input);
+        Ok(Self { input, name: name.into(), meta, part: 0, geometry, tags, order, stored_as, rows_read: 0, ahead: vec![] })
+    }
+
+    /// Whether headers describe something that [`Self::stream`] can read.
+    fn header(&self) -> &Header {
+        &self.meta.headers[self.part]
+    }
+
+    /// Size, place and channels; the data window's corner is the origin.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// Attributes.
+    pub fn tags(&self) -> &ExrTags {
+        &self.tags
+    }
+
+    /// How samples are stored: `f32`, `f16`, `u32` or `mixed`.
+    pub fn stored_as(&self) -> &'static str {
+        self.stored_as
+    }
+
+    /// Rows that decode together.
+    pub fn natural_rows(&self) -> usize {
+        self.header().max_block_pixel_size().height().min(self.geometry.height)
+    }
+
+    /// Appends the next `rows` rows, laid out as `[row][channel][column]`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] where a block is damaged or missing, [`Error::Disk`] where reading fails.
+    pub fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        let row = self.geometry.row_samples();
+        let end = samples.len() + rows * row;
+        let from_ahead = self.ahead.len().min(rows * row);
+        samples.extend(self.ahead.drain(..from_ahead));
+        while samples.len() < end {
+            let start = samples.len();
+            self.read_row_of_blocks(samples)?;
+            if samples.len() > end {
+                self.ahead.extend_from_slice(&samples[end..]);
+                samples.truncate(end);
+            }
+            debug_assert!(samples.len() > start);
+        }
+        Ok(())
+    }
+
+    /// Decodes the next block of scanlines, or row of tiles.
+    fn read_row_of_blocks(&mut self, samples: &mut Vec<f32>) -> Result<()> {
+        let (first, natural) = (self.rows_read, self.natural_rows());
+        let rows = natural.min(self.geometry.height - first);
+        let across = match self.header().blocks {
+            BlockDescription::ScanLines => 1,
+            BlockDescription::Tiles(tiles) => self.geometry.width.div_ceil(tiles.tile_size.width()),
+        };
+        let start = samples.len();
+        let mut done = 0;
+        // A few blocks at a time: as many as make sense to decode in parallel, without holding a whole wide row twice.
+        let batch = if self.header().max_block_byte_size() < PARALLEL_BLOCK_BYTES { 32 } else { 2 };
+        while done < across {
+            let count = batch.min(across - done);
+            let chunks: Vec<Chunk> = (done..done + count)
+                .map(|column| self.next_chunk(first / natural * across + column, column, first))
+                .collect::<Result<_>>()?;
+            let (meta, name) = (&self.meta, &self.name);
+            let decode = |chunk| UncompressedBlock::decompress_chunk(chunk, meta, true).map_err(|e| damaged(name, &e));
+            let blocks: Vec<UncompressedBlock> = if count > 1 {
+                chunks.into_par_iter().map(decode).collect::<Result<_>>()?
+            } else {
+                chunks.into_iter().map(decode).collect::<Result<_>>()?
+            };
+            // Only now, when data have come, is memory given to the rows.
+            samples.resize(start + rows * self.geometry.row_samples(), 0.0);
+            for block in &blocks {
+                self.place(block, first, rows, &mut samples[start..])?;
+            }
+            done += count;
+        }
+        self.rows_read += rows;
+        Ok(())
+    }
+
+    /// Reads the chunk of block `index` (blocks counted row by row), which must lie at `column` and row `first`.
+    fn next_chunk(&mut self, index: usize, column: usize, first: usize) -> Result<Chunk> {
+        let name = &self.name;
+        let chunk = match &mut self.input {
+            Input::Pipe(input) => Chunk::read(input, &self.meta).map_err(|e| damaged(name, &e))?,
+            Input::File { reader, position, length, offsets } => {
+                let offset = offsets[index];
+                let delta = i64::try_from(offset).ok().zip(i64::try_from(*position).ok()).map(|(to, from)| to - from);
+                let Some(delta) = delta.filter(|_| offset < *length) else {
+                    return Err(Error::format(name, "its table of blocks points outside the file; it is damaged"));
+                };
+                reader.seek_relative(delta).map_err(|e| Error::disk(name, "read", e))?;
+                let mut counted = Counted { inner: reader, count: 0 };
+                let chunk = Chunk::read(&mut counted, &self.meta).map_err(|e| damaged(name, &e))?;
+                *position = offset + counted.count;
+                chunk
+            }
+        };
+        let header = &self.meta.headers[self.part];
+        let in_place = chunk.layer_index == self.part
+            && match &chunk.compressed_block {
+                CompressedBlock::ScanLine(block) => {
+                    i64::from(block.y_coordinate)
+                        == i64::from(header.own_attributes.layer_position.y()) + first as i64
+                }
+                CompressedBlock::Tile(tile) => {
+                    tile.coordinates.level_index == Vec2(0, 0)
+                        && tile.coordinates.tile_index == Vec2(column, first / header.max_block_pixel_size().height())
+                }
+                _ => false,
+            };
+        if in_place {
+            Ok(chunk)
+        } else {
+            Err(Error::format(name, format!("the block of row {first} is missing or out of order; it is damaged")))
+        }
+    }
+
+    /// Puts a decoded block into rows that start at row `first`.
+    fn place(&self, block: &UncompressedBlock, first: usize, rows: usize, samples: &mut [f32]) -> Result<()> {
+        let header = self.header();
+        let (width, channels) = (self.geometry.width, self.geometry.channels.len());
+        let (left, top) = (block.index.pixel_position.x(), block.index.pixel_position.y());
+        let (block_width, block_rows) = (block.index.pixel_size.width(), block.index.pixel_size.height());
+        if top != first || block_rows != rows || left + block_width > width {
+            return Err(Error::format(&self.name, "a block has another size than its header says; it is damaged"));
+        }
+        // Where each of the file's channels goes.
+        let mut target = vec![0; channels];
+        for (channel, &place) in self.order.iter().enumerate() {
+            target[place] = channel;
+        }
+        let mut bytes = block.data.as_slice();
+        for row in 0..block_rows {
+            for (description, &channel) in header.channels.list.iter().zip(&target) {
+                let size = description.sample_type.bytes_per_sample();
+                let (line, rest) = bytes.split_at(block_width * size);
+                bytes = rest;
+                let start = (row * channels + channel) * width + left;
+                let to = &mut samples[start..start + block_width];
+                match description.sample_type {
+                    SampleType::F32 => {
+                        for (to, from) in to.iter_mut().zip(line.as_chunks().0) {
+                            *to = f32::from_ne_bytes(*from);
+                        }
+                    }
+                    SampleType::F16 => {
+                        for (to, from) in to.iter_mut().zip(line.as_chunks().0) {
+                            *to = f16::from_ne_bytes(*from).to_f32();
+                        }
+                    }
+                    SampleType::U32 => {
+                        for (to, from) in to.iter_mut().zip(line.as_chunks().0) {
+                            *to = to_sample(f64::from(u32::from_ne_bytes(*from)));
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Every block of the part must have a place of its own within the file.
+    fn check_offsets(&self) -> Result<()> {
+        let Input::File { offsets, length, .. } = &self.input else { return Ok(()) };
+        let mut sorted = offsets.clone();
+        sorted.sort_unstable();
+        if sorted.first() == Some(&0) || sorted.last().is_some_and(|last| last >= length) {
+            return Err(cut_short(&self.name));
+        }
+        if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
+            return Err(Error::format(&self.name, "two entries of its table of blocks are the same; it is damaged"));
+        }
+        Ok(())
+    }
+}
+
+/// Whether the bytes are the start of an EXR file that can be read without seeking: one part of scanlines.
+pub fn is_streamable(head: &[u8]) -> bool {
+    // Bytes 5 and 6 hold the flags: tiled 0x02, deep 0x08, multi-part 0x10 [OpenEXR file layout].
+    head.len() >= 8 && head[..4] == magic_number::BYTES && head[5] & (0x02 | 0x08 | 0x10) == 0
+}
+
+fn read_meta(input: &mut impl Read, name: &str) -> Result<MetaData> {
+    let meta =
+        MetaData::read_from_buffered(input.take(MAX_HEADER_BYTES), false).map_err(|e| damaged(name, &e))?;
+    // The strict check of the whole, as the crate makes it before it writes.
+    for header in &meta.headers {
+        let mut long_names = false;
+        header
+            .validate(meta.requirements.has_multiple_layers, &mut long_names, false)
+            .map_err(|e| damaged(name, &e))?;
+    }
+    Ok(meta)
+}
+
+fn read_table(input: &mut impl Read, entries: usize, name: &str) -> Result<Vec<u64>> {
+    let mut table = Vec::new();
+    let mut entry = [0; 8];
+    for _ in 0..entries {
+        input.read_exact(&mut entry).map_err(|e| Error::disk(name, "read", e))?;
+        table.push(u64::from_le_bytes(entry));
+    }
+    Ok(table)
+}
+
+/// What a part holds: order of channels, geometry, attributes, sample type.
+type Description = (Vec<usize>, Geometry, ExrTags, &'static str);
+
+fn describe(meta: &MetaData, part: usize, name: &str) -> Result<Description> {
+    let Some(header) = meta.headers.get(part) else {
+        let last = meta.headers.len().saturating_sub(1);
+        return Err(Error::Usage(format!("{name}: there is no part {part}; its parts are 0 to {last}")));
+    };
+    let refuse = |problem: &str| Err(Error::format(name, problem));
+    if header.deep {
+        return refuse("deep data are not supported; flatten them first, for example with `oiiotool --flatten`");
+    }
+    if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
+        return refuse("subsampled channels (luminance/chroma images) are not supported; convert it to RGB first");
+    }
+    if !matches!(
+        header.compression,
+        Compression::Uncompressed | Compression::RLE | Compression::ZIP1 | Compression::ZIP16 | Compression::PIZ
+    ) {
+        return Err(Error::format(
+            name,
+            format!(
+                "its compression, {}, loses data; store it as none, rle, zips, zip or piz",
+                header.compression
+            ),
+        ));
+    }
+    if header.max_block_byte_size() > MAX_BLOCK_BYTES {
+        return refuse("its blocks are larger than 1 GiB; store it in smaller ones");
+    }
+    let (width, height) = (header.layer_size.width(), header.layer_size.height());
+    if width == 0 || height == 0 || header.channels.list.is_empty() {
+        return refuse("it has no samples");
+    }
+    let names: Vec<String> =
+        header.channels.list.iter().map(|channel| String::from_utf8_lossy(channel.name.as_slice()).into()).collect();
+    let order = canonical_order(&names);
+    let origin = header.own_attributes.layer_position;
+    let geometry = Geometry {
+        width,
+        height,
+        origin: [origin.x(), origin.y()],
+        channels: order.iter().map(|&place| names[place].clone()).collect(),
+    };
+    let stored_as = match header.channels.uniform_sample_type {
+        Some(SampleType::F32) => "f32",
+        Some(SampleType::F16) => "f16",
+        Some(SampleType::U32) => "u32",
+        None => "mixed",
+    };
+    Ok((order, geometry, read_tags(header), stored_as))
+}
+
+fn read_tags(header: &Header) -> ExrTags {
+    let text = |text: &Text| String::from_utf8_lossy(text.as_slice()).into_owned();
+    let own = &header.own_attributes;
+    let other = |name: &str| match own.other.get(&Text::new_or_none(name)?)? {
+        AttributeValue::Text(value) => Some(text(value)),
+        _ => None,
+    };
+    let point = |Vec2(x, y): Vec2<f32>| [f64::from(x), f64::from(y)];
+    ExrTags {
+        metadata: other(METADATA_ATTRIBUTE),
+        software: own.software_name.as_ref().map(text),
+        exposure_s: own.exposure.map(f64::from),
+        f_number: own.aperture.map(f64::from),
+        white_luminance: own.white_luminance.map(f64::from),
+        primaries: header
+            .shared_attributes
+            .chromaticities
+            .map(|c| [point(c.red), point(c.green), point(c.blue), point(c.white)]),
+        emissive_units: other("emissiveUnits"),
+    }
+}
+
+/// The order in which channels are worked on: R, G, B (or Y; x, y, Y; L, a, b) first, the rest as the file has them.
+fn canonical_order(names: &[String]) -> Vec<usize> {
+    let has = |wanted: &str| names.iter().any(|name| name == wanted);
+    let leading: &[&str] = [&["R", "G", "B"][..], &["x", "y", "Y"], &["L", "a", "b"], &["X", "Y", "Z"], &["Y"]]
+        .into_iter()
+        .find(|set| set.iter().all(|name| has(name)))
+        .unwrap_or_default();
+    let mut order: Vec<usize> = (0..names.len()).collect();
+    order.sort_by_key(|&place| leading.iter().position(|name| names[place] == *name).unwrap_or(leading.len()));
+    order
+}
+
+fn cut_short(name: &str) -> Error {
+    Error::format(name, "the file ends before its last row; it was cut short")
+}
+
+/// The crate's complaint as ours.
+fn damaged(name: &str, error: &ExrError) -> Error {
+    match error {
+        ExrError::Io(source) if source.kind() == io::ErrorKind::UnexpectedEof => cut_short(name),
+        ExrError::Io(source) => Error::disk(name, "read", io::Error::new(source.kind(), source.to_string())),
+        ExrError::NotSupported(what) => Error::format(name, format!("this kind of EXR is not supported: {what}")),
+        // The crate reports the end of the file as "invalid: reference to missing bytes".
+        ExrError::Invalid(what) if what.contains("missing bytes") => cut_short(name),
+        ExrError::Invalid(what) => Error::format(name, format!("it is no valid EXR file: {what}")),
+        ExrError::Aborted => Error::format(name, "reading was given up"),
+    }
+}
+
+/// Counts the bytes that pass, to know where a reader stands.
+struct Counted<'a, R> {
+    inner: &'a mut R,
+    count: u64,
+}
+
+impl<R: Read> Read for Counted<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.inner.read(buffer)?;
+        self.count += read as u64;
+        Ok(read)
+    }
+}
+
+/// Writes a scanline EXR file, single part.
+///
+/// Without compression every size is known, so header and offset table come first and nothing is patched.
+pub struct ExrWriter<W> {
+    output: W,
+    name: String,
+    header: Header,
+    samples: ExrSamples,
+    geometry: Geometry,
+    /// For each of the file's channels, its place in the geometry.
+    order: Vec<usize>,
+    rows_taken: usize,
+    /// Bytes of the rows of a block that is not full yet.
+    partial: Vec<u8>,
+    /// Where each compressed block went.
+    offsets: Vec<u64>,
+    table_at: u64,
+    position: u64,
+}
+
+/// An offset table that must be put in once the file is written: where, and what.
+pub type TablePatch = (u64, Vec<u8>);
+
+impl<W: Write> ExrWriter<W> {
+    /// Writes header and offset table.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Disk`] where writing fails, [`Error::Data`] for a frame larger than the format can hold.
+    pub fn create(
+        output: W,
+        name: &str,
+        geometry: &Geometry,
+        samples: ExrSamples,
+        compression: ExrCompression,
+        tags: &ExrTags,
+    ) -> Result<Self> {
+        let mut order: Vec<usize> = (0..geometry.channels.len()).collect();
+        order.sort_by(|&a, &b| geometry.channels[a].as_bytes().cmp(geometry.channels[b].as_bytes()));
+        let header = file_header(name, geometry, &order, samples, compression, tags)?;
+        let mut head = Vec::new();
+        let requirements = Requirements {
+            file_format_version: 2,
+            is_single_layer_and_tiled: false,
+            has_long_names: geometry.channels.iter().any(|channel| channel.len() > 31),
+            has_deep_data: false,
+            has_multiple_layers: false,
+        };
+        let encoded = magic_number::write(&mut head)
+            .and_then(|()| requirements.write(&mut head))
+            .and_then(|()| Header::write_all(std::slice::from_ref(&header), &mut head, false));
+        encoded.map_err(|error| Error::format(name, format!("its header cannot be written: {error}")))?;
+        let table_at = head.len() as u64;
+        let blocks = header.chunk_count as u64;
+        let data_at = table_at + 8 * blocks;
+        // An uncompressed block is one row: y coordinate and size in 4 bytes each, then the samples.
+        let block_bytes = 8 + header.max_block_byte_size() as u64;
+        for block in 0..blocks {
+            let offset = if compression == ExrCompression::None { data_at + block * block_bytes } else { 0 };
+            head.extend_from_slice(&offset.to_le_bytes());
+        }
+        let mut writer = Self {
+            output,
+            name: name.into(),
+            header,
+            samples,
+            geometry: geometry.clone(),
+            order,
+            rows_taken: 0,
+            partial: Vec::new(),
+            offsets: Vec::new(),
+            table_at,
+            position: data_at,
+        };
+        writer.put(&head)?;
+        Ok(writer)
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<()> {
+        self.output.write_all(bytes).map_err(|e| Error::disk(&self.name, "write", e))
+    }
+
+    /// Takes rows laid out as `[row][channel][column]`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Disk`] where writing fails.
+    pub fn write(&mut self, samples: &[f32]) -> Result<()> {
+        for row in samples.chunks_exact(self.geometry.row_samples()) {
+            if self.header.compression == Compression::Uncompressed {
+                let mut bytes = std::mem::take(&mut self.partial);
+                bytes.clear();
+                let y = self.row_coordinate(self.rows_taken);
+                let size = i32::try_from(self.header.max_block_byte_size()).unwrap_or(i32::MAX);
+                bytes.extend_from_slice(&y.to_le_bytes());
+                bytes.extend_from_slice(&size.to_le_bytes());
+                self.encode(row, &mut bytes);
+                self.put(&bytes)?;
+                self.partial = bytes;
+                self.rows_taken += 1;
+            } else {
+                let mut bytes = std::mem::take(&mut self.partial);
+                self.encode(row, &mut bytes);
+                self.partial = bytes;
+                self.rows_taken += 1;
+                self.compress_full_blocks()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends a row in the file's order of channels and sample type, little-endian.
+    fn encode(&self, row: &[f32], bytes: &mut Vec<u8>) {
+        let width = self.geometry.width;
+        for &channel in &self.order {
+            let line = &row[channel * width..(channel + 1) * width];
+            match self.samples {
+                ExrSamples::F32 => bytes.extend(line.iter().flat_map(|sample| sample.to_le_bytes())),
+                ExrSamples::F16 => bytes.extend(line.iter().flat_map(|&sample| f16::from_f32(sample).to_le_bytes())),
+            }
+        }
+    }
+
+    fn row_coordinate(&self, row: usize) -> i32 {
+        self.geometry.origin[1].wrapping_add(i32::try_from(row).unwrap_or(i32::MAX))
+    }
+
+    /// Compresses what is pending once it fills enough blocks to keep the threads busy, or at the end.
+    fn compress_full_blocks(&mut self) -> Result<()> {
+        let block_bytes = self.header.max_block_byte_size();
+        let together = if block_bytes < PARALLEL_BLOCK_BYTES { 2 * rayon::current_num_threads() } else { 1 };
+        let last = self.rows_taken == self.geometry.height;
+        if self.partial.is_empty() || !(last || self.partial.len() >= together * block_bytes) {
+            return Ok(());
+        }
+        let lines = self.header.compression.scan_lines_per_block();
+        let pending = std::mem::take(&mut self.partial);
+        let first_row = self.rows_taken - pending.len() / (block_bytes / lines);
+        let compress = |(index, data): (usize, &[u8])| {
+            let row = first_row + index * lines;
+            let block = UncompressedBlock {
+                index: exr::block::BlockIndex {
+                    layer: 0,
+                    pixel_position: Vec2(0, row),
+                    pixel_size: Vec2(self.geometry.width, data.len() / (block_bytes / lines)),
+                    level: Vec2(0, 0),
+                },
+                data: data.to_vec(),
+            };
+            block
+                .compress_to_chunk(std::slice::from_ref(&self.header))
+                .map_err(|error| Error::format(&self.name, format!("a block cannot be compressed: {error}")))
+        };
+        let chunks: Vec<Chunk> =
+            pending.par_chunks(block_bytes).enumerate().map(compress).collect::<Result<Vec<_>>>()?;
+        drop(pending);
+        for chunk in chunks {
+            let CompressedBlock::ScanLine(block) = &chunk.compressed_block else { continue };
+            self.offsets.push(self.position);
+            let size = i32::try_from(block.compressed_pixels_le.len()).unwrap_or(i32::MAX);
+            let head = [block.y_coordinate.to_le_bytes(), size.to_le_bytes()].concat();
+            self.put(&head)?;
+            self.put(&block.compressed_pixels_le)?;
+            self.position += 8 + block.compressed_pixels_le.len() as u64;
+        }
+        Ok(())
+    }
+
+    /// Ends the file; gives back the output and, after compression, the offset table to patch in.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Disk`] where writing fails.
+    pub fn finish(mut self) -> Result<(W, Option<TablePatch>)> {
+        assert_eq!(self.rows_taken, self.geometry.height, "a frame was ended before its last row");
+        self.output.flush().map_err(|e| Error::disk(&self.name, "write", e))?;
+        let table = self.offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
+        let patch = (self.header.compression != Compression::Uncompressed).then_some((self.table_at, table));
+        Ok((self.output, patch))
+    }
+}
+
+/// Puts an offset table into its place.
+///
+/// # Errors
+///
+/// [`Error::Disk`] where writing fails.
+pub fn patch_table<W: Write + Seek>(output: &mut W, name: &str, (at, table): &TablePatch) -> Result<()> {
+    let patch = |output: &mut W| -> io::Result<()> {
+        output.seek(SeekFrom::Start(*at))?;
+        output.write_all(table)?;
+        output.seek(SeekFrom::End(0))?;
+        output.flush()
+    };
+    patch(output).map_err(|e| Error::disk(name, "write", e))
+}
+
+fn file_header(
+    name: &str,
+    geometry: &Geometry,
+    order: &[usize],
+    samples: ExrSamples,
+    compression: ExrCompression,
+    tags: &ExrTags,
+) -> Result<Header> {
+    let too_large = || Error::Data(format!("{name}: the frame is larger than an EXR file can hold"));
+    let limit = i32::MAX as usize;
+    let sample_bytes = if samples == ExrSamples::F32 { 4 } else { 2 };
+    if geometry.width > limit || geometry.height > limit || geometry.row_samples() * sample_bytes * 32 > limit {
+        return Err(too_large());
+    }
+    let text = |string: &String| Text::from_slice_unchecked(string.as_bytes());
+    let sample_type = if samples == ExrSamples::F32 { SampleType::F32 } else { SampleType::F16 };
+    let channels = order
+        .iter()
+        .map(|&place| ChannelDescription {
+            name: text(&geometry.channels[place]),
+            sample_type,
+            quantize_linearly: false,
+            sampling: Vec2(1, 1),
+        })
+        .collect();
+    let size = Vec2(geometry.width, geometry.height);
+    let origin = Vec2(geometry.origin[0], geometry.origin[1]);
+    let compression = match compression {
+        ExrCompression::None => Compression::Uncompressed,
+        ExrCompression::Rle => Compression::RLE,
+        ExrCompression::Zips => Compression::ZIP1,
+        ExrCompression::Zip => Compression::ZIP16,
+        ExrCompression::Piz => Compression::PIZ,
+    };
+    let mut own = LayerAttributes { layer_position: origin, ..LayerAttributes::default() };
+    own.software_name = tags.software.as_ref().map(text);
+    own.exposure = tags.exposure_s.map(to_sample);
+    own.aperture = tags.f_number.map(to_sample);
+    own.white_luminance = tags.white_luminance.map(to_sample);
+    // The crate keeps other attributes in a hash map; one entry alone has the same order in every run.
+    if let Some(metadata) = &tags.metadata {
+        own.other.insert(Text::new_or_panic(METADATA_ATTRIBUTE), AttributeValue::Text(text(metadata)));
+    }
+    let mut shared = ImageAttributes::new(IntegerBounds::new(origin, size));
+    let point = |[x, y]: [f64; 2]| Vec2(to_sample(x), to_sample(y));
+    shared.chromaticities = tags.primaries.map(|[red, green, blue, white]| Chromaticities {
+        red: point(red),
+        green: point(green),
+        blue: point(blue),
+        white: point(white),
+    });
+    let blocks = BlockDescription::ScanLines;
+    let mut header = Header {
+        channels: ChannelList::new(channels),
+        compression,
+        blocks,
+        line_order: LineOrder::Increasing,
+        layer_size: size,
+        deep: false,
+        deep_data_version: None,
+        chunk_count: 0,
+        max_samples_per_pixel: None,
+        shared_attributes: shared,
+        own_attributes: own,
+    };
+    header.chunk_count = exr::meta::compute_chunk_count(compression, size, blocks);
+    Ok(header)
+}

@@ -1,0 +1,321 @@
+//! What is known about a frame: its quantity, its camera, and everything that was done to it.
+
+use crate::cfa::CfaPattern;
+use crate::error::{Error, Result};
+use crate::frame::Geometry;
+use crate::optics::Exposure;
+use crate::random::Source;
+use crate::sensor::Sensor;
+use crate::units::QuantityKind;
+use serde::{Deserialize, Serialize};
+use serde_yaml::Mapping;
+
+/// The schema that metadata names.
+pub const METADATA_SCHEMA: &str = "cyanometer/1";
+
+/// Metadata of a frame, as YAML stores it. Keys that this version does not know are kept in `unknown`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Metadata {
+    /// `cyanometer/1`.
+    pub schema: String,
+    /// What the samples are.
+    #[serde(default)]
+    pub quantity: QuantityKind,
+    /// Unit of the samples, for people.
+    #[serde(default)]
+    pub unit: String,
+    /// Pattern of a single plane behind a colour filter array; absent for planes that are complete.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cfa: Option<CfaPattern>,
+    /// What no light reads in a frame of electrons: the mean dark signal, e⁻.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dark_signal_e: Option<f64>,
+    /// What no light reads in a frame of ADU.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub black_level_adu: Option<f64>,
+    /// The largest code, on the scale of the samples.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub white_level_adu: Option<f64>,
+    /// The sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<Sensor>,
+    /// Exposure time and lens.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure: Option<Exposure>,
+    /// What the camera looked at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<Scene>,
+    /// The noise that was drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseRecord>,
+    /// The converter, as it was set.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adc: Option<AdcRecord>,
+    /// How the missing classes were interpolated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub demosaic: Option<DemosaicRecord>,
+    /// How colours were computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color: Option<ColorRecord>,
+    /// Moments of every sample by formula, where the scene is uniform.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted: Option<PredictedRecord>,
+    /// What was left out because the scene did not need it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
+    /// The programs that made the frame, first to last.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub history: Vec<HistoryEntry>,
+    /// What is known only after the last row; in sidecars alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<SamplesRecord>,
+    /// What this version does not know, passed on as it came.
+    #[serde(skip)]
+    pub unknown: Mapping,
+}
+
+/// What the camera looked at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Scene {
+    /// File, column or sample, or `--electrons`.
+    pub source: String,
+    /// Whether every photosite of a class expects the same.
+    pub uniform: bool,
+    /// Expected signal electrons of R, G and B where the scene is uniform.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected_electrons: Option<[f64; 3]>,
+    /// Focal length in mm where natural vignetting was applied.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vignetting_focal_length_mm: Option<f64>,
+    /// Photosites that show one pixel of the source, width and height.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub patch: Option<[usize; 2]>,
+    /// Largest expected signal of any class in e⁻, where it was worked out for `--expose-to`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub brightest_e: Option<f64>,
+}
+
+/// How Poisson numbers are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum PoissonKind {
+    /// Exactly.
+    #[default]
+    Exact,
+    /// As normal numbers of the same mean and variance, to see what that approximation costs.
+    Gaussian,
+}
+
+/// The noise that was drawn, enough to draw it again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NoiseRecord {
+    /// Sources drawn, in the order of Eq. 9.
+    pub sources: Vec<Source>,
+    /// Seed of the temporal noise.
+    pub seed: u64,
+    /// Seed of the fixed patterns.
+    pub sensor_seed: u64,
+    /// Number of the exposure.
+    pub frame: u32,
+    /// Temperature of the sensor in K.
+    pub temperature_k: f64,
+    /// Mean dark signal of a photosite before non-uniformity, Q_DC of Eq. 7, in e⁻.
+    pub dark_e: f64,
+    /// How Poisson numbers were drawn.
+    pub poisson: PoissonKind,
+}
+
+/// The converter as it was set.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AdcRecord {
+    /// Bits.
+    pub bits: u32,
+    /// Bias in ADU.
+    pub bias_adu: f64,
+    /// Slope in ADU per e⁻.
+    pub adu_per_e: f64,
+}
+
+/// How the missing classes were interpolated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DemosaicRecord {
+    /// Method.
+    pub method: String,
+    /// Pattern of the plane.
+    pub cfa: CfaPattern,
+    /// What was subtracted first, in the unit of the samples.
+    pub black: f64,
+}
+
+/// How colours were computed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ColorRecord {
+    /// The matrix, XYZ per black-free ADU per s sr.
+    pub xyz_from_camera: [[f64; 3]; 3],
+    /// What it was fitted by.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<String>,
+    /// XYZ of the white that Lab and sRGB refer to, absolute.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub white: Option<[f64; 3]>,
+}
+
+/// Moments by formula.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PredictedRecord {
+    /// Mean of R, G and B in the unit of the samples.
+    pub mean: [f64; 3],
+    /// Standard deviation of R, G and B over the photosites of a frame, fixed patterns included.
+    pub std: [f64; 3],
+}
+
+/// Work that was left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// The program.
+    pub program: String,
+    /// What was left out.
+    pub what: String,
+    /// Why the result is the same.
+    pub why: String,
+}
+
+/// One program of the chain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HistoryEntry {
+    /// Name.
+    pub program: String,
+    /// Version.
+    pub version: String,
+    /// Arguments that bear on the samples: where and how the output is stored is left out.
+    pub arguments: Vec<String>,
+}
+
+/// What is known only after the last row.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SamplesRecord {
+    /// `sha256:` and the digest of all samples as little-endian 32-bit floats, rows top to bottom, in each row channel
+    /// by channel.
+    pub digest: String,
+    /// Photosites whose charge was clipped at full well.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub full_well: Option<u64>,
+    /// Samples clipped to the smallest code.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clipped_low: Option<u64>,
+    /// Samples clipped to the largest code.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clipped_high: Option<u64>,
+    /// Samples that are NaN or infinite.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_finite: Option<u64>,
+    /// Expected electrons below zero, taken as zero.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub negative: Option<u64>,
+    /// Hues that could not be formed because green was zero; bilinear values stand in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub undefined_hue: Option<u64>,
+    /// Colours outside sRGB, clipped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub out_of_gamut: Option<u64>,
+}
+
+impl Metadata {
+    /// Metadata of a quantity, with nothing else known.
+    pub fn new(quantity: QuantityKind) -> Self {
+        Self {
+            schema: METADATA_SCHEMA.into(),
+            quantity,
+            unit: quantity.unit().into(),
+            cfa: None,
+            dark_signal_e: None,
+            black_level_adu: None,
+            white_level_adu: None,
+            sensor: None,
+            exposure: None,
+            scene: None,
+            noise: None,
+            adc: None,
+            demosaic: None,
+            color: None,
+            predicted: None,
+            left_out: Vec::new(),
+            history: Vec::new(),
+            samples: None,
+            unknown: Mapping::new(),
+        }
+    }
+
+    /// The same record about samples of another quantity: what held for the old samples alone is dropped.
+    pub fn becoming(&self, quantity: QuantityKind) -> Self {
+        Self { quantity, unit: quantity.unit().into(), predicted: None, samples: None, ..self.clone() }
+    }
+
+    /// Notes that something was left out.
+    pub fn leave_out(&mut self, program: &str, what: impl Into<String>, why: impl Into<String>) {
+        self.left_out.push(LeftOut { program: program.into(), what: what.into(), why: why.into() });
+    }
+}
+
+/// The head of a frame that streams by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameHeader {
+    /// The frame as messages call it: a file name or `standard input`.
+    pub name: String,
+    /// Size, place, channels.
+    pub geometry: Geometry,
+    /// What is known about it.
+    pub metadata: Metadata,
+}
+
+impl FrameHeader {
+    /// Whether the frame has the three planes R, G and B (or what was made of them).
+    pub fn has_three_planes(&self) -> bool {
+        self.geometry.channels.len() == 3
+    }
+
+    /// The sensor, or the error that names the option to give.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingKey`].
+    pub fn sensor(&self) -> Result<&Sensor> {
+        self.metadata.sensor.as_ref().ok_or_else(|| self.missing("sensor", "--sensor NAME|FILE"))
+    }
+
+    /// The exposure, or the error that names the options to give.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingKey`].
+    pub fn exposure(&self) -> Result<Exposure> {
+        self.metadata.exposure.ok_or_else(|| self.missing("exposure", "--exposure S and --f-number N"))
+    }
+
+    /// An [`Error::MissingKey`] about this frame.
+    pub fn missing(&self, key: &'static str, option: &'static str) -> Error {
+        Error::MissingKey { file: self.name.clone(), key, option }
+    }
+
+    /// An [`Error::Format`] about this frame.
+    pub fn refuse(&self, problem: impl Into<String>) -> Error {
+        Error::format(&self.name, problem)
+    }
+
+    /// An [`Error::Order`] about this frame.
+    pub fn out_of_order(&self, problem: impl Into<String>, first: &'static str) -> Error {
+        Error::Order { file: self.name.clone(), problem: problem.into(), first }
+    }
+
+    /// What the frame holds, in a few words: `three planes of electrons`, `a CFA plane of ADU`.
+    pub fn holds(&self) -> String {
+        let quantity = self.metadata.quantity;
+        match (self.geometry.channels.len(), self.metadata.cfa) {
+            (1, Some(_)) => format!("a CFA plane of {quantity}"),
+            (1, None) => format!("one plane of {quantity}"),
+            (3, _) if self.metadata.demosaic.is_some() => format!("three demosaicked planes of {quantity}"),
+            (3, _) => format!("three planes of {quantity}"),
+            (n, _) => format!("{n} planes of {quantity}"),
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Mathematics that knows no camera.
+
+pub mod least_squares;
+pub mod moments;
+pub mod normal;
+pub mod quadrature;

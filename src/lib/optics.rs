@@ -1,0 +1,125 @@
+//! The lens: what of a radiance reaches the sensor, and where.
+
+use crate::error::{Error, Result};
+use crate::units::MM_PER_UM;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// Exposure time and lens setting.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Exposure {
+    /// Time in s.
+    pub exposure_s: f64,
+    /// Relative aperture N.
+    pub f_number: f64,
+    /// Transmittance of the lens, 0…1.
+    pub lens_transmittance: f64,
+}
+
+impl Exposure {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] naming what is out of range.
+    pub fn checked(self) -> Result<Self> {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        if !positive(self.exposure_s) {
+            return Err(Error::Usage(format!(
+                "an exposure of {} s is impossible; give a time above 0",
+                self.exposure_s
+            )));
+        }
+        if !positive(self.f_number) {
+            return Err(Error::Usage(format!(
+                "an f-number of {} is impossible; give one above 0, such as 8",
+                self.f_number
+            )));
+        }
+        if !(positive(self.lens_transmittance) && self.lens_transmittance <= 1.0) {
+            return Err(Error::Usage(format!(
+                "a lens transmittance of {} is impossible; give a fraction above 0 and at most 1",
+                self.lens_transmittance
+            )));
+        }
+        Ok(self)
+    }
+
+    /// Irradiance on the axis per radiance, in sr.
+    ///
+    /// E/L = π T / (4N² + 1)        object at infinity, pupil magnification 1        [HP2005, Eq. 1a]
+    pub fn image_illumination_sr(&self) -> f64 {
+        PI * self.lens_transmittance / (4.0 * self.f_number.powi(2) + 1.0)
+    }
+
+    /// Radiant exposure per radiance, in s sr: what a camera's signal is proportional to.
+    pub fn exposure_s_sr(&self) -> f64 {
+        self.exposure_s * self.image_illumination_sr()
+    }
+}
+
+/// Natural vignetting of a frame centred on the optical axis.
+///
+/// cos⁴θ = 1 / (1 + tan²θ_H + tan²θ_V)²        [HP2005, Eq. 1b]
+///
+/// because cos(arctan t) = 1/√(1 + t²). The tangents are those of the photosites' centres, (j + ½ − N_H/2) · pitch / f;
+/// the paper's range of indices in Eq. 2 has two values too many.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vignetting {
+    /// tan²θ_H of each column.
+    columns: Vec<f64>,
+    /// tan²θ_V of each row.
+    rows: Vec<f64>,
+}
+
+impl Vignetting {
+    /// The vignetting of `width` × `height` photosites of `pixel_pitch_um` behind a lens of `focal_length_mm`.
+    pub fn new(width: usize, height: usize, pixel_pitch_um: f64, focal_length_mm: f64) -> Self {
+        let squares = |count: usize| {
+            (0..count)
+                .map(|i| {
+                    let offset = i as f64 + 0.5 - count as f64 / 2.0;
+                    (offset * pixel_pitch_um * MM_PER_UM / focal_length_mm).powi(2)
+                })
+                .collect()
+        };
+        Self { columns: squares(width), rows: squares(height) }
+    }
+
+    /// cos⁴θ of each photosite in row `y`.
+    pub fn row(&self, y: usize) -> impl Iterator<Item = f64> {
+        let vertical = 1.0 + self.rows[y];
+        self.columns.iter().map(move |horizontal| (vertical + horizontal).powi(-2))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rational_form_is_the_fourth_power_of_the_cosine() {
+        let vignetting = Vignetting::new(5, 4, 2000.0, 10.0);
+        for y in 0..4 {
+            for (x, factor) in vignetting.row(y).enumerate() {
+                let tangent = |i: usize, count: f64| (i as f64 + 0.5 - count / 2.0) * 2.0 / 10.0;
+                let angle = tangent(x, 5.0).hypot(tangent(y, 4.0)).atan();
+                assert!((factor - angle.cos().powi(4)).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_settings_are_refused() {
+        let good = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
+        assert!(good.checked().is_ok());
+        for bad in [
+            Exposure { exposure_s: -1.0, ..good },
+            Exposure { exposure_s: f64::NAN, ..good },
+            Exposure { f_number: 0.0, ..good },
+            Exposure { lens_transmittance: 1.1, ..good },
+        ] {
+            assert!(bad.checked().is_err());
+        }
+    }
+}

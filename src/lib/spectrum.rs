@@ -1,0 +1,221 @@
+//! Sampled spectra: curves, libraries of radiances, and sums over wavelength.
+
+use crate::error::{Error, Result};
+use crate::numerics::quadrature::{self, Rule};
+use ndarray::{Array2, ArrayView1};
+use serde::{Deserialize, Serialize};
+
+/// An even grid of wavelengths, and the rule that sums over it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WavelengthGrid {
+    /// First wavelength in nm.
+    pub start_nm: f64,
+    /// Last wavelength in nm.
+    pub end_nm: f64,
+    /// Distance of neighbours in nm.
+    pub step_nm: f64,
+    /// The rule.
+    #[serde(default)]
+    pub quadrature: Rule,
+}
+
+impl Default for WavelengthGrid {
+    /// 360 to 830 nm in steps of 1 nm, summed as they are: Eq. 5a of [HP2005].
+    fn default() -> Self {
+        Self { start_nm: 360.0, end_nm: 830.0, step_nm: 1.0, quadrature: Rule::Rectangle }
+    }
+}
+
+impl WavelengthGrid {
+    /// The wavelengths in nm with the weight of each in nm.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] when the grid is empty, runs backwards, does not end on a step or has over 10⁶ points, or when
+    /// the rule does not fit the number of points.
+    pub fn points(&self) -> Result<(Vec<f64>, Vec<f64>)> {
+        let Self { start_nm, end_nm, step_nm, quadrature } = *self;
+        let in_range = start_nm > 0.0 && end_nm >= start_nm && end_nm.is_finite() && step_nm > 0.0;
+        let steps = (end_nm - start_nm) / step_nm;
+        if !in_range || !(0.0..1e6).contains(&steps) {
+            return Err(Error::Usage(format!(
+                "wavelengths {start_nm}:{end_nm}:{step_nm} make no grid; give START:END:STEP in nm, such as 360:830:1"
+            )));
+        }
+        if (steps - steps.round()).abs() > 1e-6 {
+            return Err(Error::Usage(format!(
+                "wavelengths {start_nm}:{end_nm}:{step_nm} do not end on a step; change the end or the step"
+            )));
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to lie in 0..10⁶")]
+        let intervals = steps.round() as usize;
+        let wavelengths = (0..=intervals).map(|i| start_nm + i as f64 * step_nm).collect();
+        Ok((wavelengths, quadrature::weights(quadrature, intervals + 1, step_nm)?))
+    }
+}
+
+/// A function of wavelength, known at some wavelengths and linear between them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    wavelength_nm: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Curve {
+    /// A curve through `values` at `wavelength_nm`.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the table, in words: too short, not ascending, not finite.
+    pub fn new(wavelength_nm: Vec<f64>, values: Vec<f64>) -> std::result::Result<Self, String> {
+        check_wavelengths(&wavelength_nm)?;
+        if values.len() != wavelength_nm.len() {
+            return Err(format!("{} values for {} wavelengths", values.len(), wavelength_nm.len()));
+        }
+        match values.iter().position(|value| !value.is_finite()) {
+            Some(at) => Err(format!("the value at {} nm is not a finite number", wavelength_nm[at])),
+            None => Ok(Self { wavelength_nm, values }),
+        }
+    }
+
+    /// The value at a wavelength in nm; zero beyond the table.
+    pub fn at(&self, wavelength_nm: f64) -> f64 {
+        neighbours(&self.wavelength_nm, wavelength_nm)
+            .map_or(0.0, |parts| parts.iter().map(|&(index, share)| share * self.values[index]).sum())
+    }
+
+    /// The smallest and the largest value.
+    pub fn extremes(&self) -> (f64, f64) {
+        self.values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+    }
+}
+
+/// Checks that wavelengths are positive, finite and strictly ascending.
+///
+/// # Errors
+///
+/// What is wrong, in words.
+pub fn check_wavelengths(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
+    if wavelength_nm.is_empty() {
+        return Err("it has no wavelengths".into());
+    }
+    if let Some(bad) = wavelength_nm.iter().find(|&&nm| !(nm > 0.0 && nm.is_finite())) {
+        return Err(format!("{bad} is no wavelength in nm"));
+    }
+    match wavelength_nm.windows(2).find(|pair| pair[0] >= pair[1]) {
+        Some(pair) => Err(format!("wavelengths must ascend, but {} nm follows {} nm", pair[1], pair[0])),
+        None => Ok(()),
+    }
+}
+
+/// The two samples that a wavelength lies between, with the share of each; none beyond the table.
+fn neighbours(table: &[f64], wavelength_nm: f64) -> Option<[(usize, f64); 2]> {
+    let above = table.partition_point(|&nm| nm < wavelength_nm);
+    if above == table.len() {
+        return None;
+    }
+    if table[above] == wavelength_nm {
+        return Some([(above, 1.0), (above, 0.0)]);
+    }
+    if above == 0 {
+        return None;
+    }
+    let share = (wavelength_nm - table[above - 1]) / (table[above] - table[above - 1]);
+    Some([(above - 1, 1.0 - share), (above, share)])
+}
+
+/// Weights on a radiance's own samples that give a sum over another grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Folded {
+    /// One weight per sample of the radiance.
+    pub weights: Vec<f64>,
+    /// Share of the summed absolute weight that lies where the radiance has no samples (taken as zero there).
+    pub uncovered: f64,
+}
+
+/// Folds weights on the wavelengths `grid_nm` onto the wavelengths `sampled_nm` of a radiance.
+///
+/// Σ_g w_g L(λ_g) with L linear between its samples is linear in the samples, so it is Σ_j w′_j L_j.
+pub fn fold(sampled_nm: &[f64], grid_nm: &[f64], weights: &[f64]) -> Folded {
+    let mut folded = vec![0.0; sampled_nm.len()];
+    let (mut covered, mut total) = (0.0, 0.0);
+    for (&nm, &weight) in grid_nm.iter().zip(weights) {
+        total += weight.abs();
+        if let Some(parts) = neighbours(sampled_nm, nm) {
+            covered += weight.abs();
+            for (index, share) in parts {
+                folded[index] += weight * share;
+            }
+        }
+    }
+    let uncovered = if total > 0.0 { 1.0 - covered / total } else { 0.0 };
+    Folded { weights: folded, uncovered }
+}
+
+/// Radiances on one grid of wavelengths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpectralLibrary {
+    /// Wavelengths in nm, ascending.
+    pub wavelength_nm: Vec<f64>,
+    /// Spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, shape samples × wavelengths.
+    pub radiance: Array2<f64>,
+}
+
+impl SpectralLibrary {
+    /// One radiance of the library.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] when there is no such sample.
+    pub fn sample(&self, index: usize) -> Result<ArrayView1<'_, f64>> {
+        if index >= self.radiance.nrows() {
+            return Err(Error::Usage(format!(
+                "there is no sample {index}: the library has samples 0 to {}",
+                self.radiance.nrows() - 1
+            )));
+        }
+        Ok(self.radiance.row(index))
+    }
+}
+
+/// The CIE 1931 2° standard observer x̄, ȳ, z̄.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observer {
+    /// Colour-matching functions x̄, ȳ, z̄.
+    pub matching: [Curve; 3],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_grid_is_the_papers() {
+        let (wavelengths, weights) = WavelengthGrid::default().points().unwrap();
+        assert_eq!((wavelengths.len(), wavelengths[0], wavelengths[470]), (471, 360.0, 830.0));
+        assert_eq!(weights.iter().sum::<f64>(), 471.0);
+    }
+
+    #[test]
+    fn folding_and_interpolating_give_the_same_sum() {
+        let sampled = [400.0, 410.0, 430.0, 500.0];
+        let values = [1.0, 3.0, -2.0, 5.0];
+        let curve = Curve::new(sampled.to_vec(), values.to_vec()).unwrap();
+        let grid: Vec<f64> = (0..120).map(|i| 395.0 + f64::from(i)).collect();
+        let weights: Vec<f64> = grid.iter().map(|nm| (nm / 100.0).sin()).collect();
+        let direct: f64 = grid.iter().zip(&weights).map(|(&nm, w)| w * curve.at(nm)).sum();
+        let folded = fold(&sampled, &grid, &weights);
+        let sum: f64 = folded.weights.iter().zip(values).map(|(w, v)| w * v).sum();
+        assert!((direct - sum).abs() < 1e-12 * direct.abs().max(1.0));
+        assert!(folded.uncovered > 0.0 && folded.uncovered < 0.3);
+    }
+
+    #[test]
+    fn grids_that_make_no_sense_are_refused() {
+        let grid = |start_nm, end_nm, step_nm| WavelengthGrid { start_nm, end_nm, step_nm, ..Default::default() };
+        for bad in [grid(830.0, 360.0, 1.0), grid(360.0, 830.0, 0.0), grid(360.0, 830.0, f64::NAN), grid(360.0, 830.5, 1.0)]
+        {
+            assert!(bad.points().is_err(), "{bad:?}");
+        }
+    }
+}
