@@ -1,0 +1,400 @@
+"""Bad input, as a shell would give it: one line that says what is wrong, the right status, nothing left behind."""
+
+import os
+import pathlib
+import stat
+import subprocess
+import unittest
+
+import numpy as np
+
+from programs import BINARIES, TIMEOUT_S, ProgramCase, read_planes, write_planes
+
+BAD_DATA, BAD_USAGE = 1, 2
+
+
+class Errors(ProgramCase):
+    def setUp(self):
+        super().setUp()
+        self.electrons = self.run_program(["render-radiance", "--electrons", "100,2000,3000", "--size", "16x12"])
+
+    def listing(self):
+        """What is in the directory: names, sizes and times of change."""
+        return {
+            str(path.relative_to(self.directory)): (path.stat().st_size, path.stat().st_mtime_ns)
+            for path in self.directory.rglob("*")
+        }
+
+    def check_complaint(self, done, program, status, what):
+        text = done.stderr.decode()
+        self.assertIn(done.returncode, status if isinstance(status, tuple) else (status,), f"{what}: {text}")
+        self.assertEqual(len(text.splitlines()), 1, f"{what}: {text!r}")
+        self.assertTrue(text.startswith(f"{program}: "), f"{what}: {text!r}")
+        self.assertTrue(text.endswith("\n"), f"{what}: {text!r}")
+        self.assertNotIn("panicked", text)
+        return text
+
+    def refused(self, command, status, *mentions, stdin=b""):
+        """Checks that a command is refused and gives its complaint."""
+        before = self.listing()
+        done = self.attempt(command, stdin)
+        what = " ".join(str(word) for word in command)
+        text = self.check_complaint(done, command[0], status, what)
+        self.assertEqual(self.listing(), before, f"{what}: something was left behind")
+        for mention in mentions:
+            self.assertIn(mention, text, what)
+        return text
+
+    def write(self, name, data):
+        (self.directory / name).write_bytes(data)
+        return name
+
+
+class Input(Errors):
+    READERS = {
+        "add-noise": [],
+        "digitize": [],
+        "mosaic": [],
+        "demosaic": [],
+        "measure": [],
+    }
+
+    def test_missing_file(self):
+        for program, options in self.READERS.items():
+            self.refused([program, "missing.exr", *options], BAD_DATA, "missing.exr")
+            if program != "measure":
+                self.refused([program, "missing.exr", *options, "-o", "out.exr"], BAD_DATA, "missing.exr")
+        self.refused(["render-radiance", "missing.csv", "-o", "out.exr"], BAD_DATA, "missing.csv")
+        self.refused(["fit-matrix", "missing.exr", "-o", "matrix.yaml"], BAD_DATA, "missing.exr")
+        self.write("in.exr", self.electrons)
+        self.refused(["to-xyz", "in.exr", "--matrix", "missing.yaml", "-o", "out.exr"], (1, 2), "missing.yaml")
+
+    def test_text_named_as_an_image(self):
+        for name in ("text.exr", "text.tif"):
+            self.write(name, b"this is no image\n" * 50)
+            for program in self.READERS:
+                self.refused([program, name], BAD_DATA, name)
+        self.write("text.csv", b"this is no table\n" * 50)
+        self.refused(["render-radiance", "text.csv"], BAD_DATA, "text.csv")
+
+    def test_empty_file_and_empty_pipe(self):
+        self.write("empty.exr", b"")
+        for program in self.READERS:
+            self.refused([program, "empty.exr"], BAD_DATA, "empty.exr")
+            self.refused([program], BAD_DATA)
+
+    def test_truncated_exr(self):
+        zipped = self.run_program(["add-noise", "--compression", "zip"], self.electrons)
+        for data in (self.electrons, zipped):
+            for length in (3, 8, 60, 400, len(data) // 2, len(data) - 200, len(data) - 1):
+                self.write("cut.exr", data[:length])
+                for program in ("add-noise", "measure", "mosaic"):
+                    self.refused([program, "cut.exr"], BAD_DATA, "cut.exr")
+                self.refused(["mosaic", "cut.exr", "-o", "out.exr"], BAD_DATA, "cut.exr")
+                self.refused(["mosaic", "-o", "out.tif"], BAD_DATA, stdin=data[:length])
+
+    def test_truncated_tiff(self):
+        for compression in ("none", "lzw", "deflate"):
+            data = self.run_program(["add-noise", "--format", "tiff", "--compression", compression], self.electrons)
+            for length in (3, 7, 20, len(data) // 3, len(data) // 2):
+                self.write("cut.tif", data[:length])
+                self.refused(["mosaic", "cut.tif", "-o", "out.tif"], BAD_DATA, "cut.tif")
+
+    def test_flipped_bytes_never_crash(self):
+        chance = np.random.default_rng(77)
+        files = {
+            "a.exr": self.run_program(["add-noise", "--compression", "piz"], self.electrons),
+            "b.exr": self.run_program(["add-noise", "--compression", "zip"], self.electrons),
+            "c.tif": self.run_program(["add-noise", "--format", "tiff", "--compression", "lzw"], self.electrons),
+        }
+        for name, data in files.items():
+            for _ in range(40):
+                spoiled = bytearray(data)
+                for place in chance.integers(0, len(data), 3):
+                    spoiled[place] = chance.integers(0, 256)
+                self.write(name, bytes(spoiled))
+                done = self.attempt(["mosaic", name])
+                self.assertIn(done.returncode, (0, 1), f"{name}: {done.stderr!r}")
+                self.assertNotIn(b"panicked", done.stderr)
+
+    def test_directory_as_input(self):
+        (self.directory / "folder.exr").mkdir()
+        self.refused(["measure", "folder.exr"], BAD_DATA, "folder.exr")
+
+    def test_bad_spectra(self):
+        rows = "\n".join(f"{nm},1e-6" for nm in range(360, 831))
+        for name, text in {
+            "no-rows.csv": "wavelength_nm,radiance_w_per_cm2_sr_nm\n",
+            "word.csv": "wavelength_nm,radiance_w_per_cm2_sr_nm\n" + rows.replace("400,1e-6", "400,much"),
+            "ragged.csv": "wavelength_nm,radiance_w_per_cm2_sr_nm\n" + rows.replace("400,1e-6", "400"),
+            "backwards.csv": "wavelength_nm,radiance_w_per_cm2_sr_nm\n" + "\n".join(reversed(rows.split("\n"))).replace("829,", "835,"),
+            "not-a-number.csv": "wavelength_nm,radiance_w_per_cm2_sr_nm\n" + rows.replace("400,1e-6", "400,nan"),
+        }.items():
+            self.write(name, text.encode())
+            self.refused(["render-radiance", name, "--size", "4x4", "-o", "out.exr"], BAD_DATA, name)
+
+
+class Stages(Errors):
+    def test_demosaic_of_planes_names_mosaic(self):
+        self.write("electrons.exr", self.electrons)
+        self.refused(["demosaic", "electrons.exr", "-o", "out.exr"], BAD_DATA, "electrons.exr", "mosaic")
+        text = self.refused(["demosaic"], BAD_DATA, "mosaic", stdin=self.electrons)
+        self.assertIn("mosaic", text.removeprefix("demosaic: ").replace("demosaic", ""))
+
+    def test_to_xyz_of_a_cfa_plane_names_demosaic(self):
+        sky = pathlib.Path(__file__).resolve().parents[2] / "sample_data/skies/sky912.exr"
+        if not sky.exists():
+            self.skipTest("sample_data/skies/sky912.exr is missing")
+        self.run_program(["fit-matrix", sky, "--sensor", "kaf-5101ce", "-o", "matrix.yaml"])
+        cfa = self.run_pipe(["add-noise"], ["digitize"], ["mosaic"], stdin=self.electrons)
+        self.write("cfa.exr", cfa)
+        self.refused(
+            ["to-xyz", "cfa.exr", "--matrix", "matrix.yaml", "-o", "out.exr"], BAD_DATA, "cfa.exr", "demosaic"
+        )
+
+    def test_digitize_of_adu(self):
+        self.write("codes.exr", self.run_pipe(["add-noise"], ["digitize"], stdin=self.electrons))
+        self.refused(["digitize", "codes.exr", "-o", "out.exr"], BAD_DATA, "codes.exr")
+
+    def test_noise_on_adu(self):
+        self.write("codes.exr", self.run_pipe(["add-noise"], ["digitize"], stdin=self.electrons))
+        self.refused(["add-noise", "codes.exr", "-o", "out.exr"], BAD_DATA, "codes.exr")
+
+    def test_mosaic_of_a_plane(self):
+        self.write("cfa.exr", self.run_program(["mosaic"], self.electrons))
+        self.refused(["mosaic", "cfa.exr", "-o", "out.exr"], BAD_DATA, "cfa.exr")
+
+    def test_plane_without_a_pattern(self):
+        write_planes(self.path("plane.tif"), {"Y": np.ones((6, 6), np.uint16)}, "u16")
+        self.refused(["demosaic", "plane.tif", "--black", "none"], (1, 2), "plane.tif", "--pattern")
+
+
+class SmallFrames(Errors):
+    def test_one_photosite_and_one_column(self):
+        for size, shape in [("1x1", (1, 1)), ("1x7", (7, 1)), ("7x1", (1, 7))]:
+            self.run_program(["render-radiance", "--electrons", "100,200,300", "--size", size, "-o", "e.exr"])
+            self.run_program(["add-noise", "e.exr", "--seed", "1", "-o", "n.exr"])
+            self.run_program(["digitize", "n.exr", "-o", "d.tif"])
+            self.run_program(["mosaic", "d.tif", "-o", "m.exr"])
+            for name in ("e.exr", "n.exr", "d.tif", "m.exr"):
+                self.assertEqual(next(iter(read_planes(self.path(name)).values())).shape, shape)
+                self.run_program(["measure", name])
+                self.run_program(["measure", name, "--output-format", "json"])
+            self.refused(["demosaic", "m.exr", "-o", "out.exr"], BAD_DATA, "m.exr")
+            for name in ("e.exr", "n.exr", "d.tif", "m.exr"):
+                os.remove(self.path(name))
+                os.remove(self.path(name + ".yaml"))
+
+
+class Usage(Errors):
+    def test_numbers_out_of_range(self):
+        light = ["render-radiance", "--electrons", "1,2,3", "--size", "4x4", "-o", "out.exr"]
+        for option, value in [
+            ("--exposure", "-1"),
+            ("--exposure", "nan"),
+            ("--exposure", "inf"),
+            ("--f-number", "0"),
+            ("--f-number", "-8"),
+            ("--lens-transmittance", "-0.1"),
+            ("--lens-transmittance", "1.5"),
+            ("--exposure", "soon"),
+            ("--wavelengths", "830:360:1"),
+            ("--wavelengths", "360:830:0"),
+            ("--quadrature", "guess"),
+            ("--cfa", "xyzw"),
+        ]:
+            self.refused([*light, f"{option}={value}"], BAD_USAGE, option)
+        for size in ("0x5", "5x0", "-1x5", "5", "5x", "axb", "99999999999999999999x2"):
+            self.refused(
+                ["render-radiance", "--electrons", "1,2,3", f"--size={size}", "-o", "out.exr"], BAD_USAGE, "--size"
+            )
+        for electrons in ("1,2", "1,2,3,4", "1,2,-3", "a,b,c", "1,2,nan"):
+            self.refused(
+                ["render-radiance", f"--electrons={electrons}", "--size", "4x4", "-o", "out.exr"],
+                *(BAD_USAGE, "--electrons"),
+            )
+
+    def test_noise_and_converter_options(self):
+        self.write("in.exr", self.electrons)
+        for option, value in [
+            ("--seed", "-1"),
+            ("--seed", "seven"),
+            ("--temperature", "-5"),
+            ("--temperature", "nan"),
+            ("--without", "rain"),
+            ("--threads", "-2"),
+        ]:
+            self.refused(["add-noise", "in.exr", "-o", "out.exr", f"{option}={value}"], BAD_USAGE, option)
+        for option, value in [("--bits", "0"), ("--bits", "99"), ("--slope", "-1"), ("--slope", "nan")]:
+            self.refused(["digitize", "in.exr", "-o", "out.exr", f"{option}={value}"], BAD_USAGE, option)
+        self.refused(["mosaic", "in.exr", "-o", "out.exr", "--pattern=rgbw"], BAD_USAGE, "--pattern")
+        self.refused(["mosaic", "in.exr", "-o", "out.exr", "--compression=best"], BAD_USAGE, "--compression")
+        self.refused(["mosaic", "in.exr", "-o", "out.tif", "--compression=piz"], BAD_USAGE, "piz")
+        self.refused(["mosaic", "in.exr", "-o", "out.exr", "--sample-type=u16"], BAD_USAGE, "u16")
+        self.refused(["measure", "in.exr", "--region", "0,0,17,1"], (1, 2), "0,0,17,1")
+        self.refused(["measure", "in.exr", "--region", "0,0,0,1"], (1, 2), "0,0,0,1")
+
+    def test_unknown_option_and_missing_source(self):
+        for program in ("render-radiance", "add-noise", "digitize", "mosaic", "demosaic", "to-xyz", "measure", "fit-matrix"):
+            self.refused([program, "--colour-of-the-sky"], BAD_USAGE, "--colour-of-the-sky")
+            self.refused([program, "a", "b", "c", "d"], BAD_USAGE)
+        self.refused(["render-radiance", "--size", "4x4", "--dark", "--electrons", "1,2,3"], BAD_USAGE)
+
+    def test_unknown_sensor(self):
+        self.refused(
+            ["render-radiance", "--electrons", "1,2,3", "--size", "4x4", "--sensor", "kaf-1501", "-o", "out.exr"],
+            *((BAD_DATA, BAD_USAGE), "kaf-1501"),
+        )
+
+    def test_sensor_file_with_a_misspelt_key(self):
+        sensor = pathlib.Path(__file__).resolve().parents[2] / "sample_data/sensors/kaf-5101ce.yaml"
+        if not sensor.exists():
+            self.skipTest("sample_data/sensors/kaf-5101ce.yaml is missing")
+        text = sensor.read_text(encoding="utf-8").replace("read_noise_e:", "read_nois_e:")
+        text = text.replace("file: ", f"file: {sensor.parent}/")
+        self.write("sensor.yaml", text.encode())
+        self.refused(
+            ["render-radiance", "--electrons", "1,2,3", "--size", "4x4", "--sensor", "sensor.yaml", "-o", "out.exr"],
+            *(BAD_DATA, "sensor.yaml", "read_nois_e", "read_noise_e"),
+        )
+
+    def test_help_and_version_succeed(self):
+        for program in ("render-radiance", "add-noise", "digitize", "mosaic", "demosaic", "to-xyz", "measure", "fit-matrix"):
+            self.assertIn(b"--threads", self.run_program([program, "--help"]))
+            self.assertTrue(self.run_program([program, "--version"]).startswith(program.encode() + b" "))
+
+
+class Output(Errors):
+    def test_directory_missing(self):
+        self.write("in.exr", self.electrons)
+        for name in ("nowhere/out.exr", "nowhere/out.tif"):
+            self.refused(["add-noise", "in.exr", "-o", name], BAD_DATA, "nowhere")
+            self.refused(["add-noise", "-o", name], BAD_DATA, "nowhere", stdin=self.electrons)
+
+    def test_output_is_a_directory(self):
+        (self.directory / "folder.exr").mkdir()
+        self.refused(["add-noise", "-o", "folder.exr"], BAD_DATA, "folder.exr", stdin=self.electrons)
+
+    @unittest.skipIf(os.geteuid() == 0, "the superuser may write anywhere")
+    def test_read_only_directory(self):
+        folder = self.directory / "folder"
+        folder.mkdir(mode=0o500)
+        self.refused(["add-noise", "-o", "folder/out.exr"], BAD_DATA, "folder/out.exr", stdin=self.electrons)
+
+    def test_input_is_output(self):
+        self.write("same.exr", self.electrons)
+        (self.directory / "folder").mkdir()
+        os.symlink("same.exr", self.path("link.exr"))
+        os.link(self.path("same.exr"), self.path("hard.exr"))
+        for name in ("same.exr", "./same.exr", "folder/../same.exr", self.path("same.exr"), "link.exr", "hard.exr"):
+            self.refused(["add-noise", "same.exr", "-o", name], (1, 2), "same.exr")
+        self.assertEqual((self.directory / "same.exr").read_bytes(), self.electrons)
+
+    def test_earlier_output_survives_an_error(self):
+        self.write("out.exr", b"precious")
+        self.write("cut.exr", self.electrons[:-10])
+        self.refused(["add-noise", "cut.exr", "-o", "out.exr"], BAD_DATA, "cut.exr")
+        self.assertEqual((self.directory / "out.exr").read_bytes(), b"precious")
+
+    def test_unknown_suffix(self):
+        self.refused(["add-noise", "-o", "out.jpeg"], BAD_USAGE, "out.jpeg", stdin=self.electrons)
+
+    def full_device(self):
+        """A device that is always full: our own if we may make one, so that a program that replaces its output cannot
+        harm the machine."""
+        path = self.directory / "full"
+        try:
+            os.mknod(path, 0o666 | stat.S_IFCHR, os.makedev(1, 7))
+            with open(path, "wb", buffering=0) as file:
+                file.write(b"x")
+        except PermissionError:
+            path.unlink(missing_ok=True)
+            if os.geteuid() == 0 or not os.path.exists("/dev/full"):
+                self.skipTest("there is no full device that is safe to try")
+            return pathlib.Path("/dev/full")
+        except OSError:
+            pass
+        return path
+
+    def test_full_disk(self):
+        full = self.full_device()
+        large = self.run_program(["render-radiance", "--electrons", "100,2000,3000", "--size", "700x400"])
+        for data in (self.electrons, large):
+            for options in ([], ["--format", "tiff"]):
+                for program in ("add-noise", "mosaic"):
+                    self.refused([program, *options, "-o", full], BAD_DATA, "full", stdin=data)
+                    self.assertTrue(stat.S_ISCHR(os.stat(full).st_mode), "the device was replaced by a file")
+                    with open(full, "wb") as sink:
+                        done = subprocess.run(
+                            [str(BINARIES / program), *options],
+                            input=data,
+                            stdout=sink,
+                            stderr=subprocess.PIPE,
+                            cwd=self.directory,
+                            timeout=TIMEOUT_S,
+                            check=False,
+                        )
+                    self.check_complaint(done, program, BAD_DATA, f"{program} > full")
+        self.write("in.exr", self.electrons)
+        with open(full, "wb") as sink:
+            done = subprocess.run(
+                [str(BINARIES / "measure"), "in.exr"],
+                stdout=sink, stderr=subprocess.PIPE, cwd=self.directory, timeout=TIMEOUT_S, check=False,
+            )
+        self.check_complaint(done, "measure", BAD_DATA, "measure > full")
+
+    def test_closed_pipe_is_no_error(self):
+        for command, data in [
+            (["render-radiance", "--electrons", "100,2000,3000", "--size", "900x700"], b""),
+            (["add-noise", "in.exr"], None),
+            (["mosaic", "in.exr", "--format", "tiff"], None),
+        ]:
+            if data is None and not (self.directory / "in.exr").exists():
+                large = self.run_program(["render-radiance", "--electrons", "100,2000,3000", "--size", "900x700"])
+                self.write("in.exr", large)
+            program = subprocess.Popen(
+                [str(BINARIES / command[0]), *command[1:]],
+                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=self.directory,
+            )
+            self.assertEqual(len(program.stdout.read(100)), 100)
+            program.stdout.close()
+            try:
+                complaint = program.stderr.read()
+                status = program.wait(timeout=TIMEOUT_S)
+            finally:
+                program.stderr.close()
+                if program.poll() is None:
+                    program.kill()
+                    program.wait()
+            self.assertEqual((status, complaint), (0, b""), " ".join(command))
+
+    def test_interrupt_leaves_nothing(self):
+        # The program waits for the rest of its input when it is interrupted.
+        for number in (2, 15):
+            before = self.listing()
+            program = subprocess.Popen(
+                [str(BINARIES / "add-noise"), "-o", "out.exr"],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=self.directory,
+            )
+            try:
+                program.stdin.write(self.electrons[:-100])
+                program.stdin.flush()
+                for _ in range(100):
+                    if self.listing() != before:
+                        break
+                    try:
+                        program.wait(timeout=0.01)
+                        break
+                    except subprocess.TimeoutExpired:
+                        pass
+                program.send_signal(number)
+                program.wait(timeout=10)
+            finally:
+                if program.poll() is None:
+                    program.kill()
+                    program.wait()
+                program.stdin.close()
+                program.stdout.close()
+                program.stderr.close()
+            self.assertNotEqual(program.returncode, 0)
+            self.assertEqual(self.listing(), before, f"signal {number}")
