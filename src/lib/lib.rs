@@ -1,6 +1,7 @@
 //! Cyanometer.
 pub mod adc;
 pub mod cfa;
+pub mod color;
 pub mod demosaic;
 pub mod error;
 pub mod formats;
@@ -10,6 +11,7 @@ pub mod mosaic;
 pub mod noise;
 pub mod numerics;
 pub mod optics;
+pub mod propagation;
 pub mod random;
 pub mod sensor;
 pub mod spectrum;

@@ -1,3 +1,11 @@
 //! Files: bytes to frames and back.
 
+pub mod atomic;
+pub mod csv;
+pub mod data;
 pub mod exr;
+pub mod input;
+pub mod output;
+pub mod spectral;
+pub mod tiff;
+pub mod yaml;

@@ -121,34 +121,34 @@ impl NearlyNormal {
         let variance = 1.0 + z * z - 2.0 * second - mean * mean;
         MeanVariance { mean: limit + sigma * mean, variance: (self.variance * variance).max(0.0) }
     }
+}
 
-    /// Mean and variance of the variable rounded to the nearest whole number and clipped to `0..=top`.
-    ///
-    /// With p_k = P(x > k + ½), the code is Σ p_k in the mean and its square Σ (2k + 1) p_k, k from 0 to top − 1, exact
-    /// at every spread from 0 up and at both rails. Sums run about the mean, over the codes that can occur.
-    pub fn rounded(self, top: u32) -> MeanVariance {
-        let top = i64::from(top);
-        let sigma = self.variance.max(0.0).sqrt();
-        // Codes beyond 9 σ have a probability below 10⁻¹⁸.
-        let reach = 9.0 * sigma + 1.0;
-        let code = |x: f64| -> i64 {
-            #[expect(clippy::cast_possible_truncation, reason = "clamped to the codes, at most 2³²")]
-            let code = x.clamp(0.0, top as f64) as i64;
-            code
-        };
-        let (lowest, highest) = (code((self.mean - reach).floor()), code((self.mean + reach).ceil()));
-        let centre = code(self.mean.round());
-        let (mut first, mut second) = (0.0, 0.0);
-        for k in lowest..highest {
-            // One step of the code from k to k + 1: below the centre, what falls short of it counts.
-            let offset = (k - centre) as f64;
-            let above = self.exceeds(k as f64 + 0.5);
-            let share = if k >= centre { above } else { above - 1.0 };
-            first += share;
-            second += (2.0 * offset + 1.0) * share;
-        }
-        MeanVariance { mean: centre as f64 + first, variance: (second - first * first).max(0.0) }
+/// Mean and variance of a variable rounded to the nearest whole number and clipped to `0..=top`, from its tail
+/// probability `exceeds(edge)`; its own mean and spread only say where to look.
+///
+/// With p_k = P(x > k + ½), the code is Σ p_k in the mean and its square Σ (2k + 1) p_k, k from 0 to top − 1, exact at
+/// every spread from 0 up and at both rails. Sums run about the mean, over the codes that can occur.
+pub fn rounded(mean: f64, sigma: f64, top: u32, exceeds: impl Fn(f64) -> f64) -> MeanVariance {
+    let top = i64::from(top);
+    // Codes beyond 9 σ have a probability below 10⁻¹⁸.
+    let reach = 9.0 * sigma + 1.0;
+    let code = |x: f64| -> i64 {
+        #[expect(clippy::cast_possible_truncation, reason = "clamped to the codes, at most 2³²")]
+        let code = x.clamp(0.0, top as f64) as i64;
+        code
+    };
+    let (lowest, highest) = (code((mean - reach).floor()), code((mean + reach).ceil()));
+    let centre = code(mean.round());
+    let (mut first, mut second) = (0.0, 0.0);
+    for k in lowest..highest {
+        // One step of the code from k to k + 1: below the centre, what falls short of it counts.
+        let offset = (k - centre) as f64;
+        let above = exceeds(k as f64 + 0.5);
+        let share = if k >= centre { above } else { above - 1.0 };
+        first += share;
+        second += (2.0 * offset + 1.0) * share;
     }
+    MeanVariance { mean: centre as f64 + first, variance: (second - first * first).max(0.0) }
 }
 
 #[cfg(test)]
@@ -174,6 +174,11 @@ mod tests {
             .sum()
     }
 
+    fn round_normal(mean: f64, sigma: f64, top: u32) -> MeanVariance {
+        let variable = NearlyNormal::normal(mean, sigma * sigma);
+        rounded(mean, sigma, top, |edge| variable.exceeds(edge))
+    }
+
     #[test]
     fn clipping_agrees_with_numerical_integration() {
         for (third, fourth) in [(0.0, 0.0), (12.0, 30.0)] {
@@ -192,23 +197,22 @@ mod tests {
     #[test]
     fn rounding_adds_a_twelfth_once_the_spread_reaches_a_code() {
         // The deviation falls as exp(−2π²σ²): 10⁻⁸ at σ = 1.
-        let rounded = NearlyNormal::normal(1753.3, 1.0).rounded(4095);
+        let rounded = round_normal(1753.3, 1.0, 4095);
         assert!((rounded.mean - 1753.3).abs() < 1e-8);
         assert!((rounded.variance - 1.0 - 1.0 / 12.0).abs() < 1e-7);
     }
 
     #[test]
     fn rounding_without_spread_is_rounding() {
-        assert_eq!(NearlyNormal::normal(12.4, 0.0).rounded(4095), MeanVariance { mean: 12.0, variance: 0.0 });
-        assert_eq!(NearlyNormal::normal(-3.0, 0.0).rounded(255), MeanVariance { mean: 0.0, variance: 0.0 });
-        assert_eq!(NearlyNormal::normal(300.0, 0.0).rounded(255), MeanVariance { mean: 255.0, variance: 0.0 });
+        assert_eq!(round_normal(12.4, 0.0, 4095), MeanVariance { mean: 12.0, variance: 0.0 });
+        assert_eq!(round_normal(-3.0, 0.0, 255), MeanVariance { mean: 0.0, variance: 0.0 });
+        assert_eq!(round_normal(300.0, 0.0, 255), MeanVariance { mean: 255.0, variance: 0.0 });
     }
 
     #[test]
     fn rounding_near_the_rails_agrees_with_the_sum_over_codes() {
         for (mean, sigma) in [(0.2, 0.7), (-1.0, 3.0), (253.0, 4.0), (40.5, 0.1)] {
-            let variable = NearlyNormal::normal(mean, sigma * sigma);
-            let rounded = variable.rounded(255);
+            let rounded = round_normal(mean, sigma, 255);
             let probability = |k: i32| -> f64 {
                 let below = if k == 0 { 1.0 } else { cumulative(-((f64::from(k) - 0.5 - mean) / sigma)) };
                 let above = if k == 255 { 0.0 } else { cumulative(-((f64::from(k) + 0.5 - mean) / sigma)) };

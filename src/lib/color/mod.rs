@@ -1,0 +1,290 @@
+//! Colour: from camera signals to CIE XYZ and on to xyY, L*a*b* and a viewable sRGB.
+
+pub mod characterization;
+
+use crate::error::{Error, Result};
+use crate::frame::{Rows, Window, to_sample};
+use crate::metadata::{ColorRecord, FrameHeader};
+use crate::stage::{Counts, Stage};
+use crate::units::{Adu, QuantityKind, Tristimulus};
+use nalgebra::{Matrix3, Vector3};
+
+/// A colour space that frames are given in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Space {
+    /// Absolute XYZ, Y in cd m⁻².
+    Xyz,
+    /// Chromaticities x, y and luminance Y in cd m⁻².
+    Xyy,
+    /// CIE 1976 L*a*b*.
+    Lab,
+    /// sRGB for viewing.
+    Srgb,
+}
+
+/// The white that L*a*b* and sRGB refer to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum White {
+    /// Chromaticity of D65; the luminance is chosen apart.
+    D65,
+    /// Chromaticity of equal energy, (⅓, ⅓).
+    EqualEnergy,
+    /// Absolute XYZ.
+    Absolute([f64; 3]),
+}
+
+/// Chromaticity of D65 for the 2° observer, as IEC 61966-2-1 has it.
+pub const D65_XY: [f64; 2] = [0.3127, 0.3290];
+
+/// Linear sRGB from XYZ of unit white luminance [IEC 61966-2-1].
+const SRGB_FROM_XYZ: Matrix3<f64> = Matrix3::new(
+    3.2406, -1.5372, -0.4986, //
+    -0.9689, 1.8758, 0.0415, //
+    0.0557, -0.2040, 1.0570,
+);
+
+/// The cone responses of the Bradford transform [Lam1985].
+const BRADFORD: Matrix3<f64> = Matrix3::new(
+    0.8951, 0.2664, -0.1614, //
+    -0.7502, 1.7135, 0.0367, //
+    0.0389, -0.0685, 1.0296,
+);
+
+/// XYZ of a chromaticity at a luminance.
+pub fn xyz_of_chromaticity([x, y]: [f64; 2], luminance: f64) -> [f64; 3] {
+    [luminance * x / y, luminance, luminance * (1.0 - x - y) / y]
+}
+
+/// xyY of XYZ; where X + Y + Z is not above zero there is no chromaticity, and that of `white` stands in.
+pub fn xyy_from_xyz([x, y, z]: [f64; 3], white: [f64; 2]) -> [f64; 3] {
+    let sum = x + y + z;
+    if sum > 0.0 { [x / sum, y / sum, y] } else { [white[0], white[1], y] }
+}
+
+/// CIE 1976 L*a*b* of XYZ about a white [CIE 015, Eqs. 8.3–8.8]; the straight part of f goes on below zero, where noise
+/// may lead.
+pub fn lab_from_xyz(xyz: [f64; 3], white: [f64; 3]) -> [f64; 3] {
+    const DELTA: f64 = 6.0 / 29.0;
+    let f = |index: usize| {
+        let t = xyz[index] / white[index];
+        if t > DELTA.powi(3) { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 }
+    };
+    let [fx, fy, fz] = [f(0), f(1), f(2)];
+    [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
+}
+
+/// The transfer curve of sRGB from linear light 0…1 [IEC 61966-2-1].
+pub fn srgb_encode(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// The matrix to linear sRGB from absolute XYZ under a white that shall look white: Bradford adaptation to D65.
+pub fn linear_srgb_from_xyz(white: [f64; 3]) -> Matrix3<f64> {
+    let source = BRADFORD * Vector3::from(white) / white[1];
+    let target = BRADFORD * Vector3::from(xyz_of_chromaticity(D65_XY, 1.0));
+    let gains = Matrix3::from_diagonal(&target.component_div(&source));
+    // The constant matrix is far from singular.
+    let back = BRADFORD.try_inverse().unwrap_or_else(Matrix3::identity);
+    SRGB_FROM_XYZ * back * gains * BRADFORD / white[1]
+}
+
+/// A 3×3 matrix row by row, as files and metadata have it.
+pub fn matrix(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| rows[i][j])
+}
+
+/// Chromaticities of the primaries that a matrix implies (XYZ of its columns) and of their sum; none where one has none.
+pub fn implied_primaries(xyz_from_camera: &[[f64; 3]; 3]) -> Option<[[f64; 2]; 4]> {
+    let matrix = matrix(xyz_from_camera);
+    let chromaticity = |xyz: Vector3<f64>| {
+        let sum = xyz.sum();
+        (sum.abs() > f64::EPSILON * xyz.abs().sum()).then(|| [xyz.x / sum, xyz.y / sum])
+    };
+    let column = |j| chromaticity(matrix.column(j).into_owned());
+    Some([column(0)?, column(1)?, column(2)?, chromaticity(matrix.column_sum())?])
+}
+
+/// What a user may set of the conversion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColorSettings {
+    /// The matrix, XYZ from black-free ADU per s sr.
+    pub xyz_from_camera: [[f64; 3]; 3],
+    /// How it was fitted, for the record.
+    pub method: Option<String>,
+    /// The space.
+    pub space: Space,
+    /// The white of L*a*b* and sRGB.
+    pub white: White,
+    /// Luminance of a white that is given by its chromaticity, cd m⁻²; that at which the camera saturates where none is
+    /// given.
+    pub white_luminance: Option<f64>,
+}
+
+/// Turns demosaicked ADU into colours.
+///
+/// x = M ρ / H        ρ: ADU above black; H = t π T / (4N² + 1)        [HP2005, Eq. 18, per exposure]
+#[derive(Debug, Clone)]
+pub struct ToXyz {
+    header: FrameHeader,
+    space: Space,
+    /// XYZ from ADU above black, exposure included.
+    xyz_from_adu: Matrix3<f64>,
+    black: f64,
+    white: [f64; 3],
+    srgb_from_xyz: Matrix3<f64>,
+}
+
+impl ToXyz {
+    /// The conversion of `input`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Order`] unless the frame holds three planes of ADU; [`Error::MissingKey`] without exposure;
+    /// [`Error::Usage`] for an impossible white.
+    pub fn new(input: &FrameHeader, settings: &ColorSettings) -> Result<Self> {
+        let holds = input.holds();
+        match input.metadata.quantity {
+            QuantityKind::Adu | QuantityKind::Unspecified => {}
+            QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
+                return Err(input.out_of_order(format!("it holds {holds}, not ADU"), "digitize"));
+            }
+            _ => return Err(input.refuse(format!("it holds {holds}: it is converted already"))),
+        }
+        if input.metadata.cfa.is_some() || input.geometry.channels.len() == 1 {
+            return Err(input.out_of_order(format!("it holds {holds}, not three classes at each pixel"), "demosaic"));
+        }
+        if !input.has_three_planes() {
+            return Err(input.refuse(format!("it holds {holds}; a camera has the three planes R, G and B")));
+        }
+        let exposure = input.exposure()?;
+        let black = input.metadata.black_level_adu.unwrap_or(0.0);
+        let xyz_from_adu = matrix(&settings.xyz_from_camera) / exposure.exposure_s_sr();
+        let needs_white = matches!(settings.space, Space::Lab | Space::Srgb);
+        let white = match settings.white {
+            White::Absolute(white) => white,
+            White::D65 | White::EqualEnergy => {
+                let xy = if settings.white == White::D65 { D65_XY } else { [1.0 / 3.0, 1.0 / 3.0] };
+                let at_saturation = || -> Option<f64> {
+                    let range = input.metadata.white_level_adu? - black;
+                    Some((xyz_from_adu * Vector3::repeat(range)).y)
+                };
+                let luminance = match settings.white_luminance.or_else(at_saturation) {
+                    Some(luminance) => luminance,
+                    None if needs_white => return Err(input.missing("white_level_adu", "--white-luminance CD_PER_M2")),
+                    None => 1.0,
+                };
+                xyz_of_chromaticity(xy, luminance)
+            }
+        };
+        if needs_white && !white.iter().all(|&value| value > 0.0 && value.is_finite()) {
+            return Err(Error::Usage(format!(
+                "a white of XYZ {:.6} {:.6} {:.6} is impossible; all three must be above 0",
+                white[0], white[1], white[2]
+            )));
+        }
+        let (quantity, channels) = match settings.space {
+            Space::Xyz => (QuantityKind::Xyz, ["R", "G", "B"]),
+            Space::Xyy => (QuantityKind::Xyy, ["x", "y", "Y"]),
+            Space::Lab => (QuantityKind::Lab, ["L", "a", "b"]),
+            Space::Srgb => (QuantityKind::Srgb, ["R", "G", "B"]),
+        };
+        let mut metadata = input.metadata.becoming(quantity);
+        metadata.black_level_adu = None;
+        metadata.white_level_adu = None;
+        metadata.color = Some(ColorRecord {
+            xyz_from_camera: settings.xyz_from_camera,
+            method: settings.method.clone(),
+            white: needs_white.then_some(white),
+        });
+        let geometry = input.geometry.with_channels(&channels);
+        let srgb_from_xyz = if needs_white { linear_srgb_from_xyz(white) } else { Matrix3::identity() };
+        let header = FrameHeader { name: input.name.clone(), geometry, metadata };
+        Ok(Self { header, space: settings.space, xyz_from_adu, black, white, srgb_from_xyz })
+    }
+
+    /// The head of the converted frame, to add to.
+    pub fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.header
+    }
+}
+
+impl Stage for ToXyz {
+    type Input = Adu;
+    type Output = Tristimulus;
+
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn apply(&self, input: Window<'_, Adu>, mut output: Rows<'_, Tristimulus>) -> Counts {
+        let mut counts = Counts::default();
+        let white_sum: f64 = self.white.iter().sum();
+        let white_xy = [self.white[0] / white_sum, self.white[1] / white_sum];
+        for y in output.range() {
+            let planes = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
+            let [first, second, third] = output.three(y);
+            for x in 0..input.width() {
+                let signal = Vector3::from(planes.map(|plane| f64::from(plane[x]) - self.black));
+                let xyz = self.xyz_from_adu * signal;
+                let color = match self.space {
+                    Space::Xyz => xyz.into(),
+                    Space::Xyy => xyy_from_xyz(xyz.into(), white_xy),
+                    Space::Lab => lab_from_xyz(xyz.into(), self.white),
+                    Space::Srgb => {
+                        let linear = self.srgb_from_xyz * xyz;
+                        counts.out_of_gamut += u64::from(linear.iter().any(|v| !(-1e-6..=1.0 + 1e-6).contains(v)));
+                        <[f64; 3]>::from(linear).map(|v| srgb_encode(v.clamp(0.0, 1.0)))
+                    }
+                };
+                counts.not_finite += u64::from(color.iter().any(|value| !value.is_finite()));
+                (first[x], second[x], third[x]) = (to_sample(color[0]), to_sample(color[1]), to_sample(color[2]));
+            }
+        }
+        counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_white_is_white_in_every_space() {
+        for white in [[95.047, 100.0, 108.883], [3000.0, 3000.0, 3000.0], [109.85, 100.0, 35.585]] {
+            let lab = lab_from_xyz(white, white);
+            assert!((lab[0] - 100.0).abs() < 1e-12 && lab[1].abs() < 1e-12 && lab[2].abs() < 1e-12);
+            // The four decimals of the matrix of IEC 61966-2-1 leave 2·10⁻⁴.
+            let linear = linear_srgb_from_xyz(white) * Vector3::from(white);
+            assert!(linear.iter().all(|v| (v - 1.0).abs() < 3e-4), "{linear}");
+        }
+    }
+
+    /// Sharma, Wu and Dalal's CIEDE2000 data start from L*a*b*; here the classic check of CIELAB itself: a colour of
+    /// XYZ (19.01, 20, 21.78) under D65 (95.047, 100, 108.883) is the neutral of L* = 116 · 0.2^⅓ − 16 = 51.837.
+    #[test]
+    fn neutrals_have_no_chroma_and_the_lightness_of_the_cube_root() {
+        let white = [95.047, 100.0, 108.883];
+        let lab = lab_from_xyz(white.map(|value| value / 5.0), white);
+        assert!((lab[0] - 51.837_211).abs() < 1e-5 && lab[1].abs() < 1e-9 && lab[2].abs() < 1e-9);
+        // Below (6/29)³ the curve is a straight line: 24389/27 · t, here t = 0.001.
+        let dark = lab_from_xyz(white.map(|value| value / 1000.0), white);
+        assert!((dark[0] - 0.903_296_3).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_srgb_curve_joins_its_two_pieces() {
+        assert!((srgb_encode(0.003_130_8) - srgb_encode(0.003_130_800_1)).abs() < 1e-7);
+        assert_eq!(srgb_encode(0.0), 0.0);
+        assert!((srgb_encode(1.0) - 1.0).abs() < 1e-15);
+        // Middle grey of IEC 61966-2-1: linear 0.2140 is code 127.5/255.
+        assert!((srgb_encode(0.214_041_140_482_232_55) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_matrix_implies_its_columns_as_primaries() {
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let third = 1.0 / 3.0;
+        assert_eq!(implied_primaries(&identity), Some([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [third, third]]));
+        assert_eq!(implied_primaries(&[[0.0; 3]; 3]), None);
+    }
+}

@@ -1,0 +1,167 @@
+//! Tables of spectra as CSV, plain or gzipped.
+//!
+//! Lines that start with `#` are comments. Two layouts are read: a column of wavelengths in nm and one column per curve,
+//! or one row per spectrum under a header of wavelengths.
+
+use crate::error::{Error, Result};
+use crate::spectrum::{Curve, check_wavelengths};
+use crate::units::RadianceUnit;
+use flate2::read::GzDecoder;
+use ndarray::Array2;
+use std::io::Read;
+
+/// A table may unpack to this much.
+const MAX_BYTES: u64 = 256 << 20;
+
+/// Curves over common wavelengths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpectralTable {
+    name: String,
+    /// Wavelengths in nm, ascending.
+    pub wavelength_nm: Vec<f64>,
+    /// Names of the curves.
+    pub columns: Vec<String>,
+    /// Values, shape curves × wavelengths.
+    pub values: Array2<f64>,
+}
+
+impl SpectralTable {
+    /// Reads a table; `name` is the file in messages.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] naming line and column of what is no number, or what the table lacks.
+    pub fn parse(name: &str, bytes: &[u8]) -> Result<Self> {
+        let mut unpacked = Vec::new();
+        let bytes = if bytes.starts_with(&[0x1F, 0x8B]) {
+            let unpack = GzDecoder::new(bytes).take(MAX_BYTES).read_to_end(&mut unpacked);
+            unpack.map_err(|_| Error::format(name, "it is gzipped, but damaged"))?;
+            &unpacked
+        } else {
+            bytes
+        };
+        let refuse = |problem: String| Error::format(name, problem);
+        if bytes.contains(&0) {
+            return Err(refuse("it is not a CSV table but a binary file".into()));
+        }
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .has_headers(false)
+            .trim(csv::Trim::All)
+            .from_reader(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
+        let mut records = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(|error| refuse(format!("it is not a CSV table: {error}")))?;
+            records.push((record.position().map_or(0, csv::Position::line), record));
+        }
+        let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite());
+        let Some((_, first)) = records.first() else { return Err(refuse("it holds no rows".into())) };
+        let by_rows = first.len() > 2 && number(&first[0]).is_none() && first.iter().skip(1).all(|c| number(c).is_some());
+        let header: Option<Vec<String>> =
+            number(&first[0]).is_none().then(|| first.iter().map(ToOwned::to_owned).collect());
+        let body = &records[usize::from(header.is_some())..];
+        let width = first.len();
+        let mut cells = Vec::with_capacity(body.len() * width);
+        for (line, record) in body {
+            for (column, text) in record.iter().enumerate() {
+                let value = match number(text) {
+                    Some(value) => value,
+                    // The label of a row need not be a number.
+                    None if by_rows && column == 0 => 0.0,
+                    None => {
+                        let shown: String = text.chars().take(20).collect();
+                        return Err(refuse(format!("line {line}, column {}: `{shown}` is no number", column + 1)));
+                    }
+                };
+                cells.push(value);
+            }
+        }
+        let cells = Array2::from_shape_vec((body.len(), width), cells)
+            .map_err(|_| refuse("its rows differ in length".into()))?;
+        if width < 2 || body.is_empty() {
+            return Err(refuse("it needs a column of wavelengths in nm and at least one of values".into()));
+        }
+        let (wavelength_nm, columns, values) = if by_rows {
+            let labels = body.iter().map(|(_, record)| record[0].to_owned()).collect();
+            let wavelengths = first.iter().skip(1).filter_map(number).collect();
+            (wavelengths, labels, cells.slice(ndarray::s![.., 1..]).to_owned())
+        } else {
+            let columns = match &header {
+                Some(header) => header[1..].to_vec(),
+                None => (1..width).map(|column| format!("column{column}")).collect(),
+            };
+            (cells.column(0).to_vec(), columns, cells.slice(ndarray::s![.., 1..]).t().to_owned())
+        };
+        check_wavelengths(&wavelength_nm).map_err(refuse)?;
+        Ok(Self { name: name.into(), wavelength_nm, columns, values })
+    }
+
+    /// The place of a column; the first, where none is named.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] naming the columns that there are.
+    pub fn column_index(&self, column: Option<&str>) -> Result<usize> {
+        let Some(column) = column else { return Ok(0) };
+        self.columns.iter().position(|name| name == column).ok_or_else(|| {
+            let some: Vec<&str> = self.columns.iter().take(8).map(String::as_str).collect();
+            Error::Usage(format!("{}: there is no column `{column}`; it has {}", self.name, some.join(", ")))
+        })
+    }
+
+    /// A column as a curve.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::column_index`], and [`Error::Format`] for values that make no curve.
+    pub fn curve(&self, column: Option<&str>) -> Result<Curve> {
+        let index = self.column_index(column)?;
+        Curve::new(self.wavelength_nm.clone(), self.values.row(index).to_vec())
+            .map_err(|problem| Error::format(&self.name, problem))
+    }
+
+    /// The unit of radiance that a column's name ends with, such as `radiance_w_per_m2_sr_nm`.
+    pub fn unit_of(&self, index: usize) -> Option<RadianceUnit> {
+        let lower = self.columns.get(index)?.to_ascii_lowercase();
+        [
+            ("_mw_per_m2_sr_nm", RadianceUnit::MwPerM2SrNm),
+            ("_uw_per_cm2_sr_nm", RadianceUnit::UwPerCm2SrNm),
+            ("w_per_cm2_sr_nm", RadianceUnit::WPerCm2SrNm),
+            ("w_per_m2_sr_nm", RadianceUnit::WPerM2SrNm),
+            ("w_per_m2_sr_um", RadianceUnit::WPerM2SrUm),
+        ]
+        .into_iter()
+        .find_map(|(suffix, unit)| lower.ends_with(suffix).then_some(unit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_layouts_give_the_same_curves() {
+        let by_columns = SpectralTable::parse("a", b"# sky\nwavelength_nm,a,b\n400,1,2\n410,3,4\n").unwrap();
+        let by_rows = SpectralTable::parse("b", b"id,400,410\nx,1,3\ny,2,4\n").unwrap();
+        assert_eq!(by_columns.values, by_rows.values);
+        assert_eq!(by_columns.wavelength_nm, by_rows.wavelength_nm);
+        assert_eq!(by_rows.columns, ["x", "y"]);
+        assert_eq!(by_columns.curve(Some("b")).unwrap().at(405.0), 3.0);
+    }
+
+    #[test]
+    fn complaints_name_the_place() {
+        let complaint = |text: &str| SpectralTable::parse("t.csv", text.as_bytes()).unwrap_err().to_string();
+        assert_eq!(complaint("nm,L\n400,1\n410,x\n"), "t.csv: line 3, column 2: `x` is no number");
+        assert!(complaint("nm,L\n410,1\n400,2\n").contains("must ascend"));
+        assert!(complaint("nm,L\n400,nan\n").contains("`nan` is no number"));
+        assert!(complaint("").contains("no rows"));
+        assert!(complaint("nm,L\n400,1\n410\n").contains("not a CSV table"));
+    }
+
+    #[test]
+    fn a_column_may_name_its_unit() {
+        let table = SpectralTable::parse("a", b"nm,radiance_W_per_m2_sr_nm\n400,1\n").unwrap();
+        assert_eq!(table.unit_of(0), Some(RadianceUnit::WPerM2SrNm));
+    }
+}

@@ -1,0 +1,224 @@
+//! Data files: sensors, the observer, curves; where they are found, and what is built in.
+
+use super::csv::SpectralTable;
+use super::yaml;
+use crate::error::{Error, Result};
+use crate::sensor::{CurveFile, Sensor, SpectralResponse};
+use crate::spectrum::{Curve, Observer};
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+
+/// The environment variable that names directories with data files, like `sample_data`.
+pub const DATA_VARIABLE: &str = "CYANOMETER_DATA";
+/// The default sensor.
+pub const DEFAULT_SENSOR: &str = "kaf-5101ce";
+
+/// Files that every program carries, by their place in `sample_data`.
+const BUILT_IN: [(&str, &[u8]); 4] = [
+    ("sensors/kaf-5101ce.yaml", include_bytes!("../../../sample_data/sensors/kaf-5101ce.yaml")),
+    ("sensors/kaf5101ce_est_qe_1nm.csv", include_bytes!("../../../sample_data/sensors/kaf5101ce_est_qe_1nm.csv")),
+    ("sensors/bg39_1mm.csv", include_bytes!("../../../sample_data/sensors/bg39_1mm.csv")),
+    ("observers/cie1931_2deg_1nm.csv", include_bytes!("../../../sample_data/observers/cie1931_2deg_1nm.csv")),
+];
+
+/// A sensor with its curves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedSensor {
+    /// The description, digests of the curves filled in.
+    pub sensor: Sensor,
+    /// The curves.
+    pub response: SpectralResponse,
+}
+
+/// Where a data file was found: in a directory, or built in.
+enum Place {
+    Directory(PathBuf),
+    BuiltIn,
+}
+
+/// Finds and reads a sensor: a name among the installed, in-tree and built-in ones, or the path of a file.
+///
+/// Names are looked for in the directories of `CYANOMETER_DATA`, in `share/cyanometer` beside the program's directory,
+/// in the `sample_data` of the tree that the program was built in, and among what is built in.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for an unknown name, listing those there are; [`Error::Disk`] and [`Error::Format`] for bad files.
+pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
+    let path = Path::new(name);
+    let is_path = path.components().count() > 1 || path.extension().is_some_and(|end| end == "yaml" || end == "yml");
+    let (place, shown, bytes) = if is_path {
+        let bytes = read_file(path)?;
+        (Place::Directory(path.parent().map(Path::to_owned).unwrap_or_default()), name.to_owned(), bytes)
+    } else {
+        let file = format!("sensors/{name}.yaml");
+        match find(&file)? {
+            Some((Place::Directory(directory), bytes)) => {
+                (Place::Directory(directory.join("sensors")), directory.join(file).display().to_string(), bytes)
+            }
+            Some((Place::BuiltIn, bytes)) => (Place::BuiltIn, format!("sensor {name}"), bytes),
+            None => {
+                return Err(Error::Usage(format!(
+                    "there is no sensor `{name}`; known are {}; for a file of your own give its path, ending in .yaml",
+                    known_sensors().join(", ")
+                )));
+            }
+        }
+    };
+    let mut sensor: Sensor = yaml::parse_strict(&shown, &bytes)?;
+    sensor.check().map_err(|problem| Error::format(&shown, problem))?;
+    let table = |curve: &mut CurveFile| -> Result<SpectralTable> {
+        let (name, bytes) = read_beside(&place, &shown, &curve.file)?;
+        curve.sha256 = Some(hex(&Sha256::digest(&bytes)));
+        SpectralTable::parse(&name, &bytes)
+    };
+    let efficiencies = table(&mut sensor.quantum_efficiency)?;
+    let class = |letter: &str| within_unit(&shown, "quantum_efficiency", efficiencies.curve(Some(letter))?);
+    let quantum_efficiency = [class("R")?, class("G")?, class("B")?];
+    let cover_glass = match &mut sensor.cover_glass {
+        Some(glass) => {
+            let transmittance = table(glass)?.curve(glass.column.as_deref())?;
+            Some(within_unit(&shown, "cover_glass", transmittance)?)
+        }
+        None => None,
+    };
+    Ok(LoadedSensor { sensor, response: SpectralResponse { quantum_efficiency, cover_glass } })
+}
+
+/// The CIE 1931 2° observer, built in.
+///
+/// # Errors
+///
+/// None unless the built-in table is damaged.
+pub fn load_observer() -> Result<Observer> {
+    let name = "observers/cie1931_2deg_1nm.csv";
+    let table = SpectralTable::parse(name, built_in(name).unwrap_or_default())?;
+    Ok(Observer { matching: [table.curve(Some("xbar"))?, table.curve(Some("ybar"))?, table.curve(Some("zbar"))?] })
+}
+
+/// Reads a whole small file.
+///
+/// # Errors
+///
+/// [`Error::Disk`].
+pub fn read_file(path: &Path) -> Result<Vec<u8>> {
+    let name = path.display().to_string();
+    let length = std::fs::metadata(path).map_err(|e| Error::disk(&name, "open", e))?;
+    if length.is_dir() {
+        return Err(Error::format(&name, "it is a directory"));
+    }
+    if length.len() > 1 << 30 {
+        return Err(Error::format(&name, "it is larger than 1 GiB; no table is"));
+    }
+    std::fs::read(path).map_err(|e| Error::disk(&name, "open", e))
+}
+
+/// An efficiency or a transmittance is a fraction.
+fn within_unit(sensor: &str, key: &str, curve: Curve) -> Result<Curve> {
+    let (low, high) = curve.extremes();
+    if low < 0.0 || high > 1.0 {
+        return Err(Error::format(sensor, format!("`{key}` runs from {low} to {high}; it must lie within 0 and 1")));
+    }
+    Ok(curve)
+}
+
+/// Reads a file that a sensor file names; a name with a directory in it is never opened.
+fn read_beside(place: &Place, sensor: &str, file: &str) -> Result<(String, Vec<u8>)> {
+    if Path::new(file).file_name().is_none_or(|name| name != file) {
+        return Err(Error::format(sensor, format!("`{file}` must be the bare name of a file beside the sensor file")));
+    }
+    match place {
+        Place::Directory(directory) => {
+            let path = directory.join(file);
+            Ok((path.display().to_string(), read_file(&path)?))
+        }
+        Place::BuiltIn => match built_in(&format!("sensors/{file}")) {
+            Some(bytes) => Ok((file.to_owned(), bytes.to_vec())),
+            None => Err(Error::format(sensor, format!("its file `{file}` is not built in"))),
+        },
+    }
+}
+
+fn built_in(file: &str) -> Option<&'static [u8]> {
+    BUILT_IN.iter().find(|(name, _)| *name == file).map(|(_, bytes)| *bytes)
+}
+
+/// Directories that may hold data files, first to last.
+fn directories() -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> =
+        std::env::var_os(DATA_VARIABLE).map(|list| std::env::split_paths(&list).collect()).unwrap_or_default();
+    if let Ok(program) = std::env::current_exe() {
+        let above: Vec<&Path> = program.ancestors().skip(1).collect();
+        found.extend(above.get(1).map(|prefix| prefix.join("share/cyanometer")));
+        found.extend(above.iter().take(4).map(|directory| directory.join("sample_data")));
+    }
+    found
+}
+
+fn find(file: &str) -> Result<Option<(Place, Vec<u8>)>> {
+    for directory in directories() {
+        let path = directory.join(file);
+        if path.is_file() {
+            return Ok(Some((Place::Directory(directory), read_file(&path)?)));
+        }
+    }
+    Ok(built_in(file).map(|bytes| (Place::BuiltIn, bytes.to_vec())))
+}
+
+fn known_sensors() -> Vec<String> {
+    let mut names: Vec<String> = directories()
+        .iter()
+        .filter_map(|directory| std::fs::read_dir(directory.join("sensors")).ok())
+        .flatten()
+        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+        .chain(BUILT_IN.iter().map(|(name, _)| PathBuf::from(name)))
+        .filter(|path| path.extension().is_some_and(|end| end == "yaml"))
+        .filter_map(|path| path.file_stem().map(|stem| stem.to_string_lossy().into_owned()))
+        .collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+/// Bytes as hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_sensor_is_built_in_and_complete() {
+        let loaded = load_sensor(DEFAULT_SENSOR).unwrap();
+        assert_eq!(loaded.sensor.full_well_e, 40_000.0);
+        // Table 1 of the data file's source: Kodak publishes peak efficiencies of 0.31, 0.34 and 0.31.
+        for (curve, peak) in loaded.response.quantum_efficiency.iter().zip([0.31, 0.34, 0.31]) {
+            assert!((curve.extremes().1 - peak).abs() < 0.005);
+        }
+        assert!(loaded.sensor.quantum_efficiency.sha256.is_some());
+    }
+
+    #[test]
+    fn unknown_sensors_are_answered_with_the_known_ones() {
+        let message = load_sensor("kaf-5101").unwrap_err().to_string();
+        assert!(message.contains("kaf-5101ce"), "{message}");
+    }
+
+    #[test]
+    fn the_observer_integrates_to_the_equal_energy_white() {
+        let observer = load_observer().unwrap();
+        let sums = observer.matching.each_ref().map(|curve| (360..=830).map(|nm| curve.at(f64::from(nm))).sum::<f64>());
+        // Equal energy has x = y = ⅓ to the rounding of the tables (CIE 015, Table T.4: 0.33333 to 0.33334).
+        let total: f64 = sums.iter().sum();
+        assert!(sums.iter().all(|sum| (sum / total - 1.0 / 3.0).abs() < 1e-4), "{sums:?}");
+    }
+
+    #[test]
+    fn no_path_in_a_sensor_file_is_opened() {
+        for file in ["../qe.csv", "/etc/passwd", "a/b.csv", ".."] {
+            assert!(read_beside(&Place::BuiltIn, "s.yaml", file).unwrap_err().to_string().contains("bare name"));
+        }
+    }
+}

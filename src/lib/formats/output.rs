@@ -1,0 +1,312 @@
+//! Writes frames: to named files, whole or not at all, and to pipes.
+
+use super::atomic::{AtomicFile, Target};
+use super::data::hex;
+use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter};
+use super::input::{FileId, XYZ_PRIMARIES, sidecar_path, update_digest};
+use super::tiff::{TiffCompression, TiffSamples, TiffTags, TiffWriter};
+use super::yaml;
+use crate::color;
+use crate::error::{Error, Result};
+use crate::frame::to_sample;
+use crate::metadata::FrameHeader;
+use crate::stage::{Counts, RowSink};
+use crate::units::QuantityKind;
+use half::f16;
+use sha2::{Digest, Sha256};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// A file format for frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// OpenEXR.
+    Exr,
+    /// TIFF.
+    Tiff,
+}
+
+/// How blocks are compressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CompressionKind {
+    /// Not at all.
+    None,
+    /// Run lengths (EXR).
+    Rle,
+    /// Deflate by row (EXR).
+    Zips,
+    /// Deflate by 16 rows (EXR).
+    Zip,
+    /// Wavelets (EXR).
+    Piz,
+    /// Lempel-Ziv-Welch (TIFF).
+    Lzw,
+    /// Deflate (TIFF).
+    Deflate,
+}
+
+/// How samples are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SampleKind {
+    /// 32-bit float.
+    F32,
+    /// 16-bit float (EXR).
+    F16,
+    /// 16-bit unsigned (TIFF).
+    U16,
+}
+
+/// Where and how a frame is written.
+#[derive(Debug, Clone, Default)]
+pub struct OutputOptions {
+    /// The file; none or `-` for the standard output.
+    pub path: Option<PathBuf>,
+    /// The format; by the file's extension where none is given, EXR without one.
+    pub format: Option<Format>,
+    /// Compression; none by default.
+    pub compression: Option<CompressionKind>,
+    /// Sample type; by quantity where none is given.
+    pub samples: Option<SampleKind>,
+}
+
+/// How a frame is encoded, once all options are settled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Encoding {
+    Exr(ExrSamples, ExrCompression),
+    Tiff(TiffSamples, TiffCompression),
+}
+
+/// Samples above this are what a full-scale sRGB value becomes in 16 bits.
+const U16_FULL_SCALE: f32 = 65535.0;
+
+impl OutputOptions {
+    fn encoding(&self, header: &FrameHeader) -> Result<Encoding> {
+        let path = self.path.as_deref().filter(|path| *path != Path::new("-"));
+        let extension = path.and_then(Path::extension).map(|end| end.to_string_lossy().to_ascii_lowercase());
+        let format = match (self.format, extension.as_deref()) {
+            (Some(format), _) => format,
+            (None, Some("exr") | None) => Format::Exr,
+            (None, Some("tif" | "tiff")) => Format::Tiff,
+            (None, Some(end)) => {
+                return Err(Error::Usage(format!(
+                    "`.{end}` names no format that is written here; end the name in .exr or .tiff, or give --format"
+                )));
+            }
+        };
+        let quantity = header.metadata.quantity;
+        let is_codes = quantity == QuantityKind::Adu && header.metadata.demosaic.is_none();
+        let default = match format {
+            Format::Tiff if is_codes || quantity == QuantityKind::Srgb => SampleKind::U16,
+            _ => SampleKind::F32,
+        };
+        let samples = self.samples.unwrap_or(default);
+        let compression = self.compression.unwrap_or(CompressionKind::None);
+        let refuse = |problem: &str| Err(Error::Usage(problem.into()));
+        match format {
+            Format::Exr => {
+                let samples = match samples {
+                    SampleKind::F32 => ExrSamples::F32,
+                    SampleKind::F16 => ExrSamples::F16,
+                    SampleKind::U16 => return refuse("EXR stores f32 or f16; for u16 write a TIFF"),
+                };
+                let compression = match compression {
+                    CompressionKind::None => ExrCompression::None,
+                    CompressionKind::Rle => ExrCompression::Rle,
+                    CompressionKind::Zips => ExrCompression::Zips,
+                    CompressionKind::Zip => ExrCompression::Zip,
+                    CompressionKind::Piz => ExrCompression::Piz,
+                    CompressionKind::Lzw | CompressionKind::Deflate => {
+                        return refuse("EXR is compressed by none, rle, zips, zip or piz");
+                    }
+                };
+                Ok(Encoding::Exr(samples, compression))
+            }
+            Format::Tiff => {
+                let samples = match samples {
+                    SampleKind::F32 => TiffSamples::F32,
+                    SampleKind::U16 if is_codes || quantity == QuantityKind::Srgb => TiffSamples::U16,
+                    SampleKind::U16 => {
+                        return Err(Error::Usage(format!(
+                            "u16 would round or clip {quantity}; write f32"
+                        )));
+                    }
+                    SampleKind::F16 => return refuse("TIFF stores u16 or f32 here; for f16 write an EXR"),
+                };
+                let compression = match compression {
+                    CompressionKind::None => TiffCompression::None,
+                    CompressionKind::Lzw => TiffCompression::Lzw,
+                    CompressionKind::Deflate => TiffCompression::Deflate,
+                    _ => return refuse("TIFF is compressed by none, lzw or deflate"),
+                };
+                Ok(Encoding::Tiff(samples, compression))
+            }
+        }
+    }
+}
+
+/// A frame that is being written.
+pub struct FrameWriter {
+    encoder: Encoder,
+    header: FrameHeader,
+    name: String,
+    /// The digest of what a reader will get, and the sidecar's path; only for named files.
+    record: Option<(Sha256, PathBuf)>,
+    encoding: Encoding,
+    stored: Vec<f32>,
+}
+
+enum Encoder {
+    Exr(Box<ExrWriter<Target>>),
+    Tiff(Box<TiffWriter<Target>>),
+}
+
+impl FrameWriter {
+    /// Opens the output and writes the head of the frame. `inputs` are the files that are being read.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where options do not go together, the output is a terminal or an input; [`Error::Disk`].
+    pub fn create(options: &OutputOptions, header: &FrameHeader, inputs: &[Option<FileId>]) -> Result<Self> {
+        let encoding = options.encoding(header)?;
+        let path = options.path.as_deref().filter(|path| *path != Path::new("-"));
+        let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
+        let target = Target::open(path, needs_seek, inputs)?;
+        let name = target.name().to_owned();
+        let record = target.named_file().map(|path| (Sha256::new(), sidecar_path(path)));
+        let metadata = yaml::write_metadata(&header.metadata)?;
+        let software = Some(format!("cyanometer {}", env!("CARGO_PKG_VERSION")));
+        let geometry = &header.geometry;
+        let encoder = match encoding {
+            Encoding::Exr(samples, compression) => {
+                let exposure = header.metadata.exposure;
+                let primaries = match header.metadata.quantity {
+                    QuantityKind::Xyz => Some(XYZ_PRIMARIES),
+                    QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu
+                        if header.has_three_planes() =>
+                    {
+                        let matrix = header.metadata.sensor.as_ref().and_then(|sensor| sensor.xyz_from_camera);
+                        matrix.and_then(|matrix| color::implied_primaries(&matrix))
+                    }
+                    _ => None,
+                };
+                let tags = ExrTags {
+                    metadata: Some(metadata),
+                    software,
+                    exposure_s: exposure.map(|e| e.exposure_s),
+                    f_number: exposure.map(|e| e.f_number),
+                    // Absolute XYZ: (1, 1, 1) has Y = 1 cd m⁻².
+                    white_luminance: (header.metadata.quantity == QuantityKind::Xyz).then_some(1.0),
+                    primaries,
+                    emissive_units: None,
+                };
+                Encoder::Exr(Box::new(ExrWriter::create(target, &name, geometry, samples, compression, &tags)?))
+            }
+            Encoding::Tiff(samples, compression) => {
+                let scale = u16_scale(header.metadata.quantity, samples);
+                let tags = TiffTags { description: Some(metadata), software };
+                Encoder::Tiff(Box::new(TiffWriter::create(
+                    target,
+                    &name,
+                    geometry,
+                    samples,
+                    scale,
+                    compression,
+                    &tags,
+                )?))
+            }
+        };
+        Ok(Self { encoder, header: header.clone(), name, record, encoding, stored: Vec::new() })
+    }
+
+    /// Ends the frame: gives a named file its name, and writes its sidecar.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Disk`]; the file is then not left behind.
+    pub fn finish(self, counts: Counts) -> Result<()> {
+        let mut target = match self.encoder {
+            Encoder::Exr(writer) => {
+                let (mut target, patch) = writer.finish()?;
+                if let Some(patch) = patch {
+                    exr::patch_table(&mut target, &self.name, &patch)?;
+                }
+                target
+            }
+            Encoder::Tiff(writer) => writer.finish()?.0,
+        };
+        target.flush().map_err(|e| Error::disk(&self.name, "write", e))?;
+        let sidecar = match self.record {
+            Some((digest, path)) => {
+                let mut metadata = self.header.metadata;
+                metadata.samples = Some(counts.record(format!("sha256:{}", hex(&digest.finalize()))));
+                let mut file = AtomicFile::create(&path)?;
+                file.write_all(yaml::write_metadata(&metadata)?.as_bytes())
+                    .map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
+                Some(file)
+            }
+            None => None,
+        };
+        // Both files are complete before either gets its name.
+        target.commit()?;
+        sidecar.map_or(Ok(()), AtomicFile::commit)
+    }
+}
+
+/// What samples are multiplied with before they become 16-bit integers.
+fn u16_scale(quantity: QuantityKind, samples: TiffSamples) -> f32 {
+    if samples == TiffSamples::U16 && quantity == QuantityKind::Srgb { U16_FULL_SCALE } else { 1.0 }
+}
+
+impl RowSink for FrameWriter {
+    fn write(&mut self, samples: &[f32]) -> Result<()> {
+        if let Some((digest, _)) = &mut self.record {
+            // The digest is that of the samples as a reader will get them.
+            let scale = match self.encoding {
+                Encoding::Exr(ExrSamples::F16, _) => None,
+                Encoding::Tiff(TiffSamples::U16, _) => {
+                    Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16))
+                }
+                _ => {
+                    update_digest(digest, samples);
+                    return self.encode(samples);
+                }
+            };
+            self.stored.clear();
+            self.stored.extend(samples.iter().map(|&sample| match scale {
+                None => f16::from_f32(sample).to_f32(),
+                Some(scale) => to_sample(f64::from((sample * scale).round().clamp(0.0, U16_FULL_SCALE)).max(0.0)),
+            }));
+            update_digest(digest, &self.stored);
+        }
+        self.encode(samples)
+    }
+}
+
+impl FrameWriter {
+    fn encode(&mut self, samples: &[f32]) -> Result<()> {
+        match &mut self.encoder {
+            Encoder::Exr(writer) => writer.write(samples),
+            Encoder::Tiff(writer) => writer.write_rows(samples),
+        }
+    }
+}
+
+/// Writes a text (a report, a matrix) to a named file or the standard output.
+///
+/// # Errors
+///
+/// [`Error::Disk`].
+pub fn write_text(path: Option<&Path>, text: &str) -> Result<()> {
+    match path.filter(|path| *path != Path::new("-")) {
+        Some(path) => {
+            let mut file = AtomicFile::create(path)?;
+            file.write_all(text.as_bytes()).map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
+            file.commit()
+        }
+        None => {
+            let mut output = io::stdout().lock();
+            let written = output.write_all(text.as_bytes()).and_then(|()| output.flush());
+            written.map_err(|e| Error::disk(super::atomic::STDOUT_NAME, "write", e))
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` [Fichet2021].
+
+use super::csv::SpectralTable;
+use super::data::read_file;
+use super::input::{FrameReader, InputOptions, open_stdin};
+use crate::error::{Error, Result};
+use crate::metadata::FrameHeader;
+use crate::spectrum::{SpectralLibrary, check_wavelengths};
+use crate::stage::RowSource;
+use crate::units::RadianceUnit;
+use ndarray::Array2;
+use std::path::Path;
+
+/// The wavelength in nm that a channel's name states; none for channels of another kind.
+pub fn wavelength_of(channel: &str) -> Option<f64> {
+    let number = channel.strip_prefix("S0.")?.strip_suffix("nm")?;
+    number.replace(',', ".").parse().ok().filter(|nm: &f64| *nm > 0.0 && nm.is_finite())
+}
+
+/// The spectral channels of a frame, by ascending wavelength.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpectralChannels {
+    /// Places of the channels in the frame.
+    pub channels: Vec<usize>,
+    /// Their wavelengths in nm.
+    pub wavelength_nm: Vec<f64>,
+    /// The unit of their samples.
+    pub unit: RadianceUnit,
+}
+
+impl SpectralChannels {
+    /// Finds the spectral channels; `unit` overrides what the file says.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] when there are none, two share a wavelength, or the unit is none that is known.
+    pub fn of(frame: &FrameHeader, unit: Option<RadianceUnit>) -> Result<Self> {
+        let mut found: Vec<(f64, usize)> = frame
+            .geometry
+            .channels
+            .iter()
+            .enumerate()
+            .filter_map(|(place, name)| wavelength_of(name).map(|nm| (nm, place)))
+            .collect();
+        if found.is_empty() {
+            return Err(frame.refuse(
+                "it holds no spectral radiance: no channel is named like S0.550,000000nm; give a spectrum as CSV or a \
+                 spectral EXR",
+            ));
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (wavelength_nm, channels): (Vec<f64>, Vec<usize>) = found.into_iter().unzip();
+        check_wavelengths(&wavelength_nm).map_err(|problem| frame.refuse(problem))?;
+        let stated = &frame.metadata.unit;
+        let unit = match unit {
+            Some(unit) => unit,
+            None if stated.is_empty() => RadianceUnit::default(),
+            None => RadianceUnit::parse(stated).ok_or_else(|| {
+                frame.refuse(format!("its unit of radiance, `{stated}`, is not known; give --radiance-unit"))
+            })?,
+        };
+        Ok(Self { channels, wavelength_nm, unit })
+    }
+}
+
+/// Whether a file is an EXR by its first bytes; a spectrum as CSV is not.
+///
+/// # Errors
+///
+/// [`Error::Disk`].
+pub fn is_exr_file(path: &Path) -> Result<bool> {
+    use std::io::Read;
+    let name = path.display().to_string();
+    let mut head = Vec::new();
+    let file = std::fs::File::open(path).map_err(|e| Error::disk(&name, "open", e))?;
+    file.take(4).read_to_end(&mut head).map_err(|e| Error::disk(&name, "read", e))?;
+    Ok(head == [0x76, 0x2F, 0x31, 0x01])
+}
+
+/// Reads a table of spectra from a file, or from the standard input for `-` or none.
+///
+/// # Errors
+///
+/// Those of [`SpectralTable::parse`], and [`Error::Disk`].
+pub fn read_table(path: Option<&Path>) -> Result<SpectralTable> {
+    use super::input::STDIN_NAME;
+    use std::io::Read;
+    match path.filter(|path| *path != Path::new("-")) {
+        Some(path) => SpectralTable::parse(&path.display().to_string(), &read_file(path)?),
+        None => {
+            let mut bytes = Vec::new();
+            let read = open_stdin()?.take(1 << 28).read_to_end(&mut bytes);
+            read.map_err(|e| Error::disk(STDIN_NAME, "read", e))?;
+            SpectralTable::parse(STDIN_NAME, &bytes)
+        }
+    }
+}
+
+/// Reads a whole library of spectra, CSV or spectral EXR, in W cm⁻² sr⁻¹ nm⁻¹; pixels count row by row.
+///
+/// # Errors
+///
+/// [`Error::Format`] for what is no library, or a radiance that is not finite.
+pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralLibrary> {
+    let name = path.display().to_string();
+    let library = if is_exr_file(path)? {
+        let options = InputOptions { path: Some(path.to_owned()), all_channels: true, ..InputOptions::default() };
+        let mut reader = FrameReader::open(&options)?;
+        let spectral = SpectralChannels::of(reader.header(), unit)?;
+        let geometry = reader.header().geometry.clone();
+        let factor = spectral.unit.in_w_per_cm2_sr_nm();
+        let mut radiance = Array2::zeros((geometry.width * geometry.height, spectral.channels.len()));
+        let mut row = Vec::new();
+        for y in 0..geometry.height {
+            row.clear();
+            reader.read(1, &mut row)?;
+            for (index, channel) in spectral.channels.iter().enumerate() {
+                let samples = &row[channel * geometry.width..(channel + 1) * geometry.width];
+                for (x, &sample) in samples.iter().enumerate() {
+                    radiance[(y * geometry.width + x, index)] = f64::from(sample) * factor;
+                }
+            }
+        }
+        SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance }
+    } else {
+        let table = SpectralTable::parse(&name, &read_file(path)?)?;
+        let unit = unit.or_else(|| table.unit_of(0)).unwrap_or_default();
+        let radiance = table.values * unit.in_w_per_cm2_sr_nm();
+        SpectralLibrary { wavelength_nm: table.wavelength_nm, radiance }
+    };
+    match library.radiance.indexed_iter().find(|(_, value)| !value.is_finite()) {
+        Some(((sample, _), _)) => Err(Error::format(&name, format!("sample {sample} is not finite"))),
+        None => Ok(library),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channel_names_state_wavelengths() {
+        assert_eq!(wavelength_of("S0.550,000000nm"), Some(550.0));
+        assert_eq!(wavelength_of("S0.550.5nm"), Some(550.5));
+        for other in ["R", "S1.550,0nm", "S0.nm", "S0.-1nm", "T.550,0nm"] {
+            assert_eq!(wavelength_of(other), None);
+        }
+    }
+}
