@@ -274,7 +274,7 @@ impl RowSink for FrameWriter {
             self.stored.clear();
             self.stored.extend(samples.iter().map(|&sample| match scale {
                 None => f16::from_f32(sample).to_f32(),
-                Some(scale) => to_sample(f64::from((sample * scale).round().clamp(0.0, U16_FULL_SCALE)).max(0.0)),
+                Some(scale) => to_sample(f64::from((sample * scale).round_ties_even().clamp(0.0, U16_FULL_SCALE)).max(0.0)),
             }));
             update_digest(digest, &self.stored);
         }

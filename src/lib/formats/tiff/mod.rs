@@ -1,0 +1,46 @@
+//! TIFF: rows of samples in and out, without ever holding a whole image.
+//!
+//! The crate `tiff` supplies the vocabulary (numbers of tags, types, compressions) and, in the tests, an independent
+//! witness. Directories and samples are read and written here, because its decoder inverts MinIsWhite, reads the first
+//! plane only of planar files, takes short strips for whole ones, and does not open photometric 32803 (CFA); its
+//! encoder has neither the floating-point predictor nor strips that arrive row by row.
+
+mod chunk;
+mod directory;
+mod layout;
+mod read;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use read::TiffReader;
+pub use write::TiffWriter;
+
+/// What a TIFF's own tags say in words.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TiffTags {
+    /// ImageDescription (270).
+    pub description: Option<String>,
+    /// Software (305).
+    pub software: Option<String>,
+}
+
+/// How samples are stored in a file that we write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TiffSamples {
+    /// 16-bit unsigned integers.
+    U16,
+    /// 32-bit floats.
+    F32,
+}
+
+/// How strips are compressed in a file that we write; without loss, all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TiffCompression {
+    /// Not at all.
+    None,
+    /// LZW: every reader knows it.
+    Lzw,
+    /// Deflate at level 1; higher levels gain nothing on noise.
+    Deflate,
+}

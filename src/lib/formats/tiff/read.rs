@@ -1,0 +1,343 @@
+//! Reading rows.
+
+use super::TiffTags;
+use super::chunk::{Compression, Trouble};
+use super::directory::Source;
+use super::layout::{Layout, Stored};
+use crate::error::Result;
+use crate::frame::Geometry;
+use half::f16;
+use rayon::prelude::*;
+use std::fs::File;
+use std::ops::Range;
+
+/// Decoded bytes that are held at least, where the caller asks for so many: enough work for some threads.
+const DECODED_BYTES: usize = 8 << 20;
+/// Bytes as stored that are held at a time, or those of one chunk if that is more.
+const STORED_BYTES: usize = 16 << 20;
+/// What is not compressed is read in pieces of about this size.
+const PIECE_BYTES: usize = 1 << 20;
+/// Rows that take more than this as `f32` are not worth having together.
+const NATURAL_BYTES: usize = 64 << 20;
+
+/// Reads rows of one image of a TIFF file.
+///
+/// Reads strips and tiles, interleaved and planar; 8, 16 and 32-bit integers, half, single and double floats; no
+/// compression, LZW, Deflate and PackBits with any predictor; both byte orders; classic TIFF and BigTIFF. Gray, RGB,
+/// CMYK, and planes behind a color filter array (photometric 32803). Extra samples are channels like the others.
+/// What it does not read, it refuses by name.
+///
+/// Memory is the decoded bytes of one row of tiles or one strip, or about 8 MiB where these are smaller.
+#[derive(Debug)]
+pub struct TiffReader {
+    source: Source,
+    layout: Layout,
+    /// Rows of a piece: a chunk's rows; or fewer where samples are not compressed, so that any rows can be had.
+    piece_rows: usize,
+    /// The pieces that are decoded, in the order of [`TiffReader::piece_range`].
+    decoded: Vec<u8>,
+    held: Range<usize>,
+}
+
+impl TiffReader {
+    /// Opens image number `page` (0 is the first) of a file, which the user calls `name`.
+    ///
+    /// # Errors
+    ///
+    /// When the file is no TIFF, is damaged or shorter than its tags say, or is of a kind that is not supported.
+    pub fn open(file: File, name: &str, page: usize) -> Result<Self> {
+        let mut source = Source::open(file, name)?;
+        let directory = source.directory(page)?;
+        let layout = Layout::read(&mut source, &directory)?;
+        let piece_rows = if layout.compression == Compression::None {
+            let row_bytes = layout.chunk_row_bytes() * layout.across * layout.planes();
+            layout.chunk_rows.min((PIECE_BYTES / row_bytes).max(1))
+        } else {
+            layout.chunk_rows
+        };
+        Ok(Self { source, layout, piece_rows, decoded: Vec::new(), held: 0..0 })
+    }
+
+    /// Size, place and channels of the image. Channels are `Y`; `Y`, `A`; `R`, `G`, `B`; with `A`; `C`, `M`, `Y`, `K`;
+    /// or else `C0`, `C1` …
+    pub fn geometry(&self) -> &Geometry {
+        &self.layout.geometry
+    }
+
+    /// The texts in the image's tags.
+    pub fn tags(&self) -> &TiffTags {
+        &self.layout.tags
+    }
+
+    /// How samples are stored: `u8`, `i8`, `u16`, `i16`, `u32`, `i32`, `f16`, `f32` or `f64`.
+    pub fn stored_as(&self) -> &'static str {
+        self.layout.stored.name()
+    }
+
+    /// Rows that decode together, where these are not too many; asking for multiples of it is fastest.
+    pub fn natural_rows(&self) -> usize {
+        let row_bytes = self.layout.geometry.row_samples() * size_of::<f32>();
+        if self.layout.chunk_rows.saturating_mul(row_bytes) <= NATURAL_BYTES {
+            self.layout.chunk_rows
+        } else {
+            self.piece_rows.min((PIECE_BYTES / row_bytes).max(1))
+        }
+    }
+
+    /// Reads rows `first_row..first_row + rows` into `samples`, laid out `[row][channel][column]`.
+    ///
+    /// The values are those stored, integers not scaled; integers beyond 2²⁴ and doubles are rounded to `f32`. 8-bit
+    /// MinIsWhite is inverted, wider MinIsWhite is not.
+    ///
+    /// # Errors
+    ///
+    /// When the disk refuses, or a strip or tile is damaged or cut short.
+    ///
+    /// # Panics
+    ///
+    /// When the rows are not those of the image, or `samples` has not their size.
+    pub fn read_rows(&mut self, first_row: usize, rows: usize, samples: &mut [f32]) -> Result<()> {
+        let end = first_row + rows;
+        let row_samples = self.layout.geometry.row_samples();
+        assert!(end <= self.layout.geometry.height && samples.len() == rows * row_samples);
+        let mut row = first_row;
+        let mut rest = samples;
+        while row < end {
+            let piece = self.piece_of(row);
+            if !self.held.contains(&piece) {
+                self.hold(piece..self.piece_of(end - 1) + 1)?;
+            }
+            let until = self.piece_range(self.held.end - 1).end.min(end);
+            let (now, later) = rest.split_at_mut((until - row) * row_samples);
+            let this = &*self;
+            now.par_chunks_mut(row_samples)
+                .with_min_len((PIECE_BYTES / size_of::<f32>() / row_samples).max(1))
+                .enumerate()
+                .for_each(|(index, samples)| this.convert_row(row + index, samples));
+            (row, rest) = (until, later);
+        }
+        Ok(())
+    }
+
+    /// Pieces in a chunk.
+    fn pieces_in_chunk(&self) -> usize {
+        self.layout.chunk_rows.div_ceil(self.piece_rows)
+    }
+
+    /// The piece that holds a row.
+    fn piece_of(&self, row: usize) -> usize {
+        row / self.layout.chunk_rows * self.pieces_in_chunk()
+            + row % self.layout.chunk_rows / self.piece_rows
+    }
+
+    /// The image's rows in a piece.
+    fn piece_range(&self, piece: usize) -> Range<usize> {
+        let (chunk, part) = (piece / self.pieces_in_chunk(), piece % self.pieces_in_chunk());
+        let chunk_first = chunk * self.layout.chunk_rows;
+        let chunk_end = (chunk_first + self.layout.chunk_rows).min(self.layout.geometry.height);
+        let first = chunk_first + part * self.piece_rows;
+        first..(first + self.piece_rows).min(chunk_end)
+    }
+
+    /// Bytes that a chunk takes in a decoded piece.
+    fn piece_bytes(&self) -> usize {
+        self.piece_rows * self.layout.chunk_row_bytes()
+    }
+
+    /// Chunks that a row of the image passes through, in all planes.
+    fn chunks_in_piece(&self) -> usize {
+        self.layout.planes() * self.layout.across
+    }
+
+    /// Decodes as many of the pieces as are to be held at a time, at least the first.
+    fn hold(&mut self, pieces: Range<usize>) -> Result<()> {
+        self.held = 0..0;
+        let one = self.piece_bytes() * self.chunks_in_piece();
+        let fitting = (DECODED_BYTES / one).clamp(1, pieces.len());
+        let pieces = pieces.start..pieces.start + fitting;
+        self.decoded.clear();
+        if self.decoded.try_reserve_exact(one * fitting).is_err() {
+            let mebibytes = one >> 20;
+            return Err(self.source.problem(format!(
+                "its strips or tiles need {mebibytes} MiB of memory at a time, and there is not so much; rewrite it with smaller ones, for example with `tiffcp -r 64`"
+            )));
+        }
+        self.decoded.resize(one * fitting, 0);
+
+        // Reads one after another, decodes in parallel.
+        let mut decoded = std::mem::take(&mut self.decoded);
+        let mut rest = &mut decoded[..];
+        let mut jobs = Vec::new();
+        let mut pending = 0;
+        for piece in pieces.clone() {
+            for plane in 0..self.layout.planes() {
+                for across in 0..self.layout.across {
+                    let (place, later) = rest.split_at_mut(self.piece_bytes());
+                    rest = later;
+                    let job = self.job(piece, plane, across, place)?;
+                    pending += job.stored.len();
+                    jobs.push(job);
+                    if pending > STORED_BYTES {
+                        self.decode(std::mem::take(&mut jobs))?;
+                        pending = 0;
+                    }
+                }
+            }
+        }
+        self.decode(jobs)?;
+        self.decoded = decoded;
+        self.held = pieces;
+        Ok(())
+    }
+
+    /// Reads the bytes of one chunk of a piece.
+    fn job<'a>(
+        &mut self,
+        piece: usize,
+        plane: usize,
+        across: usize,
+        place: &'a mut [u8],
+    ) -> Result<Job<'a>> {
+        let layout = &self.layout;
+        let (down, part) = (piece / self.pieces_in_chunk(), piece % self.pieces_in_chunk());
+        let chunk = (plane * layout.down + down) * layout.across + across;
+        let (offset, stored) = layout.chunks[chunk];
+        let range = self.piece_range(piece);
+        // Tiles are stored whole, also those that hang over the lower edge.
+        let rows = if layout.tiled && layout.compression != Compression::None {
+            self.piece_rows
+        } else {
+            range.len()
+        };
+        let decoded = &mut place[..rows * layout.chunk_row_bytes()];
+        if layout.compression == Compression::None {
+            let skip = part * self.piece_rows * layout.chunk_row_bytes();
+            self.source.read_at(offset + skip as u64, decoded)?;
+            return Ok(Job { chunk, stored: Vec::new(), decoded });
+        }
+        // No compression makes data so much longer; what is beyond cannot be needed.
+        let most = 2 * decoded.len() as u64 + 1024;
+        let mut bytes = vec![0; usize::try_from(stored.min(most)).unwrap_or_default()];
+        self.source.read_at(offset, &mut bytes)?;
+        Ok(Job { chunk, stored: bytes, decoded })
+    }
+
+    /// Decodes chunks, all of them or up to an error.
+    fn decode(&self, jobs: Vec<Job>) -> Result<()> {
+        let layout = &self.layout;
+        let results: Vec<(usize, std::result::Result<(), Trouble>)> = jobs
+            .into_par_iter()
+            .map(|Job { chunk, stored, decoded }| {
+                let result = match layout.compression {
+                    Compression::None => Ok(()),
+                    compression => compression.decode(&stored, decoded),
+                };
+                layout.predictor.undo(
+                    decoded,
+                    layout.chunk_row_bytes(),
+                    layout.chunk_channels(),
+                    layout.stored.bytes(),
+                    self.source.big_endian,
+                );
+                (chunk, result)
+            })
+            .collect();
+        for (chunk, result) in results {
+            if let Err(trouble) = result {
+                let what = if layout.tiled { "tile" } else { "strip" };
+                return Err(self.source.problem(format!("{what} {chunk} {}", trouble.text())));
+            }
+        }
+        Ok(())
+    }
+
+    /// Converts one row of the held pieces.
+    fn convert_row(&self, row: usize, samples: &mut [f32]) {
+        match self.layout.stored {
+            Stored::U8 => self.convert(row, samples, |[byte]: [u8; 1]| f32::from(byte)),
+            Stored::I8 => self.convert(row, samples, |bytes| f32::from(i8::from_ne_bytes(bytes))),
+            Stored::U16 => self.convert(row, samples, |bytes| f32::from(u16::from_ne_bytes(bytes))),
+            Stored::I16 => self.convert(row, samples, |bytes| f32::from(i16::from_ne_bytes(bytes))),
+            Stored::U32 => self.convert(row, samples, |bytes| u32::from_ne_bytes(bytes) as f32),
+            Stored::I32 => self.convert(row, samples, |bytes| i32::from_ne_bytes(bytes) as f32),
+            Stored::F16 => self.convert(row, samples, |bytes| f16::from_ne_bytes(bytes).to_f32()),
+            Stored::F32 => self.convert(row, samples, f32::from_ne_bytes),
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "rounding to f32 is what is promised"
+            )]
+            Stored::F64 => self.convert(row, samples, |bytes| f64::from_ne_bytes(bytes) as f32),
+        }
+        if self.layout.inverted {
+            for sample in samples {
+                *sample = 255.0 - *sample;
+            }
+        }
+    }
+
+    /// Converts one row, sample by sample with `value`.
+    fn convert<const BYTES: usize>(
+        &self,
+        row: usize,
+        samples: &mut [f32],
+        value: impl Fn([u8; BYTES]) -> f32 + Copy,
+    ) {
+        let layout = &self.layout;
+        let piece = self.piece_of(row);
+        let row_bytes = layout.chunk_row_bytes();
+        let within = (row - self.piece_range(piece).start) * row_bytes;
+        let first_chunk = (piece - self.held.start) * self.chunks_in_piece();
+        let width = layout.geometry.width;
+        let channels = layout.chunk_channels();
+        for plane in 0..layout.planes() {
+            let samples = &mut samples[plane * channels * width..][..channels * width];
+            for across in 0..layout.across {
+                let chunk = first_chunk + plane * layout.across + across;
+                let stored = &self.decoded[chunk * self.piece_bytes() + within..][..row_bytes];
+                let first = across * layout.chunk_width;
+                let columns = first..(first + layout.chunk_width).min(width);
+                match channels {
+                    1 => separate::<1, BYTES>(stored, samples, width, columns, value),
+                    2 => separate::<2, BYTES>(stored, samples, width, columns, value),
+                    3 => separate::<3, BYTES>(stored, samples, width, columns, value),
+                    4 => separate::<4, BYTES>(stored, samples, width, columns, value),
+                    _ => {
+                        let (stored, _) = stored.as_chunks::<BYTES>();
+                        for channel in 0..channels {
+                            let line = &mut samples[channel * width..][columns.clone()];
+                            let stored = stored[channel..].iter().step_by(channels);
+                            for (sample, bytes) in line.iter_mut().zip(stored) {
+                                *sample = value(*bytes);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// One chunk on its way.
+struct Job<'a> {
+    chunk: usize,
+    stored: Vec<u8>,
+    decoded: &'a mut [u8],
+}
+
+/// Takes the interleaved channels of a chunk's row apart; with their number known, the compiler unrolls it.
+fn separate<const CHANNELS: usize, const BYTES: usize>(
+    stored: &[u8],
+    samples: &mut [f32],
+    width: usize,
+    columns: Range<usize>,
+    value: impl Fn([u8; BYTES]) -> f32,
+) {
+    let (stored, _) = stored.as_chunks::<BYTES>();
+    let (pixels, _) = stored.as_chunks::<CHANNELS>();
+    for channel in 0..CHANNELS {
+        let line = &mut samples[channel * width..][columns.clone()];
+        for (sample, pixel) in line.iter_mut().zip(pixels) {
+            *sample = value(pixel[channel]);
+        }
+    }
+}

@@ -1,0 +1,483 @@
+//! Writing rows.
+
+use super::chunk::{self, Predictor};
+use super::directory::type_bytes;
+use super::{TiffCompression, TiffSamples, TiffTags};
+use crate::error::{Error, Result};
+use crate::frame::Geometry;
+use rayon::prelude::*;
+use std::io::{Seek, SeekFrom, Write};
+use tiff::tags::{CompressionMethod, Tag, Type};
+
+/// Uncompressed bytes of a strip, about.
+const STRIP_BYTES: usize = 128 << 10;
+/// Uncompressed bytes that are collected before they are compressed, in parallel, and written; or those of one strip
+/// if that is more.
+const COLLECTED_BYTES: usize = 4 << 20;
+
+/// Writes rows as a TIFF file: little-endian, interleaved strips, the directory at the end.
+///
+/// The bytes depend on what is written only, not on the number of rows per call or of threads. Memory is about 8 MiB.
+#[derive(Debug)]
+pub struct TiffWriter<W: Write + Seek> {
+    output: W,
+    name: String,
+    geometry: Geometry,
+    samples: TiffSamples,
+    scale: f32,
+    compression: TiffCompression,
+    tags: TiffTags,
+    big: bool,
+    rows_per_strip: usize,
+    rows: usize,
+    /// Where the next byte goes.
+    position: u64,
+    /// Interleaved rows that are not written yet.
+    collected: Vec<u8>,
+    /// Offset and bytes of the strips written.
+    strips: Vec<(u64, u64)>,
+    unfit: u64,
+}
+
+impl<W: Write + Seek> TiffWriter<W> {
+    /// Starts a file that the user calls `name`. For [`TiffSamples::U16`], each sample is multiplied with `scale`
+    /// before it is rounded: 1 for ADU, 65535 for sRGB; floats are written as they are.
+    ///
+    /// `output` must be empty and at its start. The file is a BigTIFF if it might not fit into 4 GiB.
+    ///
+    /// # Errors
+    ///
+    /// When the frame is larger than TIFF can say, or the disk refuses.
+    pub fn create(
+        output: W,
+        name: &str,
+        geometry: &Geometry,
+        samples: TiffSamples,
+        scale: f32,
+        compression: TiffCompression,
+        tags: &TiffTags,
+    ) -> Result<Self> {
+        let big = needs_big_tiff(geometry, samples, compression, tags);
+        Self::begin(output, name, geometry, samples, scale, compression, tags, big)
+    }
+
+    /// [`TiffWriter::create`], told whether it is to be a BigTIFF.
+    #[expect(clippy::too_many_arguments, reason = "those of `create` and one for the tests")]
+    pub(super) fn begin(
+        output: W,
+        name: &str,
+        geometry: &Geometry,
+        samples: TiffSamples,
+        scale: f32,
+        compression: TiffCompression,
+        tags: &TiffTags,
+        big: bool,
+    ) -> Result<Self> {
+        let fits = u32::try_from(geometry.width).is_ok()
+            && u32::try_from(geometry.height).is_ok()
+            && u16::try_from(geometry.channels.len()).is_ok();
+        if !fits || geometry.height * geometry.row_samples() == 0 {
+            return Err(Error::format(
+                name,
+                format!(
+                    "a TIFF cannot hold {}x{} pixels of {} channels",
+                    geometry.width,
+                    geometry.height,
+                    geometry.channels.len()
+                ),
+            ));
+        }
+        let rows_per_strip = rows_per_strip(geometry, samples);
+        let mut writer = Self {
+            output,
+            name: name.to_owned(),
+            geometry: geometry.clone(),
+            samples,
+            scale,
+            compression,
+            tags: tags.clone(),
+            big,
+            rows_per_strip,
+            rows: 0,
+            position: 0,
+            collected: Vec::new(),
+            strips: Vec::new(),
+            unfit: 0,
+        };
+        // The offset of the directory follows in the end.
+        if writer.big {
+            writer.put(b"II\x2b\0\x08\0\0\0\0\0\0\0\0\0\0\0")?;
+        } else {
+            writer.put(b"II\x2a\0\0\0\0\0")?;
+        }
+        Ok(writer)
+    }
+
+    /// Takes the next rows, laid out `[row][channel][column]`, as many as there are in `samples`.
+    ///
+    /// # Errors
+    ///
+    /// When the disk refuses.
+    ///
+    /// # Panics
+    ///
+    /// When these are not whole rows, or more than the frame has.
+    pub fn write_rows(&mut self, samples: &[f32]) -> Result<()> {
+        let row_samples = self.geometry.row_samples();
+        assert!(samples.len().is_multiple_of(row_samples));
+        let rows = samples.len() / row_samples;
+        assert!(self.rows + rows <= self.geometry.height);
+        self.rows += rows;
+        let (row_bytes, strip_bytes) = (self.row_bytes(), self.rows_per_strip * self.row_bytes());
+        let together = (COLLECTED_BYTES / strip_bytes).max(1) * strip_bytes;
+        let mut rest = samples;
+        while !rest.is_empty() {
+            let missing = (together - self.collected.len()) / row_bytes * row_samples;
+            let (now, later) = rest.split_at(missing.min(rest.len()));
+            rest = later;
+            self.collect(now);
+            if self.collected.len() == together {
+                self.write_strips()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what is left, and the directory. Gives the output back, and the number of samples that did not fit into
+    /// 16 bits: beyond 0…65535 after scaling and rounding, which are stored as the nearer end, or NaN, stored as 0.
+    ///
+    /// # Errors
+    ///
+    /// When rows are missing, or the disk refuses.
+    pub fn finish(mut self) -> Result<(W, u64)> {
+        if self.rows != self.geometry.height {
+            let (rows, height) = (self.rows, self.geometry.height);
+            return Err(Error::format(
+                &self.name,
+                format!("only {rows} of {height} rows were written; the file is not complete"),
+            ));
+        }
+        self.write_strips()?;
+        self.write_directory()?;
+        self.output.flush().map_err(|source| Error::disk(&self.name, "write", source))?;
+        Ok((self.output, self.unfit))
+    }
+
+    fn row_bytes(&self) -> usize {
+        self.geometry.row_samples() * sample_bytes(self.samples)
+    }
+
+    fn predictor(&self) -> Predictor {
+        match (self.compression, self.samples) {
+            (TiffCompression::None, _) => Predictor::None,
+            (_, TiffSamples::U16) => Predictor::Horizontal,
+            (_, TiffSamples::F32) => Predictor::FloatingPoint,
+        }
+    }
+
+    /// Appends rows, interleaved and little-endian, to those collected.
+    fn collect(&mut self, samples: &[f32]) {
+        let start = self.collected.len();
+        self.collected.resize(start + samples.len() * sample_bytes(self.samples), 0);
+        let rows = self.collected[start..]
+            .par_chunks_mut(self.geometry.row_samples() * sample_bytes(self.samples));
+        let lines = samples.par_chunks(self.geometry.row_samples());
+        let (channels, scale, kind) = (self.geometry.channels.len(), self.scale, self.samples);
+        self.unfit += rows
+            .zip(lines)
+            .with_min_len(16)
+            .map(|(row, samples)| match kind {
+                TiffSamples::U16 => interleave_u16(samples, row, channels, scale),
+                TiffSamples::F32 => {
+                    interleave(samples, row, channels, f32::to_le_bytes);
+                    0
+                }
+            })
+            .sum::<u64>();
+    }
+
+    /// Compresses and writes the rows collected; whole strips, but for the frame's last.
+    fn write_strips(&mut self) -> Result<()> {
+        let (row_bytes, channels) = (self.row_bytes(), self.geometry.channels.len());
+        let (predictor, compression) = (self.predictor(), self.compression);
+        let mut collected = std::mem::take(&mut self.collected);
+        if compression == TiffCompression::None {
+            for strip in collected.chunks(self.rows_per_strip * row_bytes) {
+                self.put_strip(strip)?;
+            }
+        } else {
+            let strips: Vec<std::io::Result<Vec<u8>>> = collected
+                .par_chunks_mut(self.rows_per_strip * row_bytes)
+                .map(|strip| {
+                    predictor.apply(strip, row_bytes, channels);
+                    chunk::encode(compression, strip)
+                })
+                .collect();
+            for strip in strips {
+                let strip = strip.map_err(|source| Error::disk(&self.name, "compress", source))?;
+                self.put_strip(&strip)?;
+            }
+        }
+        collected.clear();
+        self.collected = collected;
+        Ok(())
+    }
+
+    fn put_strip(&mut self, strip: &[u8]) -> Result<()> {
+        self.strips.push((self.position, strip.len() as u64));
+        self.put(strip)
+    }
+
+    /// Writes bytes at the end.
+    fn put(&mut self, bytes: &[u8]) -> Result<()> {
+        self.output.write_all(bytes).map_err(|source| Error::disk(&self.name, "write", source))?;
+        self.position += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// Writes the directory at the end and its offset into the header.
+    fn write_directory(&mut self) -> Result<()> {
+        // What does not fit into an entry stands before the directory.
+        let mut entries: Vec<u8> = Vec::new();
+        let fields = self.fields();
+        let count = fields.len() as u64;
+        for Field { tag, kind, count, mut bytes } in fields {
+            entries.extend(tag.to_u16().to_le_bytes());
+            entries.extend(kind.to_u16().to_le_bytes());
+            self.append_offset(&mut entries, count);
+            let inline = if self.big { 8 } else { 4 };
+            if bytes.len() <= inline {
+                bytes.resize(inline, 0);
+                entries.extend(bytes);
+            } else {
+                self.align()?;
+                self.append_offset(&mut entries, self.position);
+                self.put(&bytes)?;
+            }
+        }
+        self.align()?;
+        let directory = self.position;
+        let mut table = Vec::with_capacity(entries.len() + 16);
+        if self.big {
+            table.extend(count.to_le_bytes());
+        } else {
+            table.extend(count.to_le_bytes().into_iter().take(2));
+        }
+        table.extend(entries);
+        self.append_offset(&mut table, 0);
+        self.put(&table)?;
+        if !self.big && self.position > u64::from(u32::MAX) {
+            return Err(Error::format(
+                &self.name,
+                "the file came out larger than 4 GiB; write it without compression",
+            ));
+        }
+        let mut offset = Vec::new();
+        self.append_offset(&mut offset, directory);
+        self.output
+            .seek(SeekFrom::Start(if self.big { 8 } else { 4 }))
+            .and_then(|_| self.output.write_all(&offset))
+            .and_then(|()| self.output.seek(SeekFrom::End(0)))
+            .map_err(|source| Error::disk(&self.name, "write", source))?;
+        Ok(())
+    }
+
+    /// Goes on at an even place, as the specification asks.
+    fn align(&mut self) -> Result<()> {
+        if self.position % 2 == 1 { self.put(&[0]) } else { Ok(()) }
+    }
+
+    /// Appends an offset or a count: four bytes, or eight in a BigTIFF.
+    fn append_offset(&self, bytes: &mut Vec<u8>, offset: u64) {
+        bytes.extend(offset.to_le_bytes().into_iter().take(if self.big { 8 } else { 4 }));
+    }
+
+    /// All fields of the directory, in the order of their tags.
+    fn fields(&self) -> Vec<Field> {
+        let channels = self.geometry.channels.len();
+        let (bits, format) = match self.samples {
+            TiffSamples::U16 => (16, 1),
+            TiffSamples::F32 => (32, 3),
+        };
+        let compression = match self.compression {
+            TiffCompression::None => CompressionMethod::None,
+            TiffCompression::Lzw => CompressionMethod::LZW,
+            TiffCompression::Deflate => CompressionMethod::Deflate,
+        };
+        let (photometric, colors) = if channels < 3 { (1, 1) } else { (2, 3) };
+        let predictor = match self.predictor() {
+            Predictor::None => 1,
+            Predictor::Horizontal => 2,
+            Predictor::FloatingPoint => 3,
+        };
+        let [offsets, counts] = [|strip: &(u64, u64)| strip.0, |strip: &(u64, u64)| strip.1]
+            .map(|part| self.offsets(self.strips.iter().map(part)));
+        let long =
+            |tag, value: usize| Field::new(tag, Type::LONG, value.to_le_bytes()[..4].to_vec());
+        let short = |tag, value: u16| Field::new(tag, Type::SHORT, value.to_le_bytes().to_vec());
+        let shorts = |tag, value: u16, count: usize| {
+            Field::new(tag, Type::SHORT, value.to_le_bytes().repeat(count))
+        };
+        let ratio = |tag, value: u32| {
+            let bytes = [value, 1].iter().flat_map(|part| part.to_le_bytes()).collect();
+            Field::new(tag, Type::RATIONAL, bytes)
+        };
+        let text = |tag, text: &Option<String>| {
+            text.as_ref().map(|text| {
+                let mut bytes: Vec<u8> = text.bytes().filter(|&byte| byte != 0).collect();
+                bytes.push(0);
+                Field::new(tag, Type::ASCII, bytes)
+            })
+        };
+        let mut fields = vec![
+            long(Tag::ImageWidth, self.geometry.width),
+            long(Tag::ImageLength, self.geometry.height),
+            shorts(Tag::BitsPerSample, bits, channels),
+            short(Tag::Compression, compression.to_u16()),
+            short(Tag::PhotometricInterpretation, photometric),
+        ];
+        fields.extend(text(Tag::ImageDescription, &self.tags.description));
+        fields.extend([
+            Field { tag: Tag::StripOffsets, ..offsets },
+            short(Tag::SamplesPerPixel, u16::try_from(channels).unwrap_or(u16::MAX)),
+            long(Tag::RowsPerStrip, self.rows_per_strip),
+            Field { tag: Tag::StripByteCounts, ..counts },
+            ratio(Tag::XResolution, 1),
+            ratio(Tag::YResolution, 1),
+            short(Tag::PlanarConfiguration, 1),
+        ]);
+        if let [Ok(x), Ok(y)] = self.geometry.origin.map(u32::try_from)
+            && [x, y] != [0, 0]
+        {
+            fields.extend([ratio(Tag::Unknown(286), x), ratio(Tag::Unknown(287), y)]);
+        }
+        fields.push(short(Tag::ResolutionUnit, 1));
+        fields.extend(text(Tag::Software, &self.tags.software));
+        if predictor != 1 {
+            fields.push(short(Tag::Predictor, predictor));
+        }
+        if channels > colors {
+            fields.push(shorts(Tag::ExtraSamples, 0, channels - colors));
+        }
+        fields.push(shorts(Tag::SampleFormat, format, channels));
+        fields
+    }
+
+    /// A field of offsets or byte counts.
+    fn offsets(&self, values: impl Iterator<Item = u64>) -> Field {
+        let mut bytes = Vec::new();
+        values.for_each(|value| self.append_offset(&mut bytes, value));
+        Field::new(Tag::StripOffsets, if self.big { Type::LONG8 } else { Type::LONG }, bytes)
+    }
+}
+
+/// One entry of the directory.
+struct Field {
+    tag: Tag,
+    kind: Type,
+    count: u64,
+    bytes: Vec<u8>,
+}
+
+impl Field {
+    fn new(tag: Tag, kind: Type, bytes: Vec<u8>) -> Self {
+        Self { tag, kind, count: (bytes.len() / type_bytes(kind.to_u16())) as u64, bytes }
+    }
+}
+
+fn sample_bytes(samples: TiffSamples) -> usize {
+    match samples {
+        TiffSamples::U16 => 2,
+        TiffSamples::F32 => 4,
+    }
+}
+
+/// Rows of all strips but the last.
+fn rows_per_strip(geometry: &Geometry, samples: TiffSamples) -> usize {
+    let row_bytes = geometry.row_samples() * sample_bytes(samples);
+    (STRIP_BYTES / row_bytes.max(1)).clamp(1, geometry.height.max(1))
+}
+
+/// Whether the file might not fit into the 4 GiB of a classic TIFF.
+pub(super) fn needs_big_tiff(
+    geometry: &Geometry,
+    samples: TiffSamples,
+    compression: TiffCompression,
+    tags: &TiffTags,
+) -> bool {
+    let row_bytes = geometry.row_samples() * sample_bytes(samples);
+    let data = geometry.height as u128 * row_bytes as u128;
+    let worst = match compression {
+        TiffCompression::None => data,
+        TiffCompression::Deflate => data + data / 10,
+        // Codes of up to 12 bits, each for one byte where nothing repeats.
+        TiffCompression::Lzw => data + data / 2,
+    };
+    let strips = geometry.height.div_ceil(rows_per_strip(geometry, samples)) as u128;
+    let texts = [&tags.description, &tags.software];
+    let text_bytes: usize = texts.into_iter().flatten().map(String::len).sum();
+    let directory = 4096 + 16 * strips + 6 * geometry.channels.len() as u128 + text_bytes as u128;
+    worst + directory > u128::from(u32::MAX)
+}
+
+/// Interleaves the channels of a row.
+fn interleave<const BYTES: usize>(
+    samples: &[f32],
+    row: &mut [u8],
+    channels: usize,
+    bytes: impl Fn(f32) -> [u8; BYTES] + Copy,
+) {
+    match channels {
+        1 => interleave_known::<1, BYTES>(samples, row, bytes),
+        3 => interleave_known::<3, BYTES>(samples, row, bytes),
+        4 => interleave_known::<4, BYTES>(samples, row, bytes),
+        _ => {
+            let (places, _) = row.as_chunks_mut::<BYTES>();
+            for (channel, line) in samples.chunks_exact(samples.len() / channels).enumerate() {
+                for (place, sample) in places[channel..].iter_mut().step_by(channels).zip(line) {
+                    *place = bytes(*sample);
+                }
+            }
+        }
+    }
+}
+
+/// Interleaves a number of channels that the compiler knows.
+fn interleave_known<const CHANNELS: usize, const BYTES: usize>(
+    samples: &[f32],
+    row: &mut [u8],
+    bytes: impl Fn(f32) -> [u8; BYTES],
+) {
+    let (places, _) = row.as_chunks_mut::<BYTES>();
+    let (pixels, _) = places.as_chunks_mut::<CHANNELS>();
+    for (channel, line) in samples.chunks_exact(pixels.len()).enumerate() {
+        for (pixel, sample) in pixels.iter_mut().zip(line) {
+            pixel[channel] = bytes(*sample);
+        }
+    }
+}
+
+/// Interleaves a row as 16-bit integers, and counts the samples that do not fit.
+fn interleave_u16(samples: &[f32], row: &mut [u8], channels: usize, scale: f32) -> u64 {
+    let unfit: u32 = samples
+        .iter()
+        .map(|sample| u32::from(!(0..=i32::from(u16::MAX)).contains(&rounded(sample * scale))))
+        .sum();
+    interleave(samples, row, channels, |sample| {
+        let fitting = rounded(sample * scale).clamp(0, i32::from(u16::MAX));
+        let [low, high, ..] = fitting.to_le_bytes();
+        [low, high]
+    });
+    unfit.into()
+}
+
+/// The nearest integer, ties to even, for values from −1 to 65536; what is beyond becomes the nearer of these, and NaN
+/// becomes −1.
+fn rounded(value: f32) -> i32 {
+    // 1.5·2²³: at this size a float's last bit is worth 1, so adding it rounds, and the integer stands in the lowest
+    // bits. The compiler makes vectors of this, unlike of `round_ties_even`.
+    const SHIFT: f32 = 12_582_912.0;
+    #[expect(clippy::manual_clamp, reason = "`clamp` lets NaN pass, and here it must not")]
+    let shifted = value.max(-1.0).min(65536.0) + SHIFT;
+    shifted.to_bits().wrapping_sub(SHIFT.to_bits()).cast_signed()
+}
