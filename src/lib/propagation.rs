@@ -2,7 +2,7 @@
 //!
 //! Each stage has the **exact** moments and, where they differ, those of the **paper**.
 
-use crate::metadata::{AdcRecord, FrameHeader, NoiseRecord, PoissonKind};
+use crate::metadata::{AdcRecord, FrameHeader, NoiseRecord, PoissonKind, PredictedRecord};
 use crate::noise::{NoiseModel, rectified_mean, rectified_mean_square};
 use crate::numerics::normal::{self, MeanVariance, NearlyNormal};
 use crate::units::QuantityKind;
@@ -258,6 +258,14 @@ pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Option<[Prediction
         }
         _ => None,
     }
+}
+
+/// Writes the predicted moments of a frame into its metadata, where there are any.
+pub fn note(frame: &mut FrameHeader, equations: Equations) {
+    frame.metadata.predicted = of_frame(frame, equations).map(|classes| PredictedRecord {
+        mean: classes.map(|class| class.moments.mean),
+        std: classes.map(|class| class.moments.std()),
+    });
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
 use crate::optics::Exposure;
-use crate::spectrum::{Curve, WavelengthGrid};
+use crate::spectrum::{Curve, WavelengthGrid, fold};
 use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, LIGHT_M_PER_S, M_PER_NM, PLANCK_J_S};
 use serde::{Deserialize, Serialize};
 
@@ -215,6 +215,29 @@ pub struct GridWeights {
     pub weights: [Vec<f64>; 3],
     /// How many wavelengths were left out because no class responds there.
     pub left_out: usize,
+}
+
+impl GridWeights {
+    /// The camera for radiances that are sampled at `sampled_nm`, and the share of its response that lies beyond them.
+    pub fn camera(&self, sampled_nm: &[f64]) -> (Camera, f64) {
+        let folded = self.weights.each_ref().map(|weights| fold(sampled_nm, &self.wavelengths_nm, weights));
+        let uncovered = folded.iter().map(|class| class.uncovered).fold(0.0, f64::max);
+        (Camera { weights: folded.map(|class| class.weights) }, uncovered)
+    }
+}
+
+/// A sensor behind a lens at a set exposure, for radiances on one set of wavelengths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// Electrons per unit of radiance at each wavelength, for R, G and B.
+    weights: [Vec<f64>; 3],
+}
+
+impl Camera {
+    /// Signal electrons of R, G and B from a radiance in W cm⁻² sr⁻¹ nm⁻¹.
+    pub fn electrons(&self, radiance: &[f64]) -> [f64; 3] {
+        self.weights.each_ref().map(|weights| weights.iter().zip(radiance).map(|(w, l)| w * l).sum())
+    }
 }
 
 #[cfg(test)]

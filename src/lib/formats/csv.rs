@@ -96,6 +96,11 @@ impl SpectralTable {
         Ok(Self { name: name.into(), wavelength_nm, columns, values })
     }
 
+    /// The file as messages call it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// The place of a column; the first, where none is named.
     ///
     /// # Errors

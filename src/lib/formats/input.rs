@@ -77,14 +77,23 @@ impl FrameReader {
             Some(path) => (path.display().to_string(), open_path(path)?),
             None => (STDIN_NAME.to_owned(), open_stdin()?),
         };
+        Self::open_file(input, &name, path, options)
+    }
+
+    /// Opens a frame in a file that is open already and stands at the frame's first byte; `path` leads to its sidecar.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`].
+    pub fn open_file(input: File, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let id = input.metadata().ok().map(|m| file_id(&m));
-        let (file, id) = sort_out(input, &name, options.part, id)?;
+        let (file, id) = sort_out(input, name, options.part, id)?;
         let (stored, stored_as) = match &file {
             Rows::Exr(reader) => (reader.geometry().clone(), reader.stored_as()),
             Rows::Tiff(reader) => (reader.geometry().clone(), reader.stored_as()),
         };
         let mut notes = Vec::new();
-        let (metadata, sidecar) = find_metadata(&file, &name, path, options)?;
+        let (metadata, sidecar) = find_metadata(&file, name, path, options)?;
         let geometry = keep_planes(&stored, options.all_channels, metadata.quantity);
         if geometry.channels.len() < stored.channels.len() {
             let dropped = stored.channels[geometry.channels.len()..].join(", ");
@@ -95,7 +104,7 @@ impl FrameReader {
             sidecar,
             digest: Sha256::new(),
         });
-        let header = FrameHeader { name, geometry, metadata };
+        let header = FrameHeader { name: name.into(), geometry, metadata };
         Ok(Self { file, header, stored, stored_as, id, rows_read: 0, check, buffer: Vec::new(), notes })
     }
 
@@ -218,6 +227,34 @@ pub fn open_stdin() -> Result<File> {
     Ok(File::from(owned))
 }
 
+/// Opens a named file, or the standard input, so that it can be read from its start more than once; what comes down a
+/// pipe is copied to a temporary file. Gives the name for messages too.
+///
+/// # Errors
+///
+/// [`Error::Disk`], [`Error::Format`] for directories, [`Error::Usage`] for a terminal.
+pub fn open_seekable(path: Option<&Path>) -> Result<(File, String)> {
+    let (name, mut file) = match path {
+        Some(path) => (path.display().to_string(), open_path(path)?),
+        None => (STDIN_NAME.to_owned(), open_stdin()?),
+    };
+    if !file.metadata().is_ok_and(|m| m.is_file()) {
+        file = spool(&mut file, &name)?;
+    }
+    Ok((file, name))
+}
+
+/// Copies a stream to a temporary file and stands at its start.
+fn spool(stream: &mut impl Read, name: &str) -> Result<File> {
+    let mut copied = || -> io::Result<File> {
+        let mut copy = tempfile::tempfile()?;
+        io::copy(stream, &mut copy)?;
+        copy.rewind()?;
+        Ok(copy)
+    };
+    copied().map_err(|e| Error::disk(name, "copy to a temporary file", e))
+}
+
 /// Finds out what a file holds and opens it with the right reader. A stream that its format cannot read without seeking
 /// is first copied to a temporary file.
 fn sort_out(mut input: File, name: &str, part: usize, id: Option<FileId>) -> Result<(Rows, Option<FileId>)> {
@@ -245,13 +282,7 @@ fn sort_out(mut input: File, name: &str, part: usize, id: Option<FileId>) -> Res
         let whole = io::Cursor::new(head).chain(io::BufReader::with_capacity(1 << 16, input));
         return Ok((Rows::Exr(Box::new(ExrReader::stream(Box::new(whole), name)?)), None));
     } else {
-        let spooled = || -> io::Result<File> {
-            let mut copy = tempfile::tempfile()?;
-            io::copy(&mut io::Cursor::new(&head).chain(&mut input), &mut copy)?;
-            copy.rewind()?;
-            Ok(copy)
-        };
-        input = spooled().map_err(|e| Error::disk(name, "copy to a temporary file", e))?;
+        input = spool(&mut io::Cursor::new(&head).chain(&mut input), name)?;
     }
     let id = id.filter(|_| seekable);
     if is_exr {

@@ -1,14 +1,14 @@
 //! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` [Fichet2021].
 
 use super::csv::SpectralTable;
-use super::data::read_file;
-use super::input::{FrameReader, InputOptions, open_stdin};
+use super::input::{FrameReader, InputOptions, open_seekable};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::spectrum::{SpectralLibrary, check_wavelengths};
 use crate::stage::RowSource;
 use crate::units::RadianceUnit;
 use ndarray::Array2;
+use std::io::{self, Read, Seek};
 use std::path::Path;
 
 /// The wavelength in nm that a channel's name states; none for channels of another kind.
@@ -63,38 +63,41 @@ impl SpectralChannels {
     }
 }
 
-/// Whether a file is an EXR by its first bytes; a spectrum as CSV is not.
-///
-/// # Errors
-///
-/// [`Error::Disk`].
-pub fn is_exr_file(path: &Path) -> Result<bool> {
-    use std::io::Read;
-    let name = path.display().to_string();
-    let mut head = Vec::new();
-    let file = std::fs::File::open(path).map_err(|e| Error::disk(&name, "open", e))?;
-    file.take(4).read_to_end(&mut head).map_err(|e| Error::disk(&name, "read", e))?;
-    Ok(head == [0x76, 0x2F, 0x31, 0x01])
+/// A source of radiances: a table, or an image.
+pub enum Radiances {
+    /// Spectra as CSV.
+    Table(SpectralTable),
+    /// A spectral EXR.
+    Image(Box<FrameReader>),
 }
 
-/// Reads a table of spectra from a file, or from the standard input for `-` or none.
+/// Opens a table or a spectral image; the standard input for `-` or none. What comes down a pipe is copied to a temporary
+/// file first.
 ///
 /// # Errors
 ///
-/// Those of [`SpectralTable::parse`], and [`Error::Disk`].
-pub fn read_table(path: Option<&Path>) -> Result<SpectralTable> {
-    use super::input::STDIN_NAME;
-    use std::io::Read;
-    match path.filter(|path| *path != Path::new("-")) {
-        Some(path) => SpectralTable::parse(&path.display().to_string(), &read_file(path)?),
-        None => {
-            let mut bytes = Vec::new();
-            let read = open_stdin()?.take(1 << 28).read_to_end(&mut bytes);
-            read.map_err(|e| Error::disk(STDIN_NAME, "read", e))?;
-            SpectralTable::parse(STDIN_NAME, &bytes)
-        }
+/// Those of the readers, and [`Error::Disk`].
+pub fn open(options: &InputOptions) -> Result<Radiances> {
+    let path = options.path.as_deref().filter(|path| *path != Path::new("-"));
+    let (mut file, name) = open_seekable(path)?;
+    let mut sniff = || -> io::Result<Vec<u8>> {
+        let mut head = Vec::new();
+        (&mut file).take(4).read_to_end(&mut head)?;
+        file.rewind()?;
+        Ok(head)
+    };
+    let head = sniff().map_err(|e| Error::disk(&name, "read", e))?;
+    if head == [0x76, 0x2F, 0x31, 0x01] {
+        let options = InputOptions { all_channels: true, ..options.clone() };
+        return Ok(Radiances::Image(Box::new(FrameReader::open_file(file, &name, path, &options)?)));
     }
+    let mut bytes = Vec::new();
+    file.take(MAX_TABLE_BYTES).read_to_end(&mut bytes).map_err(|e| Error::disk(&name, "read", e))?;
+    Ok(Radiances::Table(SpectralTable::parse(&name, &bytes)?))
 }
+
+/// A table may be this long.
+const MAX_TABLE_BYTES: u64 = 256 << 20;
 
 /// Reads a whole library of spectra, CSV or spectral EXR, in W cm⁻² sr⁻¹ nm⁻¹; pixels count row by row.
 ///
@@ -103,9 +106,9 @@ pub fn read_table(path: Option<&Path>) -> Result<SpectralTable> {
 /// [`Error::Format`] for what is no library, or a radiance that is not finite.
 pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralLibrary> {
     let name = path.display().to_string();
-    let library = if is_exr_file(path)? {
-        let options = InputOptions { path: Some(path.to_owned()), all_channels: true, ..InputOptions::default() };
-        let mut reader = FrameReader::open(&options)?;
+    let options = InputOptions { path: Some(path.to_owned()), ..InputOptions::default() };
+    let library = match open(&options)? {
+        Radiances::Image(mut reader) => {
         let spectral = SpectralChannels::of(reader.header(), unit)?;
         let geometry = reader.header().geometry.clone();
         let factor = spectral.unit.in_w_per_cm2_sr_nm();
@@ -122,11 +125,12 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralL
             }
         }
         SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance }
-    } else {
-        let table = SpectralTable::parse(&name, &read_file(path)?)?;
+        }
+        Radiances::Table(table) => {
         let unit = unit.or_else(|| table.unit_of(0)).unwrap_or_default();
         let radiance = table.values * unit.in_w_per_cm2_sr_nm();
         SpectralLibrary { wavelength_nm: table.wavelength_nm, radiance }
+        }
     };
     match library.radiance.indexed_iter().find(|(_, value)| !value.is_finite()) {
         Some(((sample, _), _)) => Err(Error::format(&name, format!("sample {sample} is not finite"))),

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::metadata::{METADATA_SCHEMA, Metadata};
 use serde::de::{DeserializeOwned, Deserializer, Visitor, value};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_yaml::{Mapping, Value};
 
 /// A document may be this long.
@@ -224,6 +224,7 @@ fn field_names<T: DeserializeOwned>() -> &'static [&'static str] {
 mod tests {
     use super::*;
     use crate::units::QuantityKind;
+    use serde::Deserialize;
 
     #[derive(Debug, Serialize, Deserialize)]
     struct Small {

@@ -1,0 +1,81 @@
+//! `add-noise`: one noisy exposure from expected electrons.
+
+use clap::Parser;
+use cyanometer::cli::{self, options};
+use cyanometer::error::Result;
+use cyanometer::formats::{data, input::FrameReader};
+use cyanometer::metadata::PoissonKind;
+use cyanometer::noise::{AddNoise, NoiseSettings};
+use cyanometer::propagation::{self, Equations};
+use cyanometer::random::Source;
+use cyanometer::stage::RowSource;
+use std::process::ExitCode;
+
+/// Draw one noisy exposure from expected electrons
+///
+/// Takes the frame of expected electrons that render-radiance makes, three planes or one CFA plane, and gives the
+/// electrons of one exposure: dark and signal shot noise, dark-current and photo-response non-uniformity, full well,
+/// read noise. The same seeds give the same noise at each photosite, whatever else is drawn.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(flatten)]
+    input: options::Input,
+    /// Seed of the temporal noise
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Seed of the fixed patterns: another number, another sensor
+    #[arg(long, default_value_t = 0)]
+    sensor_seed: u64,
+    /// Number of the exposure: another number, other temporal noise
+    #[arg(long, default_value_t = 0)]
+    frame: u32,
+    /// Sources to leave out, between commas; their means stay: dcsn, dcnu, ssn, prnu, ron
+    #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = options::choice(&SOURCES))]
+    without: Vec<Source>,
+    /// Temperature of the sensor in K; by default the sensor's own
+    #[arg(long, value_name = "K", value_parser = options::positive, allow_negative_numbers = true)]
+    temperature: Option<f64>,
+    /// How Poisson numbers are drawn: exact, or gaussian to see what that approximation costs
+    #[arg(long, default_value = "exact", value_parser = options::choice(&[("exact", PoissonKind::Exact), ("gaussian", PoissonKind::Gaussian)]))]
+    poisson: PoissonKind,
+    /// Sensor, for a frame whose metadata names none, or another than it names
+    #[arg(long, value_name = "NAME|FILE")]
+    sensor: Option<String>,
+    #[command(flatten)]
+    output: options::Output,
+    #[command(flatten)]
+    general: options::General,
+}
+
+const SOURCES: [(&str, Source); 5] = [
+    ("dcsn", Source::Dcsn),
+    ("dcnu", Source::Dcnu),
+    ("ssn", Source::Ssn),
+    ("prnu", Source::Prnu),
+    ("ron", Source::Ron),
+];
+
+fn main() -> ExitCode {
+    cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
+}
+
+fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    let mut reader = FrameReader::open(&arguments.input.options())?;
+    if let Some(sensor) = &arguments.sensor {
+        reader.header_mut().metadata.sensor = Some(data::load_sensor(sensor)?.sensor);
+    }
+    let settings = NoiseSettings {
+        seed: arguments.seed,
+        sensor_seed: arguments.sensor_seed,
+        frame: arguments.frame,
+        without: arguments.without.clone(),
+        temperature_k: arguments.temperature,
+        poisson: arguments.poisson,
+    };
+    let mut stage = AddNoise::new(reader.header(), &settings)?;
+    propagation::note(stage.header_mut(), Equations::Exact);
+    session.sign(stage.header_mut());
+    session.drive(reader, &stage, &arguments.output)?;
+    Ok(())
+}

@@ -1,0 +1,63 @@
+//! `demosaic`: sensor RGB from a CFA plane.
+
+use clap::Parser;
+use cyanometer::cfa::CfaPattern;
+use cyanometer::cli::{self, options};
+use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::error::Result;
+use cyanometer::formats::input::FrameReader;
+use cyanometer::stage::RowSource;
+use std::process::ExitCode;
+
+/// Interpolate the two classes that each photosite did not measure
+///
+/// The black level (bias plus mean dark signal) is removed first and values stay signed. Edges are mirrored without
+/// repeating the edge sample.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(flatten)]
+    input: options::Input,
+    /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color)
+    #[arg(long, default_value = "eci", value_parser = options::choice(&METHODS))]
+    method: Method,
+    /// Black level to remove: auto (from the metadata), none, or a number in the unit of the samples
+    #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = black, allow_negative_numbers = true)]
+    black: Black,
+    /// Pattern of a plane that carries none, or another than it carries: rggb, bggr, grbg or gbrg
+    #[arg(long, value_parser = options::pattern)]
+    pattern: Option<CfaPattern>,
+    #[command(flatten)]
+    output: options::Output,
+    #[command(flatten)]
+    general: options::General,
+}
+
+const METHODS: [(&str, Method); 6] = [
+    ("bi", Method::Bilinear),
+    ("bilinear", Method::Bilinear),
+    ("shti", Method::SmoothHue),
+    ("smooth-hue", Method::SmoothHue),
+    ("eci", Method::EffectiveColor),
+    ("effective-color", Method::EffectiveColor),
+];
+
+fn black(text: &str) -> std::result::Result<Black, String> {
+    match text {
+        "auto" => Ok(Black::Auto),
+        "none" => Ok(Black::None),
+        level => options::number(level).map(Black::Level).map_err(|_| "give auto, none or a number".into()),
+    }
+}
+
+fn main() -> ExitCode {
+    cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
+}
+
+fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    let reader = FrameReader::open(&arguments.input.options())?;
+    let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
+    session.sign(stage.header_mut());
+    session.drive(reader, &stage, &arguments.output)?;
+    Ok(())
+}

@@ -1,0 +1,54 @@
+//! `digitize`: codes from electrons.
+
+use clap::Parser;
+use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::cli::{self, options};
+use cyanometer::error::Result;
+use cyanometer::formats::{data, input::FrameReader};
+use cyanometer::propagation::{self, Equations};
+use cyanometer::stage::RowSource;
+use std::process::ExitCode;
+
+/// Turn electrons into the codes of the analogue-to-digital converter (ADU)
+///
+/// Each sample becomes round(bias + slope * electrons), clipped to 0 ... 2^bits - 1. Rounding is the quantisation noise;
+/// nothing else is added.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(flatten)]
+    input: options::Input,
+    /// Bits of the converter, 1 to 16; by default the sensor's
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    bits: Option<u32>,
+    /// Bias in ADU; by default the sensor's
+    #[arg(long, value_name = "ADU", value_parser = options::number, allow_negative_numbers = true)]
+    bias: Option<f64>,
+    /// Slope in ADU per electron; by default the sensor's
+    #[arg(long, value_name = "ADU_PER_E", value_parser = options::positive, allow_negative_numbers = true)]
+    slope: Option<f64>,
+    /// Sensor, for a frame whose metadata names none, or another than it names
+    #[arg(long, value_name = "NAME|FILE")]
+    sensor: Option<String>,
+    #[command(flatten)]
+    output: options::Output,
+    #[command(flatten)]
+    general: options::General,
+}
+
+fn main() -> ExitCode {
+    cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
+}
+
+fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    let mut reader = FrameReader::open(&arguments.input.options())?;
+    if let Some(sensor) = &arguments.sensor {
+        reader.header_mut().metadata.sensor = Some(data::load_sensor(sensor)?.sensor);
+    }
+    let settings = AdcSettings { bits: arguments.bits, bias_adu: arguments.bias, adu_per_e: arguments.slope };
+    let mut stage = Digitize::new(reader.header(), &settings)?;
+    propagation::note(stage.header_mut(), Equations::Exact);
+    session.sign(stage.header_mut());
+    session.drive(reader, &stage, &arguments.output)?;
+    Ok(())
+}

@@ -1,0 +1,56 @@
+//! `measure`: statistics of a frame beside what propagation predicts.
+
+use clap::Parser;
+use cyanometer::cli::{self, options};
+use cyanometer::error::Result;
+use cyanometer::formats::{input::FrameReader, input::InputOptions, output};
+use cyanometer::propagation::Equations;
+use cyanometer::report::{self, ReportFormat};
+use cyanometer::statistics::{Region, measure};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Measure mean, spread and covariance of a frame, beside what the formulas predict
+///
+/// Predictions are made for uniform scenes, of electrons and of ADU, before demosaicking. Planes behind a colour filter
+/// array are also measured class by class.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(flatten)]
+    input: options::Input,
+    /// Rectangle X,Y,W,H in pixels; may be given more than once; by default the whole frame
+    #[arg(long, value_name = "X,Y,W,H", value_parser = options::region)]
+    region: Vec<Region>,
+    /// Form of the report
+    #[arg(long, default_value = "text", value_parser = options::choice(&[("text", ReportFormat::Text), ("json", ReportFormat::Json), ("yaml", ReportFormat::Yaml), ("csv", ReportFormat::Csv)]))]
+    output_format: ReportFormat,
+    /// Equations to predict by: exact, or those of the paper
+    #[arg(long, default_value = "exact", value_parser = options::choice(&[("exact", Equations::Exact), ("paper", Equations::Paper)]))]
+    equations: Equations,
+    /// File for the report; by default standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    general: options::General,
+}
+
+fn main() -> ExitCode {
+    cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
+}
+
+fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    let options = InputOptions { all_channels: true, ..arguments.input.options() };
+    let mut reader = FrameReader::open(&options)?;
+    session.report_reader(&reader);
+    let report = measure(&mut reader, &arguments.region, arguments.equations)?;
+    output::write_text(arguments.output.as_deref(), &report::render(&report, arguments.output_format)?)?;
+    if let Some(warning) = reader.check_digest() {
+        session.warn(&warning);
+    }
+    let not_finite: u64 = report.regions.iter().map(|region| region.not_finite).sum();
+    if not_finite > 0 {
+        session.warn(&format!("{not_finite} pixels are NaN or infinite; they are left out of the statistics"));
+    }
+    Ok(())
+}

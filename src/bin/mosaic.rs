@@ -1,0 +1,40 @@
+//! `mosaic`: one CFA plane from three.
+
+use clap::Parser;
+use cyanometer::cfa::CfaPattern;
+use cyanometer::cli::{self, options};
+use cyanometer::error::Result;
+use cyanometer::formats::input::FrameReader;
+use cyanometer::mosaic::Mosaic;
+use cyanometer::stage::RowSource;
+use std::process::ExitCode;
+
+/// Keep of three planes what a Bayer colour filter array lets through
+///
+/// Works at any stage: on expected electrons, on noisy ones, on ADU. The noise of a photosite does not depend on when
+/// the mosaic is made, so making it first saves two thirds of the work.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(flatten)]
+    input: options::Input,
+    /// Pattern at the sensor's corner: rggb, bggr, grbg or gbrg; by default the sensor's, or rggb
+    #[arg(long, value_parser = options::pattern)]
+    pattern: Option<CfaPattern>,
+    #[command(flatten)]
+    output: options::Output,
+    #[command(flatten)]
+    general: options::General,
+}
+
+fn main() -> ExitCode {
+    cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
+}
+
+fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    let reader = FrameReader::open(&arguments.input.options())?;
+    let mut stage = Mosaic::new(reader.header(), arguments.pattern)?;
+    session.sign(stage.header_mut());
+    session.drive(reader, &stage, &arguments.output)?;
+    Ok(())
+}

@@ -1,0 +1,217 @@
+//! The command line: start, fail, exit, and the options that programs share.
+
+mod history;
+pub mod options;
+pub mod rendering;
+
+pub use history::history_entry;
+
+use crate::error::{Error, Result};
+use crate::formats::atomic::remove_pending;
+use crate::formats::input::FrameReader;
+use crate::formats::output::FrameWriter;
+use crate::metadata::FrameHeader;
+use crate::stage::{Counts, RowSource, Stage, run};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, FromArgMatches};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use options::{General, Output, ProgressWhen};
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+
+/// Exit status after an interrupt, as shells have it: 128 + SIGINT.
+const INTERRUPTED: i32 = 130;
+
+/// What a running program says besides its output.
+#[derive(Debug)]
+pub struct Session {
+    program: &'static str,
+    general: General,
+}
+
+/// Parses the arguments, runs a program, and says in one line what went wrong.
+pub fn start<A: CommandFactory + FromArgMatches>(
+    program: &'static str,
+    general: impl FnOnce(&A) -> General,
+    body: impl FnOnce(&A, &Session) -> Result<()>,
+) -> ExitCode {
+    std::panic::set_hook(Box::new(move |panic| {
+        let place = panic.location().map_or(String::new(), |at| format!(" at {}:{}", at.file(), at.line()));
+        complain(program, &format!("internal error{place}; please report it with the command that led to it"));
+    }));
+    // Without a handler an interrupt ends the program all the same, only less tidily.
+    drop(ctrlc::set_handler(|| {
+        remove_pending();
+        std::process::exit(INTERRUPTED);
+    }));
+    let command = A::command().name(program).bin_name(program);
+    let parsed = command.try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
+    let arguments = match parsed {
+        Ok(arguments) => arguments,
+        Err(error) if !error.use_stderr() => {
+            // Help or version; a closed pipe is no error.
+            drop(error.print());
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => {
+            complain(program, &one_line(program, &error));
+            return ExitCode::from(2);
+        }
+    };
+    let general = general(&arguments);
+    if let Some(threads) = general.threads {
+        // Only a second pool in one process could fail.
+        drop(rayon::ThreadPoolBuilder::new().num_threads(threads).build_global());
+    }
+    let session = Session { program, general };
+    match body(&arguments, &session) {
+        Ok(()) | Err(Error::ClosedPipe) => ExitCode::SUCCESS,
+        Err(error) => {
+            complain(program, &error.to_string());
+            ExitCode::from(error.exit_status())
+        }
+    }
+}
+
+/// Writes one line to the standard error, control characters shown as escapes.
+fn complain(program: &str, text: &str) {
+    let shown: String = text
+        .chars()
+        .flat_map(|c| {
+            let is_bidi = matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
+            let escape = c.is_control() || is_bidi;
+            let plain = (!escape).then_some(c);
+            plain.into_iter().chain(c.escape_default().take(if escape { usize::MAX } else { 0 }))
+        })
+        .collect();
+    // Where the standard error is closed there is nobody to tell.
+    drop(writeln!(std::io::stderr(), "{program}: {shown}"));
+}
+
+/// clap's complaint in one line.
+fn one_line(program: &str, error: &clap::Error) -> String {
+    let context = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        Some(ContextValue::Strings(texts)) => Some(texts.join(", ")),
+        _ => None,
+    };
+    let argument = context(ContextKind::InvalidArg).unwrap_or_default();
+    let value = context(ContextKind::InvalidValue).unwrap_or_default();
+    let suggestion = context(ContextKind::SuggestedArg).or_else(|| context(ContextKind::SuggestedValue));
+    let hint = suggestion.map_or(String::new(), |s| format!("; did you mean `{s}`?"));
+    let problem = match error.kind() {
+        ErrorKind::UnknownArgument => format!("unknown option or extra argument `{argument}`{hint}"),
+        ErrorKind::InvalidValue if value.is_empty() => format!("{argument} needs a value"),
+        ErrorKind::InvalidValue => {
+            let choices = context(ContextKind::ValidValue);
+            let choices = choices.map_or(String::new(), |list| format!("; it is one of {list}"));
+            format!("`{value}` is no value for {argument}{choices}{hint}")
+        }
+        ErrorKind::ValueValidation => {
+            let reason = std::error::Error::source(error).map_or(String::new(), |source| format!(": {source}"));
+            format!("`{value}` is no value for {argument}{reason}")
+        }
+        ErrorKind::MissingRequiredArgument => format!("{argument} is missing"),
+        ErrorKind::ArgumentConflict => {
+            let other = context(ContextKind::PriorArg).unwrap_or_default();
+            if argument == other || other.is_empty() {
+                format!("{argument} is given twice")
+            } else {
+                format!("{argument} and {other} exclude each other")
+            }
+        }
+        _ => {
+            let text = error.to_string();
+            text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned()
+        }
+    };
+    format!("{problem}; see `{program} --help`")
+}
+
+impl Session {
+    /// Says something that the user should hear, unless `--quiet`.
+    pub fn warn(&self, text: &str) {
+        if !self.general.quiet {
+            complain(self.program, &format!("warning: {text}"));
+        }
+    }
+
+    /// Says something to those who asked with `--verbose`.
+    pub fn note(&self, text: &str) {
+        if self.general.verbose {
+            complain(self.program, text);
+        }
+    }
+
+    /// Adds this program to a frame's history and says what it leaves out.
+    pub fn sign(&self, header: &mut FrameHeader) {
+        header.metadata.history.push(history_entry(self.program, std::env::args().skip(1)));
+        for left_out in header.metadata.left_out.iter().filter(|entry| entry.program == self.program) {
+            self.note(&format!("left out: {} ({})", left_out.what, left_out.why));
+        }
+    }
+
+    /// Says what a reader noticed.
+    pub fn report_reader(&self, reader: &FrameReader) {
+        self.note(&format!(
+            "{}: {}x{}, {}, stored as {}",
+            reader.header().name,
+            reader.header().geometry.width,
+            reader.header().geometry.height,
+            reader.header().holds(),
+            reader.stored_as()
+        ));
+        for note in reader.notes() {
+            self.note(note);
+        }
+    }
+
+    /// A progress bar over rows, on terminals only.
+    pub fn progress(&self, rows: usize) -> ProgressBar {
+        let shown = match self.general.progress {
+            ProgressWhen::Always => true,
+            ProgressWhen::Never => false,
+            ProgressWhen::Auto => !self.general.quiet && std::io::stderr().is_terminal(),
+        };
+        let bar = ProgressBar::with_draw_target(Some(rows as u64), ProgressDrawTarget::hidden());
+        if shown {
+            let template = format!("{} {{bar:30}} {{percent}} % {{eta}}", self.program);
+            if let Ok(style) = ProgressStyle::with_template(&template) {
+                bar.set_style(style);
+            }
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+        bar
+    }
+
+    /// Drives a frame through a stage from an open reader to a new output.
+    ///
+    /// # Errors
+    ///
+    /// Those of reader, stage and writer.
+    pub fn drive<S: Stage>(&self, mut reader: FrameReader, stage: &S, output: &Output) -> Result<Counts> {
+        self.report_reader(&reader);
+        let mut writer = FrameWriter::create(&output.options(), stage.header(), &[reader.id()])?;
+        let bar = self.progress(stage.header().geometry.height);
+        let counts = run(stage, &mut reader, &mut writer, &mut |rows| bar.set_position(rows as u64))?;
+        bar.finish_and_clear();
+        self.finish(reader, writer, counts)?;
+        Ok(counts)
+    }
+
+    /// Ends an output, and says what was counted.
+    ///
+    /// # Errors
+    ///
+    /// Those of the writer.
+    pub fn finish(&self, mut reader: FrameReader, writer: FrameWriter, counts: Counts) -> Result<()> {
+        writer.finish(counts)?;
+        if let Some(warning) = reader.check_digest() {
+            self.warn(&warning);
+        }
+        for warning in counts.warnings() {
+            self.warn(&warning);
+        }
+        Ok(())
+    }
+}

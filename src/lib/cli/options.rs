@@ -1,0 +1,217 @@
+//! Options that programs share, and how their values are read.
+
+use crate::cfa::CfaPattern;
+use crate::formats::input::InputOptions;
+use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
+use crate::statistics::Region;
+use crate::units::RadianceUnit;
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use std::path::PathBuf;
+
+/// A parser for one of a few words.
+pub fn choice<T: Copy + Send + Sync + 'static>(
+    words: &'static [(&'static str, T)],
+) -> impl TypedValueParser<Value = T> + Clone {
+    PossibleValuesParser::new(words.iter().map(|(word, _)| *word)).map(move |word| {
+        // The parser lets only these words through; the first stands in for what cannot be.
+        words.iter().find(|(known, _)| *known == word).map_or(words[0].1, |(_, value)| *value)
+    })
+}
+
+/// A frame to read.
+#[derive(Debug, Clone, Args)]
+pub struct Input {
+    /// Frame to read, EXR or TIFF; `-` or none for standard input
+    pub input: Option<PathBuf>,
+    /// Part of a multi-part EXR, or page of a TIFF, counted from 0
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub part: usize,
+    /// YAML file whose metadata replace those that come with the input
+    #[arg(long, value_name = "FILE")]
+    pub metadata: Option<PathBuf>,
+}
+
+impl Input {
+    /// What to open; channels besides R, G, B or Y are left out.
+    pub fn options(&self) -> InputOptions {
+        InputOptions {
+            path: self.input.clone(),
+            part: self.part,
+            metadata: self.metadata.clone(),
+            all_channels: false,
+        }
+    }
+}
+
+/// A frame to write.
+#[derive(Debug, Clone, Args)]
+pub struct Output {
+    /// File to write, with a sidecar FILE.yaml; `-` or none for standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Format; by default that of the file's extension, or EXR
+    #[arg(long, value_parser = choice(&[("exr", Format::Exr), ("tiff", Format::Tiff)]))]
+    pub format: Option<Format>,
+    /// Compression, without loss: rle, zips, zip, piz for EXR; lzw, deflate for TIFF; none by default
+    #[arg(long, value_parser = choice(&COMPRESSIONS))]
+    pub compression: Option<CompressionKind>,
+    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF; by default f32, and u16 for ADU in TIFF
+    #[arg(long, value_name = "TYPE", value_parser = choice(&[("f32", SampleKind::F32), ("f16", SampleKind::F16), ("u16", SampleKind::U16)]))]
+    pub sample_type: Option<SampleKind>,
+}
+
+const COMPRESSIONS: [(&str, CompressionKind); 7] = [
+    ("none", CompressionKind::None),
+    ("rle", CompressionKind::Rle),
+    ("zips", CompressionKind::Zips),
+    ("zip", CompressionKind::Zip),
+    ("piz", CompressionKind::Piz),
+    ("lzw", CompressionKind::Lzw),
+    ("deflate", CompressionKind::Deflate),
+];
+
+impl Output {
+    /// Where and how to write.
+    pub fn options(&self) -> OutputOptions {
+        OutputOptions {
+            path: self.output.clone(),
+            format: self.format,
+            compression: self.compression,
+            samples: self.sample_type,
+        }
+    }
+}
+
+/// When to show a progress bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProgressWhen {
+    /// On terminals.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// How the program runs and talks.
+#[derive(Debug, Clone, Args)]
+pub struct General {
+    /// Threads to use; by default all. The result does not depend on it
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<usize>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Say what is read, and what is left out
+    #[arg(short, long)]
+    pub verbose: bool,
+    /// Progress bar on standard error
+    #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = choice(&[("auto", ProgressWhen::Auto), ("always", ProgressWhen::Always), ("never", ProgressWhen::Never)]))]
+    pub progress: ProgressWhen,
+}
+
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(threads @ 1..=1024) => Ok(threads),
+        _ => Err("give a whole number from 1 to 1024".into()),
+    }
+}
+
+/// Reads `WIDTHxHEIGHT`, both at least 1.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn size(text: &str) -> Result<[usize; 2], String> {
+    let parse = |part: &str| part.parse::<usize>().ok().filter(|n| (1..=i32::MAX as usize).contains(n));
+    text.split_once(['x', 'X'])
+        .and_then(|(width, height)| Some([parse(width)?, parse(height)?]))
+        .ok_or_else(|| "a size is WIDTHxHEIGHT in photosites, such as 1332x1000".into())
+}
+
+/// Reads finite numbers between commas.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn three_numbers(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    match (numbers.as_slice(), text.split(',').count()) {
+        ([a, b, c], 3) => Ok([*a, *b, *c]),
+        _ => Err("give three numbers between commas".into()),
+    }
+}
+
+/// Reads expected electrons `R,G,B`, none below zero.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn electrons(text: &str) -> Result<[f64; 3], String> {
+    let wrong = || "give the electrons of R,G,B between commas, none below 0".to_owned();
+    let found = three_numbers(text).map_err(|_| wrong())?;
+    if found.iter().all(|e| *e >= 0.0) { Ok(found) } else { Err(wrong()) }
+}
+
+/// Reads a finite number.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn number(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "give a number".into())
+}
+
+/// Reads a number above zero.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn positive(text: &str) -> Result<f64, String> {
+    number(text).ok().filter(|x| *x > 0.0).ok_or_else(|| "give a number above 0".into())
+}
+
+/// Reads a fraction above 0 and at most 1.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn fraction(text: &str) -> Result<f64, String> {
+    positive(text).ok().filter(|x| *x <= 1.0).ok_or_else(|| "give a fraction above 0 and at most 1".into())
+}
+
+/// Reads a region `X,Y,W,H`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn region(text: &str) -> Result<Region, String> {
+    let numbers: Option<Vec<usize>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([x, y, width, height]) => Ok(Region { x: *x, y: *y, width: *width, height: *height }),
+        _ => Err("a region is X,Y,W,H in pixels, counted from the frame's corner".into()),
+    }
+}
+
+/// Reads a colour filter array's pattern.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn pattern(text: &str) -> Result<CfaPattern, String> {
+    text.parse()
+}
+
+/// Reads a unit of spectral radiance.
+///
+/// # Errors
+///
+/// The units that there are.
+pub fn radiance_unit(text: &str) -> Result<RadianceUnit, String> {
+    RadianceUnit::parse(text).ok_or_else(|| {
+        let names: Vec<&str> = RadianceUnit::ALL.into_iter().map(RadianceUnit::name).collect();
+        format!("known units are {}", names.join("; "))
+    })
+}

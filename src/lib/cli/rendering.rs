@@ -1,0 +1,386 @@
+//! The work of `render-radiance`: from a request to a frame.
+
+use super::Session;
+use super::options::Output;
+use crate::cfa::CfaPattern;
+use crate::error::{Error, Result};
+use crate::formats::input::{FileId, FrameReader, InputOptions};
+use crate::formats::output::FrameWriter;
+use crate::formats::spectral::{self, Radiances, SpectralChannels};
+use crate::formats::{csv::SpectralTable, data};
+use crate::frame::Geometry;
+use crate::metadata::{FrameHeader, Metadata, Scene};
+use crate::numerics::quadrature::Rule;
+use crate::optics::{Exposure, Vignetting};
+use crate::render::Rendering;
+use crate::sensor::{Camera, Sensor};
+use crate::spectrum::WavelengthGrid;
+use crate::stage::{Counts, RowSource};
+use crate::units::{QuantityKind, RadianceUnit};
+use std::path::PathBuf;
+
+/// What is to be rendered, and how.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Spectrum, library or spectral image.
+    pub input: Option<PathBuf>,
+    /// Part of a multi-part EXR.
+    pub part: usize,
+    /// Sensor, name or file.
+    pub sensor: String,
+    /// Size of the frame.
+    pub size: Option<[usize; 2]>,
+    /// Exposure time in s.
+    pub exposure_s: f64,
+    /// Relative aperture.
+    pub f_number: f64,
+    /// Transmittance of the lens.
+    pub lens_transmittance: f64,
+    /// Focal length in mm, where vignetting is wanted.
+    pub vignetting_focal_length_mm: Option<f64>,
+    /// Fraction of full well to expose to.
+    pub expose_to: Option<f64>,
+    /// Electrons given outright.
+    pub electrons: Option<[f64; 3]>,
+    /// Start, end and step of the wavelengths in nm.
+    pub wavelengths: [f64; 3],
+    /// Rule of summation.
+    pub quadrature: Rule,
+    /// Unit of the radiance.
+    pub radiance_unit: Option<RadianceUnit>,
+    /// Column of a table.
+    pub column: Option<String>,
+    /// Sample of a library.
+    pub sample: Option<usize>,
+    /// Photosites of a source pixel.
+    pub patch: Option<[usize; 2]>,
+    /// Pattern of the plane that is wanted.
+    pub cfa: Option<CfaPattern>,
+}
+
+/// Reads `START:END:STEP`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn wavelengths(text: &str) -> std::result::Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(':').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([start, end, step]) if numbers.iter().flatten().all(|x| x.is_finite()) => Ok([*start, *end, *step]),
+        _ => Err("give START:END:STEP in nm, such as 360:830:1".into()),
+    }
+}
+
+/// Where the light comes from, once opened.
+enum Light {
+    /// The same everywhere: signal electrons, and what to call it.
+    Uniform { electrons: [f64; 3], source: String },
+    /// An image; its rows come one by one, and are multiplied with `factor`.
+    Image { rows: ImageRows, factor: f64, width: usize, height: usize, source: String },
+}
+
+enum ImageRows {
+    /// As the file is read.
+    Streamed(Box<SpectralRows>),
+    /// All rows, read once to find the brightest.
+    Kept(std::vec::IntoIter<Vec<[f64; 3]>>),
+}
+
+/// Rows of a spectral image as signal electrons.
+struct SpectralRows {
+    reader: FrameReader,
+    spectral: SpectralChannels,
+    camera: Camera,
+    samples: Vec<f32>,
+}
+
+impl SpectralRows {
+    fn next(&mut self) -> Result<Vec<[f64; 3]>> {
+        self.samples.clear();
+        self.reader.read(1, &mut self.samples)?;
+        let width = self.reader.header().geometry.width;
+        let factor = self.spectral.unit.in_w_per_cm2_sr_nm();
+        let mut radiance = vec![0.0; self.spectral.channels.len()];
+        (0..width)
+            .map(|x| {
+                for (value, channel) in radiance.iter_mut().zip(&self.spectral.channels) {
+                    *value = f64::from(self.samples[channel * width + x]) * factor;
+                }
+                checked(self.camera.electrons(&radiance), &self.reader.header().name)
+            })
+            .collect()
+    }
+}
+
+/// Electrons that can be.
+fn checked(electrons: [f64; 3], name: &str) -> Result<[f64; 3]> {
+    if electrons.iter().all(|e| (0.0..f64::INFINITY).contains(e)) {
+        Ok(electrons)
+    } else {
+        Err(Error::format(name, "its radiance is negative or not finite, so that no electrons can be expected of it"))
+    }
+}
+
+impl Request {
+    /// Renders the frame to an output.
+    ///
+    /// # Errors
+    ///
+    /// Those of readers, sensor files and writers; [`Error::Usage`] where the request makes no sense.
+    pub fn render(&self, session: &Session, output: &Output) -> Result<()> {
+        let loaded = data::load_sensor(&self.sensor)?;
+        let [start_nm, end_nm, step_nm] = self.wavelengths;
+        let grid = WavelengthGrid { start_nm, end_nm, step_nm, quadrature: self.quadrature };
+        let mut exposure = Exposure {
+            exposure_s: self.exposure_s,
+            f_number: self.f_number,
+            lens_transmittance: self.lens_transmittance,
+        }
+        .checked()?;
+        if self.expose_to.is_some() {
+            // The signal is proportional to time: work it out for 1 s, then choose.
+            exposure.exposure_s = 1.0;
+        }
+        let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+        let mut input = None;
+        let mut light = match self.electrons {
+            Some(electrons) => {
+                let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
+                Light::Uniform { electrons, source: source.into() }
+            }
+            None => {
+                let weights = loaded.response.weights_on(&loaded.sensor, &exposure, &grid)?;
+                if weights.left_out > 0 {
+                    metadata.leave_out(
+                        "render-radiance",
+                        format!("{} of {} wavelengths", weights.left_out, weights.left_out + weights.wavelengths_nm.len()),
+                        "no class responds there",
+                    );
+                }
+                let camera = |sampled_nm: &[f64], name: &str| {
+                    let (camera, uncovered) = weights.camera(sampled_nm);
+                    if uncovered > 1e-6 {
+                        session.warn(&format!(
+                            "{name}: it covers {} to {} nm; {:.2} % of the sensor's response lies beyond, where its \
+                             radiance is taken as zero",
+                            sampled_nm[0],
+                            sampled_nm[sampled_nm.len() - 1],
+                            100.0 * uncovered
+                        ));
+                    }
+                    camera
+                };
+                self.open_light(session, camera, &mut input)?
+            }
+        };
+        let mut brightest_e = None;
+        if let Some(fraction) = self.expose_to {
+            let (kept, brightest) = light.keep_and_find_brightest()?;
+            light = kept;
+            if brightest <= 0.0 {
+                return Err(Error::Data("the scene is dark: no exposure reaches a fraction of full well".into()));
+            }
+            exposure.exposure_s = fraction * loaded.sensor.full_well_e / brightest;
+            brightest_e = Some(fraction * loaded.sensor.full_well_e);
+            session.note(&format!("exposure {} s", exposure.exposure_s));
+        }
+        let rendering = self.rendering(&loaded.sensor, exposure, &mut light, brightest_e, metadata)?;
+        self.write(session, output, rendering, light, input)
+    }
+
+    /// Opens the radiance; gives a pixel's electrons at the exposure that `camera` was made for.
+    fn open_light(
+        &self,
+        session: &Session,
+        camera: impl Fn(&[f64], &str) -> Camera,
+        input: &mut Option<FileId>,
+    ) -> Result<Light> {
+        let options =
+            InputOptions { path: self.input.clone(), part: self.part, metadata: None, all_channels: true };
+        match spectral::open(&options)? {
+            Radiances::Table(table) => {
+                let index = self.choose(&table)?;
+                let name = table.name().to_owned();
+                let unit = self.radiance_unit.or_else(|| table.unit_of(index)).unwrap_or_default();
+                let radiance: Vec<f64> =
+                    table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect();
+                let electrons = checked(camera(&table.wavelength_nm, &name).electrons(&radiance), &name)?;
+                let source = if table.columns.len() > 1 { format!("{name}: {}", table.columns[index]) } else { name };
+                Ok(Light::Uniform { electrons, source })
+            }
+            Radiances::Image(reader) => {
+                if self.column.is_some() {
+                    return Err(Error::Usage("a spectral image has no columns; choose a pixel with --sample N".into()));
+                }
+                session.report_reader(&reader);
+                *input = reader.id();
+                let header = reader.header().clone();
+                let spectral = SpectralChannels::of(&header, self.radiance_unit)?;
+                let camera = camera(&spectral.wavelength_nm, &header.name);
+                let Geometry { width, height, .. } = header.geometry;
+                let mut rows = SpectralRows { reader: *reader, spectral, camera, samples: Vec::new() };
+                match self.sample {
+                    None => Ok(Light::Image {
+                        rows: ImageRows::Streamed(Box::new(rows)),
+                        factor: 1.0,
+                        width,
+                        height,
+                        source: header.name,
+                    }),
+                    Some(sample) if sample >= width * height => Err(Error::Usage(format!(
+                        "{}: there is no sample {sample}; it has samples 0 to {}",
+                        header.name,
+                        width * height - 1
+                    ))),
+                    Some(sample) => {
+                        for _ in 0..sample / width {
+                            rows.next()?;
+                        }
+                        let electrons = rows.next()?[sample % width];
+                        Ok(Light::Uniform { electrons, source: format!("{}: sample {sample}", header.name) })
+                    }
+                }
+            }
+        }
+    }
+
+    /// The row of a table that is wanted.
+    fn choose(&self, table: &SpectralTable) -> Result<usize> {
+        let count = table.columns.len();
+        match (&self.column, self.sample) {
+            (Some(column), _) => table.column_index(Some(column)),
+            (None, Some(sample)) if sample < count => Ok(sample),
+            (None, Some(sample)) => Err(Error::Usage(format!(
+                "{}: there is no sample {sample}; it has samples 0 to {}",
+                table.name(),
+                count - 1
+            ))),
+            (None, None) if count == 1 => Ok(0),
+            (None, None) => Err(Error::Usage(format!(
+                "{}: it holds {count} spectra; choose one with --column NAME or --sample N",
+                table.name()
+            ))),
+        }
+    }
+
+    /// Settles size, metadata and layout of the frame.
+    fn rendering(
+        &self,
+        sensor: &Sensor,
+        exposure: Exposure,
+        light: &mut Light,
+        brightest_e: Option<f64>,
+        mut metadata: Metadata,
+    ) -> Result<Rendering> {
+        let of_sensor = [sensor.width as usize, sensor.height as usize];
+        let (size, patch, source, uniform) = match light {
+            Light::Uniform { electrons, source } => {
+                if self.patch.is_some() {
+                    return Err(Error::Usage(
+                        "--patch is for the pixels of a spectral image, but the scene is uniform".into(),
+                    ));
+                }
+                if self.expose_to.is_some() {
+                    *electrons = electrons.map(|e| e * exposure.exposure_s);
+                }
+                let size = self.size.unwrap_or(of_sensor);
+                (size, size, source.clone(), Some(*electrons))
+            }
+            Light::Image { factor, width, height, source, .. } => {
+                if self.expose_to.is_some() {
+                    *factor = exposure.exposure_s;
+                }
+                let patch = self.patch.unwrap_or([1, 1]);
+                let whole = [*width * patch[0], *height * patch[1]];
+                let size = self.size.unwrap_or(whole);
+                if size[0] > whole[0] || size[1] > whole[1] {
+                    return Err(Error::Usage(format!(
+                        "{source}: its {width}x{height} pixels in patches of {}x{} make {}x{} photosites, fewer than \
+                         --size {}x{}",
+                        patch[0], patch[1], whole[0], whole[1], size[0], size[1]
+                    )));
+                }
+                (size, patch, source.clone(), None)
+            }
+        };
+        let vignetting = self
+            .vignetting_focal_length_mm
+            .map(|focal_length| Vignetting::new(size[0], size[1], sensor.pixel_pitch_um, focal_length));
+        if vignetting.is_none() && size[0] * size[1] > patch.len() {
+            metadata.leave_out(
+                "render-radiance",
+                "all photosites of a patch but one of each class",
+                "without vignetting they expect the same",
+            );
+        }
+        let is_uniform = uniform.is_some() && vignetting.is_none();
+        metadata.cfa = self.cfa;
+        metadata.sensor = Some(sensor.clone());
+        metadata.exposure = Some(exposure);
+        metadata.scene = Some(Scene {
+            source,
+            uniform: is_uniform,
+            expected_electrons: uniform.filter(|_| is_uniform),
+            vignetting_focal_length_mm: self.vignetting_focal_length_mm,
+            patch: uniform.is_none().then_some(patch),
+            brightest_e,
+        });
+        let channels: &[&str] = if self.cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
+        let geometry = Geometry::new(size[0], size[1], channels);
+        let header = FrameHeader { name: "the frame".into(), geometry, metadata };
+        Ok(Rendering { header, patch, vignetting, cfa: self.cfa })
+    }
+
+    fn write(
+        &self,
+        session: &Session,
+        output: &Output,
+        mut rendering: Rendering,
+        mut light: Light,
+        input: Option<FileId>,
+    ) -> Result<()> {
+        session.sign(&mut rendering.header);
+        let mut writer = FrameWriter::create(&output.options(), &rendering.header, &[input])?;
+        let bar = session.progress(rendering.header.geometry.height);
+        let next_row = || match &mut light {
+            Light::Uniform { electrons, .. } => Ok(vec![*electrons]),
+            Light::Image { rows, factor, .. } => {
+                let row = match rows {
+                    ImageRows::Streamed(rows) => rows.next()?,
+                    ImageRows::Kept(rows) => rows.next().unwrap_or_default(),
+                };
+                Ok(row.into_iter().map(|electrons| electrons.map(|e| e * *factor)).collect())
+            }
+        };
+        rendering.run(next_row, &mut writer, &mut |rows| bar.set_position(rows as u64))?;
+        bar.finish_and_clear();
+        writer.finish(Counts::default())
+    }
+}
+
+impl Light {
+    /// The largest electrons of any class and pixel; an image is read whole and kept for that, three numbers a pixel.
+    fn keep_and_find_brightest(self) -> Result<(Self, f64)> {
+        let largest = |electrons: &[f64; 3]| electrons.iter().copied().fold(0.0, f64::max);
+        match self {
+            Self::Uniform { electrons, source } => {
+                let brightest = largest(&electrons);
+                Ok((Self::Uniform { electrons, source }, brightest))
+            }
+            Self::Image { mut rows, factor, width, height, source } => {
+                let mut kept = Vec::with_capacity(height.min(1 << 16));
+                let mut brightest = 0.0;
+                for _ in 0..height {
+                    let row = match &mut rows {
+                        ImageRows::Streamed(rows) => rows.next()?,
+                        ImageRows::Kept(rows) => rows.next().unwrap_or_default(),
+                    };
+                    brightest = row.iter().map(largest).fold(brightest, f64::max);
+                    kept.push(row);
+                }
+                let rows = ImageRows::Kept(kept.into_iter());
+                Ok((Self::Image { rows, factor, width, height, source }, brightest))
+            }
+        }
+    }
+}

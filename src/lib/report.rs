@@ -1,0 +1,199 @@
+//! Reports: statistics and matrices as text, JSON, YAML and CSV.
+
+use crate::color::characterization::CameraMatrix;
+use crate::error::{Error, Result};
+use crate::statistics::{ChannelReport, RegionReport, Report};
+use std::fmt::Write;
+
+/// The form of a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReportFormat {
+    /// A table for people.
+    Text,
+    /// JSON.
+    Json,
+    /// YAML.
+    Yaml,
+    /// CSV, one row per region and channel.
+    Csv,
+}
+
+fn unwritable(error: impl std::fmt::Display) -> Error {
+    Error::Data(format!("the report cannot be written: {error}"))
+}
+
+/// Writes statistics.
+///
+/// # Errors
+///
+/// [`Error::Data`] when the form cannot hold them.
+pub fn render(report: &Report, format: ReportFormat) -> Result<String> {
+    match format {
+        ReportFormat::Json => {
+            serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable)
+        }
+        ReportFormat::Yaml => serde_yaml::to_string(report).map_err(unwritable),
+        ReportFormat::Csv => csv(report),
+        ReportFormat::Text => Ok(text(report)),
+    }
+}
+
+/// Column headings of the text and CSV forms, with the number of significant digits of text.
+const COLUMNS: [(&str, &str); 10] = [
+    ("mean", "mean"),
+    ("std", "std"),
+    ("min", "min"),
+    ("max", "max"),
+    ("snr_db", "SNR/dB"),
+    ("clipped", "clipped"),
+    ("predicted_mean", "pred. mean"),
+    ("predicted_std", "pred. std"),
+    ("z_mean", "z mean"),
+    ("z_std", "z std"),
+];
+
+fn values(channel: &ChannelReport) -> [Option<f64>; 10] {
+    [
+        channel.mean,
+        channel.std,
+        channel.min,
+        channel.max,
+        channel.snr_db,
+        channel.clipped.map(|count| count as f64),
+        channel.predicted_mean,
+        channel.predicted_std,
+        channel.z_mean,
+        channel.z_std,
+    ]
+}
+
+fn csv(report: &Report) -> Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let head = ["x", "y", "width", "height", "channel", "count"].into_iter().chain(COLUMNS.map(|(key, _)| key));
+    writer.write_record(head).map_err(unwritable)?;
+    for region in &report.regions {
+        for channel in region.channels.iter().chain(&region.classes) {
+            let place = [region.region.x, region.region.y, region.region.width, region.region.height];
+            let cells = place
+                .iter()
+                .map(ToString::to_string)
+                .chain([channel.name.clone(), channel.count.to_string()])
+                .chain(values(channel).map(|value| value.map_or(String::new(), |v| v.to_string())));
+            writer.write_record(cells).map_err(unwritable)?;
+        }
+    }
+    let bytes = writer.into_inner().map_err(unwritable)?;
+    String::from_utf8(bytes).map_err(unwritable)
+}
+
+fn text(report: &Report) -> String {
+    let mut out = String::new();
+    for region in &report.regions {
+        region_text(region, &mut out);
+    }
+    out
+}
+
+/// A number in as many digits as a reader compares.
+fn shown(key: &str, value: Option<f64>) -> String {
+    let Some(value) = value else { return "-".into() };
+    match key {
+        "clipped" => format!("{value}"),
+        "snr_db" | "z_mean" | "z_std" => format!("{value:.2}"),
+        _ if value == 0.0 => "0".into(),
+        _ if (1e-3..1e7).contains(&value.abs()) => {
+            // Six significant digits.
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a value within -3..7")]
+            let digits = (5.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+            format!("{value:.digits$}")
+        }
+        _ => format!("{value:.5e}"),
+    }
+}
+
+fn region_text(region: &RegionReport, out: &mut String) {
+    let r = region.region;
+    let mut line = format!(
+        "{}x{} at {},{}: {} pixels of {} [{}]",
+        r.width, r.height, r.x, r.y, region.count, region.quantity, region.unit
+    );
+    if region.not_finite > 0 {
+        let _ = write!(line, ", {} not finite left out", region.not_finite);
+    }
+    out.push_str(&line);
+    out.push('\n');
+    let channels: Vec<&ChannelReport> = region.channels.iter().chain(&region.classes).collect();
+    let mut columns: Vec<Vec<String>> =
+        vec![std::iter::once(String::new()).chain(channels.iter().map(|channel| channel.name.clone())).collect()];
+    for (index, (key, heading)) in COLUMNS.into_iter().enumerate() {
+        let cells: Vec<Option<f64>> = channels.iter().map(|channel| values(channel)[index]).collect();
+        if cells.iter().any(Option::is_some) {
+            let texts = cells.into_iter().map(|value| shown(key, value));
+            columns.push(std::iter::once(heading.to_owned()).chain(texts).collect());
+        }
+    }
+    table(&columns, out);
+    if region.channels.len() > 1
+        && region.channels.len() <= 6
+        && let Some(covariance) = &region.covariance
+    {
+        out.push_str("covariance\n");
+        let names: Vec<String> =
+            std::iter::once(String::new()).chain(region.channels.iter().map(|channel| channel.name.clone())).collect();
+        let mut columns = vec![names];
+        for (j, channel) in region.channels.iter().enumerate() {
+            let cells = covariance.iter().map(|row| shown("covariance", Some(row[j])));
+            columns.push(std::iter::once(channel.name.clone()).chain(cells).collect());
+        }
+        table(&columns, out);
+    }
+}
+
+/// Writes columns of equal length, numbers flush right.
+fn table(columns: &[Vec<String>], out: &mut String) {
+    let widths: Vec<usize> =
+        columns.iter().map(|column| column.iter().map(|cell| cell.chars().count()).max().unwrap_or(0)).collect();
+    for row in 0..columns.first().map_or(0, Vec::len) {
+        let cells: Vec<String> =
+            columns.iter().zip(&widths).map(|(column, width)| format!("{:>width$}", column[row])).collect();
+        let _ = writeln!(out, "{}", cells.join("  ").trim_end());
+    }
+}
+
+/// Writes a matrix: YAML is the file that `to-xyz` reads.
+///
+/// # Errors
+///
+/// [`Error::Data`] when the form cannot hold it.
+pub fn matrix(matrix: &CameraMatrix, format: ReportFormat) -> Result<String> {
+    match format {
+        ReportFormat::Yaml => serde_yaml::to_string(matrix).map_err(unwritable),
+        ReportFormat::Json => {
+            let value = serde_json::json!({
+                "matrix": matrix.xyz_from_camera,
+                "condition": matrix.condition,
+                "training": matrix.training,
+            });
+            serde_json::to_string_pretty(&value).map(|text| text + "\n").map_err(unwritable)
+        }
+        ReportFormat::Text | ReportFormat::Csv => {
+            let mut out = String::new();
+            let unit = matrix.unit.as_deref().unwrap_or_default();
+            let _ = writeln!(out, "XYZ from R, G, B [{unit}]");
+            for (name, row) in ["X", "Y", "Z"].iter().zip(matrix.xyz_from_camera) {
+                let _ = writeln!(out, "{name} {:>14.6e} {:>14.6e} {:>14.6e}", row[0], row[1], row[2]);
+            }
+            if let Some(condition) = matrix.condition {
+                let _ = writeln!(out, "condition number {condition:.2}");
+            }
+            if let Some(training) = &matrix.training {
+                let [x, y, z] = training.relative_rms.map(|rms| 100.0 * rms);
+                let [dx, dy] = training.max_chromaticity_error;
+                let _ = writeln!(out, "{} samples of {}", training.count, training.library);
+                let _ = writeln!(out, "rms error of X, Y, Z: {x:.3} %, {y:.3} %, {z:.3} %");
+                let _ = writeln!(out, "largest error of x, y: {dx:.5}, {dy:.5}");
+            }
+            Ok(out)
+        }
+    }
+}

@@ -1,0 +1,398 @@
+//! Statistics of frames and regions, beside what propagation predicts.
+
+use crate::cfa::Class;
+use crate::error::{Error, Result};
+use crate::metadata::FrameHeader;
+use crate::numerics::moments::Moments;
+use crate::propagation::{self, Equations, Prediction};
+use crate::stage::RowSource;
+use crate::units::QuantityKind;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// A rectangle of a frame, counted from the frame's own corner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Region {
+    /// First column.
+    pub x: usize,
+    /// First row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+/// Everything that is said of a frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// One entry per region; the whole frame where none was named.
+    pub regions: Vec<RegionReport>,
+}
+
+/// What is said of a region.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegionReport {
+    /// The rectangle.
+    pub region: Region,
+    /// Pixels whose samples are all finite.
+    pub count: u64,
+    /// Pixels left out because a sample is NaN or infinite.
+    pub not_finite: u64,
+    /// Quantity and unit of the samples.
+    pub quantity: QuantityKind,
+    /// Unit.
+    pub unit: String,
+    /// Statistics of each channel.
+    pub channels: Vec<ChannelReport>,
+    /// Statistics of the classes of a CFA plane.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub classes: Vec<ChannelReport>,
+    /// Sample covariance of the channels (divisor n − 1).
+    pub covariance: Option<Vec<Vec<f64>>>,
+    /// The same by formula.
+    pub predicted_covariance: Option<Vec<Vec<f64>>>,
+    /// Predicted standard deviation of the mean of the region in each channel.
+    pub patch_mean_std: Option<Vec<f64>>,
+}
+
+/// Statistics of one channel, or of one class of a CFA plane.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelReport {
+    /// Name.
+    pub name: String,
+    /// Finite samples.
+    pub count: u64,
+    /// Mean.
+    pub mean: Option<f64>,
+    /// Sample standard deviation (divisor n − 1).
+    pub std: Option<f64>,
+    /// Smallest sample.
+    pub min: Option<f64>,
+    /// Largest sample.
+    pub max: Option<f64>,
+    /// 20 log₁₀ of the mean above black over the standard deviation.
+    pub snr_db: Option<f64>,
+    /// Samples at the ends of the range: codes 0 and 2^bits − 1, or electrons at full well or above.
+    pub clipped: Option<u64>,
+    /// Mean by formula.
+    pub predicted_mean: Option<f64>,
+    /// Standard deviation by formula.
+    pub predicted_std: Option<f64>,
+    /// (mean − predicted) / (predicted_std / √n).
+    pub z_mean: Option<f64>,
+    /// (std / predicted − 1) over its sampling error √((2 + κ n⁄(n−1)) / 4n), κ the excess kurtosis.
+    pub z_std: Option<f64>,
+}
+
+/// What one region has seen so far.
+#[derive(Debug, Clone)]
+struct Tally {
+    channels: Moments,
+    classes: [Moments; 3],
+    clipped: Vec<u64>,
+    clipped_classes: [u64; 3],
+}
+
+/// Which samples count as clipped.
+#[derive(Debug, Clone, Copy)]
+enum Rails {
+    None,
+    /// At or beyond either.
+    Codes(f32, f32),
+    /// At or above.
+    FullWell(f32),
+}
+
+impl Rails {
+    fn of(frame: &FrameHeader) -> Self {
+        let metadata = &frame.metadata;
+        match metadata.quantity {
+            QuantityKind::Adu if metadata.demosaic.is_none() => match metadata.white_level_adu {
+                Some(white) => Self::Codes(0.0, crate::frame::to_sample(white)),
+                None => Self::None,
+            },
+            QuantityKind::Electrons if metadata.demosaic.is_none() => match &metadata.sensor {
+                Some(sensor) => Self::FullWell(crate::frame::to_sample(sensor.full_well_e)),
+                None => Self::None,
+            },
+            _ => Self::None,
+        }
+    }
+
+    fn count(self, samples: impl Iterator<Item = f32>) -> u64 {
+        match self {
+            Self::None => 0,
+            Self::Codes(low, high) => samples.filter(|&s| s <= low || s >= high).count() as u64,
+            Self::FullWell(top) => samples.filter(|&s| s >= top).count() as u64,
+        }
+    }
+}
+
+/// Reads a whole frame and works out the statistics of its regions.
+///
+/// Rows are summed one by one and merged in order, so the result is the same at any number of threads.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for a region outside the frame, and those of the source.
+pub fn measure(source: &mut dyn RowSource, regions: &[Region], equations: Equations) -> Result<Report> {
+    let frame = source.header().clone();
+    let geometry = &frame.geometry;
+    let whole = [Region { x: 0, y: 0, width: geometry.width, height: geometry.height }];
+    let regions = if regions.is_empty() { &whole } else { regions };
+    for region in regions {
+        let inside = region.x.checked_add(region.width).is_some_and(|end| end <= geometry.width)
+            && region.y.checked_add(region.height).is_some_and(|end| end <= geometry.height);
+        if !inside || region.width == 0 || region.height == 0 {
+            return Err(Error::Usage(format!(
+                "{}: region {},{},{},{} does not lie within the frame of {}x{}",
+                frame.name, region.x, region.y, region.width, region.height, geometry.width, geometry.height
+            )));
+        }
+    }
+    let channels = geometry.channels.len();
+    let rails = Rails::of(&frame);
+    let empty = || Tally {
+        channels: Moments::new(channels),
+        classes: [const { 0 }; 3].map(|_| Moments::new(1)),
+        clipped: vec![0; channels],
+        clipped_classes: [0; 3],
+    };
+    let mut tallies: Vec<Tally> = regions.iter().map(|_| empty()).collect();
+    let band_rows = geometry.band_rows(source.natural_rows());
+    let mut samples = Vec::new();
+    let mut first = 0;
+    while first < geometry.height {
+        let rows = band_rows.min(geometry.height - first);
+        samples.clear();
+        source.read(rows, &mut samples)?;
+        for (region, tally) in regions.iter().zip(&mut tallies) {
+            let row_tallies: Vec<Tally> = samples
+                .par_chunks(geometry.row_samples())
+                .enumerate()
+                .filter(|(index, _)| (region.y..region.y + region.height).contains(&(first + index)))
+                .map(|(index, row)| {
+                    let mut tally = empty();
+                    tally.add_row(&frame, first + index, row, *region, rails);
+                    tally
+                })
+                .collect();
+            for row in &row_tallies {
+                tally.merge(row);
+            }
+        }
+        first += rows;
+    }
+    let predictions = propagation::of_frame(&frame, equations);
+    let report = |(region, tally): (&Region, &Tally)| tally.report(&frame, *region, rails, predictions.as_ref());
+    Ok(Report { regions: regions.iter().zip(&tallies).map(report).collect() })
+}
+
+impl Tally {
+    fn add_row(&mut self, frame: &FrameHeader, y: usize, row: &[f32], region: Region, rails: Rails) {
+        let width = frame.geometry.width;
+        let lines: Vec<&[f32]> =
+            row.chunks_exact(width).map(|line| &line[region.x..region.x + region.width]).collect();
+        self.channels.add(&lines);
+        for (clipped, line) in self.clipped.iter_mut().zip(&lines) {
+            *clipped += rails.count(line.iter().copied());
+        }
+        if let (Some(pattern), [line]) = (frame.metadata.cfa, lines.as_slice()) {
+            let classes = pattern.row_classes(frame.geometry.origin, y);
+            for (parity, class) in classes.into_iter().enumerate() {
+                let skip = (parity + region.x) % 2;
+                let sites: Vec<f32> = line.iter().skip(skip).step_by(2).copied().collect();
+                self.classes[class as usize].add(&[&sites]);
+                self.clipped_classes[class as usize] += rails.count(sites.into_iter());
+            }
+        }
+    }
+
+    fn merge(&mut self, row: &Self) {
+        self.channels.merge(&row.channels);
+        for (mine, theirs) in self.classes.iter_mut().zip(&row.classes) {
+            mine.merge(theirs);
+        }
+        for (mine, theirs) in self.clipped.iter_mut().zip(&row.clipped) {
+            *mine += theirs;
+        }
+        for (mine, theirs) in self.clipped_classes.iter_mut().zip(row.clipped_classes) {
+            *mine += theirs;
+        }
+    }
+
+    fn report(
+        &self,
+        frame: &FrameHeader,
+        region: Region,
+        rails: Rails,
+        predictions: Option<&[Prediction; 3]>,
+    ) -> RegionReport {
+        let metadata = &frame.metadata;
+        let black = match metadata.quantity {
+            QuantityKind::Adu => metadata.black_level_adu.unwrap_or(0.0),
+            QuantityKind::Electrons => metadata.dark_signal_e.unwrap_or(0.0),
+            _ => 0.0,
+        };
+        let channels = self.channels.channels();
+        let has_rails = !matches!(rails, Rails::None);
+        let planes = metadata.quantity.plane_names();
+        let channel_report = |index: usize| {
+            let name = match channels {
+                3 => planes[index].to_owned(),
+                _ => frame.geometry.channels[index].clone(),
+            };
+            let prediction = match (channels, predictions) {
+                (3, Some(predictions)) => Some(predictions[index]),
+                (1, Some(predictions)) => self.mixture(predictions),
+                _ => None,
+            };
+            let clipped = has_rails.then_some(self.clipped[index]);
+            ChannelReport::new(name, &self.channels, index, black, clipped, prediction)
+        };
+        let reports: Vec<ChannelReport> = (0..channels).map(channel_report).collect();
+        let classes = match metadata.cfa {
+            Some(_) if channels == 1 => Class::ALL
+                .into_iter()
+                .map(|class| {
+                    let index = class as usize;
+                    let clipped = has_rails.then_some(self.clipped_classes[index]);
+                    let prediction = predictions.map(|predictions| predictions[index]);
+                    ChannelReport::new(class.letter().into(), &self.classes[index], 0, black, clipped, prediction)
+                })
+                .collect(),
+            _ => Vec::new(),
+        };
+        let count = self.channels.count;
+        let predicted: Option<Vec<f64>> = reports.iter().map(|report| report.predicted_std).collect();
+        let diagonal = |stds: &[f64]| -> Vec<Vec<f64>> {
+            // Photosites of different classes are drawn apart, so nothing is correlated before demosaicking.
+            (0..channels).map(|i| (0..channels).map(|j| if i == j { stds[i].powi(2) } else { 0.0 }).collect()).collect()
+        };
+        let covariance_row = |i| (0..channels).map(|j| self.channels.covariance(i, j)).collect::<Option<Vec<f64>>>();
+        RegionReport {
+            region,
+            count,
+            not_finite: self.channels.not_finite,
+            quantity: metadata.quantity,
+            unit: metadata.unit.clone(),
+            channels: reports,
+            classes,
+            covariance: (0..channels).map(covariance_row).collect(),
+            predicted_covariance: predicted.as_deref().map(diagonal),
+            patch_mean_std: predicted
+                .filter(|_| count > 0)
+                .map(|stds| stds.iter().map(|std| std / (count as f64).sqrt()).collect()),
+        }
+    }
+
+    /// The prediction for a plane in which the classes are mixed as the region has them.
+    fn mixture(&self, predictions: &[Prediction; 3]) -> Option<Prediction> {
+        let total: u64 = self.classes.iter().map(|class| class.count).sum();
+        if total == 0 {
+            return None;
+        }
+        let shares = self.classes.each_ref().map(|class| class.count as f64 / total as f64);
+        let mean: f64 = shares.iter().zip(predictions).map(|(w, p)| w * p.moments.mean).sum();
+        let offsets = predictions.each_ref().map(|p| p.moments.mean - mean);
+        let variance: f64 =
+            (0..3).map(|k| shares[k] * (predictions[k].moments.variance + offsets[k].powi(2))).sum();
+        let fourth: f64 = (0..3)
+            .map(|k| {
+                let (v, d) = (predictions[k].moments.variance, offsets[k]);
+                shares[k] * ((3.0 + predictions[k].excess_kurtosis) * v * v + 6.0 * v * d * d + d.powi(4))
+            })
+            .sum();
+        let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) - 3.0 } else { 0.0 };
+        let moments = crate::numerics::normal::MeanVariance { mean, variance };
+        Some(Prediction { moments, excess_kurtosis })
+    }
+}
+
+impl ChannelReport {
+    fn new(
+        name: String,
+        moments: &Moments,
+        index: usize,
+        black: f64,
+        clipped: Option<u64>,
+        prediction: Option<Prediction>,
+    ) -> Self {
+        let count = moments.count;
+        let seen = |value: f64| (count > 0).then_some(value);
+        let mean = seen(moments.mean[index]);
+        let std = moments.std(index);
+        let n = count as f64;
+        let ratio_db = |mean: f64, std: f64| {
+            let ratio = (mean - black) / std;
+            (ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
+        };
+        let predicted = prediction.map(|p| (p.moments.mean, p.moments.std(), p.excess_kurtosis));
+        let spread = predicted.filter(|(_, std, _)| *std > 0.0);
+        Self {
+            name,
+            count,
+            mean,
+            std,
+            min: seen(moments.min[index]),
+            max: seen(moments.max[index]),
+            snr_db: mean.zip(std).and_then(|(mean, std)| ratio_db(mean, std)),
+            clipped,
+            predicted_mean: predicted.map(|(mean, _, _)| mean),
+            predicted_std: predicted.map(|(_, std, _)| std),
+            z_mean: mean.zip(spread).map(|(mean, (m, s, _))| (mean - m) / (s / n.sqrt())),
+            z_std: std.zip(spread).map(|(std, (_, s, kurtosis))| {
+                // Var(s²) = σ⁴ (2/(n−1) + κ/n); the standard deviation has a quarter of its relative variance.
+                let sampling = ((2.0 / (n - 1.0) + kurtosis / n).max(0.0) / 4.0).sqrt();
+                (std / s - 1.0) / sampling
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cfa::CfaPattern;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+    use crate::stage::MemoryFrame;
+
+    fn frame(channels: &[&str], width: usize, height: usize, f: impl Fn(usize) -> f32) -> MemoryFrame {
+        let geometry = Geometry::new(width, height, channels);
+        let samples = (0..geometry.row_samples() * height).map(f).collect();
+        let header = FrameHeader { name: "test".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+        MemoryFrame::new(header, samples)
+    }
+
+    #[test]
+    fn regions_see_their_own_samples() {
+        let mut ramp = frame(&["Y"], 10, 8, |i| i as f32);
+        let region = Region { x: 2, y: 3, width: 3, height: 2 };
+        let report = measure(&mut ramp, &[region], Equations::Exact).unwrap();
+        let channel = &report.regions[0].channels[0];
+        assert_eq!((channel.min, channel.max, channel.mean), (Some(32.0), Some(44.0), Some(38.0)));
+        let outside = Region { x: 8, ..region };
+        let again = measure(&mut frame(&["Y"], 10, 8, |i| i as f32), &[outside], Equations::Exact);
+        assert!(again.unwrap_err().to_string().contains("does not lie within"));
+    }
+
+    #[test]
+    fn classes_of_a_plane_are_told_apart_wherever_the_region_starts() {
+        let mut plane = frame(&["Y"], 8, 6, |i| [10.0, 20.0, 20.0, 30.0][(i / 8 % 2) * 2 + i % 2]);
+        plane.header.metadata.cfa = Some(CfaPattern::Rggb);
+        let region = Region { x: 1, y: 1, width: 5, height: 4 };
+        let report = measure(&mut plane, &[region], Equations::Exact).unwrap();
+        let means: Vec<_> = report.regions[0].classes.iter().map(|class| class.mean).collect();
+        assert_eq!(means, [Some(10.0), Some(20.0), Some(30.0)]);
+    }
+
+    #[test]
+    fn one_sample_has_a_mean_and_no_spread() {
+        let report = measure(&mut frame(&["Y"], 1, 1, |_| 7.0), &[], Equations::Exact).unwrap();
+        let channel = &report.regions[0].channels[0];
+        assert_eq!((channel.mean, channel.std, channel.snr_db), (Some(7.0), None, None));
+        assert_eq!(report.regions[0].covariance, None);
+    }
+}
