@@ -8,7 +8,7 @@ import unittest
 
 import numpy as np
 
-from programs import BINARIES, TIMEOUT_S, ProgramCase, read_planes, write_planes
+from programs import BINARIES, TIMEOUT_S, ProgramCase, read_planes, sample_data, write_planes
 
 BAD_DATA, BAD_USAGE = 1, 2
 
@@ -148,9 +148,7 @@ class Stages(Errors):
         self.assertIn("mosaic", text.removeprefix("demosaic: ").replace("demosaic", ""))
 
     def test_to_xyz_of_a_cfa_plane_names_demosaic(self):
-        sky = pathlib.Path(__file__).resolve().parents[2] / "sample_data/skies/sky912.exr"
-        if not sky.exists():
-            self.skipTest("sample_data/skies/sky912.exr is missing")
+        sky = sample_data("skies/sky912.exr")
         self.run_program(["fit-matrix", sky, "--sensor", "kaf-5101ce", "-o", "matrix.yaml"])
         cfa = self.run_pipe(["add-noise"], ["digitize"], ["mosaic"], stdin=self.electrons)
         self.write("cfa.exr", cfa)
@@ -253,16 +251,17 @@ class Usage(Errors):
         )
 
     def test_sensor_file_with_a_misspelt_key(self):
-        sensor = pathlib.Path(__file__).resolve().parents[2] / "sample_data/sensors/kaf-5101ce.yaml"
-        if not sensor.exists():
-            self.skipTest("sample_data/sensors/kaf-5101ce.yaml is missing")
-        text = sensor.read_text(encoding="utf-8").replace("read_noise_e:", "read_nois_e:")
-        text = text.replace("file: ", f"file: {sensor.parent}/")
-        self.write("sensor.yaml", text.encode())
-        self.refused(
-            ["render-radiance", "--electrons", "1,2,3", "--size", "4x4", "--sensor", "sensor.yaml", "-o", "out.exr"],
-            *(BAD_DATA, "sensor.yaml", "read_nois_e", "read_noise_e"),
-        )
+        for name in ("kaf-5101ce.yaml", "kaf5101ce_est_qe_1nm.csv", "bg39_1mm.csv"):
+            self.write(name, sample_data(f"sensors/{name}").read_bytes())
+        light = ["render-radiance", "--electrons", "1,2,3", "--size", "4x4", "-o", "out.exr", "--sensor"]
+        text = (self.directory / "kaf-5101ce.yaml").read_text(encoding="utf-8")
+        for right, wrong in [("read_noise_e", "read_nois_e"), ("prnu", "pnru"), ("full_well_e", "full_well")]:
+            self.write("sensor.yaml", text.replace(f"\n{right}:", f"\n{wrong}:").encode())
+            self.refused([*light, "./sensor.yaml"], BAD_DATA, "sensor.yaml", wrong, right)
+        for key, value in [("bits", "0"), ("read_noise_e", "-1"), ("prnu", ".nan"), ("cfa", "rgbw")]:
+            lines = [f"{key}: {value}" if line.startswith(f"{key}:") else line for line in text.splitlines()]
+            self.write("sensor.yaml", "\n".join(lines).encode())
+            self.refused([*light, "./sensor.yaml"], BAD_DATA, "sensor.yaml", key)
 
     def test_help_and_version_succeed(self):
         for program in PROGRAMS:

@@ -118,7 +118,8 @@ class Written(ProgramCase):
                     self.same_planes(read_planes(self.directory / "out.tiff"), plain)
 
     def test_compressed_is_smaller(self):
-        flat = self.run_program(["render-radiance", "--electrons", "500,500,500", "--size", "200x200"])
+        # Zeros: the run lengths of EXR find nothing in other flat frames of single precision.
+        flat = self.run_program(["render-radiance", "--electrons", "0,0,0", "--size", "200x200"])
         for suffix, compressions in (("exr", ("zip", "zips", "rle", "piz")), ("tif", ("lzw", "deflate"))):
             for compression in compressions:
                 self.run_program(["mosaic", "-o", f"a.{suffix}", "--compression", compression], flat)
