@@ -18,6 +18,11 @@ PROGRAMS = [
 ]
 
 
+def naming(option, value):
+    """What a complaint about an option may call it."""
+    return (option, option.lstrip("-"), option.lstrip("-").replace("-", " "), value)
+
+
 class Errors(ProgramCase):
     def setUp(self):
         super().setUp()
@@ -40,7 +45,7 @@ class Errors(ProgramCase):
         return text
 
     def refused(self, command, status, *mentions, stdin=b""):
-        """Checks that a command is refused and gives its complaint."""
+        """Checks that a command is refused and gives its complaint. Of a mention that is a tuple, one word will do."""
         what = " ".join(str(word) for word in command)
         before = self.listing()
         done = self.attempt(command, stdin)
@@ -48,7 +53,10 @@ class Errors(ProgramCase):
             self.assertEqual(self.listing(), before, f"{what}: something was left behind")
             text = self.check_complaint(done, command[0], status, what)
             for mention in mentions:
-                self.assertIn(mention, text, what)
+                words = mention if isinstance(mention, tuple) else (mention,)
+                self.assertTrue(
+                    any(word.lower() in text.lower() for word in words), f"{what}: no {words} in {text!r}"
+                )
         return done.stderr.decode(errors="replace")
 
     def write(self, name, data):
@@ -207,15 +215,16 @@ class Usage(Errors):
             ("--quadrature", "guess"),
             ("--cfa", "xyzw"),
         ]:
-            self.refused([*light, f"{option}={value}"], BAD_USAGE, option)
+            self.refused([*light, f"{option}={value}"], BAD_USAGE, naming(option, value))
         for size in ("0x5", "5x0", "-1x5", "5", "5x", "axb", "99999999999999999999x2"):
             self.refused(
-                ["render-radiance", "--electrons", "1,2,3", f"--size={size}", "-o", "out.exr"], BAD_USAGE, "--size"
+                ["render-radiance", "--electrons", "1,2,3", f"--size={size}", "-o", "out.exr"],
+                *(BAD_USAGE, naming("--size", size)),
             )
         for electrons in ("1,2", "1,2,3,4", "1,2,-3", "a,b,c", "1,2,nan"):
             self.refused(
                 ["render-radiance", f"--electrons={electrons}", "--size", "4x4", "-o", "out.exr"],
-                *(BAD_USAGE, "--electrons"),
+                *(BAD_USAGE, naming("--electrons", electrons)),
             )
 
     def test_noise_and_converter_options(self):
@@ -228,11 +237,11 @@ class Usage(Errors):
             ("--without", "rain"),
             ("--threads", "-2"),
         ]:
-            self.refused(["add-noise", "in.exr", "-o", "out.exr", f"{option}={value}"], BAD_USAGE, option)
+            self.refused(["add-noise", "in.exr", "-o", "out.exr", f"{option}={value}"], BAD_USAGE, naming(option, value))
         for option, value in [("--bits", "0"), ("--bits", "99"), ("--slope", "-1"), ("--slope", "nan")]:
-            self.refused(["digitize", "in.exr", "-o", "out.exr", f"{option}={value}"], BAD_USAGE, option)
-        self.refused(["mosaic", "in.exr", "-o", "out.exr", "--pattern=rgbw"], BAD_USAGE, "--pattern")
-        self.refused(["mosaic", "in.exr", "-o", "out.exr", "--compression=best"], BAD_USAGE, "--compression")
+            self.refused(["digitize", "in.exr", "-o", "out.exr", f"{option}={value}"], BAD_USAGE, naming(option, value))
+        self.refused(["mosaic", "in.exr", "-o", "out.exr", "--pattern=rgbw"], BAD_USAGE, "rgbw")
+        self.refused(["mosaic", "in.exr", "-o", "out.exr", "--compression=best"], BAD_USAGE, "best")
         self.refused(["mosaic", "in.exr", "-o", "out.tif", "--compression=piz"], BAD_USAGE, "piz")
         self.refused(["mosaic", "in.exr", "-o", "out.exr", "--sample-type=u16"], BAD_USAGE, "u16")
         self.refused(["measure", "in.exr", "--region", "0,0,17,1"], (1, 2), "0,0,17,1")
