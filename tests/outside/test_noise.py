@@ -1,8 +1,8 @@
 """Noise and digitization: measured moments beside formulas, and the laws that hold to the bit.
 
-Var(PN) = λ + λ²s² + λs² for P ~ Poisson(λ), N ~ Normal(1, s), independent. The tolerance of a mean is 5 σ/√n, that of
-a standard deviation 5 σ √(1/(2n)): the distributions here are nearly normal, the term in the kurtosis is below 3 % of
-the 2 it is added to.
+Var(PN) = λ + λ²s² + λs² for P ~ Poisson(λ), N ~ Normal(1, s), independent. The tolerance of a mean is 5 σ/√n, that
+of a standard deviation 5 σ √(1/(2n)): the distributions here are nearly normal, their excess kurtosis is a few
+hundredths beside the 2 it is added to.
 """
 
 import math
@@ -209,7 +209,8 @@ class Digitize(Noise):
             tie = np.abs(exact - np.floor(exact) - 0.5) < 1e-6
             expected = np.clip(np.floor(exact + 0.5), 0, top)
             wrong = (codes[name] != expected) & ~tie
-            self.assertEqual(np.count_nonzero(wrong), 0, f"{name}: {noisy[name][wrong][:3]} gave {codes[name][wrong][:3]}")
+            example = f"{name}: {noisy[name][wrong][:3]} gave {codes[name][wrong][:3]}"
+            self.assertEqual(np.count_nonzero(wrong), 0, example)
 
     def test_codes_of_the_default_converter(self):
         for seed, levels in enumerate([(0, 100, 5000), (20000, 38000, 39900)]):
