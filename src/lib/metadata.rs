@@ -269,6 +269,16 @@ pub struct FrameHeader {
 }
 
 impl FrameHeader {
+    /// What reports call a channel: its own name, but X, Y, Z where XYZ is stored as R, G, B.
+    pub fn channel_name(&self, index: usize) -> &str {
+        match (self.metadata.quantity, self.geometry.channels[index].as_str()) {
+            (QuantityKind::Xyz, "R") => "X",
+            (QuantityKind::Xyz, "G") => "Y",
+            (QuantityKind::Xyz, "B") => "Z",
+            (_, name) => name,
+        }
+    }
+
     /// Whether the frame has the three planes R, G and B (or what was made of them).
     pub fn has_three_planes(&self) -> bool {
         self.geometry.channels.len() == 3

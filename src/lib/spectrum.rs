@@ -39,12 +39,12 @@ impl WavelengthGrid {
         let steps = (end_nm - start_nm) / step_nm;
         if !in_range || !(0.0..1e6).contains(&steps) {
             return Err(Error::Usage(format!(
-                "wavelengths {start_nm}:{end_nm}:{step_nm} make no grid; give START:END:STEP in nm, such as 360:830:1"
+                "{start_nm}:{end_nm}:{step_nm} nm make no grid; give START:END:STEP, such as 360:830:1"
             )));
         }
         if (steps - steps.round()).abs() > 1e-6 {
             return Err(Error::Usage(format!(
-                "wavelengths {start_nm}:{end_nm}:{step_nm} do not end on a step; change the end or the step"
+                "{start_nm}:{end_nm}:{step_nm} nm do not end on a step; change the end or the step"
             )));
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to lie in 0..10⁶")]

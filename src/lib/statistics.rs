@@ -237,12 +237,8 @@ impl Tally {
         };
         let channels = self.channels.channels();
         let has_rails = !matches!(rails, Rails::None);
-        let planes = metadata.quantity.plane_names();
         let channel_report = |index: usize| {
-            let name = match channels {
-                3 => planes[index].to_owned(),
-                _ => frame.geometry.channels[index].clone(),
-            };
+            let name = frame.channel_name(index).to_owned();
             let prediction = match (channels, predictions) {
                 (3, Some(predictions)) => Some(predictions[index]),
                 (1, Some(predictions)) => self.mixture(predictions),

@@ -147,16 +147,6 @@ impl QuantityKind {
             Self::Lab | Self::Srgb => "1",
         }
     }
-
-    /// The names by which reports call the three planes.
-    pub fn plane_names(self) -> [&'static str; 3] {
-        match self {
-            Self::Xyz => ["X", "Y", "Z"],
-            Self::Xyy => ["x", "y", "Y"],
-            Self::Lab => ["L", "a", "b"],
-            _ => ["R", "G", "B"],
-        }
-    }
 }
 
 impl fmt::Display for QuantityKind {

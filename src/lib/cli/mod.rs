@@ -191,7 +191,7 @@ impl Session {
     /// Those of reader, stage and writer.
     pub fn drive<S: Stage>(&self, mut reader: FrameReader, stage: &S, output: &Output) -> Result<Counts> {
         self.report_reader(&reader);
-        let mut writer = FrameWriter::create(&output.options(), stage.header(), &[reader.id()])?;
+        let mut writer = FrameWriter::create(&output.options(), stage.header(), reader.file().as_ref())?;
         let bar = self.progress(stage.header().geometry.height);
         let counts = run(stage, &mut reader, &mut writer, &mut |rows| bar.set_position(rows as u64))?;
         bar.finish_and_clear();

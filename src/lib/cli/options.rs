@@ -54,22 +54,12 @@ pub struct Output {
     #[arg(long, value_parser = choice(&[("exr", Format::Exr), ("tiff", Format::Tiff)]))]
     pub format: Option<Format>,
     /// Compression, without loss: rle, zips, zip, piz for EXR; lzw, deflate for TIFF; none by default
-    #[arg(long, value_parser = choice(&COMPRESSIONS))]
+    #[arg(long, value_parser = choice(&CompressionKind::NAMES))]
     pub compression: Option<CompressionKind>,
     /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF; by default f32, and u16 for ADU in TIFF
     #[arg(long, value_name = "TYPE", value_parser = choice(&[("f32", SampleKind::F32), ("f16", SampleKind::F16), ("u16", SampleKind::U16)]))]
     pub sample_type: Option<SampleKind>,
 }
-
-const COMPRESSIONS: [(&str, CompressionKind); 7] = [
-    ("none", CompressionKind::None),
-    ("rle", CompressionKind::Rle),
-    ("zips", CompressionKind::Zips),
-    ("zip", CompressionKind::Zip),
-    ("piz", CompressionKind::Piz),
-    ("lzw", CompressionKind::Lzw),
-    ("deflate", CompressionKind::Deflate),
-];
 
 impl Output {
     /// Where and how to write.

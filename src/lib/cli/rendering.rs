@@ -66,7 +66,11 @@ pub struct Request {
 pub fn wavelengths(text: &str) -> std::result::Result<[f64; 3], String> {
     let numbers: Option<Vec<f64>> = text.split(':').map(|part| part.trim().parse().ok()).collect();
     match numbers.as_deref() {
-        Some([start, end, step]) if numbers.iter().flatten().all(|x| x.is_finite()) => Ok([*start, *end, *step]),
+        Some([start_nm, end_nm, step_nm]) => {
+            let (start_nm, end_nm, step_nm) = (*start_nm, *end_nm, *step_nm);
+            let grid = WavelengthGrid { start_nm, end_nm, step_nm, ..WavelengthGrid::default() };
+            grid.points().map(|_| [start_nm, end_nm, step_nm]).map_err(|error| error.to_string())
+        }
         _ => Err("give START:END:STEP in nm, such as 360:830:1".into()),
     }
 }
@@ -142,7 +146,7 @@ impl Request {
             exposure.exposure_s = 1.0;
         }
         let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-        let mut input = None;
+        let mut input: Option<(FileId, String)> = None;
         let mut light = match self.electrons {
             Some(electrons) => {
                 let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
@@ -193,7 +197,7 @@ impl Request {
         &self,
         session: &Session,
         camera: impl Fn(&[f64], &str) -> Camera,
-        input: &mut Option<FileId>,
+        input: &mut Option<(FileId, String)>,
     ) -> Result<Light> {
         let options =
             InputOptions { path: self.input.clone(), part: self.part, metadata: None, all_channels: true };
@@ -213,7 +217,7 @@ impl Request {
                     return Err(Error::Usage("a spectral image has no columns; choose a pixel with --sample N".into()));
                 }
                 session.report_reader(&reader);
-                *input = reader.id();
+                *input = reader.file();
                 let header = reader.header().clone();
                 let spectral = SpectralChannels::of(&header, self.radiance_unit)?;
                 let camera = camera(&spectral.wavelength_nm, &header.name);
@@ -337,10 +341,10 @@ impl Request {
         output: &Output,
         mut rendering: Rendering,
         mut light: Light,
-        input: Option<FileId>,
+        input: Option<(FileId, String)>,
     ) -> Result<()> {
         session.sign(&mut rendering.header);
-        let mut writer = FrameWriter::create(&output.options(), &rendering.header, &[input])?;
+        let mut writer = FrameWriter::create(&output.options(), &rendering.header, input.as_ref())?;
         let bar = session.progress(rendering.header.geometry.height);
         let next_row = || match &mut light {
             Light::Uniform { electrons, .. } => Ok(vec![*electrons]),

@@ -127,11 +127,14 @@ impl Target {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] when the output is a terminal or one of `inputs`; [`Error::Disk`].
-    pub fn open(path: Option<&Path>, needs_seek: bool, inputs: &[Option<FileId>]) -> Result<Self> {
+    /// [`Error::Usage`] when the output is a terminal or the file `input`; [`Error::Disk`].
+    pub fn open(path: Option<&Path>, needs_seek: bool, input: Option<&(FileId, String)>) -> Result<Self> {
         let name = path.map_or_else(|| STDOUT_NAME.to_owned(), |path| path.display().to_string());
-        let is_input = |metadata: &std::fs::Metadata| inputs.contains(&Some(file_id(metadata)));
-        let same = || Error::Usage(format!("{name}: it is the input too; name another output"));
+        let is_input = |metadata: &std::fs::Metadata| input.is_some_and(|(id, _)| *id == file_id(metadata));
+        let same = || {
+            let input = input.map_or("", |(_, input)| input.as_str());
+            Error::Usage(format!("{name}: it is the same file as the input {input}; name another output"))
+        };
         let output = match path {
             None => {
                 let stdout = io::stdout();

@@ -119,8 +119,8 @@ impl FrameReader {
     }
 
     /// The file that is read, so that it is not written over; none for pipes.
-    pub fn id(&self) -> Option<FileId> {
-        self.id
+    pub fn file(&self) -> Option<(FileId, String)> {
+        self.id.map(|id| (id, self.header.name.clone()))
     }
 
     /// What a careful user should know: channels left out, a digest that does not match.

@@ -45,6 +45,24 @@ pub enum CompressionKind {
     Deflate,
 }
 
+impl CompressionKind {
+    /// All kinds with the names used on the command line.
+    pub const NAMES: [(&str, Self); 7] = [
+        ("none", Self::None),
+        ("rle", Self::Rle),
+        ("zips", Self::Zips),
+        ("zip", Self::Zip),
+        ("piz", Self::Piz),
+        ("lzw", Self::Lzw),
+        ("deflate", Self::Deflate),
+    ];
+
+    fn refused(self, format: &str, choices: &str) -> Error {
+        let name = Self::NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name);
+        Error::Usage(format!("{format} is not compressed by {name}; it is one of {choices}"))
+    }
+}
+
 /// How samples are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SampleKind {
@@ -89,7 +107,8 @@ impl OutputOptions {
             (None, Some("tif" | "tiff")) => Format::Tiff,
             (None, Some(end)) => {
                 return Err(Error::Usage(format!(
-                    "`.{end}` names no format that is written here; end the name in .exr or .tiff, or give --format"
+                    "{}: `.{end}` names no format that is written here; end the name in .exr or .tiff, or give --format",
+                    path.unwrap_or(Path::new("-")).display()
                 )));
             }
         };
@@ -116,7 +135,7 @@ impl OutputOptions {
                     CompressionKind::Zip => ExrCompression::Zip,
                     CompressionKind::Piz => ExrCompression::Piz,
                     CompressionKind::Lzw | CompressionKind::Deflate => {
-                        return refuse("EXR is compressed by none, rle, zips, zip or piz");
+                        return Err(compression.refused("EXR", "none, rle, zips, zip or piz"));
                     }
                 };
                 Ok(Encoding::Exr(samples, compression))
@@ -136,7 +155,7 @@ impl OutputOptions {
                     CompressionKind::None => TiffCompression::None,
                     CompressionKind::Lzw => TiffCompression::Lzw,
                     CompressionKind::Deflate => TiffCompression::Deflate,
-                    _ => return refuse("TIFF is compressed by none, lzw or deflate"),
+                    _ => return Err(compression.refused("TIFF", "none, lzw or deflate")),
                 };
                 Ok(Encoding::Tiff(samples, compression))
             }
@@ -161,16 +180,16 @@ enum Encoder {
 }
 
 impl FrameWriter {
-    /// Opens the output and writes the head of the frame. `inputs` are the files that are being read.
+    /// Opens the output and writes the head of the frame. `input` is the file that is being read, if it is one.
     ///
     /// # Errors
     ///
     /// [`Error::Usage`] where options do not go together, the output is a terminal or an input; [`Error::Disk`].
-    pub fn create(options: &OutputOptions, header: &FrameHeader, inputs: &[Option<FileId>]) -> Result<Self> {
+    pub fn create(options: &OutputOptions, header: &FrameHeader, input: Option<&(FileId, String)>) -> Result<Self> {
         let encoding = options.encoding(header)?;
         let path = options.path.as_deref().filter(|path| *path != Path::new("-"));
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
-        let target = Target::open(path, needs_seek, inputs)?;
+        let target = Target::open(path, needs_seek, input)?;
         let name = target.name().to_owned();
         let record = target.named_file().map(|path| (Sha256::new(), sidecar_path(path)));
         let metadata = yaml::write_metadata(&header.metadata)?;
