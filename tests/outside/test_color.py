@@ -10,7 +10,8 @@ from test_radiance import Sensor
 
 # Short enough that no sky of the library fills a photosite.
 EXPOSURE_S = 0.002
-PATCH = 8
+# Effective-color interpolation looks three photosites around.
+PATCH, MARGIN = 10, 3
 WITHOUT_NOISE = ["add-noise", "--without", "dcsn,dcnu,ssn,prnu,ron"]
 
 
@@ -51,7 +52,7 @@ class Chain(ProgramCase):
         self.assertEqual(sorted(planes), ["B", "G", "R"])
         xyz = np.stack([planes[name].astype(np.float64) for name in "RGB"], axis=-1)
         patches = xyz.reshape(24, PATCH, 38, PATCH, 3)
-        return patches[:, 2:-2, :, 2:-2].mean(axis=(1, 3))
+        return patches[:, MARGIN:-MARGIN, :, MARGIN:-MARGIN].mean(axis=(1, 3))
 
     def bright(self, exposure_s):
         """Skies that reach 1000 electrons in each class: rounding to codes then matters by less than 1 %."""

@@ -210,12 +210,26 @@ class Usage(Errors):
             ("--lens-transmittance", "-0.1"),
             ("--lens-transmittance", "1.5"),
             ("--exposure", "soon"),
-            ("--wavelengths", "830:360:1"),
-            ("--wavelengths", "360:830:0"),
             ("--quadrature", "guess"),
             ("--cfa", "xyzw"),
         ]:
             self.refused([*light, f"{option}={value}"], BAD_USAGE, naming(option, value))
+        sky = sample_data("skies/clear_zenith.csv")
+        for option, value in [
+            ("--wavelengths", "830:360:1"),
+            ("--wavelengths", "360:830:0"),
+            ("--wavelengths", "360:830:-1"),
+            ("--wavelengths", "360:830:nan"),
+            ("--wavelengths", "360:830:1e-9"),
+            ("--wavelengths", "360"),
+            ("--expose-to", "0"),
+            ("--expose-to", "-1"),
+            ("--expose-to", "nan"),
+        ]:
+            self.refused(
+                ["render-radiance", sky, "--size", "4x4", "-o", "out.exr", f"{option}={value}"],
+                *(BAD_USAGE, naming(option, value)),
+            )
         for size in ("0x5", "5x0", "-1x5", "5", "5x", "axb", "99999999999999999999x2"):
             self.refused(
                 ["render-radiance", "--electrons", "1,2,3", f"--size={size}", "-o", "out.exr"],
@@ -242,8 +256,8 @@ class Usage(Errors):
             self.refused(["digitize", "in.exr", "-o", "out.exr", f"{option}={value}"], BAD_USAGE, naming(option, value))
         self.refused(["mosaic", "in.exr", "-o", "out.exr", "--pattern=rgbw"], BAD_USAGE, "rgbw")
         self.refused(["mosaic", "in.exr", "-o", "out.exr", "--compression=best"], BAD_USAGE, "best")
-        self.refused(["mosaic", "in.exr", "-o", "out.tif", "--compression=piz"], BAD_USAGE, "piz")
-        self.refused(["mosaic", "in.exr", "-o", "out.exr", "--sample-type=u16"], BAD_USAGE, "u16")
+        self.refused(["mosaic", "in.exr", "-o", "out.tif", "--compression=piz"], BAD_USAGE, ("piz", "compress"))
+        self.refused(["mosaic", "in.exr", "-o", "out.exr", "--sample-type=u16"], BAD_USAGE, ("u16", "f16"))
         self.refused(["measure", "in.exr", "--region", "0,0,17,1"], (1, 2), "0,0,17,1")
         self.refused(["measure", "in.exr", "--region", "0,0,0,1"], (1, 2), "0,0,0,1")
 
@@ -264,9 +278,11 @@ class Usage(Errors):
             self.write(name, sample_data(f"sensors/{name}").read_bytes())
         light = ["render-radiance", "--electrons", "1,2,3", "--size", "4x4", "-o", "out.exr", "--sensor"]
         text = (self.directory / "kaf-5101ce.yaml").read_text(encoding="utf-8")
-        for right, wrong in [("read_noise_e", "read_nois_e"), ("prnu", "pnru"), ("full_well_e", "full_well")]:
+        for right, wrong in [("read_noise_e", "read_nois_e"), ("prnu", "pnru"), ("full_well_e", "fullwell_e")]:
             self.write("sensor.yaml", text.replace(f"\n{right}:", f"\n{wrong}:").encode())
             self.refused([*light, "./sensor.yaml"], BAD_DATA, "sensor.yaml", wrong, right)
+        self.write("sensor.yaml", (text + "read_noise: 3\n").encode())
+        self.refused([*light, "./sensor.yaml"], BAD_DATA, "sensor.yaml", "read_noise_e")
         for key, value in [("bits", "0"), ("read_noise_e", "-1"), ("prnu", ".nan"), ("cfa", "rgbw")]:
             lines = [f"{key}: {value}" if line.startswith(f"{key}:") else line for line in text.splitlines()]
             self.write("sensor.yaml", "\n".join(lines).encode())
@@ -301,7 +317,7 @@ class Output(Errors):
         os.symlink("same.exr", self.path("link.exr"))
         os.link(self.path("same.exr"), self.path("hard.exr"))
         for name in ("same.exr", "./same.exr", "folder/../same.exr", self.path("same.exr"), "link.exr", "hard.exr"):
-            self.refused(["add-noise", "same.exr", "-o", name], (1, 2), "same.exr")
+            self.refused(["add-noise", "same.exr", "-o", name], (1, 2), (name, "same.exr"))
         self.assertEqual((self.directory / "same.exr").read_bytes(), self.electrons)
 
     def test_earlier_output_survives_an_error(self):
@@ -311,7 +327,7 @@ class Output(Errors):
         self.assertEqual((self.directory / "out.exr").read_bytes(), b"precious")
 
     def test_unknown_suffix(self):
-        self.refused(["add-noise", "-o", "out.jpeg"], (BAD_DATA, BAD_USAGE), "out.jpeg", stdin=self.electrons)
+        self.refused(["add-noise", "-o", "out.jpeg"], (BAD_DATA, BAD_USAGE), ".jpeg", stdin=self.electrons)
 
     def full_device(self):
         """A device that is always full: our own if we may make one, so that a program that replaces its output cannot

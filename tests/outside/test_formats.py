@@ -265,11 +265,23 @@ class Read(ProgramCase):
             np.testing.assert_array_equal(cfa["Y"], mosaic(planes, "rggb"))
 
     def test_exr_statistics(self):
-        for names in ("Y", "RGB", "RGBA", ("left.R", "depth.Z", "mask")):
+        layer = ("left.R", "left.G", "left.B")
+        for names in ("Y", "RGB", "RGBA", "ab", "abc", layer, ("left.R", "depth.Z", "mask")):
             for sample_type in ("f32", "f16"):
-                planes = self.color(sample_type, names=names)
-                write_planes(self.path("in.exr"), planes, sample_type)
-                self.check_statistics("in.exr", planes, f"channels {names}")
+                with self.subTest(names=names, sample_type=sample_type):
+                    planes = self.color(sample_type, names=names)
+                    write_planes(self.path("in.exr"), planes, sample_type)
+                    self.check_statistics("in.exr", planes, f"channels {names}")
+
+    def test_exr_layer_is_not_taken_in_the_order_of_the_file(self):
+        # The file holds left.B, left.G, left.R: a program may refuse them, but may not take blue for red.
+        planes = self.color("f32")
+        write_planes(self.path("in.exr"), {f"left.{name}": planes[name] for name in "RGB"}, "f32")
+        done = self.attempt(["mosaic", "in.exr", "--pattern", "rggb"])
+        if done.returncode == 0:
+            np.testing.assert_array_equal(self.planes(done.stdout)["Y"], mosaic(planes, "rggb"))
+        else:
+            self.assertEqual(done.returncode, 1, done.stderr)
 
     def test_exr_extra_channels(self):
         for names in (("R", "G", "B", "A"), ("A", "B", "G", "R", "Z"), ("R", "G", "B", "mask.m", "other.R")):

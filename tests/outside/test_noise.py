@@ -114,7 +114,7 @@ class Moments(Noise):
         z = {k: (v.astype(np.float64) - v.mean(dtype=np.float64)) / READ_NOISE_E for k, v in planes.items()}
         for name, values in z.items():
             self.assertLess(abs(np.mean(values**3)), 5 * math.sqrt(6 / n), f"skewness of {name}")
-            self.assertLess(abs(np.mean(values**4) - 3), 5 * math.sqrt(24 / n), f"kurtosis of {name}")
+            self.assertLess(abs(np.mean(values**4) - 3), 5 * math.sqrt(96 / n), f"kurtosis of {name}")
         limit = 5 / math.sqrt(n)
         for one, other in ("RG", "RB", "GB"):
             self.assertLess(abs(np.mean(z[one] * z[other])), limit, f"{one} and {other}")
