@@ -44,13 +44,18 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&options)?;
     session.report_reader(&reader);
     let report = measure(&mut reader, &arguments.region, arguments.equations)?;
-    output::write_text(arguments.output.as_deref(), &report::render(&report, arguments.output_format)?)?;
+    output::write_text(
+        arguments.output.as_deref(),
+        &report::render(&report, arguments.output_format)?,
+    )?;
     if let Some(warning) = reader.check_digest() {
         session.warn(&warning);
     }
     let not_finite: u64 = report.regions.iter().map(|region| region.not_finite).sum();
     if not_finite > 0 {
-        session.warn(&format!("{not_finite} pixels are NaN or infinite; they are left out of the statistics"));
+        session.warn(&format!(
+            "{not_finite} pixels are NaN or infinite; they are left out of the statistics"
+        ));
     }
     Ok(())
 }

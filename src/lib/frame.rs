@@ -193,8 +193,16 @@ impl<'a, Q: Quantity> Rows<'a, Q> {
     }
 }
 
+/// A channel's name without that of its layer: `R` of `left.R`.
+pub fn bare_name(channel: &str) -> &str {
+    channel.rsplit('.').next().unwrap_or(channel)
+}
+
 /// Rounds a double to the nearest sample.
-#[expect(clippy::cast_possible_truncation, reason = "the one place where double results become 32-bit samples")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the one place where double results become 32-bit samples"
+)]
 pub fn to_sample(value: f64) -> f32 {
     value as f32
 }

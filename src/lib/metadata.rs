@@ -2,7 +2,7 @@
 
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
-use crate::frame::Geometry;
+use crate::frame::{Geometry, bare_name};
 use crate::optics::Exposure;
 use crate::random::Source;
 use crate::sensor::Sensor;
@@ -248,7 +248,13 @@ impl Metadata {
 
     /// The same record about samples of another quantity: what held for the old samples alone is dropped.
     pub fn becoming(&self, quantity: QuantityKind) -> Self {
-        Self { quantity, unit: quantity.unit().into(), predicted: None, samples: None, ..self.clone() }
+        Self {
+            quantity,
+            unit: quantity.unit().into(),
+            predicted: None,
+            samples: None,
+            ..self.clone()
+        }
     }
 
     /// Notes that something was left out.
@@ -281,7 +287,7 @@ impl FrameHeader {
 
     /// Whether the frame has the three planes R, G and B (or what was made of them).
     pub fn has_three_planes(&self) -> bool {
-        self.geometry.channels.len() == 3
+        self.geometry.channels.iter().map(|name| bare_name(name)).eq(["R", "G", "B"])
     }
 
     /// The sensor, or the error that names the option to give.
@@ -299,7 +305,9 @@ impl FrameHeader {
     ///
     /// [`Error::MissingKey`].
     pub fn exposure(&self) -> Result<Exposure> {
-        self.metadata.exposure.ok_or_else(|| self.missing("exposure", "--exposure S and --f-number N"))
+        self.metadata
+            .exposure
+            .ok_or_else(|| self.missing("exposure", "--exposure S and --f-number N"))
     }
 
     /// An [`Error::MissingKey`] about this frame.
@@ -317,15 +325,27 @@ impl FrameHeader {
         Error::Order { file: self.name.clone(), problem: problem.into(), first }
     }
 
+    /// The names of the first channels.
+    fn some_channels(&self) -> String {
+        let names = &self.geometry.channels;
+        let more = if names.len() > 4 { ", …" } else { "" };
+        names[..names.len().min(4)].join(", ") + more
+    }
+
     /// What the frame holds, in a few words: `three planes of electrons`, `a CFA plane of ADU`.
     pub fn holds(&self) -> String {
         let quantity = self.metadata.quantity;
         match (self.geometry.channels.len(), self.metadata.cfa) {
             (1, Some(_)) => format!("a CFA plane of {quantity}"),
             (1, None) => format!("one plane of {quantity}"),
-            (3, _) if self.metadata.demosaic.is_some() => format!("three demosaicked planes of {quantity}"),
+            (3, _) if !self.has_three_planes() => {
+                format!("the planes {} of {quantity}", self.some_channels())
+            }
+            (3, _) if self.metadata.demosaic.is_some() => {
+                format!("three demosaicked planes of {quantity}")
+            }
             (3, _) => format!("three planes of {quantity}"),
-            (n, _) => format!("{n} planes of {quantity}"),
+            (n, _) => format!("{n} planes ({}) of {quantity}", self.some_channels()),
         }
     }
 }

@@ -99,7 +99,9 @@ impl AddNoise {
         match input.metadata.quantity {
             QuantityKind::ExpectedElectrons if input.metadata.demosaic.is_none() => {}
             QuantityKind::Electrons => {
-                return Err(input.refuse(format!("it holds {holds} that have their noise already; noise is added once")));
+                return Err(input.refuse(format!(
+                    "it holds {holds} that have their noise already; noise is added once"
+                )));
             }
             _ => {
                 let problem = format!("it holds {holds}, not expected electrons of photosites");
@@ -119,7 +121,8 @@ impl AddNoise {
         let mut metadata = input.metadata.becoming(QuantityKind::Electrons);
         let mut sources: Vec<Source> =
             Source::ALL.into_iter().filter(|source| !settings.without.contains(source)).collect();
-        let read_variance = if sources.contains(&Source::Ron) { sensor.read_noise_e.powi(2) } else { 0.0 };
+        let read_variance =
+            if sources.contains(&Source::Ron) { sensor.read_noise_e.powi(2) } else { 0.0 };
         if dark_e > 0.0 && dark_e * (1.0 + sensor.dcnu.powi(2)) < NEGLIGIBLE_DARK * read_variance {
             metadata.leave_out(
                 "add-noise",
@@ -166,9 +169,11 @@ impl AddNoise {
 /// [`Error::Format`] when the frame has neither three planes nor a CFA pattern.
 fn plane_classes(frame: &FrameHeader) -> Result<()> {
     match (frame.geometry.channels.len(), frame.metadata.cfa) {
-        (3, None) | (1, Some(_)) => Ok(()),
-        (n, _) => Err(frame.refuse(format!(
-            "it has {n} planes; noise needs the three planes R, G, B, or one CFA plane whose pattern the metadata names"
+        (3, None) if frame.has_three_planes() => Ok(()),
+        (1, Some(_)) => Ok(()),
+        _ => Err(frame.refuse(format!(
+            "it holds {}; noise needs the three planes R, G, B, or one CFA plane whose pattern the metadata names",
+            frame.holds()
         ))),
     }
 }
@@ -229,7 +234,11 @@ impl Stage for AddNoise {
         &self.header
     }
 
-    fn apply(&self, input: Window<'_, ExpectedElectrons>, mut output: Rows<'_, Electrons>) -> Counts {
+    fn apply(
+        &self,
+        input: Window<'_, ExpectedElectrons>,
+        mut output: Rows<'_, Electrons>,
+    ) -> Counts {
         let mut counts = Counts::default();
         let geometry = &self.header.geometry;
         for y in output.range() {
@@ -238,7 +247,13 @@ impl Stage for AddNoise {
                     Some(pattern) => pattern.row_classes(geometry.origin, y),
                     None => [Class::ALL[channel]; 2],
                 };
-                self.row(y, classes, input.row(y.cast_signed(), channel), output.row(y, channel), &mut counts);
+                self.row(
+                    y,
+                    classes,
+                    input.row(y.cast_signed(), channel),
+                    output.row(y, channel),
+                    &mut counts,
+                );
             }
         }
         counts
@@ -247,18 +262,32 @@ impl Stage for AddNoise {
 
 impl AddNoise {
     /// One row of one plane; `classes` are those of its even and odd columns.
-    fn row(&self, y: usize, classes: [Class; 2], expected: &[f32], noisy: &mut [f32], counts: &mut Counts) {
+    fn row(
+        &self,
+        y: usize,
+        classes: [Class; 2],
+        expected: &[f32],
+        noisy: &mut [f32],
+        counts: &mut Counts,
+    ) {
         let Self { model, record, .. } = self;
         let [x0, y0] = self.header.geometry.origin;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_possible_wrap,
+            reason = "wraps as sensor columns do"
+        )]
         let (row, column) = (y0.wrapping_add(y as i32), |x: usize| x0.wrapping_add(x as i32));
         let mut light_counters = [Counter::new(model.poisson), Counter::new(model.poisson)];
         let mut dark_counter = Counter::new(model.poisson);
         for (x, (&expected, noisy)) in expected.iter().zip(noisy).enumerate() {
             let class = classes[x % 2];
             let draws = |source: Source| {
-                let (seed, frame) =
-                    if source.is_fixed_pattern() { (record.sensor_seed, 0) } else { (record.seed, record.frame) };
+                let (seed, frame) = if source.is_fixed_pattern() {
+                    (record.sensor_seed, 0)
+                } else {
+                    (record.seed, record.frame)
+                };
                 Draws::new(seed, frame, source, class as u8, column(x), row)
             };
             let normal = |source: Source| -> f64 { StandardNormal.sample(&mut draws(source)) };
@@ -268,8 +297,11 @@ impl AddNoise {
                 counts.negative += 1;
                 rate = 0.0;
             }
-            let mut light =
-                if model.signal_shot { light_counters[x % 2].draw(rate, &mut draws(Source::Ssn)) } else { rate };
+            let mut light = if model.signal_shot {
+                light_counters[x % 2].draw(rate, &mut draws(Source::Ssn))
+            } else {
+                rate
+            };
             if model.prnu > 0.0 {
                 light *= sensitivity(Source::Prnu, model.prnu);
             }

@@ -101,7 +101,8 @@ pub fn electrons(model: &NoiseModel, expected_e: f64, equations: Equations) -> P
             let charge = charge(model, expected_e);
             let clipped = charge.clipped_above(model.full_well_e);
             let variance = clipped.variance + read;
-            let excess_kurtosis = if variance > 0.0 { charge.fourth / variance.powi(2) } else { 0.0 };
+            let excess_kurtosis =
+                if variance > 0.0 { charge.fourth / variance.powi(2) } else { 0.0 };
             Prediction { moments: MeanVariance { mean: clipped.mean, variance }, excess_kurtosis }
         }
     }
@@ -111,12 +112,19 @@ pub fn electrons(model: &NoiseModel, expected_e: f64, equations: Equations) -> P
 ///
 /// Exact: first and second moments of the rounded and clipped charge, from spread 0 up and at both rails. The paper
 /// scales Eq. 11 by the slope and takes the converter's noise as nil.
-pub fn adu(model: &NoiseModel, adc: &AdcRecord, expected_e: f64, equations: Equations) -> Prediction {
+pub fn adu(
+    model: &NoiseModel,
+    adc: &AdcRecord,
+    expected_e: f64,
+    equations: Equations,
+) -> Prediction {
     if equations == Equations::Paper {
         let before = electrons(model, expected_e, equations);
         let MeanVariance { mean, variance } = before.moments;
-        let moments =
-            MeanVariance { mean: adc.bias_adu + adc.adu_per_e * mean, variance: variance * adc.adu_per_e.powi(2) };
+        let moments = MeanVariance {
+            mean: adc.bias_adu + adc.adu_per_e * mean,
+            variance: variance * adc.adu_per_e.powi(2),
+        };
         return Prediction { moments, ..before };
     }
     let before = electrons(model, expected_e, equations);
@@ -130,13 +138,18 @@ pub fn adu(model: &NoiseModel, adc: &AdcRecord, expected_e: f64, equations: Equa
     let moments = if let Some(lattice) = Lattice::of(model, adc, expected_e) {
         normal::rounded(mean, sigma, adc.top_code(), |edge| lattice.exceeds(electrons_at(edge)))
     } else if sites_clipped > 1e-12 {
-        let clipped = ClippedAndRead { charge, full_well_e: model.full_well_e, read_noise_e: model.read_noise_e };
+        let clipped = ClippedAndRead {
+            charge,
+            full_well_e: model.full_well_e,
+            read_noise_e: model.read_noise_e,
+        };
         normal::rounded(mean, sigma, adc.top_code(), |edge| clipped.exceeds(electrons_at(edge)))
     } else {
         normal::rounded(mean, sigma, adc.top_code(), |edge| whole.exceeds(electrons_at(edge)))
     };
     let scaled_fourth = charge.fourth * adc.adu_per_e.powi(4);
-    let excess_kurtosis = if moments.variance > 0.0 { scaled_fourth / moments.variance.powi(2) } else { 0.0 };
+    let excess_kurtosis =
+        if moments.variance > 0.0 { scaled_fourth / moments.variance.powi(2) } else { 0.0 };
     Prediction { moments, excess_kurtosis }
 }
 
@@ -165,7 +178,8 @@ impl ClippedAndRead {
             let z = from + step * f64::from(i);
             normal::density(z) * self.charge.exceeds(t - z * sigma)
         };
-        let weight = |i: i32| if i == 0 || i == intervals { 1.0 } else { 2.0 + 2.0 * f64::from(i % 2) };
+        let weight =
+            |i: i32| if i == 0 || i == intervals { 1.0 } else { 2.0 + 2.0 * f64::from(i % 2) };
         (0..=intervals).map(|i| weight(i) * value(i)).sum::<f64>() * step / 3.0
     }
 }
@@ -182,17 +196,23 @@ impl Lattice {
     /// moments is below e^(−2π²·0.75²) ≈ 10⁻⁵) and counts are below 200 on average.
     fn of(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> Option<Self> {
         let resolved = model.read_noise_e * adc.adu_per_e < 0.75;
-        let few = expected_e + model.dark_e < 200.0 && expected_e + model.dark_e < model.full_well_e / 4.0;
+        let few = expected_e + model.dark_e < 200.0
+            && expected_e + model.dark_e < model.full_well_e / 4.0;
         if !(resolved && few) || model.poisson == PoissonKind::Gaussian {
             return None;
         }
         let light = counts(expected_e, model.signal_shot);
         let dark = counts(model.dark_e, model.dark_shot);
         let pair = |&(p, a): &(f64, f64), &(q, b): &(f64, f64)| {
-            let variance = (a * model.prnu).powi(2) + (b * model.dcnu).powi(2) + model.read_noise_e.powi(2);
+            let variance =
+                (a * model.prnu).powi(2) + (b * model.dcnu).powi(2) + model.read_noise_e.powi(2);
             (p * q, a + b, variance.sqrt())
         };
-        let pairs = light.iter().flat_map(|a| dark.iter().map(move |b| pair(a, b))).filter(|p| p.0 > 1e-14).collect();
+        let pairs = light
+            .iter()
+            .flat_map(|a| dark.iter().map(move |b| pair(a, b)))
+            .filter(|p| p.0 > 1e-14)
+            .collect();
         Some(Self { pairs })
     }
 
@@ -309,7 +329,10 @@ mod tests {
                 let x = (1.0 + sigma * z).max(0.0);
                 for (p, count) in counts(rate, true) {
                     for (k, sum) in raw.iter_mut().enumerate() {
-                        *sum += step * normal::density(z) * p * (count * x).powi(i32::try_from(k).unwrap());
+                        *sum += step
+                            * normal::density(z)
+                            * p
+                            * (count * x).powi(i32::try_from(k).unwrap());
                     }
                 }
             }
@@ -319,7 +342,12 @@ mod tests {
             let fourth = m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4) - 3.0 * v * v;
             let found = product(rate, true, PoissonKind::Exact, sigma);
             // The kink of the rectified normal at zero costs the sum about step² ≈ 10⁻⁵.
-            for (a, b) in [(found.mean, m1), (found.variance, v), (found.third, third), (found.fourth, fourth)] {
+            for (a, b) in [
+                (found.mean, m1),
+                (found.variance, v),
+                (found.third, third),
+                (found.fourth, fourth),
+            ] {
                 assert!((a / b - 1.0).abs() < 1e-4, "{rate} {sigma}: {a} {b}");
             }
         }
@@ -358,7 +386,8 @@ mod tests {
             let mut n = (expected - 9.0 * spread).floor();
             while n < expected + 9.0 * spread {
                 let log_p = n * expected.ln() - expected - libm::lgamma(n + 1.0);
-                let given = NearlyNormal::normal(n, (n * model.prnu).powi(2)).clipped_above(model.full_well_e);
+                let given = NearlyNormal::normal(n, (n * model.prnu).powi(2))
+                    .clipped_above(model.full_well_e);
                 m1 += log_p.exp() * given.mean;
                 m2 += log_p.exp() * (given.variance + (given.mean - expected).powi(2));
                 total += log_p.exp();
@@ -368,7 +397,12 @@ mod tests {
             let variance = m2 / total - (mean - expected).powi(2) + 15.7 * 15.7;
             // lgamma at 4·10⁵ is good to 10⁻¹⁰ relative to the probabilities; Edgeworth to skewness³ ≈ 10⁻⁶.
             assert!((reference.mean - mean).abs() < 1e-2, "{} {mean}", reference.mean);
-            assert!((reference.std() / variance.sqrt() - 1.0).abs() < 1e-4, "{} {}", reference.std(), variance.sqrt());
+            assert!(
+                (reference.std() / variance.sqrt() - 1.0).abs() < 1e-4,
+                "{} {}",
+                reference.std(),
+                variance.sqrt()
+            );
         }
         let codes = adu(&model, &ADC, 40_000.0, Equations::Exact).moments;
         assert!(codes.mean < 4095.0 && codes.mean > 4070.0 && codes.variance > 0.0);

@@ -51,12 +51,17 @@ impl SpectralTable {
             .from_reader(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
         let mut records = Vec::new();
         for record in reader.records() {
-            let record = record.map_err(|error| refuse(format!("it is not a CSV table: {error}")))?;
+            let record =
+                record.map_err(|error| refuse(format!("it is not a CSV table: {error}")))?;
             records.push((record.position().map_or(0, csv::Position::line), record));
         }
         let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite());
-        let Some((_, first)) = records.first() else { return Err(refuse("it holds no rows".into())) };
-        let by_rows = first.len() > 2 && number(&first[0]).is_none() && first.iter().skip(1).all(|c| number(c).is_some());
+        let Some((_, first)) = records.first() else {
+            return Err(refuse("it holds no rows".into()));
+        };
+        let by_rows = first.len() > 2
+            && number(&first[0]).is_none()
+            && first.iter().skip(1).all(|c| number(c).is_some());
         let header: Option<Vec<String>> =
             number(&first[0]).is_none().then(|| first.iter().map(ToOwned::to_owned).collect());
         let body = &records[usize::from(header.is_some())..];
@@ -70,7 +75,10 @@ impl SpectralTable {
                     None if by_rows && column == 0 => 0.0,
                     None => {
                         let shown: String = text.chars().take(20).collect();
-                        return Err(refuse(format!("line {line}, column {}: `{shown}` is no number", column + 1)));
+                        return Err(refuse(format!(
+                            "line {line}, column {}: `{shown}` is no number",
+                            column + 1
+                        )));
                     }
                 };
                 cells.push(value);
@@ -79,7 +87,9 @@ impl SpectralTable {
         let cells = Array2::from_shape_vec((body.len(), width), cells)
             .map_err(|_| refuse("its rows differ in length".into()))?;
         if width < 2 || body.is_empty() {
-            return Err(refuse("it needs a column of wavelengths in nm and at least one of values".into()));
+            return Err(refuse(
+                "it needs a column of wavelengths in nm and at least one of values".into(),
+            ));
         }
         let (wavelength_nm, columns, values) = if by_rows {
             let labels = body.iter().map(|(_, record)| record[0].to_owned()).collect();
@@ -110,7 +120,11 @@ impl SpectralTable {
         let Some(column) = column else { return Ok(0) };
         self.columns.iter().position(|name| name == column).ok_or_else(|| {
             let some: Vec<&str> = self.columns.iter().take(8).map(String::as_str).collect();
-            Error::Usage(format!("{}: there is no column `{column}`; it has {}", self.name, some.join(", ")))
+            Error::Usage(format!(
+                "{}: there is no column `{column}`; it has {}",
+                self.name,
+                some.join(", ")
+            ))
         })
     }
 
@@ -146,7 +160,8 @@ mod tests {
 
     #[test]
     fn both_layouts_give_the_same_curves() {
-        let by_columns = SpectralTable::parse("a", b"# sky\nwavelength_nm,a,b\n400,1,2\n410,3,4\n").unwrap();
+        let by_columns =
+            SpectralTable::parse("a", b"# sky\nwavelength_nm,a,b\n400,1,2\n410,3,4\n").unwrap();
         let by_rows = SpectralTable::parse("b", b"id,400,410\nx,1,3\ny,2,4\n").unwrap();
         assert_eq!(by_columns.values, by_rows.values);
         assert_eq!(by_columns.wavelength_nm, by_rows.wavelength_nm);
@@ -156,7 +171,8 @@ mod tests {
 
     #[test]
     fn complaints_name_the_place() {
-        let complaint = |text: &str| SpectralTable::parse("t.csv", text.as_bytes()).unwrap_err().to_string();
+        let complaint =
+            |text: &str| SpectralTable::parse("t.csv", text.as_bytes()).unwrap_err().to_string();
         assert_eq!(complaint("nm,L\n400,1\n410,x\n"), "t.csv: line 3, column 2: `x` is no number");
         assert!(complaint("nm,L\n410,1\n400,2\n").contains("must ascend"));
         assert!(complaint("nm,L\n400,nan\n").contains("`nan` is no number"));

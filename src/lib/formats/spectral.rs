@@ -56,7 +56,9 @@ impl SpectralChannels {
             Some(unit) => unit,
             None if stated.is_empty() => RadianceUnit::default(),
             None => RadianceUnit::parse(stated).ok_or_else(|| {
-                frame.refuse(format!("its unit of radiance, `{stated}`, is not known; give --radiance-unit"))
+                frame.refuse(format!(
+                    "its unit of radiance, `{stated}`, is not known; give --radiance-unit"
+                ))
             })?,
         };
         Ok(Self { channels, wavelength_nm, unit })
@@ -89,10 +91,14 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
     let head = sniff().map_err(|e| Error::disk(&name, "read", e))?;
     if head == [0x76, 0x2F, 0x31, 0x01] {
         let options = InputOptions { all_channels: true, ..options.clone() };
-        return Ok(Radiances::Image(Box::new(FrameReader::open_file(file, &name, path, &options)?)));
+        return Ok(Radiances::Image(Box::new(FrameReader::open_file(
+            file, &name, path, &options,
+        )?)));
     }
     let mut bytes = Vec::new();
-    file.take(MAX_TABLE_BYTES).read_to_end(&mut bytes).map_err(|e| Error::disk(&name, "read", e))?;
+    file.take(MAX_TABLE_BYTES)
+        .read_to_end(&mut bytes)
+        .map_err(|e| Error::disk(&name, "read", e))?;
     Ok(Radiances::Table(SpectralTable::parse(&name, &bytes)?))
 }
 
@@ -109,31 +115,34 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralL
     let options = InputOptions { path: Some(path.to_owned()), ..InputOptions::default() };
     let library = match open(&options)? {
         Radiances::Image(mut reader) => {
-        let spectral = SpectralChannels::of(reader.header(), unit)?;
-        let geometry = reader.header().geometry.clone();
-        let factor = spectral.unit.in_w_per_cm2_sr_nm();
-        let mut radiance = Array2::zeros((geometry.width * geometry.height, spectral.channels.len()));
-        let mut row = Vec::new();
-        for y in 0..geometry.height {
-            row.clear();
-            reader.read(1, &mut row)?;
-            for (index, channel) in spectral.channels.iter().enumerate() {
-                let samples = &row[channel * geometry.width..(channel + 1) * geometry.width];
-                for (x, &sample) in samples.iter().enumerate() {
-                    radiance[(y * geometry.width + x, index)] = f64::from(sample) * factor;
+            let spectral = SpectralChannels::of(reader.header(), unit)?;
+            let geometry = reader.header().geometry.clone();
+            let factor = spectral.unit.in_w_per_cm2_sr_nm();
+            let mut radiance =
+                Array2::zeros((geometry.width * geometry.height, spectral.channels.len()));
+            let mut row = Vec::new();
+            for y in 0..geometry.height {
+                row.clear();
+                reader.read(1, &mut row)?;
+                for (index, channel) in spectral.channels.iter().enumerate() {
+                    let samples = &row[channel * geometry.width..(channel + 1) * geometry.width];
+                    for (x, &sample) in samples.iter().enumerate() {
+                        radiance[(y * geometry.width + x, index)] = f64::from(sample) * factor;
+                    }
                 }
             }
-        }
-        SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance }
+            SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance }
         }
         Radiances::Table(table) => {
-        let unit = unit.or_else(|| table.unit_of(0)).unwrap_or_default();
-        let radiance = table.values * unit.in_w_per_cm2_sr_nm();
-        SpectralLibrary { wavelength_nm: table.wavelength_nm, radiance }
+            let unit = unit.or_else(|| table.unit_of(0)).unwrap_or_default();
+            let radiance = table.values * unit.in_w_per_cm2_sr_nm();
+            SpectralLibrary { wavelength_nm: table.wavelength_nm, radiance }
         }
     };
     match library.radiance.indexed_iter().find(|(_, value)| !value.is_finite()) {
-        Some(((sample, _), _)) => Err(Error::format(&name, format!("sample {sample} is not finite"))),
+        Some(((sample, _), _)) => {
+            Err(Error::format(&name, format!("sample {sample} is not finite")))
+        }
         None => Ok(library),
     }
 }

@@ -111,8 +111,8 @@ impl NearlyNormal {
         let he3 = z * (z * z - 3.0);
         let he2 = z * z - 1.0;
         // First tail integral I₁ = ∫_z^∞ P(X > t) dt = E[(X − z)₊], in units of σ.
-        let first =
-            phi - z * tail + phi * (skewness / 6.0 * z + kurtosis / 24.0 * he2 + skewness.powi(2) / 72.0 * he4);
+        let first = phi - z * tail
+            + phi * (skewness / 6.0 * z + kurtosis / 24.0 * he2 + skewness.powi(2) / 72.0 * he4);
         // Second, I₂ = ∫_z^∞ (t − z) P(X > t) dt = ½ E[(X − z)₊²].
         let second = 0.5 * ((1.0 + z * z) * tail - z * phi)
             + phi * (skewness / 6.0 + kurtosis / 24.0 * z + skewness.powi(2) / 72.0 * he3);
@@ -189,7 +189,11 @@ mod tests {
                 let square = expectation(variable, |x| (x.min(limit) - mean).powi(2));
                 // Trapezoid sum of a kinked function: error ~ (step σ)² / 12 ≈ 3·10⁻⁸.
                 assert!((clipped.mean - mean).abs() < 1e-7, "{limit} {} {mean}", clipped.mean);
-                assert!((clipped.variance - square).abs() < 1e-6, "{limit} {} {square}", clipped.variance);
+                assert!(
+                    (clipped.variance - square).abs() < 1e-6,
+                    "{limit} {} {square}",
+                    clipped.variance
+                );
             }
         }
     }
@@ -214,13 +218,18 @@ mod tests {
         for (mean, sigma) in [(0.2, 0.7), (-1.0, 3.0), (253.0, 4.0), (40.5, 0.1)] {
             let rounded = round_normal(mean, sigma, 255);
             let probability = |k: i32| -> f64 {
-                let below = if k == 0 { 1.0 } else { cumulative(-((f64::from(k) - 0.5 - mean) / sigma)) };
-                let above = if k == 255 { 0.0 } else { cumulative(-((f64::from(k) + 0.5 - mean) / sigma)) };
+                let below =
+                    if k == 0 { 1.0 } else { cumulative(-((f64::from(k) - 0.5 - mean) / sigma)) };
+                let above =
+                    if k == 255 { 0.0 } else { cumulative(-((f64::from(k) + 0.5 - mean) / sigma)) };
                 below - above
             };
             let m: f64 = (0..=255).map(|k| f64::from(k) * probability(k)).sum();
             let v: f64 = (0..=255).map(|k| (f64::from(k) - m).powi(2) * probability(k)).sum();
-            assert!((rounded.mean - m).abs() < 1e-11 && (rounded.variance - v).abs() < 1e-10, "{mean} {sigma}");
+            assert!(
+                (rounded.mean - m).abs() < 1e-11 && (rounded.variance - v).abs() < 1e-10,
+                "{mean} {sigma}"
+            );
         }
     }
 }
