@@ -23,6 +23,27 @@ pub struct Region {
     pub height: usize,
 }
 
+impl Region {
+    /// Checks that the region has pixels and lies within a frame.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] otherwise.
+    pub fn check(&self, frame: &FrameHeader) -> Result<()> {
+        let Self { x, y, width, height } = *self;
+        let geometry = &frame.geometry;
+        let inside = x.checked_add(width).is_some_and(|end| end <= geometry.width)
+            && y.checked_add(height).is_some_and(|end| end <= geometry.height);
+        if inside && width > 0 && height > 0 {
+            return Ok(());
+        }
+        Err(Error::Usage(format!(
+            "{}: region {x},{y},{width},{height} does not lie within the frame of {}x{}",
+            frame.name, geometry.width, geometry.height
+        )))
+    }
+}
+
 /// Everything that is said of a frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
@@ -146,20 +167,7 @@ pub fn measure(
     let whole = [Region { x: 0, y: 0, width: geometry.width, height: geometry.height }];
     let regions = if regions.is_empty() { &whole } else { regions };
     for region in regions {
-        let inside = region.x.checked_add(region.width).is_some_and(|end| end <= geometry.width)
-            && region.y.checked_add(region.height).is_some_and(|end| end <= geometry.height);
-        if !inside || region.width == 0 || region.height == 0 {
-            return Err(Error::Usage(format!(
-                "{}: region {},{},{},{} does not lie within the frame of {}x{}",
-                frame.name,
-                region.x,
-                region.y,
-                region.width,
-                region.height,
-                geometry.width,
-                geometry.height
-            )));
-        }
+        region.check(&frame)?;
     }
     let channels = geometry.channels.len();
     let rails = Rails::of(&frame);

@@ -165,6 +165,7 @@ impl ToXyz {
         let black = input.metadata.black_level_adu.unwrap_or(0.0);
         let xyz_from_adu = matrix(&settings.xyz_from_camera) / exposure.exposure_s_sr();
         let needs_white = matches!(settings.space, Space::Lab | Space::Srgb);
+        let mut known_white = true;
         let white = match settings.white {
             White::Absolute(white) => white,
             White::D65 | White::EqualEnergy => {
@@ -178,7 +179,10 @@ impl ToXyz {
                     None if needs_white => {
                         return Err(input.missing("white_level_adu", "--white-luminance CD_PER_M2"));
                     }
-                    None => 1.0,
+                    None => {
+                        known_white = false;
+                        1.0
+                    }
                 };
                 xyz_of_chromaticity(xy, luminance)
             }
@@ -201,7 +205,7 @@ impl ToXyz {
         metadata.color = Some(ColorRecord {
             xyz_from_camera: settings.xyz_from_camera,
             method: settings.method.clone(),
-            white: needs_white.then_some(white),
+            white: known_white.then_some(white),
         });
         let geometry = input.geometry.with_channels(&channels);
         let srgb_from_xyz =

@@ -35,6 +35,9 @@ pub struct InputOptions {
     pub all_channels: bool,
 }
 
+/// What full-scale sRGB is in 16 bits.
+pub const U16_FULL_SCALE: f32 = 65535.0;
+
 /// Identity of an opened file: device and inode.
 pub type FileId = (u64, u64);
 
@@ -49,6 +52,8 @@ pub struct FrameReader {
     rows_read: usize,
     check: Option<DigestCheck>,
     buffer: Vec<f32>,
+    /// What stored samples are divided by: sRGB in 16 bits runs to 65535.
+    divisor: Option<f32>,
     notes: Vec<String>,
 }
 
@@ -109,6 +114,8 @@ impl FrameReader {
             sidecar,
             digest: Sha256::new(),
         });
+        let is_integer = stored_as.starts_with('u');
+        let divisor = (metadata.quantity == QuantityKind::Srgb && is_integer).then_some(U16_FULL_SCALE);
         let header = FrameHeader { name: name.into(), geometry, metadata };
         Ok(Self {
             file,
@@ -119,6 +126,7 @@ impl FrameReader {
             rows_read: 0,
             check,
             buffer: Vec::new(),
+            divisor,
             notes,
         })
     }
@@ -185,6 +193,9 @@ impl RowSource for FrameReader {
         }
         if let Some(check) = &mut self.check {
             update_digest(&mut check.digest, &into[start..]);
+        }
+        if let Some(divisor) = self.divisor {
+            into[start..].iter_mut().for_each(|sample| *sample /= divisor);
         }
         if !direct {
             for row in buffer.chunks_exact(whole) {

@@ -6,6 +6,7 @@ pub mod data;
 pub mod exr;
 pub mod input;
 pub mod output;
+pub mod picture;
 pub mod spectral;
 pub mod tiff;
 pub mod yaml;

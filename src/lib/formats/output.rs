@@ -3,7 +3,7 @@
 use super::atomic::{AtomicFile, Target};
 use super::data::hex;
 use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter};
-use super::input::{FileId, XYZ_PRIMARIES, sidecar_path, update_digest};
+use super::input::{FileId, U16_FULL_SCALE, XYZ_PRIMARIES, sidecar_path, update_digest};
 use super::tiff::{TiffCompression, TiffSamples, TiffTags, TiffWriter};
 use super::yaml;
 use crate::color;
@@ -93,9 +93,6 @@ enum Encoding {
     Exr(ExrSamples, ExrCompression),
     Tiff(TiffSamples, TiffCompression),
 }
-
-/// Samples above this are what a full-scale sRGB value becomes in 16 bits.
-const U16_FULL_SCALE: f32 = 65535.0;
 
 impl OutputOptions {
     fn encoding(&self, header: &FrameHeader) -> Result<Encoding> {

@@ -1,0 +1,190 @@
+//! Pictures for people: 8-bit PNG of any frame.
+
+use super::atomic::AtomicFile;
+use crate::color::{linear_srgb_from_xyz, srgb_encode};
+use crate::error::{Error, Result};
+use crate::metadata::FrameHeader;
+use crate::numerics::moments::Moments;
+use crate::stage::RowSource;
+use crate::statistics::Region;
+use crate::units::QuantityKind;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use nalgebra::Vector3;
+use std::io::Write;
+use std::path::Path;
+
+/// A picture may have this many pixels: it is held in memory.
+const MAX_PIXELS: usize = 64 << 20;
+
+/// Which samples become black and which white.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Range {
+    /// What no light reads, and the most that the stage can hold.
+    Full,
+    /// In each plane by itself, from so many standard deviations below its mean to as many above.
+    Deviations(f64),
+    /// From one value to another, in the unit of the samples.
+    Values(f64, f64),
+}
+
+/// What of a frame to show, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PictureSettings {
+    /// The part of the frame; all of it where there is none.
+    pub region: Option<Region>,
+    /// Every pixel becomes a square of so many.
+    pub zoom: usize,
+    /// What is black and what is white.
+    pub range: Range,
+}
+
+/// Reads a frame and writes it as a PNG.
+///
+/// Electrons and ADU are shown plane by plane, R as red and so on, with the sRGB curve; XYZ in its colours under the
+/// white that its metadata name; sRGB as it is.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for a region outside the frame or a picture too large; [`Error::Format`] for quantities that are no
+/// picture; those of the reader; [`Error::Disk`].
+pub fn write_png(source: &mut dyn RowSource, settings: &PictureSettings, path: &Path) -> Result<()> {
+    let frame = source.header().clone();
+    let geometry = &frame.geometry;
+    let whole = Region { x: 0, y: 0, width: geometry.width, height: geometry.height };
+    let region = settings.region.unwrap_or(whole);
+    region.check(&frame)?;
+    let (width, height) = (region.width * settings.zoom, region.height * settings.zoom);
+    if width.checked_mul(height).is_none_or(|pixels| pixels > MAX_PIXELS) {
+        return Err(Error::Usage(format!(
+            "{}: a picture of {width}x{height} is too large; show a part of it with --region",
+            frame.name
+        )));
+    }
+    let planes = match geometry.channels.len() {
+        1 => 1,
+        3 if frame.has_three_planes() => 3,
+        _ => return Err(frame.refuse(format!("it holds {}, which makes no picture", frame.holds()))),
+    };
+    let mut kept: Vec<f32> = Vec::new();
+    let mut moments = vec![Moments::new(1); planes];
+    let mut row = Vec::new();
+    for y in 0..region.y + region.height {
+        row.clear();
+        source.read(1, &mut row)?;
+        if y >= region.y {
+            for (plane, moments) in row.chunks_exact(geometry.width).zip(&mut moments) {
+                let shown = &plane[region.x..region.x + region.width];
+                moments.add(&[shown]);
+                kept.extend_from_slice(shown);
+            }
+        }
+    }
+    let shade = Shade::new(&frame, settings.range, &moments)?;
+    let mut bytes = Vec::with_capacity(width * height * planes);
+    for row in kept.chunks_exact(region.width * planes) {
+        let start = bytes.len();
+        for x in 0..region.width {
+            let pixel: Vec<f64> = (0..planes).map(|plane| f64::from(row[plane * region.width + x])).collect();
+            let shown = shade.apply(&pixel);
+            for _ in 0..settings.zoom {
+                bytes.extend_from_slice(&shown);
+            }
+        }
+        for _ in 1..settings.zoom {
+            bytes.extend_from_within(start..start + width * planes);
+        }
+    }
+    let name = path.display().to_string();
+    let mut file = AtomicFile::create(path)?;
+    let color = if planes == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
+    let size = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+    PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Adaptive)
+        .write_image(&bytes, size(width), size(height), color)
+        .map_err(|error| match error {
+            image::ImageError::IoError(source) => Error::disk(&name, "write", source),
+            other => Error::format(&name, format!("it cannot be written as PNG: {other}")),
+        })?;
+    file.flush().map_err(|e| Error::disk(&name, "write", e))?;
+    file.commit()
+}
+
+/// From samples to display values.
+enum Shade {
+    /// Each plane by itself, from its black to its white.
+    Planes(Vec<(f64, f64)>),
+    /// XYZ through the matrix to linear sRGB.
+    Xyz(nalgebra::Matrix3<f64>),
+    /// Encoded already.
+    Encoded,
+}
+
+impl Shade {
+    fn new(frame: &FrameHeader, range: Range, moments: &[Moments]) -> Result<Self> {
+        let metadata = &frame.metadata;
+        let lowest = moments.iter().map(|plane| plane.min[0]).fold(f64::INFINITY, f64::min);
+        let highest = moments.iter().map(|plane| plane.max[0]).fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) = match range {
+            Range::Values(low, high) => (low, high),
+            Range::Deviations(count) => {
+                let about = |plane: &Moments| {
+                    let spread = count * plane.std(0).unwrap_or(0.0);
+                    (plane.mean[0] - spread, plane.mean[0] + spread)
+                };
+                return Self::planes(frame, moments.iter().map(about).collect());
+            }
+            Range::Full => match metadata.quantity {
+                QuantityKind::Srgb => return Ok(Self::Encoded),
+                QuantityKind::Xyz => {
+                    let white = metadata.color.as_ref().and_then(|color| color.white);
+                    let white = white.ok_or_else(|| {
+                        frame.refuse("the metadata name no white; convert it with `to-xyz --space srgb` instead")
+                    })?;
+                    return Ok(Self::Xyz(linear_srgb_from_xyz(white)));
+                }
+                QuantityKind::ExpectedElectrons | QuantityKind::Electrons => {
+                    let full = metadata.sensor.as_ref().map_or(highest, |sensor| sensor.full_well_e);
+                    (metadata.dark_signal_e.unwrap_or(0.0), full)
+                }
+                QuantityKind::Adu => {
+                    let black = metadata.black_level_adu.unwrap_or(0.0);
+                    (black, metadata.white_level_adu.unwrap_or(highest))
+                }
+                QuantityKind::Unspecified => (lowest.min(0.0), highest),
+                other => {
+                    return Err(frame.refuse(format!(
+                        "{other} is no picture; convert it with `to-xyz --space srgb`, or give --range"
+                    )));
+                }
+            },
+        };
+        Self::planes(frame, vec![(low, high); moments.len()])
+    }
+
+    fn planes(frame: &FrameHeader, ranges: Vec<(f64, f64)>) -> Result<Self> {
+        match ranges.iter().find(|(low, high)| !(low < high && (high - low).is_finite())) {
+            None => Ok(Self::Planes(ranges)),
+            Some((low, high)) => Err(Error::Usage(format!(
+                "{}: a range from {low} to {high} shows nothing; give another with --range",
+                frame.name
+            ))),
+        }
+    }
+
+    fn apply(&self, pixel: &[f64]) -> Vec<u8> {
+        let encoded: Vec<f64> = match self {
+            Self::Encoded => pixel.to_vec(),
+            Self::Planes(ranges) => {
+                let shade = |(value, (low, high)): (&f64, &(f64, f64))| (value - low) / (high - low);
+                pixel.iter().zip(ranges).map(|pair| srgb_encode(shade(pair).clamp(0.0, 1.0))).collect()
+            }
+            Self::Xyz(matrix) => {
+                let linear = matrix * Vector3::from_fn(|i, _| pixel.get(i).copied().unwrap_or(0.0));
+                linear.iter().map(|value| srgb_encode(value.clamp(0.0, 1.0))).collect()
+            }
+        };
+        // NaN is shown as black.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a byte")]
+        encoded.iter().map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8).collect()
+    }
+}
