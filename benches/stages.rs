@@ -1,0 +1,92 @@
+//! Throughput of the stages in samples per second, on a frame of 1332×1000 in memory.
+//!
+//! `cargo bench` prints medians; compare figures of one run only.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::color::{ColorSettings, Space, ToXyz, White};
+use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::error::Result;
+use cyanometer::formats::data;
+use cyanometer::frame::Geometry;
+use cyanometer::metadata::{FrameHeader, Metadata, Scene};
+use cyanometer::mosaic::Mosaic;
+use cyanometer::noise::{AddNoise, NoiseSettings};
+use cyanometer::optics::Exposure;
+use cyanometer::propagation::Equations;
+use cyanometer::stage::{MemoryFrame, Stage};
+use cyanometer::statistics::measure;
+use cyanometer::units::QuantityKind;
+
+/// A clear sky at three quarters of full well.
+const SKY: [f64; 3] = [4448.0, 16_599.0, 30_000.0];
+
+fn expected() -> Result<MemoryFrame> {
+    let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+    metadata.sensor = Some(data::load_sensor(data::DEFAULT_SENSOR)?.sensor);
+    metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
+    metadata.scene = Some(Scene {
+        source: "bench".into(),
+        uniform: true,
+        expected_electrons: Some(SKY),
+        vignetting_focal_length_mm: None,
+        patch: None,
+        brightest_e: None,
+    });
+    let geometry = Geometry::new(1332, 1000, &["R", "G", "B"]);
+    let row: Vec<f32> =
+        SKY.iter().flat_map(|e| std::iter::repeat_n(cyanometer::frame::to_sample(*e), 1332)).collect();
+    let samples = row.repeat(1000);
+    Ok(MemoryFrame::new(FrameHeader { name: "bench".into(), geometry, metadata }, samples))
+}
+
+fn time<S: Stage>(criterion: &mut Criterion, name: &str, frame: &MemoryFrame, stage: Result<S>) -> MemoryFrame {
+    let Ok(stage) = stage else { panic!("{name}: the stage refuses the frame") };
+    let mut group = criterion.benchmark_group("stages");
+    group.throughput(Throughput::Elements(frame.samples.len() as u64)).sample_size(10);
+    group.bench_function(name, |bencher| bencher.iter(|| frame.through(&stage)));
+    group.finish();
+    match frame.through(&stage) {
+        Ok((made, _)) => made,
+        Err(error) => panic!("{name}: {error}"),
+    }
+}
+
+fn stages(criterion: &mut Criterion) {
+    let Ok(expected) = expected() else { panic!("the default sensor is built in") };
+    let noise = |frame: &MemoryFrame| AddNoise::new(&frame.header, &NoiseSettings::default());
+    let electrons = time(criterion, "add-noise, three planes", &expected, noise(&expected));
+    let plane = time(criterion, "mosaic", &expected, Mosaic::new(&expected.header, None));
+    time(criterion, "add-noise, CFA plane", &plane, noise(&plane));
+    let adc = AdcSettings::default();
+    let codes = time(criterion, "digitize", &electrons, Digitize::new(&electrons.header, &adc));
+    let cfa = time(criterion, "mosaic, codes", &codes, Mosaic::new(&codes.header, None));
+    let mut rgb = None;
+    for method in Method::ALL {
+        let name = format!("demosaic, {}", method.names()[0]);
+        rgb = Some(time(criterion, &name, &cfa, Demosaic::new(&cfa.header, method, Black::Auto, None)));
+    }
+    let Some(rgb) = rgb else { return };
+    for (name, space) in [("to-xyz", Space::Xyz), ("to-xyz, lab", Space::Lab), ("to-xyz, srgb", Space::Srgb)] {
+        let settings = ColorSettings {
+            xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
+            method: None,
+            space,
+            white: White::D65,
+            white_luminance: None,
+        };
+        time(criterion, name, &rgb, ToXyz::new(&rgb.header, &settings));
+    }
+    let mut group = criterion.benchmark_group("stages");
+    group.throughput(Throughput::Elements(rgb.samples.len() as u64)).sample_size(10);
+    group.bench_function("measure", |bencher| {
+        bencher.iter(|| {
+            let mut source = MemoryFrame::new(rgb.header.clone(), rgb.samples.clone());
+            measure(&mut source, &[], Equations::Exact)
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, stages);
+criterion_main!(benches);
