@@ -26,7 +26,7 @@ impl Class {
     }
 }
 
-/// A Bayer pattern: the classes of the 2×2 photosites at the sensor's corner, row by row [Bayer1976].
+/// A Bayer pattern: the classes of the 2×2 photosites at the sensor's corner, row by row \[Bayer1976].
 ///
 /// The corner is the sensor's photosite (0, 0). A crop that starts elsewhere keeps the pattern and says where it
 /// starts, so the class of each photosite stays true.

@@ -15,7 +15,7 @@ pub enum Equations {
     /// Exact moments.
     #[default]
     Exact,
-    /// Those of [HP2005], misprints mended.
+    /// Those of \[HP2005], misprints mended.
     Paper,
 }
 
@@ -48,7 +48,7 @@ fn sensitivity(sigma: f64) -> (f64, f64, f64, f64) {
 /// Cumulants of the product of a count P of mean λ and an independent sensitivity X.
 ///
 /// With δ = P − λ and X = μ + ε the product is λμ + μδ + εP; hence κ₂ = μ²λ + c₂(λ² + λ), the cross term λ c₂ of
-/// which Eqs. 11 and 24–26 of [HP2005] drop, and κ₃, κ₄ below. The third and fourth cumulant of P are λ for a Poisson
+/// which Eqs. 11 and 24–26 of \[HP2005] drop, and κ₃, κ₄ below. The third and fourth cumulant of P are λ for a Poisson
 /// count, 0 for its Gaussian substitute; without shot noise P = λ.
 fn product(rate: f64, shot: bool, kind: PoissonKind, sigma: f64) -> NearlyNormal {
     let (mu, c2, c3, c4) = sensitivity(sigma);

@@ -1,4 +1,4 @@
-//! Random numbers keyed by what is drawn, not by when: Philox 4x32-10 [Salmon2011].
+//! Random numbers keyed by what is drawn, not by when: Philox 4x32-10 \[Salmon2011].
 //!
 //! A draw is named by seed, frame, source of noise, photosite and sensor class. Whoever asks for it, in whatever order
 //! and on whatever thread, gets the same number; a crop, a mosaic or a single photosite costs only its own draws.
@@ -41,7 +41,7 @@ impl Source {
 
 /// The Philox 4x32 bijection with 10 rounds: 128 random bits from a 128-bit counter and a 64-bit key.
 ///
-/// Multipliers and Weyl constants of [Salmon2011], Table 2 and Sec. 4.
+/// Multipliers and Weyl constants of \[Salmon2011], Table 2 and Sec. 4.
 pub fn philox4x32_10(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
     const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];

@@ -20,7 +20,7 @@ pub struct WavelengthGrid {
 }
 
 impl Default for WavelengthGrid {
-    /// 360 to 830 nm in steps of 1 nm, summed as they are: Eq. 5a of [HP2005].
+    /// 360 to 830 nm in steps of 1 nm, summed as they are: Eq. 5a of \[HP2005].
     fn default() -> Self {
         Self { start_nm: 360.0, end_nm: 830.0, step_nm: 1.0, quadrature: Rule::Rectangle }
     }

@@ -43,7 +43,7 @@ const SRGB_FROM_XYZ: Matrix3<f64> = Matrix3::new(
     0.0557, -0.2040, 1.0570,
 );
 
-/// The cone responses of the Bradford transform [Lam1985].
+/// The cone responses of the Bradford transform \[Lam1985].
 const BRADFORD: Matrix3<f64> = Matrix3::new(
     0.8951, 0.2664, -0.1614, //
     -0.7502, 1.7135, 0.0367, //

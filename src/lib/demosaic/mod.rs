@@ -19,9 +19,9 @@ use crate::units::{Any, QuantityKind};
 pub enum Method {
     /// Bilinear interpolation (BI) of each class by itself.
     Bilinear,
-    /// Smooth hue transition interpolation (SHTI), of the ratios R/G and B/G [Cok1987].
+    /// Smooth hue transition interpolation (SHTI), of the ratios R/G and B/G \[Cok1987].
     SmoothHue,
-    /// Effective colour interpolation (ECI), of the differences G − R and G − B [PeiTam2003].
+    /// Effective colour interpolation (ECI), of the differences G − R and G − B \[PeiTam2003].
     EffectiveColor,
 }
 

@@ -1,4 +1,4 @@
-//! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` [Fichet2021].
+//! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` \[Fichet2021].
 
 use super::csv::SpectralTable;
 use super::input::{FrameReader, InputOptions, open_seekable};

@@ -52,7 +52,8 @@ fn parse<T: DeserializeOwned + Serialize>(
 ///
 /// # Errors
 ///
-/// As [`parse`], and for unknown keys.
+/// [`Error::Format`] when the text is no YAML of this kind or too large or deep, for a number that is not finite, and for
+/// unknown keys.
 pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -> Result<T> {
     let text = checked_text(name, bytes)?;
     let raw = parse_raw(name, text)?;
@@ -85,7 +86,8 @@ pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -
 ///
 /// # Errors
 ///
-/// As [`parse`]; also when the schema is another one or a number is impossible.
+/// [`Error::Format`] as for [`parse_strict`], unknown keys apart; also when the schema is another one or a number is
+/// impossible.
 pub fn parse_metadata(name: &str, text: &str) -> Result<Metadata> {
     let text = checked_text(name, text.as_bytes())?;
     let (mut metadata, unknown) = parse::<Metadata>(name, &parse_raw(name, text)?, text)?;

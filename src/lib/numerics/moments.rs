@@ -3,7 +3,7 @@
 /// Count, means, extremes and sums of products of deviations of `channels` variables observed together.
 ///
 /// Each row is summed about a pivot taken from itself, so that nothing cancels; rows are merged by the pairwise update
-/// of Chan, Golub and LeVeque [Chan1983], so the result does not depend on how a frame is cut into bands beyond
+/// of Chan, Golub and LeVeque \[Chan1983], so the result does not depend on how a frame is cut into bands beyond
 /// rounding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moments {

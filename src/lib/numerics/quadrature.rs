@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {
-    /// Every point counts alike: Eq. 5a of [HP2005].
+    /// Every point counts alike: Eq. 5a of \[HP2005].
     #[default]
     Rectangle,
     /// The end points count half.
