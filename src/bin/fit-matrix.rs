@@ -15,7 +15,7 @@ use std::process::ExitCode;
 
 /// Fit the matrix that turns a sensor's signals into CIE XYZ
 ///
-/// The training samples are spectral radiances: a spectral EXR (channels S0.<nm>nm), or a CSV table with one spectrum in
+/// The training samples are spectral radiances: a spectral EXR (channels named like S0.550,000000nm), or a CSV table with one spectrum in
 /// each row or column. The matrix takes ADU above black, divided by exposure, to absolute XYZ.
 #[derive(Parser)]
 #[command(version)]

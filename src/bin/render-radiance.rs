@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 /// Render what a camera expects to collect of a spectral radiance: electrons per photosite and sensor class
 ///
-/// Takes a spectrum (CSV: wavelength in nm, radiance), one of a library, or a spectral EXR (channels S0.<nm>nm) whose
+/// Takes a spectrum (CSV: wavelength in nm, radiance), one of a library, or a spectral EXR (channels like S0.550,000000nm) whose
 /// every pixel becomes a patch; or electrons given outright. Nothing is random yet: add-noise comes next.
 #[derive(Parser)]
 #[command(version)]
