@@ -12,7 +12,7 @@ fn sky_library() -> SpectralLibrary {
     spectral::read_library(&path, None).unwrap()
 }
 
-/// The matrix in the default sensor's file is what its comment says: the fit to all skies, to the seven digits given.
+/// The matrix in the default sensor's file is what its comment says: the fit to all skies, to half a unit of the seventh digit.
 #[test]
 fn the_default_sensors_matrix_is_the_fit_to_the_sky_library() {
     let loaded = data::load_sensor(data::DEFAULT_SENSOR).unwrap();
@@ -25,7 +25,7 @@ fn the_default_sensors_matrix_is_the_fit_to_the_sky_library() {
     let stated = loaded.sensor.xyz_from_camera.unwrap();
     for (row, stated) in matrix.iter().zip(stated) {
         for (element, stated) in row.iter().zip(stated) {
-            assert!((element / stated - 1.0).abs() < 2e-7, "{element} {stated}");
+            assert!((element / stated - 1.0).abs() < 5e-7, "{element} {stated}");
         }
     }
     assert!((100.0..300.0).contains(&condition), "{condition}");
