@@ -122,7 +122,8 @@ impl Stage for Digitize {
                     counts.clipped_low += u64::from(level < 0.0);
                     counts.clipped_high += u64::from(level > top);
                     counts.not_finite += u64::from(level.is_nan());
-                    *code = to_sample(level.clamp(0.0, top));
+                    // Rounding makes −0 of small negative levels; code 0 is one code, also to a digest.
+                    *code = to_sample(level.clamp(0.0, top) + 0.0);
                 }
             }
         }
