@@ -331,7 +331,7 @@ fn restore_from_hues(
                     vertical(cfa_above, cfa_below, x)
                 }
             });
-            planes[Class::Green as usize][index] = to_sample(green);
+            keep(Class::Green, green, &|| (cfa.sides(x) + vertical(cfa_above, cfa_below, x)) / 2.0);
         }
     }
     counts
