@@ -101,8 +101,8 @@ pub fn electrons(model: &NoiseModel, expected_e: f64, equations: Equations) -> P
             let charge = charge(model, expected_e);
             let clipped = charge.clipped_above(model.full_well_e);
             let variance = clipped.variance + read;
-            let excess_kurtosis =
-                if variance > 0.0 { charge.fourth / variance.powi(2) } else { 0.0 };
+            let fourth = charge.fourth_clipped_above(model.full_well_e);
+            let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) } else { 0.0 };
             Prediction { moments: MeanVariance { mean: clipped.mean, variance }, excess_kurtosis }
         }
     }
@@ -135,7 +135,7 @@ pub fn adu(
     let sigma = adc.adu_per_e * before.moments.std();
     let electrons_at = |level: f64| (level - adc.bias_adu) / adc.adu_per_e;
     let sites_clipped = charge.exceeds(model.full_well_e);
-    let moments = if let Some(lattice) = Lattice::of(model, adc, expected_e) {
+    let (moments, fourth) = if let Some(lattice) = Lattice::of(model, adc, expected_e) {
         normal::rounded(mean, sigma, adc.top_code(), |edge| lattice.exceeds(electrons_at(edge)))
     } else if sites_clipped > 1e-12 {
         let clipped = ClippedAndRead {
@@ -147,9 +147,8 @@ pub fn adu(
     } else {
         normal::rounded(mean, sigma, adc.top_code(), |edge| whole.exceeds(electrons_at(edge)))
     };
-    let scaled_fourth = charge.fourth * adc.adu_per_e.powi(4);
     let excess_kurtosis =
-        if moments.variance > 0.0 { scaled_fourth / moments.variance.powi(2) } else { 0.0 };
+        if moments.variance > 0.0 { fourth / moments.variance.powi(2) } else { 0.0 };
     Prediction { moments, excess_kurtosis }
 }
 

@@ -115,7 +115,8 @@ impl FrameReader {
             digest: Sha256::new(),
         });
         let is_integer = stored_as.starts_with('u');
-        let divisor = (metadata.quantity == QuantityKind::Srgb && is_integer).then_some(U16_FULL_SCALE);
+        let divisor =
+            (metadata.quantity == QuantityKind::Srgb && is_integer).then_some(U16_FULL_SCALE);
         let header = FrameHeader { name: name.into(), geometry, metadata };
         Ok(Self {
             file,
