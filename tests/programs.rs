@@ -1,0 +1,634 @@
+//! The programs as a shell sees them: pipes, files, sidecars, complaints.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::formats::input::{FrameReader, InputOptions, update_digest};
+use cyanometer::formats::yaml::parse_metadata;
+use cyanometer::metadata::Metadata;
+use cyanometer::stage::RowSource;
+use sha2::{Digest, Sha256};
+use std::fs::{self, File};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+use support::TREE;
+use tempfile::TempDir;
+
+/// The programs that there are, by their sources.
+fn programs() -> Vec<String> {
+    let sources = fs::read_dir(Path::new(TREE).join("src/bin")).unwrap();
+    let mut names: Vec<String> = sources
+        .map(|entry| entry.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    assert!(names.len() >= 8, "{names:?}");
+    names
+}
+
+/// A program where cargo has built it; another name is left to the shell's path.
+fn path_of(program: &str) -> PathBuf {
+    let built = Path::new(env!("CARGO_BIN_EXE_add-noise")).with_file_name(program);
+    if built.exists() { built } else { program.into() }
+}
+
+/// A directory to work in.
+struct Workshop {
+    directory: TempDir,
+}
+
+impl Workshop {
+    fn new() -> Self {
+        Self { directory: TempDir::new().unwrap() }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    fn files(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.directory.path()).unwrap();
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    /// A command line, split at spaces.
+    fn command(&self, line: &str) -> Command {
+        let line = line.replace("SAMPLES", &format!("{TREE}/sample_data"));
+        let mut words = line.split(' ');
+        let mut command = Command::new(path_of(words.next().unwrap()));
+        command.args(words).current_dir(self.directory.path()).env_remove("CYANOMETER_DATA");
+        command
+    }
+
+    /// Runs a command on `input` to its end.
+    fn attempt(&self, line: &str, input: &[u8]) -> Output {
+        let mut command = self.command(line);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut stdin = child.stdin.take().unwrap();
+        let input = input.to_vec();
+        // A program that refuses its input does not read it all.
+        let writer = std::thread::spawn(move || drop(stdin.write_all(&input)));
+        let output = child.wait_with_output().unwrap();
+        writer.join().unwrap();
+        output
+    }
+
+    /// Runs a command that shall succeed without a word on the standard error, and gives its output.
+    #[track_caller]
+    fn run(&self, line: &str, input: &[u8]) -> Vec<u8> {
+        let output = self.attempt(line, input);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && said.is_empty(), "{line}: {} {said}", output.status);
+        output.stdout
+    }
+
+    fn spawn(&self, line: &str, input: Stdio) -> Child {
+        self.command(line)
+            .stdin(input)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap_or_else(|error| panic!("{line}: {error}"))
+    }
+
+    /// Runs a pipeline, all its commands at once, and gives what comes out at its end.
+    #[track_caller]
+    fn pipe(&self, pipeline: &str) -> Vec<u8> {
+        let lines: Vec<&str> = pipeline.split(" | ").collect();
+        let mut children: Vec<Child> = Vec::new();
+        for line in &lines {
+            let before: Option<ChildStdout> =
+                children.last_mut().map(|child| child.stdout.take().unwrap());
+            children.push(self.spawn(line, before.map_or(Stdio::null(), Stdio::from)));
+        }
+        let last = children.pop().unwrap().wait_with_output().unwrap();
+        let mut outputs: Vec<Output> =
+            children.into_iter().map(|child| child.wait_with_output().unwrap()).collect();
+        outputs.push(last);
+        for (line, output) in lines.iter().zip(&outputs) {
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success() && said.is_empty(), "{line}: {} {said}", output.status);
+        }
+        outputs.pop().unwrap().stdout
+    }
+
+    fn sidecar(&self, name: &str) -> Metadata {
+        let text = String::from_utf8(self.bytes(&format!("{name}.yaml"))).unwrap();
+        parse_metadata(name, &text).unwrap()
+    }
+
+    /// All samples of a frame and its metadata, by the library's reader.
+    fn read(&self, name: &str) -> (Vec<f32>, Metadata) {
+        let options = InputOptions { path: Some(self.path(name)), ..Default::default() };
+        let mut reader = FrameReader::open(&options).unwrap();
+        let (height, mut samples) = (reader.header().geometry.height, Vec::new());
+        reader.read(height, &mut samples).unwrap();
+        (samples, reader.header().metadata.clone())
+    }
+
+    /// One frame of each stage, and a matrix.
+    fn with_frames() -> Self {
+        let shop = Self::new();
+        shop.run("fit-matrix SAMPLES/skies/sky912.exr -o matrix.yaml", &[]);
+        shop.run("render-radiance --electrons 100,200,300 --size 8x6 -o expected.exr", &[]);
+        shop.run("add-noise expected.exr --seed 7 -o noisy.exr", &[]);
+        shop.run("digitize noisy.exr -o codes.exr", &[]);
+        shop.run("mosaic codes.exr -o plane.exr", &[]);
+        shop.run("demosaic plane.exr -o rgb.exr", &[]);
+        shop.run("to-xyz rgb.exr --matrix matrix.yaml -o xyz.exr", &[]);
+        shop
+    }
+}
+
+const SKY: &str = "render-radiance SAMPLES/skies/measured_blue.csv --expose-to 0.8 --size 64x48";
+
+// --- good runs -----------------------------------------------------------------------------------------------------
+
+#[test]
+fn a_pipeline_runs_all_at_once_with_tees_between() {
+    let shop = Workshop::new();
+    shop.run("fit-matrix SAMPLES/skies/sky912.exr -o matrix.yaml", &[]);
+    let report = shop.pipe(&format!(
+        "{SKY} | tee expected.exr | add-noise --seed 7 | tee noisy.exr | digitize | mosaic | tee plane.exr \
+         | demosaic --method eci | to-xyz --matrix matrix.yaml | tee xyz.exr | measure --output-format json"
+    ));
+    let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
+    let region = &report["regions"][0];
+    assert_eq!(region["count"], 64 * 48);
+    let channels = region["channels"].as_array().unwrap();
+    let names: Vec<&str> = channels.iter().map(|c| c["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["X", "Y", "Z"]);
+    // The spectrum's own luminance is 1391.68 cd m⁻², as its file says; a matrix fitted to 912 skies restores that of a
+    // sky to some per cent.
+    let luminance = channels[1]["mean"].as_f64().unwrap();
+    assert!((luminance / 1391.68 - 1.0).abs() < 0.1, "{luminance}");
+
+    // Program by program the same bytes come out, and what tee kept can be gone on with.
+    shop.run(&format!("{SKY} -o again.exr"), &[]);
+    assert_eq!(shop.bytes("again.exr"), shop.bytes("expected.exr"));
+    let noisy = shop.run("add-noise --seed 7", &shop.bytes("expected.exr"));
+    assert_eq!(noisy, shop.bytes("noisy.exr"));
+    let plane = shop.run("mosaic", &shop.run("digitize", &noisy));
+    assert_eq!(plane, shop.bytes("plane.exr"));
+    let rgb = shop.run("demosaic --method eci", &plane);
+    assert_eq!(shop.run("to-xyz --matrix matrix.yaml", &rgb), shop.bytes("xyz.exr"));
+    shop.run("measure noisy.exr", &[]);
+}
+
+/// Mosaicking first does a third of the work, and changes no sample of what comes out.
+#[test]
+fn the_mosaic_may_come_anywhere_before_demosaicking() {
+    let shop = Workshop::new();
+    let planes: Vec<Vec<f32>> = [
+        format!("{SKY} | add-noise --seed 7 | digitize | mosaic -o last.exr"),
+        format!("{SKY} | add-noise --seed 7 | mosaic | digitize -o middle.exr"),
+        format!("{SKY} | mosaic | add-noise --seed 7 | digitize -o first.exr"),
+        format!("{SKY} --cfa rggb | add-noise --seed 7 | digitize -o never.exr"),
+    ]
+    .iter()
+    .map(|pipeline| {
+        assert!(shop.pipe(pipeline).is_empty());
+        shop.read(pipeline.rsplit(' ').next().unwrap()).0
+    })
+    .collect();
+    for plane in &planes[1..] {
+        assert_eq!(planes[0], *plane);
+    }
+}
+
+/// A redirection and a name give the same file, whatever the format.
+#[test]
+fn named_output_is_the_standard_output_byte_for_byte() {
+    let shop = Workshop::with_frames();
+    let mut runs: Vec<(String, &str)> = [
+        ("render-radiance --electrons 1,2,3 --size 9x7", ""),
+        ("add-noise --seed 3", "expected.exr"),
+        ("digitize", "noisy.exr"),
+        ("mosaic", "noisy.exr"),
+        ("demosaic --method shti", "plane.exr"),
+        ("to-xyz --matrix matrix.yaml --space srgb", "rgb.exr"),
+        ("measure", "noisy.exr"),
+        ("measure --output-format json", "noisy.exr"),
+    ]
+    .map(|(line, input)| (line.to_owned(), input))
+    .into();
+    for storage in [
+        "--format exr --compression zip",
+        "--format exr --compression piz --sample-type f16",
+        "--format tiff",
+        "--format tiff --compression lzw",
+        "--format tiff --compression deflate --sample-type f32",
+    ] {
+        runs.push((format!("digitize {storage}"), "noisy.exr"));
+    }
+    for (line, input) in runs {
+        let input = if input.is_empty() { Vec::new() } else { shop.bytes(input) };
+        let redirected = shop.run(&line, &input);
+        assert!(!redirected.is_empty(), "{line}");
+        assert!(shop.run(&format!("{line} -o named"), &input).is_empty());
+        assert_eq!(shop.bytes("named"), redirected, "{line}");
+        fs::remove_file(shop.path("named")).unwrap();
+        assert_eq!(shop.run(&format!("{line} -o -"), &input), redirected, "{line}");
+    }
+    assert!(!shop.files().contains(&"-".to_owned()));
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let shop = Workshop::new();
+    let light = shop.run("render-radiance --electrons 90,900,9000 --size 300x200", &[]);
+    let alone = shop.run("add-noise --threads 1", &light);
+    assert_eq!(shop.run("add-noise --threads 3", &light), alone);
+    let codes = shop.run("mosaic", &shop.run("digitize", &alone));
+    for method in ["bi", "shti", "eci"] {
+        let line = format!("demosaic --method {method}");
+        let rgb = shop.run(&format!("{line} --threads 1"), &codes);
+        assert_eq!(shop.run(&format!("{line} --threads 3"), &codes), rgb);
+    }
+    let report = shop.run("measure --output-format json --threads 1", &alone);
+    assert_eq!(shop.run("measure --output-format json --threads 3", &alone), report);
+}
+
+/// Rows leave before the last has come: half of a frame goes in, and some of the result comes out.
+#[test]
+fn every_stage_of_a_pipeline_streams() {
+    let shop = Workshop::new();
+    // 12 MB of expected electrons, of which a band takes one.
+    let frame = shop.run("render-radiance --electrons 90,900,9000 --size 1000x1000", &[]);
+    for line in ["add-noise", "mosaic", "digitize"] {
+        let mut child = shop.spawn(line, Stdio::piped());
+        let (mut stdin, mut stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+        let (come, has_come) = mpsc::channel();
+        let reader = std::thread::spawn(move || {
+            let mut first = vec![0; 1 << 19];
+            come.send(stdout.read_exact(&mut first).is_ok()).unwrap();
+            let mut rest = Vec::new();
+            stdout.read_to_end(&mut rest).unwrap();
+            first.len() + rest.len()
+        });
+        let (half, rest) = frame.split_at(frame.len() / 2);
+        stdin.write_all(half).unwrap();
+        let streams = has_come.recv_timeout(Duration::from_secs(60));
+        if streams != Ok(true) {
+            child.kill().unwrap();
+        }
+        assert_eq!(streams, Ok(true), "{line} keeps its rows back");
+        stdin.write_all(rest).unwrap();
+        drop(stdin);
+        assert!(child.wait().unwrap().success(), "{line}");
+        assert!(reader.join().unwrap() > 1_000_000 * 4);
+    }
+}
+
+/// `… | head -c 100`: whoever listens has heard enough, and that is no error.
+#[test]
+fn a_closed_pipe_is_no_error() {
+    let shop = Workshop::new();
+    let frame = shop.run("render-radiance --electrons 90,900,9000 --size 1000x500", &[]);
+    fs::write(shop.path("expected.exr"), frame).unwrap();
+    for line in [
+        "render-radiance --dark --size 1000x500",
+        "add-noise expected.exr",
+        "mosaic expected.exr",
+        "digitize expected.exr --format tiff",
+    ] {
+        let mut child = shop.spawn(line, Stdio::null());
+        let mut first = [0; 100];
+        let mut stdout = child.stdout.take().unwrap();
+        stdout.read_exact(&mut first).unwrap();
+        drop(stdout);
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty(), "{line}: {output:?}");
+    }
+}
+
+// --- sidecars ------------------------------------------------------------------------------------------------------
+
+#[test]
+fn the_sidecar_tells_what_was_done_and_what_came_of_it() {
+    let shop = Workshop::new();
+    shop.run("fit-matrix SAMPLES/skies/sky912.exr -o matrix.yaml", &[]);
+    let bright = "render-radiance --electrons 100,39900,45000 --size 32x20";
+    shop.run(&format!("{bright} -o expected.exr"), &[]);
+    let output = shop.attempt("add-noise expected.exr --seed 7 --frame 2 -v -o noisy.exr", &[]);
+    assert!(output.status.success());
+    let output = shop.attempt("digitize noisy.exr -q --threads 2 -o codes.tiff", &[]);
+    assert!(output.status.success() && output.stderr.is_empty(), "--quiet is quiet");
+    shop.run("mosaic codes.tiff --compression zip -o plane.exr", &[]);
+    shop.run("demosaic plane.exr --method bi -orgb.exr", &[]);
+    shop.run("to-xyz --output=xyz.exr --matrix matrix.yaml rgb.exr", &[]);
+
+    let metadata = shop.sidecar("xyz.exr");
+    let history: Vec<String> = metadata
+        .history
+        .iter()
+        .map(|entry| format!("{} {}", entry.program, entry.arguments.join(" ")))
+        .collect();
+    // Where and how the output is stored is left out: the samples do not depend on it.
+    assert_eq!(
+        history,
+        [
+            bright,
+            "add-noise expected.exr --seed 7 --frame 2",
+            "digitize noisy.exr",
+            "mosaic codes.tiff",
+            "demosaic plane.exr --method bi",
+            "to-xyz --matrix matrix.yaml rgb.exr",
+        ]
+    );
+    assert!(metadata.history.iter().all(|entry| entry.version == env!("CARGO_PKG_VERSION")));
+
+    for name in ["expected.exr", "noisy.exr", "codes.tiff", "plane.exr", "rgb.exr", "xyz.exr"] {
+        let mut sidecar = shop.sidecar(name);
+        let (samples, _) = shop.read(name);
+        let mut digest = Sha256::new();
+        update_digest(&mut digest, &samples);
+        let digest: String = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        let record = sidecar.samples.take().unwrap();
+        assert_eq!(record.digest, format!("sha256:{digest}"), "{name}");
+        let count = |is: &dyn Fn(f32) -> bool| {
+            let count = samples.iter().filter(|&&sample| is(sample)).count() as u64;
+            (count > 0).then_some(count)
+        };
+        match name {
+            "codes.tiff" => {
+                // Every code at the top was cut off there but for those that were just right.
+                let at_top = count(&|code| code >= 4095.0).unwrap();
+                assert!(
+                    record.clipped_high.unwrap() <= at_top && record.clipped_high.unwrap() > 640
+                );
+                assert_eq!(record.clipped_low, None);
+            }
+            "noisy.exr" => {
+                // 45,000 e⁻ always overflow, 39,900 with 73 more often, 100 never.
+                let full = record.full_well.unwrap();
+                assert!((641..1280).contains(&full), "{full}");
+            }
+            _ => assert_eq!((record.full_well, record.clipped_high), (None, None), "{name}"),
+        }
+        assert_eq!(record.not_finite, None);
+        // What the file itself carries is the same, but for what only the last row could tell.
+        fs::rename(shop.path(&format!("{name}.yaml")), shop.path("aside.yaml")).unwrap();
+        assert_eq!(shop.read(name).1, sidecar, "{name}");
+        fs::rename(shop.path("aside.yaml"), shop.path(&format!("{name}.yaml"))).unwrap();
+    }
+}
+
+#[test]
+fn samples_that_are_not_the_sidecars_are_told_of() {
+    let shop = Workshop::with_frames();
+    fs::copy(shop.path("expected.exr"), shop.path("noisy.exr")).unwrap();
+    let output = shop.attempt("measure noisy.exr", &[]);
+    assert!(output.status.success());
+    assert_eq!(
+        String::from_utf8_lossy(&output.stderr),
+        "measure: warning: noisy.exr: its samples are not those that noisy.exr.yaml describes; one of the two was \
+         changed\n"
+    );
+}
+
+#[test]
+fn unknown_keys_go_down_the_chain() {
+    let shop = Workshop::with_frames();
+    let sidecar = shop.path("expected.exr.yaml");
+    let mut file = File::options().append(true).open(sidecar).unwrap();
+    writeln!(file, "observatory: Pic du Midi").unwrap();
+    drop(file);
+    shop.run("add-noise expected.exr -o noisy.exr", &[]);
+    shop.run("digitize noisy.exr -o codes.tiff", &[]);
+    fs::remove_file(shop.path("codes.tiff.yaml")).unwrap();
+    shop.run("mosaic codes.tiff -o plane.exr", &[]);
+    let text = String::from_utf8(shop.bytes("plane.exr.yaml")).unwrap();
+    assert!(text.contains("\nobservatory: Pic du Midi\n"), "{text}");
+}
+
+// --- help and mistakes ---------------------------------------------------------------------------------------------
+
+#[test]
+fn every_program_tells_its_version_and_its_options() {
+    let shop = Workshop::new();
+    for program in programs() {
+        let version = shop.run(&format!("{program} --version"), &[]);
+        let expected = format!("{program} {}\n", env!("CARGO_PKG_VERSION"));
+        assert_eq!(String::from_utf8(version).unwrap(), expected);
+        let help = String::from_utf8(shop.run(&format!("{program} --help"), &[])).unwrap();
+        assert!(help.contains(&format!("Usage: {program} ")), "{help}");
+        for option in ["--help", "--version", "--quiet", "--verbose"] {
+            assert!(help.contains(option), "{program}: no {option} in its help");
+        }
+        assert!(shop.files().is_empty(), "{program}");
+    }
+}
+
+const BAD_DATA: i32 = 1;
+const BAD_USAGE: i32 = 2;
+
+/// The likeliest mistakes with each program: the command, the exit status, the line.
+const MISTAKES: [(&str, i32, &str); 37] = [
+    (
+        "render-radiance missing.csv",
+        BAD_DATA,
+        "missing.csv: cannot open: no such file or directory",
+    ),
+    (
+        "render-radiance --dark --size 8",
+        BAD_USAGE,
+        "`8` is no value for --size <WIDTHxHEIGHT>: a size is WIDTHxHEIGHT in photosites, such as 1332x1000; see \
+         `render-radiance --help`",
+    ),
+    (
+        "render-radiance --electrons 1,2",
+        BAD_USAGE,
+        "`1,2` is no value for --electrons <R,G,B>: give the electrons of R,G,B between commas, none below 0; see \
+         `render-radiance --help`",
+    ),
+    (
+        "render-radiance --dark --sensor kaf-5101",
+        BAD_USAGE,
+        "there is no sensor `kaf-5101`; known are kaf-5101ce; for a file of your own give its path, ending in .yaml",
+    ),
+    (
+        "render-radiance sky.csv --electrons 1,2,3",
+        BAD_USAGE,
+        "[INPUT] and --electrons <R,G,B> exclude each other; see `render-radiance --help`",
+    ),
+    ("add-noise", BAD_DATA, "standard input: it is empty; the program before it wrote nothing"),
+    (
+        "add-noise noisy.exr",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons that have their noise already; noise is added once",
+    ),
+    (
+        "add-noise codes.exr",
+        BAD_DATA,
+        "codes.exr: it holds three planes of ADU, not expected electrons of photosites; run `render-radiance` first",
+    ),
+    (
+        "add-noise expected.exr --without ssm",
+        BAD_USAGE,
+        "`ssm` is no value for --without <SOURCES>; it is one of dcsn, dcnu, ssn, prnu, ron; did you mean `ssn`?; see \
+         `add-noise --help`",
+    ),
+    (
+        "add-noise expected.exr --sed 7",
+        BAD_USAGE,
+        "unknown option or extra argument `--sed`; did you mean `--seed`?; see `add-noise --help`",
+    ),
+    (
+        "add-noise expected.exr -o expected.exr",
+        BAD_USAGE,
+        "expected.exr: it is the same file as the input expected.exr; name another output",
+    ),
+    (
+        "add-noise matrix.yaml",
+        BAD_DATA,
+        "matrix.yaml: it is neither an EXR nor a TIFF file; it looks like text (a spectrum goes into \
+         `render-radiance`)",
+    ),
+    (
+        "digitize codes.exr",
+        BAD_DATA,
+        "codes.exr: it holds three planes of ADU: it is digitized already",
+    ),
+    (
+        "digitize noisy.exr --bits 20",
+        BAD_USAGE,
+        "a converter of 20 bits is impossible here; give 1 to 16",
+    ),
+    (
+        "digitize noisy.exr --slope 0",
+        BAD_USAGE,
+        "`0` is no value for --slope <ADU_PER_E>: give a number above 0; see `digitize --help`",
+    ),
+    (
+        "digitize noisy.exr -o codes.png",
+        BAD_USAGE,
+        "codes.png: `.png` names no format that is written here; end the name in .exr or .tiff, or give --format",
+    ),
+    ("mosaic plane.exr", BAD_DATA, "plane.exr: it is a CFA plane already, rggb"),
+    (
+        "mosaic codes.exr --pattern rgbg",
+        BAD_USAGE,
+        "`rgbg` is no value for --pattern <PATTERN>: a pattern is rggb, bggr, grbg or gbrg; see `mosaic --help`",
+    ),
+    (
+        "mosaic xyz.exr",
+        BAD_DATA,
+        "xyz.exr: it holds three demosaicked planes of XYZ; a mosaic is made of the three planes R, G and B of a sensor",
+    ),
+    (
+        "demosaic codes.exr",
+        BAD_DATA,
+        "codes.exr: it holds three planes of ADU, not a CFA plane; run `mosaic` first",
+    ),
+    (
+        "demosaic plane.exr --black dark",
+        BAD_USAGE,
+        "`dark` is no value for --black <auto|none|N>: give auto, none or a number; see `demosaic --help`",
+    ),
+    (
+        "demosaic rgb.exr",
+        BAD_DATA,
+        "rgb.exr: it holds three demosaicked planes of ADU; demosaicking is done once",
+    ),
+    (
+        "demosaic plane.exr -o no/where.exr",
+        BAD_DATA,
+        "no/where.exr: there is no directory `no`; make it first",
+    ),
+    ("to-xyz rgb.exr", BAD_USAGE, "--matrix <FILE> is missing; see `to-xyz --help`"),
+    (
+        "to-xyz plane.exr --matrix matrix.yaml",
+        BAD_DATA,
+        "plane.exr: it holds a CFA plane of ADU, not three classes at each pixel; run `demosaic` first",
+    ),
+    (
+        "to-xyz rgb.exr --matrix missing.yaml",
+        BAD_DATA,
+        "missing.yaml: cannot open: no such file or directory",
+    ),
+    (
+        "to-xyz noisy.exr --matrix matrix.yaml",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons, not ADU; run `digitize` first",
+    ),
+    ("measure missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
+    (
+        "measure noisy.exr --region 0,0,9,9",
+        BAD_USAGE,
+        "noisy.exr: region 0,0,9,9 does not lie within the frame of 8x6",
+    ),
+    (
+        "measure noisy.exr codes.exr",
+        BAD_USAGE,
+        "unknown option or extra argument `codes.exr`; see `measure --help`",
+    ),
+    (
+        "measure noisy.exr --output-format xml",
+        BAD_USAGE,
+        "`xml` is no value for --output-format <OUTPUT_FORMAT>; it is one of text, json, yaml, csv; did you mean `yaml`?; see \
+         `measure --help`",
+    ),
+    ("fit-matrix", BAD_USAGE, "<LIBRARY> is missing; see `fit-matrix --help`"),
+    ("fit-matrix missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --train 2000",
+        BAD_USAGE,
+        "the library has 912 samples, fewer than 2000",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --train 0,1",
+        BAD_DATA,
+        "2 training samples cannot determine 3 coefficients per channel; give at least 3",
+    ),
+    ("preview expected.exr", BAD_USAGE, "--output <FILE.png> is missing; see `preview --help`"),
+    (
+        "preview missing.exr -o picture.png",
+        BAD_DATA,
+        "missing.exr: cannot open: no such file or directory",
+    ),
+];
+
+#[test]
+fn mistakes_are_answered_in_one_line() {
+    let shop = Workshop::with_frames();
+    let files = shop.files();
+    for (line, status, complaint) in MISTAKES {
+        let output = shop.attempt(line, &[]);
+        let program = line.split(' ').next().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(said, format!("{program}: {complaint}\n"), "{line}");
+        assert_eq!(output.status.code(), Some(status), "{line}");
+        assert!(output.stdout.is_empty(), "{line}");
+        assert_eq!(shop.files(), files, "{line} leaves something behind");
+    }
+}
+
+/// A run that fails in the middle leaves the output of the run before as it was.
+#[test]
+fn a_failed_run_keeps_the_old_output() {
+    let shop = Workshop::with_frames();
+    let (old, old_sidecar) = (shop.bytes("noisy.exr"), shop.bytes("noisy.exr.yaml"));
+    let files = shop.files();
+    let whole = shop.bytes("expected.exr");
+    let output = shop.attempt("add-noise -o noisy.exr", &whole[..whole.len() - 20]);
+    assert_eq!(output.status.code(), Some(BAD_DATA));
+    assert_eq!(
+        String::from_utf8_lossy(&output.stderr),
+        "add-noise: standard input: the file ends before its last row; it was cut short\n"
+    );
+    assert_eq!((shop.bytes("noisy.exr"), shop.bytes("noisy.exr.yaml")), (old, old_sidecar));
+    assert_eq!(shop.files(), files);
+}
