@@ -340,7 +340,7 @@ impl Request {
         let vignetting = self.vignetting_focal_length_mm.map(|focal_length| {
             Vignetting::new(size[0], size[1], sensor.pixel_pitch_um, focal_length)
         });
-        if vignetting.is_none() && size[0] * size[1] > patch.len() {
+        if vignetting.is_none() && patch[0] * patch[1] > 1 {
             metadata.leave_out(
                 "render-radiance",
                 "all photosites of a patch but one of each class",
