@@ -54,5 +54,6 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
     session.report_reader(&reader);
     let settings = PictureSettings { region: arguments.region, zoom: arguments.zoom, range: arguments.range };
-    write_png(&mut reader, &settings, &arguments.output)
+    let input = reader.file();
+    write_png(&mut reader, &settings, &arguments.output, input.as_ref())
 }

@@ -226,6 +226,12 @@ pub fn file_id(metadata: &std::fs::Metadata) -> FileId {
     (metadata.dev(), metadata.ino())
 }
 
+/// The identity of a named file and its name, so that it is not written over; none where there is no such file.
+pub fn identify(path: &Path) -> Option<(FileId, String)> {
+    let metadata = std::fs::metadata(path).ok()?;
+    Some((file_id(&metadata), path.display().to_string()))
+}
+
 /// Opens a named file.
 ///
 /// # Errors

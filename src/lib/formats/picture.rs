@@ -1,6 +1,7 @@
 //! Pictures for people: 8-bit PNG of any frame.
 
-use super::atomic::AtomicFile;
+use super::atomic::Target;
+use super::input::FileId;
 use crate::color::{linear_srgb_from_xyz, srgb_encode};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
@@ -46,12 +47,13 @@ pub struct PictureSettings {
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for a region outside the frame or a picture too large; [`Error::Format`] for quantities that are no
+/// [`Error::Usage`] for a region outside the frame, a picture too large or the file `input` as the output; [`Error::Format`] for quantities that are no
 /// picture; those of the reader; [`Error::Disk`].
 pub fn write_png(
     source: &mut dyn RowSource,
     settings: &PictureSettings,
     path: &Path,
+    input: Option<&(FileId, String)>,
 ) -> Result<()> {
     let frame = source.header().clone();
     let geometry = &frame.geometry;
@@ -103,7 +105,7 @@ pub fn write_png(
         }
     }
     let name = path.display().to_string();
-    let mut file = AtomicFile::create(path)?;
+    let mut file = Target::open(Some(path), false, input)?;
     let color = if planes == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
     let size = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
     PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Adaptive)
