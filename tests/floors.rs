@@ -77,8 +77,8 @@ fn string_length(rest: &str) -> usize {
 
 fn char_length(rest: &str) -> Option<usize> {
     let inside = rest.strip_prefix('\'')?;
-    let length = if inside.starts_with('\\') {
-        1 + inside[1..].char_indices().skip(1).find(|(_, c)| *c == '\'')?.0
+    let length = if let Some(escape) = inside.strip_prefix('\\') {
+        1 + escape.char_indices().skip(1).find(|(_, c)| *c == '\'')?.0
     } else {
         inside.chars().next()?.len_utf8()
     };

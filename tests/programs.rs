@@ -616,6 +616,54 @@ fn mistakes_are_answered_in_one_line() {
     }
 }
 
+/// What is read is not written over, whatever it is called; devices are written to, not replaced.
+#[test]
+fn inputs_and_devices_are_not_written_over() {
+    let shop = Workshop::with_frames();
+    fs::copy(format!("{TREE}/sample_data/skies/sky912.exr"), shop.path("library.exr")).unwrap();
+    std::os::unix::fs::symlink(shop.path("expected.exr"), shop.path("link.exr")).unwrap();
+    for (line, input) in [
+        ("add-noise", "expected.exr"),
+        ("mosaic", "noisy.exr"),
+        ("measure", "noisy.exr"),
+        ("preview", "noisy.exr"),
+        ("fit-matrix", "library.exr"),
+    ] {
+        let before = shop.bytes(input);
+        for output in [input.to_owned(), format!("./{input}")] {
+            let done = shop.attempt(&format!("{line} {input} -o {output}"), &[]);
+            assert_eq!(
+                String::from_utf8_lossy(&done.stderr),
+                format!(
+                    "{line}: {output}: it is the same file as the input {input}; name another output\n"
+                )
+            );
+            assert_eq!(done.status.code(), Some(BAD_USAGE), "{line}");
+            assert!(shop.bytes(input) == before, "{line} has written over its input");
+        }
+    }
+    assert_eq!(
+        shop.attempt("measure expected.exr -o link.exr", &[]).status.code(),
+        Some(BAD_USAGE)
+    );
+    // A named pipe stands for all devices: replacing it harms nobody.
+    let fifo = shop.path("fifo");
+    assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
+    for line in
+        ["measure noisy.exr -o fifo", "preview noisy.exr -o fifo", "add-noise expected.exr -o fifo"]
+    {
+        let listener = std::thread::spawn({
+            let fifo = fifo.clone();
+            move || fs::read(fifo).unwrap().len()
+        });
+        let done = shop.attempt(line, &[]);
+        let is_kept =
+            std::os::unix::fs::FileTypeExt::is_fifo(&fifo.metadata().unwrap().file_type());
+        assert!(done.status.success() && is_kept, "{line} has replaced a named pipe");
+        assert!(listener.join().unwrap() > 0, "{line}");
+    }
+}
+
 /// A run that fails in the middle leaves the output of the run before as it was.
 #[test]
 fn a_failed_run_keeps_the_old_output() {
