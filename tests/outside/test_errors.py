@@ -131,6 +131,15 @@ class Input(Errors):
                 self.assertIn(done.returncode, (0, 1), f"{name}: {done.stderr!r}")
                 self.assertNotIn(b"panicked", done.stderr)
 
+    def test_file_name_that_is_no_text(self):
+        name = os.fsencode(self.path("")) + b"sky\xff.exr"
+        try:
+            pathlib.Path(os.fsdecode(name)).write_bytes(self.electrons)
+        except OSError:
+            self.skipTest("this file system wants names to be text")
+        done = self.attempt(["add-noise", os.fsdecode(name), "-o", "out.exr"])
+        self.assertEqual((done.returncode, done.stderr), (0, b""))
+
     def test_directory_as_input(self):
         (self.directory / "folder.exr").mkdir()
         self.refused(["measure", "folder.exr"], BAD_DATA, "folder.exr")
