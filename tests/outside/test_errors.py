@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import resource
 import stat
 import subprocess
 import unittest
@@ -381,6 +382,29 @@ class Output(Errors):
                 stdout=sink, stderr=subprocess.PIPE, cwd=self.directory, timeout=TIMEOUT_S, check=False,
             )
         self.check_complaint(done, "measure", BAD_DATA, "measure > full")
+
+    def test_tallest_frame_starts_at_once(self):
+        # Its table of rows alone has 16 GiB: it has to stream too.
+        limit = (1 << 30, 1 << 30)
+        with subprocess.Popen(
+            [str(BINARIES / "render-radiance"), "--dark", "--threads", "1", "--size", f"1x{(1 << 31) - 1}"],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=self.directory,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, limit),
+        ) as program:
+            try:
+                head = program.stdout.read(1 << 20)
+                program.stdout.close()
+                self.assertEqual(len(head), 1 << 20, program.stderr.read())
+                self.assertEqual(program.wait(timeout=TIMEOUT_S), 0)
+                # What such a header announces is not kept in memory either.
+                endless = head + bytes(64 << 20)
+            finally:
+                program.kill()
+        done = subprocess.run(
+            [str(BINARIES / "measure"), "--threads", "1"], input=endless, capture_output=True, timeout=TIMEOUT_S,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (1 << 26, 1 << 26)), check=False,
+        )
+        self.check_complaint(done, "measure", BAD_DATA, "a table that is cut short")
 
     def test_closed_pipe_is_no_error(self):
         for command, data in [

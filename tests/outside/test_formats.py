@@ -264,6 +264,15 @@ class Read(ProgramCase):
             cfa = self.frame(["mosaic", "--pattern", "rggb"], stdin=data)
             np.testing.assert_array_equal(cfa["Y"], mosaic(planes, "rggb"))
 
+    def test_exr_from_bottom_to_top(self):
+        planes = self.color("f32")
+        write_planes(self.path("in.exr"), planes, "f32", openexr__lineOrder="decreasingY")
+        self.check_samples("in.exr", planes, "decreasing line order")
+        done = self.attempt(["mosaic", "--pattern", "rggb"], (self.directory / "in.exr").read_bytes())
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(b"bottom to top", done.stderr)
+        self.assertNotIn(b"damaged", done.stderr)
+
     def test_exr_statistics(self):
         layer = ("left.R", "left.G", "left.B")
         for names in ("Y", "RGB", "RGBA", "ab", "abc", layer, ("left.R", "depth.Z", "mask")):

@@ -147,7 +147,13 @@ impl ExrReader {
     pub fn stream(mut input: Box<dyn Read>, name: &str) -> Result<Self> {
         let meta = read_meta(&mut input, name)?;
         let (order, geometry, tags, stored_as) = describe(&meta, 0, name)?;
-        read_table(&mut input, meta.headers[0].chunk_count, name)?;
+        if meta.headers[0].line_order != LineOrder::Increasing {
+            return Err(Error::format(
+                name,
+                "its rows are stored from bottom to top, which a pipe cannot turn round; name the file instead",
+            ));
+        }
+        skip_table(&mut input, meta.headers[0].chunk_count, name)?;
         let input = Input::Pipe(input);
         Ok(Self {
             input,
@@ -396,6 +402,16 @@ fn read_table(input: &mut impl Read, entries: usize, name: &str) -> Result<Vec<u
     Ok(table)
 }
 
+/// Reads past an offset table, which may claim any length, without keeping it.
+fn skip_table(input: &mut impl Read, entries: usize, name: &str) -> Result<()> {
+    let length = 8 * entries as u64;
+    match io::copy(&mut input.take(length), &mut io::sink()) {
+        Ok(skipped) if skipped == length => Ok(()),
+        Ok(_) => Err(cut_short(name)),
+        Err(error) => Err(Error::disk(name, "read", error)),
+    }
+}
+
 /// What a part holds: order of channels, geometry, attributes, sample type.
 type Description = (Vec<usize>, Geometry, ExrTags, &'static str);
 
@@ -599,11 +615,6 @@ impl<W: Write> ExrWriter<W> {
         let data_at = table_at + 8 * blocks;
         // An uncompressed block is one row: y coordinate and size in 4 bytes each, then the samples.
         let block_bytes = 8 + header.max_block_byte_size() as u64;
-        for block in 0..blocks {
-            let offset =
-                if compression == ExrCompression::None { data_at + block * block_bytes } else { 0 };
-            head.extend_from_slice(&offset.to_le_bytes());
-        }
         let mut writer = Self {
             output,
             name: name.into(),
@@ -618,6 +629,12 @@ impl<W: Write> ExrWriter<W> {
             position: data_at,
         };
         writer.put(&head)?;
+        // Entry by entry: the table of a frame of 2^31 rows takes 16 GiB.
+        for block in 0..blocks {
+            let offset =
+                if compression == ExrCompression::None { data_at + block * block_bytes } else { 0 };
+            writer.put(&offset.to_le_bytes())?;
+        }
         Ok(writer)
     }
 
