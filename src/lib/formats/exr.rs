@@ -429,24 +429,24 @@ fn describe(meta: &MetaData, part: usize, name: &str) -> Result<Description> {
         );
     }
     if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
-        return refuse(
-            "subsampled channels (luminance/chroma images) are not supported; convert it to RGB first",
-        );
+        return refuse(SUBSAMPLED);
     }
-    if !matches!(
-        header.compression,
+    let is_read = match header.compression {
         Compression::Uncompressed
-            | Compression::RLE
-            | Compression::ZIP1
-            | Compression::ZIP16
-            | Compression::PIZ
-    ) {
+        | Compression::RLE
+        | Compression::ZIP1
+        | Compression::ZIP16
+        | Compression::PIZ => true,
+        // It cuts 32-bit floats to 24 bits, and loses nothing of the other types.
+        Compression::PXR24 => {
+            header.channels.list.iter().all(|channel| channel.sample_type != SampleType::F32)
+        }
+        _ => false,
+    };
+    if !is_read {
         return Err(Error::format(
             name,
-            format!(
-                "its compression, {}, loses data; store it as none, rle, zips, zip or piz",
-                header.compression
-            ),
+            format!("its {} is not read here; {STORE_WITHOUT_LOSS}", header.compression),
         ));
     }
     if header.max_block_byte_size() > MAX_BLOCK_BYTES {
@@ -520,6 +520,10 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
     order
 }
 
+const SUBSAMPLED: &str =
+    "subsampled channels (luminance/chroma images) are not supported; convert it to RGB first";
+const STORE_WITHOUT_LOSS: &str = "store it without loss as none, rle, zips, zip or piz";
+
 fn cut_short(name: &str) -> Error {
     Error::format(name, "the file ends before its last row; it was cut short")
 }
@@ -531,6 +535,14 @@ fn damaged(name: &str, error: &ExrError) -> Error {
         ExrError::Io(source) => {
             Error::disk(name, "read", io::Error::new(source.kind(), source.to_string()))
         }
+        // Before any header is given out, the crate refuses what is named better here.
+        ExrError::NotSupported(what) if what.contains("subsampling") => {
+            Error::format(name, SUBSAMPLED)
+        }
+        ExrError::Invalid(what) if what.contains("compression attribute") => Error::format(
+            name,
+            format!("its compression is missing or of an unknown kind; {STORE_WITHOUT_LOSS}"),
+        ),
         ExrError::NotSupported(what) => {
             Error::format(name, format!("this kind of EXR is not supported: {what}"))
         }
