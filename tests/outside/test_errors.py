@@ -141,6 +141,14 @@ class Input(Errors):
         done = self.attempt(["add-noise", os.fsdecode(name), "-o", "out.exr"])
         self.assertEqual((done.returncode, done.stderr), (0, b""))
 
+    @unittest.skipUnless(os.path.exists("/dev/zero"), "there is no endless device")
+    def test_input_that_never_ends(self):
+        self.write("in.exr", self.electrons)
+        self.refused(["render-radiance", "/dev/zero"], BAD_DATA, "/dev/zero")
+        self.refused(["render-radiance", "--dark", "--sensor", "/dev/zero"], BAD_DATA, "/dev/zero")
+        self.refused(["measure", "in.exr", "--metadata", "/dev/zero"], BAD_DATA, "/dev/zero")
+        self.refused(["to-xyz", "in.exr", "--matrix", "/dev/zero"], BAD_DATA, "/dev/zero")
+
     def test_directory_as_input(self):
         (self.directory / "folder.exr").mkdir()
         self.refused(["measure", "folder.exr"], BAD_DATA, "folder.exr")
