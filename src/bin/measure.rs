@@ -47,6 +47,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     output::write_text(
         arguments.output.as_deref(),
         &report::render(&report, arguments.output_format)?,
+        reader.file().as_ref(),
     )?;
     if let Some(warning) = reader.check_digest() {
         session.warn(&warning);

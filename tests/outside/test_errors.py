@@ -338,6 +338,31 @@ class Output(Errors):
             self.refused(["add-noise", "same.exr", "-o", name], (1, 2), (name, "same.exr"))
         self.assertEqual((self.directory / "same.exr").read_bytes(), self.electrons)
 
+    def test_no_input_is_written_over(self):
+        self.write("in.exr", self.electrons)
+        self.refused(["measure", "in.exr", "-o", "in.exr"], BAD_USAGE, "in.exr")
+        sky = self.write("sky.csv", sample_data("skies/clear_zenith.csv").read_bytes())
+        self.refused(["render-radiance", sky, "--size", "4x4", "--format", "exr", "-o", sky], BAD_USAGE, sky)
+        library = self.write("library.exr", sample_data("skies/sky912.exr").read_bytes())
+        self.refused(["fit-matrix", library, "-o", library], BAD_USAGE, library)
+        self.run_program(["fit-matrix", library, "-o", "matrix.yaml"])
+        self.refused(
+            ["to-xyz", "in.exr", "--matrix", "matrix.yaml", "--format", "exr", "-o", "matrix.yaml"],
+            BAD_USAGE,
+            "matrix.yaml",
+        )
+
+    def test_report_goes_into_a_named_pipe(self):
+        self.write("in.exr", self.electrons)
+        os.mkfifo(self.path("pipe"))
+        with subprocess.Popen(["cat", self.path("pipe")], stdout=subprocess.PIPE) as reader:
+            try:
+                self.run_program(["measure", "in.exr", "-o", "pipe"])
+                self.assertTrue(stat.S_ISFIFO(os.stat(self.path("pipe")).st_mode), "it was replaced by a file")
+                self.assertIn(b"16x12", reader.stdout.read())
+            finally:
+                reader.kill()
+
     def test_earlier_output_survives_an_error(self):
         self.write("out.exr", b"precious")
         self.write("cut.exr", self.electrons[:-10])

@@ -214,6 +214,12 @@ pub fn file_id(metadata: &std::fs::Metadata) -> FileId {
     (metadata.dev(), metadata.ino())
 }
 
+/// The file at a path, so that it is not written over; none for pipes and devices.
+pub fn regular_file(path: &Path) -> Option<(FileId, String)> {
+    let metadata = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
+    Some((file_id(&metadata), path.display().to_string()))
+}
+
 /// Opens a named file.
 ///
 /// # Errors

@@ -340,15 +340,16 @@ impl FrameWriter {
     }
 }
 
-/// Writes a text (a report, a matrix) to a named file or the standard output.
+/// Writes a text (a report, a matrix) to a named file or the standard output. `input` is the file that was read, if it
+/// is one.
 ///
 /// # Errors
 ///
-/// [`Error::Disk`].
-pub fn write_text(path: Option<&Path>, text: &str) -> Result<()> {
+/// [`Error::Usage`] where the output is the input; [`Error::Disk`].
+pub fn write_text(path: Option<&Path>, text: &str, input: Option<&(FileId, String)>) -> Result<()> {
     match path.filter(|path| *path != Path::new("-")) {
         Some(path) => {
-            let mut file = AtomicFile::create(path)?;
+            let mut file = Target::open(Some(path), false, input)?;
             file.write_all(text.as_bytes())
                 .map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
             file.commit()
