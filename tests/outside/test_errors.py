@@ -363,6 +363,25 @@ class Output(Errors):
             finally:
                 reader.kill()
 
+    def test_disk_that_fills_up_with_the_sidecar(self):
+        # A disk of our own, so small that for one of these heights the frame still fits but its sidecar does not.
+        mount = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"]
+        script = (
+            "mkdir -p disk && mount -t tmpfs -o size=200k none disk || exit 99; for rows in 124 125 126 127 128 129; do "
+            '"$0" --dark --size 130x$rows -o disk/out.exr; echo $? $(ls -A disk); rm -f disk/*; done'
+        )
+        try:
+            done = subprocess.run(
+                [*mount, script, str(BINARIES / "render-radiance")],
+                capture_output=True, cwd=self.directory, timeout=TIMEOUT_S, check=False,
+            )
+        except FileNotFoundError:
+            self.skipTest("there is no unshare")
+        if done.returncode != 0:
+            self.skipTest("no disk may be mounted here")
+        lines = set(done.stdout.decode().split("\n")) - {""}
+        self.assertEqual(lines, {"0 out.exr out.exr.yaml", "1"}, done.stderr)
+
     def test_earlier_output_survives_an_error(self):
         self.write("out.exr", b"precious")
         self.write("cut.exr", self.electrons[:-10])

@@ -284,7 +284,9 @@ impl FrameWriter {
                 metadata.samples =
                     Some(counts.record(format!("sha256:{}", hex(&digest.finalize()))));
                 let mut file = AtomicFile::create(&path)?;
-                file.write_all(yaml::write_metadata(&metadata)?.as_bytes())
+                let text = yaml::write_metadata(&metadata)?;
+                file.write_all(text.as_bytes())
+                    .and_then(|()| file.flush())
                     .map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
                 Some(file)
             }
