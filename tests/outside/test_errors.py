@@ -285,6 +285,10 @@ class Usage(Errors):
             self.refused([program, "a", "b", "c", "d"], BAD_USAGE)
         self.refused(["render-radiance", "--size", "4x4", "--dark", "--electrons", "1,2,3"], BAD_USAGE)
 
+    def test_exposure_that_no_number_can_hold(self):
+        sky = sample_data("skies/clear_zenith.csv")
+        self.refused(["render-radiance", sky, "--expose-to", "1e308", "--size", "2x2"], (1, 2), "exposure")
+
     def test_unknown_sensor(self):
         self.refused(
             ["render-radiance", "--electrons", "1,2,3", "--size", "4x4", "--sensor", "kaf-1501", "-o", "out.exr"],

@@ -194,6 +194,7 @@ impl Request {
                 ));
             }
             exposure.exposure_s = fraction * loaded.sensor.full_well_e / brightest;
+            exposure = exposure.checked()?;
             brightest_e = Some(fraction * loaded.sensor.full_well_e);
             session.note(&format!("exposure {} s", exposure.exposure_s));
         }
