@@ -285,6 +285,14 @@ class Usage(Errors):
             self.refused([program, "a", "b", "c", "d"], BAD_USAGE)
         self.refused(["render-radiance", "--size", "4x4", "--dark", "--electrons", "1,2,3"], BAD_USAGE)
 
+    def test_negative_counts_are_values(self):
+        for command in (
+            *(["add-noise", option, "-1"] for option in ("--seed", "--sensor-seed", "--frame", "--part")),
+            *(["render-radiance", option, "-1"] for option in ("--sample", "--part")),
+            ["measure", "--region", "-1,0,2,2"],
+        ):
+            self.refused(command, BAD_USAGE, f"`{command[2]}` is no value for {command[1]}", stdin=self.electrons)
+
     def test_exposure_that_no_number_can_hold(self):
         sky = sample_data("skies/clear_zenith.csv")
         self.refused(["render-radiance", sky, "--expose-to", "1e308", "--size", "2x2"], (1, 2), "exposure")
