@@ -293,6 +293,12 @@ class Usage(Errors):
         ):
             self.refused(command, BAD_USAGE, f"`{command[2]}` is no value for {command[1]}", stdin=self.electrons)
 
+    def test_half_does_not_become_infinite(self):
+        self.run_program(["render-radiance", "--electrons", "65504,1,1", "--size", "4x4", "--sample-type", "f16"])
+        for options in ([], ["-o", "out.exr"]):
+            bright = ["render-radiance", "--electrons", "70000,1,1", "--size", "4x4", "--sample-type", "f16"]
+            self.refused([*bright, *options], BAD_DATA, "65504")
+
     def test_exposure_that_no_number_can_hold(self):
         sky = sample_data("skies/clear_zenith.csv")
         self.refused(["render-radiance", sky, "--expose-to", "1e308", "--size", "2x2"], (1, 2), "exposure")

@@ -305,6 +305,15 @@ fn u16_scale(quantity: QuantityKind, samples: TiffSamples) -> f32 {
 
 impl RowSink for FrameWriter {
     fn write(&mut self, samples: &[f32]) -> Result<()> {
+        let overflows = |sample: &&f32| sample.is_finite() && f16::from_f32(**sample).is_infinite();
+        if matches!(self.encoding, Encoding::Exr(ExrSamples::F16, _))
+            && let Some(sample) = samples.iter().find(overflows)
+        {
+            return Err(Error::Data(format!(
+                "{}: the sample {sample} would become infinite as f16, which ends at 65504; write f32",
+                self.name
+            )));
+        }
         if let Some((digest, _)) = &mut self.record {
             // The digest is that of the samples as a reader will get them.
             let scale = match self.encoding {
