@@ -22,13 +22,13 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Seed of the temporal noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     seed: u64,
     /// Seed of the fixed patterns: another number, another sensor
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     sensor_seed: u64,
     /// Number of the exposure: another number, other temporal noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     frame: u32,
     /// Sources to leave out, between commas; their means stay: dcsn, dcnu, ssn, prnu, ron
     #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = options::choice(&SOURCES))]

@@ -6,7 +6,7 @@ use cyanometer::color::characterization::{
     CameraMatrix, MATRIX_SCHEMA, MATRIX_UNIT, fit_sky_rad_ls, signals,
 };
 use cyanometer::error::{Error, Result};
-use cyanometer::formats::{data, input, output, spectral};
+use cyanometer::formats::{data, input::regular_file, output, spectral};
 use cyanometer::report::{self, ReportFormat};
 use cyanometer::spectrum::WavelengthGrid;
 use cyanometer::units::RadianceUnit;
@@ -100,9 +100,8 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     session.note(&format!("fitted {} samples, condition number {condition:.1}", samples.len()));
     let to_file = arguments.output.as_deref().filter(|path| *path != std::path::Path::new("-"));
     if let Some(path) = to_file {
-        let library = input::identify(&arguments.library);
-        let yaml = report::matrix(&matrix, ReportFormat::Yaml)?;
-        output::write_text(Some(path), &yaml, library.as_ref())?;
+        let text = report::matrix(&matrix, ReportFormat::Yaml)?;
+        output::write_text(Some(path), &text, regular_file(&arguments.library).as_ref())?;
     }
     if to_file.is_none() || arguments.output_format != ReportFormat::Yaml {
         output::write_text(None, &report::matrix(&matrix, arguments.output_format)?, None)?;

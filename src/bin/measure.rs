@@ -20,7 +20,7 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Rectangle X,Y,W,H in pixels; may be given more than once; by default the whole frame
-    #[arg(long, value_name = "X,Y,W,H", value_parser = options::region)]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = options::region, allow_hyphen_values = true)]
     region: Vec<Region>,
     /// Form of the report
     #[arg(long, default_value = "text", value_parser = options::choice(&[("text", ReportFormat::Text), ("json", ReportFormat::Json), ("yaml", ReportFormat::Yaml), ("csv", ReportFormat::Csv)]))]

@@ -63,7 +63,7 @@ struct Arguments {
     #[arg(long, value_name = "NAME", conflicts_with = "sample")]
     column: Option<String>,
     /// One spectrum of a library, counted from 0 (pixels row by row)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     sample: Option<usize>,
     /// Photosites that show one pixel of a spectral image; by default 1x1
     #[arg(long, value_name = "WxH", value_parser = options::size)]
@@ -72,7 +72,7 @@ struct Arguments {
     #[arg(long, value_name = "PATTERN", value_parser = options::pattern)]
     cfa: Option<CfaPattern>,
     /// Part of a multi-part EXR, counted from 0
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
     part: usize,
     #[command(flatten)]
     output: options::Output,

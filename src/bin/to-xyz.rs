@@ -5,7 +5,9 @@ use cyanometer::cli::{self, options};
 use cyanometer::color::characterization::CameraMatrix;
 use cyanometer::color::{ColorSettings, Space, ToXyz, White};
 use cyanometer::error::{Error, Result};
-use cyanometer::formats::{data, input::FrameReader, yaml};
+use cyanometer::formats::atomic::same_file;
+use cyanometer::formats::input::{FrameReader, regular_file};
+use cyanometer::formats::{data, yaml};
 use cyanometer::optics::Exposure;
 use cyanometer::stage::RowSource;
 use std::path::PathBuf;
@@ -65,6 +67,12 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let shown = arguments.matrix.display().to_string();
     let matrix: CameraMatrix = yaml::parse_strict(&shown, &data::read_file(&arguments.matrix)?)?;
     matrix.check().map_err(|problem| Error::format(&shown, problem))?;
+    let output = arguments.output.output.as_deref().and_then(regular_file);
+    if let (Some((output, name)), Some((matrix, _))) = (output, regular_file(&arguments.matrix))
+        && output == matrix
+    {
+        return Err(same_file(&name, &shown));
+    }
     let mut reader = FrameReader::open(&arguments.input.options())?;
     let metadata = &mut reader.header_mut().metadata;
     let known = metadata.exposure;

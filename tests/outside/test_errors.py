@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import resource
 import stat
 import subprocess
 import unittest
@@ -130,6 +131,23 @@ class Input(Errors):
                 done = self.attempt(["mosaic", name])
                 self.assertIn(done.returncode, (0, 1), f"{name}: {done.stderr!r}")
                 self.assertNotIn(b"panicked", done.stderr)
+
+    def test_file_name_that_is_no_text(self):
+        name = os.fsencode(self.path("")) + b"sky\xff.exr"
+        try:
+            pathlib.Path(os.fsdecode(name)).write_bytes(self.electrons)
+        except OSError:
+            self.skipTest("this file system wants names to be text")
+        done = self.attempt(["add-noise", os.fsdecode(name), "-o", "out.exr"])
+        self.assertEqual((done.returncode, done.stderr), (0, b""))
+
+    @unittest.skipUnless(os.path.exists("/dev/zero"), "there is no endless device")
+    def test_input_that_never_ends(self):
+        self.write("in.exr", self.electrons)
+        self.refused(["render-radiance", "/dev/zero"], BAD_DATA, "/dev/zero")
+        self.refused(["render-radiance", "--dark", "--sensor", "/dev/zero"], BAD_DATA, "/dev/zero")
+        self.refused(["measure", "in.exr", "--metadata", "/dev/zero"], BAD_DATA, "/dev/zero")
+        self.refused(["to-xyz", "in.exr", "--matrix", "/dev/zero"], BAD_DATA, "/dev/zero")
 
     def test_directory_as_input(self):
         (self.directory / "folder.exr").mkdir()
@@ -267,6 +285,24 @@ class Usage(Errors):
             self.refused([program, "a", "b", "c", "d"], BAD_USAGE)
         self.refused(["render-radiance", "--size", "4x4", "--dark", "--electrons", "1,2,3"], BAD_USAGE)
 
+    def test_negative_counts_are_values(self):
+        for command in (
+            *(["add-noise", option, "-1"] for option in ("--seed", "--sensor-seed", "--frame", "--part")),
+            *(["render-radiance", option, "-1"] for option in ("--sample", "--part")),
+            ["measure", "--region", "-1,0,2,2"],
+        ):
+            self.refused(command, BAD_USAGE, f"`{command[2]}` is no value for {command[1]}", stdin=self.electrons)
+
+    def test_half_does_not_become_infinite(self):
+        self.run_program(["render-radiance", "--electrons", "65504,1,1", "--size", "4x4", "--sample-type", "f16"])
+        for options in ([], ["-o", "out.exr"]):
+            bright = ["render-radiance", "--electrons", "70000,1,1", "--size", "4x4", "--sample-type", "f16"]
+            self.refused([*bright, *options], BAD_DATA, "65504")
+
+    def test_exposure_that_no_number_can_hold(self):
+        sky = sample_data("skies/clear_zenith.csv")
+        self.refused(["render-radiance", sky, "--expose-to", "1e308", "--size", "2x2"], (1, 2), "exposure")
+
     def test_unknown_sensor(self):
         self.refused(
             ["render-radiance", "--electrons", "1,2,3", "--size", "4x4", "--sensor", "kaf-1501", "-o", "out.exr"],
@@ -320,6 +356,50 @@ class Output(Errors):
             self.refused(["add-noise", "same.exr", "-o", name], (1, 2), (name, "same.exr"))
         self.assertEqual((self.directory / "same.exr").read_bytes(), self.electrons)
 
+    def test_no_input_is_written_over(self):
+        self.write("in.exr", self.electrons)
+        self.refused(["measure", "in.exr", "-o", "in.exr"], BAD_USAGE, "in.exr")
+        sky = self.write("sky.csv", sample_data("skies/clear_zenith.csv").read_bytes())
+        self.refused(["render-radiance", sky, "--size", "4x4", "--format", "exr", "-o", sky], BAD_USAGE, sky)
+        library = self.write("library.exr", sample_data("skies/sky912.exr").read_bytes())
+        self.refused(["fit-matrix", library, "-o", library], BAD_USAGE, library)
+        self.run_program(["fit-matrix", library, "-o", "matrix.yaml"])
+        self.refused(
+            ["to-xyz", "in.exr", "--matrix", "matrix.yaml", "--format", "exr", "-o", "matrix.yaml"],
+            BAD_USAGE,
+            "matrix.yaml",
+        )
+
+    def test_report_goes_into_a_named_pipe(self):
+        self.write("in.exr", self.electrons)
+        os.mkfifo(self.path("pipe"))
+        with subprocess.Popen(["cat", self.path("pipe")], stdout=subprocess.PIPE) as reader:
+            try:
+                self.run_program(["measure", "in.exr", "-o", "pipe"])
+                self.assertTrue(stat.S_ISFIFO(os.stat(self.path("pipe")).st_mode), "it was replaced by a file")
+                self.assertIn(b"16x12", reader.stdout.read())
+            finally:
+                reader.kill()
+
+    def test_disk_that_fills_up_with_the_sidecar(self):
+        # A disk of our own, so small that for one of these heights the frame still fits but its sidecar does not.
+        mount = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"]
+        script = (
+            "mkdir -p disk && mount -t tmpfs -o size=200k none disk || exit 99; for rows in 124 125 126 127 128 129; do "
+            '"$0" --dark --size 130x$rows -o disk/out.exr; echo $? $(ls -A disk); rm -f disk/*; done'
+        )
+        try:
+            done = subprocess.run(
+                [*mount, script, str(BINARIES / "render-radiance")],
+                capture_output=True, cwd=self.directory, timeout=TIMEOUT_S, check=False,
+            )
+        except FileNotFoundError:
+            self.skipTest("there is no unshare")
+        if done.returncode != 0:
+            self.skipTest("no disk may be mounted here")
+        lines = set(done.stdout.decode().split("\n")) - {""}
+        self.assertEqual(lines, {"0 out.exr out.exr.yaml", "1"}, done.stderr)
+
     def test_earlier_output_survives_an_error(self):
         self.write("out.exr", b"precious")
         self.write("cut.exr", self.electrons[:-10])
@@ -372,6 +452,29 @@ class Output(Errors):
                 stdout=sink, stderr=subprocess.PIPE, cwd=self.directory, timeout=TIMEOUT_S, check=False,
             )
         self.check_complaint(done, "measure", BAD_DATA, "measure > full")
+
+    def test_tallest_frame_starts_at_once(self):
+        # Its table of rows alone has 16 GiB: it has to stream too.
+        limit = (1 << 30, 1 << 30)
+        with subprocess.Popen(
+            [str(BINARIES / "render-radiance"), "--dark", "--threads", "1", "--size", f"1x{(1 << 31) - 1}"],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=self.directory,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, limit),
+        ) as program:
+            try:
+                head = program.stdout.read(1 << 20)
+                program.stdout.close()
+                self.assertEqual(len(head), 1 << 20, program.stderr.read())
+                self.assertEqual(program.wait(timeout=TIMEOUT_S), 0)
+                # What such a header announces is not kept in memory either.
+                endless = head + bytes(64 << 20)
+            finally:
+                program.kill()
+        done = subprocess.run(
+            [str(BINARIES / "measure"), "--threads", "1"], input=endless, capture_output=True, timeout=TIMEOUT_S,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (1 << 26, 1 << 26)), check=False,
+        )
+        self.check_complaint(done, "measure", BAD_DATA, "a table that is cut short")
 
     def test_closed_pipe_is_no_error(self):
         for command, data in [

@@ -264,6 +264,39 @@ class Read(ProgramCase):
             cfa = self.frame(["mosaic", "--pattern", "rggb"], stdin=data)
             np.testing.assert_array_equal(cfa["Y"], mosaic(planes, "rggb"))
 
+    def test_exr_from_bottom_to_top(self):
+        planes = self.color("f32")
+        write_planes(self.path("in.exr"), planes, "f32", openexr__lineOrder="decreasingY")
+        self.check_samples("in.exr", planes, "decreasing line order")
+        done = self.attempt(["mosaic", "--pattern", "rggb"], (self.directory / "in.exr").read_bytes())
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(b"bottom to top", done.stderr)
+        self.assertNotIn(b"damaged", done.stderr)
+
+    def test_exr_compressions_that_lose(self):
+        for compression in ("pxr24", "b44", "dwaa"):
+            for sample_type in ("f32", "f16", "u32"):
+                planes = self.color(sample_type)
+                write_planes(self.path("in.exr"), planes, sample_type, compression=compression)
+                # PXR24 keeps all bits of half and integer samples.
+                if compression == "pxr24" and sample_type != "f32":
+                    self.check_samples("in.exr", planes, f"{compression} {sample_type}")
+                else:
+                    done = self.attempt(["mosaic", "in.exr", "--pattern", "rggb"])
+                    self.assertEqual(done.returncode, 1)
+                    self.assertIn(compression.encode(), done.stderr)
+                    self.assertIn(b"zip", done.stderr)
+
+    def test_exr_compression_of_the_future(self):
+        planes = self.color("f32")
+        write_planes(self.path("in.exr"), planes, "f32", compression="none")
+        data = (self.directory / "in.exr").read_bytes()
+        kind = data.index(b"compression\0compression\0\1\0\0\0") + 28
+        (self.directory / "in.exr").write_bytes(data[:kind] + b"\x63" + data[kind + 1 :])
+        done = self.attempt(["mosaic", "in.exr", "--pattern", "rggb"])
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(b"compression is missing or of an unknown kind", done.stderr)
+
     def test_exr_statistics(self):
         layer = ("left.R", "left.G", "left.B")
         for names in ("Y", "RGB", "RGBA", "ab", "abc", layer, ("left.R", "depth.Z", "mask")):

@@ -153,7 +153,9 @@ impl Session {
 
     /// Adds this program to a frame's history and says what it leaves out.
     pub fn sign(&self, header: &mut FrameHeader) {
-        header.metadata.history.push(history_entry(self.program, std::env::args().skip(1)));
+        // A file's name may be no UTF-8; the history is.
+        let arguments = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+        header.metadata.history.push(history_entry(self.program, arguments));
         for left_out in
             header.metadata.left_out.iter().filter(|entry| entry.program == self.program)
         {

@@ -25,7 +25,7 @@ pub struct Input {
     /// Frame to read, EXR or TIFF; `-` or none for standard input
     pub input: Option<PathBuf>,
     /// Part of a multi-part EXR, or page of a TIFF, counted from 0
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
     pub part: usize,
     /// YAML file whose metadata replace those that come with the input
     #[arg(long, value_name = "FILE")]

@@ -4,7 +4,7 @@ use super::Session;
 use super::options::Output;
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
-use crate::formats::input::{FileId, FrameReader, InputOptions};
+use crate::formats::input::{FileId, FrameReader, InputOptions, regular_file};
 use crate::formats::output::FrameWriter;
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::formats::{csv::SpectralTable, data};
@@ -149,7 +149,7 @@ impl Request {
             exposure.exposure_s = 1.0;
         }
         let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-        let mut input: Option<(FileId, String)> = None;
+        let mut input = self.input.as_deref().and_then(regular_file);
         let mut light = match self.electrons {
             Some(electrons) => {
                 let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
@@ -194,6 +194,7 @@ impl Request {
                 ));
             }
             exposure.exposure_s = fraction * loaded.sensor.full_well_e / brightest;
+            exposure = exposure.checked()?;
             brightest_e = Some(fraction * loaded.sensor.full_well_e);
             session.note(&format!("exposure {} s", exposure.exposure_s));
         }

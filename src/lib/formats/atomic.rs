@@ -105,6 +105,11 @@ fn plain(error: &io::Error) -> io::Error {
     error.raw_os_error().map_or_else(|| io::Error::from(error.kind()), io::Error::from_raw_os_error)
 }
 
+/// The complaint about an output that would be written over its input.
+pub fn same_file(output: &str, input: &str) -> Error {
+    Error::Usage(format!("{output}: it is the same file as the input {input}; name another output"))
+}
+
 /// Where the bytes of a frame go.
 #[derive(Debug)]
 pub struct Target {
@@ -137,12 +142,7 @@ impl Target {
         let name = path.map_or_else(|| STDOUT_NAME.to_owned(), |path| path.display().to_string());
         let is_input =
             |metadata: &std::fs::Metadata| input.is_some_and(|(id, _)| *id == file_id(metadata));
-        let same = || {
-            let input = input.map_or("", |(_, input)| input.as_str());
-            Error::Usage(format!(
-                "{name}: it is the same file as the input {input}; name another output"
-            ))
-        };
+        let same = || same_file(&name, input.map_or("", |(_, input)| input.as_str()));
         let output = match path {
             None => {
                 let stdout = io::stdout();

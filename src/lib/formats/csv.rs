@@ -6,12 +6,15 @@
 use crate::error::{Error, Result};
 use crate::spectrum::{Curve, check_wavelengths};
 use crate::units::RadianceUnit;
+use csv::StringRecord;
 use flate2::read::GzDecoder;
 use ndarray::Array2;
 use std::io::Read;
 
 /// A table may unpack to this much.
 const MAX_BYTES: u64 = 256 << 20;
+/// A table may have this many numbers: 256 MiB of them.
+const MAX_CELLS: usize = 1 << 25;
 
 /// Curves over common wavelengths.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,8 +37,11 @@ impl SpectralTable {
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self> {
         let mut unpacked = Vec::new();
         let bytes = if bytes.starts_with(&[0x1F, 0x8B]) {
-            let unpack = GzDecoder::new(bytes).take(MAX_BYTES).read_to_end(&mut unpacked);
+            let unpack = GzDecoder::new(bytes).take(MAX_BYTES + 1).read_to_end(&mut unpacked);
             unpack.map_err(|_| Error::format(name, "it is gzipped, but damaged"))?;
+            if unpacked.len() as u64 > MAX_BYTES {
+                return Err(Error::format(name, "it unpacks to more than 256 MiB; no table does"));
+            }
             &unpacked
         } else {
             bytes
@@ -49,25 +55,30 @@ impl SpectralTable {
             .has_headers(false)
             .trim(csv::Trim::All)
             .from_reader(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
-        let mut records = Vec::new();
-        for record in reader.records() {
-            let record =
-                record.map_err(|error| refuse(format!("it is not a CSV table: {error}")))?;
-            records.push((record.position().map_or(0, csv::Position::line), record));
-        }
+        let not_csv = |error: csv::Error| refuse(format!("it is not a CSV table: {error}"));
         let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite());
-        let Some((_, first)) = records.first() else {
+        let mut first = StringRecord::new();
+        if !reader.read_record(&mut first).map_err(not_csv)? {
             return Err(refuse("it holds no rows".into()));
-        };
+        }
         let by_rows = first.len() > 2
             && number(&first[0]).is_none()
             && first.iter().skip(1).all(|c| number(c).is_some());
         let header: Option<Vec<String>> =
             number(&first[0]).is_none().then(|| first.iter().map(ToOwned::to_owned).collect());
-        let body = &records[usize::from(header.is_some())..];
         let width = first.len();
-        let mut cells = Vec::with_capacity(body.len() * width);
-        for (line, record) in body {
+        let (mut cells, mut labels, mut rows) = (Vec::new(), Vec::new(), 0);
+        let mut record = if header.is_none() { first.clone() } else { StringRecord::new() };
+        // One row at a time: as text a table takes many times the memory of its numbers.
+        while header.is_none() && rows == 0 || reader.read_record(&mut record).map_err(not_csv)? {
+            let line = record.position().map_or(0, csv::Position::line);
+            rows += 1;
+            if cells.len() + width > MAX_CELLS {
+                return Err(refuse(format!("it has more than {MAX_CELLS} numbers; no table has")));
+            }
+            if by_rows {
+                labels.push(record[0].to_owned());
+            }
             for (column, text) in record.iter().enumerate() {
                 let value = match number(text) {
                     Some(value) => value,
@@ -84,15 +95,14 @@ impl SpectralTable {
                 cells.push(value);
             }
         }
-        let cells = Array2::from_shape_vec((body.len(), width), cells)
+        let cells = Array2::from_shape_vec((rows, width), cells)
             .map_err(|_| refuse("its rows differ in length".into()))?;
-        if width < 2 || body.is_empty() {
+        if width < 2 || rows == 0 {
             return Err(refuse(
                 "it needs a column of wavelengths in nm and at least one of values".into(),
             ));
         }
         let (wavelength_nm, columns, values) = if by_rows {
-            let labels = body.iter().map(|(_, record)| record[0].to_owned()).collect();
             let wavelengths = first.iter().skip(1).filter_map(number).collect();
             (wavelengths, labels, cells.slice(ndarray::s![.., 1..]).to_owned())
         } else {
@@ -157,6 +167,8 @@ impl SpectralTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flate2::{Compression, write::GzEncoder};
+    use std::io::Write;
 
     #[test]
     fn both_layouts_give_the_same_curves() {
@@ -178,6 +190,18 @@ mod tests {
         assert!(complaint("nm,L\n400,nan\n").contains("`nan` is no number"));
         assert!(complaint("").contains("no rows"));
         assert!(complaint("nm,L\n400,1\n410\n").contains("not a CSV table"));
+    }
+
+    #[test]
+    fn tables_that_blow_up_are_refused() {
+        let row = format!("500{}\n", ",1".repeat(1 << 20));
+        let complaint = |text: &[u8]| SpectralTable::parse("t", text).unwrap_err().to_string();
+        assert!(complaint(row.repeat(33).as_bytes()).contains("more than 33554432 numbers"));
+        let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+        for _ in 0..257 {
+            packed.write_all(&[b'#'; 1 << 20]).unwrap();
+        }
+        assert!(complaint(&packed.finish().unwrap()).contains("more than 256 MiB"));
     }
 
     #[test]

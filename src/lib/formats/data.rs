@@ -6,6 +6,8 @@ use crate::error::{Error, Result};
 use crate::sensor::{CurveFile, Sensor, SpectralResponse};
 use crate::spectrum::{Curve, Observer};
 use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The environment variable that names directories with data files, like `sample_data`.
@@ -120,17 +122,30 @@ pub fn load_observer() -> Result<Observer> {
 ///
 /// # Errors
 ///
-/// [`Error::Disk`].
+/// [`Error::Disk`], and as [`read_table`].
 pub fn read_file(path: &Path) -> Result<Vec<u8>> {
     let name = path.display().to_string();
-    let length = std::fs::metadata(path).map_err(|e| Error::disk(&name, "open", e))?;
-    if length.is_dir() {
+    let file = File::open(path).map_err(|e| Error::disk(&name, "open", e))?;
+    if file.metadata().is_ok_and(|m| m.is_dir()) {
         return Err(Error::format(&name, "it is a directory"));
     }
-    if length.len() > 1 << 30 {
-        return Err(Error::format(&name, "it is larger than 1 GiB; no table is"));
+    read_table(file, &name)
+}
+
+/// Reads what is small to its end, but no more than a table can be: a device may never end.
+///
+/// # Errors
+///
+/// [`Error::Disk`]; [`Error::Format`] when there is more.
+pub fn read_table(input: impl Read, name: &str) -> Result<Vec<u8>> {
+    /// A table may be this long.
+    const MAX_BYTES: u64 = 256 << 20;
+    let mut bytes = Vec::new();
+    input.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::disk(name, "read", e))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(Error::format(name, "it is longer than 256 MiB; no table is"));
     }
-    std::fs::read(path).map_err(|e| Error::disk(&name, "open", e))
+    Ok(bytes)
 }
 
 /// An efficiency or a transmittance is a fraction.
@@ -243,6 +258,12 @@ mod tests {
         // Equal energy has x = y = ⅓ to the rounding of the tables (CIE 015, Table T.4: 0.33333 to 0.33334).
         let total: f64 = sums.iter().sum();
         assert!(sums.iter().all(|sum| (sum / total - 1.0 / 3.0).abs() < 1e-4), "{sums:?}");
+    }
+
+    #[test]
+    fn what_never_ends_is_not_read_for_ever() {
+        let complaint = read_file(Path::new("/dev/zero")).unwrap_err().to_string();
+        assert!(complaint.contains("longer than 256 MiB"), "{complaint}");
     }
 
     #[test]

@@ -147,7 +147,13 @@ impl ExrReader {
     pub fn stream(mut input: Box<dyn Read>, name: &str) -> Result<Self> {
         let meta = read_meta(&mut input, name)?;
         let (order, geometry, tags, stored_as) = describe(&meta, 0, name)?;
-        read_table(&mut input, meta.headers[0].chunk_count, name)?;
+        if meta.headers[0].line_order != LineOrder::Increasing {
+            return Err(Error::format(
+                name,
+                "its rows are stored from bottom to top, which a pipe cannot turn round; name the file instead",
+            ));
+        }
+        skip_table(&mut input, meta.headers[0].chunk_count, name)?;
         let input = Input::Pipe(input);
         Ok(Self {
             input,
@@ -396,6 +402,16 @@ fn read_table(input: &mut impl Read, entries: usize, name: &str) -> Result<Vec<u
     Ok(table)
 }
 
+/// Reads past an offset table, which may claim any length, without keeping it.
+fn skip_table(input: &mut impl Read, entries: usize, name: &str) -> Result<()> {
+    let length = 8 * entries as u64;
+    match io::copy(&mut input.take(length), &mut io::sink()) {
+        Ok(skipped) if skipped == length => Ok(()),
+        Ok(_) => Err(cut_short(name)),
+        Err(error) => Err(Error::disk(name, "read", error)),
+    }
+}
+
 /// What a part holds: order of channels, geometry, attributes, sample type.
 type Description = (Vec<usize>, Geometry, ExrTags, &'static str);
 
@@ -413,24 +429,24 @@ fn describe(meta: &MetaData, part: usize, name: &str) -> Result<Description> {
         );
     }
     if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
-        return refuse(
-            "subsampled channels (luminance/chroma images) are not supported; convert it to RGB first",
-        );
+        return refuse(SUBSAMPLED);
     }
-    if !matches!(
-        header.compression,
+    let is_read = match header.compression {
         Compression::Uncompressed
-            | Compression::RLE
-            | Compression::ZIP1
-            | Compression::ZIP16
-            | Compression::PIZ
-    ) {
+        | Compression::RLE
+        | Compression::ZIP1
+        | Compression::ZIP16
+        | Compression::PIZ => true,
+        // It cuts 32-bit floats to 24 bits, and loses nothing of the other types.
+        Compression::PXR24 => {
+            header.channels.list.iter().all(|channel| channel.sample_type != SampleType::F32)
+        }
+        _ => false,
+    };
+    if !is_read {
         return Err(Error::format(
             name,
-            format!(
-                "its compression, {}, loses data; store it as none, rle, zips, zip or piz",
-                header.compression
-            ),
+            format!("its {} is not read here; {STORE_WITHOUT_LOSS}", header.compression),
         ));
     }
     if header.max_block_byte_size() > MAX_BLOCK_BYTES {
@@ -504,6 +520,10 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
     order
 }
 
+const SUBSAMPLED: &str =
+    "subsampled channels (luminance/chroma images) are not supported; convert it to RGB first";
+const STORE_WITHOUT_LOSS: &str = "store it without loss as none, rle, zips, zip or piz";
+
 fn cut_short(name: &str) -> Error {
     Error::format(name, "the file ends before its last row; it was cut short")
 }
@@ -515,6 +535,14 @@ fn damaged(name: &str, error: &ExrError) -> Error {
         ExrError::Io(source) => {
             Error::disk(name, "read", io::Error::new(source.kind(), source.to_string()))
         }
+        // Before any header is given out, the crate refuses what is named better here.
+        ExrError::NotSupported(what) if what.contains("subsampling") => {
+            Error::format(name, SUBSAMPLED)
+        }
+        ExrError::Invalid(what) if what.contains("compression attribute") => Error::format(
+            name,
+            format!("its compression is missing or of an unknown kind; {STORE_WITHOUT_LOSS}"),
+        ),
         ExrError::NotSupported(what) => {
             Error::format(name, format!("this kind of EXR is not supported: {what}"))
         }
@@ -599,11 +627,6 @@ impl<W: Write> ExrWriter<W> {
         let data_at = table_at + 8 * blocks;
         // An uncompressed block is one row: y coordinate and size in 4 bytes each, then the samples.
         let block_bytes = 8 + header.max_block_byte_size() as u64;
-        for block in 0..blocks {
-            let offset =
-                if compression == ExrCompression::None { data_at + block * block_bytes } else { 0 };
-            head.extend_from_slice(&offset.to_le_bytes());
-        }
         let mut writer = Self {
             output,
             name: name.into(),
@@ -618,6 +641,12 @@ impl<W: Write> ExrWriter<W> {
             position: data_at,
         };
         writer.put(&head)?;
+        // Entry by entry: the table of a frame of 2^31 rows takes 16 GiB.
+        for block in 0..blocks {
+            let offset =
+                if compression == ExrCompression::None { data_at + block * block_bytes } else { 0 };
+            writer.put(&offset.to_le_bytes())?;
+        }
         Ok(writer)
     }
 

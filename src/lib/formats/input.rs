@@ -226,9 +226,9 @@ pub fn file_id(metadata: &std::fs::Metadata) -> FileId {
     (metadata.dev(), metadata.ino())
 }
 
-/// The identity of a named file and its name, so that it is not written over; none where there is no such file.
-pub fn identify(path: &Path) -> Option<(FileId, String)> {
-    let metadata = std::fs::metadata(path).ok()?;
+/// The file at a path, so that it is not written over; none for pipes and devices.
+pub fn regular_file(path: &Path) -> Option<(FileId, String)> {
+    let metadata = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
     Some((file_id(&metadata), path.display().to_string()))
 }
 
@@ -261,25 +261,24 @@ pub fn open_stdin() -> Result<File> {
     Ok(File::from(owned))
 }
 
-/// Opens a named file, or the standard input, so that it can be read from its start more than once; what comes down a
-/// pipe is copied to a temporary file. Gives the name for messages too.
+/// Opens a named file, or the standard input. Gives the name for messages too.
 ///
 /// # Errors
 ///
 /// [`Error::Disk`], [`Error::Format`] for directories, [`Error::Usage`] for a terminal.
-pub fn open_seekable(path: Option<&Path>) -> Result<(File, String)> {
-    let (name, mut file) = match path {
-        Some(path) => (path.display().to_string(), open_path(path)?),
-        None => (STDIN_NAME.to_owned(), open_stdin()?),
-    };
-    if !file.metadata().is_ok_and(|m| m.is_file()) {
-        file = spool(&mut file, &name)?;
-    }
-    Ok((file, name))
+pub fn open_named(path: Option<&Path>) -> Result<(File, String)> {
+    Ok(match path {
+        Some(path) => (open_path(path)?, path.display().to_string()),
+        None => (open_stdin()?, STDIN_NAME.to_owned()),
+    })
 }
 
 /// Copies a stream to a temporary file and stands at its start.
-fn spool(stream: &mut impl Read, name: &str) -> Result<File> {
+///
+/// # Errors
+///
+/// [`Error::Disk`].
+pub fn spool(stream: &mut impl Read, name: &str) -> Result<File> {
     let mut copied = || -> io::Result<File> {
         let mut copy = tempfile::tempfile()?;
         io::copy(stream, &mut copy)?;

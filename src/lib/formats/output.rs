@@ -281,7 +281,9 @@ impl FrameWriter {
                 metadata.samples =
                     Some(counts.record(format!("sha256:{}", hex(&digest.finalize()))));
                 let mut file = AtomicFile::create(&path)?;
-                file.write_all(yaml::write_metadata(&metadata)?.as_bytes())
+                let text = yaml::write_metadata(&metadata)?;
+                file.write_all(text.as_bytes())
+                    .and_then(|()| file.flush())
                     .map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
                 Some(file)
             }
@@ -300,6 +302,15 @@ fn u16_scale(quantity: QuantityKind, samples: TiffSamples) -> f32 {
 
 impl RowSink for FrameWriter {
     fn write(&mut self, samples: &[f32]) -> Result<()> {
+        let overflows = |sample: &&f32| sample.is_finite() && f16::from_f32(**sample).is_infinite();
+        if matches!(self.encoding, Encoding::Exr(ExrSamples::F16, _))
+            && let Some(sample) = samples.iter().find(overflows)
+        {
+            return Err(Error::Data(format!(
+                "{}: the sample {sample} would become infinite as f16, which ends at 65504; write f32",
+                self.name
+            )));
+        }
         if let Some((digest, _)) = &mut self.record {
             // The digest is that of the samples as a reader will get them.
             let scale = match self.encoding {
@@ -342,12 +353,8 @@ impl FrameWriter {
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] when the output is the input; [`Error::Disk`].
-pub fn write_text(
-    path: Option<&Path>,
-    text: &str,
-    input: Option<&(FileId, String)>,
-) -> Result<()> {
+/// [`Error::Usage`] where the output is the input; [`Error::Disk`].
+pub fn write_text(path: Option<&Path>, text: &str, input: Option<&(FileId, String)>) -> Result<()> {
     match path.filter(|path| *path != Path::new("-")) {
         Some(path) => {
             let mut file = Target::open(Some(path), false, input)?;

@@ -1,7 +1,8 @@
 //! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` \[Fichet2021].
 
 use super::csv::SpectralTable;
-use super::input::{FrameReader, InputOptions, open_seekable};
+use super::data;
+use super::input::{FrameReader, InputOptions, open_named, spool};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::spectrum::{SpectralLibrary, check_wavelengths};
@@ -73,37 +74,32 @@ pub enum Radiances {
     Image(Box<FrameReader>),
 }
 
-/// Opens a table or a spectral image; the standard input for `-` or none. What comes down a pipe is copied to a temporary
-/// file first.
+/// Opens a table or a spectral image; the standard input for `-` or none. An image that comes down a pipe is copied to a
+/// temporary file first.
 ///
 /// # Errors
 ///
 /// Those of the readers, and [`Error::Disk`].
 pub fn open(options: &InputOptions) -> Result<Radiances> {
     let path = options.path.as_deref().filter(|path| *path != Path::new("-"));
-    let (mut file, name) = open_seekable(path)?;
-    let mut sniff = || -> io::Result<Vec<u8>> {
-        let mut head = Vec::new();
-        (&mut file).take(4).read_to_end(&mut head)?;
-        file.rewind()?;
-        Ok(head)
-    };
-    let head = sniff().map_err(|e| Error::disk(&name, "read", e))?;
+    let (mut file, name) = open_named(path)?;
+    let failed = |e| Error::disk(&name, "read", e);
+    let mut head = Vec::new();
+    (&mut file).take(4).read_to_end(&mut head).map_err(failed)?;
     if head == [0x76, 0x2F, 0x31, 0x01] {
+        if file.metadata().is_ok_and(|m| m.is_file()) {
+            file.rewind().map_err(failed)?;
+        } else {
+            file = spool(&mut io::Cursor::new(head).chain(file), &name)?;
+        }
         let options = InputOptions { all_channels: true, ..options.clone() };
         return Ok(Radiances::Image(Box::new(FrameReader::open_file(
             file, &name, path, &options,
         )?)));
     }
-    let mut bytes = Vec::new();
-    file.take(MAX_TABLE_BYTES)
-        .read_to_end(&mut bytes)
-        .map_err(|e| Error::disk(&name, "read", e))?;
+    let bytes = data::read_table(io::Cursor::new(head).chain(file), &name)?;
     Ok(Radiances::Table(SpectralTable::parse(&name, &bytes)?))
 }
-
-/// A table may be this long.
-const MAX_TABLE_BYTES: u64 = 256 << 20;
 
 /// Reads a whole library of spectra, CSV or spectral EXR, in W cm⁻² sr⁻¹ nm⁻¹; pixels count row by row.
 ///

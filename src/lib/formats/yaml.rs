@@ -122,6 +122,12 @@ pub fn write_metadata(metadata: &Metadata) -> Result<String> {
     if let Value::Mapping(mapping) = &mut value {
         merge(mapping, &metadata.unknown);
     }
+    // What no reader takes must not be written.
+    if let Some(key) = not_finite(&value) {
+        return Err(Error::Data(format!(
+            "the metadata cannot be written: `{key}` is not a finite number; choose less extreme settings"
+        )));
+    }
     serde_yaml::to_string(&value).map_err(wrong)
 }
 
@@ -292,6 +298,14 @@ mod tests {
             parse_metadata("x", &again).unwrap(),
             Metadata { unit: String::new(), ..metadata }
         );
+    }
+
+    #[test]
+    fn what_cannot_be_read_again_is_not_written() {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.black_level_adu = Some(f64::INFINITY);
+        let complaint = write_metadata(&metadata).unwrap_err().to_string();
+        assert!(complaint.contains("`black_level_adu` is not a finite number"), "{complaint}");
     }
 
     #[test]
