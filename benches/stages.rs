@@ -34,8 +34,7 @@ fn expected() -> Result<MemoryFrame> {
         brightest_e: None,
     });
     let geometry = Geometry::new(1332, 1000, &["R", "G", "B"]);
-    let row: Vec<f32> =
-        SKY.iter().flat_map(|e| std::iter::repeat_n(cyanometer::frame::to_sample(*e), 1332)).collect();
+    let row: Vec<f32> = SKY.iter().flat_map(|e| std::iter::repeat_n(cyanometer::frame::to_sample(*e), 1332)).collect();
     let samples = row.repeat(1000);
     Ok(MemoryFrame::new(FrameHeader { name: "bench".into(), geometry, metadata }, samples))
 }

@@ -49,8 +49,7 @@ fn a_colorimetric_camera_is_characterised_without_error() {
         Curve::new(wavelengths.clone(), wavelengths.iter().map(value).collect()).unwrap()
     });
     let response = SpectralResponse { quantum_efficiency: efficiency, cover_glass: None };
-    let found =
-        signals(&sky_library(), &loaded.sensor, &response, &observer, &WavelengthGrid::default()).unwrap();
+    let found = signals(&sky_library(), &loaded.sensor, &response, &observer, &WavelengthGrid::default()).unwrap();
     let (_, _, training) = fit_sky_rad_ls(&found, &[0, 17, 240, 505, 721, 900], "six skies").unwrap();
     // Rounding of doubles times the condition number of a handful of skies, some 10⁴.
     assert!(training.relative_rms.iter().all(|rms| *rms < 1e-11), "{:?}", training.relative_rms);

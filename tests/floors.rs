@@ -191,10 +191,9 @@ fn no_module_uses_a_higher_floor() {
         for (line, used) in uses(&without_tests(&source.code), depth) {
             uses_seen += 1;
             match floors.get(&used) {
-                Some(&other) if other > floor => wrong.push(format!(
-                    "{}:{line}: {module} (floor {floor}) uses {used} (floor {other})",
-                    source.path
-                )),
+                Some(&other) if other > floor => {
+                    wrong.push(format!("{}:{line}: {module} (floor {floor}) uses {used} (floor {other})", source.path))
+                }
                 _ => {}
             }
         }

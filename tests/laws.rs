@@ -44,8 +44,7 @@ fn any_light(x: usize, y: usize, class: Class) -> f32 {
 }
 
 fn noise(header: &FrameHeader, seed: u64) -> AddNoise {
-    AddNoise::new(header, &NoiseSettings { seed, sensor_seed: seed + 1, ..Default::default() })
-        .unwrap()
+    AddNoise::new(header, &NoiseSettings { seed, sensor_seed: seed + 1, ..Default::default() }).unwrap()
 }
 
 fn noisy(frame: &MemoryFrame, settings: &NoiseSettings) -> MemoryFrame {
@@ -271,8 +270,7 @@ fn the_mosaic_commutes_with_noise_and_with_the_converter() {
         let seed = seed >> 1;
         let mut three = expected(21, 18, any_light);
         three.header.geometry.origin = [x0, y0];
-        let mosaic =
-            |frame: &MemoryFrame| through(frame, &Mosaic::new(&frame.header, Some(cfa)).unwrap());
+        let mosaic = |frame: &MemoryFrame| through(frame, &Mosaic::new(&frame.header, Some(cfa)).unwrap());
         let noise = |frame: &MemoryFrame| through(frame, &noise(&frame.header, seed));
         let digitize = |frame: &MemoryFrame| through(frame, &digitizer(&frame.header));
         let same = |a: MemoryFrame, b: MemoryFrame| {
@@ -297,16 +295,11 @@ fn a_plane_rendered_behind_a_pattern_is_the_mosaic_of_three() {
         let vignetting = vignetted.then(|| Vignetting::new(size[0], size[1], 900.0, 30.0));
         let render = |cfa: Option<CfaPattern>| {
             let channels: &[&str] = if cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
-            let mut header =
-                header(QuantityKind::ExpectedElectrons, Geometry::new(size[0], size[1], channels));
+            let mut header = header(QuantityKind::ExpectedElectrons, Geometry::new(size[0], size[1], channels));
             header.geometry.origin = [x0, y0];
             header.metadata.cfa = cfa;
-            let rendering = Rendering {
-                header: header.clone(),
-                patch: [patch_x, patch_y],
-                vignetting: vignetting.clone(),
-                cfa,
-            };
+            let rendering =
+                Rendering { header: header.clone(), patch: [patch_x, patch_y], vignetting: vignetting.clone(), cfa };
             let mut sink = MemoryFrame::new(header, Vec::new());
             let mut row = 0;
             let mut next_row = || {
@@ -361,11 +354,7 @@ fn frames_change_temporal_noise_and_sensors_change_patterns() {
         }
     }
     assert_same(&take(&FIXED, 1, 2, 3), &take(&FIXED, 8, 2, 7), "fixed patterns of one sensor");
-    assert_same(
-        &take(&TEMPORAL, 1, 2, 3),
-        &take(&TEMPORAL, 1, 5, 3),
-        "temporal noise of one frame",
-    );
+    assert_same(&take(&TEMPORAL, 1, 2, 3), &take(&TEMPORAL, 1, 5, 3), "temporal noise of one frame");
 }
 
 /// M = DCSN ∘ DCNU + SSN ∘ PRNU + RON: what the five sources give one by one makes up what they give together, so each
@@ -397,8 +386,7 @@ fn a_source_left_out_leaves_the_other_draws_alone() {
         let read = take(&dark, &[Source::Ron], 1.0);
         let dark_e = take(&dark, &[], 333.0).samples[0];
         for left_out in [None, Some(Source::Ron), Some(Source::Prnu), Some(Source::Dcsn)] {
-            let kept: Vec<Source> =
-                Source::ALL.into_iter().filter(|source| Some(*source) != left_out).collect();
+            let kept: Vec<Source> = Source::ALL.into_iter().filter(|source| Some(*source) != left_out).collect();
             let together = take(&lit, &kept, 333.0);
             for (i, &sample) in together.samples.iter().enumerate() {
                 let part = |frame: &MemoryFrame| f64::from(frame.samples[i]);
@@ -407,16 +395,12 @@ fn a_source_left_out_leaves_the_other_draws_alone() {
                 };
                 let (expected, dark_e) = (part(&lit), f64::from(dark_e));
                 let light = part(&shot) * or(Source::Prnu, part(&response) / expected, 1.0);
-                let dark =
-                    or(Source::Dcsn, part(&dark_shot), dark_e) * part(&dark_response) / dark_e;
+                let dark = or(Source::Dcsn, part(&dark_shot), dark_e) * part(&dark_response) / dark_e;
                 let sum = light + dark + or(Source::Ron, part(&read), 0.0);
                 // Each of the samples involved is rounded to half of 2⁻²³ of itself: two factors, one quotient of
                 // the light and its like of the dark, and the sum.
                 let bound = 4.0 * 0.5 * f64::from(f32::EPSILON) * (light + dark + 60.0);
-                assert!(
-                    (f64::from(sample) - sum).abs() <= bound,
-                    "{left_out:?}, sample {i}: {sample} {sum}"
-                );
+                assert!((f64::from(sample) - sum).abs() <= bound, "{left_out:?}, sample {i}: {sample} {sum}");
             }
         }
     }
@@ -432,15 +416,10 @@ fn averaged_frames_converge_to_the_fixed_pattern() {
     let model = &sensor();
     for sensor_seed in [0, 77] {
         let settings = NoiseSettings { seed: 4, sensor_seed, ..Default::default() };
-        let pattern =
-            noisy(&light, &NoiseSettings { without: TEMPORAL.into(), ..settings.clone() });
+        let pattern = noisy(&light, &NoiseSettings { without: TEMPORAL.into(), ..settings.clone() });
         let response = noisy(
             &light,
-            &NoiseSettings {
-                without: all_but(&[Source::Prnu]),
-                temperature_k: Some(1.0),
-                ..settings.clone()
-            },
+            &NoiseSettings { without: all_but(&[Source::Prnu]), temperature_k: Some(1.0), ..settings.clone() },
         );
         let dark_e = model.dark_current_e_per_s(333.0) * EXPOSURE.exposure_s;
         let mut sums = vec![0.0; light.samples.len()];
@@ -473,36 +452,25 @@ fn averaged_frames_converge_to_the_fixed_pattern() {
 fn maps_of_sensitivity_have_mean_one_and_the_stated_rms() {
     let n = 200.0 * 150.0 * 3.0;
     for sensor_seed in 0..4 {
-        for (source, sigma) in [
-            (Source::Prnu, 0.008),
-            (Source::Prnu, 0.05),
-            (Source::Dcnu, 0.2),
-            (Source::Dcnu, 0.5),
-            (Source::Dcnu, 1.5),
-        ] {
-            let (level, temperature_k) =
-                if source == Source::Prnu { (10_000.0, 1.0) } else { (0.0, 333.0) };
+        for (source, sigma) in
+            [(Source::Prnu, 0.008), (Source::Prnu, 0.05), (Source::Dcnu, 0.2), (Source::Dcnu, 0.5), (Source::Dcnu, 1.5)]
+        {
+            let (level, temperature_k) = if source == Source::Prnu { (10_000.0, 1.0) } else { (0.0, 333.0) };
             let mut scene = expected(200, 150, |_, _, _| level);
             let sensor = scene.header.metadata.sensor.as_mut().unwrap();
             (sensor.prnu, sensor.dcnu) = (sigma, sigma);
             let dark_e = sensor.dark_current_e_per_s(temperature_k) * EXPOSURE.exposure_s;
             let unit = if source == Source::Prnu { f64::from(level) } else { dark_e };
             let without = all_but(&[source]);
-            let settings = NoiseSettings {
-                sensor_seed,
-                without,
-                temperature_k: Some(temperature_k),
-                ..Default::default()
-            };
+            let settings =
+                NoiseSettings { sensor_seed, without, temperature_k: Some(temperature_k), ..Default::default() };
             let stage = AddNoise::new(&scene.header, &settings).unwrap();
             if source == Source::Dcnu {
                 let noted = stage.header().metadata.dark_signal_e.unwrap();
                 assert!((noted / (dark_e * rectified_mean(sigma)) - 1.0).abs() < 1e-12);
             }
             let map = through(&scene, &stage);
-            let power = |k: i32| {
-                map.samples.iter().map(|&s| (f64::from(s) / unit).powi(k)).sum::<f64>() / n
-            };
+            let power = |k: i32| map.samples.iter().map(|&s| (f64::from(s) / unit).powi(k)).sum::<f64>() / n;
             let (mean, square, fourth) = (power(1), power(2), power(4));
             let (true_mean, true_square) = (rectified_mean(sigma), rectified_mean_square(sigma));
             let true_variance = true_square - true_mean * true_mean;
@@ -511,16 +479,10 @@ fn maps_of_sensitivity_have_mean_one_and_the_stated_rms() {
             let bound = 5.0 * (true_variance / n).sqrt() + 6e-8;
             assert!((mean - true_mean).abs() < bound, "{source:?} {sigma}: {mean} {true_mean}");
             let bound = 5.0 * ((fourth - square * square) / n).sqrt() + 1.2e-7;
-            assert!(
-                (square - true_square).abs() < bound,
-                "{source:?} {sigma}: {square} {true_square}"
-            );
+            assert!((square - true_square).abs() < bound, "{source:?} {sigma}: {square} {true_square}");
             // The spread itself: 5 √((2 + κ)/4n), κ of the rectified normal below 1 here.
             let (std, true_std) = ((square - mean * mean).sqrt(), true_variance.sqrt());
-            assert!(
-                (std / true_std - 1.0).abs() < 5.0 * (3.0 / (4.0 * n)).sqrt(),
-                "{std} {true_std}"
-            );
+            assert!((std / true_std - 1.0).abs() < 5.0 * (3.0 / (4.0 * n)).sqrt(), "{std} {true_std}");
             assert!(map.samples.iter().all(|&s| s >= 0.0), "a sensitivity is negative");
         }
     }
@@ -566,15 +528,11 @@ fn linear_ramps_are_restored() {
         let value = |x: usize, y: usize, class: Class| {
             let shared = method == Method::SmoothHue;
             let (level, by_x, by_y) = slopes[if shared { 0 } else { class as usize }];
-            let ramp =
-                f64::from(300 + level) + f64::from(by_x) * x as f64 + f64::from(by_y) * y as f64;
+            let ramp = f64::from(300 + level) + f64::from(by_x) * x as f64 + f64::from(by_y) * y as f64;
             if shared { (1.0 + f64::from(class as u8)) * ramp } else { ramp }
         };
         let size = [15, 13];
-        let made = demosaicked(
-            &plane(size, [x0, y0], cfa, |x, y, class| to_sample(value(x, y, class))),
-            method,
-        );
+        let made = demosaicked(&plane(size, [x0, y0], cfa, |x, y, class| to_sample(value(x, y, class))), method);
         let reach = method.reach();
         for y in reach..size[1] - reach {
             for x in reach..size[0] - reach {
@@ -606,9 +564,7 @@ fn bilinear_and_effective_color_are_linear() {
         let (a, b) = (whole_numbers(1), whole_numbers(2));
         let factor = f32::from(factor);
         let sum = |x, y, class| a(x, y, class) + factor * b(x, y, class);
-        let make = |f: &dyn Fn(usize, usize, Class) -> f32| {
-            demosaicked(&plane(size, [0, 0], cfa, f), method)
-        };
+        let make = |f: &dyn Fn(usize, usize, Class) -> f32| demosaicked(&plane(size, [0, 0], cfa, f), method);
         let (of_a, of_b, of_sum) = (make(&a), make(&b), make(&sum));
         for ((a, b), sum) in of_a.samples.iter().zip(&of_b.samples).zip(&of_sum.samples) {
             prop_assert_eq!(*sum, a + factor * b);
@@ -625,13 +581,11 @@ fn every_method_scales_with_the_light() {
         let light = |x, y, _| 1.0 + 3000.0 * scatter(x, y, 5);
         let gain = 2.0_f32.powi(exponent);
         let made = demosaicked(&plane(size, [0, 0], cfa, light), method);
-        let brighter =
-            demosaicked(&plane(size, [0, 0], cfa, |x, y, class| gain * light(x, y, class)), method);
+        let brighter = demosaicked(&plane(size, [0, 0], cfa, |x, y, class| gain * light(x, y, class)), method);
         for (a, b) in made.samples.iter().zip(&brighter.samples) {
             prop_assert_eq!(gain * a, *b);
         }
-        let redder =
-            |x, y, class| if class == Class::Red { gain } else { 1.0 } * light(x, y, class);
+        let redder = |x, y, class| if class == Class::Red { gain } else { 1.0 } * light(x, y, class);
         let redder = demosaicked(&plane(size, [0, 0], cfa, redder), method);
         if method != Method::EffectiveColor {
             let geometry = &made.header.geometry;
@@ -688,15 +642,7 @@ fn reflected_frames_give_reflected_results() {
                     let a = at(&made, from_x, from_y, channel);
                     let b = at(&mirrored, x, y, channel);
                     let bound = if is_exact { 0.0 } else { f32::EPSILON * a.abs() };
-                    prop_assert!(
-                        (a - b).abs() <= bound,
-                        "{:?} {} {}: {} {}",
-                        method,
-                        cfa,
-                        how,
-                        a,
-                        b
-                    );
+                    prop_assert!((a - b).abs() <= bound, "{:?} {} {}: {} {}", method, cfa, how, a, b);
                 }
             }
         }
@@ -753,8 +699,7 @@ fn codes_rise_with_charge_and_tell_it_to_half_a_code() {
         charges.sort_by(f32::total_cmp);
         let geometry = Geometry::new(charges.len(), 1, &["Y"]);
         let header = header(QuantityKind::Electrons, geometry);
-        let settings =
-            AdcSettings { bits: Some(bits), bias_adu: Some(bias_adu), adu_per_e: Some(adu_per_e) };
+        let settings = AdcSettings { bits: Some(bits), bias_adu: Some(bias_adu), adu_per_e: Some(adu_per_e) };
         let stage = Digitize::new(&header, &settings).unwrap();
         let electrons = frame(header.clone(), |x, _, _| charges[x]);
         let (codes, counts) = through_cuts(&electrons, &stage, &[]);
@@ -773,9 +718,7 @@ fn codes_rise_with_charge_and_tell_it_to_half_a_code() {
         let above = charges.iter().filter(|&&charge| level(charge).round() > top).count() as u64;
         prop_assert_eq!((counts.clipped_low, counts.clipped_high), (below, above));
         // What a code stands for becomes that code again.
-        let back = frame(header, |x, _, _| {
-            to_sample((f64::from(codes.samples[x]) - bias_adu) / adu_per_e)
-        });
+        let back = frame(header, |x, _, _| to_sample((f64::from(codes.samples[x]) - bias_adu) / adu_per_e));
         let (again, counts) = through_cuts(&back, &stage, &[]);
         prop_assert_eq!(first_difference(&codes, &again), None);
         prop_assert_eq!((counts.clipped_low, counts.clipped_high), (0, 0));
@@ -787,8 +730,7 @@ fn codes_rise_with_charge_and_tell_it_to_half_a_code() {
 fn what_is_no_number_is_counted_and_not_made_a_code() {
     let header = header(QuantityKind::Electrons, Geometry::new(3, 1, &["Y"]));
     let strange = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
-    let (codes, counts) =
-        through_cuts(&frame(header.clone(), |x, _, _| strange[x]), &digitizer(&header), &[]);
+    let (codes, counts) = through_cuts(&frame(header.clone(), |x, _, _| strange[x]), &digitizer(&header), &[]);
     assert!(codes.samples[0].is_nan());
     assert_eq!(codes.samples[1..], [4095.0, 0.0]);
     assert_eq!((counts.not_finite, counts.clipped_high, counts.clipped_low), (1, 1, 1));

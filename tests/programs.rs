@@ -21,9 +21,8 @@ use tempfile::TempDir;
 /// The programs that there are, by their sources.
 fn programs() -> Vec<String> {
     let sources = fs::read_dir(Path::new(TREE).join("src/bin")).unwrap();
-    let mut names: Vec<String> = sources
-        .map(|entry| entry.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned())
-        .collect();
+    let mut names: Vec<String> =
+        sources.map(|entry| entry.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned()).collect();
     names.sort();
     assert!(names.len() >= 8, "{names:?}");
     names
@@ -55,9 +54,8 @@ impl Workshop {
 
     fn files(&self) -> Vec<String> {
         let entries = fs::read_dir(self.directory.path()).unwrap();
-        let mut names: Vec<String> = entries
-            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
-            .collect();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
         names.sort();
         names
     }
@@ -109,13 +107,11 @@ impl Workshop {
         let lines: Vec<&str> = pipeline.split(" | ").collect();
         let mut children: Vec<Child> = Vec::new();
         for line in &lines {
-            let before: Option<ChildStdout> =
-                children.last_mut().map(|child| child.stdout.take().unwrap());
+            let before: Option<ChildStdout> = children.last_mut().map(|child| child.stdout.take().unwrap());
             children.push(self.spawn(line, before.map_or(Stdio::null(), Stdio::from)));
         }
         let last = children.pop().unwrap().wait_with_output().unwrap();
-        let mut outputs: Vec<Output> =
-            children.into_iter().map(|child| child.wait_with_output().unwrap()).collect();
+        let mut outputs: Vec<Output> = children.into_iter().map(|child| child.wait_with_output().unwrap()).collect();
         outputs.push(last);
         for (line, output) in lines.iter().zip(&outputs) {
             let said = String::from_utf8_lossy(&output.stderr);
@@ -331,11 +327,8 @@ fn the_sidecar_tells_what_was_done_and_what_came_of_it() {
     shop.run("to-xyz --output=xyz.exr --matrix matrix.yaml rgb.exr", &[]);
 
     let metadata = shop.sidecar("xyz.exr");
-    let history: Vec<String> = metadata
-        .history
-        .iter()
-        .map(|entry| format!("{} {}", entry.program, entry.arguments.join(" ")))
-        .collect();
+    let history: Vec<String> =
+        metadata.history.iter().map(|entry| format!("{} {}", entry.program, entry.arguments.join(" "))).collect();
     // Where and how the output is stored is left out: the samples do not depend on it.
     assert_eq!(
         history,
@@ -366,9 +359,7 @@ fn the_sidecar_tells_what_was_done_and_what_came_of_it() {
             "codes.tiff" => {
                 // Every code at the top was cut off there but for those that were just right.
                 let at_top = count(&|code| code >= 4095.0).unwrap();
-                assert!(
-                    record.clipped_high.unwrap() <= at_top && record.clipped_high.unwrap() > 640
-                );
+                assert!(record.clipped_high.unwrap() <= at_top && record.clipped_high.unwrap() > 640);
                 assert_eq!(record.clipped_low, None);
             }
             "noisy.exr" => {
@@ -437,11 +428,7 @@ const BAD_USAGE: i32 = 2;
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
 const MISTAKES: [(&str, i32, &str); 37] = [
-    (
-        "render-radiance missing.csv",
-        BAD_DATA,
-        "missing.csv: cannot open: no such file or directory",
-    ),
+    ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
         BAD_USAGE,
@@ -497,16 +484,8 @@ const MISTAKES: [(&str, i32, &str); 37] = [
         "matrix.yaml: it is neither an EXR nor a TIFF file; it looks like text (a spectrum goes into \
          `render-radiance`)",
     ),
-    (
-        "digitize codes.exr",
-        BAD_DATA,
-        "codes.exr: it holds three planes of ADU: it is digitized already",
-    ),
-    (
-        "digitize noisy.exr --bits 20",
-        BAD_USAGE,
-        "a converter of 20 bits is impossible here; give 1 to 16",
-    ),
+    ("digitize codes.exr", BAD_DATA, "codes.exr: it holds three planes of ADU: it is digitized already"),
+    ("digitize noisy.exr --bits 20", BAD_USAGE, "a converter of 20 bits is impossible here; give 1 to 16"),
     (
         "digitize noisy.exr --slope 0",
         BAD_USAGE,
@@ -528,53 +507,29 @@ const MISTAKES: [(&str, i32, &str); 37] = [
         BAD_DATA,
         "xyz.exr: it holds three demosaicked planes of XYZ; a mosaic is made of the three planes R, G and B of a sensor",
     ),
-    (
-        "demosaic codes.exr",
-        BAD_DATA,
-        "codes.exr: it holds three planes of ADU, not a CFA plane; run `mosaic` first",
-    ),
+    ("demosaic codes.exr", BAD_DATA, "codes.exr: it holds three planes of ADU, not a CFA plane; run `mosaic` first"),
     (
         "demosaic plane.exr --black dark",
         BAD_USAGE,
         "`dark` is no value for --black <auto|none|N>: give auto, none or a number; see `demosaic --help`",
     ),
-    (
-        "demosaic rgb.exr",
-        BAD_DATA,
-        "rgb.exr: it holds three demosaicked planes of ADU; demosaicking is done once",
-    ),
-    (
-        "demosaic plane.exr -o no/where.exr",
-        BAD_DATA,
-        "no/where.exr: there is no directory `no`; make it first",
-    ),
+    ("demosaic rgb.exr", BAD_DATA, "rgb.exr: it holds three demosaicked planes of ADU; demosaicking is done once"),
+    ("demosaic plane.exr -o no/where.exr", BAD_DATA, "no/where.exr: there is no directory `no`; make it first"),
     ("to-xyz rgb.exr", BAD_USAGE, "--matrix <FILE> is missing; see `to-xyz --help`"),
     (
         "to-xyz plane.exr --matrix matrix.yaml",
         BAD_DATA,
         "plane.exr: it holds a CFA plane of ADU, not three classes at each pixel; run `demosaic` first",
     ),
-    (
-        "to-xyz rgb.exr --matrix missing.yaml",
-        BAD_DATA,
-        "missing.yaml: cannot open: no such file or directory",
-    ),
+    ("to-xyz rgb.exr --matrix missing.yaml", BAD_DATA, "missing.yaml: cannot open: no such file or directory"),
     (
         "to-xyz noisy.exr --matrix matrix.yaml",
         BAD_DATA,
         "noisy.exr: it holds three planes of electrons, not ADU; run `digitize` first",
     ),
     ("measure missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
-    (
-        "measure noisy.exr --region 0,0,9,9",
-        BAD_USAGE,
-        "noisy.exr: region 0,0,9,9 does not lie within the frame of 8x6",
-    ),
-    (
-        "measure noisy.exr codes.exr",
-        BAD_USAGE,
-        "unknown option or extra argument `codes.exr`; see `measure --help`",
-    ),
+    ("measure noisy.exr --region 0,0,9,9", BAD_USAGE, "noisy.exr: region 0,0,9,9 does not lie within the frame of 8x6"),
+    ("measure noisy.exr codes.exr", BAD_USAGE, "unknown option or extra argument `codes.exr`; see `measure --help`"),
     (
         "measure noisy.exr --output-format xml",
         BAD_USAGE,
@@ -583,22 +538,14 @@ const MISTAKES: [(&str, i32, &str); 37] = [
     ),
     ("fit-matrix", BAD_USAGE, "<LIBRARY> is missing; see `fit-matrix --help`"),
     ("fit-matrix missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
-    (
-        "fit-matrix SAMPLES/skies/sky912.exr --train 2000",
-        BAD_USAGE,
-        "the library has 912 samples, fewer than 2000",
-    ),
+    ("fit-matrix SAMPLES/skies/sky912.exr --train 2000", BAD_USAGE, "the library has 912 samples, fewer than 2000"),
     (
         "fit-matrix SAMPLES/skies/sky912.exr --train 0,1",
         BAD_DATA,
         "2 training samples cannot determine 3 coefficients per channel; give at least 3",
     ),
     ("preview expected.exr", BAD_USAGE, "--output <FILE.png> is missing; see `preview --help`"),
-    (
-        "preview missing.exr -o picture.png",
-        BAD_DATA,
-        "missing.exr: cannot open: no such file or directory",
-    ),
+    ("preview missing.exr -o picture.png", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
 ];
 
 #[test]
@@ -634,31 +581,23 @@ fn inputs_and_devices_are_not_written_over() {
             let done = shop.attempt(&format!("{line} {input} -o {output}"), &[]);
             assert_eq!(
                 String::from_utf8_lossy(&done.stderr),
-                format!(
-                    "{line}: {output}: it is the same file as the input {input}; name another output\n"
-                )
+                format!("{line}: {output}: it is the same file as the input {input}; name another output\n")
             );
             assert_eq!(done.status.code(), Some(BAD_USAGE), "{line}");
             assert!(shop.bytes(input) == before, "{line} has written over its input");
         }
     }
-    assert_eq!(
-        shop.attempt("measure expected.exr -o link.exr", &[]).status.code(),
-        Some(BAD_USAGE)
-    );
+    assert_eq!(shop.attempt("measure expected.exr -o link.exr", &[]).status.code(), Some(BAD_USAGE));
     // A named pipe stands for all devices: replacing it harms nobody.
     let fifo = shop.path("fifo");
     assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
-    for line in
-        ["measure noisy.exr -o fifo", "preview noisy.exr -o fifo", "add-noise expected.exr -o fifo"]
-    {
+    for line in ["measure noisy.exr -o fifo", "preview noisy.exr -o fifo", "add-noise expected.exr -o fifo"] {
         let listener = std::thread::spawn({
             let fifo = fifo.clone();
             move || fs::read(fifo).unwrap().len()
         });
         let done = shop.attempt(line, &[]);
-        let is_kept =
-            std::os::unix::fs::FileTypeExt::is_fifo(&fifo.metadata().unwrap().file_type());
+        let is_kept = std::os::unix::fs::FileTypeExt::is_fifo(&fifo.metadata().unwrap().file_type());
         assert!(done.status.success() && is_kept, "{line} has replaced a named pipe");
         assert!(listener.join().unwrap() > 0, "{line}");
     }

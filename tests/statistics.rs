@@ -67,8 +67,7 @@ impl Deviations {
         assert!(n >= 100.0, "{what}: only {n} deviations");
         let bound = self.bound();
         self.z.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
-        let worst: Vec<String> =
-            self.z.iter().take(12).map(|(z, case)| format!("{z:8.2}  {case}")).collect();
+        let worst: Vec<String> = self.z.iter().take(12).map(|(z, case)| format!("{z:8.2}  {case}")).collect();
         let worst = worst.join("\n");
         assert!(self.z[0].0.abs() < bound, "{what}: {n} deviations, bound {bound}\n{worst}");
         // χ² has mean n and variance 2n; the mean of z has variance 1/n. Five standard deviations of each.
@@ -181,27 +180,21 @@ fn dim_light_is_as_noisy_as_predicted() {
 
 #[test]
 fn bright_light_is_as_noisy_as_predicted() {
-    let levels =
-        [[1500.0, 2500.0, 5000.0], [9000.0, 14_000.0, 20_000.0], [25_000.0, 30_000.0, 37_000.0]];
+    let levels = [[1500.0, 2500.0, 5000.0], [9000.0, 14_000.0, 20_000.0], [25_000.0, 30_000.0, 37_000.0]];
     gather(&levels, &TEMPERATURES_K, PoissonKind::Exact).judge();
 }
 
 /// The top code stands for 39,813 e⁻, full well is 40,000: both clip, the one what the other has left.
 #[test]
 fn light_near_saturation_is_as_noisy_as_predicted() {
-    let levels = [
-        [38_500.0, 39_000.0, 39_250.0],
-        [39_500.0, 39_600.0, 39_750.0],
-        [39_900.0, 40_000.0, 40_300.0],
-    ];
+    let levels = [[38_500.0, 39_000.0, 39_250.0], [39_500.0, 39_600.0, 39_750.0], [39_900.0, 40_000.0, 40_300.0]];
     gather(&levels, &TEMPERATURES_K, PoissonKind::Exact).judge();
 }
 
 /// Normal numbers in place of Poisson counts have moments of their own; below a few electrons they mean nothing.
 #[test]
 fn gaussian_counts_are_as_noisy_as_predicted() {
-    let levels =
-        [[20.0, 100.0, 190.0], [1000.0, 10_000.0, 30_000.0], [39_000.0, 39_500.0, 40_000.0]];
+    let levels = [[20.0, 100.0, 190.0], [1000.0, 10_000.0, 30_000.0], [39_000.0, 39_500.0, 40_000.0]];
     gather(&levels, &[200.0, 333.0, 350.0], PoissonKind::Gaussian).judge();
 }
 
@@ -236,12 +229,7 @@ fn classes_of_a_plane_are_as_noisy_as_predicted() {
 fn the_papers_dark_floor_is_too_low_and_the_exact_one_is_not() {
     for seed in 0..3 {
         let scene = scene(1000, 700, [0.0; 3]);
-        let settings = NoiseSettings {
-            seed,
-            sensor_seed: seed,
-            without: vec![Source::Ron],
-            ..Default::default()
-        };
+        let settings = NoiseSettings { seed, sensor_seed: seed, without: vec![Source::Ron], ..Default::default() };
         let dark = noisy(&scene, &settings);
         // Three planes without light are one sample of the dark signal; deviations of their sum, in σ/√3.
         let together = |equations| {

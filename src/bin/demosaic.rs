@@ -46,9 +46,7 @@ fn black(text: &str) -> std::result::Result<Black, String> {
     match text {
         "auto" => Ok(Black::Auto),
         "none" => Ok(Black::None),
-        level => options::number(level)
-            .map(Black::Level)
-            .map_err(|_| "give auto, none or a number".into()),
+        level => options::number(level).map(Black::Level).map_err(|_| "give auto, none or a number".into()),
     }
 }
 
@@ -58,8 +56,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let reader = FrameReader::open(&arguments.input.options())?;
-    let mut stage =
-        Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
+    let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
     session.sign(stage.header_mut());
     session.drive(reader, &stage, &arguments.output)?;
     Ok(())

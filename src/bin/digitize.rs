@@ -45,8 +45,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     if let Some(sensor) = &arguments.sensor {
         reader.header_mut().metadata.sensor = Some(data::load_sensor(sensor)?.sensor);
     }
-    let settings =
-        AdcSettings { bits: arguments.bits, bias_adu: arguments.bias, adu_per_e: arguments.slope };
+    let settings = AdcSettings { bits: arguments.bits, bias_adu: arguments.bias, adu_per_e: arguments.slope };
     let mut stage = Digitize::new(reader.header(), &settings)?;
     propagation::note(stage.header_mut(), Equations::Exact);
     session.sign(stage.header_mut());

@@ -2,9 +2,7 @@
 
 use clap::Parser;
 use cyanometer::cli::{self, options};
-use cyanometer::color::characterization::{
-    CameraMatrix, MATRIX_SCHEMA, MATRIX_UNIT, fit_sky_rad_ls, signals,
-};
+use cyanometer::color::characterization::{CameraMatrix, MATRIX_SCHEMA, MATRIX_UNIT, fit_sky_rad_ls, signals};
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::{data, input::regular_file, output, spectral};
 use cyanometer::report::{self, ReportFormat};
@@ -51,8 +49,7 @@ enum TrainingChoice {
 }
 
 fn training(text: &str) -> std::result::Result<TrainingChoice, String> {
-    let numbers: Option<Vec<usize>> =
-        text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let numbers: Option<Vec<usize>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     match numbers.as_deref() {
         Some([count]) if *count > 0 => Ok(TrainingChoice::Count(*count)),
         Some(list) if list.len() > 1 => Ok(TrainingChoice::List(list.to_vec())),
@@ -72,19 +69,13 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         None => (0..available).collect(),
         Some(TrainingChoice::List(list)) => list.clone(),
         Some(TrainingChoice::Count(count)) if *count > available => {
-            return Err(Error::Usage(format!(
-                "the library has {available} samples, fewer than {count}"
-            )));
+            return Err(Error::Usage(format!("the library has {available} samples, fewer than {count}")));
         }
         Some(TrainingChoice::Count(count)) => (0..*count).map(|i| i * available / count).collect(),
     };
     let grid = WavelengthGrid::default();
-    let signals =
-        signals(&library, &loaded.sensor, &loaded.response, &data::load_observer()?, &grid)?;
-    let name = arguments
-        .library
-        .file_name()
-        .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let signals = signals(&library, &loaded.sensor, &loaded.response, &data::load_observer()?, &grid)?;
+    let name = arguments.library.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let (xyz_from_camera, condition, training) = fit_sky_rad_ls(&signals, &samples, &name)?;
     let matrix = CameraMatrix {
         schema: MATRIX_SCHEMA.into(),

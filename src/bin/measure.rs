@@ -54,9 +54,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     }
     let not_finite: u64 = report.regions.iter().map(|region| region.not_finite).sum();
     if not_finite > 0 {
-        session.warn(&format!(
-            "{not_finite} pixels are NaN or infinite; they are left out of the statistics"
-        ));
+        session.warn(&format!("{not_finite} pixels are NaN or infinite; they are left out of the statistics"));
     }
     Ok(())
 }

@@ -78,18 +78,14 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let known = metadata.exposure;
     let exposure_s = arguments.exposure.or(known.map(|e| e.exposure_s));
     let f_number = arguments.f_number.or(known.map(|e| e.f_number));
-    let lens_transmittance =
-        arguments.lens_transmittance.or(known.map(|e| e.lens_transmittance)).unwrap_or(1.0);
+    let lens_transmittance = arguments.lens_transmittance.or(known.map(|e| e.lens_transmittance)).unwrap_or(1.0);
     if let Some((exposure_s, f_number)) = exposure_s.zip(f_number) {
         metadata.exposure = Some(Exposure { exposure_s, f_number, lens_transmittance }.checked()?);
     }
-    if let (Some(of_matrix), Some(of_frame)) =
-        (&matrix.sensor, metadata.sensor.as_ref().map(|sensor| &sensor.name))
+    if let (Some(of_matrix), Some(of_frame)) = (&matrix.sensor, metadata.sensor.as_ref().map(|sensor| &sensor.name))
         && of_matrix != of_frame
     {
-        session.warn(&format!(
-            "{shown} was fitted for the sensor {of_matrix}, but the frame comes from {of_frame}"
-        ));
+        session.warn(&format!("{shown} was fitted for the sensor {of_matrix}, but the frame comes from {of_frame}"));
     }
     let settings = ColorSettings {
         xyz_from_camera: matrix.xyz_from_camera,

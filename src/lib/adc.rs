@@ -46,37 +46,23 @@ impl Digitize {
     pub fn new(input: &FrameHeader, settings: &AdcSettings) -> Result<Self> {
         let holds = input.holds();
         match input.metadata.quantity {
-            QuantityKind::ExpectedElectrons | QuantityKind::Electrons
-                if input.metadata.demosaic.is_none() => {}
+            QuantityKind::ExpectedElectrons | QuantityKind::Electrons if input.metadata.demosaic.is_none() => {}
             QuantityKind::Adu => {
                 return Err(input.refuse(format!("it holds {holds}: it is digitized already")));
             }
             _ => {
-                return Err(input.out_of_order(
-                    format!("it holds {holds}, not electrons of photosites"),
-                    "add-noise",
-                ));
+                return Err(input.out_of_order(format!("it holds {holds}, not electrons of photosites"), "add-noise"));
             }
         }
         let sensor = input.metadata.sensor.as_ref();
-        let needed =
-            |key| input.missing(key, "--sensor NAME|FILE, or all of --bits, --bias and --slope");
+        let needed = |key| input.missing(key, "--sensor NAME|FILE, or all of --bits, --bias and --slope");
         let adc = AdcRecord {
             bits: settings.bits.or(sensor.map(|s| s.bits)).ok_or_else(|| needed("sensor.bits"))?,
-            bias_adu: settings
-                .bias_adu
-                .or(sensor.map(|s| s.bias_adu))
-                .ok_or_else(|| needed("sensor.bias_adu"))?,
-            adu_per_e: settings
-                .adu_per_e
-                .or(sensor.map(|s| s.adu_per_e))
-                .ok_or_else(|| needed("sensor.adu_per_e"))?,
+            bias_adu: settings.bias_adu.or(sensor.map(|s| s.bias_adu)).ok_or_else(|| needed("sensor.bias_adu"))?,
+            adu_per_e: settings.adu_per_e.or(sensor.map(|s| s.adu_per_e)).ok_or_else(|| needed("sensor.adu_per_e"))?,
         };
         if !(1..=16).contains(&adc.bits) {
-            return Err(Error::Usage(format!(
-                "a converter of {} bits is impossible here; give 1 to 16",
-                adc.bits
-            )));
+            return Err(Error::Usage(format!("a converter of {} bits is impossible here; give 1 to 16", adc.bits)));
         }
         if !adc.bias_adu.is_finite() {
             return Err(Error::Usage(format!("a bias of {} ADU is impossible", adc.bias_adu)));
@@ -89,8 +75,7 @@ impl Digitize {
         }
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
         metadata.adc = Some(adc);
-        metadata.black_level_adu =
-            Some(adc.bias_adu + adc.adu_per_e * metadata.dark_signal_e.take().unwrap_or(0.0));
+        metadata.black_level_adu = Some(adc.bias_adu + adc.adu_per_e * metadata.dark_signal_e.take().unwrap_or(0.0));
         metadata.white_level_adu = Some(f64::from(adc.top_code()));
         Ok(Self { header: FrameHeader { metadata, ..input.clone() }, adc })
     }
@@ -114,11 +99,8 @@ impl Stage for Digitize {
         let top = f64::from(self.adc.top_code());
         for y in output.range() {
             for channel in 0..input.channels() {
-                for (&charge, code) in
-                    input.row(y.cast_signed(), channel).iter().zip(output.row(y, channel))
-                {
-                    let level =
-                        (self.adc.bias_adu + self.adc.adu_per_e * f64::from(charge)).round();
+                for (&charge, code) in input.row(y.cast_signed(), channel).iter().zip(output.row(y, channel)) {
+                    let level = (self.adc.bias_adu + self.adc.adu_per_e * f64::from(charge)).round();
                     counts.clipped_low += u64::from(level < 0.0);
                     counts.clipped_high += u64::from(level > top);
                     counts.not_finite += u64::from(level.is_nan());

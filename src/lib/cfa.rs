@@ -103,10 +103,8 @@ mod tests {
     #[test]
     fn patterns_spell_their_corner() {
         for pattern in CfaPattern::ALL {
-            let corner: String = [(0, 0), (1, 0), (0, 1), (1, 1)]
-                .map(|(x, y)| pattern.class(x, y).letter())
-                .concat()
-                .to_lowercase();
+            let corner: String =
+                [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| pattern.class(x, y).letter()).concat().to_lowercase();
             assert_eq!(corner, pattern.name());
             assert_eq!(pattern.name().parse(), Ok(pattern));
         }

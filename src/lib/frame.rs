@@ -69,12 +69,7 @@ impl<Q: Quantity> Band<Q> {
     }
 
     /// A band around samples laid out as `[row][channel][column]`.
-    pub fn from_samples(
-        first_row: usize,
-        width: usize,
-        channels: usize,
-        samples: Vec<f32>,
-    ) -> Self {
+    pub fn from_samples(first_row: usize, width: usize, channels: usize, samples: Vec<f32>) -> Self {
         assert!(width * channels > 0 && samples.len().is_multiple_of(width * channels));
         Self { first_row, width, channels, samples, quantity: PhantomData }
     }
@@ -109,13 +104,7 @@ pub struct Window<'a, Q = Any> {
 
 impl<'a, Q: Quantity> Window<'a, Q> {
     /// A window on `samples`, whose first row is the frame's row `first_row`.
-    pub fn new(
-        frame_height: usize,
-        first_row: usize,
-        width: usize,
-        channels: usize,
-        samples: &'a [f32],
-    ) -> Self {
+    pub fn new(frame_height: usize, first_row: usize, width: usize, channels: usize, samples: &'a [f32]) -> Self {
         assert!(samples.len().is_multiple_of(width * channels));
         Self { frame_height, first_row, width, channels, samples, quantity: PhantomData }
     }
@@ -199,10 +188,7 @@ pub fn bare_name(channel: &str) -> &str {
 }
 
 /// Rounds a double to the nearest sample.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the one place where double results become 32-bit samples"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "the one place where double results become 32-bit samples")]
 pub fn to_sample(value: f64) -> f32 {
     value as f32
 }

@@ -248,13 +248,7 @@ impl Metadata {
 
     /// The same record about samples of another quantity: what held for the old samples alone is dropped.
     pub fn becoming(&self, quantity: QuantityKind) -> Self {
-        Self {
-            quantity,
-            unit: quantity.unit().into(),
-            predicted: None,
-            samples: None,
-            ..self.clone()
-        }
+        Self { quantity, unit: quantity.unit().into(), predicted: None, samples: None, ..self.clone() }
     }
 
     /// Notes that something was left out.
@@ -305,9 +299,7 @@ impl FrameHeader {
     ///
     /// [`Error::MissingKey`].
     pub fn exposure(&self) -> Result<Exposure> {
-        self.metadata
-            .exposure
-            .ok_or_else(|| self.missing("exposure", "--exposure S and --f-number N"))
+        self.metadata.exposure.ok_or_else(|| self.missing("exposure", "--exposure S and --f-number N"))
     }
 
     /// An [`Error::MissingKey`] about this frame.

@@ -44,11 +44,7 @@ impl Mosaic {
         metadata.predicted.clone_from(&input.metadata.predicted);
         metadata.cfa = Some(pattern);
         metadata.demosaic = None;
-        let header = FrameHeader {
-            geometry: input.geometry.with_channels(&["Y"]),
-            metadata,
-            name: input.name.clone(),
-        };
+        let header = FrameHeader { geometry: input.geometry.with_channels(&["Y"]), metadata, name: input.name.clone() };
         Ok(Self { header, pattern })
     }
 

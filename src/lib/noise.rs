@@ -99,9 +99,9 @@ impl AddNoise {
         match input.metadata.quantity {
             QuantityKind::ExpectedElectrons if input.metadata.demosaic.is_none() => {}
             QuantityKind::Electrons => {
-                return Err(input.refuse(format!(
-                    "it holds {holds} that have their noise already; noise is added once"
-                )));
+                return Err(
+                    input.refuse(format!("it holds {holds} that have their noise already; noise is added once"))
+                );
             }
             _ => {
                 let problem = format!("it holds {holds}, not expected electrons of photosites");
@@ -121,8 +121,7 @@ impl AddNoise {
         let mut metadata = input.metadata.becoming(QuantityKind::Electrons);
         let mut sources: Vec<Source> =
             Source::ALL.into_iter().filter(|source| !settings.without.contains(source)).collect();
-        let read_variance =
-            if sources.contains(&Source::Ron) { sensor.read_noise_e.powi(2) } else { 0.0 };
+        let read_variance = if sources.contains(&Source::Ron) { sensor.read_noise_e.powi(2) } else { 0.0 };
         if dark_e > 0.0 && dark_e * (1.0 + sensor.dcnu.powi(2)) < NEGLIGIBLE_DARK * read_variance {
             metadata.leave_out(
                 "add-noise",
@@ -188,11 +187,7 @@ pub fn rectified_mean(sigma: f64) -> f64 {
 /// Mean square of max(0, N) for N normal with mean 1.
 pub fn rectified_mean_square(sigma: f64) -> f64 {
     use crate::numerics::normal::{cumulative, density};
-    if sigma <= 0.0 {
-        1.0
-    } else {
-        (1.0 + sigma * sigma) * cumulative(1.0 / sigma) + sigma * density(1.0 / sigma)
-    }
+    if sigma <= 0.0 { 1.0 } else { (1.0 + sigma * sigma) * cumulative(1.0 / sigma) + sigma * density(1.0 / sigma) }
 }
 
 /// Draws counts at one rate after another, keeping what a rate needs while it stays the same.
@@ -234,11 +229,7 @@ impl Stage for AddNoise {
         &self.header
     }
 
-    fn apply(
-        &self,
-        input: Window<'_, ExpectedElectrons>,
-        mut output: Rows<'_, Electrons>,
-    ) -> Counts {
+    fn apply(&self, input: Window<'_, ExpectedElectrons>, mut output: Rows<'_, Electrons>) -> Counts {
         let mut counts = Counts::default();
         let geometry = &self.header.geometry;
         for y in output.range() {
@@ -247,13 +238,7 @@ impl Stage for AddNoise {
                     Some(pattern) => pattern.row_classes(geometry.origin, y),
                     None => [Class::ALL[channel]; 2],
                 };
-                self.row(
-                    y,
-                    classes,
-                    input.row(y.cast_signed(), channel),
-                    output.row(y, channel),
-                    &mut counts,
-                );
+                self.row(y, classes, input.row(y.cast_signed(), channel), output.row(y, channel), &mut counts);
             }
         }
         counts
@@ -262,32 +247,18 @@ impl Stage for AddNoise {
 
 impl AddNoise {
     /// One row of one plane; `classes` are those of its even and odd columns.
-    fn row(
-        &self,
-        y: usize,
-        classes: [Class; 2],
-        expected: &[f32],
-        noisy: &mut [f32],
-        counts: &mut Counts,
-    ) {
+    fn row(&self, y: usize, classes: [Class; 2], expected: &[f32], noisy: &mut [f32], counts: &mut Counts) {
         let Self { model, record, .. } = self;
         let [x0, y0] = self.header.geometry.origin;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_possible_wrap,
-            reason = "wraps as sensor columns do"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
         let (row, column) = (y0.wrapping_add(y as i32), |x: usize| x0.wrapping_add(x as i32));
         let mut light_counters = [Counter::new(model.poisson), Counter::new(model.poisson)];
         let mut dark_counter = Counter::new(model.poisson);
         for (x, (&expected, noisy)) in expected.iter().zip(noisy).enumerate() {
             let class = classes[x % 2];
             let draws = |source: Source| {
-                let (seed, frame) = if source.is_fixed_pattern() {
-                    (record.sensor_seed, 0)
-                } else {
-                    (record.seed, record.frame)
-                };
+                let (seed, frame) =
+                    if source.is_fixed_pattern() { (record.sensor_seed, 0) } else { (record.seed, record.frame) };
                 Draws::new(seed, frame, source, class as u8, column(x), row)
             };
             let normal = |source: Source| -> f64 { StandardNormal.sample(&mut draws(source)) };
@@ -297,11 +268,8 @@ impl AddNoise {
                 counts.negative += 1;
                 rate = 0.0;
             }
-            let mut light = if model.signal_shot {
-                light_counters[x % 2].draw(rate, &mut draws(Source::Ssn))
-            } else {
-                rate
-            };
+            let mut light =
+                if model.signal_shot { light_counters[x % 2].draw(rate, &mut draws(Source::Ssn)) } else { rate };
             if model.prnu > 0.0 {
                 light *= sensitivity(Source::Prnu, model.prnu);
             }

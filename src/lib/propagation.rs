@@ -92,10 +92,7 @@ pub fn electrons(model: &NoiseModel, expected_e: f64, equations: Equations) -> P
             let dark_shot = if model.dark_shot { model.dark_e } else { 0.0 };
             let patterns = (model.dark_e * model.dcnu).powi(2) + (expected_e * model.prnu).powi(2);
             let variance = dark_shot + shot + patterns + read;
-            Prediction {
-                moments: MeanVariance { mean: model.dark_e + expected_e, variance },
-                excess_kurtosis: 0.0,
-            }
+            Prediction { moments: MeanVariance { mean: model.dark_e + expected_e, variance }, excess_kurtosis: 0.0 }
         }
         Equations::Exact => {
             let charge = charge(model, expected_e);
@@ -112,19 +109,12 @@ pub fn electrons(model: &NoiseModel, expected_e: f64, equations: Equations) -> P
 ///
 /// Exact: first and second moments of the rounded and clipped charge, from spread 0 up and at both rails. The paper
 /// scales Eq. 11 by the slope and takes the converter's noise as nil.
-pub fn adu(
-    model: &NoiseModel,
-    adc: &AdcRecord,
-    expected_e: f64,
-    equations: Equations,
-) -> Prediction {
+pub fn adu(model: &NoiseModel, adc: &AdcRecord, expected_e: f64, equations: Equations) -> Prediction {
     if equations == Equations::Paper {
         let before = electrons(model, expected_e, equations);
         let MeanVariance { mean, variance } = before.moments;
-        let moments = MeanVariance {
-            mean: adc.bias_adu + adc.adu_per_e * mean,
-            variance: variance * adc.adu_per_e.powi(2),
-        };
+        let moments =
+            MeanVariance { mean: adc.bias_adu + adc.adu_per_e * mean, variance: variance * adc.adu_per_e.powi(2) };
         return Prediction { moments, ..before };
     }
     let before = electrons(model, expected_e, equations);
@@ -138,17 +128,12 @@ pub fn adu(
     let (moments, fourth) = if let Some(lattice) = Lattice::of(model, adc, expected_e) {
         normal::rounded(mean, sigma, adc.top_code(), |edge| lattice.exceeds(electrons_at(edge)))
     } else if sites_clipped > 1e-12 {
-        let clipped = ClippedAndRead {
-            charge,
-            full_well_e: model.full_well_e,
-            read_noise_e: model.read_noise_e,
-        };
+        let clipped = ClippedAndRead { charge, full_well_e: model.full_well_e, read_noise_e: model.read_noise_e };
         normal::rounded(mean, sigma, adc.top_code(), |edge| clipped.exceeds(electrons_at(edge)))
     } else {
         normal::rounded(mean, sigma, adc.top_code(), |edge| whole.exceeds(electrons_at(edge)))
     };
-    let excess_kurtosis =
-        if moments.variance > 0.0 { fourth / moments.variance.powi(2) } else { 0.0 };
+    let excess_kurtosis = if moments.variance > 0.0 { fourth / moments.variance.powi(2) } else { 0.0 };
     Prediction { moments, excess_kurtosis }
 }
 
@@ -177,8 +162,7 @@ impl ClippedAndRead {
             let z = from + step * f64::from(i);
             normal::density(z) * self.charge.exceeds(t - z * sigma)
         };
-        let weight =
-            |i: i32| if i == 0 || i == intervals { 1.0 } else { 2.0 + 2.0 * f64::from(i % 2) };
+        let weight = |i: i32| if i == 0 || i == intervals { 1.0 } else { 2.0 + 2.0 * f64::from(i % 2) };
         (0..=intervals).map(|i| weight(i) * value(i)).sum::<f64>() * step / 3.0
     }
 }
@@ -195,23 +179,17 @@ impl Lattice {
     /// moments is below e^(−2π²·0.75²) ≈ 10⁻⁵) and counts are below 200 on average.
     fn of(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> Option<Self> {
         let resolved = model.read_noise_e * adc.adu_per_e < 0.75;
-        let few = expected_e + model.dark_e < 200.0
-            && expected_e + model.dark_e < model.full_well_e / 4.0;
+        let few = expected_e + model.dark_e < 200.0 && expected_e + model.dark_e < model.full_well_e / 4.0;
         if !(resolved && few) || model.poisson == PoissonKind::Gaussian {
             return None;
         }
         let light = counts(expected_e, model.signal_shot);
         let dark = counts(model.dark_e, model.dark_shot);
         let pair = |&(p, a): &(f64, f64), &(q, b): &(f64, f64)| {
-            let variance =
-                (a * model.prnu).powi(2) + (b * model.dcnu).powi(2) + model.read_noise_e.powi(2);
+            let variance = (a * model.prnu).powi(2) + (b * model.dcnu).powi(2) + model.read_noise_e.powi(2);
             (p * q, a + b, variance.sqrt())
         };
-        let pairs = light
-            .iter()
-            .flat_map(|a| dark.iter().map(move |b| pair(a, b)))
-            .filter(|p| p.0 > 1e-14)
-            .collect();
+        let pairs = light.iter().flat_map(|a| dark.iter().map(move |b| pair(a, b))).filter(|p| p.0 > 1e-14).collect();
         Some(Self { pairs })
     }
 
@@ -266,10 +244,9 @@ pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Option<[Prediction
         model.full_well_e = f64::INFINITY;
     }
     match metadata.quantity {
-        QuantityKind::ExpectedElectrons => Some(expected.map(|mean| Prediction {
-            moments: MeanVariance { mean, variance: 0.0 },
-            excess_kurtosis: 0.0,
-        })),
+        QuantityKind::ExpectedElectrons => Some(
+            expected.map(|mean| Prediction { moments: MeanVariance { mean, variance: 0.0 }, excess_kurtosis: 0.0 }),
+        ),
         QuantityKind::Electrons => Some(expected.map(|mean| electrons(&model, mean, equations))),
         QuantityKind::Adu => {
             let adc = metadata.adc?;
@@ -328,10 +305,7 @@ mod tests {
                 let x = (1.0 + sigma * z).max(0.0);
                 for (p, count) in counts(rate, true) {
                     for (k, sum) in raw.iter_mut().enumerate() {
-                        *sum += step
-                            * normal::density(z)
-                            * p
-                            * (count * x).powi(i32::try_from(k).unwrap());
+                        *sum += step * normal::density(z) * p * (count * x).powi(i32::try_from(k).unwrap());
                     }
                 }
             }
@@ -341,12 +315,7 @@ mod tests {
             let fourth = m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4) - 3.0 * v * v;
             let found = product(rate, true, PoissonKind::Exact, sigma);
             // The kink of the rectified normal at zero costs the sum about step² ≈ 10⁻⁵.
-            for (a, b) in [
-                (found.mean, m1),
-                (found.variance, v),
-                (found.third, third),
-                (found.fourth, fourth),
-            ] {
+            for (a, b) in [(found.mean, m1), (found.variance, v), (found.third, third), (found.fourth, fourth)] {
                 assert!((a / b - 1.0).abs() < 1e-4, "{rate} {sigma}: {a} {b}");
             }
         }
@@ -385,8 +354,7 @@ mod tests {
             let mut n = (expected - 9.0 * spread).floor();
             while n < expected + 9.0 * spread {
                 let log_p = n * expected.ln() - expected - libm::lgamma(n + 1.0);
-                let given = NearlyNormal::normal(n, (n * model.prnu).powi(2))
-                    .clipped_above(model.full_well_e);
+                let given = NearlyNormal::normal(n, (n * model.prnu).powi(2)).clipped_above(model.full_well_e);
                 m1 += log_p.exp() * given.mean;
                 m2 += log_p.exp() * (given.variance + (given.mean - expected).powi(2));
                 total += log_p.exp();
@@ -396,12 +364,7 @@ mod tests {
             let variance = m2 / total - (mean - expected).powi(2) + 15.7 * 15.7;
             // lgamma at 4·10⁵ is good to 10⁻¹⁰ relative to the probabilities; Edgeworth to skewness³ ≈ 10⁻⁶.
             assert!((reference.mean - mean).abs() < 1e-2, "{} {mean}", reference.mean);
-            assert!(
-                (reference.std() / variance.sqrt() - 1.0).abs() < 1e-4,
-                "{} {}",
-                reference.std(),
-                variance.sqrt()
-            );
+            assert!((reference.std() / variance.sqrt() - 1.0).abs() < 1e-4, "{} {}", reference.std(), variance.sqrt());
         }
         let codes = adu(&model, &ADC, 40_000.0, Equations::Exact).moments;
         assert!(codes.mean < 4095.0 && codes.mean > 4070.0 && codes.variance > 0.0);

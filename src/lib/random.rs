@@ -57,10 +57,7 @@ pub fn philox4x32_10(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
 }
 
 /// The low and the high 32 bits.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "taking the halves of a 64-bit word is what this is for"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "taking the halves of a 64-bit word is what this is for")]
 fn halves(word: u64) -> [u32; 2] {
     [word as u32, (word >> 32) as u32]
 }
@@ -80,12 +77,8 @@ pub struct Draws {
 impl Draws {
     /// The stream of `source` in the photosite at `(x, y)` of `class`.
     pub fn new(seed: u64, frame: u32, source: Source, class: u8, x: i32, y: i32) -> Self {
-        let counter = [
-            x.cast_unsigned(),
-            y.cast_unsigned(),
-            frame,
-            u32::from(source as u8) << 24 | u32::from(class) << 16,
-        ];
+        let counter =
+            [x.cast_unsigned(), y.cast_unsigned(), frame, u32::from(source as u8) << 24 | u32::from(class) << 16];
         Self { key: halves(seed), counter, block: [0; 4], used: 4 }
     }
 

@@ -67,8 +67,7 @@ impl Rendering {
             }
             if let Some(vignetting) = &self.vignetting {
                 for ((x, sample), factor) in plane.iter_mut().enumerate().zip(vignetting.row(y)) {
-                    *sample =
-                        to_sample(factor * pixels[x / self.patch[0]][classes[x % 2] as usize]);
+                    *sample = to_sample(factor * pixels[x / self.patch[0]][classes[x % 2] as usize]);
                 }
             }
         }

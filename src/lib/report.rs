@@ -29,9 +29,7 @@ fn unwritable(error: impl std::fmt::Display) -> Error {
 /// [`Error::Data`] when the form cannot hold them.
 pub fn render(report: &Report, format: ReportFormat) -> Result<String> {
     match format {
-        ReportFormat::Json => {
-            serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable)
-        }
+        ReportFormat::Json => serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable),
         ReportFormat::Yaml => serde_yaml::to_string(report).map_err(unwritable),
         ReportFormat::Csv => csv(report),
         ReportFormat::Text => Ok(text(report)),
@@ -69,14 +67,11 @@ fn values(channel: &ChannelReport) -> [Option<f64>; 10] {
 
 fn csv(report: &Report) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let head = ["x", "y", "width", "height", "channel", "count"]
-        .into_iter()
-        .chain(COLUMNS.map(|(key, _)| key));
+    let head = ["x", "y", "width", "height", "channel", "count"].into_iter().chain(COLUMNS.map(|(key, _)| key));
     writer.write_record(head).map_err(unwritable)?;
     for region in &report.regions {
         for channel in region.channels.iter().chain(&region.classes) {
-            let place =
-                [region.region.x, region.region.y, region.region.width, region.region.height];
+            let place = [region.region.x, region.region.y, region.region.width, region.region.height];
             let cells = place
                 .iter()
                 .map(ToString::to_string)
@@ -106,11 +101,7 @@ fn shown(key: &str, value: Option<f64>) -> String {
         _ if value == 0.0 => "0".into(),
         _ if (1e-3..1e7).contains(&value.abs()) => {
             // Six significant digits.
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a value within -3..7"
-            )]
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a value within -3..7")]
             let digits = (5.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
             format!("{value:.digits$}")
         }
@@ -130,14 +121,10 @@ fn region_text(region: &RegionReport, out: &mut String) {
     out.push_str(&line);
     out.push('\n');
     let channels: Vec<&ChannelReport> = region.channels.iter().chain(&region.classes).collect();
-    let mut columns: Vec<Vec<String>> = vec![
-        std::iter::once(String::new())
-            .chain(channels.iter().map(|channel| channel.name.clone()))
-            .collect(),
-    ];
+    let mut columns: Vec<Vec<String>> =
+        vec![std::iter::once(String::new()).chain(channels.iter().map(|channel| channel.name.clone())).collect()];
     for (index, (key, heading)) in COLUMNS.into_iter().enumerate() {
-        let cells: Vec<Option<f64>> =
-            channels.iter().map(|channel| values(channel)[index]).collect();
+        let cells: Vec<Option<f64>> = channels.iter().map(|channel| values(channel)[index]).collect();
         if cells.iter().any(Option::is_some) {
             let texts = cells.into_iter().map(|value| shown(key, value));
             columns.push(std::iter::once(heading.to_owned()).chain(texts).collect());
@@ -149,9 +136,8 @@ fn region_text(region: &RegionReport, out: &mut String) {
         && let Some(covariance) = &region.covariance
     {
         out.push_str("covariance\n");
-        let names: Vec<String> = std::iter::once(String::new())
-            .chain(region.channels.iter().map(|channel| channel.name.clone()))
-            .collect();
+        let names: Vec<String> =
+            std::iter::once(String::new()).chain(region.channels.iter().map(|channel| channel.name.clone())).collect();
         let mut columns = vec![names];
         for (j, channel) in region.channels.iter().enumerate() {
             let cells = covariance.iter().map(|row| shown("covariance", Some(row[j])));
@@ -163,16 +149,11 @@ fn region_text(region: &RegionReport, out: &mut String) {
 
 /// Writes columns of equal length, numbers flush right.
 fn table(columns: &[Vec<String>], out: &mut String) {
-    let widths: Vec<usize> = columns
-        .iter()
-        .map(|column| column.iter().map(|cell| cell.chars().count()).max().unwrap_or(0))
-        .collect();
+    let widths: Vec<usize> =
+        columns.iter().map(|column| column.iter().map(|cell| cell.chars().count()).max().unwrap_or(0)).collect();
     for row in 0..columns.first().map_or(0, Vec::len) {
-        let cells: Vec<String> = columns
-            .iter()
-            .zip(&widths)
-            .map(|(column, width)| format!("{:>width$}", column[row]))
-            .collect();
+        let cells: Vec<String> =
+            columns.iter().zip(&widths).map(|(column, width)| format!("{:>width$}", column[row])).collect();
         let _ = writeln!(out, "{}", cells.join("  ").trim_end());
     }
 }
@@ -198,8 +179,7 @@ pub fn matrix(matrix: &CameraMatrix, format: ReportFormat) -> Result<String> {
             let unit = matrix.unit.as_deref().unwrap_or_default();
             let _ = writeln!(out, "XYZ from R, G, B [{unit}]");
             for (name, row) in ["X", "Y", "Z"].iter().zip(matrix.xyz_from_camera) {
-                let _ =
-                    writeln!(out, "{name} {:>14.6e} {:>14.6e} {:>14.6e}", row[0], row[1], row[2]);
+                let _ = writeln!(out, "{name} {:>14.6e} {:>14.6e} {:>14.6e}", row[0], row[1], row[2]);
             }
             if let Some(condition) = matrix.condition {
                 let _ = writeln!(out, "condition number {condition:.2}");

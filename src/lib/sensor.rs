@@ -119,10 +119,7 @@ impl Sensor {
         }
         match (self.dark_current_na_per_cm2, self.dark_current_e_per_s) {
             (Some(_), None) | (None, Some(_)) => Ok(()),
-            _ => {
-                Err("it must have one of `dark_current_na_per_cm2` and `dark_current_e_per_s`"
-                    .into())
-            }
+            _ => Err("it must have one of `dark_current_na_per_cm2` and `dark_current_e_per_s`".into()),
         }
     }
 
@@ -139,8 +136,7 @@ impl Sensor {
     pub fn dark_current_e_per_s(&self, temperature_k: f64) -> f64 {
         /// Electrons per s, cm² and nA cm⁻² that Eq. 6 has in front of T^1.5.
         const PREFACTOR: f64 = 2.5e15;
-        let law =
-            |t: f64| t.powf(1.5) * (-silicon_band_gap_ev(t) / (2.0 * BOLTZMANN_EV_PER_K * t)).exp();
+        let law = |t: f64| t.powf(1.5) * (-silicon_band_gap_ev(t) / (2.0 * BOLTZMANN_EV_PER_K * t)).exp();
         match (self.dark_current_na_per_cm2, self.dark_current_e_per_s) {
             (Some(density), _) => PREFACTOR * self.pixel_area_cm2() * density * law(temperature_k),
             (None, Some(measured)) => measured * law(temperature_k) / law(self.temperature_k),
@@ -194,16 +190,10 @@ impl SpectralResponse {
     /// # Errors
     ///
     /// As [`WavelengthGrid::points`]; [`Error::Data`] when no class responds anywhere on the grid.
-    pub fn weights_on(
-        &self,
-        sensor: &Sensor,
-        exposure: &Exposure,
-        grid: &WavelengthGrid,
-    ) -> Result<GridWeights> {
+    pub fn weights_on(&self, sensor: &Sensor, exposure: &Exposure, grid: &WavelengthGrid) -> Result<GridWeights> {
         let (all_nm, widths) = grid.points()?;
         let all = self.electron_weights(sensor, exposure, &all_nm, &widths);
-        let kept: Vec<usize> =
-            (0..all_nm.len()).filter(|&i| all.iter().any(|class| class[i] != 0.0)).collect();
+        let kept: Vec<usize> = (0..all_nm.len()).filter(|&i| all.iter().any(|class| class[i] != 0.0)).collect();
         if kept.is_empty() {
             return Err(Error::Data(format!(
                 "the sensor {} does not respond between {} and {} nm",
@@ -230,8 +220,7 @@ pub struct GridWeights {
 impl GridWeights {
     /// The camera for radiances that are sampled at `sampled_nm`, and the share of its response that lies beyond them.
     pub fn camera(&self, sampled_nm: &[f64]) -> (Camera, f64) {
-        let folded =
-            self.weights.each_ref().map(|weights| fold(sampled_nm, &self.wavelengths_nm, weights));
+        let folded = self.weights.each_ref().map(|weights| fold(sampled_nm, &self.wavelengths_nm, weights));
         let uncovered = folded.iter().map(|class| class.uncovered).fold(0.0, f64::max);
         (Camera { weights: folded.map(|class| class.weights) }, uncovered)
     }
@@ -247,9 +236,7 @@ pub struct Camera {
 impl Camera {
     /// Signal electrons of R, G and B from a radiance in W cm⁻² sr⁻¹ nm⁻¹.
     pub fn electrons(&self, radiance: &[f64]) -> [f64; 3] {
-        self.weights
-            .each_ref()
-            .map(|weights| weights.iter().zip(radiance).map(|(w, l)| w * l).sum())
+        self.weights.each_ref().map(|weights| weights.iter().zip(radiance).map(|(w, l)| w * l).sum())
     }
 }
 
@@ -310,14 +297,10 @@ pub(crate) mod tests {
     #[test]
     fn impossible_sensors_are_refused_by_key() {
         let complaint = |sensor: Sensor| sensor.check().unwrap_err();
-        assert!(
-            complaint(Sensor { read_noise_e: f64::NAN, ..kaf5101ce() }).contains("read_noise_e")
-        );
+        assert!(complaint(Sensor { read_noise_e: f64::NAN, ..kaf5101ce() }).contains("read_noise_e"));
         assert!(complaint(Sensor { adu_per_e: 0.0, ..kaf5101ce() }).contains("adu_per_e"));
         assert!(complaint(Sensor { bits: 17, ..kaf5101ce() }).contains("bits"));
-        assert!(
-            complaint(Sensor { dark_current_na_per_cm2: None, ..kaf5101ce() }).contains("one of")
-        );
+        assert!(complaint(Sensor { dark_current_na_per_cm2: None, ..kaf5101ce() }).contains("one of"));
         assert_eq!(kaf5101ce().check(), Ok(()));
     }
 
@@ -325,10 +308,7 @@ pub(crate) mod tests {
     #[test]
     fn a_perfect_sensor_counts_photons() {
         let flat = Curve::new(vec![300.0, 900.0], vec![1.0, 1.0]).unwrap();
-        let response = SpectralResponse {
-            quantum_efficiency: [flat.clone(), flat.clone(), flat],
-            cover_glass: None,
-        };
+        let response = SpectralResponse { quantum_efficiency: [flat.clone(), flat.clone(), flat], cover_glass: None };
         let exposure = Exposure { exposure_s: 2.0, f_number: 0.5, lens_transmittance: 1.0 };
         let weights = response.electron_weights(&kaf5101ce(), &exposure, &[500.0], &[1.0]);
         // Photon energy at 500 nm from hc = 1.986 445 857·10⁻²⁵ J m (CODATA 2018); π/(4·¼ + 1) = π/2 sr.

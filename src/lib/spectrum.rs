@@ -47,11 +47,7 @@ impl WavelengthGrid {
                 "{start_nm}:{end_nm}:{step_nm} nm do not end on a step; change the end or the step"
             )));
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "checked to lie in 0..10⁶"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to lie in 0..10⁶")]
         let intervals = steps.round() as usize;
         let wavelengths = (0..=intervals).map(|i| start_nm + i as f64 * step_nm).collect();
         Ok((wavelengths, quadrature::weights(quadrature, intervals + 1, step_nm)?))
@@ -77,25 +73,20 @@ impl Curve {
             return Err(format!("{} values for {} wavelengths", values.len(), wavelength_nm.len()));
         }
         match values.iter().position(|value| !value.is_finite()) {
-            Some(at) => {
-                Err(format!("the value at {} nm is not a finite number", wavelength_nm[at]))
-            }
+            Some(at) => Err(format!("the value at {} nm is not a finite number", wavelength_nm[at])),
             None => Ok(Self { wavelength_nm, values }),
         }
     }
 
     /// The value at a wavelength in nm; zero beyond the table.
     pub fn at(&self, wavelength_nm: f64) -> f64 {
-        neighbours(&self.wavelength_nm, wavelength_nm).map_or(0.0, |parts| {
-            parts.iter().map(|&(index, share)| share * self.values[index]).sum()
-        })
+        neighbours(&self.wavelength_nm, wavelength_nm)
+            .map_or(0.0, |parts| parts.iter().map(|&(index, share)| share * self.values[index]).sum())
     }
 
     /// The smallest and the largest value.
     pub fn extremes(&self) -> (f64, f64) {
-        self.values
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+        self.values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
     }
 }
 
@@ -112,9 +103,7 @@ pub fn check_wavelengths(wavelength_nm: &[f64]) -> std::result::Result<(), Strin
         return Err(format!("{bad} is no wavelength in nm"));
     }
     match wavelength_nm.windows(2).find(|pair| pair[0] >= pair[1]) {
-        Some(pair) => {
-            Err(format!("wavelengths must ascend, but {} nm follows {} nm", pair[1], pair[0]))
-        }
+        Some(pair) => Err(format!("wavelengths must ascend, but {} nm follows {} nm", pair[1], pair[0])),
         None => Ok(()),
     }
 }
@@ -223,18 +212,10 @@ mod tests {
 
     #[test]
     fn grids_that_make_no_sense_are_refused() {
-        let grid = |start_nm, end_nm, step_nm| WavelengthGrid {
-            start_nm,
-            end_nm,
-            step_nm,
-            ..Default::default()
-        };
-        for bad in [
-            grid(830.0, 360.0, 1.0),
-            grid(360.0, 830.0, 0.0),
-            grid(360.0, 830.0, f64::NAN),
-            grid(360.0, 830.5, 1.0),
-        ] {
+        let grid = |start_nm, end_nm, step_nm| WavelengthGrid { start_nm, end_nm, step_nm, ..Default::default() };
+        for bad in
+            [grid(830.0, 360.0, 1.0), grid(360.0, 830.0, 0.0), grid(360.0, 830.0, f64::NAN), grid(360.0, 830.5, 1.0)]
+        {
             assert!(bad.points().is_err(), "{bad:?}");
         }
     }

@@ -155,16 +155,8 @@ pub fn run<S: Stage>(
             .par_chunks_mut(piece_rows * output.row_samples())
             .enumerate()
             .map(|(piece, samples)| {
-                let rows = Rows::new(
-                    first + piece * piece_rows,
-                    output.width,
-                    output.channels.len(),
-                    samples,
-                );
-                stage.apply(
-                    Window::new(height, window_first, input.width, input.channels.len(), &window),
-                    rows,
-                )
+                let rows = Rows::new(first + piece * piece_rows, output.width, output.channels.len(), samples);
+                stage.apply(Window::new(height, window_first, input.width, input.channels.len(), &window), rows)
             })
             .reduce(Counts::default, Counts::plus)
             .plus(counts);

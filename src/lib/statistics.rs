@@ -157,11 +157,7 @@ impl Rails {
 /// # Errors
 ///
 /// [`Error::Usage`] for a region outside the frame, and those of the source.
-pub fn measure(
-    source: &mut dyn RowSource,
-    regions: &[Region],
-    equations: Equations,
-) -> Result<Report> {
+pub fn measure(source: &mut dyn RowSource, regions: &[Region], equations: Equations) -> Result<Report> {
     let frame = source.header().clone();
     let geometry = &frame.geometry;
     let whole = [Region { x: 0, y: 0, width: geometry.width, height: geometry.height }];
@@ -189,9 +185,7 @@ pub fn measure(
             let row_tallies: Vec<Tally> = samples
                 .par_chunks(geometry.row_samples())
                 .enumerate()
-                .filter(|(index, _)| {
-                    (region.y..region.y + region.height).contains(&(first + index))
-                })
+                .filter(|(index, _)| (region.y..region.y + region.height).contains(&(first + index)))
                 .map(|(index, row)| {
                     let mut tally = empty();
                     tally.add_row(&frame, first + index, row, *region, rails);
@@ -205,24 +199,14 @@ pub fn measure(
         first += rows;
     }
     let predictions = propagation::of_frame(&frame, equations);
-    let report = |(region, tally): (&Region, &Tally)| {
-        tally.report(&frame, *region, rails, predictions.as_ref())
-    };
+    let report = |(region, tally): (&Region, &Tally)| tally.report(&frame, *region, rails, predictions.as_ref());
     Ok(Report { regions: regions.iter().zip(&tallies).map(report).collect() })
 }
 
 impl Tally {
-    fn add_row(
-        &mut self,
-        frame: &FrameHeader,
-        y: usize,
-        row: &[f32],
-        region: Region,
-        rails: Rails,
-    ) {
+    fn add_row(&mut self, frame: &FrameHeader, y: usize, row: &[f32], region: Region, rails: Rails) {
         let width = frame.geometry.width;
-        let lines: Vec<&[f32]> =
-            row.chunks_exact(width).map(|line| &line[region.x..region.x + region.width]).collect();
+        let lines: Vec<&[f32]> = row.chunks_exact(width).map(|line| &line[region.x..region.x + region.width]).collect();
         self.channels.add(&lines);
         for (clipped, line) in self.clipped.iter_mut().zip(&lines) {
             *clipped += rails.count(line.iter().copied());
@@ -284,31 +268,18 @@ impl Tally {
                     let index = class as usize;
                     let clipped = has_rails.then_some(self.clipped_classes[index]);
                     let prediction = predictions.map(|predictions| predictions[index]);
-                    ChannelReport::new(
-                        class.letter().into(),
-                        &self.classes[index],
-                        0,
-                        black,
-                        clipped,
-                        prediction,
-                    )
+                    ChannelReport::new(class.letter().into(), &self.classes[index], 0, black, clipped, prediction)
                 })
                 .collect(),
             _ => Vec::new(),
         };
         let count = self.channels.count;
-        let predicted: Option<Vec<f64>> =
-            reports.iter().map(|report| report.predicted_std).collect();
+        let predicted: Option<Vec<f64>> = reports.iter().map(|report| report.predicted_std).collect();
         let diagonal = |stds: &[f64]| -> Vec<Vec<f64>> {
             // Photosites of different classes are drawn apart, so nothing is correlated before demosaicking.
-            (0..channels)
-                .map(|i| {
-                    (0..channels).map(|j| if i == j { stds[i].powi(2) } else { 0.0 }).collect()
-                })
-                .collect()
+            (0..channels).map(|i| (0..channels).map(|j| if i == j { stds[i].powi(2) } else { 0.0 }).collect()).collect()
         };
-        let covariance_row =
-            |i| (0..channels).map(|j| self.channels.covariance(i, j)).collect::<Option<Vec<f64>>>();
+        let covariance_row = |i| (0..channels).map(|j| self.channels.covariance(i, j)).collect::<Option<Vec<f64>>>();
         RegionReport {
             region,
             count,
@@ -334,14 +305,11 @@ impl Tally {
         let shares = self.classes.each_ref().map(|class| class.count as f64 / total as f64);
         let mean: f64 = shares.iter().zip(predictions).map(|(w, p)| w * p.moments.mean).sum();
         let offsets = predictions.each_ref().map(|p| p.moments.mean - mean);
-        let variance: f64 = (0..3)
-            .map(|k| shares[k] * (predictions[k].moments.variance + offsets[k].powi(2)))
-            .sum();
+        let variance: f64 = (0..3).map(|k| shares[k] * (predictions[k].moments.variance + offsets[k].powi(2))).sum();
         let fourth: f64 = (0..3)
             .map(|k| {
                 let (v, d) = (predictions[k].moments.variance, offsets[k]);
-                shares[k]
-                    * ((3.0 + predictions[k].excess_kurtosis) * v * v + 6.0 * v * d * d + d.powi(4))
+                shares[k] * ((3.0 + predictions[k].excess_kurtosis) * v * v + 6.0 * v * d * d + d.powi(4))
             })
             .sum();
         let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) - 3.0 } else { 0.0 };
@@ -399,19 +367,10 @@ mod tests {
     use crate::metadata::Metadata;
     use crate::stage::MemoryFrame;
 
-    fn frame(
-        channels: &[&str],
-        width: usize,
-        height: usize,
-        f: impl Fn(usize) -> f32,
-    ) -> MemoryFrame {
+    fn frame(channels: &[&str], width: usize, height: usize, f: impl Fn(usize) -> f32) -> MemoryFrame {
         let geometry = Geometry::new(width, height, channels);
         let samples = (0..geometry.row_samples() * height).map(f).collect();
-        let header = FrameHeader {
-            name: "test".into(),
-            geometry,
-            metadata: Metadata::new(QuantityKind::Adu),
-        };
+        let header = FrameHeader { name: "test".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
         MemoryFrame::new(header, samples)
     }
 

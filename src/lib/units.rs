@@ -50,13 +50,8 @@ pub enum RadianceUnit {
 
 impl RadianceUnit {
     /// All units, in the order in which help lists them.
-    pub const ALL: [Self; 5] = [
-        Self::WPerCm2SrNm,
-        Self::WPerM2SrNm,
-        Self::MwPerM2SrNm,
-        Self::WPerM2SrUm,
-        Self::UwPerCm2SrNm,
-    ];
+    pub const ALL: [Self; 5] =
+        [Self::WPerCm2SrNm, Self::WPerM2SrNm, Self::MwPerM2SrNm, Self::WPerM2SrUm, Self::UwPerCm2SrNm];
 
     /// What one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
     pub fn in_w_per_cm2_sr_nm(self) -> f64 {
@@ -83,11 +78,7 @@ impl RadianceUnit {
     pub fn parse(text: &str) -> Option<Self> {
         // Squeezes every spelling into the form `W/cm2/sr/nm`.
         let mut squeezed = String::new();
-        for factor in text
-            .replace(['µ', 'μ'], "u")
-            .split([' ', '.', '/', '*'])
-            .filter(|part| !part.is_empty())
-        {
+        for factor in text.replace(['µ', 'μ'], "u").split([' ', '.', '/', '*']).filter(|part| !part.is_empty()) {
             let factor = factor.replace('^', "");
             let factor = factor.trim_end_matches("-1").replace("-2", "2");
             if !squeezed.is_empty() {

@@ -19,8 +19,7 @@ use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
 pub const TREE: &str = env!("CARGO_MANIFEST_DIR");
 
 /// The exposure of the paper: 33 ms at f/8.
-pub const EXPOSURE: Exposure =
-    Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
+pub const EXPOSURE: Exposure = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
 
 /// The sensor of the paper, from the tree, whatever the environment says.
 pub fn sensor() -> Sensor {
@@ -49,13 +48,8 @@ pub fn frame(header: FrameHeader, f: impl Fn(usize, usize, usize) -> f32) -> Mem
 }
 
 /// Three planes of expected electrons.
-pub fn expected(
-    width: usize,
-    height: usize,
-    f: impl Fn(usize, usize, Class) -> f32,
-) -> MemoryFrame {
-    let header =
-        header(QuantityKind::ExpectedElectrons, Geometry::new(width, height, &["R", "G", "B"]));
+pub fn expected(width: usize, height: usize, f: impl Fn(usize, usize, Class) -> f32) -> MemoryFrame {
+    let header = header(QuantityKind::ExpectedElectrons, Geometry::new(width, height, &["R", "G", "B"]));
     frame(header, |x, y, channel| f(x, y, Class::ALL[channel]))
 }
 
@@ -144,9 +138,7 @@ impl RowSource for Blocks<'_> {
             self.natural
         );
         let row = self.frame.header.geometry.row_samples();
-        samples.extend_from_slice(
-            &self.frame.samples[self.next_row * row..(self.next_row + rows) * row],
-        );
+        samples.extend_from_slice(&self.frame.samples[self.next_row * row..(self.next_row + rows) * row]);
         self.next_row += rows;
         Ok(())
     }
@@ -187,11 +179,7 @@ pub fn through_blocks<S: Stage>(
 
 /// Applies a stage to the rows `0..cuts[0]`, `cuts[0]..cuts[1]`, … each on its own, with no row more in sight than the
 /// stage says it needs.
-pub fn through_cuts<S: Stage>(
-    input: &MemoryFrame,
-    stage: &S,
-    cuts: &[usize],
-) -> (MemoryFrame, Counts) {
+pub fn through_cuts<S: Stage>(input: &MemoryFrame, stage: &S, cuts: &[usize]) -> (MemoryFrame, Counts) {
     let Geometry { width, height, ref channels, .. } = input.header.geometry;
     let output = &stage.header().geometry;
     let mut made = vec![f32::NAN; output.row_samples() * height];
@@ -203,13 +191,8 @@ pub fn through_cuts<S: Stage>(
         }
         let seen = first.saturating_sub(stage.reach())..(end + stage.reach()).min(height);
         let row = input.header.geometry.row_samples();
-        let window = Window::new(
-            height,
-            seen.start,
-            width,
-            channels.len(),
-            &input.samples[seen.start * row..seen.end * row],
-        );
+        let window =
+            Window::new(height, seen.start, width, channels.len(), &input.samples[seen.start * row..seen.end * row]);
         let samples = &mut made[first * output.row_samples()..end * output.row_samples()];
         let rows = Rows::new(first, output.width, output.channels.len(), samples);
         counts = counts.plus(stage.apply(window, rows));
@@ -225,17 +208,8 @@ pub fn through<S: Stage>(input: &MemoryFrame, stage: &S) -> MemoryFrame {
 
 /// Checks a law on `cases` values, always the same ones, and shows the simplest that breaks it.
 #[track_caller]
-pub fn for_all<S: Strategy>(
-    cases: u32,
-    values: S,
-    law: impl Fn(S::Value) -> std::result::Result<(), TestCaseError>,
-) {
-    let config = Config {
-        cases,
-        rng_seed: RngSeed::Fixed(1789),
-        failure_persistence: None,
-        ..Config::default()
-    };
+pub fn for_all<S: Strategy>(cases: u32, values: S, law: impl Fn(S::Value) -> std::result::Result<(), TestCaseError>) {
+    let config = Config { cases, rng_seed: RngSeed::Fixed(1789), failure_persistence: None, ..Config::default() };
     if let Err(error) = TestRunner::new(config).run(&values, law) {
         panic!("{error}");
     }

@@ -28,8 +28,7 @@ pub fn history_entry(program: &str, arguments: impl Iterator<Item = String>) -> 
             continue;
         }
         // Short options: flags q and v, and o with its value attached or next.
-        if let Some(letters) =
-            argument.strip_prefix('-').filter(|rest| !rest.is_empty() && !rest.starts_with('-'))
+        if let Some(letters) = argument.strip_prefix('-').filter(|rest| !rest.is_empty() && !rest.starts_with('-'))
             && letters.trim_start_matches(['q', 'v']).chars().next().is_none_or(|c| c == 'o')
         {
             skip_value = letters.ends_with('o') && letters.trim_start_matches(['q', 'v']) == "o";
@@ -37,11 +36,7 @@ pub fn history_entry(program: &str, arguments: impl Iterator<Item = String>) -> 
         }
         recorded.push(argument);
     }
-    HistoryEntry {
-        program: program.into(),
-        version: env!("CARGO_PKG_VERSION").into(),
-        arguments: recorded,
-    }
+    HistoryEntry { program: program.into(), version: env!("CARGO_PKG_VERSION").into(), arguments: recorded }
 }
 
 #[cfg(test)]
@@ -50,11 +45,8 @@ mod tests {
 
     #[test]
     fn where_the_output_goes_is_not_recorded() {
-        let recorded = |line: &str| {
-            history_entry("add-noise", line.split_whitespace().map(ToOwned::to_owned))
-                .arguments
-                .join(" ")
-        };
+        let recorded =
+            |line: &str| history_entry("add-noise", line.split_whitespace().map(ToOwned::to_owned)).arguments.join(" ");
         assert_eq!(recorded("in.exr --seed 7 -o out.exr"), "in.exr --seed 7");
         assert_eq!(recorded("--output=x.exr --seed=7 -vq -qo y.exr --threads 2"), "--seed=7");
         assert_eq!(recorded("-oout.exr -v - --without ron"), "- --without ron");

@@ -36,12 +36,8 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     body: impl FnOnce(&A, &Session) -> Result<()>,
 ) -> ExitCode {
     std::panic::set_hook(Box::new(move |panic| {
-        let place =
-            panic.location().map_or(String::new(), |at| format!(" at {}:{}", at.file(), at.line()));
-        complain(
-            program,
-            &format!("internal error{place}; please report it with the command that led to it"),
-        );
+        let place = panic.location().map_or(String::new(), |at| format!(" at {}:{}", at.file(), at.line()));
+        complain(program, &format!("internal error{place}; please report it with the command that led to it"));
     }));
     // Without a handler an interrupt ends the program all the same, only less tidily.
     drop(ctrlc::set_handler(|| {
@@ -101,8 +97,7 @@ fn one_line(program: &str, error: &clap::Error) -> String {
     };
     let argument = context(ContextKind::InvalidArg).unwrap_or_default();
     let value = context(ContextKind::InvalidValue).unwrap_or_default();
-    let suggestion =
-        context(ContextKind::SuggestedArg).or_else(|| context(ContextKind::SuggestedValue));
+    let suggestion = context(ContextKind::SuggestedArg).or_else(|| context(ContextKind::SuggestedValue));
     let hint = suggestion.map_or(String::new(), |s| format!("; did you mean `{s}`?"));
     let problem = match error.kind() {
         ErrorKind::UnknownArgument => {
@@ -115,8 +110,7 @@ fn one_line(program: &str, error: &clap::Error) -> String {
             format!("`{value}` is no value for {argument}{choices}{hint}")
         }
         ErrorKind::ValueValidation => {
-            let reason = std::error::Error::source(error)
-                .map_or(String::new(), |source| format!(": {source}"));
+            let reason = std::error::Error::source(error).map_or(String::new(), |source| format!(": {source}"));
             format!("`{value}` is no value for {argument}{reason}")
         }
         ErrorKind::MissingRequiredArgument => format!("{argument} is missing"),
@@ -156,9 +150,7 @@ impl Session {
         // A file's name may be no UTF-8; the history is.
         let arguments = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
         header.metadata.history.push(history_entry(self.program, arguments));
-        for left_out in
-            header.metadata.left_out.iter().filter(|entry| entry.program == self.program)
-        {
+        for left_out in header.metadata.left_out.iter().filter(|entry| entry.program == self.program) {
             self.note(&format!("left out: {} ({})", left_out.what, left_out.why));
         }
     }
@@ -201,18 +193,11 @@ impl Session {
     /// # Errors
     ///
     /// Those of reader, stage and writer.
-    pub fn drive<S: Stage>(
-        &self,
-        mut reader: FrameReader,
-        stage: &S,
-        output: &Output,
-    ) -> Result<Counts> {
+    pub fn drive<S: Stage>(&self, mut reader: FrameReader, stage: &S, output: &Output) -> Result<Counts> {
         self.report_reader(&reader);
-        let mut writer =
-            FrameWriter::create(&output.options(), stage.header(), reader.file().as_ref())?;
+        let mut writer = FrameWriter::create(&output.options(), stage.header(), reader.file().as_ref())?;
         let bar = self.progress(stage.header().geometry.height);
-        let counts =
-            run(stage, &mut reader, &mut writer, &mut |rows| bar.set_position(rows as u64))?;
+        let counts = run(stage, &mut reader, &mut writer, &mut |rows| bar.set_position(rows as u64))?;
         bar.finish_and_clear();
         self.finish(reader, writer, counts)?;
         Ok(counts)
@@ -223,12 +208,7 @@ impl Session {
     /// # Errors
     ///
     /// Those of the writer.
-    pub fn finish(
-        &self,
-        mut reader: FrameReader,
-        writer: FrameWriter,
-        counts: Counts,
-    ) -> Result<()> {
+    pub fn finish(&self, mut reader: FrameReader, writer: FrameWriter, counts: Counts) -> Result<()> {
         writer.finish(counts)?;
         if let Some(warning) = reader.check_digest() {
             self.warn(&warning);

@@ -35,12 +35,7 @@ pub struct Input {
 impl Input {
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
-        InputOptions {
-            path: self.input.clone(),
-            part: self.part,
-            metadata: self.metadata.clone(),
-            all_channels: false,
-        }
+        InputOptions { path: self.input.clone(), part: self.part, metadata: self.metadata.clone(), all_channels: false }
     }
 }
 
@@ -114,8 +109,7 @@ fn threads(text: &str) -> Result<usize, String> {
 ///
 /// What is expected, in words.
 pub fn size(text: &str) -> Result<[usize; 2], String> {
-    let parse =
-        |part: &str| part.parse::<usize>().ok().filter(|n| (1..=i32::MAX as usize).contains(n));
+    let parse = |part: &str| part.parse::<usize>().ok().filter(|n| (1..=i32::MAX as usize).contains(n));
     text.split_once(['x', 'X'])
         .and_then(|(width, height)| Some([parse(width)?, parse(height)?]))
         .ok_or_else(|| "a size is WIDTHxHEIGHT in photosites, such as 1332x1000".into())
@@ -127,10 +121,8 @@ pub fn size(text: &str) -> Result<[usize; 2], String> {
 ///
 /// What is expected, in words.
 pub fn three_numbers(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Vec<f64> = text
-        .split(',')
-        .filter_map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite()))
-        .collect();
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
     match (numbers.as_slice(), text.split(',').count()) {
         ([a, b, c], 3) => Ok([*a, *b, *c]),
         _ => Err("give three numbers between commas".into()),
@@ -172,10 +164,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 ///
 /// What is expected, in words.
 pub fn fraction(text: &str) -> Result<f64, String> {
-    positive(text)
-        .ok()
-        .filter(|x| *x <= 1.0)
-        .ok_or_else(|| "give a fraction above 0 and at most 1".into())
+    positive(text).ok().filter(|x| *x <= 1.0).ok_or_else(|| "give a fraction above 0 and at most 1".into())
 }
 
 /// Reads a region `X,Y,W,H`.
@@ -184,8 +173,7 @@ pub fn fraction(text: &str) -> Result<f64, String> {
 ///
 /// What is expected, in words.
 pub fn region(text: &str) -> Result<Region, String> {
-    let numbers: Option<Vec<usize>> =
-        text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let numbers: Option<Vec<usize>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     match numbers.as_deref() {
         Some([x, y, width, height]) => Ok(Region { x: *x, y: *y, width: *width, height: *height }),
         _ => Err("a region is X,Y,W,H in pixels, counted from the frame's corner".into()),

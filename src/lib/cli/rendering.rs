@@ -121,10 +121,7 @@ fn checked(electrons: [f64; 3], name: &str) -> Result<[f64; 3]> {
     if electrons.iter().all(|e| (0.0..f64::INFINITY).contains(e)) {
         Ok(electrons)
     } else {
-        Err(Error::format(
-            name,
-            "its radiance is negative or not finite, so that no electrons can be expected of it",
-        ))
+        Err(Error::format(name, "its radiance is negative or not finite, so that no electrons can be expected of it"))
     }
 }
 
@@ -189,17 +186,14 @@ impl Request {
             let (kept, brightest) = light.keep_and_find_brightest()?;
             light = kept;
             if brightest <= 0.0 {
-                return Err(Error::Data(
-                    "the scene is dark: no exposure reaches a fraction of full well".into(),
-                ));
+                return Err(Error::Data("the scene is dark: no exposure reaches a fraction of full well".into()));
             }
             exposure.exposure_s = fraction * loaded.sensor.full_well_e / brightest;
             exposure = exposure.checked()?;
             brightest_e = Some(fraction * loaded.sensor.full_well_e);
             session.note(&format!("exposure {} s", exposure.exposure_s));
         }
-        let rendering =
-            self.rendering(&loaded.sensor, exposure, &mut light, brightest_e, metadata)?;
+        let rendering = self.rendering(&loaded.sensor, exposure, &mut light, brightest_e, metadata)?;
         self.write(session, output, rendering, light, input)
     }
 
@@ -210,37 +204,21 @@ impl Request {
         camera: impl Fn(&[f64], &str) -> Camera,
         input: &mut Option<(FileId, String)>,
     ) -> Result<Light> {
-        let options = InputOptions {
-            path: self.input.clone(),
-            part: self.part,
-            metadata: None,
-            all_channels: true,
-        };
+        let options = InputOptions { path: self.input.clone(), part: self.part, metadata: None, all_channels: true };
         match spectral::open(&options)? {
             Radiances::Table(table) => {
                 let index = self.choose(&table)?;
                 let name = table.name().to_owned();
                 let unit = self.radiance_unit.or_else(|| table.unit_of(index)).unwrap_or_default();
-                let radiance: Vec<f64> = table
-                    .values
-                    .row(index)
-                    .iter()
-                    .map(|value| value * unit.in_w_per_cm2_sr_nm())
-                    .collect();
-                let electrons =
-                    checked(camera(&table.wavelength_nm, &name).electrons(&radiance), &name)?;
-                let source = if table.columns.len() > 1 {
-                    format!("{name}: {}", table.columns[index])
-                } else {
-                    name
-                };
+                let radiance: Vec<f64> =
+                    table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect();
+                let electrons = checked(camera(&table.wavelength_nm, &name).electrons(&radiance), &name)?;
+                let source = if table.columns.len() > 1 { format!("{name}: {}", table.columns[index]) } else { name };
                 Ok(Light::Uniform { electrons, source })
             }
             Radiances::Image(reader) => {
                 if self.column.is_some() {
-                    return Err(Error::Usage(
-                        "a spectral image has no columns; choose a pixel with --sample N".into(),
-                    ));
+                    return Err(Error::Usage("a spectral image has no columns; choose a pixel with --sample N".into()));
                 }
                 session.report_reader(&reader);
                 *input = reader.file();
@@ -248,8 +226,7 @@ impl Request {
                 let spectral = SpectralChannels::of(&header, self.radiance_unit)?;
                 let camera = camera(&spectral.wavelength_nm, &header.name);
                 let Geometry { width, height, .. } = header.geometry;
-                let mut rows =
-                    SpectralRows { reader: *reader, spectral, camera, samples: Vec::new() };
+                let mut rows = SpectralRows { reader: *reader, spectral, camera, samples: Vec::new() };
                 match self.sample {
                     None => Ok(Light::Image {
                         rows: ImageRows::Streamed(Box::new(rows)),
@@ -268,10 +245,7 @@ impl Request {
                             rows.next()?;
                         }
                         let electrons = rows.next()?[sample % width];
-                        Ok(Light::Uniform {
-                            electrons,
-                            source: format!("{}: sample {sample}", header.name),
-                        })
+                        Ok(Light::Uniform { electrons, source: format!("{}: sample {sample}", header.name) })
                     }
                 }
             }
@@ -311,8 +285,7 @@ impl Request {
             Light::Uniform { electrons, source } => {
                 if self.patch.is_some() {
                     return Err(Error::Usage(
-                        "--patch is for the pixels of a spectral image, but the scene is uniform"
-                            .into(),
+                        "--patch is for the pixels of a spectral image, but the scene is uniform".into(),
                     ));
                 }
                 if self.expose_to.is_some() {
@@ -338,9 +311,9 @@ impl Request {
                 (size, patch, source.clone(), None)
             }
         };
-        let vignetting = self.vignetting_focal_length_mm.map(|focal_length| {
-            Vignetting::new(size[0], size[1], sensor.pixel_pitch_um, focal_length)
-        });
+        let vignetting = self
+            .vignetting_focal_length_mm
+            .map(|focal_length| Vignetting::new(size[0], size[1], sensor.pixel_pitch_um, focal_length));
         if vignetting.is_none() && patch[0] * patch[1] > 1 {
             metadata.leave_out(
                 "render-radiance",

@@ -74,10 +74,7 @@ impl CameraMatrix {
             return Err(format!("its unit is `{unit}`, but only `{MATRIX_UNIT}` is understood"));
         }
         if super::matrix(&self.xyz_from_camera).try_inverse().is_none() {
-            return Err(
-                "its `xyz_from_camera` is singular: three signals would not give three stimuli"
-                    .into(),
-            );
+            return Err("its `xyz_from_camera` is singular: three signals would not give three stimuli".into());
         }
         Ok(())
     }
@@ -111,9 +108,7 @@ pub fn signals(
     let electrons = response.electron_weights(sensor, &unit, &wavelengths, &widths);
     let per_exposure = sensor.adu_per_e / unit.exposure_s_sr();
     let matching = observer.matching.each_ref().map(|curve| -> Vec<f64> {
-        let weight = |(&nm, width): (&f64, &f64)| {
-            LUMINOUS_EFFICACY_LM_PER_W * CM2_PER_M2 * curve.at(nm) * width
-        };
+        let weight = |(&nm, width): (&f64, &f64)| LUMINOUS_EFFICACY_LM_PER_W * CM2_PER_M2 * curve.at(nm) * width;
         wavelengths.iter().zip(&widths).map(weight).collect()
     });
     let project = |weights: &[f64], what: &str| -> Result<Vec<f64>> {
@@ -126,9 +121,7 @@ pub fn signals(
                 grid.end_nm
             )));
         }
-        let dot = |row: ndarray::ArrayView1<'_, f64>| {
-            row.iter().zip(&folded.weights).map(|(l, w)| l * w).sum()
-        };
+        let dot = |row: ndarray::ArrayView1<'_, f64>| row.iter().zip(&folded.weights).map(|(l, w)| l * w).sum();
         Ok(library.radiance.rows().into_iter().map(dot).collect())
     };
     let columns = |all: [Vec<f64>; 3], factor: f64, what: &str| -> Result<DMatrix<f64>> {
@@ -152,17 +145,10 @@ pub fn signals(
 /// # Errors
 ///
 /// [`Error::Data`] where the samples do not determine it; [`Error::Usage`] for a sample that there is not.
-pub fn fit_sky_rad_ls(
-    signals: &Signals,
-    samples: &[usize],
-    library: &str,
-) -> Result<([[f64; 3]; 3], f64, Training)> {
+pub fn fit_sky_rad_ls(signals: &Signals, samples: &[usize], library: &str) -> Result<([[f64; 3]; 3], f64, Training)> {
     let available = signals.camera.nrows();
     if let Some(bad) = samples.iter().find(|&&sample| sample >= available) {
-        return Err(Error::Usage(format!(
-            "there is no sample {bad}: the library has samples 0 to {}",
-            available - 1
-        )));
+        return Err(Error::Usage(format!("there is no sample {bad}: the library has samples 0 to {}", available - 1)));
     }
     let camera = signals.camera.select_rows(samples);
     let xyz = signals.xyz.select_rows(samples);
@@ -177,9 +163,7 @@ pub fn fit_sky_rad_ls(
     });
     let max_chromaticity_error = [0, 1].map(|j| {
         let chromaticity = |m: &DMatrix<f64>, i: usize| m[(i, j)] / m.row(i).sum();
-        (0..count)
-            .map(|i| (chromaticity(&fitted, i) - chromaticity(&xyz, i)).abs())
-            .fold(0.0, f64::max)
+        (0..count).map(|i| (chromaticity(&fitted, i) - chromaticity(&xyz, i)).abs()).fold(0.0, f64::max)
     });
     let all = samples.iter().copied().eq(0..available);
     let training = Training {

@@ -151,15 +151,10 @@ impl ToXyz {
             _ => return Err(input.refuse(format!("it holds {holds}: it is converted already"))),
         }
         if input.metadata.cfa.is_some() || input.geometry.channels.len() == 1 {
-            return Err(input.out_of_order(
-                format!("it holds {holds}, not three classes at each pixel"),
-                "demosaic",
-            ));
+            return Err(input.out_of_order(format!("it holds {holds}, not three classes at each pixel"), "demosaic"));
         }
         if !input.has_three_planes() {
-            return Err(
-                input.refuse(format!("it holds {holds}; a camera has the three planes R, G and B"))
-            );
+            return Err(input.refuse(format!("it holds {holds}; a camera has the three planes R, G and B")));
         }
         let exposure = input.exposure()?;
         let black = input.metadata.black_level_adu.unwrap_or(0.0);
@@ -208,8 +203,7 @@ impl ToXyz {
             white: known_white.then_some(white),
         });
         let geometry = input.geometry.with_channels(&channels);
-        let srgb_from_xyz =
-            if needs_white { linear_srgb_from_xyz(white) } else { Matrix3::identity() };
+        let srgb_from_xyz = if needs_white { linear_srgb_from_xyz(white) } else { Matrix3::identity() };
         let header = FrameHeader { name: input.name.clone(), geometry, metadata };
         Ok(Self { header, space: settings.space, xyz_from_adu, black, white, srgb_from_xyz })
     }
@@ -244,14 +238,12 @@ impl Stage for ToXyz {
                     Space::Lab => lab_from_xyz(xyz.into(), self.white),
                     Space::Srgb => {
                         let linear = self.srgb_from_xyz * xyz;
-                        counts.out_of_gamut +=
-                            u64::from(linear.iter().any(|v| !(-1e-6..=1.0 + 1e-6).contains(v)));
+                        counts.out_of_gamut += u64::from(linear.iter().any(|v| !(-1e-6..=1.0 + 1e-6).contains(v)));
                         <[f64; 3]>::from(linear).map(|v| srgb_encode(v.clamp(0.0, 1.0)))
                     }
                 };
                 counts.not_finite += u64::from(color.iter().any(|value| !value.is_finite()));
-                (first[x], second[x], third[x]) =
-                    (to_sample(color[0]), to_sample(color[1]), to_sample(color[2]));
+                (first[x], second[x], third[x]) = (to_sample(color[0]), to_sample(color[1]), to_sample(color[2]));
             }
         }
         counts
@@ -298,10 +290,7 @@ mod tests {
     fn a_matrix_implies_its_columns_as_primaries() {
         let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let third = 1.0 / 3.0;
-        assert_eq!(
-            implied_primaries(&identity),
-            Some([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [third, third]])
-        );
+        assert_eq!(implied_primaries(&identity), Some([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [third, third]]));
         assert_eq!(implied_primaries(&[[0.0; 3]; 3]), None);
     }
 }

@@ -17,11 +17,7 @@ pub(super) fn interpolate(tile: &Tile, output: &mut Rows<'_>) -> Counts {
             let x = index.cast_signed();
             let vertical = (above.at(x) + below.at(x)) / 2.0;
             let (own, green, opposite) = if x & 1 == parity {
-                (
-                    line.at(x),
-                    (line.sides(x) + vertical) / 2.0,
-                    (above.sides(x) + below.sides(x)) / 2.0,
-                )
+                (line.at(x), (line.sides(x) + vertical) / 2.0, (above.sides(x) + below.sides(x)) / 2.0)
             } else {
                 (line.sides(x), line.at(x), vertical)
             };

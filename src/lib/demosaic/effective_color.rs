@@ -13,8 +13,7 @@ pub(super) fn interpolate(tile: &Tile, output: &mut Rows<'_>) -> Counts {
     let columns = tile.columns(2);
     let green = tile.derive(2, |y, line| {
         let (_, parity) = tile.chrominance(y);
-        let [cfa, above, below, above2, below2] =
-            [y, y - 1, y + 1, y - 2, y + 2].map(|y| tile.line(y));
+        let [cfa, above, below, above2, below2] = [y, y - 1, y + 1, y - 2, y + 2].map(|y| tile.line(y));
         for (x, sample) in columns.clone().zip(line) {
             let own = cfa.at(x);
             *sample = if x & 1 == parity {

@@ -91,12 +91,7 @@ impl Demosaic {
     ///
     /// [`Error::Order`](crate::error::Error::Order) unless the frame is one plane of photosites;
     /// [`Error::MissingKey`](crate::error::Error::MissingKey) when nothing gives a pattern; a format error below 2×2.
-    pub fn new(
-        input: &FrameHeader,
-        method: Method,
-        black: Black,
-        pattern: Option<CfaPattern>,
-    ) -> Result<Self> {
+    pub fn new(input: &FrameHeader, method: Method, black: Black, pattern: Option<CfaPattern>) -> Result<Self> {
         let metadata = &input.metadata;
         let holds = input.holds();
         if metadata.demosaic.is_some() {
@@ -111,9 +106,7 @@ impl Demosaic {
                 "a CFA plane of {width}x{height} lacks whole classes; demosaicking needs at least 2x2"
             )));
         }
-        let cfa = pattern
-            .or(metadata.cfa)
-            .ok_or_else(|| input.missing("cfa", "--pattern rggb|bggr|grbg|gbrg"))?;
+        let cfa = pattern.or(metadata.cfa).ok_or_else(|| input.missing("cfa", "--pattern rggb|bggr|grbg|gbrg"))?;
         let level = black.level(input);
         let quantity = match metadata.quantity {
             QuantityKind::Unspecified => QuantityKind::Adu,
@@ -121,17 +114,13 @@ impl Demosaic {
         };
         let mut made = metadata.becoming(quantity);
         made.cfa = None;
-        made.demosaic =
-            Some(DemosaicRecord { method: method.names()[0].into(), cfa, black: level });
+        made.demosaic = Some(DemosaicRecord { method: method.names()[0].into(), cfa, black: level });
         match quantity {
             QuantityKind::Adu => {
                 made.white_level_adu = made.white_level_adu.map(|white| white - level);
                 made.black_level_adu = Some(black_left(metadata.black_level_adu, level));
             }
-            _ => {
-                made.dark_signal_e =
-                    metadata.dark_signal_e.map(|dark| black_left(Some(dark), level))
-            }
+            _ => made.dark_signal_e = metadata.dark_signal_e.map(|dark| black_left(Some(dark), level)),
         }
         let geometry = input.geometry.with_channels(&["R", "G", "B"]);
         let header = FrameHeader { geometry, metadata: made, name: input.name.clone() };
@@ -225,8 +214,7 @@ impl Tile {
             }
             for x in 1..=reach {
                 line[reach - x] = line[reach + mirror(-x.cast_signed(), width)];
-                line[reach + width - 1 + x] =
-                    line[reach + mirror((width - 1 + x).cast_signed(), width)];
+                line[reach + width - 1 + x] = line[reach + mirror((width - 1 + x).cast_signed(), width)];
             }
             tile.classes.push(classes(mirror(y, height)));
         }
@@ -305,8 +293,7 @@ fn restore_from_hues(
         let greens = green.line(row);
         let mut planes = output.three(y);
         let vertical = |above: Line<'_>, below: Line<'_>, x| (above.at(x) + below.at(x)) / 2.0;
-        let diagonal =
-            |above: Line<'_>, below: Line<'_>, x| (above.sides(x) + below.sides(x)) / 2.0;
+        let diagonal = |above: Line<'_>, below: Line<'_>, x| (above.sides(x) + below.sides(x)) / 2.0;
         for index in 0..tile.width {
             let x = index.cast_signed();
             let green = greens.at(x);
@@ -325,11 +312,7 @@ fn restore_from_hues(
             };
             keep(class, own, &|| cfa.sides(x));
             keep(other, opposite, &|| {
-                if x & 1 == parity {
-                    diagonal(cfa_above, cfa_below, x)
-                } else {
-                    vertical(cfa_above, cfa_below, x)
-                }
+                if x & 1 == parity { diagonal(cfa_above, cfa_below, x) } else { vertical(cfa_above, cfa_below, x) }
             });
             keep(Class::Green, green, &|| (cfa.sides(x) + vertical(cfa_above, cfa_below, x)) / 2.0);
         }
@@ -344,19 +327,10 @@ mod tests {
     use crate::metadata::Metadata;
     use crate::stage::MemoryFrame;
 
-    fn plane(
-        width: usize,
-        height: usize,
-        pattern: CfaPattern,
-        f: impl Fn(usize, usize, Class) -> f32,
-    ) -> MemoryFrame {
+    fn plane(width: usize, height: usize, pattern: CfaPattern, f: impl Fn(usize, usize, Class) -> f32) -> MemoryFrame {
         let mut metadata = Metadata::new(QuantityKind::Adu);
         metadata.cfa = Some(pattern);
-        let header = FrameHeader {
-            name: "test".into(),
-            geometry: Geometry::new(width, height, &["Y"]),
-            metadata,
-        };
+        let header = FrameHeader { name: "test".into(), geometry: Geometry::new(width, height, &["Y"]), metadata };
         let sites = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let samples = sites.map(|(x, y)| f(x, y, pattern.class(x as i64, y as i64))).collect();
         MemoryFrame::new(header, samples)
@@ -372,16 +346,11 @@ mod tests {
         for method in Method::ALL {
             for pattern in CfaPattern::ALL {
                 for (width, height) in [(2, 2), (3, 5), (8, 7)] {
-                    let (made, counts) = demosaicked(
-                        &plane(width, height, pattern, |_, _, class| level(class)),
-                        method,
-                    );
+                    let (made, counts) =
+                        demosaicked(&plane(width, height, pattern, |_, _, class| level(class)), method);
                     for row in made.samples.chunks(3 * width) {
                         for (class, samples) in Class::ALL.iter().zip(row.chunks(width)) {
-                            assert!(
-                                samples.iter().all(|&s| (s - level(*class)).abs() < 1e-3),
-                                "{method:?} {pattern}"
-                            );
+                            assert!(samples.iter().all(|&s| (s - level(*class)).abs() < 1e-3), "{method:?} {pattern}");
                         }
                     }
                     assert_eq!(counts, Counts::default());
@@ -394,8 +363,7 @@ mod tests {
     fn measured_sites_are_kept() {
         let value = |x: usize, y: usize| ((x * 31 + y * 17) % 101) as f32;
         for method in Method::ALL {
-            let (made, _) =
-                demosaicked(&plane(9, 8, CfaPattern::Gbrg, |x, y, _| value(x, y) + 1.0), method);
+            let (made, _) = demosaicked(&plane(9, 8, CfaPattern::Gbrg, |x, y, _| value(x, y) + 1.0), method);
             for y in 0..8 {
                 for x in 0..9 {
                     let class = CfaPattern::Gbrg.class(x as i64, y as i64) as usize;
@@ -419,10 +387,7 @@ mod tests {
                 for x in 3..13 {
                     for class in Class::ALL {
                         let sample = f64::from(made.samples[(y * 3 + class as usize) * 16 + x]);
-                        assert!(
-                            (sample - ramp(class, x, y)).abs() < 1e-4,
-                            "{method:?} {class:?} {x} {y} {sample}"
-                        );
+                        assert!((sample - ramp(class, x, y)).abs() < 1e-4, "{method:?} {class:?} {x} {y} {sample}");
                     }
                 }
             }
@@ -433,9 +398,7 @@ mod tests {
     #[test]
     fn appendix_a_is_followed_with_its_misprints_mended() {
         // B at (row 4, column 3): rows even blue in odd columns, so the corner (1, 1) is G, (1, 2) R: grbg.
-        let site = |row: usize, column: usize| {
-            f64::from((row * 7919 + column * 104_729) as u32 % 997) + 500.0
-        };
+        let site = |row: usize, column: usize| f64::from((row * 7919 + column * 104_729) as u32 % 997) + 500.0;
         let frame = plane(7, 8, CfaPattern::Grbg, |x, y, _| to_sample(site(y + 1, x + 1)));
         let at = |made: &MemoryFrame, class: Class, row: usize, column: usize| {
             f64::from(made.samples[((row - 1) * 3 + class as usize) * 7 + column - 1])
@@ -447,15 +410,11 @@ mod tests {
         near(at(&bi, Class::Green, 4, 3), (v(3, 3) + v(4, 4) + v(5, 3) + v(4, 2)) / 4.0);
         near(at(&bi, Class::Red, 4, 3), (v(3, 2) + v(3, 4) + v(5, 4) + v(5, 2)) / 4.0);
 
-        let green =
-            |r: usize, c: usize| (v(r - 1, c) + v(r + 1, c) + v(r, c - 1) + v(r, c + 1)) / 4.0;
+        let green = |r: usize, c: usize| (v(r - 1, c) + v(r + 1, c) + v(r, c - 1) + v(r, c + 1)) / 4.0;
         let ratio = |r: usize, c: usize| v(r, c) / green(r, c);
         let (shti, _) = demosaicked(&frame, Method::SmoothHue);
         near(at(&shti, Class::Blue, 4, 4), v(4, 4) * (ratio(4, 3) + ratio(4, 5)) / 2.0);
-        near(
-            at(&shti, Class::Blue, 3, 4),
-            green(3, 4) * (ratio(2, 3) + ratio(2, 5) + ratio(4, 5) + ratio(4, 3)) / 4.0,
-        );
+        near(at(&shti, Class::Blue, 3, 4), green(3, 4) * (ratio(2, 3) + ratio(2, 5) + ratio(4, 5) + ratio(4, 3)) / 4.0);
 
         let (eci, _) = demosaicked(&frame, Method::EffectiveColor);
         let k_up = |r: usize, c: usize| v(r, c) - (v(r - 1, c) + v(r + 1, c)) / 2.0;
@@ -466,17 +425,13 @@ mod tests {
         near(at(&eci, Class::Green, 3, 4), full(3, 4));
         let k = |r: usize, c: usize| full(r, c) - v(r, c);
         near(at(&eci, Class::Red, 4, 4), v(4, 4) - (k(3, 4) + k(5, 4)) / 2.0);
-        near(
-            at(&eci, Class::Blue, 5, 4),
-            full(5, 4) - (k(4, 5) + k(6, 5) + k(6, 3) + k(4, 3)) / 4.0,
-        );
+        near(at(&eci, Class::Blue, 5, 4), full(5, 4) - (k(4, 5) + k(6, 5) + k(6, 3) + k(4, 3)) / 4.0);
     }
 
     #[test]
     fn a_green_of_zero_never_gives_infinity() {
-        let frame = plane(12, 10, CfaPattern::Rggb, |x, _, class| {
-            if class == Class::Green { 0.0 } else { 5.0 + x as f32 }
-        });
+        let frame =
+            plane(12, 10, CfaPattern::Rggb, |x, _, class| if class == Class::Green { 0.0 } else { 5.0 + x as f32 });
         let (made, counts) = demosaicked(&frame, Method::SmoothHue);
         assert!(made.samples.iter().all(|s| s.is_finite()));
         assert!(counts.undefined_hue > 0);
@@ -500,8 +455,7 @@ mod tests {
             geometry: Geometry::new(4, 4, &["R", "G", "B"]),
             metadata: Metadata::new(QuantityKind::Electrons),
         };
-        let message =
-            Demosaic::new(&header, Method::Bilinear, Black::Auto, None).unwrap_err().to_string();
+        let message = Demosaic::new(&header, Method::Bilinear, Black::Auto, None).unwrap_err().to_string();
         assert!(message.contains("e.exr") && message.contains("run `mosaic` first"), "{message}");
     }
 }

@@ -15,11 +15,8 @@ pub(super) fn interpolate(tile: &Tile, output: &mut Rows<'_>) -> Counts {
         let (_, parity) = tile.chrominance(y);
         let [cfa, above, below] = [y, y - 1, y + 1].map(|y| tile.line(y));
         for (x, sample) in columns.clone().zip(line) {
-            *sample = if x & 1 == parity {
-                (cfa.sides(x) + (above.at(x) + below.at(x)) / 2.0) / 2.0
-            } else {
-                cfa.at(x)
-            };
+            *sample =
+                if x & 1 == parity { (cfa.sides(x) + (above.at(x) + below.at(x)) / 2.0) / 2.0 } else { cfa.at(x) };
         }
     });
     let hue = green.derive(0, |y, line| {

@@ -59,8 +59,7 @@ impl AtomicFile {
                 format!("there is no directory `{}`; make it first", directory.display()),
             ));
         }
-        let permissions =
-            std::fs::metadata(&resolved).map_or(Permissions::from_mode(0o666), |m| m.permissions());
+        let permissions = std::fs::metadata(&resolved).map_or(Permissions::from_mode(0o666), |m| m.permissions());
         let temporary: NamedTempFile = tempfile::Builder::new()
             .prefix(".cyanometer-")
             .permissions(permissions)
@@ -134,14 +133,9 @@ impl Target {
     /// # Errors
     ///
     /// [`Error::Usage`] when the output is a terminal or the file `input`; [`Error::Disk`].
-    pub fn open(
-        path: Option<&Path>,
-        needs_seek: bool,
-        input: Option<&(FileId, String)>,
-    ) -> Result<Self> {
+    pub fn open(path: Option<&Path>, needs_seek: bool, input: Option<&(FileId, String)>) -> Result<Self> {
         let name = path.map_or_else(|| STDOUT_NAME.to_owned(), |path| path.display().to_string());
-        let is_input =
-            |metadata: &std::fs::Metadata| input.is_some_and(|(id, _)| *id == file_id(metadata));
+        let is_input = |metadata: &std::fs::Metadata| input.is_some_and(|(id, _)| *id == file_id(metadata));
         let same = || same_file(&name, input.map_or("", |(_, input)| input.as_str()));
         let output = match path {
             None => {
@@ -151,12 +145,7 @@ impl Target {
                         "a frame is binary and does not go to a terminal; pipe it on, or name a file with -o".into(),
                     ));
                 }
-                File::from(
-                    stdout
-                        .as_fd()
-                        .try_clone_to_owned()
-                        .map_err(|e| Error::disk(&name, "open", e))?,
-                )
+                File::from(stdout.as_fd().try_clone_to_owned().map_err(|e| Error::disk(&name, "open", e))?)
             }
             Some(path) => {
                 let existing = std::fs::metadata(path).ok();
@@ -167,10 +156,7 @@ impl Target {
                     let file = AtomicFile::create(path)?;
                     return Ok(Self { name, path: Some(path.to_owned()), kind: Kind::Named(file) });
                 }
-                OpenOptions::new()
-                    .write(true)
-                    .open(path)
-                    .map_err(|e| Error::disk(&name, "open", e))?
+                OpenOptions::new().write(true).open(path).map_err(|e| Error::disk(&name, "open", e))?
             }
         };
         if output.metadata().is_ok_and(|metadata| metadata.is_file() && is_input(&metadata)) {

@@ -61,9 +61,8 @@ impl SpectralTable {
         if !reader.read_record(&mut first).map_err(not_csv)? {
             return Err(refuse("it holds no rows".into()));
         }
-        let by_rows = first.len() > 2
-            && number(&first[0]).is_none()
-            && first.iter().skip(1).all(|c| number(c).is_some());
+        let by_rows =
+            first.len() > 2 && number(&first[0]).is_none() && first.iter().skip(1).all(|c| number(c).is_some());
         let header: Option<Vec<String>> =
             number(&first[0]).is_none().then(|| first.iter().map(ToOwned::to_owned).collect());
         let width = first.len();
@@ -86,21 +85,16 @@ impl SpectralTable {
                     None if by_rows && column == 0 => 0.0,
                     None => {
                         let shown: String = text.chars().take(20).collect();
-                        return Err(refuse(format!(
-                            "line {line}, column {}: `{shown}` is no number",
-                            column + 1
-                        )));
+                        return Err(refuse(format!("line {line}, column {}: `{shown}` is no number", column + 1)));
                     }
                 };
                 cells.push(value);
             }
         }
-        let cells = Array2::from_shape_vec((rows, width), cells)
-            .map_err(|_| refuse("its rows differ in length".into()))?;
+        let cells =
+            Array2::from_shape_vec((rows, width), cells).map_err(|_| refuse("its rows differ in length".into()))?;
         if width < 2 || rows == 0 {
-            return Err(refuse(
-                "it needs a column of wavelengths in nm and at least one of values".into(),
-            ));
+            return Err(refuse("it needs a column of wavelengths in nm and at least one of values".into()));
         }
         let (wavelength_nm, columns, values) = if by_rows {
             let wavelengths = first.iter().skip(1).filter_map(number).collect();
@@ -130,11 +124,7 @@ impl SpectralTable {
         let Some(column) = column else { return Ok(0) };
         self.columns.iter().position(|name| name == column).ok_or_else(|| {
             let some: Vec<&str> = self.columns.iter().take(8).map(String::as_str).collect();
-            Error::Usage(format!(
-                "{}: there is no column `{column}`; it has {}",
-                self.name,
-                some.join(", ")
-            ))
+            Error::Usage(format!("{}: there is no column `{column}`; it has {}", self.name, some.join(", ")))
         })
     }
 
@@ -172,8 +162,7 @@ mod tests {
 
     #[test]
     fn both_layouts_give_the_same_curves() {
-        let by_columns =
-            SpectralTable::parse("a", b"# sky\nwavelength_nm,a,b\n400,1,2\n410,3,4\n").unwrap();
+        let by_columns = SpectralTable::parse("a", b"# sky\nwavelength_nm,a,b\n400,1,2\n410,3,4\n").unwrap();
         let by_rows = SpectralTable::parse("b", b"id,400,410\nx,1,3\ny,2,4\n").unwrap();
         assert_eq!(by_columns.values, by_rows.values);
         assert_eq!(by_columns.wavelength_nm, by_rows.wavelength_nm);
@@ -183,8 +172,7 @@ mod tests {
 
     #[test]
     fn complaints_name_the_place() {
-        let complaint =
-            |text: &str| SpectralTable::parse("t.csv", text.as_bytes()).unwrap_err().to_string();
+        let complaint = |text: &str| SpectralTable::parse("t.csv", text.as_bytes()).unwrap_err().to_string();
         assert_eq!(complaint("nm,L\n400,1\n410,x\n"), "t.csv: line 3, column 2: `x` is no number");
         assert!(complaint("nm,L\n410,1\n400,2\n").contains("must ascend"));
         assert!(complaint("nm,L\n400,nan\n").contains("`nan` is no number"));

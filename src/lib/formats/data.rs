@@ -18,15 +18,9 @@ pub const DEFAULT_SENSOR: &str = "kaf-5101ce";
 /// Files that every program carries, by their place in `sample_data`.
 const BUILT_IN: [(&str, &[u8]); 4] = [
     ("sensors/kaf-5101ce.yaml", include_bytes!("../../../sample_data/sensors/kaf-5101ce.yaml")),
-    (
-        "sensors/kaf5101ce_est_qe_1nm.csv",
-        include_bytes!("../../../sample_data/sensors/kaf5101ce_est_qe_1nm.csv"),
-    ),
+    ("sensors/kaf5101ce_est_qe_1nm.csv", include_bytes!("../../../sample_data/sensors/kaf5101ce_est_qe_1nm.csv")),
     ("sensors/bg39_1mm.csv", include_bytes!("../../../sample_data/sensors/bg39_1mm.csv")),
-    (
-        "observers/cie1931_2deg_1nm.csv",
-        include_bytes!("../../../sample_data/observers/cie1931_2deg_1nm.csv"),
-    ),
+    ("observers/cie1931_2deg_1nm.csv", include_bytes!("../../../sample_data/observers/cie1931_2deg_1nm.csv")),
 ];
 
 /// A sensor with its curves.
@@ -54,23 +48,16 @@ enum Place {
 /// [`Error::Usage`] for an unknown name, listing those there are; [`Error::Disk`] and [`Error::Format`] for bad files.
 pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
     let path = Path::new(name);
-    let is_path = path.components().count() > 1
-        || path.extension().is_some_and(|end| end == "yaml" || end == "yml");
+    let is_path = path.components().count() > 1 || path.extension().is_some_and(|end| end == "yaml" || end == "yml");
     let (place, shown, bytes) = if is_path {
         let bytes = read_file(path)?;
-        (
-            Place::Directory(path.parent().map(Path::to_owned).unwrap_or_default()),
-            name.to_owned(),
-            bytes,
-        )
+        (Place::Directory(path.parent().map(Path::to_owned).unwrap_or_default()), name.to_owned(), bytes)
     } else {
         let file = format!("sensors/{name}.yaml");
         match find(&file)? {
-            Some((Place::Directory(directory), bytes)) => (
-                Place::Directory(directory.join("sensors")),
-                directory.join(file).display().to_string(),
-                bytes,
-            ),
+            Some((Place::Directory(directory), bytes)) => {
+                (Place::Directory(directory.join("sensors")), directory.join(file).display().to_string(), bytes)
+            }
             Some((Place::BuiltIn, bytes)) => (Place::BuiltIn, format!("sensor {name}"), bytes),
             None => {
                 return Err(Error::Usage(format!(
@@ -88,8 +75,7 @@ pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
         SpectralTable::parse(&name, &bytes)
     };
     let efficiencies = table(&mut sensor.quantum_efficiency)?;
-    let class =
-        |letter: &str| within_unit(&shown, "quantum_efficiency", efficiencies.curve(Some(letter))?);
+    let class = |letter: &str| within_unit(&shown, "quantum_efficiency", efficiencies.curve(Some(letter))?);
     let quantum_efficiency = [class("R")?, class("G")?, class("B")?];
     let cover_glass = match &mut sensor.cover_glass {
         Some(glass) => {
@@ -109,13 +95,7 @@ pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
 pub fn load_observer() -> Result<Observer> {
     let name = "observers/cie1931_2deg_1nm.csv";
     let table = SpectralTable::parse(name, built_in(name).unwrap_or_default())?;
-    Ok(Observer {
-        matching: [
-            table.curve(Some("xbar"))?,
-            table.curve(Some("ybar"))?,
-            table.curve(Some("zbar"))?,
-        ],
-    })
+    Ok(Observer { matching: [table.curve(Some("xbar"))?, table.curve(Some("ybar"))?, table.curve(Some("zbar"))?] })
 }
 
 /// Reads a whole small file.
@@ -152,10 +132,7 @@ pub fn read_table(input: impl Read, name: &str) -> Result<Vec<u8>> {
 fn within_unit(sensor: &str, key: &str, curve: Curve) -> Result<Curve> {
     let (low, high) = curve.extremes();
     if low < 0.0 || high > 1.0 {
-        return Err(Error::format(
-            sensor,
-            format!("`{key}` runs from {low} to {high}; it must lie within 0 and 1"),
-        ));
+        return Err(Error::format(sensor, format!("`{key}` runs from {low} to {high}; it must lie within 0 and 1")));
     }
     Ok(curve)
 }
@@ -163,10 +140,7 @@ fn within_unit(sensor: &str, key: &str, curve: Curve) -> Result<Curve> {
 /// Reads a file that a sensor file names; a name with a directory in it is never opened.
 fn read_beside(place: &Place, sensor: &str, file: &str) -> Result<(String, Vec<u8>)> {
     if Path::new(file).file_name().is_none_or(|name| name != file) {
-        return Err(Error::format(
-            sensor,
-            format!("`{file}` must be the bare name of a file beside the sensor file"),
-        ));
+        return Err(Error::format(sensor, format!("`{file}` must be the bare name of a file beside the sensor file")));
     }
     match place {
         Place::Directory(directory) => {
@@ -186,9 +160,8 @@ fn built_in(file: &str) -> Option<&'static [u8]> {
 
 /// Directories that may hold data files, first to last.
 fn directories() -> Vec<PathBuf> {
-    let mut found: Vec<PathBuf> = std::env::var_os(DATA_VARIABLE)
-        .map(|list| std::env::split_paths(&list).collect())
-        .unwrap_or_default();
+    let mut found: Vec<PathBuf> =
+        std::env::var_os(DATA_VARIABLE).map(|list| std::env::split_paths(&list).collect()).unwrap_or_default();
     if let Ok(program) = std::env::current_exe() {
         let above: Vec<&Path> = program.ancestors().skip(1).collect();
         found.extend(above.get(1).map(|prefix| prefix.join("share/cyanometer")));
@@ -251,10 +224,7 @@ mod tests {
     #[test]
     fn the_observer_integrates_to_the_equal_energy_white() {
         let observer = load_observer().unwrap();
-        let sums = observer
-            .matching
-            .each_ref()
-            .map(|curve| (360..=830).map(|nm| curve.at(f64::from(nm))).sum::<f64>());
+        let sums = observer.matching.each_ref().map(|curve| (360..=830).map(|nm| curve.at(f64::from(nm))).sum::<f64>());
         // Equal energy has x = y = ⅓ to the rounding of the tables (CIE 015, Table T.4: 0.33333 to 0.33334).
         let total: f64 = sums.iter().sum();
         assert!(sums.iter().all(|sum| (sum / total - 1.0 / 3.0).abs() < 1e-4), "{sums:?}");
@@ -269,12 +239,7 @@ mod tests {
     #[test]
     fn no_path_in_a_sensor_file_is_opened() {
         for file in ["../qe.csv", "/etc/passwd", "a/b.csv", ".."] {
-            assert!(
-                read_beside(&Place::BuiltIn, "s.yaml", file)
-                    .unwrap_err()
-                    .to_string()
-                    .contains("bare name")
-            );
+            assert!(read_beside(&Place::BuiltIn, "s.yaml", file).unwrap_err().to_string().contains("bare name"));
         }
     }
 }

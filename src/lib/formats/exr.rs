@@ -11,8 +11,7 @@ use exr::compression::Compression;
 use exr::error::Error as ExrError;
 use exr::math::Vec2;
 use exr::meta::attribute::{
-    AttributeValue, ChannelDescription, ChannelList, Chromaticities, IntegerBounds, LineOrder,
-    SampleType, Text,
+    AttributeValue, ChannelDescription, ChannelList, Chromaticities, IntegerBounds, LineOrder, SampleType, Text,
 };
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::meta::{BlockDescription, MetaData, Requirements, magic_number};
@@ -233,10 +232,7 @@ impl ExrReader {
                 .map(|column| self.next_chunk(first / natural * across + column, column, first))
                 .collect::<Result<_>>()?;
             let (meta, name) = (&self.meta, &self.name);
-            let decode = |chunk| {
-                UncompressedBlock::decompress_chunk(chunk, meta, true)
-                    .map_err(|e| damaged(name, &e))
-            };
+            let decode = |chunk| UncompressedBlock::decompress_chunk(chunk, meta, true).map_err(|e| damaged(name, &e));
             let blocks: Vec<UncompressedBlock> = if count > 1 {
                 chunks.into_par_iter().map(decode).collect::<Result<_>>()?
             } else {
@@ -260,15 +256,9 @@ impl ExrReader {
             Input::Pipe(input) => Chunk::read(input, &self.meta).map_err(|e| damaged(name, &e))?,
             Input::File { reader, position, length, offsets } => {
                 let offset = offsets[index];
-                let delta = i64::try_from(offset)
-                    .ok()
-                    .zip(i64::try_from(*position).ok())
-                    .map(|(to, from)| to - from);
+                let delta = i64::try_from(offset).ok().zip(i64::try_from(*position).ok()).map(|(to, from)| to - from);
                 let Some(delta) = delta.filter(|_| offset < *length) else {
-                    return Err(Error::format(
-                        name,
-                        "its table of blocks points outside the file; it is damaged",
-                    ));
+                    return Err(Error::format(name, "its table of blocks points outside the file; it is damaged"));
                 };
                 reader.seek_relative(delta).map_err(|e| Error::disk(name, "read", e))?;
                 let mut counted = Counted { inner: reader, count: 0 };
@@ -281,44 +271,29 @@ impl ExrReader {
         let in_place = chunk.layer_index == self.part
             && match &chunk.compressed_block {
                 CompressedBlock::ScanLine(block) => {
-                    i64::from(block.y_coordinate)
-                        == i64::from(header.own_attributes.layer_position.y()) + first as i64
+                    i64::from(block.y_coordinate) == i64::from(header.own_attributes.layer_position.y()) + first as i64
                 }
                 CompressedBlock::Tile(tile) => {
                     tile.coordinates.level_index == Vec2(0, 0)
-                        && tile.coordinates.tile_index
-                            == Vec2(column, first / header.max_block_pixel_size().height())
+                        && tile.coordinates.tile_index == Vec2(column, first / header.max_block_pixel_size().height())
                 }
                 _ => false,
             };
         if in_place {
             Ok(chunk)
         } else {
-            Err(Error::format(
-                name,
-                format!("the block of row {first} is missing or out of order; it is damaged"),
-            ))
+            Err(Error::format(name, format!("the block of row {first} is missing or out of order; it is damaged")))
         }
     }
 
     /// Puts a decoded block into rows that start at row `first`.
-    fn place(
-        &self,
-        block: &UncompressedBlock,
-        first: usize,
-        rows: usize,
-        samples: &mut [f32],
-    ) -> Result<()> {
+    fn place(&self, block: &UncompressedBlock, first: usize, rows: usize, samples: &mut [f32]) -> Result<()> {
         let header = self.header();
         let (width, channels) = (self.geometry.width, self.geometry.channels.len());
         let (left, top) = (block.index.pixel_position.x(), block.index.pixel_position.y());
-        let (block_width, block_rows) =
-            (block.index.pixel_size.width(), block.index.pixel_size.height());
+        let (block_width, block_rows) = (block.index.pixel_size.width(), block.index.pixel_size.height());
         if top != first || block_rows != rows || left + block_width > width {
-            return Err(Error::format(
-                &self.name,
-                "a block has another size than its header says; it is damaged",
-            ));
+            return Err(Error::format(&self.name, "a block has another size than its header says; it is damaged"));
         }
         // Where each of the file's channels goes.
         let mut target = vec![0; channels];
@@ -364,10 +339,7 @@ impl ExrReader {
             return Err(cut_short(&self.name));
         }
         if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
-            return Err(Error::format(
-                &self.name,
-                "two entries of its table of blocks are the same; it is damaged",
-            ));
+            return Err(Error::format(&self.name, "two entries of its table of blocks are the same; it is damaged"));
         }
         Ok(())
     }
@@ -380,8 +352,7 @@ pub fn is_streamable(head: &[u8]) -> bool {
 }
 
 fn read_meta(input: &mut impl Read, name: &str) -> Result<MetaData> {
-    let meta = MetaData::read_from_buffered(input.take(MAX_HEADER_BYTES), false)
-        .map_err(|e| damaged(name, &e))?;
+    let meta = MetaData::read_from_buffered(input.take(MAX_HEADER_BYTES), false).map_err(|e| damaged(name, &e))?;
     // The strict check of the whole, as the crate makes it before it writes.
     for header in &meta.headers {
         let mut long_names = false;
@@ -418,36 +389,25 @@ type Description = (Vec<usize>, Geometry, ExrTags, &'static str);
 fn describe(meta: &MetaData, part: usize, name: &str) -> Result<Description> {
     let Some(header) = meta.headers.get(part) else {
         let last = meta.headers.len().saturating_sub(1);
-        return Err(Error::Usage(format!(
-            "{name}: there is no part {part}; its parts are 0 to {last}"
-        )));
+        return Err(Error::Usage(format!("{name}: there is no part {part}; its parts are 0 to {last}")));
     };
     let refuse = |problem: &str| Err(Error::format(name, problem));
     if header.deep {
-        return refuse(
-            "deep data are not supported; flatten them first, for example with `oiiotool --flatten`",
-        );
+        return refuse("deep data are not supported; flatten them first, for example with `oiiotool --flatten`");
     }
     if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
         return refuse(SUBSAMPLED);
     }
     let is_read = match header.compression {
-        Compression::Uncompressed
-        | Compression::RLE
-        | Compression::ZIP1
-        | Compression::ZIP16
-        | Compression::PIZ => true,
-        // It cuts 32-bit floats to 24 bits, and loses nothing of the other types.
-        Compression::PXR24 => {
-            header.channels.list.iter().all(|channel| channel.sample_type != SampleType::F32)
+        Compression::Uncompressed | Compression::RLE | Compression::ZIP1 | Compression::ZIP16 | Compression::PIZ => {
+            true
         }
+        // It cuts 32-bit floats to 24 bits, and loses nothing of the other types.
+        Compression::PXR24 => header.channels.list.iter().all(|channel| channel.sample_type != SampleType::F32),
         _ => false,
     };
     if !is_read {
-        return Err(Error::format(
-            name,
-            format!("its {} is not read here; {STORE_WITHOUT_LOSS}", header.compression),
-        ));
+        return Err(Error::format(name, format!("its {} is not read here; {STORE_WITHOUT_LOSS}", header.compression)));
     }
     if header.max_block_byte_size() > MAX_BLOCK_BYTES {
         return refuse("its blocks are larger than 1 GiB; store it in smaller ones");
@@ -456,12 +416,8 @@ fn describe(meta: &MetaData, part: usize, name: &str) -> Result<Description> {
     if width == 0 || height == 0 || header.channels.list.is_empty() {
         return refuse("it has no samples");
     }
-    let names: Vec<String> = header
-        .channels
-        .list
-        .iter()
-        .map(|channel| String::from_utf8_lossy(channel.name.as_slice()).into())
-        .collect();
+    let names: Vec<String> =
+        header.channels.list.iter().map(|channel| String::from_utf8_lossy(channel.name.as_slice()).into()).collect();
     let order = canonical_order(&names);
     let origin = header.own_attributes.layer_position;
     let geometry = Geometry {
@@ -508,20 +464,16 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
         let exact = names.iter().position(|name| name == wanted);
         exact.or_else(|| names.iter().position(|name| bare_name(name) == wanted))
     };
-    let leading: Vec<usize> =
-        [&["R", "G", "B"][..], &["x", "y", "Y"], &["L", "a", "b"], &["X", "Y", "Z"], &["Y"]]
-            .into_iter()
-            .find_map(|set| set.iter().map(|name| place(name)).collect())
-            .unwrap_or_default();
+    let leading: Vec<usize> = [&["R", "G", "B"][..], &["x", "y", "Y"], &["L", "a", "b"], &["X", "Y", "Z"], &["Y"]]
+        .into_iter()
+        .find_map(|set| set.iter().map(|name| place(name)).collect())
+        .unwrap_or_default();
     let mut order: Vec<usize> = (0..names.len()).collect();
-    order.sort_by_key(|place| {
-        leading.iter().position(|leader| leader == place).unwrap_or(leading.len())
-    });
+    order.sort_by_key(|place| leading.iter().position(|leader| leader == place).unwrap_or(leading.len()));
     order
 }
 
-const SUBSAMPLED: &str =
-    "subsampled channels (luminance/chroma images) are not supported; convert it to RGB first";
+const SUBSAMPLED: &str = "subsampled channels (luminance/chroma images) are not supported; convert it to RGB first";
 const STORE_WITHOUT_LOSS: &str = "store it without loss as none, rle, zips, zip or piz";
 
 fn cut_short(name: &str) -> Error {
@@ -532,20 +484,13 @@ fn cut_short(name: &str) -> Error {
 fn damaged(name: &str, error: &ExrError) -> Error {
     match error {
         ExrError::Io(source) if source.kind() == io::ErrorKind::UnexpectedEof => cut_short(name),
-        ExrError::Io(source) => {
-            Error::disk(name, "read", io::Error::new(source.kind(), source.to_string()))
-        }
+        ExrError::Io(source) => Error::disk(name, "read", io::Error::new(source.kind(), source.to_string())),
         // Before any header is given out, the crate refuses what is named better here.
-        ExrError::NotSupported(what) if what.contains("subsampling") => {
-            Error::format(name, SUBSAMPLED)
+        ExrError::NotSupported(what) if what.contains("subsampling") => Error::format(name, SUBSAMPLED),
+        ExrError::Invalid(what) if what.contains("compression attribute") => {
+            Error::format(name, format!("its compression is missing or of an unknown kind; {STORE_WITHOUT_LOSS}"))
         }
-        ExrError::Invalid(what) if what.contains("compression attribute") => Error::format(
-            name,
-            format!("its compression is missing or of an unknown kind; {STORE_WITHOUT_LOSS}"),
-        ),
-        ExrError::NotSupported(what) => {
-            Error::format(name, format!("this kind of EXR is not supported: {what}"))
-        }
+        ExrError::NotSupported(what) => Error::format(name, format!("this kind of EXR is not supported: {what}")),
         // The crate reports the end of the file as "invalid: reference to missing bytes".
         ExrError::Invalid(what) if what.contains("missing bytes") => cut_short(name),
         ExrError::Invalid(what) => Error::format(name, format!("it is no valid EXR file: {what}")),
@@ -605,8 +550,7 @@ impl<W: Write> ExrWriter<W> {
         tags: &ExrTags,
     ) -> Result<Self> {
         let mut order: Vec<usize> = (0..geometry.channels.len()).collect();
-        order
-            .sort_by(|&a, &b| geometry.channels[a].as_bytes().cmp(geometry.channels[b].as_bytes()));
+        order.sort_by(|&a, &b| geometry.channels[a].as_bytes().cmp(geometry.channels[b].as_bytes()));
         let header = file_header(name, geometry, &order, samples, compression, tags)?;
         let mut head = Vec::new();
         let requirements = Requirements {
@@ -619,9 +563,7 @@ impl<W: Write> ExrWriter<W> {
         let encoded = magic_number::write(&mut head)
             .and_then(|()| requirements.write(&mut head))
             .and_then(|()| Header::write_all(std::slice::from_ref(&header), &mut head, false));
-        encoded.map_err(|error| {
-            Error::format(name, format!("its header cannot be written: {error}"))
-        })?;
+        encoded.map_err(|error| Error::format(name, format!("its header cannot be written: {error}")))?;
         let table_at = head.len() as u64;
         let blocks = header.chunk_count as u64;
         let data_at = table_at + 8 * blocks;
@@ -643,8 +585,7 @@ impl<W: Write> ExrWriter<W> {
         writer.put(&head)?;
         // Entry by entry: the table of a frame of 2^31 rows takes 16 GiB.
         for block in 0..blocks {
-            let offset =
-                if compression == ExrCompression::None { data_at + block * block_bytes } else { 0 };
+            let offset = if compression == ExrCompression::None { data_at + block * block_bytes } else { 0 };
             writer.put(&offset.to_le_bytes())?;
         }
         Ok(writer)
@@ -689,11 +630,8 @@ impl<W: Write> ExrWriter<W> {
         for &channel in &self.order {
             let line = &row[channel * width..(channel + 1) * width];
             match self.samples {
-                ExrSamples::F32 => {
-                    bytes.extend(line.iter().flat_map(|sample| sample.to_le_bytes()))
-                }
-                ExrSamples::F16 => bytes
-                    .extend(line.iter().flat_map(|&sample| f16::from_f32(sample).to_le_bytes())),
+                ExrSamples::F32 => bytes.extend(line.iter().flat_map(|sample| sample.to_le_bytes())),
+                ExrSamples::F16 => bytes.extend(line.iter().flat_map(|&sample| f16::from_f32(sample).to_le_bytes())),
             }
         }
     }
@@ -705,8 +643,7 @@ impl<W: Write> ExrWriter<W> {
     /// Compresses what is pending once it fills enough blocks to keep the threads busy, or at the end.
     fn compress_full_blocks(&mut self) -> Result<()> {
         let block_bytes = self.header.max_block_byte_size();
-        let together =
-            if block_bytes < PARALLEL_BLOCK_BYTES { 2 * rayon::current_num_threads() } else { 1 };
+        let together = if block_bytes < PARALLEL_BLOCK_BYTES { 2 * rayon::current_num_threads() } else { 1 };
         let last = self.rows_taken == self.geometry.height;
         if self.partial.is_empty() || !(last || self.partial.len() >= together * block_bytes) {
             return Ok(());
@@ -725,15 +662,12 @@ impl<W: Write> ExrWriter<W> {
                 },
                 data: data.to_vec(),
             };
-            block.compress_to_chunk(std::slice::from_ref(&self.header)).map_err(|error| {
-                Error::format(&self.name, format!("a block cannot be compressed: {error}"))
-            })
+            block
+                .compress_to_chunk(std::slice::from_ref(&self.header))
+                .map_err(|error| Error::format(&self.name, format!("a block cannot be compressed: {error}")))
         };
-        let chunks: Vec<Chunk> = pending
-            .par_chunks(block_bytes)
-            .enumerate()
-            .map(compress)
-            .collect::<Result<Vec<_>>>()?;
+        let chunks: Vec<Chunk> =
+            pending.par_chunks(block_bytes).enumerate().map(compress).collect::<Result<Vec<_>>>()?;
         drop(pending);
         for chunk in chunks {
             let CompressedBlock::ScanLine(block) = &chunk.compressed_block else { continue };
@@ -756,8 +690,7 @@ impl<W: Write> ExrWriter<W> {
         assert_eq!(self.rows_taken, self.geometry.height, "a frame was ended before its last row");
         self.output.flush().map_err(|e| Error::disk(&self.name, "write", e))?;
         let table = self.offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
-        let patch = (self.header.compression != Compression::Uncompressed)
-            .then_some((self.table_at, table));
+        let patch = (self.header.compression != Compression::Uncompressed).then_some((self.table_at, table));
         Ok((self.output, patch))
     }
 }
@@ -767,11 +700,7 @@ impl<W: Write> ExrWriter<W> {
 /// # Errors
 ///
 /// [`Error::Disk`] where writing fails.
-pub fn patch_table<W: Write + Seek>(
-    output: &mut W,
-    name: &str,
-    (at, table): &TablePatch,
-) -> Result<()> {
+pub fn patch_table<W: Write + Seek>(output: &mut W, name: &str, (at, table): &TablePatch) -> Result<()> {
     let patch = |output: &mut W| -> io::Result<()> {
         output.seek(SeekFrom::Start(*at))?;
         output.write_all(table)?;
@@ -789,14 +718,10 @@ fn file_header(
     compression: ExrCompression,
     tags: &ExrTags,
 ) -> Result<Header> {
-    let too_large =
-        || Error::Data(format!("{name}: the frame is larger than an EXR file can hold"));
+    let too_large = || Error::Data(format!("{name}: the frame is larger than an EXR file can hold"));
     let limit = i32::MAX as usize;
     let sample_bytes = if samples == ExrSamples::F32 { 4 } else { 2 };
-    if geometry.width > limit
-        || geometry.height > limit
-        || geometry.row_samples() * sample_bytes * 32 > limit
-    {
+    if geometry.width > limit || geometry.height > limit || geometry.row_samples() * sample_bytes * 32 > limit {
         return Err(too_large());
     }
     let text = |string: &String| Text::from_slice_unchecked(string.as_bytes());
@@ -826,8 +751,7 @@ fn file_header(
     own.white_luminance = tags.white_luminance.map(to_sample);
     // The crate keeps other attributes in a hash map; one entry alone has the same order in every run.
     if let Some(metadata) = &tags.metadata {
-        own.other
-            .insert(Text::new_or_panic(METADATA_ATTRIBUTE), AttributeValue::Text(text(metadata)));
+        own.other.insert(Text::new_or_panic(METADATA_ATTRIBUTE), AttributeValue::Text(text(metadata)));
     }
     let mut shared = ImageAttributes::new(IntegerBounds::new(origin, size));
     let point = |[x, y]: [f64; 2]| Vec2(to_sample(x), to_sample(y));

@@ -90,12 +90,7 @@ impl FrameReader {
     /// # Errors
     ///
     /// As [`Self::open`].
-    pub fn open_file(
-        input: File,
-        name: &str,
-        path: Option<&Path>,
-        options: &InputOptions,
-    ) -> Result<Self> {
+    pub fn open_file(input: File, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let id = input.metadata().ok().map(|m| file_id(&m));
         let (file, id) = sort_out(input, name, options.part, id)?;
         let (stored, stored_as) = match &file {
@@ -115,21 +110,9 @@ impl FrameReader {
             digest: Sha256::new(),
         });
         let is_integer = stored_as.starts_with('u');
-        let divisor =
-            (metadata.quantity == QuantityKind::Srgb && is_integer).then_some(U16_FULL_SCALE);
+        let divisor = (metadata.quantity == QuantityKind::Srgb && is_integer).then_some(U16_FULL_SCALE);
         let header = FrameHeader { name: name.into(), geometry, metadata };
-        Ok(Self {
-            file,
-            header,
-            stored,
-            stored_as,
-            id,
-            rows_read: 0,
-            check,
-            buffer: Vec::new(),
-            divisor,
-            notes,
-        })
+        Ok(Self { file, header, stored, stored_as, id, rows_read: 0, check, buffer: Vec::new(), divisor, notes })
     }
 
     /// Metadata to amend before a stage is built on them.
@@ -160,7 +143,10 @@ impl FrameReader {
         let DigestCheck { expected, sidecar, digest } = self.check.take()?;
         let found = format!("sha256:{}", hex(&digest.finalize()));
         (found != expected).then(|| {
-            format!("{}: its samples are not those that {sidecar} describes; one of the two was changed", self.header.name)
+            format!(
+                "{}: its samples are not those that {sidecar} describes; one of the two was changed",
+                self.header.name
+            )
         })
     }
 }
@@ -256,8 +242,7 @@ pub fn open_stdin() -> Result<File> {
     if stdin.is_terminal() {
         return Err(Error::Usage("no input: name a file, or pipe one in".into()));
     }
-    let owned =
-        stdin.as_fd().try_clone_to_owned().map_err(|e| Error::disk(STDIN_NAME, "open", e))?;
+    let owned = stdin.as_fd().try_clone_to_owned().map_err(|e| Error::disk(STDIN_NAME, "open", e))?;
     Ok(File::from(owned))
 }
 
@@ -290,12 +275,7 @@ pub fn spool(stream: &mut impl Read, name: &str) -> Result<File> {
 
 /// Finds out what a file holds and opens it with the right reader. A stream that its format cannot read without seeking
 /// is first copied to a temporary file.
-fn sort_out(
-    mut input: File,
-    name: &str,
-    part: usize,
-    id: Option<FileId>,
-) -> Result<(Rows, Option<FileId>)> {
+fn sort_out(mut input: File, name: &str, part: usize, id: Option<FileId>) -> Result<(Rows, Option<FileId>)> {
     let seekable = input.metadata().is_ok_and(|m| m.is_file());
     let mut head = Vec::new();
     let start = if seekable { input.stream_position().unwrap_or(0) } else { 0 };
@@ -305,25 +285,17 @@ fn sort_out(
         return Err(Error::format(name, format!("it is empty{hint}")));
     }
     let is_exr = head.starts_with(&[0x76, 0x2F, 0x31, 0x01]);
-    let is_tiff =
-        [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| head.starts_with(*magic));
+    let is_tiff = [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| head.starts_with(*magic));
     if !is_exr && !is_tiff {
-        let is_text =
-            head.iter().all(|&byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace());
-        let hint = if is_text {
-            "; it looks like text (a spectrum goes into `render-radiance`)"
-        } else {
-            ""
-        };
+        let is_text = head.iter().all(|&byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace());
+        let hint = if is_text { "; it looks like text (a spectrum goes into `render-radiance`)" } else { "" };
         return Err(Error::format(name, format!("it is neither an EXR nor a TIFF file{hint}")));
     }
     if seekable {
         input.seek(SeekFrom::Start(start)).map_err(|e| Error::disk(name, "read", e))?;
     } else if is_streamable(&head) {
         if part != 0 {
-            return Err(Error::Usage(format!(
-                "{name}: it has no part {part}; it has a single one"
-            )));
+            return Err(Error::Usage(format!("{name}: it has no part {part}; it has a single one")));
         }
         let whole = io::Cursor::new(head).chain(io::BufReader::with_capacity(1 << 16, input));
         return Ok((Rows::Exr(Box::new(ExrReader::stream(Box::new(whole), name)?)), None));
@@ -349,8 +321,7 @@ fn find_metadata(
     let from_file = |path: &Path| -> Result<Metadata> {
         let shown = path.display().to_string();
         let bytes = read_file(path)?;
-        let text =
-            String::from_utf8(bytes).map_err(|_| Error::format(&shown, "it is not UTF-8 text"))?;
+        let text = String::from_utf8(bytes).map_err(|_| Error::format(&shown, "it is not UTF-8 text"))?;
         yaml::parse_metadata(&shown, &text)
     };
     if let Some(path) = &options.metadata {
@@ -362,9 +333,7 @@ fn find_metadata(
     let embedded = match file {
         Rows::Exr(reader) => reader.tags().metadata.clone(),
         // Other programs put their own words into tag 270.
-        Rows::Tiff(reader) => {
-            reader.tags().description.clone().filter(|text| text.starts_with("schema: cyanometer/"))
-        }
+        Rows::Tiff(reader) => reader.tags().description.clone().filter(|text| text.starts_with("schema: cyanometer/")),
     };
     if let Some(text) = embedded {
         return Ok((yaml::parse_metadata(name, &text)?, None));
@@ -374,28 +343,15 @@ fn find_metadata(
         let tags = reader.tags();
         let known = tags.exposure_s.zip(tags.f_number);
         metadata.exposure = known
-            .map(|(exposure_s, f_number)| Exposure {
-                exposure_s,
-                f_number,
-                lens_transmittance: 1.0,
-            })
+            .map(|(exposure_s, f_number)| Exposure { exposure_s, f_number, lens_transmittance: 1.0 })
             .and_then(|exposure| exposure.checked().ok());
         let near = |found: Primaries| {
-            found
-                .iter()
-                .flatten()
-                .zip(XYZ_PRIMARIES.iter().flatten())
-                .all(|(a, b)| (a - b).abs() < 1e-6)
+            found.iter().flatten().zip(XYZ_PRIMARIES.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-6)
         };
         if tags.primaries.is_some_and(near) {
             metadata.quantity = QuantityKind::Xyz;
         }
-        if reader
-            .geometry()
-            .channels
-            .iter()
-            .any(|channel| super::spectral::wavelength_of(channel).is_some())
-        {
+        if reader.geometry().channels.iter().any(|channel| super::spectral::wavelength_of(channel).is_some()) {
             metadata.quantity = QuantityKind::SpectralRadiance;
             metadata.unit = tags.emissive_units.clone().unwrap_or_default();
         } else {
@@ -415,10 +371,8 @@ pub fn sidecar_path(path: &Path) -> PathBuf {
 /// The channels that stages work on: the first three where they are R, G, B; Y alone; otherwise all.
 fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry {
     let mut kept = stored.clone();
-    let starts = |names: &[&str]| {
-        stored.channels.len() > names.len()
-            && stored.channels.iter().zip(names).all(|(a, b)| a == b)
-    };
+    let starts =
+        |names: &[&str]| stored.channels.len() > names.len() && stored.channels.iter().zip(names).all(|(a, b)| a == b);
     if !all && quantity != QuantityKind::SpectralRadiance {
         if starts(&["R", "G", "B"]) {
             kept.channels.truncate(3);

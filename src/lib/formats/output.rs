@@ -97,8 +97,7 @@ enum Encoding {
 impl OutputOptions {
     fn encoding(&self, header: &FrameHeader) -> Result<Encoding> {
         let path = self.path.as_deref().filter(|path| *path != Path::new("-"));
-        let extension =
-            path.and_then(Path::extension).map(|end| end.to_string_lossy().to_ascii_lowercase());
+        let extension = path.and_then(Path::extension).map(|end| end.to_string_lossy().to_ascii_lowercase());
         let format = match (self.format, extension.as_deref()) {
             (Some(format), _) => format,
             (None, Some("exr") | None) => Format::Exr,
@@ -143,13 +142,9 @@ impl OutputOptions {
             Format::Tiff => {
                 let samples = match samples {
                     SampleKind::F32 => TiffSamples::F32,
-                    SampleKind::U16 if is_codes || quantity == QuantityKind::Srgb => {
-                        TiffSamples::U16
-                    }
+                    SampleKind::U16 if is_codes || quantity == QuantityKind::Srgb => TiffSamples::U16,
                     SampleKind::U16 => {
-                        return Err(Error::Usage(format!(
-                            "u16 would round or clip {quantity}; write f32"
-                        )));
+                        return Err(Error::Usage(format!("u16 would round or clip {quantity}; write f32")));
                     }
                     SampleKind::F16 => {
                         return refuse("TIFF stores u16 or f32 here; for f16 write an EXR");
@@ -189,11 +184,7 @@ impl FrameWriter {
     /// # Errors
     ///
     /// [`Error::Usage`] where options do not go together, the output is a terminal or an input; [`Error::Disk`].
-    pub fn create(
-        options: &OutputOptions,
-        header: &FrameHeader,
-        input: Option<&(FileId, String)>,
-    ) -> Result<Self> {
+    pub fn create(options: &OutputOptions, header: &FrameHeader, input: Option<&(FileId, String)>) -> Result<Self> {
         let encoding = options.encoding(header)?;
         let path = options.path.as_deref().filter(|path| *path != Path::new("-"));
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
@@ -208,16 +199,10 @@ impl FrameWriter {
                 let exposure = header.metadata.exposure;
                 let primaries = match header.metadata.quantity {
                     QuantityKind::Xyz => Some(XYZ_PRIMARIES),
-                    QuantityKind::ExpectedElectrons
-                    | QuantityKind::Electrons
-                    | QuantityKind::Adu
+                    QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu
                         if header.has_three_planes() =>
                     {
-                        let matrix = header
-                            .metadata
-                            .sensor
-                            .as_ref()
-                            .and_then(|sensor| sensor.xyz_from_camera);
+                        let matrix = header.metadata.sensor.as_ref().and_then(|sensor| sensor.xyz_from_camera);
                         matrix.and_then(|matrix| color::implied_primaries(&matrix))
                     }
                     _ => None,
@@ -232,14 +217,7 @@ impl FrameWriter {
                     primaries,
                     emissive_units: None,
                 };
-                Encoder::Exr(Box::new(ExrWriter::create(
-                    target,
-                    &name,
-                    geometry,
-                    samples,
-                    compression,
-                    &tags,
-                )?))
+                Encoder::Exr(Box::new(ExrWriter::create(target, &name, geometry, samples, compression, &tags)?))
             }
             Encoding::Tiff(samples, compression) => {
                 let scale = u16_scale(header.metadata.quantity, samples);
@@ -278,8 +256,7 @@ impl FrameWriter {
         let sidecar = match self.record {
             Some((digest, path)) => {
                 let mut metadata = self.header.metadata;
-                metadata.samples =
-                    Some(counts.record(format!("sha256:{}", hex(&digest.finalize()))));
+                metadata.samples = Some(counts.record(format!("sha256:{}", hex(&digest.finalize()))));
                 let mut file = AtomicFile::create(&path)?;
                 let text = yaml::write_metadata(&metadata)?;
                 file.write_all(text.as_bytes())
@@ -315,22 +292,17 @@ impl RowSink for FrameWriter {
             // The digest is that of the samples as a reader will get them.
             let scale = match self.encoding {
                 Encoding::Exr(ExrSamples::F16, _) => None,
-                Encoding::Tiff(TiffSamples::U16, _) => {
-                    Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16))
-                }
+                Encoding::Tiff(TiffSamples::U16, _) => Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16)),
                 _ => {
                     update_digest(digest, samples);
                     return self.encode(samples);
                 }
             };
             self.stored.clear();
-            self.stored.extend(samples.iter().map(|&sample| {
-                match scale {
-                    None => f16::from_f32(sample).to_f32(),
-                    Some(scale) => to_sample(
-                        f64::from((sample * scale).round_ties_even().clamp(0.0, U16_FULL_SCALE))
-                            .max(0.0),
-                    ),
+            self.stored.extend(samples.iter().map(|&sample| match scale {
+                None => f16::from_f32(sample).to_f32(),
+                Some(scale) => {
+                    to_sample(f64::from((sample * scale).round_ties_even().clamp(0.0, U16_FULL_SCALE)).max(0.0))
                 }
             }));
             update_digest(digest, &self.stored);
@@ -358,8 +330,7 @@ pub fn write_text(path: Option<&Path>, text: &str, input: Option<&(FileId, Strin
     match path.filter(|path| *path != Path::new("-")) {
         Some(path) => {
             let mut file = Target::open(Some(path), false, input)?;
-            file.write_all(text.as_bytes())
-                .map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
+            file.write_all(text.as_bytes()).map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
             file.commit()
         }
         None => {

@@ -93,8 +93,7 @@ pub fn write_png(
     for row in kept.chunks_exact(region.width * planes) {
         let start = bytes.len();
         for x in 0..region.width {
-            let pixel: Vec<f64> =
-                (0..planes).map(|plane| f64::from(row[plane * region.width + x])).collect();
+            let pixel: Vec<f64> = (0..planes).map(|plane| f64::from(row[plane * region.width + x])).collect();
             let shown = shade.apply(&pixel);
             for _ in 0..settings.zoom {
                 bytes.extend_from_slice(&shown);
@@ -152,8 +151,7 @@ impl Shade {
                     return Ok(Self::Xyz(linear_srgb_from_xyz(white)));
                 }
                 QuantityKind::ExpectedElectrons | QuantityKind::Electrons => {
-                    let full =
-                        metadata.sensor.as_ref().map_or(highest, |sensor| sensor.full_well_e);
+                    let full = metadata.sensor.as_ref().map_or(highest, |sensor| sensor.full_well_e);
                     (metadata.dark_signal_e.unwrap_or(0.0), full)
                 }
                 QuantityKind::Adu => {
@@ -185,13 +183,8 @@ impl Shade {
         let encoded: Vec<f64> = match self {
             Self::Encoded => pixel.to_vec(),
             Self::Planes(ranges) => {
-                let shade =
-                    |(value, (low, high)): (&f64, &(f64, f64))| (value - low) / (high - low);
-                pixel
-                    .iter()
-                    .zip(ranges)
-                    .map(|pair| srgb_encode(shade(pair).clamp(0.0, 1.0)))
-                    .collect()
+                let shade = |(value, (low, high)): (&f64, &(f64, f64))| (value - low) / (high - low);
+                pixel.iter().zip(ranges).map(|pair| srgb_encode(shade(pair).clamp(0.0, 1.0))).collect()
             }
             Self::Xyz(matrix) => {
                 let linear = matrix * Vector3::from_fn(|i, _| pixel.get(i).copied().unwrap_or(0.0));
@@ -199,11 +192,7 @@ impl Shade {
             }
         };
         // NaN is shown as black.
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped to a byte"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a byte")]
         encoded.iter().map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8).collect()
     }
 }

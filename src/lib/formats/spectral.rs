@@ -57,9 +57,7 @@ impl SpectralChannels {
             Some(unit) => unit,
             None if stated.is_empty() => RadianceUnit::default(),
             None => RadianceUnit::parse(stated).ok_or_else(|| {
-                frame.refuse(format!(
-                    "its unit of radiance, `{stated}`, is not known; give --radiance-unit"
-                ))
+                frame.refuse(format!("its unit of radiance, `{stated}`, is not known; give --radiance-unit"))
             })?,
         };
         Ok(Self { channels, wavelength_nm, unit })
@@ -93,9 +91,7 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
             file = spool(&mut io::Cursor::new(head).chain(file), &name)?;
         }
         let options = InputOptions { all_channels: true, ..options.clone() };
-        return Ok(Radiances::Image(Box::new(FrameReader::open_file(
-            file, &name, path, &options,
-        )?)));
+        return Ok(Radiances::Image(Box::new(FrameReader::open_file(file, &name, path, &options)?)));
     }
     let bytes = data::read_table(io::Cursor::new(head).chain(file), &name)?;
     Ok(Radiances::Table(SpectralTable::parse(&name, &bytes)?))
@@ -114,8 +110,7 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralL
             let spectral = SpectralChannels::of(reader.header(), unit)?;
             let geometry = reader.header().geometry.clone();
             let factor = spectral.unit.in_w_per_cm2_sr_nm();
-            let mut radiance =
-                Array2::zeros((geometry.width * geometry.height, spectral.channels.len()));
+            let mut radiance = Array2::zeros((geometry.width * geometry.height, spectral.channels.len()));
             let mut row = Vec::new();
             for y in 0..geometry.height {
                 row.clear();
@@ -136,9 +131,7 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralL
         }
     };
     match library.radiance.indexed_iter().find(|(_, value)| !value.is_finite()) {
-        Some(((sample, _), _)) => {
-            Err(Error::format(&name, format!("sample {sample} is not finite")))
-        }
+        Some(((sample, _), _)) => Err(Error::format(&name, format!("sample {sample} is not finite"))),
         None => Ok(library),
     }
 }

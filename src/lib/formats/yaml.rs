@@ -37,11 +37,7 @@ fn not_as_expected(name: &str, error: &serde_yaml::Error) -> Error {
 ///
 /// [`Error::Format`] when the text is no YAML of this kind, is larger or deeper than any of ours, or holds a number that
 /// is not finite. The place is named where the parser knows it.
-fn parse<T: DeserializeOwned + Serialize>(
-    name: &str,
-    raw: &Mapping,
-    text: &str,
-) -> Result<(T, Mapping)> {
+fn parse<T: DeserializeOwned + Serialize>(name: &str, raw: &Mapping, text: &str) -> Result<(T, Mapping)> {
     let typed: T = serde_yaml::from_str(text).map_err(|error| not_as_expected(name, &error))?;
     let known = serde_yaml::to_value(&typed).map_err(|error| not_as_expected(name, &error))?;
     let unknown = known.as_mapping().map(|known| unknown_keys(raw, known)).unwrap_or_default();
@@ -59,9 +55,7 @@ pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -
     let raw = parse_raw(name, text)?;
     let fields = field_names::<T>();
     // A misspelt key first: that another is missing then follows from it.
-    if let Some(key) =
-        raw.keys().map(|key| key.as_str().unwrap_or("?")).find(|key| !fields.contains(key))
-    {
+    if let Some(key) = raw.keys().map(|key| key.as_str().unwrap_or("?")).find(|key| !fields.contains(key)) {
         let nearest = fields
             .iter()
             .map(|known| (strsim::damerau_levenshtein(known, key), known))
@@ -74,8 +68,7 @@ pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -
     match unknown.iter().next() {
         None => Ok(typed),
         Some((key, inner)) => {
-            let inner =
-                inner.as_mapping().and_then(|inner| inner.keys().next()).and_then(Value::as_str);
+            let inner = inner.as_mapping().and_then(|inner| inner.keys().next()).and_then(Value::as_str);
             let (key, inner) = (key.as_str().unwrap_or("?"), inner.unwrap_or("?"));
             Err(Error::format(name, format!("`{key}` has an unknown key `{inner}`; remove it")))
         }
@@ -94,10 +87,7 @@ pub fn parse_metadata(name: &str, text: &str) -> Result<Metadata> {
     if metadata.schema != METADATA_SCHEMA {
         return Err(Error::format(
             name,
-            format!(
-                "its schema is `{}`, but this version reads `{METADATA_SCHEMA}`",
-                metadata.schema
-            ),
+            format!("its schema is `{}`, but this version reads `{METADATA_SCHEMA}`", metadata.schema),
         ));
     }
     if let Some(sensor) = &metadata.sensor {
@@ -116,8 +106,7 @@ pub fn parse_metadata(name: &str, text: &str) -> Result<Metadata> {
 ///
 /// [`Error::Data`] when it cannot be written as YAML.
 pub fn write_metadata(metadata: &Metadata) -> Result<String> {
-    let wrong =
-        |error: serde_yaml::Error| Error::Data(format!("the metadata cannot be written: {error}"));
+    let wrong = |error: serde_yaml::Error| Error::Data(format!("the metadata cannot be written: {error}"));
     let mut value = serde_yaml::to_value(metadata).map_err(wrong)?;
     if let Value::Mapping(mapping) = &mut value {
         merge(mapping, &metadata.unknown);
@@ -153,8 +142,7 @@ fn checked_text<'a>(name: &str, bytes: &'a [u8]) -> Result<&'a str> {
             return refuse("its brackets nest too deep");
         }
     }
-    let indent =
-        |line: &str| line.len() - line.trim_start_matches([' ', '-', '?', ':', '\t']).len();
+    let indent = |line: &str| line.len() - line.trim_start_matches([' ', '-', '?', ':', '\t']).len();
     if text.lines().any(|line| indent(line) > MAX_INDENT) {
         return refuse("its lines nest too deep");
     }
@@ -180,12 +168,10 @@ fn not_finite(value: &Value) -> Option<String> {
         other => not_finite(other).map(|inner| format!("{key}.{inner}")),
     };
     match value {
-        Value::Mapping(mapping) => mapping
-            .iter()
-            .find_map(|(key, value)| inside(key.as_str().unwrap_or("?").to_owned(), value)),
-        Value::Sequence(items) => {
-            items.iter().enumerate().find_map(|(index, value)| inside(index.to_string(), value))
+        Value::Mapping(mapping) => {
+            mapping.iter().find_map(|(key, value)| inside(key.as_str().unwrap_or("?").to_owned(), value))
         }
+        Value::Sequence(items) => items.iter().enumerate().find_map(|(index, value)| inside(index.to_string(), value)),
         Value::Tagged(tagged) => not_finite(&tagged.value),
         _ => None,
     }
@@ -232,10 +218,7 @@ fn field_names<T: DeserializeOwned>() -> &'static [&'static str] {
     impl<'de> Deserializer<'de> for Ask<'_> {
         type Error = value::Error;
 
-        fn deserialize_any<V: Visitor<'de>>(
-            self,
-            _: V,
-        ) -> std::result::Result<V::Value, value::Error> {
+        fn deserialize_any<V: Visitor<'de>>(self, _: V) -> std::result::Result<V::Value, value::Error> {
             Err(serde::de::Error::custom("only structs have fields"))
         }
 
@@ -275,8 +258,7 @@ mod tests {
 
     #[test]
     fn a_misspelt_key_is_answered_with_the_right_one() {
-        let complaint =
-            |text: &str| parse_strict::<Small>("s.yaml", text.as_bytes()).unwrap_err().to_string();
+        let complaint = |text: &str| parse_strict::<Small>("s.yaml", text.as_bytes()).unwrap_err().to_string();
         assert_eq!(
             complaint("gain: 1\nread_niose_e: 3\n"),
             "s.yaml: unknown key `read_niose_e`; did you mean `read_noise_e`?"
@@ -294,10 +276,7 @@ mod tests {
         assert_eq!(metadata.quantity, QuantityKind::Adu);
         let again = write_metadata(&metadata).unwrap();
         assert!(again.contains("observer:") && again.contains("iso: 100"), "{again}");
-        assert_eq!(
-            parse_metadata("x", &again).unwrap(),
-            Metadata { unit: String::new(), ..metadata }
-        );
+        assert_eq!(parse_metadata("x", &again).unwrap(), Metadata { unit: String::new(), ..metadata });
     }
 
     #[test]

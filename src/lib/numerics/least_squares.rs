@@ -60,13 +60,11 @@ mod tests {
     #[test]
     fn an_exact_relation_is_found_again() {
         let truth = DMatrix::from_row_slice(3, 2, &[1.0, -2.0, 0.5, 4.0, 1e-3, 7.0]);
-        let regressors =
-            DMatrix::from_fn(9, 3, |i, j| ((i * 7 + j * 5) % 11) as f64 * 10f64.powi(3 * j as i32));
+        let regressors = DMatrix::from_fn(9, 3, |i, j| ((i * 7 + j * 5) % 11) as f64 * 10f64.powi(3 * j as i32));
         let fit = fit(&regressors, &(&regressors * &truth)).unwrap();
         // The last response reaches 7·10⁷; its rounding divided by a column's scale is what a coefficient may be off.
-        for ((i, _), error) in (0..3)
-            .flat_map(|i| (0..2).map(move |j| (i, j)))
-            .zip((fit.coefficients - truth).transpose().iter())
+        for ((i, _), error) in
+            (0..3).flat_map(|i| (0..2).map(move |j| (i, j))).zip((fit.coefficients - truth).transpose().iter())
         {
             assert!(error.abs() < 7e7 * 100.0 * f64::EPSILON / 1000f64.powi(i), "{i} {error}");
         }

@@ -98,8 +98,7 @@ impl Moments {
         let mut pair = 0;
         for i in 0..self.channels() {
             for j in i..self.channels() {
-                self.comoments[pair] +=
-                    other.comoments[pair] + shift[i] * shift[j] * mine * theirs / total;
+                self.comoments[pair] += other.comoments[pair] + shift[i] * shift[j] * mine * theirs / total;
                 pair += 1;
             }
             self.mean[i] += shift[i] * theirs / total;
@@ -139,8 +138,7 @@ mod tests {
         let mean = |x: &[f32]| x.iter().map(|&v| f64::from(v)).sum::<f64>() / 1000.0;
         let covariance = |x: &[f32], y: &[f32]| -> f64 {
             let (mx, my) = (mean(x), mean(y));
-            x.iter().zip(y).map(|(&u, &v)| (f64::from(u) - mx) * (f64::from(v) - my)).sum::<f64>()
-                / 999.0
+            x.iter().zip(y).map(|(&u, &v)| (f64::from(u) - mx) * (f64::from(v) - my)).sum::<f64>() / 999.0
         };
         assert_eq!(moments.count, 1000);
         // Double rounding, 1000 terms: relative 1000 · 2⁻⁵³ ≈ 10⁻¹³, on sums that reach 10 per sample.
@@ -164,10 +162,8 @@ mod tests {
     fn the_triangle_is_indexed_as_it_is_filled() {
         let mut moments = Moments::new(3);
         moments.add(&[&[0.0, 2.0], &[0.0, 4.0], &[0.0, -6.0]]);
-        let covariances: Vec<f64> = (0..3)
-            .flat_map(|i| (0..3).map(move |j| (i, j)))
-            .map(|(i, j)| moments.covariance(i, j).unwrap())
-            .collect();
+        let covariances: Vec<f64> =
+            (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).map(|(i, j)| moments.covariance(i, j).unwrap()).collect();
         assert_eq!(covariances, [2.0, 4.0, -6.0, 4.0, 8.0, -12.0, -6.0, -12.0, 18.0]);
     }
 }

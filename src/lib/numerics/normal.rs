@@ -111,8 +111,7 @@ impl NearlyNormal {
         let he3 = z * (z * z - 3.0);
         let he2 = z * z - 1.0;
         // First tail integral I₁ = ∫_z^∞ P(X > t) dt = E[(X − z)₊], in units of σ.
-        let first = phi - z * tail
-            + phi * (skewness / 6.0 * z + kurtosis / 24.0 * he2 + skewness.powi(2) / 72.0 * he4);
+        let first = phi - z * tail + phi * (skewness / 6.0 * z + kurtosis / 24.0 * he2 + skewness.powi(2) / 72.0 * he4);
         // Second, I₂ = ∫_z^∞ (t − z) P(X > t) dt = ½ E[(X − z)₊²].
         let second = 0.5 * ((1.0 + z * z) * tail - z * phi)
             + phi * (skewness / 6.0 + kurtosis / 24.0 * z + skewness.powi(2) / 72.0 * he3);
@@ -160,12 +159,7 @@ fn fourth_cumulant([_, m1, m2, m3, m4]: [f64; 5]) -> f64 {
 /// With p_k = P(x > k + ½), the code is Σ p_k in the mean and its square Σ (2k + 1) p_k, k from 0 to top − 1, exact at
 /// every spread from 0 up and at both rails; likewise its third and fourth power. Sums run about the mean, over the
 /// codes that can occur.
-pub fn rounded(
-    mean: f64,
-    sigma: f64,
-    top: u32,
-    exceeds: impl Fn(f64) -> f64,
-) -> (MeanVariance, f64) {
+pub fn rounded(mean: f64, sigma: f64, top: u32, exceeds: impl Fn(f64) -> f64) -> (MeanVariance, f64) {
     let top = i64::from(top);
     // Codes beyond 9 σ have a probability below 10⁻¹⁸.
     let reach = 9.0 * sigma + 1.0;
@@ -233,11 +227,7 @@ mod tests {
                 let cumulant = fourth - 3.0 * square * square;
                 let found = variable.fourth_clipped_above(limit);
                 assert!((found - cumulant).abs() < 1e-4 * fourth, "{limit} {found} {cumulant}");
-                assert!(
-                    (clipped.variance - square).abs() < 1e-6,
-                    "{limit} {} {square}",
-                    clipped.variance
-                );
+                assert!((clipped.variance - square).abs() < 1e-6, "{limit} {} {square}", clipped.variance);
             }
         }
     }
@@ -263,20 +253,15 @@ mod tests {
             let variable = NearlyNormal::normal(mean, sigma * sigma);
             let (rounded, cumulant) = rounded(mean, sigma, 255, |edge| variable.exceeds(edge));
             let probability = |k: i32| -> f64 {
-                let below =
-                    if k == 0 { 1.0 } else { cumulative(-((f64::from(k) - 0.5 - mean) / sigma)) };
-                let above =
-                    if k == 255 { 0.0 } else { cumulative(-((f64::from(k) + 0.5 - mean) / sigma)) };
+                let below = if k == 0 { 1.0 } else { cumulative(-((f64::from(k) - 0.5 - mean) / sigma)) };
+                let above = if k == 255 { 0.0 } else { cumulative(-((f64::from(k) + 0.5 - mean) / sigma)) };
                 below - above
             };
             let m: f64 = (0..=255).map(|k| f64::from(k) * probability(k)).sum();
             let v: f64 = (0..=255).map(|k| (f64::from(k) - m).powi(2) * probability(k)).sum();
             let c: f64 = (0..=255).map(|k| (f64::from(k) - m).powi(4) * probability(k)).sum();
             assert!((cumulant - (c - 3.0 * v * v)).abs() < 1e-8, "{mean} {sigma}");
-            assert!(
-                (rounded.mean - m).abs() < 1e-11 && (rounded.variance - v).abs() < 1e-10,
-                "{mean} {sigma}"
-            );
+            assert!((rounded.mean - m).abs() < 1e-11 && (rounded.variance - v).abs() < 1e-10, "{mean} {sigma}");
         }
     }
 }

@@ -37,11 +37,7 @@ pub fn weights(rule: Rule, points: usize, step: f64) -> Result<Vec<f64>> {
                 )));
             }
             for (index, weight) in weights.iter_mut().enumerate() {
-                let thirds = if index == 0 || index == points - 1 {
-                    1.0
-                } else {
-                    2.0 + 2.0 * (index % 2) as f64
-                };
+                let thirds = if index == 0 || index == points - 1 { 1.0 } else { 2.0 + 2.0 * (index % 2) as f64 };
                 *weight = step * thirds / 3.0;
             }
         }
@@ -57,12 +53,7 @@ mod tests {
     #[test]
     fn simpson_is_exact_for_cubics_and_the_trapezoid_for_lines() {
         let integral = |rule, power: i32| -> f64 {
-            weights(rule, 11, 0.1)
-                .unwrap()
-                .iter()
-                .enumerate()
-                .map(|(i, w)| w * (i as f64 * 0.1).powi(power))
-                .sum()
+            weights(rule, 11, 0.1).unwrap().iter().enumerate().map(|(i, w)| w * (i as f64 * 0.1).powi(power)).sum()
         };
         assert!((integral(Rule::Simpson, 3) - 0.25).abs() < 1e-15);
         assert!((integral(Rule::Trapezoid, 1) - 0.5).abs() < 1e-15);

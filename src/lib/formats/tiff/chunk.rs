@@ -94,8 +94,7 @@ fn decode_deflate(stored: &[u8], decoded: &mut [u8]) -> Result<usize, Trouble> {
     loop {
         let read = usize::try_from(decoder.total_in()).unwrap_or(usize::MAX);
         let filled = usize::try_from(decoder.total_out()).unwrap_or(usize::MAX);
-        let status =
-            decoder.decompress(&stored[read..], &mut decoded[filled..], FlushDecompress::Finish);
+        let status = decoder.decompress(&stored[read..], &mut decoded[filled..], FlushDecompress::Finish);
         let now = usize::try_from(decoder.total_out()).unwrap_or(usize::MAX);
         match status {
             // Full: a wrong checksum behind it would be told as damage, with the data already there.
@@ -146,14 +145,7 @@ pub(super) enum Predictor {
 
 impl Predictor {
     /// Brings decoded rows into the machine's byte order and adds the differences up again.
-    pub fn undo(
-        self,
-        rows: &mut [u8],
-        row_bytes: usize,
-        channels: usize,
-        sample_bytes: usize,
-        big_endian: bool,
-    ) {
+    pub fn undo(self, rows: &mut [u8], row_bytes: usize, channels: usize, sample_bytes: usize, big_endian: bool) {
         if self != Self::FloatingPoint && big_endian != cfg!(target_endian = "big") {
             match sample_bytes {
                 2 => swap::<2>(rows),
@@ -168,40 +160,16 @@ impl Predictor {
                 for row in rows.chunks_exact_mut(row_bytes) {
                     match sample_bytes {
                         1 => {
-                            add_up::<1, u8>(
-                                row,
-                                channels,
-                                u8::from_ne_bytes,
-                                u8::wrapping_add,
-                                u8::to_ne_bytes,
-                            );
+                            add_up::<1, u8>(row, channels, u8::from_ne_bytes, u8::wrapping_add, u8::to_ne_bytes);
                         }
                         2 => {
-                            add_up::<2, u16>(
-                                row,
-                                channels,
-                                u16::from_ne_bytes,
-                                u16::wrapping_add,
-                                u16::to_ne_bytes,
-                            );
+                            add_up::<2, u16>(row, channels, u16::from_ne_bytes, u16::wrapping_add, u16::to_ne_bytes);
                         }
                         4 => {
-                            add_up::<4, u32>(
-                                row,
-                                channels,
-                                u32::from_ne_bytes,
-                                u32::wrapping_add,
-                                u32::to_ne_bytes,
-                            );
+                            add_up::<4, u32>(row, channels, u32::from_ne_bytes, u32::wrapping_add, u32::to_ne_bytes);
                         }
                         _ => {
-                            add_up::<8, u64>(
-                                row,
-                                channels,
-                                u64::from_ne_bytes,
-                                u64::wrapping_add,
-                                u64::to_ne_bytes,
-                            );
+                            add_up::<8, u64>(row, channels, u64::from_ne_bytes, u64::wrapping_add, u64::to_ne_bytes);
                         }
                     }
                 }
@@ -210,13 +178,7 @@ impl Predictor {
                 let mut planes = vec![0; row_bytes];
                 for row in rows.chunks_exact_mut(row_bytes) {
                     planes.copy_from_slice(row);
-                    add_up::<1, u8>(
-                        &mut planes,
-                        channels,
-                        u8::from_ne_bytes,
-                        u8::wrapping_add,
-                        u8::to_ne_bytes,
-                    );
+                    add_up::<1, u8>(&mut planes, channels, u8::from_ne_bytes, u8::wrapping_add, u8::to_ne_bytes);
                     match sample_bytes {
                         2 => from_planes::<2>(&planes, row),
                         4 => from_planes::<4>(&planes, row),
@@ -240,8 +202,7 @@ impl Predictor {
                     let (_, later) = row.split_at_mut(step);
                     let pairs = plain[step..].chunks_exact(2).zip(plain.chunks_exact(2));
                     for (out, (now, before)) in later.chunks_exact_mut(2).zip(pairs) {
-                        let [now, before] =
-                            [now, before].map(|bytes| u16::from_le_bytes([bytes[0], bytes[1]]));
+                        let [now, before] = [now, before].map(|bytes| u16::from_le_bytes([bytes[0], bytes[1]]));
                         out.copy_from_slice(&now.wrapping_sub(before).to_le_bytes());
                     }
                 }
@@ -254,9 +215,7 @@ impl Predictor {
                     }
                     let (first, later) = row.split_at_mut(channels);
                     first.copy_from_slice(&plain[..channels]);
-                    for (out, (now, before)) in
-                        later.iter_mut().zip(plain[channels..].iter().zip(&plain))
-                    {
+                    for (out, (now, before)) in later.iter_mut().zip(plain[channels..].iter().zip(&plain)) {
                         *out = now.wrapping_sub(*before);
                     }
                 }
@@ -314,13 +273,12 @@ fn from_planes<const BYTES: usize>(planes: &[u8], row: &mut [u8]) {
 pub(super) fn encode(compression: TiffCompression, strip: &[u8]) -> std::io::Result<Vec<u8>> {
     match compression {
         TiffCompression::None => Ok(strip.to_vec()),
-        TiffCompression::Lzw => weezl::encode::Encoder::with_tiff_size_switch(BitOrder::Msb, 8)
-            .encode(strip)
-            .map_err(std::io::Error::other),
+        TiffCompression::Lzw => {
+            weezl::encode::Encoder::with_tiff_size_switch(BitOrder::Msb, 8).encode(strip).map_err(std::io::Error::other)
+        }
         TiffCompression::Deflate => {
             let level = flate2::Compression::new(1);
-            let mut encoder =
-                flate2::write::ZlibEncoder::new(Vec::with_capacity(strip.len() / 2), level);
+            let mut encoder = flate2::write::ZlibEncoder::new(Vec::with_capacity(strip.len() / 2), level);
             encoder.write_all(strip)?;
             encoder.finish()
         }

@@ -33,16 +33,9 @@ impl Source {
     ///
     /// When the file cannot be read or is no TIFF.
     pub fn open(mut file: File, name: &str) -> Result<Self> {
-        let length =
-            file.seek(SeekFrom::End(0)).map_err(|source| Error::disk(name, "read", source))?;
-        let mut source = Self {
-            file,
-            name: name.to_owned(),
-            length,
-            big_endian: false,
-            big_tiff: false,
-            first_directory: 0,
-        };
+        let length = file.seek(SeekFrom::End(0)).map_err(|source| Error::disk(name, "read", source))?;
+        let mut source =
+            Self { file, name: name.to_owned(), length, big_endian: false, big_tiff: false, first_directory: 0 };
         if length == 0 {
             return Err(source.problem("the file is empty"));
         }
@@ -103,11 +96,7 @@ impl Source {
     /// An unsigned number of up to eight bytes in the file's byte order.
     fn number(&self, bytes: &[u8]) -> u64 {
         let append = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
-        if self.big_endian {
-            bytes.iter().fold(0, append)
-        } else {
-            bytes.iter().rev().fold(0, append)
-        }
+        if self.big_endian { bytes.iter().fold(0, append) } else { bytes.iter().rev().fold(0, append) }
     }
 
     /// Reads the directory of image number `page`, counted from 0.
@@ -142,8 +131,7 @@ impl Source {
 
     /// Reads the directory at `offset` (only its link to the next one unless `wanted`), and gives that link.
     fn directory_at(&mut self, offset: u64, wanted: bool) -> Result<(Directory, u64)> {
-        let (count_bytes, entry_bytes, offset_bytes) =
-            if self.big_tiff { (8, 20, 8) } else { (2, 12, 4) };
+        let (count_bytes, entry_bytes, offset_bytes) = if self.big_tiff { (8, 20, 8) } else { (2, 12, 4) };
         let beyond = |source: &Self| source.cut_short("the table of tags");
         if !self.holds(offset, count_bytes as u64) {
             return Err(beyond(self));
@@ -177,8 +165,7 @@ impl Source {
 
     /// Adds one entry to the directory; the first of several with one tag counts.
     fn add(&self, directory: &mut Directory, entry: &[u8]) {
-        let (count, value) =
-            if self.big_tiff { (&entry[4..12], &entry[12..]) } else { (&entry[4..8], &entry[8..]) };
+        let (count, value) = if self.big_tiff { (&entry[4..12], &entry[12..]) } else { (&entry[4..8], &entry[8..]) };
         let mut inline = [0; 8];
         inline[..value.len()].copy_from_slice(value);
         let [tag, kind] = [&entry[..2], &entry[2..4]].map(|bytes| match *bytes {
@@ -198,11 +185,9 @@ impl Source {
             return Err(self.problem(format!("the file is damaged; tag {tag:?} has type {kind}")));
         }
         let beyond = |source: &Self| source.cut_short(&format!("the value of tag {tag:?}"));
-        let total =
-            entry.count.checked_mul(size as u64).filter(|&total| total <= self.length.max(8));
+        let total = entry.count.checked_mul(size as u64).filter(|&total| total <= self.length.max(8));
         let Some(total) = total else { return Err(beyond(self)) };
-        let wanted = usize::try_from(total.min(at_most.saturating_mul(size as u64)))
-            .map_err(|_| beyond(self))?;
+        let wanted = usize::try_from(total.min(at_most.saturating_mul(size as u64))).map_err(|_| beyond(self))?;
         if total <= if self.big_tiff { 8 } else { 4 } {
             return Ok((entry.kind, size, entry.inline[..wanted].to_vec()));
         }
@@ -219,18 +204,13 @@ impl Source {
     /// # Errors
     ///
     /// When the value lies outside the file or is not of such a type.
-    pub fn unsigned(
-        &mut self,
-        directory: &Directory,
-        tag: Tag,
-        at_most: u64,
-    ) -> Result<Option<Vec<u64>>> {
+    pub fn unsigned(&mut self, directory: &Directory, tag: Tag, at_most: u64) -> Result<Option<Vec<u64>>> {
         let Some(entry) = directory.entries.get(&tag.to_u16()) else { return Ok(None) };
         let (kind, size, bytes) = self.value(entry, tag, at_most)?;
         if !matches!(kind, 1 | 3 | 4 | 13 | 16 | 18) {
-            return Err(self.problem(format!(
-                "the file is damaged; tag {tag:?} should be a whole number and has type {kind}"
-            )));
+            return Err(
+                self.problem(format!("the file is damaged; tag {tag:?} should be a whole number and has type {kind}"))
+            );
         }
         Ok(Some(bytes.chunks_exact(size).map(|bytes| self.number(bytes)).collect()))
     }
@@ -253,8 +233,7 @@ impl Source {
         let value = match kind {
             5 => {
                 let (above, below) = (bytes.get(..4)?, bytes.get(4..)?);
-                u32::try_from(number(above)).ok().map(f64::from)?
-                    / u32::try_from(number(below)).ok().map(f64::from)?
+                u32::try_from(number(above)).ok().map(f64::from)? / u32::try_from(number(below)).ok().map(f64::from)?
             }
             11 => f32::from_bits(u32::try_from(number(&bytes)).ok()?).into(),
             12 if bytes.len() == 8 => f64::from_bits(number(&bytes)),
@@ -275,9 +254,7 @@ impl Source {
             return Ok(None);
         }
         if entry.count > TEXT_BYTES && self.holds(entry.offset, entry.count) {
-            return Err(
-                self.problem(format!("the text of tag {tag:?} is longer than 16 MiB; remove it"))
-            );
+            return Err(self.problem(format!("the text of tag {tag:?} is longer than 16 MiB; remove it")));
         }
         let (_, _, bytes) = self.value(entry, tag, TEXT_BYTES)?;
         let end = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());

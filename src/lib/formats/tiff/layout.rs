@@ -127,8 +127,7 @@ impl Layout {
             1 => false,
             2 => channels > 1,
             other => {
-                return Err(source
-                    .problem(format!("the file is damaged; its planar configuration is {other}")));
+                return Err(source.problem(format!("the file is damaged; its planar configuration is {other}")));
             }
         };
 
@@ -155,8 +154,7 @@ impl Layout {
         };
         let strip_tags = (Tag::StripOffsets, Tag::StripByteCounts);
         let tile_tags = (Tag::TileOffsets, Tag::TileByteCounts);
-        let (offset_tag, count_tag) =
-            if tiled && directory.has(Tag::TileOffsets) { tile_tags } else { strip_tags };
+        let (offset_tag, count_tag) = if tiled && directory.has(Tag::TileOffsets) { tile_tags } else { strip_tags };
         let offsets = source.unsigned(directory, offset_tag, needed)?.unwrap_or_default();
         if (offsets.len() as u64) < needed {
             let found = offsets.len();
@@ -170,17 +168,12 @@ impl Layout {
             height,
             chunk_rows,
             down,
-            chunk_row_bytes: u128::from(chunk_width)
-                * u128::from(channels / planes)
-                * stored.bytes() as u128,
+            chunk_row_bytes: u128::from(chunk_width) * u128::from(channels / planes) * stored.bytes() as u128,
             tiled,
             compression,
         };
         if compression != Compression::None {
-            let together = sizes.chunk_row_bytes
-                * u128::from(chunk_rows)
-                * u128::from(across)
-                * u128::from(planes);
+            let together = sizes.chunk_row_bytes * u128::from(chunk_rows) * u128::from(across) * u128::from(planes);
             if together > MOST_DECODED_BYTES {
                 return Err(source.problem(format!(
                     "{chunk_rows} rows are compressed as one piece of {} MiB, more than fits into memory; rewrite it with smaller strips, for example with `tiffcp -r 64`",
@@ -205,8 +198,8 @@ impl Layout {
             // Nothing depends on it, so a damaged one is not worth refusing the image.
             software: source.text(directory, Tag::Software).unwrap_or_default(),
         };
-        let inverted = stored == Stored::U8
-            && photometric == u64::from(PhotometricInterpretation::WhiteIsZero.to_u16());
+        let inverted =
+            stored == Stored::U8 && photometric == u64::from(PhotometricInterpretation::WhiteIsZero.to_u16());
         Ok(Self {
             geometry,
             tags,
@@ -237,12 +230,7 @@ struct Sizes {
 
 impl Sizes {
     /// Pairs offsets with byte counts, and refuses a file that cannot hold what they promise.
-    fn check(
-        &self,
-        source: &Source,
-        offsets: &[u64],
-        counts: Option<&[u64]>,
-    ) -> Result<Vec<(u64, u64)>> {
+    fn check(&self, source: &Source, offsets: &[u64], counts: Option<&[u64]>) -> Result<Vec<(u64, u64)>> {
         let mut total_stored = 0u128;
         let mut chunks = Vec::with_capacity(offsets.len());
         for (index, &offset) in offsets.iter().enumerate() {
@@ -256,9 +244,7 @@ impl Sizes {
             let stored = match counts {
                 Some(counts) => counts.get(index).copied().unwrap_or_default(),
                 // The byte count of what is not compressed is known without its tag.
-                None if self.compression == Compression::None => {
-                    u64::try_from(decoded).unwrap_or(u64::MAX)
-                }
+                None if self.compression == Compression::None => u64::try_from(decoded).unwrap_or(u64::MAX),
                 None => return Err(source.problem("the file is damaged; it lacks StripByteCounts")),
             };
             let what = if self.tiled { "tile" } else { "strip" };
@@ -318,9 +304,7 @@ fn stored(source: &mut Source, directory: &Directory, channels: u64) -> Result<S
         let values = source.unsigned(directory, tag, channels)?.unwrap_or_default();
         // One value stands for all channels, though the specification asks for one each.
         if values.len() > 1 && (values.len() as u64) < channels {
-            return Err(source.problem(format!(
-                "the file is damaged; tag {tag:?} has too few values for its channels"
-            )));
+            return Err(source.problem(format!("the file is damaged; tag {tag:?} has too few values for its channels")));
         }
         let first = values.first().copied().unwrap_or(missing);
         if values.iter().any(|&value| value != first) {
@@ -365,14 +349,14 @@ fn stored(source: &mut Source, directory: &Directory, channels: u64) -> Result<S
             ));
         }
         (5 | 6, _) => {
-            return Err(source.problem(
-                "complex samples are not supported; write real and imaginary part as two channels",
-            ));
+            return Err(
+                source.problem("complex samples are not supported; write real and imaginary part as two channels")
+            );
         }
         _ => {
-            return Err(source.problem(format!(
-                "the file is damaged; sample format {format} with {bits} bits does not exist"
-            )));
+            return Err(
+                source.problem(format!("the file is damaged; sample format {format} with {bits} bits does not exist"))
+            );
         }
     })
 }
@@ -381,9 +365,7 @@ fn stored(source: &mut Source, directory: &Directory, channels: u64) -> Result<S
 fn photometric(source: &mut Source, directory: &Directory, channels: u64) -> Result<u64> {
     use PhotometricInterpretation as P;
     let usual = if channels < 3 { P::BlackIsZero } else { P::RGB };
-    let number = source
-        .one(directory, Tag::PhotometricInterpretation)?
-        .unwrap_or_else(|| usual.to_u16().into());
+    let number = source.one(directory, Tag::PhotometricInterpretation)?.unwrap_or_else(|| usual.to_u16().into());
     let needed = match u16::try_from(number).ok().and_then(P::from_u16) {
         Some(P::WhiteIsZero | P::BlackIsZero) => 1,
         Some(P::RGB) => 3,
@@ -394,9 +376,7 @@ fn photometric(source: &mut Source, directory: &Directory, channels: u64) -> Res
             ));
         }
         Some(P::TransparencyMask) => {
-            return Err(
-                source.problem("this image is a transparency mask for another; pick another image")
-            );
+            return Err(source.problem("this image is a transparency mask for another; pick another image"));
         }
         Some(P::YCbCr) => {
             return Err(source.problem(
@@ -404,21 +384,18 @@ fn photometric(source: &mut Source, directory: &Directory, channels: u64) -> Res
             ));
         }
         Some(P::CIELab | P::IccLab | P::ItuLab) => {
-            return Err(source.problem(
-                "L*a*b* images in integers are not supported; convert it to RGB or XYZ first",
-            ));
+            return Err(source.problem("L*a*b* images in integers are not supported; convert it to RGB or XYZ first"));
         }
         _ if number == PHOTOMETRIC_CFA || number == PHOTOMETRIC_LINEAR_RAW => 1,
         _ => {
-            return Err(source.problem(format!(
-                "photometric interpretation {number} is not supported; convert it to gray or RGB"
-            )));
+            return Err(source
+                .problem(format!("photometric interpretation {number} is not supported; convert it to gray or RGB")));
         }
     };
     if channels < needed {
-        return Err(source.problem(format!(
-            "the file is damaged; its color needs {needed} channels and it has {channels}"
-        )));
+        return Err(
+            source.problem(format!("the file is damaged; its color needs {needed} channels and it has {channels}"))
+        );
     }
     Ok(number)
 }
@@ -437,10 +414,8 @@ fn predictor(
         1 => Ok(Predictor::None),
         2 => Ok(Predictor::Horizontal),
         3 if float => Ok(Predictor::FloatingPoint),
-        _ => Err(source.problem(format!(
-            "the file is damaged; predictor {number} does not exist for {} samples",
-            stored.name()
-        ))),
+        _ => Err(source
+            .problem(format!("the file is damaged; predictor {number} does not exist for {} samples", stored.name()))),
     }
 }
 

@@ -126,8 +126,7 @@ impl TiffReader {
 
     /// The piece that holds a row.
     fn piece_of(&self, row: usize) -> usize {
-        row / self.layout.chunk_rows * self.pieces_in_chunk()
-            + row % self.layout.chunk_rows / self.piece_rows
+        row / self.layout.chunk_rows * self.pieces_in_chunk() + row % self.layout.chunk_rows / self.piece_rows
     }
 
     /// The image's rows in a piece.
@@ -191,24 +190,14 @@ impl TiffReader {
     }
 
     /// Reads the bytes of one chunk of a piece.
-    fn job<'a>(
-        &mut self,
-        piece: usize,
-        plane: usize,
-        across: usize,
-        place: &'a mut [u8],
-    ) -> Result<Job<'a>> {
+    fn job<'a>(&mut self, piece: usize, plane: usize, across: usize, place: &'a mut [u8]) -> Result<Job<'a>> {
         let layout = &self.layout;
         let (down, part) = (piece / self.pieces_in_chunk(), piece % self.pieces_in_chunk());
         let chunk = (plane * layout.down + down) * layout.across + across;
         let (offset, stored) = layout.chunks[chunk];
         let range = self.piece_range(piece);
         // Tiles are stored whole, also those that hang over the lower edge.
-        let rows = if layout.tiled && layout.compression != Compression::None {
-            self.piece_rows
-        } else {
-            range.len()
-        };
+        let rows = if layout.tiled && layout.compression != Compression::None { self.piece_rows } else { range.len() };
         let decoded = &mut place[..rows * layout.chunk_row_bytes()];
         if layout.compression == Compression::None {
             let skip = part * self.piece_rows * layout.chunk_row_bytes();
@@ -262,10 +251,7 @@ impl TiffReader {
             Stored::I32 => self.convert(row, samples, |bytes| i32::from_ne_bytes(bytes) as f32),
             Stored::F16 => self.convert(row, samples, |bytes| f16::from_ne_bytes(bytes).to_f32()),
             Stored::F32 => self.convert(row, samples, f32::from_ne_bytes),
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "rounding to f32 is what is promised"
-            )]
+            #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what is promised")]
             Stored::F64 => self.convert(row, samples, |bytes| f64::from_ne_bytes(bytes) as f32),
         }
         if self.layout.inverted {
@@ -276,12 +262,7 @@ impl TiffReader {
     }
 
     /// Converts one row, sample by sample with `value`.
-    fn convert<const BYTES: usize>(
-        &self,
-        row: usize,
-        samples: &mut [f32],
-        value: impl Fn([u8; BYTES]) -> f32 + Copy,
-    ) {
+    fn convert<const BYTES: usize>(&self, row: usize, samples: &mut [f32], value: impl Fn([u8; BYTES]) -> f32 + Copy) {
         let layout = &self.layout;
         let piece = self.piece_of(row);
         let row_bytes = layout.chunk_row_bytes();

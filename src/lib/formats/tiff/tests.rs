@@ -1,10 +1,6 @@
 //! Round trips; files of other makers, put together by hand; damage. The crate `tiff` is the second opinion.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::cast_possible_truncation,
-    reason = "tests, with values chosen to fit"
-)]
+#![expect(clippy::unwrap_used, clippy::cast_possible_truncation, reason = "tests, with values chosen to fit")]
 
 use super::write::needs_big_tiff;
 use super::*;
@@ -13,8 +9,7 @@ use crate::frame::Geometry;
 use std::fs::File;
 use std::io::{Cursor, Write};
 
-const COMPRESSIONS: [TiffCompression; 3] =
-    [TiffCompression::None, TiffCompression::Lzw, TiffCompression::Deflate];
+const COMPRESSIONS: [TiffCompression; 3] = [TiffCompression::None, TiffCompression::Lzw, TiffCompression::Deflate];
 
 /// Samples that repeat in parts and do not in others; whole numbers from 0 to 65535 for `U16`.
 fn samples(count: usize, kind: TiffSamples) -> Vec<f32> {
@@ -51,8 +46,7 @@ fn write(
     rows_at_once: usize,
 ) -> (Vec<u8>, u64) {
     let output = Cursor::new(Vec::new());
-    let mut writer =
-        TiffWriter::create(output, "out.tif", geometry, kind, 1.0, compression, tags).unwrap();
+    let mut writer = TiffWriter::create(output, "out.tif", geometry, kind, 1.0, compression, tags).unwrap();
     for rows in samples.chunks(rows_at_once * geometry.row_samples()) {
         writer.write_rows(rows).unwrap();
     }
@@ -91,8 +85,7 @@ fn what_is_written_is_read() {
                 let samples = samples(geometry.row_samples() * height, kind);
                 for compression in COMPRESSIONS {
                     let case = format!("{geometry:?} {kind:?} {compression:?}");
-                    let (bytes, unfit) =
-                        write(&geometry, kind, compression, &TiffTags::default(), &samples, height);
+                    let (bytes, unfit) = write(&geometry, kind, compression, &TiffTags::default(), &samples, height);
                     assert_eq!(unfit, 0);
                     let mut reader = open(&bytes, 0).unwrap();
                     assert_eq!(*reader.geometry(), geometry, "{case}");
@@ -115,14 +108,12 @@ fn the_crate_reads_the_same() {
         for kind in [TiffSamples::U16, TiffSamples::F32] {
             let samples = samples(300 * 200 * channels, kind);
             for compression in COMPRESSIONS {
-                let (bytes, _) =
-                    write(&geometry, kind, compression, &TiffTags::default(), &samples, 64);
-                let found: Vec<f32> =
-                    match Decoder::new(Cursor::new(bytes)).unwrap().read_image().unwrap() {
-                        DecodingResult::U16(found) => found.into_iter().map(f32::from).collect(),
-                        DecodingResult::F32(found) => found,
-                        _ => panic!("stored as something else"),
-                    };
+                let (bytes, _) = write(&geometry, kind, compression, &TiffTags::default(), &samples, 64);
+                let found: Vec<f32> = match Decoder::new(Cursor::new(bytes)).unwrap().read_image().unwrap() {
+                    DecodingResult::U16(found) => found.into_iter().map(f32::from).collect(),
+                    DecodingResult::F32(found) => found,
+                    _ => panic!("stored as something else"),
+                };
                 let pixels = found.len() / channels;
                 assert_eq!(pixels, 300 * 200, "{channels} {kind:?} {compression:?}");
                 for pixel in 0..pixels {
@@ -175,8 +166,7 @@ fn bytes_depend_on_the_samples_only() {
     for kind in [TiffSamples::U16, TiffSamples::F32] {
         let samples = samples(geometry.row_samples() * 1500, kind);
         for compression in COMPRESSIONS {
-            let write =
-                |rows| write(&geometry, kind, compression, &TiffTags::default(), &samples, rows).0;
+            let write = |rows| write(&geometry, kind, compression, &TiffTags::default(), &samples, rows).0;
             let whole = write(1500);
             assert!(whole == write(1) && whole == write(77));
             let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
@@ -187,21 +177,17 @@ fn bytes_depend_on_the_samples_only() {
 
 #[test]
 fn tags_and_origin_come_back() {
-    let tags = TiffTags {
-        description: Some("# cyanometer\nunit: e⁻\n".into()),
-        software: Some("digitize 0.1".into()),
-    };
+    let tags =
+        TiffTags { description: Some("# cyanometer\nunit: e⁻\n".into()), software: Some("digitize 0.1".into()) };
     for origin in [[0, 0], [10, 7], [0, 5], [1 << 30, 1]] {
         let geometry = Geometry { origin, ..frame(5, 4, 1) };
-        let (bytes, _) =
-            write(&geometry, TiffSamples::U16, TiffCompression::None, &tags, &[1.0; 20], 4);
+        let (bytes, _) = write(&geometry, TiffSamples::U16, TiffCompression::None, &tags, &[1.0; 20], 4);
         let reader = open(&bytes, 0).unwrap();
         assert_eq!((reader.tags(), reader.geometry()), (&tags, &geometry));
     }
     // TIFF has no negative positions.
     let geometry = Geometry { origin: [-1, 3], ..frame(5, 4, 1) };
-    let (bytes, _) =
-        write(&geometry, TiffSamples::U16, TiffCompression::None, &tags, &[1.0; 20], 4);
+    let (bytes, _) = write(&geometry, TiffSamples::U16, TiffCompression::None, &tags, &[1.0; 20], 4);
     assert_eq!(open(&bytes, 0).unwrap().geometry().origin, [0, 0]);
 }
 
@@ -225,8 +211,7 @@ fn rounds_and_clamps_to_sixteen_bits_and_counts_what_did_not_fit() {
     ];
     let (given, wanted): (Vec<f32>, Vec<f32>) = values.into_iter().unzip();
     let geometry = frame(13, 1, 1);
-    let (bytes, unfit) =
-        write(&geometry, TiffSamples::U16, TiffCompression::Lzw, &TiffTags::default(), &given, 1);
+    let (bytes, unfit) = write(&geometry, TiffSamples::U16, TiffCompression::Lzw, &TiffTags::default(), &given, 1);
     assert_eq!(unfit, 6);
     assert_eq!(read_all(&mut open(&bytes, 0).unwrap(), 1).unwrap(), wanted);
 
@@ -252,9 +237,7 @@ fn rounds_and_clamps_to_sixteen_bits_and_counts_what_did_not_fit() {
 #[test]
 fn big_tiff_when_it_must_be() {
     let tags = TiffTags::default();
-    let big = |height, compression| {
-        needs_big_tiff(&frame(10_000, height, 1), TiffSamples::F32, compression, &tags)
-    };
+    let big = |height, compression| needs_big_tiff(&frame(10_000, height, 1), TiffSamples::F32, compression, &tags);
     // 4 GiB are 107 374 rows of 40 kB.
     assert!(!big(107_000, TiffCompression::None) && big(107_374, TiffCompression::None));
     assert!(!big(97_000, TiffCompression::Deflate) && big(98_000, TiffCompression::Deflate));
@@ -370,8 +353,7 @@ impl Made {
             table.extend(number(u64::from(*tag), 2));
             table.extend(number(4, 2));
             table.extend(number(values.len() as u64, offset_bytes));
-            let mut value: Vec<u8> =
-                values.iter().flat_map(|value| number(u64::from(*value), 4)).collect();
+            let mut value: Vec<u8> = values.iter().flat_map(|value| number(u64::from(*value), 4)).collect();
             if value.len() > offset_bytes {
                 let place = out.len() as u64;
                 out.extend(value);
@@ -456,20 +438,14 @@ fn tiles_and_planes_are_put_together() {
                             for column in left..left + width {
                                 for channel in if planar { plane..plane + 1 } else { 0..3 } {
                                     let value = value(channel, row, column) as u16;
-                                    chunk.extend(if big_endian {
-                                        value.to_be_bytes()
-                                    } else {
-                                        value.to_le_bytes()
-                                    });
+                                    chunk.extend(if big_endian { value.to_be_bytes() } else { value.to_le_bytes() });
                                 }
                             }
                         }
                         made.chunks.push(match method {
                             8 => chunk::encode(TiffCompression::Deflate, &chunk).unwrap(),
                             // Packed as literals of two bytes.
-                            32_773 => {
-                                chunk.chunks(2).flat_map(|pair| [1, pair[0], pair[1]]).collect()
-                            }
+                            32_773 => chunk.chunks(2).flat_map(|pair| [1, pair[0], pair[1]]).collect(),
                             _ => chunk,
                         });
                     }
@@ -477,11 +453,7 @@ fn tiles_and_planes_are_put_together() {
             }
             let mut reader = open(&made.bytes(), 0).unwrap();
             for rows in [1, 2, 3, 7] {
-                assert_eq!(
-                    read_all(&mut reader, rows).unwrap(),
-                    wanted,
-                    "{tiled} {planar} {method} {rows}"
-                );
+                assert_eq!(read_all(&mut reader, rows).unwrap(), wanted, "{tiled} {planar} {method} {rows}");
             }
             // And upwards.
             for row in (0..7).rev() {
@@ -499,10 +471,7 @@ fn white_is_zero_is_inverted_as_openimageio_does() {
     assert_eq!(read_all(&mut open(&made.bytes(), 0).unwrap(), 1).unwrap(), [0.0, 1.0, 2.0, 3.0]);
     made = made.with(258, &[8]);
     made.chunks = vec![vec![0, 1, 254, 255]];
-    assert_eq!(
-        read_all(&mut open(&made.bytes(), 0).unwrap(), 1).unwrap(),
-        [255.0, 254.0, 1.0, 0.0]
-    );
+    assert_eq!(read_all(&mut open(&made.bytes(), 0).unwrap(), 1).unwrap(), [255.0, 254.0, 1.0, 0.0]);
 }
 
 #[test]
@@ -565,17 +534,11 @@ fn a_file_that_was_cut_short_is_never_read_as_zeros() {
     for kind in [TiffSamples::U16, TiffSamples::F32] {
         let samples = samples(600, kind);
         for compression in COMPRESSIONS {
-            let (bytes, _) =
-                write(&geometry, kind, compression, &TiffTags::default(), &samples, 20);
+            let (bytes, _) = write(&geometry, kind, compression, &TiffTags::default(), &samples, 20);
             for length in 0..bytes.len() {
-                let result =
-                    open(&bytes[..length], 0).and_then(|mut reader| read_all(&mut reader, 20));
+                let result = open(&bytes[..length], 0).and_then(|mut reader| read_all(&mut reader, 20));
                 // Only the link to the next directory, which is none, can be missed without harm.
-                assert!(
-                    result.is_err() || length >= bytes.len() - 4,
-                    "{length} of {}",
-                    bytes.len()
-                );
+                assert!(result.is_err() || length >= bytes.len() - 4, "{length} of {}", bytes.len());
             }
         }
     }
@@ -598,9 +561,7 @@ fn a_file_that_was_cut_short_is_never_read_as_zeros() {
 fn huge_promises_are_refused_before_memory_is_taken() {
     let gray = |width, height| Made::gray(4, 2).with(256, &[width]).with(257, &[height]);
     for method in [1, 5, 8, 32_773] {
-        for (width, height) in
-            [(u32::MAX, u32::MAX), (u32::MAX, 1), (1, u32::MAX), (65_535, 65_535)]
-        {
+        for (width, height) in [(u32::MAX, u32::MAX), (u32::MAX, 1), (1, u32::MAX), (65_535, 65_535)] {
             let made = gray(width, height).with(259, &[method]);
             complaint(&made.clone().with(278, &[height]).bytes());
             complaint(&made.clone().with(278, &[1]).bytes());
@@ -659,8 +620,7 @@ fn damage_anywhere_is_an_error_or_other_samples_but_no_panic() {
             let mut bytes = file.clone();
             for _ in 0..=random(3) {
                 let from_end = random(2) == 0;
-                let place =
-                    if from_end { bytes.len() - 1 - random(220) } else { random(bytes.len()) };
+                let place = if from_end { bytes.len() - 1 - random(220) } else { random(bytes.len()) };
                 bytes[place] = [0, 1, 255, 128, random(256) as u8][random(5)];
             }
             if let Ok(mut reader) = open(&bytes, 0) {
@@ -680,8 +640,7 @@ fn damage_anywhere_is_an_error_or_other_samples_but_no_panic() {
 #[test]
 fn what_is_no_tiff_is_told_so() {
     assert_eq!(complaint(b""), "in.tif: the file is empty");
-    for bytes in [&b"II*"[..], b"\x89PNG\r\n\x1a\n0123", b"II*\0\0\0\0\0", b"MM\0*\xff\xff\xff\xff"]
-    {
+    for bytes in [&b"II*"[..], b"\x89PNG\r\n\x1a\n0123", b"II*\0\0\0\0\0", b"MM\0*\xff\xff\xff\xff"] {
         complaint(bytes);
     }
     assert!(TiffReader::open(File::open(".").unwrap(), "in.tif", 0).is_err());

@@ -179,8 +179,7 @@ impl<W: Write + Seek> TiffWriter<W> {
     fn collect(&mut self, samples: &[f32]) {
         let start = self.collected.len();
         self.collected.resize(start + samples.len() * sample_bytes(self.samples), 0);
-        let rows = self.collected[start..]
-            .par_chunks_mut(self.geometry.row_samples() * sample_bytes(self.samples));
+        let rows = self.collected[start..].par_chunks_mut(self.geometry.row_samples() * sample_bytes(self.samples));
         let lines = samples.par_chunks(self.geometry.row_samples());
         let (channels, scale, kind) = (self.geometry.channels.len(), self.scale, self.samples);
         self.unfit += rows
@@ -267,10 +266,7 @@ impl<W: Write + Seek> TiffWriter<W> {
         self.append_offset(&mut table, 0);
         self.put(&table)?;
         if !self.big && self.position > u64::from(u32::MAX) {
-            return Err(Error::format(
-                &self.name,
-                "the file came out larger than 4 GiB; write it without compression",
-            ));
+            return Err(Error::format(&self.name, "the file came out larger than 4 GiB; write it without compression"));
         }
         let mut offset = Vec::new();
         self.append_offset(&mut offset, directory);
@@ -312,12 +308,9 @@ impl<W: Write + Seek> TiffWriter<W> {
         };
         let [offsets, counts] = [|strip: &(u64, u64)| strip.0, |strip: &(u64, u64)| strip.1]
             .map(|part| self.offsets(self.strips.iter().map(part)));
-        let long =
-            |tag, value: usize| Field::new(tag, Type::LONG, value.to_le_bytes()[..4].to_vec());
+        let long = |tag, value: usize| Field::new(tag, Type::LONG, value.to_le_bytes()[..4].to_vec());
         let short = |tag, value: u16| Field::new(tag, Type::SHORT, value.to_le_bytes().to_vec());
-        let shorts = |tag, value: u16, count: usize| {
-            Field::new(tag, Type::SHORT, value.to_le_bytes().repeat(count))
-        };
+        let shorts = |tag, value: u16, count: usize| Field::new(tag, Type::SHORT, value.to_le_bytes().repeat(count));
         let ratio = |tag, value: u32| {
             let bytes = [value, 1].iter().flat_map(|part| part.to_le_bytes()).collect();
             Field::new(tag, Type::RATIONAL, bytes)
@@ -459,10 +452,8 @@ fn interleave_known<const CHANNELS: usize, const BYTES: usize>(
 
 /// Interleaves a row as 16-bit integers, and counts the samples that do not fit.
 fn interleave_u16(samples: &[f32], row: &mut [u8], channels: usize, scale: f32) -> u64 {
-    let unfit: u32 = samples
-        .iter()
-        .map(|sample| u32::from(!(0..=i32::from(u16::MAX)).contains(&rounded(sample * scale))))
-        .sum();
+    let unfit: u32 =
+        samples.iter().map(|sample| u32::from(!(0..=i32::from(u16::MAX)).contains(&rounded(sample * scale)))).sum();
     interleave(samples, row, channels, |sample| {
         let fitting = rounded(sample * scale).clamp(0, i32::from(u16::MAX));
         let [low, high, ..] = fitting.to_le_bytes();
