@@ -29,7 +29,7 @@ struct Arguments {
     #[arg(long, default_value = "xyz", value_parser = options::choice(&[("xyz", Space::Xyz), ("xyy", Space::Xyy), ("lab", Space::Lab), ("srgb", Space::Srgb)]))]
     space: Space,
     /// White of lab and srgb: d65, e, or its absolute X,Y,Z in cd/m2
-    #[arg(long, default_value = "d65", value_name = "d65|e|X,Y,Z", value_parser = white)]
+    #[arg(long, default_value = "d65", value_name = "d65|e|X,Y,Z", value_parser = white, allow_hyphen_values = true)]
     white: White,
     /// Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates
     #[arg(long, value_name = "CD_PER_M2", value_parser = options::positive, allow_negative_numbers = true)]

@@ -269,13 +269,21 @@ pub struct FrameHeader {
 }
 
 impl FrameHeader {
-    /// What reports call a channel: its own name, but X, Y, Z where XYZ is stored as R, G, B.
+    /// What reports call a channel: its own name, but X where XYZ is stored as R, G, B, and the like (TIFF has no other
+    /// names).
     pub fn channel_name(&self, index: usize) -> &str {
-        match (self.metadata.quantity, self.geometry.channels[index].as_str()) {
-            (QuantityKind::Xyz, "R") => "X",
-            (QuantityKind::Xyz, "G") => "Y",
-            (QuantityKind::Xyz, "B") => "Z",
-            (_, name) => name,
+        let name = self.geometry.channels[index].as_str();
+        let [first, second, third] = match self.metadata.quantity {
+            QuantityKind::Xyz => ["X", "Y", "Z"],
+            QuantityKind::Xyy => ["x", "y", "Y"],
+            QuantityKind::Lab => ["L", "a", "b"],
+            _ => return name,
+        };
+        match name {
+            "R" => first,
+            "G" => second,
+            "B" => third,
+            other => other,
         }
     }
 

@@ -111,7 +111,7 @@ impl AddNoise {
         plane_classes(input)?;
         let sensor = input.sensor()?;
         let temperature_k = settings.temperature_k.unwrap_or(sensor.temperature_k);
-        if !(temperature_k > 0.0 && temperature_k <= 1000.0) {
+        if !(1.0..=1000.0).contains(&temperature_k) {
             return Err(Error::Usage(format!(
                 "a temperature of {temperature_k} K is impossible for a sensor; give 1 to 1000"
             )));

@@ -124,6 +124,12 @@ fn neighbours(table: &[f64], wavelength_nm: f64) -> Option<[(usize, f64); 2]> {
     Some([(above - 1, 1.0 - share), (above, share)])
 }
 
+/// The wavelength in nm that a channel's name states, as in `S0.550,000000nm` \[Fichet2021]; none for channels of another kind.
+pub fn channel_wavelength_nm(channel: &str) -> Option<f64> {
+    let number = channel.strip_prefix("S0.")?.strip_suffix("nm")?;
+    number.replace(',', ".").parse().ok().filter(|nm: &f64| *nm > 0.0 && nm.is_finite())
+}
+
 /// Weights on a radiance's own samples that give a sum over another grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Folded {
@@ -188,6 +194,15 @@ pub struct Observer {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn channel_names_state_wavelengths() {
+        assert_eq!(channel_wavelength_nm("S0.550,000000nm"), Some(550.0));
+        assert_eq!(channel_wavelength_nm("S0.550.5nm"), Some(550.5));
+        for other in ["R", "S1.550,0nm", "S0.nm", "S0.-1nm", "T.550,0nm"] {
+            assert_eq!(channel_wavelength_nm(other), None);
+        }
+    }
 
     #[test]
     fn the_default_grid_is_the_papers() {

@@ -209,7 +209,10 @@ impl Session {
     ///
     /// Those of the writer.
     pub fn finish(&self, mut reader: FrameReader, writer: FrameWriter, counts: Counts) -> Result<()> {
-        writer.finish(counts)?;
+        let did_not_fit = writer.finish(counts)?;
+        if did_not_fit > 0 {
+            self.warn(&format!("{did_not_fit} samples do not fit 16 bits; they are stored as 0 or 65535, NaN as 0"));
+        }
         if let Some(warning) = reader.check_digest() {
             self.warn(&warning);
         }

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// A parser for one of a few words.
 pub fn choice<T: Copy + Send + Sync + 'static>(
     words: &'static [(&'static str, T)],
-) -> impl TypedValueParser<Value = T> + Clone {
+) -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(words.iter().map(|(word, _)| *word)).map(move |word| {
         // The parser lets only these words through; the first stands in for what cannot be.
         words.iter().find(|(known, _)| *known == word).map_or(words[0].1, |(_, value)| *value)

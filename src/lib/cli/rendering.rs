@@ -362,7 +362,8 @@ impl Request {
         };
         rendering.run(next_row, &mut writer, &mut |rows| bar.set_position(rows as u64))?;
         bar.finish_and_clear();
-        writer.finish(Counts::default())
+        writer.finish(Counts::default())?;
+        Ok(())
     }
 }
 

@@ -13,6 +13,7 @@ pub(super) fn interpolate(tile: &Tile, output: &mut Rows<'_>) -> Counts {
         let other = if class == Class::Red { Class::Blue } else { Class::Red };
         let [line, above, below] = [row, row - 1, row + 1].map(|y| tile.line(y));
         let planes = output.three(y);
+        #[expect(clippy::needless_range_loop, reason = "the three planes advance together")]
         for index in 0..tile.width {
             let x = index.cast_signed();
             let vertical = (above.at(x) + below.at(x)) / 2.0;

@@ -294,6 +294,7 @@ fn restore_from_hues(
         let mut planes = output.three(y);
         let vertical = |above: Line<'_>, below: Line<'_>, x| (above.at(x) + below.at(x)) / 2.0;
         let diagonal = |above: Line<'_>, below: Line<'_>, x| (above.sides(x) + below.sides(x)) / 2.0;
+        #[expect(clippy::needless_range_loop, reason = "the three planes advance together")]
         for index in 0..tile.width {
             let x = index.cast_signed();
             let green = greens.at(x);
@@ -398,7 +399,7 @@ mod tests {
     #[test]
     fn appendix_a_is_followed_with_its_misprints_mended() {
         // B at (row 4, column 3): rows even blue in odd columns, so the corner (1, 1) is G, (1, 2) R: grbg.
-        let site = |row: usize, column: usize| f64::from((row * 7919 + column * 104_729) as u32 % 997) + 500.0;
+        let site = |row: usize, column: usize| ((row * 7919 + column * 104_729) % 997) as f64 + 500.0;
         let frame = plane(7, 8, CfaPattern::Grbg, |x, y, _| to_sample(site(y + 1, x + 1)));
         let at = |made: &MemoryFrame, class: Class, row: usize, column: usize| {
             f64::from(made.samples[((row - 1) * 3 + class as usize) * 7 + column - 1])

@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
 use crate::optics::Exposure;
+use crate::spectrum::channel_wavelength_nm;
 use crate::stage::RowSource;
 use crate::units::QuantityKind;
 use sha2::{Digest, Sha256};
@@ -351,7 +352,7 @@ fn find_metadata(
         if tags.primaries.is_some_and(near) {
             metadata.quantity = QuantityKind::Xyz;
         }
-        if reader.geometry().channels.iter().any(|channel| super::spectral::wavelength_of(channel).is_some()) {
+        if reader.geometry().channels.iter().any(|channel| channel_wavelength_nm(channel).is_some()) {
             metadata.quantity = QuantityKind::SpectralRadiance;
             metadata.unit = tags.emissive_units.clone().unwrap_or_default();
         } else {

@@ -236,12 +236,14 @@ impl FrameWriter {
         Ok(Self { encoder, header: header.clone(), name, record, encoding, stored: Vec::new() })
     }
 
-    /// Ends the frame: gives a named file its name, and writes its sidecar.
+    /// Ends the frame: gives a named file its name, and writes its sidecar. Gives the number of samples that 16 bits could
+    /// not hold.
     ///
     /// # Errors
     ///
     /// [`Error::Disk`]; the file is then not left behind.
-    pub fn finish(self, counts: Counts) -> Result<()> {
+    pub fn finish(self, counts: Counts) -> Result<u64> {
+        let mut did_not_fit = 0;
         let mut target = match self.encoder {
             Encoder::Exr(writer) => {
                 let (mut target, patch) = writer.finish()?;
@@ -250,7 +252,11 @@ impl FrameWriter {
                 }
                 target
             }
-            Encoder::Tiff(writer) => writer.finish()?.0,
+            Encoder::Tiff(writer) => {
+                let (target, clamped) = writer.finish()?;
+                did_not_fit = clamped;
+                target
+            }
         };
         target.flush().map_err(|e| Error::disk(&self.name, "write", e))?;
         let sidecar = match self.record {
@@ -268,7 +274,8 @@ impl FrameWriter {
         };
         // Both files are complete before either gets its name.
         target.commit()?;
-        sidecar.map_or(Ok(()), AtomicFile::commit)
+        sidecar.map_or(Ok(()), AtomicFile::commit)?;
+        Ok(did_not_fit)
     }
 }
 

@@ -5,18 +5,12 @@ use super::data;
 use super::input::{FrameReader, InputOptions, open_named, spool};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
-use crate::spectrum::{SpectralLibrary, check_wavelengths};
+use crate::spectrum::{SpectralLibrary, channel_wavelength_nm, check_wavelengths};
 use crate::stage::RowSource;
 use crate::units::RadianceUnit;
 use ndarray::Array2;
 use std::io::{self, Read, Seek};
 use std::path::Path;
-
-/// The wavelength in nm that a channel's name states; none for channels of another kind.
-pub fn wavelength_of(channel: &str) -> Option<f64> {
-    let number = channel.strip_prefix("S0.")?.strip_suffix("nm")?;
-    number.replace(',', ".").parse().ok().filter(|nm: &f64| *nm > 0.0 && nm.is_finite())
-}
 
 /// The spectral channels of a frame, by ascending wavelength.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,7 +35,7 @@ impl SpectralChannels {
             .channels
             .iter()
             .enumerate()
-            .filter_map(|(place, name)| wavelength_of(name).map(|nm| (nm, place)))
+            .filter_map(|(place, name)| channel_wavelength_nm(name).map(|nm| (nm, place)))
             .collect();
         if found.is_empty() {
             return Err(frame.refuse(
@@ -133,19 +127,5 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralL
     match library.radiance.indexed_iter().find(|(_, value)| !value.is_finite()) {
         Some(((sample, _), _)) => Err(Error::format(&name, format!("sample {sample} is not finite"))),
         None => Ok(library),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn channel_names_state_wavelengths() {
-        assert_eq!(wavelength_of("S0.550,000000nm"), Some(550.0));
-        assert_eq!(wavelength_of("S0.550.5nm"), Some(550.5));
-        for other in ["R", "S1.550,0nm", "S0.nm", "S0.-1nm", "T.550,0nm"] {
-            assert_eq!(wavelength_of(other), None);
-        }
     }
 }

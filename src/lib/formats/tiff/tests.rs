@@ -1,6 +1,6 @@
 //! Round trips; files of other makers, put together by hand; damage. The crate `tiff` is the second opinion.
 
-#![expect(clippy::unwrap_used, clippy::cast_possible_truncation, reason = "tests, with values chosen to fit")]
+#![expect(clippy::cast_possible_truncation, reason = "tests, with values chosen to fit")]
 
 use super::write::needs_big_tiff;
 use super::*;

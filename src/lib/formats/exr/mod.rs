@@ -1,0 +1,61 @@
+//! OpenEXR: scanline files written, scanline and tiled files read, in bands, from files and from pipes.
+//!
+//! The crate `exr` parses headers and (de)compresses blocks; the order of reading and writing is ours, so that rows
+//! stream by and a pipe needs no seek.
+
+mod read;
+mod write;
+
+pub use read::{ExrReader, is_streamable};
+pub use write::{ExrWriter, TablePatch, patch_table};
+
+/// The string attribute that holds the metadata.
+const METADATA_ATTRIBUTE: &str = "cyanometer";
+/// Blocks below this size are worked on in parallel; larger ones one or two at a time, to save memory.
+const PARALLEL_BLOCK_BYTES: usize = 4 << 20;
+
+/// How samples are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExrSamples {
+    /// 32-bit float.
+    F32,
+    /// 16-bit float.
+    F16,
+}
+
+/// How blocks are compressed, all without loss.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExrCompression {
+    /// Not at all: the only way down a pipe.
+    None,
+    /// Run lengths.
+    Rle,
+    /// Deflate, row by row.
+    Zips,
+    /// Deflate, 16 rows at a time.
+    Zip,
+    /// Wavelets, 32 rows at a time: best on noise.
+    Piz,
+}
+
+/// Chromaticities (x, y) of the three primaries and of white.
+pub type Primaries = [[f64; 2]; 4];
+
+/// Attributes that other software understands, and ours.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ExrTags {
+    /// The metadata, YAML.
+    pub metadata: Option<String>,
+    /// `software`.
+    pub software: Option<String>,
+    /// `expTime` in s.
+    pub exposure_s: Option<f64>,
+    /// `aperture`, the f-number.
+    pub f_number: Option<f64>,
+    /// `whiteLuminance` in cd m⁻².
+    pub white_luminance: Option<f64>,
+    /// `chromaticities`.
+    pub primaries: Option<Primaries>,
+    /// `emissiveUnits` of a spectral image.
+    pub emissive_units: Option<String>,
+}
