@@ -123,7 +123,7 @@ impl NearlyNormal {
 
     /// The fourth cumulant of the smaller of the variable and `limit`.
     ///
-    /// The shortfall U = (limit − X)₊ has E[Uᵏ] = ∫₀^∞ k uᵏ⁻¹ P(X < limit − u) du, by Simpson's rule in steps below
+    /// The shortfall U = (limit − X)₊ has the moments E(Uᵏ) = ∫₀^∞ k uᵏ⁻¹ P(X < limit − u) du, by Simpson's rule in steps below
     /// σ/10: a relative error of about 10⁻⁵, for the sampling error of a spread.
     pub fn fourth_clipped_above(self, limit: f64) -> f64 {
         let sigma = self.variance.max(0.0).sqrt();
