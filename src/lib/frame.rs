@@ -36,9 +36,20 @@ impl Geometry {
         self.width * self.channels.len()
     }
 
+    /// Bytes of one row of all channels.
+    fn row_bytes(&self) -> usize {
+        (self.row_samples() * size_of::<f32>()).max(1)
+    }
+
+    /// Rows to ask a source for together that decodes `natural` of them at a time: so many, unless they are too large to
+    /// hold more than once.
+    pub fn step_rows(&self, natural: usize) -> usize {
+        if natural * self.row_bytes() <= 4 * BAND_BYTES { natural } else { 1 }
+    }
+
     /// Rows of a band that holds about [`BAND_BYTES`], a multiple of `step`, at least one step.
     pub fn band_rows(&self, step: usize) -> usize {
-        let row_bytes = (self.row_samples() * size_of::<f32>()).max(1);
+        let row_bytes = self.row_bytes();
         // Wide frames get at least 8 rows, so that a halo of 3 does not double the work, while 8 MiB hold them.
         let fitting = (BAND_BYTES / row_bytes).max((8 * BAND_BYTES / row_bytes).min(8));
         (fitting / step * step).max(step).min(self.height.max(1))

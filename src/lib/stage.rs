@@ -133,8 +133,8 @@ pub fn run<S: Stage>(
     let input = source.header().geometry.clone();
     let output = &stage.header().geometry;
     let (height, reach) = (input.height, stage.reach());
-    let natural = source.natural_rows();
-    let band_rows = input.band_rows(natural).min(output.band_rows(natural));
+    let step = output.step_rows(input.step_rows(source.natural_rows()));
+    let band_rows = input.band_rows(step).min(output.band_rows(step));
     let mut window: Vec<f32> = Vec::new();
     let (mut window_first, mut read) = (0, 0);
     let mut made: Vec<f32> = Vec::new();
@@ -145,7 +145,7 @@ pub fn run<S: Stage>(
         let needed = (end + reach).min(height);
         if needed > read {
             // What a source decodes together is asked for together, the halo included.
-            let wanted = (needed - read).next_multiple_of(natural).min(height - read);
+            let wanted = (needed - read).next_multiple_of(step).min(height - read);
             source.read(wanted, &mut window)?;
             read += wanted;
         }

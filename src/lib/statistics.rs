@@ -174,7 +174,7 @@ pub fn measure(source: &mut dyn RowSource, regions: &[Region], equations: Equati
         clipped_classes: [0; 3],
     };
     let mut tallies: Vec<Tally> = regions.iter().map(|_| empty()).collect();
-    let band_rows = geometry.band_rows(source.natural_rows());
+    let band_rows = geometry.band_rows(geometry.step_rows(source.natural_rows()));
     let mut samples = Vec::new();
     let mut first = 0;
     while first < geometry.height {

@@ -11,7 +11,7 @@ pub use write::{ExrWriter, TablePatch, patch_table};
 
 /// The string attribute that holds the metadata.
 const METADATA_ATTRIBUTE: &str = "cyanometer";
-/// Blocks below this size are worked on in parallel; larger ones one or two at a time, to save memory.
+/// Blocks are worked on in parallel while they fit this together; larger ones one or two at a time, to save memory.
 const PARALLEL_BLOCK_BYTES: usize = 4 << 20;
 
 /// How samples are stored.

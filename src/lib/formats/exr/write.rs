@@ -147,7 +147,7 @@ impl<W: Write> ExrWriter<W> {
     /// Compresses what is pending once it fills enough blocks to keep the threads busy, or at the end.
     fn compress_full_blocks(&mut self) -> Result<()> {
         let block_bytes = self.header.max_block_byte_size();
-        let together = if block_bytes < PARALLEL_BLOCK_BYTES { 2 * rayon::current_num_threads() } else { 1 };
+        let together = (PARALLEL_BLOCK_BYTES / block_bytes).clamp(1, 2 * rayon::current_num_threads());
         let last = self.rows_taken == self.geometry.height;
         if self.partial.is_empty() || !(last || self.partial.len() >= together * block_bytes) {
             return Ok(());
@@ -155,7 +155,12 @@ impl<W: Write> ExrWriter<W> {
         let lines = self.header.compression.scan_lines_per_block();
         let pending = std::mem::take(&mut self.partial);
         let first_row = self.rows_taken - pending.len() / (block_bytes / lines);
-        let compress = |(index, data): (usize, &[u8])| {
+        // A single block is moved, not copied: on wide frames it is the largest thing in memory.
+        let blocks: Vec<Vec<u8>> = match pending.len() <= block_bytes {
+            true => vec![pending],
+            false => pending.chunks(block_bytes).map(<[u8]>::to_vec).collect(),
+        };
+        let compress = |(index, data): (usize, Vec<u8>)| {
             let row = first_row + index * lines;
             let block = UncompressedBlock {
                 index: exr::block::BlockIndex {
@@ -164,15 +169,13 @@ impl<W: Write> ExrWriter<W> {
                     pixel_size: Vec2(self.geometry.width, data.len() / (block_bytes / lines)),
                     level: Vec2(0, 0),
                 },
-                data: data.to_vec(),
+                data,
             };
             block
                 .compress_to_chunk(std::slice::from_ref(&self.header))
                 .map_err(|error| Error::format(&self.name, format!("a block cannot be compressed: {error}")))
         };
-        let chunks: Vec<Chunk> =
-            pending.par_chunks(block_bytes).enumerate().map(compress).collect::<Result<Vec<_>>>()?;
-        drop(pending);
+        let chunks: Vec<Chunk> = blocks.into_par_iter().enumerate().map(compress).collect::<Result<Vec<_>>>()?;
         for chunk in chunks {
             let CompressedBlock::ScanLine(block) = &chunk.compressed_block else { continue };
             self.offsets.push(self.position);
