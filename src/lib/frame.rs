@@ -1,4 +1,5 @@
-//! A frame is a geometry and rows of samples; a band is some of its rows.
+//! A frame is a geometry and rows of samples; a band is some of its rows. A stage sees a band through a [`Window`] and
+//! fills the [`Rows`] of another; the quantity of the samples is in their types.
 //!
 //! Samples are `f32`, laid out as `[row][channel][column]`: each row of each channel is one contiguous slice.
 
@@ -59,49 +60,6 @@ impl Geometry {
 /// The size that a band aims at: a few of them fit a level-2 cache, and the memory of a program stays a few of them.
 pub const BAND_BYTES: usize = 1 << 20;
 
-/// Some rows of a frame, of quantity `Q`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Band<Q> {
-    /// The frame's row that is the band's first.
-    pub first_row: usize,
-    /// Columns.
-    pub width: usize,
-    /// Number of channels.
-    pub channels: usize,
-    /// Samples, `[row][channel][column]`.
-    pub samples: Vec<f32>,
-    quantity: PhantomData<Q>,
-}
-
-impl<Q: Quantity> Band<Q> {
-    /// A band of `rows` rows of zeros.
-    pub fn zeros(first_row: usize, rows: usize, width: usize, channels: usize) -> Self {
-        Self::from_samples(first_row, width, channels, vec![0.0; rows * width * channels])
-    }
-
-    /// A band around samples laid out as `[row][channel][column]`.
-    pub fn from_samples(first_row: usize, width: usize, channels: usize, samples: Vec<f32>) -> Self {
-        assert!(width * channels > 0 && samples.len().is_multiple_of(width * channels));
-        Self { first_row, width, channels, samples, quantity: PhantomData }
-    }
-
-    /// Number of rows.
-    pub fn rows(&self) -> usize {
-        self.samples.len() / (self.width * self.channels)
-    }
-
-    /// One channel of the band's row `row` (counted within the band).
-    pub fn row(&self, row: usize, channel: usize) -> &[f32] {
-        let start = (row * self.channels + channel) * self.width;
-        &self.samples[start..start + self.width]
-    }
-
-    /// The band as another quantity: for the one place that has read in the metadata what the samples are.
-    pub fn assume<P: Quantity>(self) -> Band<P> {
-        Band::from_samples(self.first_row, self.width, self.channels, self.samples)
-    }
-}
-
 /// The rows of a frame that a stage can see: those it makes, and a halo above and below.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<'a, Q = Any> {
@@ -140,12 +98,6 @@ impl<'a, Q: Quantity> Window<'a, Q> {
         let y = mirror(y, self.frame_height);
         let start = ((y - self.first_row) * self.channels + channel) * self.width;
         &self.samples[start..start + self.width]
-    }
-
-    /// All channels of the frame's row `y`, one after another.
-    pub fn rows_of_all_channels(&self, y: usize) -> &'a [f32] {
-        let start = (y - self.first_row) * self.channels * self.width;
-        &self.samples[start..start + self.channels * self.width]
     }
 }
 

@@ -21,7 +21,7 @@
 //! # Units
 //!
 //! Wavelengths in nm, spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, charge in electrons, codes in ADU, luminance in cd m⁻².
-//! Samples are 32-bit floats whose quantity is in the type of the band; scalars are doubles with the unit in the name.
+//! Samples are 32-bit floats whose quantity is in the type of the window on them; scalars are doubles with the unit in the name.
 //!
 //! Sources are cited as `[HP2005, Eq. 11]`; the keys resolve in `docs/references.md`.
 

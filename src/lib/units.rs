@@ -156,7 +156,7 @@ impl fmt::Display for QuantityKind {
     }
 }
 
-/// A quantity as a type, so that a [`crate::frame::Band`] of one cannot enter a function that takes another.
+/// A quantity as a type, so that a [`crate::frame::Window`] on one cannot enter a function that takes another.
 pub trait Quantity: Copy + Send + Sync + 'static {}
 
 macro_rules! quantities {
@@ -166,8 +166,6 @@ macro_rules! quantities {
 }
 
 quantities! {
-    /// Spectral radiance.
-    Radiance,
     /// Expected signal electrons, free of noise.
     ExpectedElectrons,
     /// Electrons of an exposure.
