@@ -3,7 +3,7 @@
 use clap::Parser;
 use cyanometer::cli::{self, options};
 use cyanometer::error::Result;
-use cyanometer::formats::{data, input::FrameReader};
+use cyanometer::formats::input::FrameReader;
 use cyanometer::metadata::PoissonKind;
 use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::propagation::{self, Equations};
@@ -39,9 +39,8 @@ struct Arguments {
     /// How Poisson numbers are drawn: exact, or gaussian to see what that approximation costs
     #[arg(long, default_value = "exact", value_parser = options::choice(&[("exact", PoissonKind::Exact), ("gaussian", PoissonKind::Gaussian)]))]
     poisson: PoissonKind,
-    /// Sensor, for a frame whose metadata names none, or another than it names
-    #[arg(long, value_name = "NAME|FILE")]
-    sensor: Option<String>,
+    #[command(flatten)]
+    sensor: options::SensorChoice,
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
@@ -62,9 +61,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
-    if let Some(sensor) = &arguments.sensor {
-        reader.header_mut().metadata.sensor = Some(data::load_sensor(sensor)?.sensor);
-    }
+    arguments.sensor.apply(&mut reader)?;
     let settings = NoiseSettings {
         seed: arguments.seed,
         sensor_seed: arguments.sensor_seed,

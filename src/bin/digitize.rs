@@ -4,7 +4,7 @@ use clap::Parser;
 use cyanometer::adc::{AdcSettings, Digitize};
 use cyanometer::cli::{self, options};
 use cyanometer::error::Result;
-use cyanometer::formats::{data, input::FrameReader};
+use cyanometer::formats::input::FrameReader;
 use cyanometer::propagation::{self, Equations};
 use cyanometer::stage::RowSource;
 use std::process::ExitCode;
@@ -27,9 +27,8 @@ struct Arguments {
     /// Slope in ADU per electron; by default the sensor's
     #[arg(long, value_name = "ADU_PER_E", value_parser = options::positive, allow_negative_numbers = true)]
     slope: Option<f64>,
-    /// Sensor, for a frame whose metadata names none, or another than it names
-    #[arg(long, value_name = "NAME|FILE")]
-    sensor: Option<String>,
+    #[command(flatten)]
+    sensor: options::SensorChoice,
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
@@ -42,9 +41,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
-    if let Some(sensor) = &arguments.sensor {
-        reader.header_mut().metadata.sensor = Some(data::load_sensor(sensor)?.sensor);
-    }
+    arguments.sensor.apply(&mut reader)?;
     let settings = AdcSettings { bits: arguments.bits, bias_adu: arguments.bias, adu_per_e: arguments.slope };
     let mut stage = Digitize::new(reader.header(), &settings)?;
     propagation::note(stage.header_mut(), Equations::Exact);

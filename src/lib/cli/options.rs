@@ -1,7 +1,8 @@
 //! Options that programs share, and how their values are read.
 
 use crate::cfa::CfaPattern;
-use crate::formats::input::InputOptions;
+use crate::formats::data;
+use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::statistics::Region;
 use crate::units::RadianceUnit;
@@ -36,6 +37,28 @@ impl Input {
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
         InputOptions { path: self.input.clone(), part: self.part, metadata: self.metadata.clone(), all_channels: false }
+    }
+}
+
+/// A sensor that counts instead of the one in the frame's metadata.
+#[derive(Debug, Clone, Args)]
+pub struct SensorChoice {
+    /// Sensor, for a frame whose metadata names none, or another than it names
+    #[arg(long, value_name = "NAME|FILE")]
+    pub sensor: Option<String>,
+}
+
+impl SensorChoice {
+    /// Puts the sensor, if one was chosen, into the metadata of a frame.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`data::load_sensor`].
+    pub fn apply(&self, reader: &mut FrameReader) -> crate::error::Result<()> {
+        if let Some(sensor) = &self.sensor {
+            reader.header_mut().metadata.sensor = Some(data::load_sensor(sensor)?.sensor);
+        }
+        Ok(())
     }
 }
 
