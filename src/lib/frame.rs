@@ -185,5 +185,8 @@ mod tests {
         assert_eq!(frame.band_rows(1), 8);
         assert_eq!(frame.band_rows(32), 32);
         assert_eq!(Geometry::new(10, 7, &["Y"]).band_rows(16), 7);
+        // A block of 32 such rows takes 11.5 MB: it is taken row by row; a small one whole.
+        assert_eq!(frame.step_rows(32), 1);
+        assert_eq!(Geometry::new(1_332, 1_000, &["R", "G", "B"]).step_rows(32), 32);
     }
 }
