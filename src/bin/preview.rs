@@ -2,7 +2,7 @@
 
 use clap::Parser;
 use cyanometer::cli::{self, options};
-use cyanometer::error::{Error, Result};
+use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::picture::{PictureSettings, Range, write_png};
 use cyanometer::statistics::Region;
@@ -51,10 +51,6 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let path = &arguments.output;
-    if path.extension().is_some_and(|end| !end.eq_ignore_ascii_case("png")) {
-        return Err(Error::Usage(format!("{}: a picture is a PNG; end the name in .png", path.display())));
-    }
     let mut reader = FrameReader::open(&arguments.input.options())?;
     session.report_reader(&reader);
     let settings = PictureSettings { region: arguments.region, zoom: arguments.zoom, range: arguments.range };
