@@ -18,7 +18,7 @@ use std::process::ExitCode;
 struct Arguments {
     #[command(flatten)]
     input: options::Input,
-    /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color)
+    /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
     #[arg(long, default_value = "eci", value_parser = options::choice(&METHODS))]
     method: Method,
     /// Black level to remove: auto (from the metadata), none, or a number in the unit of the samples
@@ -33,13 +33,15 @@ struct Arguments {
     general: options::General,
 }
 
-const METHODS: [(&str, Method); 6] = [
+const METHODS: [(&str, Method); 8] = [
     ("bi", Method::Bilinear),
     ("bilinear", Method::Bilinear),
     ("shti", Method::SmoothHue),
     ("smooth-hue", Method::SmoothHue),
     ("eci", Method::EffectiveColor),
     ("effective-color", Method::EffectiveColor),
+    ("mhc", Method::Malvar),
+    ("malvar", Method::Malvar),
 ];
 
 fn black(text: &str) -> std::result::Result<Black, String> {

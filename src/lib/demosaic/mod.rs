@@ -5,7 +5,9 @@
 
 mod bilinear;
 mod effective_color;
+mod malvar;
 mod smooth_hue;
+pub mod weights;
 
 use crate::cfa::{CfaPattern, Class};
 use crate::error::Result;
@@ -23,11 +25,13 @@ pub enum Method {
     SmoothHue,
     /// Effective colour interpolation (ECI), of the differences G − R and G − B \[PeiTam2003].
     EffectiveColor,
+    /// Malvar, He and Cutler's linear filters of 5×5 sites (MHC) \[MHC2004].
+    Malvar,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 3] = [Self::Bilinear, Self::SmoothHue, Self::EffectiveColor];
+    pub const ALL: [Self; 4] = [Self::Bilinear, Self::SmoothHue, Self::EffectiveColor, Self::Malvar];
 
     /// Short and long name.
     pub fn names(self) -> [&'static str; 2] {
@@ -35,6 +39,7 @@ impl Method {
             Self::Bilinear => ["bi", "bilinear"],
             Self::SmoothHue => ["shti", "smooth-hue"],
             Self::EffectiveColor => ["eci", "effective-color"],
+            Self::Malvar => ["mhc", "malvar"],
         }
     }
 
@@ -42,7 +47,7 @@ impl Method {
     pub fn reach(self) -> usize {
         match self {
             Self::Bilinear => 1,
-            Self::SmoothHue => 2,
+            Self::SmoothHue | Self::Malvar => 2,
             Self::EffectiveColor => 3,
         }
     }
@@ -158,6 +163,7 @@ impl Stage for Demosaic {
             Method::Bilinear => bilinear::interpolate(&tile, &mut output),
             Method::SmoothHue => smooth_hue::interpolate(&tile, &mut output),
             Method::EffectiveColor => effective_color::interpolate(&tile, &mut output),
+            Method::Malvar => malvar::interpolate(&tile, &mut output),
         }
     }
 }
