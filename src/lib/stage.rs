@@ -43,7 +43,7 @@ pub struct Counts {
     pub not_finite: u64,
     /// Expected electrons below zero.
     pub negative: u64,
-    /// Hues without a green to divide by.
+    /// Demosaicked values without a green to divide by, or beyond the range of samples.
     pub undefined_hue: u64,
     /// Colours outside sRGB.
     pub out_of_gamut: u64,
@@ -86,7 +86,10 @@ impl Counts {
             (self.clipped_high, "samples were clipped to the largest code"),
             (self.not_finite, "samples are NaN or infinite"),
             (self.negative, "expected signals below zero were taken as zero"),
-            (self.undefined_hue, "hues had no green to divide by; bilinear values stand in"),
+            (
+                self.undefined_hue,
+                "values had no green to divide by, or lay beyond the range of samples; bilinear ones stand in",
+            ),
             (self.out_of_gamut, "colours lie outside sRGB and were clipped"),
         ]
         .into_iter()

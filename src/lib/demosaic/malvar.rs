@@ -13,6 +13,7 @@ use crate::stage::Counts;
 /// and the opposite class the mean of four diagonal neighbours and three quarters of that curvature; at a green site,
 /// red and blue are the mean of their two neighbours and five eighths of the curvature of green.
 pub(super) fn interpolate(tile: &Tile, output: &mut Rows<'_>) -> Counts {
+    let mut counts = Counts::default();
     for y in output.range() {
         let row = y.cast_signed();
         let (class, parity) = tile.chrominance(row);
@@ -36,12 +37,27 @@ pub(super) fn interpolate(tile: &Tile, output: &mut Rows<'_>) -> Counts {
                 let above_and_below = 5.0 * here - diagonals - far_ends + 0.5 * far_sides;
                 ((4.0 * sides + beside) / 8.0, here, (4.0 * ends + above_and_below) / 8.0)
             };
-            planes[class as usize][index] = to_sample(own);
-            planes[Class::Green as usize][index] = to_sample(green);
-            planes[other as usize][index] = to_sample(opposite);
+            let mut keep = |class: Class, value: f64, bilinear: f64| {
+                let mut sample = to_sample(value);
+                if !sample.is_finite() {
+                    // The corrections of samples near the end of the range may lie beyond it; their mean does not.
+                    sample = to_sample(bilinear);
+                    counts.undefined_hue += u64::from(sample.is_finite());
+                }
+                planes[class as usize][index] = sample;
+            };
+            if x & 1 == parity {
+                keep(class, own, own);
+                keep(Class::Green, green, (sides + ends) / 4.0);
+                keep(other, opposite, diagonals / 4.0);
+            } else {
+                keep(class, own, sides / 2.0);
+                keep(Class::Green, green, green);
+                keep(other, opposite, ends / 2.0);
+            }
         }
     }
-    Counts::default()
+    counts
 }
 
 /// Eighths of the 5×5 kernels of \[MHC2004, Fig. 2], top left quarter and centre lines: green at red or blue; red or

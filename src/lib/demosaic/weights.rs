@@ -143,7 +143,7 @@ pub struct WeightTable {
 impl WeightTable {
     /// The weights of `method` on an array of `pattern`.
     pub fn new(method: Method, pattern: CfaPattern) -> Self {
-        let zero = || PHASES.map(|_| [const { () }; 3].map(|()| Kernel::zero()));
+        let zero = || PHASES.map(|_| Class::ALL.map(|_| Kernel::zero()));
         let (mut fixed, mut of_hue) = (zero(), zero());
         for (index, phase) in PHASES.into_iter().enumerate() {
             let surroundings = Surroundings { pattern, phase };
