@@ -155,6 +155,9 @@ pub struct ColorRecord {
     /// What it was fitted by.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
+    /// Black level that was left in the camera's signals and subtracted first, ADU.
+    #[serde(default)]
+    pub black_adu: f64,
     /// XYZ of the white that Lab and sRGB refer to, absolute.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub white: Option<[f64; 3]>,

@@ -4,7 +4,7 @@ use crate::cfa::Class;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
-use crate::propagation::{self, Equations, Prediction};
+use crate::propagation::{self, Equations, FramePrediction, Prediction};
 use crate::stage::RowSource;
 use crate::units::QuantityKind;
 use rayon::prelude::*;
@@ -198,7 +198,10 @@ pub fn measure(source: &mut dyn RowSource, regions: &[Region], equations: Equati
         }
         first += rows;
     }
-    let predictions = propagation::of_frame(&frame, equations);
+    let predictions = match propagation::of_frame(&frame, equations) {
+        Some(FramePrediction::Planes(classes)) => Some(classes),
+        _ => None,
+    };
     let report = |(region, tally): (&Region, &Tally)| tally.report(&frame, *region, rails, predictions.as_ref());
     Ok(Report { regions: regions.iter().zip(&tallies).map(report).collect() })
 }

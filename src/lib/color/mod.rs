@@ -73,6 +73,74 @@ pub fn lab_from_xyz(xyz: [f64; 3], white: [f64; 3]) -> [f64; 3] {
     [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
 }
 
+/// What a curved space does to small changes of XYZ about one colour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Local {
+    /// The colour itself in that space.
+    pub value: [f64; 3],
+    /// Derivatives: rows are the space's coordinates, columns X, Y, Z.
+    pub jacobian: Matrix3<f64>,
+    /// Second derivatives of each coordinate.
+    pub hessian: [Matrix3<f64>; 3],
+}
+
+impl Local {
+    /// How far the mean of noisy colours lies from the colour, to second order: ½ tr(H Σ).
+    pub fn bias(&self, covariance: &Matrix3<f64>) -> [f64; 3] {
+        self.hessian.map(|hessian| 0.5 * hessian.component_mul(covariance).sum())
+    }
+}
+
+/// L*a*b* about a colour.
+pub fn lab_about(xyz: [f64; 3], white: [f64; 3]) -> Local {
+    const DELTA: f64 = 6.0 / 29.0;
+    let derivatives = |i: usize| {
+        let t = xyz[i] / white[i];
+        let (first, second) = if t > DELTA.powi(3) {
+            let root = t.cbrt();
+            (1.0 / (3.0 * root * root), -2.0 / (9.0 * root.powi(5)))
+        } else {
+            (1.0 / (3.0 * DELTA * DELTA), 0.0)
+        };
+        [first / white[i], second / white[i].powi(2)]
+    };
+    let [x, y, z] = [0, 1, 2].map(derivatives);
+    let jacobian = Matrix3::new(
+        0.0,
+        116.0 * y[0],
+        0.0, //
+        500.0 * x[0],
+        -500.0 * y[0],
+        0.0, //
+        0.0,
+        200.0 * y[0],
+        -200.0 * z[0],
+    );
+    let diagonal = |a: f64, b: f64, c: f64| Matrix3::from_diagonal(&Vector3::new(a, b, c));
+    let hessian = [
+        diagonal(0.0, 116.0 * y[1], 0.0),
+        diagonal(500.0 * x[1], -500.0 * y[1], 0.0),
+        diagonal(0.0, 200.0 * y[1], -200.0 * z[1]),
+    ];
+    Local { value: lab_from_xyz(xyz, white), jacobian, hessian }
+}
+
+/// xyY about a colour; none where X + Y + Z is not above zero.
+pub fn xyy_about([x, y, z]: [f64; 3]) -> Option<Local> {
+    let sum = x + y + z;
+    if !(sum > 0.0 && sum.is_finite()) {
+        return None;
+    }
+    let value = [x / sum, y / sum, y];
+    let unit = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
+    // x = X/S: ∂ᵢ = (δ − x)/S, ∂ᵢⱼ = (2x − δᵢ − δⱼ)/S², with δ = 1 for the numerator's own stimulus.
+    let first = |k: usize, i: usize| (unit(k, i) - value[k]) / sum;
+    let second = |k: usize, i: usize, j: usize| (2.0 * value[k] - unit(k, i) - unit(k, j)) / (sum * sum);
+    let jacobian = Matrix3::from_fn(|k, i| if k < 2 { first(k, i) } else { unit(1, i) });
+    let hessian = [0, 1, 2].map(|k| if k < 2 { Matrix3::from_fn(|i, j| second(k, i, j)) } else { Matrix3::zeros() });
+    Some(Local { value, jacobian, hessian })
+}
+
 /// The transfer curve of sRGB from linear light 0…1 [IEC 61966-2-1].
 pub fn srgb_encode(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
@@ -200,6 +268,7 @@ impl ToXyz {
         metadata.color = Some(ColorRecord {
             xyz_from_camera: settings.xyz_from_camera,
             method: settings.method.clone(),
+            black_adu: black,
             white: known_white.then_some(white),
         });
         let geometry = input.geometry.with_channels(&channels);

@@ -43,6 +43,11 @@ impl Method {
         }
     }
 
+    /// The method of a short or long name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|method| method.names().contains(&name))
+    }
+
     /// Rows and columns on each side that an interpolated value depends on.
     pub fn reach(self) -> usize {
         match self {
