@@ -4,6 +4,7 @@ use super::{Equations, Prediction};
 use crate::metadata::{AdcRecord, PoissonKind};
 use crate::noise::{NoiseModel, rectified_mean, rectified_mean_square};
 use crate::numerics::normal::{self, MeanVariance, NearlyNormal};
+use serde::Serialize;
 
 /// Central moments 2, 3 and 4 of a photosite's sensitivity max(0, N), N normal with mean 1 and standard deviation σ.
 fn sensitivity(sigma: f64) -> (f64, f64, f64, f64) {
@@ -94,24 +95,153 @@ pub fn adu(model: &NoiseModel, adc: &AdcRecord, expected_e: f64, equations: Equa
             MeanVariance { mean: adc.bias_adu + adc.adu_per_e * mean, variance: variance * adc.adu_per_e.powi(2) };
         return Prediction { moments, ..before };
     }
+    let tail = Tail::of(model, adc, expected_e);
     let before = electrons(model, expected_e, equations);
-    let charge = charge(model, expected_e);
-    let read = NearlyNormal::normal(0.0, model.read_noise_e.powi(2));
-    let whole = charge.plus(read);
     let mean = adc.bias_adu + adc.adu_per_e * before.moments.mean;
     let sigma = adc.adu_per_e * before.moments.std();
-    let electrons_at = |level: f64| (level - adc.bias_adu) / adc.adu_per_e;
-    let sites_clipped = charge.exceeds(model.full_well_e);
-    let (moments, fourth) = if let Some(lattice) = Lattice::of(model, adc, expected_e) {
-        normal::rounded(mean, sigma, adc.top_code(), |edge| lattice.exceeds(electrons_at(edge)))
-    } else if sites_clipped > 1e-12 {
-        let clipped = ClippedAndRead { charge, full_well_e: model.full_well_e, read_noise_e: model.read_noise_e };
-        normal::rounded(mean, sigma, adc.top_code(), |edge| clipped.exceeds(electrons_at(edge)))
-    } else {
-        normal::rounded(mean, sigma, adc.top_code(), |edge| whole.exceeds(electrons_at(edge)))
-    };
+    let (moments, fourth) = normal::rounded(mean, sigma, adc.top_code(), |edge| tail.exceeds(adc.electrons_at(edge)));
     let excess_kurtosis = if moments.variance > 0.0 { fourth / moments.variance.powi(2) } else { 0.0 };
     Prediction { moments, excess_kurtosis }
+}
+
+/// A cause of variance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// Shot noise of the light.
+    SignalShot,
+    /// Photo-response non-uniformity, a fixed pattern.
+    Prnu,
+    /// Shot noise of the dark signal.
+    DarkShot,
+    /// Dark-current non-uniformity, a fixed pattern.
+    Dcnu,
+    /// Shot noise as the patterns scale it, the cross terms λ s² that Eq. 11 of \[HP2005] drops.
+    ShotTimesPattern,
+    /// Read noise.
+    Read,
+    /// Full well, which takes from the variance.
+    FullWell,
+    /// Rounding to whole codes.
+    Quantization,
+    /// The ends of the range of codes, which take from the variance.
+    Rails,
+}
+
+impl Cause {
+    /// All causes, in the order in which they act.
+    pub const ALL: [Self; 9] = [
+        Self::SignalShot,
+        Self::Prnu,
+        Self::DarkShot,
+        Self::Dcnu,
+        Self::ShotTimesPattern,
+        Self::Read,
+        Self::FullWell,
+        Self::Quantization,
+        Self::Rails,
+    ];
+
+    /// The name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SignalShot => "signal_shot",
+            Self::Prnu => "prnu",
+            Self::DarkShot => "dark_shot",
+            Self::Dcnu => "dcnu",
+            Self::ShotTimesPattern => "shot_times_pattern",
+            Self::Read => "read",
+            Self::FullWell => "full_well",
+            Self::Quantization => "quantization",
+            Self::Rails => "rails",
+        }
+    }
+
+    /// Whether it is the same in every exposure of one sensor.
+    pub fn is_fixed_pattern(self) -> bool {
+        matches!(self, Self::Prnu | Self::Dcnu)
+    }
+}
+
+/// Variances by cause, in the order of [`Cause::ALL`]; they add up to the whole variance.
+pub type Budget = [f64; Cause::ALL.len()];
+
+/// The variance of one class in e² by cause; with `adc`, in ADU².
+pub fn budget(model: &NoiseModel, adc: Option<&AdcRecord>, expected_e: f64, equations: Equations) -> Budget {
+    let slope = adc.map_or(1.0, |adc| adc.adu_per_e);
+    let exact = equations == Equations::Exact;
+    let product = |rate: f64, shot: bool, sigma: f64| {
+        let (mu, c2, _, _) = if exact { sensitivity(sigma) } else { (1.0, sigma * sigma, 0.0, 0.0) };
+        let shot = if shot { rate } else { 0.0 };
+        [mu * mu * shot, c2 * rate * rate, if exact { c2 * shot } else { 0.0 }]
+    };
+    let light = product(expected_e, model.signal_shot, model.prnu);
+    let dark = product(model.dark_e, model.dark_shot, model.dcnu);
+    let mut budget = [0.0; Cause::ALL.len()];
+    let mut set = |cause: Cause, variance: f64| budget[cause as usize] = variance;
+    set(Cause::SignalShot, light[0]);
+    set(Cause::Prnu, light[1]);
+    set(Cause::DarkShot, dark[0]);
+    set(Cause::Dcnu, dark[1]);
+    set(Cause::ShotTimesPattern, light[2] + dark[2]);
+    set(Cause::Read, model.read_noise_e.powi(2));
+    let electrons = electrons(model, expected_e, equations).moments;
+    let unclipped: f64 = budget.iter().sum();
+    budget[Cause::FullWell as usize] = if exact { electrons.variance - unclipped } else { 0.0 };
+    let mut budget = budget.map(|variance| variance * slope * slope);
+    if let Some(adc) = adc.filter(|_| exact) {
+        let tail = Tail::of(model, adc, expected_e);
+        let mean = adc.bias_adu + slope * electrons.mean;
+        let sigma = slope * electrons.std();
+        // Codes without ends: moved up by whole codes until the lowest is far away, with as many more above.
+        let up = (9.0 * sigma + 2.0 - mean).max(0.0).ceil();
+        let top = mean + up + 9.0 * sigma + 2.0;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and `as` saturates")]
+        let top = top as u32;
+        let (endless, _) = normal::rounded(mean + up, sigma, top, |edge| tail.exceeds(adc.electrons_at(edge - up)));
+        budget[Cause::Quantization as usize] = endless.variance - electrons.variance * slope * slope;
+        budget[Cause::Rails as usize] = adu(model, adc, expected_e, equations).moments.variance - endless.variance;
+    }
+    budget
+}
+
+impl AdcRecord {
+    /// The charge that a level stands for, in e⁻.
+    fn electrons_at(&self, level_adu: f64) -> f64 {
+        (level_adu - self.bias_adu) / self.adu_per_e
+    }
+}
+
+/// The distribution of a photosite's charge and read noise, as far as rounding asks for it.
+enum Tail {
+    /// Few electrons: counts are gone through one by one.
+    Lattice(Lattice),
+    /// Full well is within reach.
+    Clipped(ClippedAndRead),
+    /// Neither.
+    Whole(NearlyNormal),
+}
+
+impl Tail {
+    fn of(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> Self {
+        let charge = charge(model, expected_e);
+        if let Some(lattice) = Lattice::of(model, adc, expected_e) {
+            Self::Lattice(lattice)
+        } else if charge.exceeds(model.full_well_e) > 1e-12 {
+            Self::Clipped(ClippedAndRead { charge, full_well_e: model.full_well_e, read_noise_e: model.read_noise_e })
+        } else {
+            Self::Whole(charge.plus(NearlyNormal::normal(0.0, model.read_noise_e.powi(2))))
+        }
+    }
+
+    /// P(charge and read noise > t), t in e⁻.
+    fn exceeds(&self, t: f64) -> f64 {
+        match self {
+            Self::Lattice(lattice) => lattice.exceeds(t),
+            Self::Clipped(clipped) => clipped.exceeds(t),
+            Self::Whole(whole) => whole.exceeds(t),
+        }
+    }
 }
 
 /// A charge that is clipped at full well before read noise is added.
@@ -211,6 +341,29 @@ mod tests {
             signal_shot: true,
             poisson: PoissonKind::Exact,
         }
+    }
+
+    /// Causes add up to the variance, whatever clips or rounds it.
+    #[test]
+    fn causes_add_up() {
+        let quiet = NoiseModel { dark_e: 0.0, read_noise_e: 0.3, ..paper_model() };
+        let loud = NoiseModel { read_noise_e: 15.7, ..paper_model() };
+        for model in [quiet, loud] {
+            for electrons_e in [0.0, 3.0, 500.0, 20_000.0, 39_800.0, 41_000.0] {
+                for equations in [Equations::Exact, Equations::Paper] {
+                    let found: f64 = budget(&model, None, electrons_e, equations).iter().sum();
+                    let whole = electrons(&model, electrons_e, equations).moments.variance;
+                    assert!((found - whole).abs() <= 1e-9 * whole, "{electrons_e}: {found} {whole}");
+                    let found: f64 = budget(&model, Some(&ADC), electrons_e, equations).iter().sum();
+                    let whole = adu(&model, &ADC, electrons_e, equations).moments.variance;
+                    assert!((found - whole).abs() <= 1e-9 * whole + 1e-12, "{electrons_e} ADU: {found} {whole}");
+                }
+            }
+        }
+        let rounding = budget(&loud, Some(&ADC), 20_000.0, Equations::Exact)[Cause::Quantization as usize];
+        assert!((rounding - 1.0 / 12.0).abs() < 1e-6);
+        let cross = budget(&loud, None, 0.0, Equations::Exact)[Cause::ShotTimesPattern as usize];
+        assert!((cross - 73.2138 * 0.04).abs() < 1e-4);
     }
 
     const ADC: AdcRecord = AdcRecord { bits: 12, bias_adu: 1753.0, adu_per_e: 0.058824 };
