@@ -270,7 +270,7 @@ mod tests {
         let still = length(&Vector3::new(3.0, 0.0, 4.0), &Matrix3::zeros());
         assert!((still.mean - 5.0).abs() < 1e-11 && still.variance < 1e-10);
         let far = length(&Vector3::new(0.0, 1000.0, 0.0), &diagonal(1.0, 9.0, 2.0));
-        assert!((far.mean - 1000.001_5).abs() < 1e-7 && (far.variance - 9.0).abs() < 1e-4, "{far:?}");
+        assert!((far.mean - 1_000.001_5).abs() < 1e-7 && (far.variance - 9.0).abs() < 1e-4, "{far:?}");
         assert_eq!(length(&none, &Matrix3::zeros()).mean, 0.0);
     }
 

@@ -3,6 +3,7 @@
 //! Each stage has the **exact** moments and, where they differ, those of the **paper**. [`classes`] knows photosites,
 //! [`mixture`] what becomes of them when each pixel is a weighted sum of many, [`paper`] the equations of \[HP2005].
 
+pub mod chain;
 pub mod classes;
 pub mod mixture;
 pub mod paper;
@@ -52,8 +53,10 @@ pub enum FramePrediction {
 /// Moments of pixels each of which is a weighted sum of photosites that are drawn apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mixture {
-    /// Mean of the three channels.
+    /// Mean of the three channels, bias included.
     pub mean: [f64; 3],
+    /// How far noise moves the mean where the channels are curved functions of the photosites, to second order.
+    pub bias: [f64; 3],
     /// Covariance of the three channels of a pixel, over all pixels of a large frame.
     pub covariance: Matrix3<f64>,
     /// What each channel is made of, to first order: the exact covariance follows from it and `sites`.
@@ -79,7 +82,7 @@ impl Mixture {
                 paper::demosaicked(method, variances, mean, Some([geometry.width, geometry.height]))?
             }
         };
-        Some(Self { mean, covariance, weights, sites })
+        Some(Self { mean, bias: [0.0; 3], covariance, weights, sites })
     }
 
     /// The same pixels in the channels that are `matrix` times these, less `black`.
@@ -87,6 +90,7 @@ impl Mixture {
     pub fn through(&self, matrix: &Matrix3<f64>, black: f64) -> Self {
         Self {
             mean: (matrix * Vector3::from(self.mean.map(|mean| mean - black))).into(),
+            bias: (matrix * Vector3::from(self.bias)).into(),
             covariance: matrix * self.covariance * matrix.transpose(),
             weights: self.weights.through(matrix),
             sites: self.sites,
@@ -99,7 +103,7 @@ impl Mixture {
     fn curved(&self, local: &color::Local) -> Self {
         let straight = self.through(&local.jacobian, 0.0);
         let bias = local.bias(&self.covariance);
-        Self { mean: [0, 1, 2].map(|i| local.value[i] + bias[i]), ..straight }
+        Self { mean: [0, 1, 2].map(|i| local.value[i] + bias[i]), bias, ..straight }
     }
 
     /// Gains of the covariance of the mean of a patch, its corner on `phase`, or on any.
