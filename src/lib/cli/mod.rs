@@ -2,6 +2,7 @@
 
 mod history;
 pub mod options;
+pub mod prediction;
 pub mod rendering;
 
 pub use history::history_entry;

@@ -1,14 +1,38 @@
 //! Options that programs share, and how their values are read.
 
 use crate::cfa::CfaPattern;
+use crate::color::White;
+use crate::demosaic::Method;
 use crate::formats::data;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
+use crate::random::Source;
 use crate::statistics::Region;
 use crate::units::RadianceUnit;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
+
+/// The demosaicking methods by their short and long names.
+pub const METHODS: [(&str, Method); 8] = [
+    ("bi", Method::Bilinear),
+    ("bilinear", Method::Bilinear),
+    ("shti", Method::SmoothHue),
+    ("smooth-hue", Method::SmoothHue),
+    ("eci", Method::EffectiveColor),
+    ("effective-color", Method::EffectiveColor),
+    ("mhc", Method::Malvar),
+    ("malvar", Method::Malvar),
+];
+
+/// The sources of noise by their names.
+pub const SOURCES: [(&str, Source); 5] = [
+    ("dcsn", Source::Dcsn),
+    ("dcnu", Source::Dcnu),
+    ("ssn", Source::Ssn),
+    ("prnu", Source::Prnu),
+    ("ron", Source::Ron),
+];
 
 /// A parser for one of a few words.
 pub fn choice<T: Copy + Send + Sync + 'static>(
@@ -200,6 +224,34 @@ pub fn region(text: &str) -> Result<Region, String> {
     match numbers.as_deref() {
         Some([x, y, width, height]) => Ok(Region { x: *x, y: *y, width: *width, height: *height }),
         _ => Err("a region is X,Y,W,H in pixels, counted from the frame's corner".into()),
+    }
+}
+
+/// Reads a white: `d65`, `e`, or absolute X,Y,Z.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn white(text: &str) -> Result<White, String> {
+    match text {
+        "d65" => Ok(White::D65),
+        "e" => Ok(White::EqualEnergy),
+        numbers => three_numbers(numbers)
+            .map(White::Absolute)
+            .map_err(|_| "give d65, e, or the white's X,Y,Z between commas".into()),
+    }
+}
+
+/// Reads a column and row of the sensor, `X,Y`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn place(text: &str) -> Result<[i64; 2], String> {
+    let numbers: Option<Vec<i64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([x, y]) => Ok([*x, *y]),
+        _ => Err("give the column and row X,Y of the sensor".into()),
     }
 }
 

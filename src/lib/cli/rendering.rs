@@ -58,6 +58,31 @@ pub struct Request {
     pub cfa: Option<CfaPattern>,
 }
 
+impl Default for Request {
+    /// The default sensor behind the paper's lens, at its exposure, and its wavelengths.
+    fn default() -> Self {
+        Self {
+            input: None,
+            part: 0,
+            sensor: data::DEFAULT_SENSOR.into(),
+            size: None,
+            exposure_s: 0.033,
+            f_number: 8.0,
+            lens_transmittance: 1.0,
+            vignetting_focal_length_mm: None,
+            expose_to: None,
+            electrons: None,
+            wavelengths: [360.0, 830.0, 1.0],
+            quadrature: Rule::Rectangle,
+            radiance_unit: None,
+            column: None,
+            sample: None,
+            patch: None,
+            cfa: None,
+        }
+    }
+}
+
 /// Reads `START:END:STEP`.
 ///
 /// # Errors
@@ -81,6 +106,16 @@ enum Light {
     Uniform { electrons: [f64; 3], source: String },
     /// An image; its rows come one by one, and are multiplied with `factor`.
     Image { rows: ImageRows, factor: f64, width: usize, height: usize, source: String },
+}
+
+/// A request whose light is open and whose exposure is settled.
+struct Prepared {
+    sensor: Sensor,
+    exposure: Exposure,
+    light: Light,
+    brightest_e: Option<f64>,
+    metadata: Metadata,
+    input: Option<(FileId, String)>,
 }
 
 enum ImageRows {
@@ -132,6 +167,31 @@ impl Request {
     ///
     /// Those of readers, sensor files and writers; [`Error::Usage`] where the request makes no sense.
     pub fn render(&self, session: &Session, output: &Output) -> Result<()> {
+        let mut prepared = self.prepare(session)?;
+        let rendering = self.rendering(&mut prepared)?;
+        self.write(session, output, rendering, prepared.light, prepared.input)
+    }
+
+    /// Sensor, exposure and signal electrons of a uniform scene, without a frame.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::render`]; [`Error::Usage`] for a spectral image of which no sample was chosen.
+    pub fn uniform(&self, session: &Session) -> Result<(Sensor, Exposure, [f64; 3])> {
+        let prepared = self.prepare(session)?;
+        match prepared.light {
+            Light::Uniform { electrons, .. } => {
+                let factor = if self.expose_to.is_some() { prepared.exposure.exposure_s } else { 1.0 };
+                Ok((prepared.sensor, prepared.exposure, electrons.map(|e| e * factor)))
+            }
+            Light::Image { source, .. } => {
+                Err(Error::Usage(format!("{source}: it holds many spectra; choose one with --sample N")))
+            }
+        }
+    }
+
+    /// Loads the sensor, opens the light and settles the exposure.
+    fn prepare(&self, session: &Session) -> Result<Prepared> {
         let loaded = data::load_sensor(&self.sensor)?;
         let [start_nm, end_nm, step_nm] = self.wavelengths;
         let grid = WavelengthGrid { start_nm, end_nm, step_nm, quadrature: self.quadrature };
@@ -193,8 +253,7 @@ impl Request {
             brightest_e = Some(fraction * loaded.sensor.full_well_e);
             session.note(&format!("exposure {} s", exposure.exposure_s));
         }
-        let rendering = self.rendering(&loaded.sensor, exposure, &mut light, brightest_e, metadata)?;
-        self.write(session, output, rendering, light, input)
+        Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, metadata, input })
     }
 
     /// Opens the radiance; gives a pixel's electrons at the exposure that `camera` was made for.
@@ -272,14 +331,9 @@ impl Request {
     }
 
     /// Settles size, metadata and layout of the frame.
-    fn rendering(
-        &self,
-        sensor: &Sensor,
-        exposure: Exposure,
-        light: &mut Light,
-        brightest_e: Option<f64>,
-        mut metadata: Metadata,
-    ) -> Result<Rendering> {
+    fn rendering(&self, prepared: &mut Prepared) -> Result<Rendering> {
+        let Prepared { sensor, exposure, light, brightest_e, metadata, .. } = prepared;
+        let (exposure, brightest_e, mut metadata) = (*exposure, *brightest_e, metadata.clone());
         let of_sensor = [sensor.width as usize, sensor.height as usize];
         let (size, patch, source, uniform) = match light {
             Light::Uniform { electrons, source } => {

@@ -2,6 +2,7 @@
 
 use super::csv::SpectralTable;
 use super::yaml;
+use crate::color::characterization::CameraMatrix;
 use crate::error::{Error, Result};
 use crate::sensor::{CurveFile, Sensor, SpectralResponse};
 use crate::spectrum::{Curve, Observer};
@@ -85,6 +86,18 @@ pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
         None => None,
     };
     Ok(LoadedSensor { sensor, response: SpectralResponse { quantum_efficiency, cover_glass } })
+}
+
+/// Reads a matrix file.
+///
+/// # Errors
+///
+/// [`Error::Disk`] and [`Error::Format`].
+pub fn load_matrix(path: &Path) -> Result<CameraMatrix> {
+    let shown = path.display().to_string();
+    let matrix: CameraMatrix = yaml::parse_strict(&shown, &read_file(path)?)?;
+    matrix.check().map_err(|problem| Error::format(&shown, problem))?;
+    Ok(matrix)
 }
 
 /// The CIE 1931 2° observer, built in.

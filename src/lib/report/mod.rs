@@ -1,5 +1,9 @@
 //! Reports: statistics and matrices as text, JSON, YAML and CSV.
 
+mod prediction;
+
+pub use prediction::{prediction, sweep};
+
 use crate::color::characterization::CameraMatrix;
 use crate::error::{Error, Result};
 use crate::statistics::{ChannelReport, RegionReport, Report};

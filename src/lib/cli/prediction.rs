@@ -1,0 +1,253 @@
+//! The work of `predict-noise`: from a request to a noise budget.
+
+use super::Session;
+use super::rendering;
+use crate::cfa::CfaPattern;
+use crate::color::{ColorSettings, Space, White};
+use crate::demosaic::Method;
+use crate::error::{Error, Result};
+use crate::formats::input::regular_file;
+use crate::formats::{data, output};
+use crate::noise::NoiseSettings;
+use crate::propagation::Equations;
+use crate::propagation::chain::{Chain, ChainPrediction, ChainSettings, Uncertainty};
+use crate::report::{self, ReportFormat};
+use crate::sensor::Sensor;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What is to be predicted, and how.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Sensor, exposure and light.
+    pub scene: rendering::Request,
+    /// Noise sources and temperature.
+    pub noise: NoiseSettings,
+    /// Demosaicking method.
+    pub method: Method,
+    /// Pattern of the filter array.
+    pub pattern: Option<CfaPattern>,
+    /// Matrix file.
+    pub matrix: Option<PathBuf>,
+    /// White of L*a*b*.
+    pub white: White,
+    /// Its luminance.
+    pub white_luminance: Option<f64>,
+    /// Equations.
+    pub equations: Equations,
+    /// Patch.
+    pub patch: Option<[usize; 2]>,
+    /// Its corner.
+    pub patch_at: Option<[i64; 2]>,
+    /// Wanted uncertainty.
+    pub wanted: Option<Uncertainty>,
+    /// Levels to go through.
+    pub sweep: Option<Sweep>,
+}
+
+/// Levels of the brightest class, in electrons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sweep {
+    start_e: f64,
+    end_e: f64,
+    count: usize,
+    is_logarithmic: bool,
+}
+
+impl Sweep {
+    /// Reads `START:END:COUNT`, `COUNT` with `log` or `lin` behind it.
+    ///
+    /// # Errors
+    ///
+    /// What is expected, in words.
+    pub fn parse(text: &str) -> std::result::Result<Self, String> {
+        let wrong = || "give START:END:COUNTlog or START:END:COUNTlin in electrons, such as 10:40000:50log".to_owned();
+        let [start, end, count] = text.split(':').collect::<Vec<_>>().try_into().map_err(|_| wrong())?;
+        let number = |text: &str| text.parse().ok().filter(|e: &f64| e.is_finite() && *e >= 0.0).ok_or_else(wrong);
+        let (start_e, end_e) = (number(start)?, number(end)?);
+        let (count, is_logarithmic) = match (count.strip_suffix("log"), count.strip_suffix("lin")) {
+            (Some(count), _) => (count, true),
+            (_, Some(count)) => (count, false),
+            _ => (count, false),
+        };
+        let count = count.parse().ok().filter(|count| (1..=100_000).contains(count)).ok_or_else(wrong)?;
+        if is_logarithmic && !(start_e > 0.0 && end_e > 0.0) {
+            return Err("a logarithmic sweep starts and ends above 0 electrons".into());
+        }
+        Ok(Self { start_e, end_e, count, is_logarithmic })
+    }
+
+    fn levels(self) -> impl Iterator<Item = f64> {
+        let Self { start_e, end_e, count, is_logarithmic } = self;
+        (0..count).map(move |i| {
+            let share = if count == 1 { 0.0 } else { i as f64 / (count - 1) as f64 };
+            match i {
+                0 => start_e,
+                _ if i == count - 1 => end_e,
+                _ if is_logarithmic => start_e * (end_e / start_e).powf(share),
+                _ => start_e + share * (end_e - start_e),
+            }
+        })
+    }
+}
+
+/// Reads a wanted uncertainty: `0.5%` or `0.1jnd`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn uncertainty(text: &str) -> std::result::Result<Uncertainty, String> {
+    let positive = |text: &str| text.trim().parse().ok().filter(|x: &f64| *x > 0.0 && x.is_finite());
+    let relative = text.strip_suffix('%').and_then(positive).map(|percent| Uncertainty::Relative(percent / 100.0));
+    let jnd = text.strip_suffix("jnd").and_then(positive).map(Uncertainty::Jnd);
+    relative
+        .or(jnd)
+        .ok_or_else(|| "give per cent of the signal, such as 0.5%, or a colour difference, such as 0.1jnd".into())
+}
+
+/// What a prediction was made for.
+#[derive(Debug, Clone, Serialize)]
+struct About {
+    sensor: String,
+    exposure_s: f64,
+    f_number: f64,
+    temperature_k: f64,
+    method: &'static str,
+    pattern: CfaPattern,
+    equations: Equations,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    patch: Option<[usize; 2]>,
+}
+
+impl Request {
+    /// Predicts, and writes the report.
+    ///
+    /// # Errors
+    ///
+    /// Those of readers, sensor and matrix files and of the chain.
+    pub fn predict(
+        &self,
+        session: &Session,
+        format: Option<ReportFormat>,
+        path: Option<&std::path::Path>,
+    ) -> Result<()> {
+        let (chain, about, electrons) = self.chain(session)?;
+        let mut chain = chain;
+        let input = self.scene.input.as_deref().and_then(regular_file);
+        let text = match self.sweep {
+            Some(sweep) => {
+                let found = sweep_levels(&mut chain, sweep, electrons)?;
+                self.warn(session, found.iter());
+                report::sweep(&about, &found, format.unwrap_or(ReportFormat::Csv))?
+            }
+            None => {
+                let found = chain.predict(electrons)?;
+                self.warn(session, std::iter::once(&found));
+                report::prediction(&about, &found, format.unwrap_or(ReportFormat::Text))?
+            }
+        };
+        output::write_text(path, &text, input.as_ref())
+    }
+
+    fn chain(&self, session: &Session) -> Result<(Chain, About, [f64; 3])> {
+        if self.scene.input.is_none() && self.scene.electrons.is_none() && self.sweep.is_none() {
+            return Err(Error::Usage("give a spectrum, --electrons R,G,B, --dark or --sweep".into()));
+        }
+        let mut scene = self.scene.clone();
+        if scene.input.is_none() && scene.electrons.is_none() {
+            scene.electrons = Some([1.0; 3]);
+        }
+        let (sensor, exposure, electrons) = scene.uniform(session)?;
+        if self.sweep.is_some() && electrons == [0.0; 3] {
+            return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
+        }
+        let color = self.color(session, &sensor)?;
+        let about = About {
+            sensor: sensor.name.clone(),
+            exposure_s: exposure.exposure_s,
+            f_number: exposure.f_number,
+            temperature_k: self.noise.temperature_k.unwrap_or(sensor.temperature_k),
+            method: self.method.names()[0],
+            pattern: self.pattern.unwrap_or(sensor.cfa),
+            equations: self.equations,
+            patch: self.patch,
+        };
+        let chain = Chain::new(ChainSettings {
+            sensor,
+            exposure,
+            noise: self.noise.clone(),
+            method: self.method,
+            pattern: self.pattern,
+            color,
+            equations: self.equations,
+            patch: self.patch,
+            patch_at: self.patch_at,
+            wanted: self.wanted,
+        })?;
+        Ok((chain, about, electrons))
+    }
+
+    fn color(&self, session: &Session, sensor: &Sensor) -> Result<Option<ColorSettings>> {
+        let Some(path) = &self.matrix else {
+            return match self.wanted {
+                Some(Uncertainty::Jnd(_)) => {
+                    Err(Error::Usage("an uncertainty in jnd needs colours; give --matrix FILE".into()))
+                }
+                _ => Ok(None),
+            };
+        };
+        let matrix = data::load_matrix(path)?;
+        if let Some(of_matrix) = matrix.sensor.as_ref().filter(|name| **name != sensor.name) {
+            session.warn(&format!("{} was fitted for the sensor {of_matrix}, not {}", path.display(), sensor.name));
+        }
+        Ok(Some(ColorSettings {
+            xyz_from_camera: matrix.xyz_from_camera,
+            method: matrix.method,
+            space: Space::Xyz,
+            white: self.white,
+            white_luminance: self.white_luminance,
+        }))
+    }
+
+    /// Says where the first order is void.
+    fn warn<'a>(&self, session: &Session, mut found: impl Iterator<Item = &'a ChainPrediction>) {
+        let void = found.find_map(|scene| scene.first_order.filter(|first_order| !first_order.holds));
+        if let Some(first_order) = void {
+            session.warn(&format!(
+                "green is {:.1} times its noise: smooth hue transition divides by it, and its noise cannot be propagated \
+                 to first order",
+                first_order.green_over_noise
+            ));
+        }
+    }
+}
+
+/// Predicts the scene at one level of its brightest class after another.
+fn sweep_levels(chain: &mut Chain, sweep: Sweep, electrons: [f64; 3]) -> Result<Vec<ChainPrediction>> {
+    let brightest = electrons.iter().copied().fold(0.0, f64::max);
+    sweep.levels().map(|level| chain.predict(electrons.map(|e| e / brightest * level))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sweeps_start_and_end_where_they_say() {
+        let sweep = Sweep::parse("10:40000:50log").unwrap();
+        let levels: Vec<f64> = sweep.levels().collect();
+        assert_eq!((levels.len(), levels[0], levels[49]), (50, 10.0, 40_000.0));
+        assert!((levels[1] / levels[0] - 4000.0_f64.powf(1.0 / 49.0)).abs() < 1e-12);
+        assert_eq!(Sweep::parse("0:10:3").unwrap().levels().collect::<Vec<_>>(), [0.0, 5.0, 10.0]);
+        for wrong in ["10:40000", "0:10:3log", "a:b:c", "1:2:0log", "-1:2:3lin"] {
+            assert!(Sweep::parse(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn uncertainties_are_in_per_cent_or_jnd() {
+        assert_eq!(uncertainty("0.5%"), Ok(Uncertainty::Relative(0.005)));
+        assert_eq!(uncertainty("0.1jnd"), Ok(Uncertainty::Jnd(0.1)));
+        assert!(uncertainty("0.1").is_err() && uncertainty("-1%").is_err());
+    }
+}

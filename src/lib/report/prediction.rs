@@ -1,0 +1,184 @@
+//! Reports of noise budgets.
+
+use super::{ReportFormat, shown, table, unwritable};
+use crate::error::Result;
+use crate::propagation::chain::{ChainPrediction, StagePrediction};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Writes the budget of one scene; `about` says what it was predicted for.
+///
+/// # Errors
+///
+/// [`crate::error::Error::Data`] when the form cannot hold it.
+pub fn prediction<A: Serialize>(about: &A, found: &ChainPrediction, format: ReportFormat) -> Result<String> {
+    #[derive(Serialize)]
+    struct Whole<'a, A> {
+        #[serde(flatten)]
+        about: &'a A,
+        #[serde(flatten)]
+        found: &'a ChainPrediction,
+    }
+    let whole = Whole { about, found };
+    match format {
+        ReportFormat::Json => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
+        ReportFormat::Yaml => serde_yaml::to_string(&whole).map_err(unwritable),
+        ReportFormat::Csv => stages_csv(found),
+        ReportFormat::Text => Ok(text(found)),
+    }
+}
+
+/// Writes budgets of one scene after another.
+///
+/// # Errors
+///
+/// [`crate::error::Error::Data`] when the form cannot hold it.
+pub fn sweep<A: Serialize>(about: &A, found: &[ChainPrediction], format: ReportFormat) -> Result<String> {
+    #[derive(Serialize)]
+    struct Whole<'a, A> {
+        #[serde(flatten)]
+        about: &'a A,
+        sweep: &'a [ChainPrediction],
+    }
+    let whole = Whole { about, sweep: found };
+    match format {
+        ReportFormat::Json => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
+        ReportFormat::Yaml => serde_yaml::to_string(&whole).map_err(unwritable),
+        ReportFormat::Csv | ReportFormat::Text => sweep_csv(found),
+    }
+}
+
+fn finish(writer: csv::Writer<Vec<u8>>) -> Result<String> {
+    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+}
+
+fn cell(value: Option<f64>) -> String {
+    value.map_or(String::new(), |value| value.to_string())
+}
+
+/// One row per stage and channel.
+fn stages_csv(found: &ChainPrediction) -> Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let causes = found.stages.first().map(|stage| stage.causes.as_slice()).unwrap_or_default();
+    let fixed = ["stage", "channel", "unit", "mean", "std", "temporal_std", "fixed_pattern_std", "snr_db"];
+    let head = fixed.into_iter().map(str::to_owned);
+    let of_causes = causes.iter().map(|entry| format!("variance_{}", entry.cause.name()));
+    writer.write_record(head.chain(["patch_mean_std".to_owned()]).chain(of_causes)).map_err(unwritable)?;
+    for stage in &found.stages {
+        for (i, channel) in stage.channels.iter().enumerate() {
+            let numbers = [
+                Some(stage.mean[i]),
+                Some(stage.std[i]),
+                stage.temporal_std.map(|std| std[i]),
+                stage.fixed_pattern_std.map(|std| std[i]),
+                stage.snr_db[i],
+                stage.patch_mean_std.map(|std| std[i]),
+            ];
+            let of_causes = (0..causes.len()).map(|cause| cell(stage.causes.get(cause).map(|entry| entry.variance[i])));
+            let words = [stage.stage.to_owned(), channel.clone(), stage.unit.clone()];
+            writer.write_record(words.into_iter().chain(numbers.map(cell)).chain(of_causes)).map_err(unwritable)?;
+        }
+    }
+    finish(writer)
+}
+
+/// One row per scene.
+fn sweep_csv(found: &[ChainPrediction]) -> Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let stages = found.first().map(|scene| scene.stages.as_slice()).unwrap_or_default();
+    let each = |stage: &StagePrediction| {
+        let name = stage.stage;
+        let channels = stage.channels.clone();
+        channels.into_iter().flat_map(move |channel| {
+            ["mean", "std", "snr_db", "patch_mean_std"].map(|what| format!("{name}_{channel}_{what}"))
+        })
+    };
+    let head = ["electrons_R", "electrons_G", "electrons_B"].map(str::to_owned);
+    let delta_e = found.first().and_then(|scene| scene.noise_delta_e).map(|_| "noise_delta_e".to_owned());
+    writer.write_record(head.into_iter().chain(stages.iter().flat_map(each)).chain(delta_e)).map_err(unwritable)?;
+    for scene in found {
+        let signal = scene.electrons.map(|e| cell(Some(e)));
+        let cells = scene.stages.iter().flat_map(|stage| {
+            (0..3).flat_map(move |i| {
+                let patch = stage.patch_mean_std.map(|std| std[i]);
+                [Some(stage.mean[i]), Some(stage.std[i]), stage.snr_db[i], patch].map(cell)
+            })
+        });
+        let delta_e = scene.noise_delta_e.map(|found| cell(Some(found.mean)));
+        writer.write_record(signal.into_iter().chain(cells).chain(delta_e)).map_err(unwritable)?;
+    }
+    finish(writer)
+}
+
+fn text(found: &ChainPrediction) -> String {
+    let mut out = String::new();
+    let [red, green, blue] = found.electrons.map(|e| shown("mean", Some(e)));
+    let _ = writeln!(out, "expected signal: R {red}, G {green}, B {blue} e-");
+    for stage in &found.stages {
+        stage_text(stage, &mut out);
+    }
+    if let Some(noise) = &found.noise_delta_e {
+        let _ = write!(
+            out,
+            "\ncolour difference that noise makes at a pixel: dE*ab {} +- {}, {} JND",
+            shown("std", Some(noise.mean)),
+            shown("std", Some(noise.std)),
+            shown("std", Some(noise.jnd))
+        );
+        if let Some(patch) = noise.patch_mean {
+            let _ = write!(out, "; in the mean of the patch dE*ab {}", shown("std", Some(patch)));
+        }
+        if let Some(pixels) = noise.pixels_needed {
+            let _ = write!(out, "; pixels needed: {pixels}");
+        }
+        out.push('\n');
+    }
+    if let Some(first_order) = found.first_order.filter(|first_order| !first_order.holds) {
+        let _ = writeln!(
+            out,
+            "\ngreen is {} times its noise: smooth hue transition divides by it, and its noise cannot be propagated to \
+             first order",
+            shown("snr_db", Some(first_order.green_over_noise))
+        );
+    }
+    out
+}
+
+fn stage_text(stage: &StagePrediction, out: &mut String) {
+    let _ = writeln!(out, "\n{} [{}]", stage.stage, stage.unit);
+    let mut lines: Vec<(String, [Option<f64>; 3])> =
+        vec![("mean".into(), stage.mean.map(Some)), ("std".into(), stage.std.map(Some))];
+    let mut part = |name: &str, values: Option<[f64; 3]>| {
+        lines.extend(values.map(|values| (name.to_owned(), values.map(Some))));
+    };
+    part("bias of the mean", stage.bias);
+    part("temporal std", stage.temporal_std);
+    part("fixed-pattern std", stage.fixed_pattern_std);
+    part("patch mean std", stage.patch_mean_std);
+    if stage.snr_db.iter().any(Option::is_some) {
+        lines.push(("SNR/dB".into(), stage.snr_db));
+    }
+    for entry in stage.causes.iter().filter(|entry| entry.variance.iter().any(|variance| *variance != 0.0)) {
+        lines.push((format!("variance: {}", entry.cause.name().replace('_', " ")), entry.variance.map(Some)));
+    }
+    for (i, row) in stage.covariance.iter().enumerate() {
+        if stage.covariance.iter().enumerate().any(|(j, other)| j != i && other[i] != 0.0) {
+            lines.push((format!("covariance with {}", stage.channels[i]), row.map(Some)));
+        }
+    }
+    if let Some(pixels) = stage.pixels_needed {
+        lines.push(("pixels needed".into(), pixels.map(|count| count.map(|count| count as f64))));
+    }
+    let key = |name: &str| match name {
+        "SNR/dB" => "snr_db",
+        "pixels needed" => "clipped",
+        _ => "std",
+    };
+    let mut columns: Vec<Vec<String>> =
+        vec![std::iter::once(String::new()).chain(lines.iter().map(|(name, _)| name.clone())).collect()];
+    for (i, channel) in stage.channels.iter().enumerate() {
+        let cells = lines.iter().map(|(name, values)| shown(key(name), values[i]));
+        columns.push(std::iter::once(channel.clone()).chain(cells).collect());
+    }
+    table(&columns, out);
+}
