@@ -335,15 +335,22 @@ impl FrameWriter {
 /// [`Error::Usage`] where the output is the input; [`Error::Disk`].
 pub fn write_text(path: Option<&Path>, text: &str, input: Option<&(FileId, String)>) -> Result<()> {
     match path.filter(|path| *path != Path::new("-")) {
-        Some(path) => {
-            let mut file = Target::open(Some(path), false, input)?;
-            file.write_all(text.as_bytes()).map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
-            file.commit()
-        }
+        Some(path) => write_bytes(path, text.as_bytes(), input),
         None => {
             let mut output = io::stdout().lock();
             let written = output.write_all(text.as_bytes()).and_then(|()| output.flush());
             written.map_err(|e| Error::disk(super::atomic::STDOUT_NAME, "write", e))
         }
     }
+}
+
+/// Writes what is complete in memory (a text, a plot) to a named file. `input` is the file that was read, if it is one.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where the output is the input; [`Error::Disk`].
+pub fn write_bytes(path: &Path, bytes: &[u8], input: Option<&(FileId, String)>) -> Result<()> {
+    let mut file = Target::open(Some(path), false, input)?;
+    file.write_all(bytes).map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
+    file.commit()
 }

@@ -1,4 +1,6 @@
-//! Reports: statistics and matrices as text, JSON, YAML and CSV.
+//! Reports: statistics and matrices as text, JSON, YAML and CSV; plots.
+
+pub mod plot;
 
 mod prediction;
 

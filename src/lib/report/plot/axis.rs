@@ -1,0 +1,310 @@
+//! Axes: from values to places, and the ticks between.
+
+/// How values are spread along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// Equal steps are equally long.
+    Linear,
+    /// Equal factors are equally long.
+    Log10,
+}
+
+/// What one direction of a panel means.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// The quantity and its unit.
+    pub label: String,
+    /// How values are spread.
+    pub scale: Scale,
+    /// The lowest and the highest value; from what is shown where there is none (or none that makes sense).
+    pub range: Option<(f64, f64)>,
+}
+
+impl Axis {
+    /// A linear axis as long as what is shown.
+    pub fn linear(label: &str) -> Self {
+        Self { label: label.into(), scale: Scale::Linear, range: None }
+    }
+
+    /// A logarithmic axis as long as what is shown.
+    pub fn log10(label: &str) -> Self {
+        Self { label: label.into(), scale: Scale::Log10, range: None }
+    }
+
+    /// The same axis from one value to another.
+    pub fn range(self, low: f64, high: f64) -> Self {
+        Self { range: Some((low, high)), ..self }
+    }
+}
+
+/// Values of a larger magnitude are not shown, and differences smaller than its inverse are none: arithmetic with them
+/// would overflow.
+const LARGEST: f64 = 1e100;
+
+/// An axis whose range is settled.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ruler {
+    scale: Scale,
+    /// The ends: values, or their decimal logarithms.
+    low: f64,
+    high: f64,
+}
+
+/// A mark on an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Tick {
+    /// The place, from 0 at the low end to 1 at the high one.
+    pub place: f64,
+    /// What stands beside it; minor ticks have nothing.
+    pub label: Option<String>,
+}
+
+impl Ruler {
+    /// Settles the range: as given, or from `values` with some room. An end at the value zero gets no room where
+    /// `grounded`, so that bars stand on the axis.
+    pub fn new(axis: &Axis, values: impl Iterator<Item = f64>, grounded: bool) -> Self {
+        let scale = axis.scale;
+        let given = axis.range.and_then(|(low, high)| Some((position(scale, low)?, position(scale, high)?)));
+        if let Some((low, high)) = given.filter(|(low, high)| is_wide(*low, *high)) {
+            return Self { scale, low, high };
+        }
+        let places = values.filter_map(|value| position(scale, value));
+        let (low, high) =
+            places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (f64::min(low, v), f64::max(high, v)));
+        let (low, high) = if low > high {
+            (0.0, 1.0)
+        } else if is_wide(low, high) {
+            let room = 0.05 * (high - low);
+            let on_ground = |end: f64| grounded && scale == Scale::Linear && end == 0.0;
+            (if on_ground(low) { low } else { low - room }, if on_ground(high) { high } else { high + room })
+        } else {
+            let room = match scale {
+                Scale::Log10 => 0.5,
+                Scale::Linear if low.abs() < 1.0 / LARGEST => 1.0,
+                Scale::Linear => 0.1 * low.abs(),
+            };
+            (low - room, high + room)
+        };
+        Self { scale, low, high }
+    }
+
+    /// Where a value lies: 0 at the low end, 1 at the high one. `None` for what the axis cannot show.
+    pub fn place(&self, value: f64) -> Option<f64> {
+        Some((position(self.scale, value)? - self.low) / (self.high - self.low))
+    }
+
+    /// The same for the end of a range, which stops at the ends of the axis. `None` only for NaN.
+    pub fn place_within(&self, value: f64) -> Option<f64> {
+        let at = match self.scale {
+            _ if value.is_nan() => return None,
+            Scale::Log10 if value <= 0.0 => f64::NEG_INFINITY,
+            Scale::Log10 => value.log10(),
+            Scale::Linear => value,
+        };
+        Some(((at.clamp(self.low, self.high) - self.low) / (self.high - self.low)).clamp(0.0, 1.0))
+    }
+
+    /// Ticks, of which at most about `count` have labels.
+    pub fn ticks(&self, count: f64) -> Vec<Tick> {
+        match self.scale {
+            Scale::Linear => {
+                let values = round_values(self.low, self.high, count);
+                let labels = plain_labels(&values);
+                let tick = |(value, label): (&f64, String)| self.tick(*value, Some(label));
+                values.iter().zip(labels).filter_map(tick).collect()
+            }
+            Scale::Log10 => self.log_ticks(count),
+        }
+    }
+
+    fn tick(&self, value: f64, label: Option<String>) -> Option<Tick> {
+        // Room for rounding: an end of the range is a tick.
+        let place = self.place(value).filter(|place| (-1e-9..=1.0 + 1e-9).contains(place))?;
+        Some(Tick { place: place.clamp(0.0, 1.0), label })
+    }
+
+    /// Decades with the numbers between them; on short axes the numbers between have labels too.
+    fn log_ticks(&self, count: f64) -> Vec<Tick> {
+        #[expect(clippy::cast_possible_truncation, reason = "logarithms of doubles are within ±324")]
+        let (first, last) = ((self.low - 1e-9).floor() as i32, (self.high + 1e-9).ceil() as i32);
+        let span = self.high - self.low;
+        if span < 0.7 {
+            let values = round_values(10_f64.powf(self.low), 10_f64.powf(self.high), count);
+            let labels = plain_labels(&values);
+            return values.iter().zip(labels).filter_map(|(value, label)| self.tick(*value, Some(label))).collect();
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "at most 200 decades")]
+        let stride = (span / count.max(1.0)).ceil().max(1.0) as i32;
+        let mut ticks = Vec::new();
+        for decade in first..=last {
+            if stride > 1 {
+                let label = (decade.rem_euclid(stride) == 0).then(|| decade_label(1, decade));
+                ticks.extend(self.tick(10_f64.powi(decade), label));
+                continue;
+            }
+            for digit in 1..=9 {
+                let labelled = digit == 1 || (span < 2.0 && (digit == 2 || digit == 5));
+                let label = labelled.then(|| decade_label(digit, decade));
+                ticks.extend(self.tick(f64::from(digit) * 10_f64.powi(decade), label));
+            }
+        }
+        ticks
+    }
+}
+
+/// A value along its scale; `None` for what the scale cannot show.
+fn position(scale: Scale, value: f64) -> Option<f64> {
+    match scale {
+        Scale::Linear => (value.abs() <= LARGEST).then_some(value),
+        Scale::Log10 => (1.0 / LARGEST..=LARGEST).contains(&value).then(|| value.log10()),
+    }
+}
+
+/// Whether places between the ends can be told apart.
+fn is_wide(low: f64, high: f64) -> bool {
+    high - low > (1e-9 * low.abs().max(high.abs())).max(1.0 / LARGEST)
+}
+
+/// Multiples of 1, 2 or 5 times a power of ten within a range, at most about `count` of them.
+fn round_values(low: f64, high: f64, count: f64) -> Vec<f64> {
+    let rough = (high - low) / count.max(1.0);
+    let power = 10_f64.powf(rough.log10().floor());
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= rough * (1.0 - 1e-9)).unwrap_or(10.0);
+    let step = factor * power;
+    let first = (low / step - 1e-9).ceil();
+    // Adding zero makes −0 a 0.
+    let values = (0..100).map(|index| (first + f64::from(index)) * step + 0.0);
+    values.take_while(|value| *value <= high + 1e-9 * step).collect()
+}
+
+/// Labels for equally spaced values, with as many digits as tell them apart.
+fn plain_labels(values: &[f64]) -> Vec<String> {
+    let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let step = match values {
+        [first, second, ..] => second - first,
+        _ => largest,
+    };
+    if !(step > 0.0 && largest > 0.0) {
+        return values.iter().map(|value| minus(&format!("{value}"))).collect();
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "logarithms of doubles are within ±324")]
+    let (magnitude, unit) = ((largest.log10() + 1e-9).floor() as i32, (step.log10() + 1e-9).floor() as i32);
+    let digits = |below: i32| usize::try_from(below).unwrap_or(0);
+    let label = |value: &f64| {
+        if *value == 0.0 {
+            "0".into()
+        } else if (-3..6).contains(&magnitude) {
+            minus(&format!("{value:.*}", digits(-unit)))
+        } else {
+            let mantissa = value / 10_f64.powi(magnitude);
+            minus(&format!("{mantissa:.*}·{}", digits(magnitude - unit), power_of_ten(magnitude)))
+        }
+    };
+    values.iter().map(label).collect()
+}
+
+/// A digit times a power of ten: 0.02, 1000, 10⁴, 5·10⁴.
+fn decade_label(digit: i32, decade: i32) -> String {
+    match decade {
+        0..=3 => format!("{}", f64::from(digit) * 10_f64.powi(decade)),
+        -3..0 => format!("{:.*}", usize::try_from(-decade).unwrap_or(0), f64::from(digit) * 10_f64.powi(decade)),
+        _ if digit == 1 => power_of_ten(decade),
+        _ => format!("{digit}·{}", power_of_ten(decade)),
+    }
+}
+
+fn power_of_ten(exponent: i32) -> String {
+    let raise = |c| match c {
+        '-' => '⁻',
+        '0' => '⁰',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '4' => '⁴',
+        '5' => '⁵',
+        '6' => '⁶',
+        '7' => '⁷',
+        '8' => '⁸',
+        _ => '⁹',
+    };
+    format!("10{}", exponent.to_string().chars().map(raise).collect::<String>())
+}
+
+/// The sign that typographers use.
+fn minus(number: &str) -> String {
+    number.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(axis: &Axis, count: f64) -> Vec<String> {
+        Ruler::new(axis, std::iter::empty(), false).ticks(count).into_iter().filter_map(|tick| tick.label).collect()
+    }
+
+    #[test]
+    fn linear_ticks_are_multiples_of_1_2_or_5() {
+        let axis = |low, high| Axis::linear("").range(low, high);
+        assert_eq!(labels(&axis(0.0, 10.0), 6.0), ["0", "2", "4", "6", "8", "10"]);
+        assert_eq!(labels(&axis(-0.3, 0.2), 5.0), ["−0.3", "−0.2", "−0.1", "0", "0.1", "0.2"]);
+        assert_eq!(labels(&axis(980.0, 1022.0), 4.0), ["980", "1000", "1020"]);
+        assert_eq!(labels(&axis(0.0, 2e6), 4.0), ["0", "0.5·10⁶", "1.0·10⁶", "1.5·10⁶", "2.0·10⁶"]);
+        assert_eq!(labels(&axis(0.0, 2e-5), 2.0), ["0", "1·10⁻⁵", "2·10⁻⁵"]);
+    }
+
+    #[test]
+    fn logarithmic_ticks_are_decades_with_minor_ones() {
+        let axis = |low, high| Axis::log10("").range(low, high);
+        assert_eq!(labels(&axis(0.01, 1e5), 10.0), ["0.01", "0.1", "1", "10", "100", "1000", "10⁴", "10⁵"]);
+        assert_eq!(labels(&axis(1e-8, 1e8), 4.0), ["10⁻⁸", "10⁻⁴", "1", "10⁴", "10⁸"]);
+        assert_eq!(labels(&axis(3.0, 30.0), 8.0), ["5", "10", "20"]);
+        assert_eq!(labels(&axis(1e4, 6e4), 8.0), ["10⁴", "2·10⁴", "5·10⁴"]);
+        assert_eq!(labels(&axis(100.0, 300.0), 5.0), ["100", "150", "200", "250", "300"]);
+        let ticks = Ruler::new(&axis(1.0, 1000.0), std::iter::empty(), false).ticks(8.0);
+        // 1…9 in each of three decades, and the end.
+        assert_eq!(ticks.len(), 28);
+        assert!((ticks[1].place - 2_f64.log10() / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn places_are_proportional_to_values_or_their_logarithms() {
+        let linear = Ruler::new(&Axis::linear("").range(-1.0, 3.0), std::iter::empty(), false);
+        assert_eq!(linear.place(0.0), Some(0.25));
+        assert_eq!(linear.place(f64::NAN), None);
+        assert_eq!(linear.place(f64::INFINITY), None);
+        assert_eq!(linear.place_within(f64::INFINITY), Some(1.0));
+        let log = Ruler::new(&Axis::log10("").range(1.0, 1e4), std::iter::empty(), false);
+        assert_eq!(log.place(100.0), Some(0.5));
+        assert_eq!(log.place(0.0), None);
+        assert_eq!(log.place(-1.0), None);
+        assert_eq!(log.place_within(0.0), Some(0.0));
+    }
+
+    #[test]
+    fn ranges_come_from_what_is_shown() {
+        let ends = |axis: Axis, values: &[f64], grounded| {
+            let ruler = Ruler::new(&axis, values.iter().copied(), grounded);
+            (ruler.low, ruler.high)
+        };
+        assert_eq!(ends(Axis::linear(""), &[0.0, f64::NAN, 100.0], true), (0.0, 105.0));
+        assert_eq!(ends(Axis::linear(""), &[0.0, 100.0], false), (-5.0, 105.0));
+        assert_eq!(ends(Axis::linear(""), &[7.0], false), (6.3, 7.7));
+        assert_eq!(ends(Axis::log10(""), &[-1.0, 0.0, 10.0], false), (0.5, 1.5));
+        assert_eq!(ends(Axis::linear(""), &[], false), (0.0, 1.0));
+        // Ranges that make no sense are as none.
+        assert_eq!(ends(Axis::log10("").range(0.0, 5.0), &[], false), (0.0, 1.0));
+        assert_eq!(ends(Axis::linear("").range(5.0, 1.0), &[], false), (0.0, 1.0));
+        assert_eq!(ends(Axis::linear("").range(f64::NAN, 1.0), &[], false), (0.0, 1.0));
+    }
+
+    #[test]
+    fn extreme_axes_have_a_bounded_number_of_ticks() {
+        for axis in [Axis::linear("").range(-1e100, 1e100), Axis::log10("").range(1e-100, 1e100)] {
+            let ticks = labels(&axis, 10.0);
+            assert!((2..=21).contains(&ticks.len()), "{ticks:?}");
+        }
+        let narrow = labels(&Axis::linear("").range(1e15, 1e15 + 2e7), 5.0);
+        assert!((2..=8).contains(&narrow.len()), "{narrow:?}");
+    }
+}

@@ -1,0 +1,90 @@
+//! The embedded font: widths of texts and outlines of letters.
+
+use std::sync::LazyLock;
+use tiny_skia::PathBuilder;
+use ttf_parser::{Face, GlyphId, OutlineBuilder};
+
+static FACE: LazyLock<Face<'static>> = LazyLock::new(|| {
+    let bytes = include_bytes!("../../../../assets/fonts/DejaVuSans-subset.ttf");
+    Face::parse(bytes, 0).expect("the embedded font is a font")
+});
+
+/// The glyph of a character, or a question mark in a diamond for one that the font lacks.
+fn glyph(c: char) -> GlyphId {
+    FACE.glyph_index(c).or_else(|| FACE.glyph_index('\u{FFFD}')).unwrap_or_default()
+}
+
+fn advance(glyph: GlyphId) -> f64 {
+    f64::from(FACE.glyph_hor_advance(glyph).unwrap_or(0))
+}
+
+/// How wide a text is, in the unit of `size`.
+pub(super) fn width(text: &str, size: f64) -> f64 {
+    text.chars().map(|c| advance(glyph(c))).sum::<f64>() * size / f64::from(FACE.units_per_em())
+}
+
+/// The outlines of a text in units of the font, y upwards, and the scale that gives it a size.
+pub(super) fn outline(text: &str, size: f64) -> (Option<tiny_skia::Path>, f64) {
+    let mut pen = Pen { path: PathBuilder::new(), x: 0.0 };
+    let mut x = 0.0;
+    for c in text.chars() {
+        let glyph = glyph(c);
+        #[expect(clippy::cast_possible_truncation, reason = "a place on the canvas")]
+        {
+            pen.x = x as f32;
+        }
+        // A space has no outline.
+        let _ = FACE.outline_glyph(glyph, &mut pen);
+        x += advance(glyph);
+    }
+    (pen.path.finish(), size / f64::from(FACE.units_per_em()))
+}
+
+struct Pen {
+    path: PathBuilder,
+    /// Where the letter begins.
+    x: f32,
+}
+
+impl OutlineBuilder for Pen {
+    fn move_to(&mut self, x: f32, y: f32) {
+        self.path.move_to(self.x + x, y);
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        self.path.line_to(self.x + x, y);
+    }
+
+    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
+        self.path.quad_to(self.x + x1, y1, self.x + x, y);
+    }
+
+    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
+        self.path.cubic_to(self.x + x1, y1, self.x + x2, y2, self.x + x, y);
+    }
+
+    fn close(&mut self) {
+        self.path.close();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_font_has_the_characters_of_labels() {
+        let needed = "0123456789−+±×·°%/()[]*=<>≤≥≈→∞√…–—’⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺₀₁₂₃₄₅₆₇₈₉αβγδΔεηκλΛμνρσΣτφΦχΩµäöüßéèñçø";
+        for c in needed.chars().chain(' '..='~') {
+            assert!(FACE.glyph_index(c).is_some(), "{c:?}");
+        }
+        assert_eq!(glyph('\u{1F600}'), FACE.glyph_index('\u{FFFD}').unwrap());
+    }
+
+    #[test]
+    fn widths_add_up() {
+        // A digit of DejaVu Sans is 1303/2048 em wide.
+        assert!((width("10", 2048.0) - 2606.0).abs() < 1e-9);
+        assert_eq!(width("", 12.0), 0.0);
+    }
+}
