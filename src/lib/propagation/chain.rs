@@ -4,7 +4,7 @@
 //! is predicted here is what `measure` compares such frames with.
 
 use super::classes::{self, Budget, Cause};
-use super::{Equations, FramePrediction, Mixture, mixture, of_frame};
+use super::{Equations, FramePrediction, Mixture, Prediction, from_sites, mixture, of_plane};
 use crate::adc::{AdcSettings, Digitize};
 use crate::cfa::{CfaPattern, Class};
 use crate::color::{ColorSettings, Space, ToXyz};
@@ -187,6 +187,23 @@ impl FirstOrder {
     }
 }
 
+/// Moments and budgets of the photosites of R, G and B.
+struct Sites {
+    moments: [Prediction; 3],
+    causes: [Budget; 3],
+}
+
+impl Sites {
+    fn of(head: &FrameHeader, electrons: [f64; 3], equations: Equations) -> Option<Self> {
+        let model = super::model(head)?;
+        let adc = if of_plane(head) == QuantityKind::Electrons { None } else { head.metadata.adc.as_ref() };
+        Some(Self {
+            moments: super::sites(head, of_plane(head), equations)?,
+            causes: electrons.map(|e| classes::budget(&model, adc, e, equations)),
+        })
+    }
+}
+
 fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)]))
 }
@@ -248,13 +265,19 @@ impl Chain {
         let mut stages = Vec::new();
         let mut noise_delta_e = None;
         let mut first_order = None;
+        // Photosites are the same from the converter on.
+        let mut known: Option<(QuantityKind, Sites)> = None;
         for (stage, head) in &mut self.heads {
             if let Some(scene) = &mut head.metadata.scene {
                 scene.expected_electrons = Some(electrons);
             }
-            let prediction = of_frame(head, self.settings.equations).ok_or_else(|| {
-                Error::Data(format!("nothing can be predicted of {stage} at {electrons:?} electrons"))
-            })?;
+            let none = || Error::Data(format!("nothing can be predicted of {stage} at {electrons:?} electrons"));
+            let quantity = of_plane(head);
+            let sites = match known.take().filter(|(of, _)| *of == quantity) {
+                Some((_, sites)) => sites,
+                None => Sites::of(head, electrons, self.settings.equations).ok_or_else(none)?,
+            };
+            let prediction = from_sites(head, sites.moments, self.settings.equations).ok_or_else(none)?;
             match &prediction {
                 FramePrediction::Mixed(mixture) if *stage == "lab" => {
                     noise_delta_e = Some(self.settings.delta_e(mixture));
@@ -266,7 +289,8 @@ impl Chain {
                 }
                 _ => {}
             }
-            stages.push(self.settings.stage(stage, head, &prediction, electrons));
+            stages.push(self.settings.stage(stage, head, &prediction, &sites.causes));
+            known = Some((quantity, sites));
         }
         Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order })
     }
@@ -278,13 +302,9 @@ impl ChainSettings {
         stage: &'static str,
         head: &FrameHeader,
         prediction: &FramePrediction,
-        electrons: [f64; 3],
+        causes: &[Budget; 3],
     ) -> StagePrediction {
         let metadata = &head.metadata;
-        let on_plane = if metadata.quantity == QuantityKind::Electrons { None } else { metadata.adc.as_ref() };
-        let causes = super::model(head)
-            .map(|model| electrons.map(|e| classes::budget(&model, on_plane, e, self.equations)))
-            .unwrap_or_default();
         let (mean, covariance) = match prediction {
             FramePrediction::Planes(classes) => {
                 let variances = classes.map(|class| class.moments.variance);
@@ -292,7 +312,7 @@ impl ChainSettings {
             }
             FramePrediction::Mixed(mixture) => (mixture.mean, mixture.covariance),
         };
-        let by_cause = self.by_cause(prediction, &causes);
+        let by_cause = self.by_cause(prediction, causes);
         let part = |fixed: bool| {
             (!by_cause.is_empty()).then(|| {
                 let chosen = by_cause.iter().filter(|entry| entry.cause.is_fixed_pattern() == fixed);

@@ -125,19 +125,28 @@ pub fn hues(mean: [f64; 3]) -> [f64; 2] {
 /// Predicts a frame from its metadata alone; none where the scene is not uniform, the stage is beyond what is predicted,
 /// or the metadata do not say enough.
 pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Option<FramePrediction> {
+    let sites = sites(frame, of_plane(frame), equations)?;
+    from_sites(frame, sites, equations)
+}
+
+/// The quantity of the photosites that a frame was made of.
+fn of_plane(frame: &FrameHeader) -> QuantityKind {
+    match (frame.metadata.quantity, &frame.metadata.demosaic) {
+        (QuantityKind::Electrons | QuantityKind::ExpectedElectrons, _) | (_, None) => frame.metadata.quantity,
+        _ => QuantityKind::Adu,
+    }
+}
+
+/// Predicts a frame from the moments of the photosites that it was made of.
+fn from_sites(frame: &FrameHeader, sites: [Prediction; 3], equations: Equations) -> Option<FramePrediction> {
     let metadata = &frame.metadata;
     if metadata.demosaic.is_none() {
-        return sites(frame, metadata.quantity, equations).map(FramePrediction::Planes);
+        return Some(FramePrediction::Planes(sites));
     }
-    let of_plane = match metadata.quantity {
-        QuantityKind::Electrons | QuantityKind::ExpectedElectrons => metadata.quantity,
-        _ => QuantityKind::Adu,
-    };
-    let sites = sites(frame, of_plane, equations)?;
     let method = Method::named(&metadata.demosaic.as_ref()?.method)?;
     let camera = Mixture::demosaicked(frame, method, sites, equations)?;
     let Some(record) = &metadata.color else {
-        return (metadata.quantity == of_plane).then(|| FramePrediction::Mixed(Box::new(camera)));
+        return (metadata.quantity == of_plane(frame)).then(|| FramePrediction::Mixed(Box::new(camera)));
     };
     let xyz_from_adu = color::matrix(&record.xyz_from_camera) / metadata.exposure?.exposure_s_sr();
     let xyz = match equations {
