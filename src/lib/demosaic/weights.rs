@@ -128,6 +128,18 @@ impl Surroundings {
     }
 }
 
+/// The greens that smooth hue transition restores `wanted` from at the pixels of a phase: that of the pixel itself, and
+/// those of the neighbours whose hues it takes the mean of; none where `wanted` is measured.
+pub fn greens_of_hue(pattern: CfaPattern, phase: usize, wanted: Class) -> (Kernel, Vec<Kernel>) {
+    let surroundings = Surroundings { pattern, phase: PHASES[phase] };
+    let green = |site| surroundings.green(site, false);
+    let neighbors = match surroundings.class([0, 0]) {
+        here if here == wanted => Vec::new(),
+        _ => surroundings.neighbors([0, 0], wanted),
+    };
+    (green([0, 0]), neighbors.into_iter().map(green).collect())
+}
+
 /// The kernels of R, G and B in each phase.
 type Kernels = [[Kernel; 3]; 4];
 

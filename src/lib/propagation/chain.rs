@@ -4,9 +4,10 @@
 //! is predicted here is what `measure` compares such frames with.
 
 use super::classes::{self, Budget, Cause};
+use super::smooth_hue::FirstOrder;
 use super::{Equations, FramePrediction, Mixture, Prediction, from_sites, mixture, of_plane};
 use crate::adc::{AdcSettings, Digitize};
-use crate::cfa::{CfaPattern, Class};
+use crate::cfa::CfaPattern;
 use crate::color::{ColorSettings, Space, ToXyz};
 use crate::demosaic::weights::PHASES;
 use crate::demosaic::{Black, Demosaic, Method};
@@ -106,7 +107,10 @@ pub struct StagePrediction {
     pub snr_db: [Option<f64>; 3],
     /// Covariance of the channels of a pixel, over the phases of the filter array.
     pub covariance: [[f64; 3]; 3],
-    /// The same for each of the four phases, of a demosaicked frame.
+    /// The same to second order, of smooth hue transition; `covariance` and `std` are its first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_order_covariance: Option<[[f64; 3]; 3]>,
+    /// The covariance for each of the four phases, of a demosaicked frame.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub phases: Vec<PhaseCovariance>,
     /// Variance by cause; the causes add up to the variance.
@@ -159,32 +163,6 @@ pub struct NoiseDeltaE {
     /// Pixels of the smallest square patch whose mean differs by no more than wanted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixels_needed: Option<u64>,
-}
-
-/// How far green is from where smooth hue transition would divide by zero.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct FirstOrder {
-    /// Whether propagation to first order holds.
-    pub holds: bool,
-    /// Mean of green, above black, over the standard deviation of green where it is interpolated.
-    pub green_over_noise: f64,
-}
-
-/// Green over its noise below which the first order is void.
-///
-/// The terms of second order in X̂ = ĝ x/ĝ′ add about 8/z² to the variance, z = ḡ/σ_ĝ: 8 % at z = 10, where ĝ′ ≤ 0 has
-/// a probability of 10⁻²³. Below, moments lean on ever rarer pixels and soon do not exist.
-pub const VOID_BELOW: f64 = 10.0;
-
-impl FirstOrder {
-    /// Of the means above black and the variances of the photosites.
-    pub fn of(mean: [f64; 3], variances: [f64; 3]) -> Self {
-        let green = Class::Green as usize;
-        // Interpolated green is the mean of four photosites.
-        let noise = (variances[green] / 4.0).sqrt();
-        let ratio = if noise > 0.0 { mean[green] / noise } else { f64::MAX.copysign(mean[green]) };
-        Self { holds: ratio >= VOID_BELOW, green_over_noise: ratio }
-    }
 }
 
 /// Moments and budgets of the photosites of R, G and B.
@@ -310,7 +288,15 @@ impl ChainSettings {
                 let variances = classes.map(|class| class.moments.variance);
                 (classes.map(|class| class.moments.mean), Matrix3::from_diagonal(&variances.into()))
             }
-            FramePrediction::Mixed(mixture) => (mixture.mean, mixture.covariance),
+            FramePrediction::Mixed(mixture) if self.equations == Equations::Paper => (mixture.mean, mixture.covariance),
+            FramePrediction::Mixed(mixture) => {
+                let variances = mixture.sites.map(|site| site.moments.variance);
+                (mixture.mean, mixture::mean_pixel(&mixture.weights).covariance(variances))
+            }
+        };
+        let second_order = match prediction {
+            FramePrediction::Mixed(mixture) if self.method == Method::SmoothHue => Some(rows(&mixture.covariance)),
+            _ => None,
         };
         let by_cause = self.by_cause(prediction, causes);
         let part = |fixed: bool| {
@@ -358,6 +344,7 @@ impl ChainSettings {
             fixed_pattern_std: part(true),
             snr_db,
             covariance: rows(&covariance),
+            second_order_covariance: second_order.filter(|_| self.equations == Equations::Exact),
             phases: self.phases(prediction),
             causes: by_cause,
             patch_mean_std: patch.as_ref().map(diagonal_std),

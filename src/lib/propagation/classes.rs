@@ -55,7 +55,7 @@ fn product(rate: f64, shot: bool, kind: PoissonKind, sigma: f64) -> NearlyNormal
 }
 
 /// Cumulants of a photosite's charge, light and dark together, before full well and read-out.
-fn charge(model: &NoiseModel, expected_e: f64) -> NearlyNormal {
+pub(super) fn charge(model: &NoiseModel, expected_e: f64) -> NearlyNormal {
     let light = product(expected_e, model.signal_shot, model.poisson, model.prnu);
     light.plus(product(model.dark_e, model.dark_shot, model.poisson, model.dcnu))
 }

@@ -7,6 +7,7 @@ pub mod chain;
 pub mod classes;
 pub mod mixture;
 pub mod paper;
+pub mod smooth_hue;
 
 pub use classes::{adu, electrons};
 
@@ -57,9 +58,10 @@ pub struct Mixture {
     pub mean: [f64; 3],
     /// How far noise moves the mean where the channels are curved functions of the photosites, to second order.
     pub bias: [f64; 3],
-    /// Covariance of the three channels of a pixel, over all pixels of a large frame.
+    /// Covariance of the three channels of a pixel, over all pixels of a large frame; to second order for smooth hue
+    /// transition, whose first order, as everyone's covariance, follows from `weights` and `sites`.
     pub covariance: Matrix3<f64>,
-    /// What each channel is made of, to first order: the exact covariance follows from it and `sites`.
+    /// What each channel is made of, to first order.
     pub weights: Weights,
     /// Moments of the photosites of R, G and B, in the unit that the weights act on.
     pub sites: [Prediction; 3],
@@ -75,14 +77,25 @@ impl Mixture {
         let hues = hues(mean);
         let weights = WeightTable::new(method, record.cfa).about(hues);
         let variances = sites.map(|site| site.moments.variance);
+        let mut bias = [0.0; 3];
         let covariance = match equations {
-            Equations::Exact => mixture::mean_pixel(&weights).covariance(variances),
+            Equations::Exact => {
+                let first = mixture::mean_pixel(&weights).covariance(variances);
+                let green = third_cumulant_of_green(frame);
+                match smooth_hue::second_order(method, record.cfa, mean, variances, green) {
+                    Some(second) => {
+                        bias = second.bias;
+                        second.covariance
+                    }
+                    None => first,
+                }
+            }
             Equations::Paper => {
                 let geometry = &frame.geometry;
                 paper::demosaicked(method, variances, mean, Some([geometry.width, geometry.height]))?
             }
         };
-        Some(Self { mean, bias: [0.0; 3], covariance, weights, sites })
+        Some(Self { mean: [0, 1, 2].map(|i| mean[i] + bias[i]), bias, covariance, weights, sites })
     }
 
     /// The same pixels in the channels that are `matrix` times these, less `black`.
@@ -183,6 +196,17 @@ fn sites(frame: &FrameHeader, quantity: QuantityKind, equations: Equations) -> O
         }
         _ => None,
     }
+}
+
+/// Third cumulant of the green photosites that a frame was made of, before anything clips or rounds.
+fn third_cumulant_of_green(frame: &FrameHeader) -> f64 {
+    let expected = frame.metadata.scene.as_ref().and_then(|scene| scene.expected_electrons);
+    let slope = match (of_plane(frame), frame.metadata.adc) {
+        (QuantityKind::Adu, Some(adc)) => adc.adu_per_e,
+        _ => 1.0,
+    };
+    let third = model(frame).zip(expected).map(|(model, e)| classes::charge(&model, e[Class::Green as usize]).third);
+    third.unwrap_or(0.0) * slope.powi(3)
 }
 
 /// The noise model of a frame; one without noise record has no noise, and no dark signal.
