@@ -48,6 +48,27 @@ pub struct Place {
     pub size: [usize; 2],
 }
 
+impl Place {
+    /// A place of the same law near the corner of a small frame: only phases, size and edges within reach matter.
+    #[must_use]
+    pub fn canonical(self) -> Self {
+        let mut place = self;
+        for axis in 0..2 {
+            let before = place.corner[axis];
+            let after = place.frame[axis] - place.size[axis] - before;
+            // Far edges come as near as they can without being felt, on the same phase.
+            let near = |distance: usize| if distance > FAR { FAR - (FAR + distance) % 2 } else { distance };
+            place.corner[axis] = near(before);
+            place.frame[axis] = near(before) + place.size[axis] + near(after);
+            place.origin[axis] &= 1;
+        }
+        place
+    }
+}
+
+/// From so many pixels on an edge is out of reach, whatever the phase.
+const FAR: usize = REACH.unsigned_abs() + 1;
+
 /// The smallest extent from which sums grow in proportion: two row sums of covariances reach 4 · [`REACH`] apart.
 const SMALL: usize = 4 * REACH.unsigned_abs() + 4;
 
@@ -392,6 +413,18 @@ mod tests {
         let pixel = mixture::mean_pixel(&weights).covariance(variances);
         // An odd extent has one phase more often than the other, by 1/601; the mean takes off a few of 300,000 pixels.
         assert!((found.covariance - pixel).abs().max() < 2e-3 * pixel.max());
+    }
+
+    #[test]
+    fn far_edges_do_not_matter() {
+        let weights = WeightTable::new(Method::EffectiveColor, CfaPattern::Rggb).about([1.0, 1.0]);
+        let sites = sites([1.0, 2.0, 3.0], 0.2);
+        for corner in [[0, 0], [2, 3], [3, 4], [17, 40], [34, 51]] {
+            let place = Place { frame: [41, 60], origin: [-3, 8], corner, size: [7, 9] };
+            let canonical = place.canonical();
+            assert!(canonical.frame[0] <= 7 + 2 * FAR && canonical.frame[1] <= 9 + 2 * FAR);
+            assert!(close(&Sampling::of(&weights, &sites, &place), &Sampling::of(&weights, &sites, &canonical), 1e-13));
+        }
     }
 
     #[test]
