@@ -34,7 +34,7 @@ pub struct Test {
     pub expected: f64,
     /// Deviation over its standard error.
     pub z: Option<f64>,
-    /// Effective degrees of freedom of a variance.
+    /// Effective degrees of freedom of a variance or a correlation.
     pub degrees_of_freedom: Option<f64>,
     /// Probability of a deviation at least as large by chance.
     pub p: f64,
@@ -186,8 +186,10 @@ fn variance(measured: &Measured<'_>, sampling: &Sampling, i: usize) -> Test {
     }
 }
 
-/// artanh r about artanh ρ; r = s_ij/√(s_ii s_jj) varies as its differential does:
-/// dr = ds_ij/√(s_ii s_jj) − ½ r (ds_ii/s_ii + ds_jj/s_jj).
+/// artanh r about artanh ρ + ρ/2ν, with variance 1/(ν − 2), as of ν + 1 independent normal pairs \[Fisher1921].
+///
+/// The effective ν makes 1/ν the variance to first order: r = s_ij/√(s_ii s_jj) varies as its differential does,
+/// dr = ds_ij/√(s_ii s_jj) − ½ r (ds_ii/s_ii + ds_jj/s_jj), and artanh r by dr/(1 − ρ²).
 fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Test {
     let [i, j] = PAIRS[index];
     let correlation = |c: &Matrix3<f64>| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
@@ -200,15 +202,16 @@ fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Te
     ];
     let variance: f64 =
         terms.iter().flat_map(|(a, f)| terms.iter().map(move |(b, g)| f * g * sampling.spread[*a][*b])).sum();
-    let error = variance.sqrt() / (1.0 - expected * expected);
-    let z = (found.clamp(-1.0, 1.0).atanh() - expected.atanh()) / error;
+    let freedom = (1.0 - expected * expected).powi(2) / variance;
+    let centre = expected.atanh() + expected / (2.0 * freedom);
+    let z = (found.clamp(-1.0, 1.0).atanh() - centre) * (freedom - 2.0).max(f64::MIN_POSITIVE).sqrt();
     Test {
         subject: Subject::Correlation,
         channels: vec![measured.names[i].clone(), measured.names[j].clone()],
         measured: found,
         expected,
         z: Some(z),
-        degrees_of_freedom: None,
+        degrees_of_freedom: Some(freedom),
         p: significance::of_normal(z),
     }
 }
