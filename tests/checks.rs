@@ -11,14 +11,14 @@ use cyanometer::demosaic::{Black, Demosaic, Method};
 use cyanometer::metadata::Scene;
 use cyanometer::mosaic::Mosaic;
 use cyanometer::noise::{AddNoise, NoiseSettings};
-use cyanometer::numerics::significance::of_smallest;
+use cyanometer::numerics::significance::{of_chi_square, of_smallest};
 use cyanometer::propagation::Equations;
 use cyanometer::random::Source;
 use cyanometer::stage::MemoryFrame;
 use cyanometer::statistics::check::Verdict;
 use cyanometer::statistics::{Region, RegionReport, measure};
 use rayon::prelude::*;
-use support::{expected, sensor, through};
+use support::{at, expected, sensor, through};
 
 /// The frame of a uniform scene.
 fn scene(size: [usize; 2], electrons: [f32; 3]) -> MemoryFrame {
@@ -202,4 +202,66 @@ fn wrong_predictions_are_caught() {
     brighter.header.metadata.scene = None;
     let refused = measure(&mut brighter, &[], Equations::Exact, Some(0.1)).unwrap_err();
     assert!(refused.to_string().contains("nothing can be checked"), "{refused}");
+}
+
+/// The mean of a patch scatters from frame to frame as predicted: 2000 frames, each of another sensor, the patch on one
+/// place. The variance of 2000 means has χ² of 1999 degrees of freedom; the bound leaves 10⁻⁴ to chance for all together.
+#[test]
+fn patch_means_scatter_as_predicted() {
+    let scene = scene([26, 24], [3000.0, 9000.0, 20_000.0]);
+    let sizes = [[1, 1], [2, 2], [7, 5], [16, 16]];
+    let place =
+        |[width, height]: [usize; 2], phase: usize| Region { x: 4 + phase % 2, y: 4 + phase / 2, width, height };
+    let patches: Vec<Region> = sizes.into_iter().flat_map(|size| [0, 1, 3].map(|phase| place(size, phase))).collect();
+    let means = |frame: &MemoryFrame| -> Vec<f64> {
+        let mean = |patch: &Region, channel: usize| {
+            let rows = patch.y..patch.y + patch.height;
+            let sites = rows.flat_map(|y| (patch.x..patch.x + patch.width).map(move |x| (x, y)));
+            let sum: f64 = sites.map(|(x, y)| f64::from(at(frame, x, y, channel))).sum();
+            sum / (patch.width * patch.height) as f64
+        };
+        patches.iter().flat_map(|patch| [0, 1, 2].map(|channel| mean(patch, channel))).collect()
+    };
+    for method in Method::ALL {
+        let frame = |seed: u64| {
+            let camera = demosaicked(&digitized(&noisy(&scene, seed + 40_000)), method);
+            [colored(&camera, Space::Xyz), camera]
+        };
+        for stage in 0..2 {
+            let reports = regions(&frame(0)[stage], &patches, Equations::Exact);
+            let predicted: Vec<f64> = reports.into_iter().flat_map(|region| region.patch_mean_std.unwrap()).collect();
+            let all: Vec<Vec<f64>> = (0..SEEDS).into_par_iter().map(|seed| means(&frame(seed)[stage])).collect();
+            let mut smallest = 1.0_f64;
+            for (index, predicted) in predicted.iter().enumerate() {
+                let n = SEEDS as f64;
+                let mean = all.iter().map(|frame| frame[index]).sum::<f64>() / n;
+                let square: f64 = all.iter().map(|frame| (frame[index] - mean).powi(2)).sum();
+                let p = of_chi_square(square / predicted.powi(2), n - 1.0);
+                let patch = patches[index / 3];
+                let ratio = (square / (n - 1.0)).sqrt() / predicted;
+                assert!(
+                    p > 1e-6,
+                    "{method:?} {patch:?} channel {}: scatters by {ratio} of what is predicted",
+                    index % 3
+                );
+                smallest = smallest.min(p);
+            }
+            assert!(of_smallest(smallest, predicted.len()) > 1e-4, "{method:?} {stage}: {smallest}");
+        }
+    }
+}
+
+/// What the paper's way of averaging would say of the same patches: after BI, which keeps 9/16 and 5/8 of the variance of
+/// a photosite, σ/√n is too small by √(4/(9/16)) = 2.67 for red and blue and by √(2/(5/8)) = 1.79 for green.
+#[test]
+fn averaging_as_if_pixels_were_independent_is_caught() {
+    let scene = scene([200, 150], [9000.0; 3]);
+    let camera = demosaicked(&digitized(&noisy(&scene, 1)), Method::Bilinear);
+    let region = regions(&camera, &[Region { x: 20, y: 20, width: 64, height: 64 }], Equations::Exact).remove(0);
+    for (i, keeps) in [(0, (4.0_f64 / (9.0 / 16.0)).sqrt()), (1, (2.0_f64 / (5.0 / 8.0)).sqrt()), (2, 8.0 / 3.0)] {
+        let independent = region.channels[i].predicted_std.unwrap() / 64.0;
+        let ratio = region.patch_mean_std.as_ref().unwrap()[i] / independent;
+        // The rim of the patch leans on sites outside, which takes off a per cent or two.
+        assert!((ratio / keeps - 1.0).abs() < 0.03, "channel {i}: {ratio}, not {keeps}");
+    }
 }
