@@ -2,8 +2,10 @@
 
 pub mod plot;
 
+mod photon_transfer;
 mod prediction;
 
+pub use photon_transfer::photon_transfer;
 pub use prediction::{prediction, sweep};
 
 use crate::color::characterization::CameraMatrix;
