@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | 0 words | [`error`], [`units`], [`frame`], [`cfa`] | no files, no chance |
 //! | 1 mathematics | [`numerics`], [`random`] | no camera |
-//! | 2 physics | [`spectrum`], [`optics`], [`sensor`], [`metadata`], [`stage`], [`render`], [`noise`], [`adc`], [`mosaic`], [`demosaic`], [`color`], [`propagation`], [`statistics`] | pure functions of bands and parameters, in the order light meets them |
+//! | 2 physics | [`spectrum`], [`optics`], [`sensor`], [`metadata`], [`stage`], [`render`], [`transfer`], [`noise`], [`adc`], [`mosaic`], [`demosaic`], [`color`], [`propagation`], [`statistics`] | pure functions of bands and parameters, in the order light meets them |
 //! | 3 files | [`formats`], [`report`] | bytes to frames and back |
 //! | 4 command line | [`cli`] | options, complaints, exit |
 //!
@@ -46,6 +46,7 @@ pub mod sensor;
 pub mod spectrum;
 pub mod stage;
 pub mod statistics;
+pub mod transfer;
 
 pub mod formats;
 pub mod report;

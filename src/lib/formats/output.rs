@@ -110,7 +110,8 @@ impl OutputOptions {
             }
         };
         let quantity = header.metadata.quantity;
-        let is_codes = quantity == QuantityKind::Adu && header.metadata.demosaic.is_none();
+        let changed = header.metadata.demosaic.is_some() || header.metadata.correction.is_some();
+        let is_codes = quantity == QuantityKind::Adu && !changed;
         let default = match format {
             Format::Tiff if is_codes || quantity == QuantityKind::Srgb => SampleKind::U16,
             _ => SampleKind::F32,
