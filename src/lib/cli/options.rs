@@ -2,7 +2,7 @@
 
 use crate::cfa::CfaPattern;
 use crate::color::White;
-use crate::demosaic::Method;
+use crate::demosaic::{Black, Method};
 use crate::formats::data;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
@@ -212,6 +212,19 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// What is expected, in words.
 pub fn fraction(text: &str) -> Result<f64, String> {
     positive(text).ok().filter(|x| *x <= 1.0).ok_or_else(|| "give a fraction above 0 and at most 1".into())
+}
+
+/// Reads a black level: `auto`, `none`, or a number.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn black(text: &str) -> Result<Black, String> {
+    match text {
+        "auto" => Ok(Black::Auto),
+        "none" => Ok(Black::None),
+        level => number(level).map(Black::Level).map_err(|_| "give auto, none or a number".into()),
+    }
 }
 
 /// Reads a region `X,Y,W,H`.
