@@ -252,3 +252,98 @@ impl<S: RowSource> RowSource for LessDarks<'_, S> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cfa::CfaPattern;
+    use crate::frame::Geometry;
+    use crate::metadata::{AdcRecord, Metadata};
+    use crate::optics::Exposure;
+
+    fn codes() -> FrameHeader {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some(CfaPattern::Rggb);
+        metadata.adc = Some(AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.05 });
+        metadata.black_level_adu = Some(104.0);
+        metadata.white_level_adu = Some(4095.0);
+        metadata.exposure = Some(Exposure { exposure_s: 0.1, f_number: 8.0, lens_transmittance: 1.0 });
+        FrameHeader { name: "codes".into(), geometry: Geometry::new(8, 6, &["Y"]), metadata }
+    }
+
+    fn correct(frame: &FrameHeader, black: Black, cte: Option<f64>, darks: &[&FrameHeader]) -> Result<CorrectFrame> {
+        CorrectFrame::new(frame, &CorrectionSettings { black, cte }, darks)
+    }
+
+    #[test]
+    fn levels_follow_what_is_subtracted_and_restored() {
+        let frame = codes();
+        let levels = |black, cte, darks: &[&FrameHeader]| {
+            let metadata = &correct(&frame, black, cte, darks).unwrap().header.metadata;
+            [metadata.black_level_adu.unwrap(), metadata.white_level_adu.unwrap()]
+        };
+        assert_eq!(levels(Black::Auto, None, &[]), [0.0, 3991.0]);
+        assert_eq!(levels(Black::Level(100.0), None, &[]), [4.0, 3995.0]);
+        assert_eq!(levels(Black::None, None, &[&frame, &frame]), [0.0, 3991.0]);
+        // Of what lies above the bias a quarter was left.
+        assert_eq!(levels(Black::None, Some(0.5), &[]), [116.0, 100.0 + 4.0 * 3995.0]);
+        assert_eq!(levels(Black::Auto, Some(0.5), &[]), [0.0, 4.0 * 3991.0]);
+        assert_eq!(levels(Black::None, Some(0.5), &[&frame]), [0.0, 4.0 * 3991.0]);
+        let mut unknown = frame.clone();
+        unknown.metadata.black_level_adu = None;
+        let found = correct(&unknown, Black::Level(9.0), None, &[]).unwrap().header.metadata;
+        assert_eq!((found.black_level_adu, found.white_level_adu), (Some(0.0), Some(4086.0)));
+        let found = correct(&unknown, Black::None, None, &[&frame]).unwrap().header.metadata;
+        assert_eq!((found.black_level_adu, found.white_level_adu), (Some(0.0), None));
+        let found = correct(&unknown, Black::None, Some(0.5), &[]).unwrap().header.metadata;
+        assert_eq!(found.black_level_adu, None);
+    }
+
+    #[test]
+    fn what_cannot_be_corrected_is_refused() {
+        let frame = codes();
+        let with = |change: &dyn Fn(&mut FrameHeader)| {
+            let mut changed = frame.clone();
+            change(&mut changed);
+            changed
+        };
+        let refused =
+            |input: &FrameHeader, black, cte, darks: &[&FrameHeader]| correct(input, black, cte, darks).unwrap_err();
+        assert!(matches!(refused(&frame, Black::None, None, &[]), Error::Usage(_)));
+        assert!(matches!(refused(&frame, Black::Auto, None, &[&frame]), Error::Usage(_)));
+        assert!(matches!(refused(&frame, Black::None, Some(0.0), &[]), Error::Usage(_)));
+        let electrons = with(&|f| f.metadata.quantity = QuantityKind::Electrons);
+        assert!(matches!(refused(&electrons, Black::Auto, None, &[]), Error::Order { first: "digitize", .. }));
+        let once = correct(&frame, Black::Auto, None, &[]).unwrap().header;
+        assert!(matches!(refused(&once, Black::Auto, None, &[]), Error::Format { .. }));
+        let crop = with(&|f| f.geometry.origin = [0, 2]);
+        assert!(matches!(refused(&crop, Black::None, Some(0.99), &[]), Error::Format { .. }));
+        assert!(correct(&crop, Black::Auto, None, &[]).is_ok());
+        let bare = with(&|f| (f.metadata.adc, f.metadata.black_level_adu) = (None, None));
+        assert!(matches!(refused(&bare, Black::Auto, None, &[]), Error::MissingKey { key: "black_level_adu", .. }));
+        assert!(matches!(refused(&bare, Black::None, Some(0.99), &[]), Error::MissingKey { key: "adc", .. }));
+        assert!(correct(&bare, Black::Level(100.0), Some(0.99), &[]).is_ok());
+        let unlike = [
+            with(&|f| f.geometry.width = 9),
+            crop,
+            with(&|f| f.metadata.cfa = Some(CfaPattern::Bggr)),
+            with(&|f| f.geometry.channels = vec!["R".into(), "G".into(), "B".into()]),
+            electrons,
+            once,
+        ];
+        for dark in &unlike {
+            assert!(correct(&frame, Black::None, None, &[&frame, dark]).is_err(), "{dark:?}");
+        }
+    }
+
+    #[test]
+    fn darks_of_another_exposure_are_told_of() {
+        let frame = codes();
+        let mut long = frame.clone();
+        long.name = "long".into();
+        long.metadata.exposure = Some(Exposure { exposure_s: 0.5, f_number: 8.0, lens_transmittance: 1.0 });
+        let stage = correct(&frame, Black::None, None, &[&frame, &long]).unwrap();
+        let said = "long: its exposure is 0.5 s, but that of codes is 0.1 s; their dark signals differ";
+        assert_eq!(stage.warnings(), [said]);
+    }
+}

@@ -51,13 +51,13 @@ impl Line {
             )));
         }
         let last = length.saturating_sub(1);
-        let too_poor = || {
-            let verb = if undone { "undone" } else { "worked out" };
+        let too_poor = |why: String| {
+            let verb = if undone { "undone" } else { "followed" };
             Err(Error::Usage(format!(
-                "a charge transfer efficiency of {cte} is too poor to be {verb} over {length} moves; \
-                 charge would spread over more than {MOST_MISSED} photosites, or errors grow {LARGEST_GAIN} times"
+                "a charge transfer efficiency of {cte} is too poor to be {verb} over {length} moves; {why}"
             )))
         };
+        let too_wide = || too_poor(format!("charge would spread over more than {MOST_MISSED} photosites"));
         let line = Self { cte, undone, most_missed: last };
         let mut sizes = Vec::new();
         for coefficient in line.coefficients(last) {
@@ -69,11 +69,12 @@ impl Line {
             }
         }
         // Where even the first coefficient is too small for a double, the sum does not tell.
-        if !sizes.iter().all(|size| size.is_finite()) || sizes[0] < f64::MIN_POSITIVE {
-            return too_poor();
+        if sizes[0] < f64::MIN_POSITIVE {
+            return too_wide();
         }
-        if undone && sizes.iter().sum::<f64>() > LARGEST_GAIN {
-            return too_poor();
+        let gain: f64 = sizes.iter().sum();
+        if undone && !(gain <= LARGEST_GAIN) {
+            return too_poor(format!("errors would grow more than {LARGEST_GAIN} times"));
         }
         let mut most_missed = sizes.len();
         let mut left_out = 0.0;
@@ -82,7 +83,7 @@ impl Line {
             left_out += sizes[most_missed];
         }
         let most_missed = most_missed.saturating_sub(1);
-        if most_missed > MOST_MISSED { too_poor() } else { Ok(Self { most_missed, ..line }) }
+        if most_missed > MOST_MISSED { too_wide() } else { Ok(Self { most_missed, ..line }) }
     }
 
     /// The coefficients of photosite `index`, by the number of missed moves.
