@@ -397,6 +397,7 @@ fn a_source_left_out_leaves_the_other_draws_alone() {
                     without,
                     temperature_k: Some(temperature_k),
                     poisson,
+                    cte: None,
                 },
             )
         };

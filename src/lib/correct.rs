@@ -268,7 +268,7 @@ mod tests {
         metadata.black_level_adu = Some(104.0);
         metadata.white_level_adu = Some(4095.0);
         metadata.exposure = Some(Exposure { exposure_s: 0.1, f_number: 8.0, lens_transmittance: 1.0 });
-        FrameHeader { name: "codes".into(), geometry: Geometry::new(8, 6, &["Y"]), metadata }
+        FrameHeader { name: "codes".into(), geometry: Geometry::new(4, 3, &["Y"]), metadata }
     }
 
     fn correct(frame: &FrameHeader, black: Black, cte: Option<f64>, darks: &[&FrameHeader]) -> Result<CorrectFrame> {

@@ -98,7 +98,7 @@ pub struct Output {
     /// Compression, without loss: rle, zips, zip, piz for EXR; lzw, deflate for TIFF; none by default
     #[arg(long, value_parser = choice(&CompressionKind::NAMES))]
     pub compression: Option<CompressionKind>,
-    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF; by default f32, and u16 for ADU in TIFF
+    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF; by default f32, and u16 for codes in TIFF
     #[arg(long, value_name = "TYPE", value_parser = choice(&[("f32", SampleKind::F32), ("f16", SampleKind::F16), ("u16", SampleKind::U16)]))]
     pub sample_type: Option<SampleKind>,
 }
