@@ -7,6 +7,7 @@ mod support;
 use cyanometer::adc::{AdcSettings, Digitize};
 use cyanometer::cfa::{CfaPattern, Class};
 use cyanometer::color::{ColorSettings, Space, ToXyz, White};
+use cyanometer::correct::{CorrectFrame, CorrectionSettings, LessDarks};
 use cyanometer::demosaic::{Black, Demosaic, Method};
 use cyanometer::formats::yaml::{parse_metadata, write_metadata};
 use cyanometer::frame::{Geometry, to_sample};
@@ -16,7 +17,7 @@ use cyanometer::noise::{AddNoise, NoiseSettings, rectified_mean, rectified_mean_
 use cyanometer::optics::Vignetting;
 use cyanometer::random::Source;
 use cyanometer::render::Rendering;
-use cyanometer::stage::{MemoryFrame, Stage};
+use cyanometer::stage::{MemoryFrame, RowSource, Stage};
 use cyanometer::units::QuantityKind;
 use proptest::prelude::*;
 use support::*;
@@ -53,6 +54,10 @@ fn noisy(frame: &MemoryFrame, settings: &NoiseSettings) -> MemoryFrame {
 
 fn digitizer(header: &FrameHeader) -> Digitize {
     Digitize::new(header, &AdcSettings::default()).unwrap()
+}
+
+fn correction(header: &FrameHeader, black: Black, cte: Option<f64>) -> CorrectFrame {
+    CorrectFrame::new(header, &CorrectionSettings { black, cte }, &[]).unwrap()
 }
 
 fn color_settings(space: Space) -> ColorSettings {
@@ -125,6 +130,15 @@ fn for_every_stage(width: usize, height: usize, check: &mut dyn FnMut(&MemoryFra
     }
     let light = through(&three, &Mosaic::new(&three.header, None).unwrap());
     check(&light, AnyStage::Noise(noise(&light.header, 5)));
+    // Charge that misses some moves on its way, of which a row sees several above it.
+    let cte = Some(1.0 - 0.4 / width as f64);
+    for light in [&three, &light] {
+        let settings = NoiseSettings { seed: 5, cte, ..Default::default() };
+        check(light, AnyStage::Noise(AddNoise::new(&light.header, &settings).unwrap()));
+    }
+    for (frame, black, cte) in [(&codes, Black::None, cte), (&cfa, Black::Auto, cte), (&cfa, Black::Auto, None)] {
+        check(frame, AnyStage::Correct(correction(&frame.header, black, cte)));
+    }
 }
 
 /// A stage of any kind.
@@ -132,6 +146,7 @@ enum AnyStage {
     Noise(AddNoise),
     Mosaic(Mosaic),
     Digitize(Digitize),
+    Correct(CorrectFrame),
     Demosaic(Demosaic),
     ToXyz(ToXyz),
 }
@@ -140,7 +155,9 @@ impl AnyStage {
     fn name(&self) -> String {
         let made = &self.header().metadata;
         match self {
+            Self::Noise(_) if made.noise.as_ref().unwrap().cte.is_some() => "add-noise --cte".into(),
             Self::Noise(_) => "add-noise".into(),
+            Self::Correct(_) => "correct-frame".into(),
             Self::Mosaic(_) => "mosaic".into(),
             Self::Digitize(_) => "digitize".into(),
             Self::Demosaic(_) => format!("demosaic {}", made.demosaic.as_ref().unwrap().method),
@@ -153,6 +170,7 @@ impl AnyStage {
             Self::Noise(stage) => stage.header(),
             Self::Mosaic(stage) => stage.header(),
             Self::Digitize(stage) => stage.header(),
+            Self::Correct(stage) => stage.header(),
             Self::Demosaic(stage) => stage.header(),
             Self::ToXyz(stage) => stage.header(),
         }
@@ -166,6 +184,7 @@ macro_rules! with_stage {
             AnyStage::Noise($stage) => $body,
             AnyStage::Mosaic($stage) => $body,
             AnyStage::Digitize($stage) => $body,
+            AnyStage::Correct($stage) => $body,
             AnyStage::Demosaic($stage) => $body,
             AnyStage::ToXyz($stage) => $body,
         }
@@ -378,6 +397,7 @@ fn a_source_left_out_leaves_the_other_draws_alone() {
                     without,
                     temperature_k: Some(temperature_k),
                     poisson,
+                    cte: None,
                 },
             )
         };
@@ -739,6 +759,137 @@ fn what_is_no_number_is_counted_and_not_made_a_code() {
     assert_eq!((counts.not_finite, counts.clipped_high, counts.clipped_low), (1, 1, 1));
 }
 
+// --- charge transfer -----------------------------------------------------------------------------------------------
+
+/// The factor by which undoing transfer may magnify errors: (1 + ε)^i / (1 − ε)^(i + 1) of the last row and column.
+fn gain(cte: f64, [width, height]: [usize; 2]) -> f64 {
+    let along = |length: usize| (2.0 - cte).powf(length as f64 - 1.0) / cte.powf(length as f64);
+    along(width) * along(height)
+}
+
+/// What four sums (two of transfer, two of its undoing) leave out of samples up to 1.
+const LEFT_OUT: f64 = 4e-10;
+
+/// Charge of one exposure without read noise, which joins it after transfer.
+fn charge(light: &MemoryFrame, cte: Option<f64>) -> MemoryFrame {
+    noisy(light, &NoiseSettings { seed: 8, without: vec![Source::Ron], cte, ..Default::default() })
+}
+
+#[test]
+fn transfer_is_undone_to_the_rounding_of_samples() {
+    for (cte, size, cfa) in
+        [(0.999995, [530, 401], None), (0.999, [150, 190], Some(CfaPattern::Gbrg)), (0.9, [9, 8], None)]
+    {
+        let [width, height] = size;
+        let mut light = expected(width, height, |x, y, class| 39_000.0 * scatter(x, y, class as usize));
+        if cfa.is_some() {
+            light = through(&light, &Mosaic::new(&light.header, cfa).unwrap());
+        }
+        let (still, mut moved) = (charge(&light, None), charge(&light, Some(cte)));
+        // The charge as a converter of one code per electron would give it that neither rounds nor clips.
+        moved.header.metadata.quantity = QuantityKind::Adu;
+        let restored = through(&moved, &correction(&moved.header, Black::Level(0.0), Some(cte)));
+        let brightest = f64::from(still.samples.iter().copied().fold(0.0, f32::max));
+        // 2⁻²⁴ is half an ulp: of what is undone, of the result, and of what it is compared with.
+        let gain = gain(cte, size);
+        let bound = brightest * (2.0_f64.powi(-24) * (gain + 2.0) + LEFT_OUT * gain);
+        assert!(bound < 0.05 || cte < 0.95, "{bound}");
+        for (a, b) in still.samples.iter().zip(&restored.samples) {
+            assert!(f64::from((a - b).abs()) <= bound, "{cte}: {a} {b}, {bound}");
+        }
+        // Otherwise there was nothing to undo.
+        let lost = still.samples.iter().zip(&moved.samples).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(f64::from(lost) > 2.0 * bound, "{cte}: {lost} {bound}");
+    }
+}
+
+#[test]
+fn transfer_is_undone_to_the_rounding_of_the_converter() {
+    for (cte, black) in [(0.999995, Black::None), (0.9999, Black::None), (0.9999, Black::Auto), (0.998, Black::Auto)] {
+        let size = [180, 140];
+        let light = expected(size[0], size[1], |x, y, class| 20_000.0 * scatter(x, y, class as usize));
+        let (still, moved) = (charge(&light, None), charge(&light, Some(cte)));
+        let codes = through(&moved, &digitizer(&moved.header));
+        let restored = through(&codes, &correction(&codes.header, black, Some(cte)));
+        let record = codes.header.metadata.adc.unwrap();
+        // Half a code, magnified; the rest is far below it.
+        let bound = 0.5 * gain(cte, size) + 0.01;
+        // The dark signal of the untransferred frame is what the metadata now call black, or what was subtracted.
+        let dark_adu = record.adu_per_e * still.header.metadata.dark_signal_e.unwrap();
+        let (offset, level) = match black {
+            Black::None => (record.bias_adu, record.bias_adu + dark_adu),
+            _ => (-dark_adu, 0.0),
+        };
+        let found = restored.header.metadata.black_level_adu.unwrap();
+        assert!((found - level).abs() < 1e-9, "{cte}: black {found}, not {level}");
+        for (charge, code) in still.samples.iter().zip(&restored.samples) {
+            let wanted = offset + record.adu_per_e * f64::from(*charge);
+            assert!((wanted - f64::from(*code)).abs() <= bound, "{cte} {black:?}: {wanted} {code}, {bound}");
+        }
+    }
+}
+
+/// Each direction keeps the share 1 − ε of uniform charge, from the first photosite on.
+#[test]
+fn uniform_charge_stays_uniform() {
+    for (cte, level) in [(1.0, 900.0), (0.999995, 30_000.0), (0.9999, 100.0), (0.99, 25_000.0)] {
+        let light = expected(210, 160, |_, _, _| level);
+        // At 1 K there is no dark current.
+        let settings = NoiseSettings {
+            without: Source::ALL.to_vec(),
+            temperature_k: Some(1.0),
+            cte: Some(cte),
+            ..Default::default()
+        };
+        let moved = noisy(&light, &settings);
+        let wanted = f64::from(level) * cte.powi(2);
+        for &sample in &moved.samples {
+            // Half an ulp of a sample, and what two sums leave out.
+            let bound = f64::from(level) * (2.0_f64.powi(-24) + 2e-10);
+            assert!((f64::from(sample) - wanted).abs() <= bound, "{cte}: {sample}, not {wanted}");
+        }
+        let dark = |cte| {
+            let settings = NoiseSettings { cte, ..Default::default() };
+            noisy(&light, &settings).header.metadata.dark_signal_e.unwrap()
+        };
+        assert!((dark(Some(cte)) / dark(None) - cte * cte).abs() < 1e-14, "{cte}");
+    }
+}
+
+/// Where every packet moves as a whole, transfer changes no sample.
+#[test]
+fn perfect_transfer_is_none() {
+    let light = expected(40, 30, any_light);
+    let settings = |cte| NoiseSettings { seed: 2, cte, ..Default::default() };
+    let plain = noisy(&light, &settings(None));
+    assert_same(&plain, &noisy(&light, &settings(Some(1.0))), "cte 1");
+}
+
+/// The mean of dark frames comes off sample by sample, however the rows are asked for.
+#[test]
+fn darks_are_subtracted_in_step() {
+    let codes =
+        |seed: usize| plane([31, 17], [0, 0], CfaPattern::Rggb, |x, y, _| (4095.0 * scatter(x, y, seed)).round());
+    let (frame, darks) = (codes(0), [1, 2, 3].map(codes));
+    let headers: Vec<&FrameHeader> = darks.iter().map(|dark| &dark.header).collect();
+    let settings = CorrectionSettings { black: Black::None, cte: None };
+    let stage = CorrectFrame::new(&frame.header, &settings, &headers).unwrap();
+    assert!(stage.warnings().is_empty());
+    for step in [1, 2, 5, 17] {
+        let (mut source, mut darks) = (frame.clone(), darks.clone());
+        let mut less = LessDarks::new(&mut source, &mut darks);
+        let mut samples = Vec::new();
+        for first in (0..17).step_by(step) {
+            less.read(step.min(17 - first), &mut samples).unwrap();
+        }
+        let made = through(&MemoryFrame::new(frame.header.clone(), samples), &stage);
+        for (index, sample) in made.samples.iter().enumerate() {
+            let sum: f64 = darks.iter().map(|dark| f64::from(dark.samples[index])).sum();
+            assert_eq!(*sample, to_sample(f64::from(frame.samples[index]) - sum / 3.0));
+        }
+    }
+}
+
 // --- metadata ------------------------------------------------------------------------------------------------------
 
 /// Keys that this version does not know, the sensor and the exposure pass every stage, and every stage's record comes
@@ -775,6 +926,9 @@ fn metadata_pass_every_stage_and_yaml() {
     check(&codes.header);
     let cfa = through(&codes, &Mosaic::new(&codes.header, None).unwrap());
     check(&cfa.header);
+    check(correction(&cfa.header, Black::Auto, Some(0.999)).header());
+    let settings = NoiseSettings { cte: Some(0.99), ..settings };
+    check(AddNoise::new(&first.header, &settings).unwrap().header());
     for method in Method::ALL {
         let rgb = through(&cfa, &Demosaic::new(&cfa.header, method, Black::Auto, None).unwrap());
         check(&rgb.header);
@@ -783,5 +937,5 @@ fn metadata_pass_every_stage_and_yaml() {
             check(&through(&rgb, &stage).header);
         }
     }
-    assert_eq!(seen.len(), 4 + Method::ALL.len() * 5);
+    assert_eq!(seen.len(), 6 + Method::ALL.len() * 5);
 }

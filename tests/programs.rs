@@ -213,6 +213,7 @@ fn named_output_is_the_standard_output_byte_for_byte() {
         ("add-noise --seed 3", "expected.exr"),
         ("digitize", "noisy.exr"),
         ("mosaic", "noisy.exr"),
+        ("correct-frame --black auto --cte 0.999", "plane.exr"),
         ("demosaic --method shti", "plane.exr"),
         ("to-xyz --matrix matrix.yaml --space srgb", "rgb.exr"),
         ("measure", "noisy.exr"),
@@ -308,6 +309,78 @@ fn a_closed_pipe_is_no_error() {
         let output = child.wait_with_output().unwrap();
         assert!(output.status.success() && output.stderr.is_empty(), "{line}: {output:?}");
     }
+}
+
+/// A frame and its darks through a sensor that loses charge, and back.
+#[test]
+fn darks_and_transfer_are_taken_back() {
+    let shop = Workshop::new();
+    shop.pipe("render-radiance --electrons 900,9000,19000 --size 60x50 --cfa rggb | add-noise --cte 0.9995 | digitize -o light.tiff");
+    for frame in 1..4 {
+        let scene = "render-radiance --dark --size 60x50 --cfa rggb";
+        shop.pipe(&format!("{scene} | add-noise --cte 0.9995 --frame {frame} | digitize -o dark{frame}.tiff"));
+    }
+    let darks = "--dark dark1.tiff --dark dark2.tiff --dark dark3.tiff";
+    shop.run(&format!("correct-frame light.tiff {darks} --cte 0.9995 -o corrected.tiff"), &[]);
+    let (samples, metadata) = shop.read("corrected.tiff");
+    // Thirds of codes, some below zero, are not what 16 bits hold.
+    assert!(samples.iter().any(|sample| sample.fract() != 0.0));
+    assert_eq!(metadata.black_level_adu, Some(0.0));
+    let white = (4095.0 - shop.read("light.tiff").1.black_level_adu.unwrap()) / 0.9995_f64.powi(2);
+    assert!((metadata.white_level_adu.unwrap() - white).abs() < 1e-9);
+    let record = metadata.correction.unwrap();
+    assert_eq!((record.black_adu, record.dark_frames, record.cte), (0.0, 3, Some(0.9995)));
+    assert_eq!(metadata.noise.unwrap().cte, Some(0.9995));
+    // On through the chain: black is off already.
+    shop.run("demosaic corrected.tiff -o rgb.exr", &[]);
+    let (rgb, metadata) = shop.read("rgb.exr");
+    assert_eq!(metadata.demosaic.unwrap().black, 0.0);
+    for (class, electrons) in [900.0, 9000.0, 19_000.0].into_iter().enumerate() {
+        let rows = rgb.chunks(60).skip(class).step_by(3).flatten();
+        let mean = rows.map(|sample| f64::from(*sample)).sum::<f64>() / 3000.0;
+        // A photosite of 19,000 e⁻ scatters by 210 e⁻ at most: shot noise 138, PRNU 152, read noise and darks 30. Five
+        // times that of the mean of 750, doubled because edges and the other classes lend some of them weight.
+        let wanted = 0.058824 * electrons;
+        assert!((mean - wanted).abs() < 0.058824 * 10.0 * 210.0 / 750.0_f64.sqrt(), "{class}: {mean} {wanted}");
+    }
+    // 16 bits are refused, and so is what would write over a dark.
+    for (line, complaint) in [
+        ("light.tiff --black auto --sample-type u16 -o other.tiff", "u16 would round or clip ADU; write f32"),
+        (
+            "light.tiff --dark dark1.tiff --dark dark2.tiff -o ./dark2.tiff",
+            "./dark2.tiff: it is the same file as the input dark2.tiff; name another output",
+        ),
+        (
+            "corrected.tiff --black auto",
+            "corrected.tiff: it holds a CFA plane of ADU that is corrected already; correction is done once",
+        ),
+    ] {
+        let output = shop.attempt(&format!("correct-frame {line}"), &[]);
+        assert_eq!(String::from_utf8_lossy(&output.stderr), format!("correct-frame: {complaint}\n"));
+        assert!(!output.status.success() && output.stdout.is_empty());
+    }
+}
+
+/// What works, but may not be what was meant.
+#[test]
+fn planes_apart_and_unlike_darks_are_told_of() {
+    let shop = Workshop::with_frames();
+    let output = shop.attempt("add-noise expected.exr --cte 0.9999 -o moved.exr", &[]);
+    assert!(output.status.success());
+    assert_eq!(
+        String::from_utf8_lossy(&output.stderr),
+        "add-noise: warning: each of the three planes is transferred by itself, as if its class were at every photosite; \
+         for what a sensor does run `mosaic` first\n"
+    );
+    shop.pipe("render-radiance --dark --exposure 2 --size 8x6 | add-noise --temperature 300 | digitize -o dark.exr");
+    let output = shop.attempt("correct-frame codes.exr --dark dark.exr -o less.exr", &[]);
+    assert!(output.status.success());
+    assert_eq!(
+        String::from_utf8_lossy(&output.stderr),
+        "correct-frame: warning: dark.exr: its exposure is 2 s, but that of codes.exr is 0.033 s; their dark signals \
+         differ\ncorrect-frame: warning: dark.exr: its temperature is 300 K, but that of codes.exr is 333 K; their dark \
+         signals differ\n"
+    );
 }
 
 // --- sidecars ------------------------------------------------------------------------------------------------------
@@ -427,7 +500,7 @@ const BAD_DATA: i32 = 1;
 const BAD_USAGE: i32 = 2;
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 37] = [
+const MISTAKES: [(&str, i32, &str); 46] = [
     ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
@@ -484,6 +557,43 @@ const MISTAKES: [(&str, i32, &str); 37] = [
         "matrix.yaml: it is neither an EXR nor a TIFF file; it looks like text (a spectrum goes into \
          `render-radiance`)",
     ),
+    (
+        "add-noise expected.exr --cte 1.1",
+        BAD_USAGE,
+        "`1.1` is no value for --cte <X>: give a fraction above 0 and at most 1; see `add-noise --help`",
+    ),
+    ("correct-frame codes.exr", BAD_USAGE, "there is nothing to correct; give --black, --dark or --cte"),
+    (
+        "correct-frame noisy.exr --cte 0.9",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons, not ADU; run `digitize` first",
+    ),
+    (
+        "correct-frame rgb.exr --black 3",
+        BAD_DATA,
+        "rgb.exr: it holds three demosaicked planes of ADU; corrections come before demosaicking",
+    ),
+    (
+        "correct-frame codes.exr --cte 0.1",
+        BAD_USAGE,
+        "a charge transfer efficiency of 0.1 is too poor to be undone over 6 moves; errors would grow more than 1000 times",
+    ),
+    (
+        "correct-frame codes.exr --dark plane.exr",
+        BAD_DATA,
+        "plane.exr: its number of planes is 1, but that of codes.exr is 3",
+    ),
+    (
+        "correct-frame codes.exr --dark noisy.exr",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons, not ADU; run `digitize` first",
+    ),
+    (
+        "correct-frame codes.exr --dark codes.exr --black 3",
+        BAD_USAGE,
+        "--dark <FILE> and --black <auto|none|N> exclude each other; see `correct-frame --help`",
+    ),
+    ("correct-frame codes.exr --dark missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
     ("digitize codes.exr", BAD_DATA, "codes.exr: it holds three planes of ADU: it is digitized already"),
     ("digitize noisy.exr --bits 20", BAD_USAGE, "a converter of 20 bits is impossible here; give 1 to 16"),
     (

@@ -39,6 +39,10 @@ struct Arguments {
     /// How Poisson numbers are drawn: exact, or gaussian to see what that approximation costs
     #[arg(long, default_value = "exact", value_parser = options::choice(&[("exact", PoissonKind::Exact), ("gaussian", PoissonKind::Gaussian)]))]
     poisson: PoissonKind,
+    /// Charge transfer efficiency: the share of a packet that each move to the output takes along, above 0 and at most 1;
+    /// by default transfer is left out
+    #[arg(long, value_name = "X", value_parser = options::fraction, allow_negative_numbers = true)]
+    cte: Option<f64>,
     #[command(flatten)]
     sensor: options::SensorChoice,
     #[command(flatten)]
@@ -69,10 +73,14 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         without: arguments.without.clone(),
         temperature_k: arguments.temperature,
         poisson: arguments.poisson,
+        cte: arguments.cte,
     };
     let mut stage = AddNoise::new(reader.header(), &settings)?;
     propagation::note(stage.header_mut(), Equations::Exact);
     session.sign(stage.header_mut());
+    if let Some(warning) = stage.warning() {
+        session.warn(&warning);
+    }
     session.drive(reader, &stage, &arguments.output)?;
     Ok(())
 }

@@ -22,7 +22,7 @@ struct Arguments {
     #[arg(long, default_value = "eci", value_parser = options::choice(&METHODS))]
     method: Method,
     /// Black level to remove: auto (from the metadata), none, or a number in the unit of the samples
-    #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = black, allow_negative_numbers = true)]
+    #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = options::black, allow_negative_numbers = true)]
     black: Black,
     /// Pattern of a plane that carries none, or another than it carries: rggb, bggr, grbg or gbrg
     #[arg(long, value_parser = options::pattern)]
@@ -43,14 +43,6 @@ const METHODS: [(&str, Method); 8] = [
     ("mhc", Method::Malvar),
     ("malvar", Method::Malvar),
 ];
-
-fn black(text: &str) -> std::result::Result<Black, String> {
-    match text {
-        "auto" => Ok(Black::Auto),
-        "none" => Ok(Black::None),
-        level => options::number(level).map(Black::Level).map_err(|_| "give auto, none or a number".into()),
-    }
-}
 
 fn main() -> ExitCode {
     cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)

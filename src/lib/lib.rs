@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | 0 words | [`error`], [`units`], [`frame`], [`cfa`] | no files, no chance |
 //! | 1 mathematics | [`numerics`], [`random`] | no camera |
-//! | 2 physics | [`spectrum`], [`optics`], [`sensor`], [`metadata`], [`stage`], [`render`], [`noise`], [`adc`], [`mosaic`], [`demosaic`], [`color`], [`propagation`], [`statistics`] | pure functions of bands and parameters, in the order light meets them |
+//! | 2 physics | [`spectrum`], [`optics`], [`sensor`], [`metadata`], [`stage`], [`render`], [`transfer`], [`noise`], [`adc`], [`correct`], [`mosaic`], [`demosaic`], [`color`], [`propagation`], [`statistics`] | pure functions of bands and parameters, in the order light meets them |
 //! | 3 files | [`formats`], [`report`] | bytes to frames and back |
 //! | 4 command line | [`cli`] | options, complaints, exit |
 //!
@@ -35,6 +35,7 @@ pub mod random;
 
 pub mod adc;
 pub mod color;
+pub mod correct;
 pub mod demosaic;
 pub mod metadata;
 pub mod mosaic;
@@ -46,6 +47,7 @@ pub mod sensor;
 pub mod spectrum;
 pub mod stage;
 pub mod statistics;
+pub mod transfer;
 
 pub mod formats;
 pub mod report;

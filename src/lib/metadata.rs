@@ -51,6 +51,9 @@ pub struct Metadata {
     /// The converter, as it was set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adc: Option<AdcRecord>,
+    /// What was taken back before demosaicking.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub correction: Option<CorrectionRecord>,
     /// How the missing classes were interpolated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub demosaic: Option<DemosaicRecord>,
@@ -123,6 +126,9 @@ pub struct NoiseRecord {
     pub dark_e: f64,
     /// How Poisson numbers were drawn.
     pub poisson: PoissonKind,
+    /// Share of a packet that each move to the output takes along, where charge transfer was simulated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cte: Option<f64>,
 }
 
 /// The converter as it was set.
@@ -134,6 +140,24 @@ pub struct AdcRecord {
     pub bias_adu: f64,
     /// Slope in ADU per e⁻.
     pub adu_per_e: f64,
+}
+
+/// What was taken back of a frame of codes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CorrectionRecord {
+    /// What was subtracted as a constant, ADU.
+    pub black_adu: f64,
+    /// How many dark frames the mean was of that was subtracted sample by sample.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub dark_frames: u32,
+    /// Charge transfer efficiency that was undone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cte: Option<f64>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_zero(count: &u32) -> bool {
+    *count == 0
 }
 
 /// How the missing classes were interpolated.
@@ -239,6 +263,7 @@ impl Metadata {
             scene: None,
             noise: None,
             adc: None,
+            correction: None,
             demosaic: None,
             color: None,
             predicted: None,
@@ -311,6 +336,22 @@ impl FrameHeader {
     /// [`Error::MissingKey`].
     pub fn exposure(&self) -> Result<Exposure> {
         self.metadata.exposure.ok_or_else(|| self.missing("exposure", "--exposure S and --f-number N"))
+    }
+
+    /// Makes sure that the frame starts at the sensor's corner, from where moves of charge are counted.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for a crop that starts elsewhere.
+    pub fn check_corner(&self) -> Result<()> {
+        let [column, row] = self.geometry.origin;
+        if [column, row] == [0, 0] {
+            return Ok(());
+        }
+        Err(self.refuse(format!(
+            "it starts at column {column}, row {row} of the sensor; charge of the photosites before these is missing, \
+             so that transfer cannot be followed"
+        )))
     }
 
     /// An [`Error::MissingKey`] about this frame.

@@ -3,7 +3,7 @@
 //! M = DCSN ∘ DCNU + SSN ∘ PRNU + RON        [HP2005, Eq. 10]
 //!
 //! DCNU and PRNU are fixed patterns: they hang on the sensor's seed alone. DCSN, SSN and RON are temporal: they hang on
-//! seed and frame.
+//! seed and frame. Where charge transfer is simulated, it takes light and dark charge to the output before RON is added.
 
 use crate::cfa::Class;
 use crate::error::{Error, Result};
@@ -11,6 +11,7 @@ use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::random::{Draws, Source};
 use crate::stage::{Counts, Stage};
+use crate::transfer::{Transfer, uniform_share};
 use crate::units::{Electrons, ExpectedElectrons, QuantityKind};
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
@@ -73,6 +74,8 @@ pub struct NoiseSettings {
     pub temperature_k: Option<f64>,
     /// How to draw Poisson numbers.
     pub poisson: PoissonKind,
+    /// Share of a packet that each move to the output takes along; none leaves transfer out.
+    pub cte: Option<f64>,
 }
 
 /// Draws one noisy exposure.
@@ -81,6 +84,7 @@ pub struct AddNoise {
     header: FrameHeader,
     model: NoiseModel,
     record: NoiseRecord,
+    transfer: Option<Transfer>,
 }
 
 /// The dark signal is left out where its variance is below this share of that of the read noise: the total standard
@@ -93,7 +97,8 @@ impl AddNoise {
     /// # Errors
     ///
     /// [`Error::Order`] unless the frame holds expected electrons of photosites; [`Error::MissingKey`] without sensor
-    /// or exposure; [`Error::Usage`] for an impossible temperature.
+    /// or exposure; [`Error::Usage`] for an impossible temperature or charge transfer efficiency; [`Error::Format`]
+    /// where charge of a crop would be transferred.
     pub fn new(input: &FrameHeader, settings: &NoiseSettings) -> Result<Self> {
         let holds = input.holds();
         match input.metadata.quantity {
@@ -116,6 +121,13 @@ impl AddNoise {
                 "a temperature of {temperature_k} K is impossible for a sensor; give 1 to 1000"
             )));
         }
+        let transfer = match settings.cte {
+            Some(cte) => {
+                input.check_corner()?;
+                Some(Transfer::new(cte, &input.geometry)?)
+            }
+            None => None,
+        };
         // Eq. 7: Q_DC = I_DC Δt.
         let mut dark_e = sensor.dark_current_e_per_s(temperature_k) * input.exposure()?.exposure_s;
         let mut metadata = input.metadata.becoming(QuantityKind::Electrons);
@@ -147,17 +159,28 @@ impl AddNoise {
             temperature_k,
             dark_e,
             poisson: settings.poisson,
+            cte: settings.cte,
         };
         let model = NoiseModel::of(input, &record)?;
-        metadata.dark_signal_e = Some(dark_e * rectified_mean(model.dcnu));
+        metadata.dark_signal_e = Some(dark_e * rectified_mean(model.dcnu) * settings.cte.map_or(1.0, uniform_share));
         metadata.noise = Some(record.clone());
         let header = FrameHeader { metadata, ..input.clone() };
-        Ok(Self { header, model, record })
+        Ok(Self { header, model, record, transfer })
     }
 
     /// The head of the noisy frame, to add to.
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
+    }
+
+    /// What a user should hear before the frame is made.
+    pub fn warning(&self) -> Option<String> {
+        let apart = self.transfer.is_some() && self.header.metadata.cfa.is_none();
+        apart.then(|| {
+            "each of the three planes is transferred by itself, as if its class were at every photosite; for what a \
+             sensor does run `mosaic` first"
+                .into()
+        })
     }
 }
 
@@ -229,54 +252,109 @@ impl Stage for AddNoise {
         &self.header
     }
 
+    fn reach(&self) -> usize {
+        self.transfer.as_ref().map_or(0, Transfer::reach)
+    }
+
     fn apply(&self, input: Window<'_, ExpectedElectrons>, mut output: Rows<'_, Electrons>) -> Counts {
         let mut counts = Counts::default();
-        let geometry = &self.header.geometry;
-        for y in output.range() {
-            for channel in 0..input.channels() {
-                let classes = match self.header.metadata.cfa {
-                    Some(pattern) => pattern.row_classes(geometry.origin, y),
-                    None => [Class::ALL[channel]; 2],
-                };
-                self.row(y, classes, input.row(y.cast_signed(), channel), output.row(y, channel), &mut counts);
+        let rows = output.range();
+        for channel in 0..input.channels() {
+            let Some(transfer) = &self.transfer else {
+                for y in rows.clone() {
+                    let noisy = output.row(y, channel);
+                    let line = self.line(y, channel);
+                    line.charges(input.row(y.cast_signed(), channel), &mut counts, |x, charge, counts| {
+                        noisy[x] = line.read(x, charge, counts);
+                    });
+                }
+                continue;
+            };
+            let mut passage = transfer.passage();
+            // The rows above are drawn again, and counted in the band that they belong to.
+            for y in rows.start.saturating_sub(transfer.reach())..rows.end {
+                let line = self.line(y, channel);
+                let mut of_row = Counts::default();
+                let entering = passage.entering(y);
+                line.charges(input.row(y.cast_signed(), channel), &mut of_row, |x, charge, _| entering[x] = charge);
+                if y >= rows.start {
+                    counts = counts.plus(of_row);
+                    for (x, (&charge, noisy)) in passage.leaving(y).iter().zip(output.row(y, channel)).enumerate() {
+                        *noisy = line.read(x, charge, &mut counts);
+                    }
+                }
             }
         }
         counts
     }
 }
 
+/// One row of one plane.
+struct Line<'a> {
+    model: &'a NoiseModel,
+    record: &'a NoiseRecord,
+    /// Row of the sensor, and column of the frame's first.
+    row: i32,
+    first_column: i32,
+    /// Classes of the frame's even and odd columns.
+    classes: [Class; 2],
+}
+
 impl AddNoise {
-    /// One row of one plane; `classes` are those of its even and odd columns.
-    fn row(&self, y: usize, classes: [Class; 2], expected: &[f32], noisy: &mut [f32], counts: &mut Counts) {
-        let Self { model, record, .. } = self;
-        let [x0, y0] = self.header.geometry.origin;
+    fn line(&self, y: usize, channel: usize) -> Line<'_> {
+        let geometry = &self.header.geometry;
+        let classes = match self.header.metadata.cfa {
+            Some(pattern) => pattern.row_classes(geometry.origin, y),
+            None => [Class::ALL[channel]; 2],
+        };
+        let [first_column, y0] = geometry.origin;
         #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
-        let (row, column) = (y0.wrapping_add(y as i32), |x: usize| x0.wrapping_add(x as i32));
+        let row = y0.wrapping_add(y as i32);
+        Line { model: &self.model, record: &self.record, row, first_column, classes }
+    }
+}
+
+impl Line<'_> {
+    #[inline(always)]
+    fn draws(&self, x: usize, source: Source) -> Draws {
+        let record = self.record;
+        let (seed, frame) =
+            if source.is_fixed_pattern() { (record.sensor_seed, 0) } else { (record.seed, record.frame) };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
+        let column = self.first_column.wrapping_add(x as i32);
+        Draws::new(seed, frame, source, self.classes[x % 2] as u8, column, self.row)
+    }
+
+    #[inline(always)]
+    fn normal(&self, x: usize, source: Source) -> f64 {
+        StandardNormal.sample(&mut self.draws(x, source))
+    }
+
+    /// Draws the charge of each photosite, light and dark, clipped at full well.
+    #[inline(always)]
+    fn charges(&self, expected: &[f32], counts: &mut Counts, mut put: impl FnMut(usize, f64, &mut Counts)) {
+        let model = self.model;
         let mut light_counters = [Counter::new(model.poisson), Counter::new(model.poisson)];
         let mut dark_counter = Counter::new(model.poisson);
-        for (x, (&expected, noisy)) in expected.iter().zip(noisy).enumerate() {
-            let class = classes[x % 2];
-            let draws = |source: Source| {
-                let (seed, frame) =
-                    if source.is_fixed_pattern() { (record.sensor_seed, 0) } else { (record.seed, record.frame) };
-                Draws::new(seed, frame, source, class as u8, column(x), row)
-            };
-            let normal = |source: Source| -> f64 { StandardNormal.sample(&mut draws(source)) };
-            let sensitivity = |source: Source, sigma: f64| (1.0 + sigma * normal(source)).max(0.0);
+        for (x, &expected) in expected.iter().enumerate() {
+            let sensitivity = |source: Source, sigma: f64| (1.0 + sigma * self.normal(x, source)).max(0.0);
             let mut rate = f64::from(expected);
             if rate < 0.0 {
                 counts.negative += 1;
                 rate = 0.0;
             }
-            let mut light =
-                if model.signal_shot { light_counters[x % 2].draw(rate, &mut draws(Source::Ssn)) } else { rate };
+            let mut light = if model.signal_shot {
+                light_counters[x % 2].draw(rate, &mut self.draws(x, Source::Ssn))
+            } else {
+                rate
+            };
             if model.prnu > 0.0 {
                 light *= sensitivity(Source::Prnu, model.prnu);
             }
             let mut charge = light;
             if model.dark_e > 0.0 {
                 let mut dark = if model.dark_shot {
-                    dark_counter.draw(model.dark_e, &mut draws(Source::Dcsn))
+                    dark_counter.draw(model.dark_e, &mut self.draws(x, Source::Dcsn))
                 } else {
                     model.dark_e
                 };
@@ -289,11 +367,17 @@ impl AddNoise {
                 charge = model.full_well_e;
                 counts.full_well += 1;
             }
-            if model.read_noise_e > 0.0 {
-                charge += model.read_noise_e * normal(Source::Ron);
-            }
-            counts.not_finite += u64::from(!charge.is_finite());
-            *noisy = to_sample(charge);
+            put(x, charge, counts);
         }
+    }
+
+    /// Reads a packet of charge out.
+    #[inline(always)]
+    fn read(&self, x: usize, mut charge: f64, counts: &mut Counts) -> f32 {
+        if self.model.read_noise_e > 0.0 {
+            charge += self.model.read_noise_e * self.normal(x, Source::Ron);
+        }
+        counts.not_finite += u64::from(!charge.is_finite());
+        to_sample(charge)
     }
 }

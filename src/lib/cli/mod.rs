@@ -7,6 +7,7 @@ pub mod rendering;
 
 pub use history::history_entry;
 
+use crate::correct::LessDarks;
 use crate::error::{Error, Result};
 use crate::formats::atomic::remove_pending;
 use crate::formats::input::FrameReader;
@@ -194,13 +195,34 @@ impl Session {
     /// # Errors
     ///
     /// Those of reader, stage and writer.
-    pub fn drive<S: Stage>(&self, mut reader: FrameReader, stage: &S, output: &Output) -> Result<Counts> {
-        self.report_reader(&reader);
-        let mut writer = FrameWriter::create(&output.options(), stage.header(), reader.file().as_ref())?;
+    pub fn drive<S: Stage>(&self, reader: FrameReader, stage: &S, output: &Output) -> Result<Counts> {
+        self.drive_less_darks(reader, Vec::new(), stage, output)
+    }
+
+    /// Drives a frame less the mean of dark frames through a stage.
+    ///
+    /// # Errors
+    ///
+    /// Those of readers, stage and writer.
+    pub fn drive_less_darks<S: Stage>(
+        &self,
+        mut reader: FrameReader,
+        mut darks: Vec<FrameReader>,
+        stage: &S,
+        output: &Output,
+    ) -> Result<Counts> {
+        let readers = || std::iter::once(&reader).chain(&darks);
+        readers().for_each(|reader| self.report_reader(reader));
+        let inputs: Vec<_> = readers().filter_map(FrameReader::file).collect();
+        let mut writer = FrameWriter::create(&output.options(), stage.header(), &inputs)?;
         let bar = self.progress(stage.header().geometry.height);
-        let counts = run(stage, &mut reader, &mut writer, &mut |rows| bar.set_position(rows as u64))?;
+        let mut source = LessDarks::new(&mut reader, &mut darks);
+        let counts = run(stage, &mut source, &mut writer, &mut |rows| bar.set_position(rows as u64))?;
         bar.finish_and_clear();
         self.finish(reader, writer, counts)?;
+        for warning in darks.iter_mut().filter_map(FrameReader::check_digest) {
+            self.warn(&warning);
+        }
         Ok(counts)
     }
 

@@ -2,7 +2,7 @@
 
 use crate::cfa::CfaPattern;
 use crate::color::White;
-use crate::demosaic::Method;
+use crate::demosaic::{Black, Method};
 use crate::formats::data;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
@@ -98,7 +98,7 @@ pub struct Output {
     /// Compression, without loss: rle, zips, zip, piz for EXR; lzw, deflate for TIFF; none by default
     #[arg(long, value_parser = choice(&CompressionKind::NAMES))]
     pub compression: Option<CompressionKind>,
-    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF; by default f32, and u16 for ADU in TIFF
+    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF; by default f32, and u16 for codes in TIFF
     #[arg(long, value_name = "TYPE", value_parser = choice(&[("f32", SampleKind::F32), ("f16", SampleKind::F16), ("u16", SampleKind::U16)]))]
     pub sample_type: Option<SampleKind>,
 }
@@ -212,6 +212,19 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// What is expected, in words.
 pub fn fraction(text: &str) -> Result<f64, String> {
     positive(text).ok().filter(|x| *x <= 1.0).ok_or_else(|| "give a fraction above 0 and at most 1".into())
+}
+
+/// Reads a black level: `auto`, `none`, or a number.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn black(text: &str) -> Result<Black, String> {
+    match text {
+        "auto" => Ok(Black::Auto),
+        "none" => Ok(Black::None),
+        level => number(level).map(Black::Level).map_err(|_| "give auto, none or a number".into()),
+    }
 }
 
 /// Reads a region `X,Y,W,H`.

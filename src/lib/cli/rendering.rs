@@ -402,7 +402,7 @@ impl Request {
         input: Option<(FileId, String)>,
     ) -> Result<()> {
         session.sign(&mut rendering.header);
-        let mut writer = FrameWriter::create(&output.options(), &rendering.header, input.as_ref())?;
+        let mut writer = FrameWriter::create(&output.options(), &rendering.header, input.as_slice())?;
         let bar = session.progress(rendering.header.geometry.height);
         let next_row = || match &mut light {
             Light::Uniform { electrons, .. } => Ok(vec![*electrons]),

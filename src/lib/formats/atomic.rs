@@ -132,11 +132,13 @@ impl Target {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] when the output is a terminal or the file `input`; [`Error::Disk`].
-    pub fn open(path: Option<&Path>, needs_seek: bool, input: Option<&(FileId, String)>) -> Result<Self> {
+    /// [`Error::Usage`] when the output is a terminal or one of the files `inputs`; [`Error::Disk`].
+    pub fn open(path: Option<&Path>, needs_seek: bool, inputs: &[(FileId, String)]) -> Result<Self> {
         let name = path.map_or_else(|| STDOUT_NAME.to_owned(), |path| path.display().to_string());
-        let is_input = |metadata: &std::fs::Metadata| input.is_some_and(|(id, _)| *id == file_id(metadata));
-        let same = || same_file(&name, input.map_or("", |(_, input)| input.as_str()));
+        let check = |metadata: &std::fs::Metadata| match inputs.iter().find(|(id, _)| *id == file_id(metadata)) {
+            Some((_, input)) => Err(same_file(&name, input)),
+            None => Ok(()),
+        };
         let output = match path {
             None => {
                 let stdout = io::stdout();
@@ -149,9 +151,7 @@ impl Target {
             }
             Some(path) => {
                 let existing = std::fs::metadata(path).ok();
-                if existing.as_ref().is_some_and(is_input) {
-                    return Err(same());
-                }
+                existing.as_ref().map_or(Ok(()), check)?;
                 if existing.is_none_or(|metadata| metadata.is_file() || metadata.is_dir()) {
                     let file = AtomicFile::create(path)?;
                     return Ok(Self { name, path: Some(path.to_owned()), kind: Kind::Named(file) });
@@ -159,8 +159,8 @@ impl Target {
                 OpenOptions::new().write(true).open(path).map_err(|e| Error::disk(&name, "open", e))?
             }
         };
-        if output.metadata().is_ok_and(|metadata| metadata.is_file() && is_input(&metadata)) {
-            return Err(same());
+        if let Some(metadata) = output.metadata().ok().filter(std::fs::Metadata::is_file) {
+            check(&metadata)?;
         }
         let kind = if needs_seek {
             let spool = tempfile::tempfile().map_err(|e| Error::disk(&name, "write", e))?;

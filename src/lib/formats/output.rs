@@ -110,7 +110,8 @@ impl OutputOptions {
             }
         };
         let quantity = header.metadata.quantity;
-        let is_codes = quantity == QuantityKind::Adu && header.metadata.demosaic.is_none();
+        let changed = header.metadata.demosaic.is_some() || header.metadata.correction.is_some();
+        let is_codes = quantity == QuantityKind::Adu && !changed;
         let default = match format {
             Format::Tiff if is_codes || quantity == QuantityKind::Srgb => SampleKind::U16,
             _ => SampleKind::F32,
@@ -179,16 +180,16 @@ enum Encoder {
 }
 
 impl FrameWriter {
-    /// Opens the output and writes the head of the frame. `input` is the file that is being read, if it is one.
+    /// Opens the output and writes the head of the frame. `inputs` are the files that are being read.
     ///
     /// # Errors
     ///
     /// [`Error::Usage`] where options do not go together, the output is a terminal or an input; [`Error::Disk`].
-    pub fn create(options: &OutputOptions, header: &FrameHeader, input: Option<&(FileId, String)>) -> Result<Self> {
+    pub fn create(options: &OutputOptions, header: &FrameHeader, inputs: &[(FileId, String)]) -> Result<Self> {
         let encoding = options.encoding(header)?;
         let path = options.path.as_deref().filter(|path| *path != Path::new("-"));
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
-        let target = Target::open(path, needs_seek, input)?;
+        let target = Target::open(path, needs_seek, inputs)?;
         let name = target.name().to_owned();
         let record = target.named_file().map(|path| (Sha256::new(), sidecar_path(path)));
         let metadata = yaml::write_metadata(&header.metadata)?;
@@ -350,7 +351,7 @@ pub fn write_text(path: Option<&Path>, text: &str, input: Option<&(FileId, Strin
 ///
 /// [`Error::Usage`] where the output is the input; [`Error::Disk`].
 pub fn write_bytes(path: &Path, bytes: &[u8], input: Option<&(FileId, String)>) -> Result<()> {
-    let mut file = Target::open(Some(path), false, input)?;
+    let mut file = Target::open(Some(path), false, input.map_or(&[], std::slice::from_ref))?;
     file.write_all(bytes).map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
     file.commit()
 }

@@ -104,7 +104,7 @@ pub fn write_png(
         }
     }
     let name = path.display().to_string();
-    let mut file = Target::open(Some(path), false, input)?;
+    let mut file = Target::open(Some(path), false, input.map_or(&[], std::slice::from_ref))?;
     let color = if planes == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
     let size = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
     PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Adaptive)

@@ -185,6 +185,10 @@ fn from_sites(frame: &FrameHeader, sites: [Prediction; 3], equations: Equations)
 fn sites(frame: &FrameHeader, quantity: QuantityKind, equations: Equations) -> Option<[Prediction; 3]> {
     let metadata = &frame.metadata;
     let expected = metadata.scene.as_ref().filter(|scene| scene.uniform)?.expected_electrons?;
+    // Transfer ties photosites to each other and to their place; so does its undoing, and a frame of darks.
+    if metadata.correction.is_some() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+        return None;
+    }
     let model = model(frame)?;
     match quantity {
         QuantityKind::ExpectedElectrons => Some(
@@ -220,6 +224,7 @@ fn model(frame: &FrameHeader) -> Option<NoiseModel> {
         temperature_k: 0.0,
         dark_e: 0.0,
         poisson: PoissonKind::Exact,
+        cte: None,
     };
     let record = frame.metadata.noise.as_ref().unwrap_or(&silent);
     let mut model = NoiseModel::of(frame, record).ok()?;

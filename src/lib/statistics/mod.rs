@@ -140,6 +140,11 @@ enum Rails {
 impl Rails {
     fn of(frame: &FrameHeader) -> Self {
         let metadata = &frame.metadata;
+        // What transfer or its undoing has mixed lies at no rail any more; nor does a code less a dark frame's.
+        let transferred = metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
+        if metadata.correction.is_some() || (transferred && metadata.quantity == QuantityKind::Electrons) {
+            return Self::None;
+        }
         match metadata.quantity {
             QuantityKind::Adu if metadata.demosaic.is_none() => match metadata.white_level_adu {
                 Some(white) => Self::Codes(0.0, crate::frame::to_sample(white)),

@@ -1,0 +1,54 @@
+//! `correct-frame`: codes without black, dark signal and the traces of charge transfer.
+
+use clap::Parser;
+use cyanometer::cli::{self, options};
+use cyanometer::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::demosaic::Black;
+use cyanometer::error::Result;
+use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::stage::RowSource;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Take black level, dark frames and charge transfer back from a frame of ADU
+///
+/// Works before demosaicking. What no light reads is subtracted first, as a constant or as the mean of dark frames; then
+/// charge transfer is undone. Values become signed and fractional.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(flatten)]
+    input: options::Input,
+    /// Black level to remove: auto (from the metadata), none, or a number of ADU
+    #[arg(long, default_value = "none", value_name = "auto|none|N", value_parser = options::black, allow_negative_numbers = true)]
+    black: Black,
+    /// Dark frame to subtract sample by sample; given more than once, the mean of all
+    #[arg(long, value_name = "FILE", conflicts_with = "black")]
+    dark: Vec<PathBuf>,
+    /// Charge transfer efficiency to undo, above 0 and at most 1; the bias of the converter is left out of it
+    #[arg(long, value_name = "X", value_parser = options::fraction, allow_negative_numbers = true)]
+    cte: Option<f64>,
+    #[command(flatten)]
+    output: options::Output,
+    #[command(flatten)]
+    general: options::General,
+}
+
+fn main() -> ExitCode {
+    cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
+}
+
+fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    let reader = FrameReader::open(&arguments.input.options())?;
+    let open = |path: &PathBuf| FrameReader::open(&InputOptions { path: Some(path.clone()), ..Default::default() });
+    let darks = arguments.dark.iter().map(open).collect::<Result<Vec<_>>>()?;
+    let dark_headers: Vec<_> = darks.iter().map(RowSource::header).collect();
+    let settings = CorrectionSettings { black: arguments.black, cte: arguments.cte };
+    let mut stage = CorrectFrame::new(reader.header(), &settings, &dark_headers)?;
+    session.sign(stage.header_mut());
+    for warning in stage.warnings() {
+        session.warn(warning);
+    }
+    session.drive_less_darks(reader, darks, &stage, &arguments.output)?;
+    Ok(())
+}
