@@ -7,6 +7,7 @@ mod support;
 
 use cyanometer::adc::{AdcSettings, Digitize};
 use cyanometer::color::{ColorSettings, Space, ToXyz, White};
+use cyanometer::correct::{CorrectFrame, CorrectionSettings, LessDarks};
 use cyanometer::demosaic::{Black, Demosaic, Method};
 use cyanometer::metadata::Scene;
 use cyanometer::mosaic::Mosaic;
@@ -14,7 +15,7 @@ use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::significance::{of_chi_square, of_smallest};
 use cyanometer::propagation::Equations;
 use cyanometer::random::Source;
-use cyanometer::stage::MemoryFrame;
+use cyanometer::stage::{MemoryFrame, Stage, run};
 use cyanometer::statistics::check::Verdict;
 use cyanometer::statistics::{Region, RegionReport, measure};
 use rayon::prelude::*;
@@ -264,4 +265,62 @@ fn averaging_as_if_pixels_were_independent_is_caught() {
         // The rim of the patch leans on sites outside, which takes off a per cent or two.
         assert!((ratio / keeps - 1.0).abs() < 0.03, "channel {i}: {ratio}, not {keeps}");
     }
+}
+
+/// Dark frames of the same sensor take its dark pattern with them and bring their own noise: predicted for one, two and
+/// nine of them, before and after demosaicking.
+#[test]
+fn dark_frames_bring_their_noise_and_take_the_pattern() {
+    let exposure = |scene: &MemoryFrame, frame: u32| {
+        let settings = NoiseSettings { seed: 6, sensor_seed: 7, frame, ..Default::default() };
+        digitized(&through(scene, &AddNoise::new(&scene.header, &settings).unwrap()))
+    };
+    let size = [400, 300];
+    let light = exposure(&scene(size, [200.0, 400.0, 300.0]), 0);
+    let all: Vec<MemoryFrame> = (1..10).map(|frame| exposure(&scene(size, [0.0; 3]), frame)).collect();
+    for count in [1, 2, 9] {
+        let mut darks = all[..count].to_vec();
+        let headers: Vec<_> = all[..count].iter().map(|dark| &dark.header).collect();
+        let settings = CorrectionSettings { black: Black::None, cte: None };
+        let stage = CorrectFrame::new(&light.header, &settings, &headers).unwrap();
+        let mut source = MemoryFrame::new(light.header.clone(), light.samples.clone());
+        let mut corrected = MemoryFrame::new(stage.header().clone(), Vec::new());
+        let mut less = LessDarks::new(&mut source, &mut darks);
+        run(&stage, &mut less, &mut corrected, &mut |_| ()).unwrap();
+        let found = verdict(&corrected, Equations::Exact);
+        assert!(found.passed, "{count} dark frames: {found:?}");
+        let camera = demosaicked(&corrected, Method::EffectiveColor);
+        let found = verdict(&camera, Equations::Exact);
+        assert!(found.passed, "{count} dark frames, ECI: {found:?}");
+        // As many dark frames as there are not would be caught: a ninth of their noise is 10 % of the variance.
+        corrected.header.metadata.correction.as_mut().unwrap().dark_frames = 20;
+        assert!(!verdict(&corrected, Equations::Exact).passed, "{count}");
+    }
+}
+
+/// Transfer takes its share of the mean and of the variance, and a frame of it is not checked as if its photosites were
+/// alone; where classes of unequal signals share charge nothing is predicted.
+#[test]
+fn charge_transfer_is_in_the_predicted_mean() {
+    let planes = scene([300, 200], [3000.0, 9000.0, 20_000.0]);
+    let level = scene([300, 200], [9000.0; 3]);
+    let plane = |scene: &MemoryFrame| through(scene, &Mosaic::new(&scene.header, None).unwrap());
+    let settings = NoiseSettings { seed: 2, sensor_seed: 2, cte: Some(0.9999), ..Default::default() };
+    let noisy = |scene: &MemoryFrame| through(scene, &AddNoise::new(&scene.header, &settings).unwrap());
+    for electrons in [noisy(&planes), noisy(&plane(&level))] {
+        for frame in [digitized(&electrons), electrons] {
+            let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+            let report = measure(&mut source, &[], Equations::Exact, None).unwrap();
+            for channel in &report.regions[0].channels {
+                // 5 standard errors; the charge that neighbours share widens them by less than 10 %.
+                assert!(channel.z_mean.unwrap().abs() < 5.0 && channel.z_std.unwrap().abs() < 5.0, "{channel:?}");
+                // Without transfer's share of 1 − 2·10⁻⁴ the mean of 9000 e⁻ would be off by 1.8 e⁻, 3 standard errors.
+            }
+            let mut again = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+            let refused = measure(&mut again, &[], Equations::Exact, Some(1e-4)).unwrap_err().to_string();
+            assert!(refused.contains("charge transfer"), "{refused}");
+        }
+    }
+    let mut mixed = noisy(&plane(&planes));
+    assert_eq!(measure(&mut mixed, &[], Equations::Exact, None).unwrap().regions[0].channels[0].predicted_mean, None);
 }

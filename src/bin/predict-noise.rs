@@ -77,6 +77,9 @@ struct Arguments {
     /// Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates
     #[arg(long, value_name = "CD_PER_M2", value_parser = options::positive, allow_negative_numbers = true)]
     white_luminance: Option<f64>,
+    /// Subtract the mean of so many dark frames rather than the black level
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100_000), allow_negative_numbers = true)]
+    dark_frames: u32,
     /// Patch whose mean is predicted, in pixels
     #[arg(long, value_name = "WxH", value_parser = options::size)]
     patch: Option<[usize; 2]>,
@@ -131,6 +134,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         matrix: a.matrix.clone(),
         white: a.white,
         white_luminance: a.white_luminance,
+        dark_frames: a.dark_frames,
         equations: a.equations,
         patch: a.patch,
         patch_at: a.patch_at,

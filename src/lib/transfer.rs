@@ -28,6 +28,7 @@ const LARGEST_GAIN: f64 = 1000.0;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transfer {
     down: Line,
+    height: usize,
     /// Coefficients by missed moves, then by column.
     across: Vec<Vec<f64>>,
 }
@@ -73,7 +74,7 @@ impl Line {
             return too_wide();
         }
         let gain: f64 = sizes.iter().sum();
-        if undone && !(gain <= LARGEST_GAIN) {
+        if undone && (gain.is_nan() || gain > LARGEST_GAIN) {
             return too_poor(format!("errors would grow more than {LARGEST_GAIN} times"));
         }
         let mut most_missed = sizes.len();
@@ -130,7 +131,7 @@ impl Transfer {
                 coefficients[x] = coefficient;
             }
         }
-        Ok(Self { down, across })
+        Ok(Self { down, height: geometry.height, across })
     }
 
     /// Rows above that a row depends on.
@@ -147,6 +148,18 @@ impl Transfer {
             column_sums: vec![0.0; width],
             moved: vec![0.0; width],
         }
+    }
+}
+
+impl Transfer {
+    /// What is left of the variance of independent charges, on average over the frame: the mean over rows, and over
+    /// columns, of the sum of squared coefficients.
+    pub fn mean_square_share(&self) -> f64 {
+        let (height, width) = (self.height, self.across[0].len());
+        let square = |coefficients: f64| coefficients * coefficients;
+        let down: f64 = (0..height).flat_map(|y| self.down.coefficients(y)).map(square).sum();
+        let along: f64 = self.across.iter().flatten().copied().map(square).sum();
+        down / height as f64 * along / width as f64
     }
 }
 

@@ -34,6 +34,8 @@ pub struct Request {
     pub white: White,
     /// Its luminance.
     pub white_luminance: Option<f64>,
+    /// Dark frames to subtract.
+    pub dark_frames: u32,
     /// Equations.
     pub equations: Equations,
     /// Patch.
@@ -199,6 +201,7 @@ impl Request {
             method: self.method,
             pattern: self.pattern,
             color,
+            dark_frames: self.dark_frames,
             equations: self.equations,
             patch: self.patch,
             patch_at: self.patch_at,

@@ -9,11 +9,12 @@ use super::{Equations, FramePrediction, Mixture, Prediction, from_sites, mixture
 use crate::adc::{AdcSettings, Digitize};
 use crate::cfa::CfaPattern;
 use crate::color::{ColorSettings, Space, ToXyz};
+use crate::correct::{CorrectFrame, CorrectionSettings};
 use crate::demosaic::weights::PHASES;
 use crate::demosaic::{Black, Demosaic, Method};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
-use crate::metadata::{FrameHeader, Metadata, Scene};
+use crate::metadata::{CorrectionRecord, FrameHeader, Metadata, Scene};
 use crate::mosaic::Mosaic;
 use crate::noise::{AddNoise, NoiseSettings};
 use crate::numerics::normal;
@@ -39,6 +40,8 @@ pub struct ChainSettings {
     pub pattern: Option<CfaPattern>,
     /// Matrix and white; XYZ and L*a*b* are predicted where there is one.
     pub color: Option<ColorSettings>,
+    /// Dark frames whose mean is subtracted; none where the black level is subtracted as a constant.
+    pub dark_frames: u32,
     /// Equations to predict by.
     pub equations: Equations,
     /// Patch whose mean is predicted, columns and rows.
@@ -86,7 +89,7 @@ pub struct ChainPrediction {
 /// Moments of one stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StagePrediction {
-    /// `electrons`, `adu`, `demosaicked`, `xyz` or `lab`.
+    /// `electrons`, `adu`, `dark_subtracted` (where dark frames are), `demosaicked`, `xyz` or `lab`.
     pub stage: &'static str,
     /// Unit of the samples.
     pub unit: String,
@@ -165,6 +168,9 @@ pub struct NoiseDeltaE {
     pub pixels_needed: Option<u64>,
 }
 
+/// What photosites are: their quantity, and how they were corrected.
+type Plane = (QuantityKind, Option<CorrectionRecord>);
+
 /// Moments and budgets of the photosites of R, G and B.
 struct Sites {
     moments: [Prediction; 3],
@@ -175,10 +181,12 @@ impl Sites {
     fn of(head: &FrameHeader, electrons: [f64; 3], equations: Equations) -> Option<Self> {
         let model = super::model(head)?;
         let adc = if of_plane(head) == QuantityKind::Electrons { None } else { head.metadata.adc.as_ref() };
-        Some(Self {
-            moments: super::sites(head, of_plane(head), equations)?,
-            causes: electrons.map(|e| classes::budget(&model, adc, e, equations)),
-        })
+        let dark_frames = head.metadata.correction.map_or(0, |correction| correction.dark_frames);
+        let causes = electrons.map(|e| match adc {
+            Some(adc) if dark_frames > 0 => classes::budget_less_dark(&model, adc, e, dark_frames, equations),
+            _ => classes::budget(&model, adc, e, equations),
+        });
+        Some(Self { moments: super::sites(head, of_plane(head), equations)?, causes })
     }
 }
 
@@ -216,9 +224,18 @@ impl Chain {
         let expected = FrameHeader { name: "the prediction".into(), geometry, metadata };
         let electrons = AddNoise::new(&expected, &settings.noise)?.header().clone();
         let adu = Digitize::new(&electrons, &AdcSettings::default())?.header().clone();
-        let plane = Mosaic::new(&adu, settings.pattern)?.header().clone();
+        let mut heads = vec![("electrons", electrons), ("adu", adu.clone())];
+        let codes = if settings.dark_frames > 0 {
+            let darks = vec![&adu; settings.dark_frames as usize];
+            let nothing_else = CorrectionSettings { black: Black::None, cte: None };
+            let corrected = CorrectFrame::new(&adu, &nothing_else, &darks)?.header().clone();
+            heads.push(("dark_subtracted", corrected.clone()));
+            corrected
+        } else {
+            adu
+        };
+        let plane = Mosaic::new(&codes, settings.pattern)?.header().clone();
         let camera = Demosaic::new(&plane, settings.method, Black::Auto, None)?.header().clone();
-        let mut heads = vec![("electrons", electrons), ("adu", adu)];
         if let Some(color) = &settings.color {
             let made = |space| ToXyz::new(&camera, &ColorSettings { space, ..color.clone() });
             let (xyz, lab) = (made(Space::Xyz)?.header().clone(), made(Space::Lab)?.header().clone());
@@ -248,15 +265,15 @@ impl Chain {
         let mut stages = Vec::new();
         let mut noise_delta_e = None;
         let mut first_order = None;
-        // Photosites are the same from the converter on.
-        let mut known: Option<(QuantityKind, Sites)> = None;
+        // Photosites are the same from the converter, or the subtraction of dark frames, on.
+        let mut known: Option<(Plane, Sites)> = None;
         for (stage, head) in &mut self.heads {
             if let Some(scene) = &mut head.metadata.scene {
                 scene.expected_electrons = Some(electrons);
             }
             let none = || Error::Data(format!("nothing can be predicted of {stage} at {electrons:?} electrons"));
-            let quantity = of_plane(head);
-            let sites = match known.take().filter(|(of, _)| *of == quantity) {
+            let plane = (of_plane(head), head.metadata.correction);
+            let sites = match known.take().filter(|(of, _)| *of == plane) {
                 Some((_, sites)) => sites,
                 None => Sites::of(head, electrons, self.settings.equations).ok_or_else(none)?,
             };
@@ -273,7 +290,7 @@ impl Chain {
                 _ => {}
             }
             stages.push(self.settings.stage(stage, head, &prediction, &sites.causes));
-            known = Some((quantity, sites));
+            known = Some((plane, sites));
         }
         Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order })
     }

@@ -175,6 +175,45 @@ impl Cause {
     }
 }
 
+/// The moments of one class after the mean of `frames` dark frames of the same sensor was subtracted.
+///
+/// Var(y − d̄) = \[Var y − v] + \[Var d − v]/n,  v = K² λ² c₂
+///
+/// since light and dark frames share the pattern of the dark current, whose variance is v; everything else is drawn
+/// anew. Rounding errors count as independent, which they are when noise covers a code.
+pub fn less_dark(
+    model: &NoiseModel,
+    adc: &AdcRecord,
+    expected_e: f64,
+    frames: u32,
+    equations: Equations,
+) -> Prediction {
+    let (light, dark) = (adu(model, adc, expected_e, equations), adu(model, adc, 0.0, equations));
+    let shared = budget(model, Some(adc), 0.0, equations)[Cause::Dcnu as usize];
+    let n = f64::from(frames);
+    let variance = light.moments.variance - shared + (dark.moments.variance - shared) / n;
+    let fourth = |prediction: Prediction| prediction.excess_kurtosis * prediction.moments.variance.powi(2);
+    let excess_kurtosis =
+        if variance > 0.0 { (fourth(light) + fourth(dark) / n.powi(3)) / variance.powi(2) } else { 0.0 };
+    Prediction { moments: MeanVariance { mean: light.moments.mean - dark.moments.mean, variance }, excess_kurtosis }
+}
+
+/// The variance of one class in ADU² by cause, after the mean of `frames` dark frames was subtracted.
+pub fn budget_less_dark(
+    model: &NoiseModel,
+    adc: &AdcRecord,
+    expected_e: f64,
+    frames: u32,
+    equations: Equations,
+) -> Budget {
+    let light = budget(model, Some(adc), expected_e, equations);
+    let dark = budget(model, Some(adc), 0.0, equations);
+    Cause::ALL.map(|cause| match cause {
+        Cause::Dcnu => 0.0,
+        _ => light[cause as usize] + dark[cause as usize] / f64::from(frames),
+    })
+}
+
 /// Variances by cause, in the order of [`Cause::ALL`]; they add up to the whole variance.
 pub type Budget = [f64; Cause::ALL.len()];
 

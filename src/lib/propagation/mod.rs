@@ -19,6 +19,7 @@ use crate::demosaic::weights::{WeightTable, Weights};
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind, PredictedRecord};
 use crate::noise::NoiseModel;
 use crate::numerics::normal::MeanVariance;
+use crate::transfer::{Transfer, uniform_share};
 use crate::units::QuantityKind;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -185,22 +186,69 @@ fn from_sites(frame: &FrameHeader, sites: [Prediction; 3], equations: Equations)
 fn sites(frame: &FrameHeader, quantity: QuantityKind, equations: Equations) -> Option<[Prediction; 3]> {
     let metadata = &frame.metadata;
     let expected = metadata.scene.as_ref().filter(|scene| scene.uniform)?.expected_electrons?;
-    // Transfer ties photosites to each other and to their place; so does its undoing, and a frame of darks.
-    if metadata.correction.is_some() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
-        return None;
-    }
     let model = model(frame)?;
     match quantity {
         QuantityKind::ExpectedElectrons => Some(
             expected.map(|mean| Prediction { moments: MeanVariance { mean, variance: 0.0 }, excess_kurtosis: 0.0 }),
         ),
-        QuantityKind::Electrons => Some(expected.map(|mean| electrons(&model, mean, equations))),
+        QuantityKind::Electrons => {
+            let classes = expected.map(|mean| electrons(&model, mean, equations));
+            transferred(frame, &model, classes, 1.0, 0.0)
+        }
         QuantityKind::Adu => {
             let adc = metadata.adc?;
-            Some(expected.map(|mean| adu(&model, &adc, mean, equations)))
+            let codes = expected.map(|mean| adu(&model, &adc, mean, equations));
+            let Some(correction) = &metadata.correction else {
+                let below_bias = codes.map(|code| Prediction {
+                    moments: MeanVariance { mean: code.moments.mean - adc.bias_adu, ..code.moments },
+                    ..code
+                });
+                return Some(transferred(frame, &model, below_bias, adc.adu_per_e, 1.0 / 12.0)?.map(|code| {
+                    Prediction {
+                        moments: MeanVariance { mean: code.moments.mean + adc.bias_adu, ..code.moments },
+                        ..code
+                    }
+                }));
+            };
+            // What charge transfer and its undoing do to each photosite's noise differs from place to place.
+            if correction.cte.is_some() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+                return None;
+            }
+            Some(match correction.dark_frames {
+                0 => codes.map(|code| Prediction {
+                    moments: MeanVariance { mean: code.moments.mean - correction.black_adu, ..code.moments },
+                    ..code
+                }),
+                frames => expected.map(|mean| classes::less_dark(&model, &adc, mean, frames, equations)),
+            })
         }
         _ => None,
     }
+}
+
+/// What charge transfer leaves of photosites whose mean is in proportion to charge, `slope` units to an electron: the same
+/// share of the mean everywhere, and of the variance, apart from read noise and from that of `rounding`, what it leaves on
+/// average over the frame. None after demosaicking, and where classes of unequal signals share charge.
+fn transferred(
+    frame: &FrameHeader,
+    model: &NoiseModel,
+    classes: [Prediction; 3],
+    slope: f64,
+    rounding: f64,
+) -> Option<[Prediction; 3]> {
+    let Some(cte) = frame.metadata.noise.as_ref().and_then(|noise| noise.cte) else { return Some(classes) };
+    // Behind a filter array charge moves between classes: where they differ, so do means from place to place.
+    let is_level = classes.iter().all(|class| class.moments.mean == classes[0].moments.mean);
+    if frame.metadata.demosaic.is_some() || (frame.metadata.cfa.is_some() && !is_level) {
+        return None;
+    }
+    let of_variance = Transfer::new(cte, &frame.geometry).ok()?.mean_square_share();
+    let after = model.read_noise_e.powi(2) * slope * slope + rounding;
+    Some(classes.map(|class| {
+        let mean = class.moments.mean * uniform_share(cte);
+        let variance = (class.moments.variance - after).max(0.0) * of_variance + after.min(class.moments.variance);
+        Prediction { moments: MeanVariance { mean, variance }, ..class }
+    }))
 }
 
 /// Third cumulant of the green photosites that a frame was made of, before anything clips or rounds.

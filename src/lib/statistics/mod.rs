@@ -223,6 +223,12 @@ pub fn measure(
         first += rows;
     }
     let prediction = propagation::of_frame(&frame, equations);
+    if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+        return Err(Error::Data(format!(
+            "{}: nothing can be checked: charge transfer mixes neighbours, differently from place to place",
+            frame.name
+        )));
+    }
     let mut samplings = Samplings::default();
     let regions = regions
         .iter()
