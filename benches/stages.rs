@@ -81,7 +81,7 @@ fn stages(criterion: &mut Criterion) {
     group.bench_function("measure", |bencher| {
         bencher.iter(|| {
             let mut source = MemoryFrame::new(rgb.header.clone(), rgb.samples.clone());
-            measure(&mut source, &[], Equations::Exact)
+            measure(&mut source, &[], Equations::Exact, None)
         });
     });
     group.finish();

@@ -6,14 +6,16 @@ use cyanometer::error::Result;
 use cyanometer::formats::{input::FrameReader, input::InputOptions, output};
 use cyanometer::propagation::Equations;
 use cyanometer::report::{self, ReportFormat};
+use cyanometer::stage::RowSource;
 use cyanometer::statistics::{Region, measure};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Measure mean, spread and covariance of a frame, beside what the formulas predict
 ///
-/// Predictions are made for uniform scenes, of electrons and of ADU, before demosaicking. Planes behind a colour filter
-/// array are also measured class by class.
+/// Predictions are made for uniform scenes, from electrons to XYZ, xyY and L*a*b*. Planes behind a colour filter array
+/// are also measured class by class. With --check, means are tested by z, variances by chi-square with the effective
+/// degrees of freedom of correlated pixels, correlations by Fisher's z.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -28,6 +30,12 @@ struct Arguments {
     /// Equations to predict by: exact, or those of the paper
     #[arg(long, default_value = "exact", value_parser = options::choice(&[("exact", Equations::Exact), ("paper", Equations::Paper)]))]
     equations: Equations,
+    /// Test every prediction, and exit with status 1 when one does not hold
+    #[arg(long)]
+    check: bool,
+    /// Chance of a false alarm that --check accepts, all tests together
+    #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = options::fraction, allow_negative_numbers = true)]
+    level: f64,
     /// File for the report; by default standard output
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -43,7 +51,8 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let options = InputOptions { all_channels: true, ..arguments.input.options() };
     let mut reader = FrameReader::open(&options)?;
     session.report_reader(&reader);
-    let report = measure(&mut reader, &arguments.region, arguments.equations)?;
+    let level = arguments.check.then_some(arguments.level);
+    let report = measure(&mut reader, &arguments.region, arguments.equations, level)?;
     output::write_text(
         arguments.output.as_deref(),
         &report::render(&report, arguments.output_format)?,
@@ -56,5 +65,5 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     if not_finite > 0 {
         session.warn(&format!("{not_finite} pixels are NaN or infinite; they are left out of the statistics"));
     }
-    Ok(())
+    report.check.map_or(Ok(()), |verdict| verdict.judge(&reader.header().name))
 }

@@ -95,6 +95,9 @@ struct Arguments {
     /// Form of the report; by default text, and csv for a sweep
     #[arg(long, value_parser = options::choice(&[("text", ReportFormat::Text), ("json", ReportFormat::Json), ("yaml", ReportFormat::Yaml), ("csv", ReportFormat::Csv)]))]
     output_format: Option<ReportFormat>,
+    /// Draw the photon transfer curve, with its read, shot and fixed-pattern regimes, as SVG or PNG
+    #[arg(long, value_name = "FILE.svg|png")]
+    plot: Option<PathBuf>,
     /// File for the report; by default standard output
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -133,6 +136,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         patch_at: a.patch_at,
         wanted: a.uncertainty,
         sweep: a.sweep,
+        plot: a.plot.clone(),
     };
     request.predict(session, a.output_format, a.output.as_deref())
 }

@@ -2,7 +2,7 @@
 
 use super::Session;
 use super::rendering;
-use crate::cfa::CfaPattern;
+use crate::cfa::{CfaPattern, Class};
 use crate::color::{ColorSettings, Space, White};
 use crate::demosaic::Method;
 use crate::error::{Error, Result};
@@ -11,6 +11,7 @@ use crate::formats::{data, output};
 use crate::noise::NoiseSettings;
 use crate::propagation::Equations;
 use crate::propagation::chain::{Chain, ChainPrediction, ChainSettings, Uncertainty};
+use crate::report::plot::{Plot, PlotFormat};
 use crate::report::{self, ReportFormat};
 use crate::sensor::Sensor;
 use serde::Serialize;
@@ -43,6 +44,8 @@ pub struct Request {
     pub wanted: Option<Uncertainty>,
     /// Levels to go through.
     pub sweep: Option<Sweep>,
+    /// File for the photon transfer curve.
+    pub plot: Option<PathBuf>,
 }
 
 /// Levels of the brightest class, in electrons.
@@ -131,8 +134,10 @@ impl Request {
         format: Option<ReportFormat>,
         path: Option<&std::path::Path>,
     ) -> Result<()> {
-        let (chain, about, electrons) = self.chain(session)?;
-        let mut chain = chain;
+        if let Some(plot) = &self.plot {
+            PlotFormat::of_path(plot)?;
+        }
+        let (mut chain, about, electrons) = self.chain(session)?;
         let input = self.scene.input.as_deref().and_then(regular_file);
         let text = match self.sweep {
             Some(sweep) => {
@@ -146,7 +151,22 @@ impl Request {
                 report::prediction(&about, &found, format.unwrap_or(ReportFormat::Text))?
             }
         };
+        if let Some(plot) = &self.plot {
+            self.curve(&mut chain, electrons)?.write(plot, input.as_ref())?;
+        }
         output::write_text(path, &text, input.as_ref())
+    }
+
+    /// The photon transfer curve of the brightest class, over the levels of the sweep, or up to full well.
+    fn curve(&self, chain: &mut Chain, electrons: [f64; 3]) -> Result<Plot> {
+        let sensor = chain.sensor();
+        let (full_well_e, name) = (sensor.full_well_e, sensor.name.clone());
+        let all = Sweep { start_e: 1.0, end_e: full_well_e, count: 200, is_logarithmic: true };
+        let electrons = if electrons == [0.0; 3] { [1.0; 3] } else { electrons };
+        let levels = sweep_levels(chain, self.sweep.unwrap_or(all), electrons)?;
+        let brightest = (0..3).max_by(|&a, &b| electrons[a].total_cmp(&electrons[b])).unwrap_or_default();
+        let title = format!("Photon transfer of {name}, class {}", Class::ALL[brightest].letter());
+        Ok(report::photon_transfer(&levels, brightest, full_well_e, &title))
     }
 
     fn chain(&self, session: &Session) -> Result<(Chain, About, [f64; 3])> {

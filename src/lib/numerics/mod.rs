@@ -4,3 +4,4 @@ pub mod least_squares;
 pub mod moments;
 pub mod normal;
 pub mod quadrature;
+pub mod significance;

@@ -229,6 +229,11 @@ impl Chain {
         Ok(Self { settings, heads })
     }
 
+    /// The sensor.
+    pub fn sensor(&self) -> &Sensor {
+        &self.settings.sensor
+    }
+
     /// The heads of the frames of each stage.
     pub fn heads(&self) -> impl Iterator<Item = (&'static str, &FrameHeader)> {
         self.heads.iter().map(|(stage, head)| (*stage, head))

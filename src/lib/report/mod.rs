@@ -2,12 +2,15 @@
 
 pub mod plot;
 
+mod photon_transfer;
 mod prediction;
 
+pub use photon_transfer::photon_transfer;
 pub use prediction::{prediction, sweep};
 
 use crate::color::characterization::CameraMatrix;
 use crate::error::{Error, Result};
+use crate::statistics::check::{Subject, Test};
 use crate::statistics::{ChannelReport, RegionReport, Report};
 use std::fmt::Write;
 
@@ -94,6 +97,15 @@ fn text(report: &Report) -> String {
     let mut out = String::new();
     for region in &report.regions {
         region_text(region, &mut out);
+        tests_text(region, &mut out);
+    }
+    if let Some(verdict) = report.check {
+        let outcome = if verdict.passed { "as predicted" } else { "not as predicted" };
+        let _ = writeln!(
+            out,
+            "{outcome}: {} tests, smallest p {:.3e}, corrected {:.3e}, level {:e}",
+            verdict.tests, verdict.smallest_p, verdict.corrected_p, verdict.level
+        );
     }
     out
 }
@@ -151,6 +163,31 @@ fn region_text(region: &RegionReport, out: &mut String) {
         }
         table(&columns, out);
     }
+}
+
+fn tests_text(region: &RegionReport, out: &mut String) {
+    if region.tests.is_empty() {
+        return;
+    }
+    let column = |heading: &str, cell: &dyn Fn(&Test) -> String| -> Vec<String> {
+        std::iter::once(heading.to_owned()).chain(region.tests.iter().map(cell)).collect()
+    };
+    let subject = |test: &Test| match test.subject {
+        Subject::Mean => "mean".to_owned(),
+        Subject::Variance => "variance".to_owned(),
+        Subject::Correlation => "correlation".to_owned(),
+        Subject::Deviation => "deviation".to_owned(),
+    };
+    let columns = [
+        column("test", &subject),
+        column("of", &|test| test.channels.join(", ")),
+        column("measured", &|test| shown("", Some(test.measured))),
+        column("expected", &|test| shown("", Some(test.expected))),
+        column("z", &|test| shown("z_mean", test.z)),
+        column("freedom", &|test| shown("", test.degrees_of_freedom)),
+        column("p", &|test| format!("{:.3e}", test.p)),
+    ];
+    table(&columns, out);
 }
 
 /// Writes columns of equal length, numbers flush right.

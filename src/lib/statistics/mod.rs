@@ -1,12 +1,17 @@
 //! Statistics of frames and regions, beside what propagation predicts.
 
+pub mod check;
+
 use crate::cfa::Class;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
-use crate::propagation::{self, Equations, FramePrediction, Prediction};
+use crate::propagation::sampling::{Place, Sampling};
+use crate::propagation::{self, Equations, FramePrediction, Mixture, Prediction, mixture};
 use crate::stage::RowSource;
 use crate::units::QuantityKind;
+use check::{Expected, Measured, Test, Verdict};
+use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -49,6 +54,9 @@ impl Region {
 pub struct Report {
     /// One entry per region; the whole frame where none was named.
     pub regions: Vec<RegionReport>,
+    /// Whether all predictions hold, where that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub check: Option<Verdict>,
 }
 
 /// What is said of a region.
@@ -75,6 +83,9 @@ pub struct RegionReport {
     pub predicted_covariance: Option<Vec<Vec<f64>>>,
     /// Predicted standard deviation of the mean of the region in each channel.
     pub patch_mean_std: Option<Vec<f64>>,
+    /// Tests of the predictions, where they were asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tests: Vec<Test>,
 }
 
 /// Statistics of one channel, or of one class of a CFA plane.
@@ -100,9 +111,10 @@ pub struct ChannelReport {
     pub predicted_mean: Option<f64>,
     /// Standard deviation by formula.
     pub predicted_std: Option<f64>,
-    /// (mean − predicted) / (predicted_std / √n).
+    /// (mean − predicted) over its sampling error, which knows that demosaicked neighbours are correlated.
     pub z_mean: Option<f64>,
-    /// (std / predicted − 1) over its sampling error √((2 + κ n⁄(n−1)) / 4n), κ the excess kurtosis.
+    /// (std / expected − 1) over its sampling error, that of independent samples √((2 + κ n⁄(n−1)) / 4n), κ the excess
+    /// kurtosis.
     pub z_std: Option<f64>,
 }
 
@@ -157,12 +169,19 @@ impl Rails {
 
 /// Reads a whole frame and works out the statistics of its regions.
 ///
-/// Rows are summed one by one and merged in order, so the result is the same at any number of threads.
+/// Rows are summed one by one and merged in order, so the result is the same at any number of threads. With a `level`,
+/// every prediction is tested.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for a region outside the frame, and those of the source.
-pub fn measure(source: &mut dyn RowSource, regions: &[Region], equations: Equations) -> Result<Report> {
+/// [`Error::Usage`] for a region outside the frame, [`Error::Data`] where a test is wanted and nothing can be predicted,
+/// and those of the source.
+pub fn measure(
+    source: &mut dyn RowSource,
+    regions: &[Region],
+    equations: Equations,
+    level: Option<f64>,
+) -> Result<Report> {
     let frame = source.header().clone();
     let geometry = &frame.geometry;
     let whole = [Region { x: 0, y: 0, width: geometry.width, height: geometry.height }];
@@ -203,12 +222,47 @@ pub fn measure(source: &mut dyn RowSource, regions: &[Region], equations: Equati
         }
         first += rows;
     }
-    let predictions = match propagation::of_frame(&frame, equations) {
-        Some(FramePrediction::Planes(classes)) => Some(classes),
-        _ => None,
-    };
-    let report = |(region, tally): (&Region, &Tally)| tally.report(&frame, *region, rails, predictions.as_ref());
-    Ok(Report { regions: regions.iter().zip(&tallies).map(report).collect() })
+    let prediction = propagation::of_frame(&frame, equations);
+    let mut samplings = Samplings::default();
+    let regions = regions
+        .iter()
+        .zip(&tallies)
+        .map(|(region, tally)| {
+            tally.report(&frame, *region, rails, prediction.as_ref(), &mut samplings, level.is_some())
+        })
+        .collect();
+    let mut report = Report { regions, check: None };
+    if let Some(level) = level {
+        report.check = Some(Verdict::of(&report, level, &frame.name)?);
+    }
+    Ok(report)
+}
+
+/// Sampling laws by place: regions of one size and phase share one.
+#[derive(Default)]
+struct Samplings(Vec<(Place, Sampling)>);
+
+impl Samplings {
+    /// The law of a region of a frame of mixed pixels.
+    fn of(&mut self, mixture: &Mixture, frame: &FrameHeader, region: Region) -> Sampling {
+        let geometry = &frame.geometry;
+        let place = Place {
+            frame: [geometry.width, geometry.height],
+            origin: geometry.origin,
+            corner: [region.x, region.y],
+            size: [region.width, region.height],
+        }
+        .canonical();
+        if let Some((_, known)) = self.0.iter().find(|(of, _)| *of == place) {
+            return known.clone();
+        }
+        let mut made = Sampling::of(&mixture.weights, &mixture.sites, &place);
+        // What is predicted beyond the weights: the second order of smooth hue transition, or the paper's equations.
+        let variances = mixture.sites.map(|site| site.moments.variance);
+        made.covariance += mixture.covariance - mixture::mean_pixel(&mixture.weights).covariance(variances);
+        self.0.push((place, made.clone()));
+        made
+    }
 }
 
 impl Tally {
@@ -248,7 +302,9 @@ impl Tally {
         frame: &FrameHeader,
         region: Region,
         rails: Rails,
-        predictions: Option<&[Prediction; 3]>,
+        prediction: Option<&FramePrediction>,
+        samplings: &mut Samplings,
+        with_tests: bool,
     ) -> RegionReport {
         let metadata = &frame.metadata;
         let black = match metadata.quantity {
@@ -257,16 +313,38 @@ impl Tally {
             _ => 0.0,
         };
         let channels = self.channels.channels();
+        let count = self.channels.count;
         let has_rails = !matches!(rails, Rails::None);
+        let whole = (channels == 3 && count > 0).then_some(prediction).flatten().map(|prediction| match prediction {
+            FramePrediction::Planes(classes) => {
+                let mean = classes.map(|class| class.moments.mean);
+                let sampling = Sampling::independent(classes, count as f64);
+                let covariance = sampling.covariance;
+                Whole { mean, covariance, sites: classes.map(|c| c.moments.variance), sampling, is_plane: true }
+            }
+            FramePrediction::Mixed(mixture) => Whole {
+                mean: mixture.mean,
+                covariance: mixture.covariance,
+                sites: mixture.sites.map(|site| site.moments.variance),
+                sampling: samplings.of(mixture, frame, region),
+                is_plane: false,
+            },
+        });
+        let planes = match prediction {
+            Some(FramePrediction::Planes(classes)) if channels == 1 => Some(classes),
+            _ => None,
+        };
         let channel_report = |index: usize| {
             let name = frame.channel_name(index).to_owned();
-            let prediction = match (channels, predictions) {
-                (3, Some(predictions)) => Some(predictions[index]),
-                (1, Some(predictions)) => self.mixture(predictions),
+            let expectation = match (&whole, planes) {
+                (Some(whole), _) => Some(whole.expectation(index)),
+                (None, Some(classes)) if metadata.cfa.is_some() => {
+                    self.mixture(classes).map(|prediction| Expectation::of(&prediction, count))
+                }
                 _ => None,
             };
             let clipped = has_rails.then_some(self.clipped[index]);
-            ChannelReport::new(name, &self.channels, index, black, clipped, prediction)
+            ChannelReport::new(name, &self.channels, index, black, clipped, expectation)
         };
         let reports: Vec<ChannelReport> = (0..channels).map(channel_report).collect();
         let classes = match metadata.cfa {
@@ -275,19 +353,40 @@ impl Tally {
                 .map(|class| {
                     let index = class as usize;
                     let clipped = has_rails.then_some(self.clipped_classes[index]);
-                    let prediction = predictions.map(|predictions| predictions[index]);
-                    ChannelReport::new(class.letter().into(), &self.classes[index], 0, black, clipped, prediction)
+                    let moments = &self.classes[index];
+                    let expectation = planes.map(|classes| Expectation::of(&classes[index], moments.count));
+                    ChannelReport::new(class.letter().into(), moments, 0, black, clipped, expectation)
                 })
                 .collect(),
             _ => Vec::new(),
         };
-        let count = self.channels.count;
-        let predicted: Option<Vec<f64>> = reports.iter().map(|report| report.predicted_std).collect();
-        let diagonal = |stds: &[f64]| -> Vec<Vec<f64>> {
-            // Photosites of different classes are drawn apart, so nothing is correlated before demosaicking.
-            (0..channels).map(|i| (0..channels).map(|j| if i == j { stds[i].powi(2) } else { 0.0 }).collect()).collect()
-        };
         let covariance_row = |i| (0..channels).map(|j| self.channels.covariance(i, j)).collect::<Option<Vec<f64>>>();
+        let covariance: Option<Vec<Vec<f64>>> = (0..channels).map(covariance_row).collect();
+        let predicted_covariance = match &whole {
+            Some(whole) => Some((0..3).map(|i| (0..3).map(|j| whole.covariance[(i, j)]).collect()).collect()),
+            None => {
+                reports.first().and_then(|y| y.predicted_std).filter(|_| channels == 1).map(|std| vec![vec![std * std]])
+            }
+        };
+        let patch_mean_std = match &whole {
+            Some(whole) => Some((0..3).map(|i| whole.sampling.mean_covariance[(i, i)].sqrt()).collect()),
+            None => reports
+                .first()
+                .and_then(|y| y.predicted_std)
+                .filter(|_| channels == 1 && count > 0)
+                .map(|std| vec![std / (count as f64).sqrt()]),
+        };
+        let tests = match (&whole, planes) {
+            _ if !with_tests => Vec::new(),
+            (Some(whole), _) => {
+                let names: Vec<String> = reports.iter().map(|channel| channel.name.clone()).collect();
+                let mean = [0, 1, 2].map(|i| self.channels.mean[i]);
+                let covariance = covariance.as_ref().map_or_else(Matrix3::zeros, |c| Matrix3::from_fn(|i, j| c[i][j]));
+                whole.tests(&Measured { names: &names, mean, covariance })
+            }
+            (None, Some(classes)) if metadata.cfa.is_some() => self.class_tests(classes),
+            _ => Vec::new(),
+        };
         RegionReport {
             region,
             count,
@@ -296,12 +395,31 @@ impl Tally {
             unit: metadata.unit.clone(),
             channels: reports,
             classes,
-            covariance: (0..channels).map(covariance_row).collect(),
-            predicted_covariance: predicted.as_deref().map(diagonal),
-            patch_mean_std: predicted
-                .filter(|_| count > 0)
-                .map(|stds| stds.iter().map(|std| std / (count as f64).sqrt()).collect()),
+            covariance,
+            predicted_covariance,
+            patch_mean_std,
+            tests,
         }
+    }
+
+    /// Tests of the classes of a CFA plane, each by itself.
+    fn class_tests(&self, classes: &[Prediction; 3]) -> Vec<Test> {
+        let seen = Class::ALL.into_iter().filter(|class| self.classes[*class as usize].count > 0);
+        seen.flat_map(|class| {
+            let (moments, prediction) = (&self.classes[class as usize], classes[class as usize]);
+            let sampling = Sampling::independent(&[prediction; 3], moments.count as f64);
+            let whole = Whole {
+                mean: [prediction.moments.mean; 3],
+                covariance: sampling.covariance,
+                sites: [prediction.moments.variance; 3],
+                sampling,
+                is_plane: true,
+            };
+            let names = [class.letter().to_owned()];
+            let covariance = Matrix3::from_element(moments.covariance(0, 0).unwrap_or(0.0));
+            whole.tests(&Measured { names: &names, mean: [moments.mean[0]; 3], covariance })
+        })
+        .collect()
     }
 
     /// The prediction for a plane in which the classes are mixed as the region has them.
@@ -326,6 +444,62 @@ impl Tally {
     }
 }
 
+/// What is expected of three channels together.
+struct Whole {
+    mean: [f64; 3],
+    /// Over all pixels of a large frame.
+    covariance: Matrix3<f64>,
+    /// Variances of the photosites.
+    sites: [f64; 3],
+    sampling: Sampling,
+    is_plane: bool,
+}
+
+impl Whole {
+    fn expectation(&self, i: usize) -> Expectation {
+        let index = check::pair([i, i]);
+        let expected = self.sampling.covariance[(i, i)];
+        Expectation {
+            mean: self.mean[i],
+            std: self.covariance[(i, i)].max(0.0).sqrt(),
+            mean_error: self.sampling.mean_covariance[(i, i)].sqrt(),
+            sample_std: expected.max(0.0).sqrt(),
+            std_error: self.sampling.spread[index][index].sqrt() / (2.0 * expected),
+        }
+    }
+
+    fn tests(&self, measured: &Measured<'_>) -> Vec<Test> {
+        let expected =
+            Expected { mean: self.mean, site_variances: self.sites, sampling: &self.sampling, is_plane: self.is_plane };
+        check::tests(measured, &expected)
+    }
+}
+
+/// What is expected of one channel of a sample.
+#[derive(Debug, Clone, Copy)]
+struct Expectation {
+    mean: f64,
+    /// Of the population.
+    std: f64,
+    /// Standard error of the sample mean.
+    mean_error: f64,
+    /// Root of the expected sample variance.
+    sample_std: f64,
+    /// Relative standard error of the sample standard deviation.
+    std_error: f64,
+}
+
+impl Expectation {
+    /// Of `count` independent samples.
+    fn of(prediction: &Prediction, count: u64) -> Self {
+        let n = count as f64;
+        let std = prediction.moments.std();
+        // Var(s²) = σ⁴ (2/(n−1) + κ/n); the standard deviation has a quarter of its relative variance.
+        let std_error = ((2.0 / (n - 1.0) + prediction.excess_kurtosis / n).max(0.0) / 4.0).sqrt();
+        Self { mean: prediction.moments.mean, std, mean_error: std / n.sqrt(), sample_std: std, std_error }
+    }
+}
+
 impl ChannelReport {
     fn new(
         name: String,
@@ -333,19 +507,17 @@ impl ChannelReport {
         index: usize,
         black: f64,
         clipped: Option<u64>,
-        prediction: Option<Prediction>,
+        expectation: Option<Expectation>,
     ) -> Self {
         let count = moments.count;
         let seen = |value: f64| (count > 0).then_some(value);
         let mean = seen(moments.mean[index]);
         let std = moments.std(index);
-        let n = count as f64;
         let ratio_db = |mean: f64, std: f64| {
             let ratio = (mean - black) / std;
             (ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
         };
-        let predicted = prediction.map(|p| (p.moments.mean, p.moments.std(), p.excess_kurtosis));
-        let spread = predicted.filter(|(_, std, _)| *std > 0.0);
+        let spread = expectation.filter(|expected| expected.std > 0.0);
         Self {
             name,
             count,
@@ -355,14 +527,10 @@ impl ChannelReport {
             max: seen(moments.max[index]),
             snr_db: mean.zip(std).and_then(|(mean, std)| ratio_db(mean, std)),
             clipped,
-            predicted_mean: predicted.map(|(mean, _, _)| mean),
-            predicted_std: predicted.map(|(_, std, _)| std),
-            z_mean: mean.zip(spread).map(|(mean, (m, s, _))| (mean - m) / (s / n.sqrt())),
-            z_std: std.zip(spread).map(|(std, (_, s, kurtosis))| {
-                // Var(s²) = σ⁴ (2/(n−1) + κ/n); the standard deviation has a quarter of its relative variance.
-                let sampling = ((2.0 / (n - 1.0) + kurtosis / n).max(0.0) / 4.0).sqrt();
-                (std / s - 1.0) / sampling
-            }),
+            predicted_mean: expectation.map(|expected| expected.mean),
+            predicted_std: expectation.map(|expected| expected.std),
+            z_mean: mean.zip(spread).map(|(mean, expected)| (mean - expected.mean) / expected.mean_error),
+            z_std: std.zip(spread).map(|(std, expected)| (std / expected.sample_std - 1.0) / expected.std_error),
         }
     }
 }
@@ -386,11 +554,11 @@ mod tests {
     fn regions_see_their_own_samples() {
         let mut ramp = frame(&["Y"], 10, 8, |i| i as f32);
         let region = Region { x: 2, y: 3, width: 3, height: 2 };
-        let report = measure(&mut ramp, &[region], Equations::Exact).unwrap();
+        let report = measure(&mut ramp, &[region], Equations::Exact, None).unwrap();
         let channel = &report.regions[0].channels[0];
         assert_eq!((channel.min, channel.max, channel.mean), (Some(32.0), Some(44.0), Some(38.0)));
         let outside = Region { x: 8, ..region };
-        let again = measure(&mut frame(&["Y"], 10, 8, |i| i as f32), &[outside], Equations::Exact);
+        let again = measure(&mut frame(&["Y"], 10, 8, |i| i as f32), &[outside], Equations::Exact, None);
         assert!(again.unwrap_err().to_string().contains("does not lie within"));
     }
 
@@ -399,14 +567,14 @@ mod tests {
         let mut plane = frame(&["Y"], 8, 6, |i| [10.0, 20.0, 20.0, 30.0][(i / 8 % 2) * 2 + i % 2]);
         plane.header.metadata.cfa = Some(CfaPattern::Rggb);
         let region = Region { x: 1, y: 1, width: 5, height: 4 };
-        let report = measure(&mut plane, &[region], Equations::Exact).unwrap();
+        let report = measure(&mut plane, &[region], Equations::Exact, None).unwrap();
         let means: Vec<_> = report.regions[0].classes.iter().map(|class| class.mean).collect();
         assert_eq!(means, [Some(10.0), Some(20.0), Some(30.0)]);
     }
 
     #[test]
     fn one_sample_has_a_mean_and_no_spread() {
-        let report = measure(&mut frame(&["Y"], 1, 1, |_| 7.0), &[], Equations::Exact).unwrap();
+        let report = measure(&mut frame(&["Y"], 1, 1, |_| 7.0), &[], Equations::Exact, None).unwrap();
         let channel = &report.regions[0].channels[0];
         assert_eq!((channel.mean, channel.std, channel.snr_db), (Some(7.0), None, None));
         assert_eq!(report.regions[0].covariance, None);

@@ -1,0 +1,437 @@
+//! How far sample means and covariances of a region scatter about what is predicted.
+//!
+//! Pixels are weighted sums of photosites, o_i(a) = Σ_s W_i,a(s) x_s, so neighbours are correlated: C_ij(a, b) =
+//! Σ_s W_i,a(s) W_j,b(s) σ_s². The sample mean of n pixels has the covariance Γ = (1/n²) Σ C(a, b). The sample covariance
+//! s_ij (divisor n − 1) is a quadratic form in the photosites, with P the projection that takes off the mean:
+//!
+//! - E s_ij = tr(P C_ij)/(n − 1)
+//! - cov(s_ij, s_kl) = \[tr(P C_ik P C_lj) + tr(P C_il P C_kj) + Σ_s κ₄(s) Q_ij(s) Q_kl(s)]/(n − 1)²
+//!
+//! where κ₄ is the fourth cumulant of a photosite and Q_ij(s) the diagonal of the form. Fixed patterns vary from site to
+//! site as temporal noise does, so within one frame they count alike.
+//!
+//! All these are sums over pixels of what lies around them. Once a region is wider than what its rim sees, they grow by
+//! the same amount with every two columns, so large regions follow exactly from small ones.
+
+use super::Prediction;
+use crate::cfa::Class;
+use crate::demosaic::weights::{Kernel, REACH, Weights, phase};
+use crate::frame::mirror;
+use nalgebra::Matrix3;
+
+/// The six covariances of three channels in the order of [`Sampling::spread`].
+pub const PAIRS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
+
+/// What sample means and covariances of a region are expected to be, and how they scatter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sampling {
+    /// Pixels.
+    pub count: f64,
+    /// Γ, covariance of the sample means.
+    pub mean_covariance: Matrix3<f64>,
+    /// Expected sample covariance.
+    pub covariance: Matrix3<f64>,
+    /// Covariances of the sample covariances, rows and columns as [`PAIRS`].
+    pub spread: [[f64; 6]; 6],
+}
+
+/// A rectangle of a frame: where it lies in the frame, and the frame on the sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// Columns and rows of the frame.
+    pub frame: [usize; 2],
+    /// Sensor column and row of the frame's first pixel.
+    pub origin: [i32; 2],
+    /// Column and row of the rectangle's first pixel in the frame.
+    pub corner: [usize; 2],
+    /// Columns and rows of the rectangle.
+    pub size: [usize; 2],
+}
+
+impl Place {
+    /// A place of the same law near the corner of a small frame: only phases, size and edges within reach matter.
+    #[must_use]
+    pub fn canonical(self) -> Self {
+        let mut place = self;
+        for axis in 0..2 {
+            let before = place.corner[axis];
+            let after = place.frame[axis] - place.size[axis] - before;
+            // Far edges come as near as they can without being felt, on the same phase.
+            let near = |distance: usize| if distance > FAR { FAR - (FAR + distance) % 2 } else { distance };
+            place.corner[axis] = near(before);
+            place.frame[axis] = near(before) + place.size[axis] + near(after);
+            place.origin[axis] &= 1;
+        }
+        place
+    }
+}
+
+/// From so many pixels on an edge is out of reach, whatever the phase.
+const FAR: usize = REACH.unsigned_abs() + 1;
+
+/// The smallest extent from which sums grow in proportion: two row sums of covariances reach 4 · [`REACH`] apart.
+const SMALL: usize = 4 * REACH.unsigned_abs() + 4;
+
+impl Sampling {
+    /// Of `count` pixels of three planes that are drawn apart.
+    pub fn independent(classes: &[Prediction; 3], count: f64) -> Self {
+        let variances = classes.map(|class| class.moments.variance);
+        let mut spread = [[0.0; 6]; 6];
+        for (index, [i, j]) in PAIRS.into_iter().enumerate() {
+            spread[index][index] = if i == j {
+                variances[i].powi(2) * (2.0 / (count - 1.0) + classes[i].excess_kurtosis / count).max(0.0)
+            } else {
+                variances[i] * variances[j] / (count - 1.0)
+            };
+        }
+        let covariance = Matrix3::from_diagonal(&variances.into());
+        Self { count, mean_covariance: covariance / count, covariance, spread }
+    }
+
+    /// Of a rectangle of demosaicked pixels with `weights` on photosites of such moments.
+    pub fn of(weights: &Weights, sites: &[Prediction; 3], place: &Place) -> Self {
+        let count = place.size[0] as f64 * place.size[1] as f64;
+        let [columns, rows] = place.size.map(steps);
+        let mut sums = Sums::zero();
+        for &(width, width_share) in &columns {
+            for &(height, height_share) in &rows {
+                let small = Place {
+                    frame: [place.frame[0] - place.size[0] + width, place.frame[1] - place.size[1] + height],
+                    size: [width, height],
+                    ..*place
+                };
+                sums.add(width_share * height_share, &Sums::of(weights, sites, &small));
+            }
+        }
+        sums.sampling(count)
+    }
+}
+
+/// The extents whose sums, in these shares, make up that of `extent`: itself, or two small ones of its parity.
+fn steps(extent: usize) -> Vec<(usize, f64)> {
+    let small = SMALL + (extent + SMALL) % 2;
+    if extent <= small + 2 {
+        return vec![(extent, 1.0)];
+    }
+    let further = (extent - small) as f64 / 2.0;
+    vec![(small, 1.0 - further), (small + 2, further)]
+}
+
+/// The kernel about a pixel of the frame, what lies beyond the edges folded back.
+fn folded(kernel: &Kernel, at: [usize; 2], frame: [usize; 2]) -> Kernel {
+    let back = |offset: isize, axis: usize| {
+        mirror(at[axis].cast_signed() + offset, frame[axis]).cast_signed() - at[axis].cast_signed()
+    };
+    kernel
+        .sites()
+        .fold(Kernel::zero(), |sum, ([x, y], weight)| sum.plus(weight, &Kernel::site([back(x, 0), back(y, 1)])))
+}
+
+/// Sums over the pixels of a rectangle, each of which is additive.
+struct Sums {
+    /// Σ_a C(a, a).
+    variance: Matrix3<f64>,
+    /// Σ_ab C(a, b).
+    total: Matrix3<f64>,
+    /// Σ_ab C_ik C_jl + C_il C_jk, by pairs ij and kl.
+    products: [[f64; 6]; 6],
+    /// The same of row sums R(a) = Σ_b C(a, b): ½ Σ_a over both orders.
+    row_products: [[f64; 6]; 6],
+    /// Σ_s κ₄ A_ij A_kl with A_ij(s) = Σ_a W_i W_j.
+    fourth: [[f64; 6]; 6],
+    /// Σ_s κ₄ (A_ij B_k B_l + B_i B_j A_kl) with B_i(s) = Σ_a W_i.
+    fourth_mixed: [[f64; 6]; 6],
+    /// Σ_s κ₄ B_i B_j B_k B_l.
+    fourth_means: [[f64; 6]; 6],
+}
+
+impl Sums {
+    fn zero() -> Self {
+        let none = [[0.0; 6]; 6];
+        Self {
+            variance: Matrix3::zeros(),
+            total: Matrix3::zeros(),
+            products: none,
+            row_products: none,
+            fourth: none,
+            fourth_mixed: none,
+            fourth_means: none,
+        }
+    }
+
+    fn add(&mut self, share: f64, other: &Self) {
+        self.variance += share * other.variance;
+        self.total += share * other.total;
+        let tables = [
+            (&mut self.products, &other.products),
+            (&mut self.row_products, &other.row_products),
+            (&mut self.fourth, &other.fourth),
+            (&mut self.fourth_mixed, &other.fourth_mixed),
+            (&mut self.fourth_means, &other.fourth_means),
+        ];
+        for (mine, theirs) in tables {
+            for (mine, theirs) in mine.iter_mut().flatten().zip(theirs.iter().flatten()) {
+                *mine += share * theirs;
+            }
+        }
+    }
+
+    /// Goes through all pairs of pixels within reach of each other.
+    fn of(weights: &Weights, sites: &[Prediction; 3], place: &Place) -> Self {
+        let [width, height] = place.size;
+        let variances = sites.map(|site| site.moments.variance);
+        let fourths = sites.map(|site| site.excess_kurtosis * site.moments.variance.powi(2));
+        let on_sensor = |at: [usize; 2]| [0, 1].map(|i| i64::from(place.origin[i]) + at[i] as i64);
+        let mut pixels = Vec::with_capacity(width * height);
+        for row in 0..height {
+            for column in 0..width {
+                let at = [place.corner[0] + column, place.corner[1] + row];
+                let [x, y] = on_sensor(at);
+                let phase = phase(x, y);
+                let kernels = [0, 1, 2].map(|channel| folded(weights.kernel(phase, channel), at, place.frame));
+                pixels.push(Pixel::new(&kernels, |offset| weights.class(phase, offset)));
+            }
+        }
+        let mut sums = Self::zero();
+        let far = 2 * REACH;
+        let mut row_sums = vec![Matrix3::zeros(); pixels.len()];
+        for (index, pixel) in pixels.iter().enumerate() {
+            let [x, y] = [(index % width).cast_signed(), (index / width).cast_signed()];
+            sums.variance += pixel.covariance(pixel, [0, 0], variances);
+            for other_y in (y - far).max(0)..(y + far + 1).min(height.cast_signed()) {
+                for other_x in (x - far).max(0)..(x + far + 1).min(width.cast_signed()) {
+                    let other = &pixels[(other_y * width.cast_signed() + other_x).cast_unsigned()];
+                    let covariance = pixel.covariance(other, [other_x - x, other_y - y], variances);
+                    row_sums[index] += covariance;
+                    add_products(&mut sums.products, |[i, j], [k, l]| {
+                        covariance[(i, k)] * covariance[(j, l)] + covariance[(i, l)] * covariance[(j, k)]
+                    });
+                }
+            }
+        }
+        for r in &row_sums {
+            sums.total += r;
+            // 1ᵀ(C_ik C_lj + C_lj C_ik)1 = Σ r_ki r_lj + r_jl r_ik, and the same with k and l exchanged.
+            add_products(&mut sums.row_products, |[i, j], [k, l]| {
+                r[(k, i)] * r[(l, j)] + r[(j, l)] * r[(i, k)] + r[(l, i)] * r[(k, j)] + r[(j, k)] * r[(i, l)]
+            });
+        }
+        sums.add_fourths(&pixels, place, weights, fourths);
+        sums
+    }
+
+    fn add_fourths(&mut self, pixels: &[Pixel], place: &Place, weights: &Weights, fourths: [f64; 3]) {
+        let [width, height] = place.size;
+        let margin = REACH.unsigned_abs();
+        let stride = width + 2 * margin;
+        let mut squares = vec![([0.0; 6], [0.0; 3]); stride * (height + 2 * margin)];
+        for (index, pixel) in pixels.iter().enumerate() {
+            for &([dx, dy], _, w) in &pixel.sites {
+                let x = (index % width + margin).wrapping_add_signed(dx);
+                let y = (index / width + margin).wrapping_add_signed(dy);
+                let (square, mean) = &mut squares[y * stride + x];
+                for (pair, [i, j]) in PAIRS.into_iter().enumerate() {
+                    square[pair] += w[i] * w[j];
+                }
+                for (mean, w) in mean.iter_mut().zip(w) {
+                    *mean += w;
+                }
+            }
+        }
+        let [x0, y0] = [0, 1].map(|i| i64::from(place.origin[i]) + place.corner[i] as i64 - margin as i64);
+        for (index, (square, mean)) in squares.iter().enumerate() {
+            let class = weights.pattern().class(x0 + (index % stride) as i64, y0 + (index / stride) as i64);
+            let fourth = fourths[class as usize];
+            let means = PAIRS.map(|[i, j]| mean[i] * mean[j]);
+            for a in 0..PAIRS.len() {
+                for b in 0..PAIRS.len() {
+                    self.fourth[a][b] += fourth * square[a] * square[b];
+                    self.fourth_mixed[a][b] += fourth * (square[a] * means[b] + means[a] * square[b]);
+                    self.fourth_means[a][b] += fourth * means[a] * means[b];
+                }
+            }
+        }
+    }
+
+    fn sampling(&self, count: f64) -> Sampling {
+        let free = (count - 1.0).max(f64::MIN_POSITIVE);
+        let total = |i: usize, j: usize| self.total[(i, j)];
+        let mut spread = [[0.0; 6]; 6];
+        for (a, [i, j]) in PAIRS.into_iter().enumerate() {
+            for (b, [k, l]) in PAIRS.into_iter().enumerate() {
+                // tr(PAPB) = tr AB − (1/n) 1ᵀ(AB + BA)1 + (1/n²) 1ᵀA1 1ᵀB1.
+                let means = total(i, k) * total(l, j) + total(i, l) * total(k, j);
+                let normal = self.products[a][b] - self.row_products[a][b] / count + means / (count * count);
+                let fourth =
+                    self.fourth[a][b] - self.fourth_mixed[a][b] / count + self.fourth_means[a][b] / (count * count);
+                spread[a][b] = (normal + fourth) / (free * free);
+            }
+        }
+        Sampling {
+            count,
+            mean_covariance: self.total / (count * count),
+            covariance: (self.variance - self.total / count) / free,
+            spread,
+        }
+    }
+}
+
+fn add_products(table: &mut [[f64; 6]; 6], product: impl Fn([usize; 2], [usize; 2]) -> f64) {
+    for (row, pair) in table.iter_mut().zip(PAIRS) {
+        for (entry, other) in row.iter_mut().zip(PAIRS) {
+            *entry += product(pair, other);
+        }
+    }
+}
+
+/// One pixel: the sites it is made of, with the weights of the three channels, and the same by offset.
+struct Pixel {
+    sites: Vec<([isize; 2], Class, [f64; 3])>,
+    kernels: [Kernel; 3],
+}
+
+impl Pixel {
+    fn new(kernels: &[Kernel; 3], class: impl Fn([isize; 2]) -> Class) -> Self {
+        let all = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| [x, y]));
+        let sites = all
+            .map(|offset| (offset, class(offset), kernels.each_ref().map(|kernel| kernel.at(offset))))
+            .filter(|(_, _, weights)| *weights != [0.0; 3])
+            .collect();
+        Self { sites, kernels: kernels.clone() }
+    }
+
+    /// The covariance of this pixel's channels (rows) with those of the pixel `lag` away.
+    fn covariance(&self, other: &Self, lag: [isize; 2], variances: [f64; 3]) -> Matrix3<f64> {
+        let mut covariance = Matrix3::zeros();
+        for (offset, class, mine) in &self.sites {
+            let there = [offset[0] - lag[0], offset[1] - lag[1]];
+            if there[0].abs() > REACH || there[1].abs() > REACH {
+                continue;
+            }
+            let theirs = other.kernels.each_ref().map(|kernel| kernel.at(there));
+            let variance = variances[*class as usize];
+            for j in 0..3 {
+                for i in 0..3 {
+                    covariance[(i, j)] += variance * mine[i] * theirs[j];
+                }
+            }
+        }
+        covariance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cfa::CfaPattern;
+    use crate::demosaic::Method;
+    use crate::demosaic::weights::WeightTable;
+    use crate::numerics::normal::MeanVariance;
+    use crate::propagation::mixture;
+    use nalgebra::{DMatrix, DVector};
+
+    fn sites(variances: [f64; 3], excess_kurtosis: f64) -> [Prediction; 3] {
+        variances.map(|variance| Prediction { moments: MeanVariance { mean: 0.0, variance }, excess_kurtosis })
+    }
+
+    fn close(a: &Sampling, b: &Sampling, tolerance: f64) -> bool {
+        let spreads = a.spread.iter().flatten().zip(b.spread.iter().flatten());
+        let scale = b.spread[0][0].abs().max(b.spread[5][5].abs());
+        (a.mean_covariance - b.mean_covariance).abs().max() < tolerance * b.mean_covariance.max()
+            && (a.covariance - b.covariance).abs().max() < tolerance * b.covariance.max()
+            && spreads.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < tolerance * scale
+    }
+
+    /// Large regions follow from small ones: against going through all pairs, with edges near, far and at the rim.
+    #[test]
+    fn large_regions_follow_from_small_ones() {
+        let weights = WeightTable::new(Method::EffectiveColor, CfaPattern::Grbg).about([1.0, 1.0]);
+        let sites = sites([1.0, 2.0, 3.0], 0.4);
+        for (frame, corner, size) in
+            [([27, 30], [0, 0], [27, 30]), ([60, 40], [3, 1], [25, 26]), ([32, 33], [5, 2], [27, 31])]
+        {
+            let place = Place { frame, origin: [1, -2], corner, size };
+            let count = (size[0] * size[1]) as f64;
+            let whole = Sums::of(&weights, &sites, &place).sampling(count);
+            assert!(close(&Sampling::of(&weights, &sites, &place), &whole, 1e-11), "{place:?}");
+        }
+    }
+
+    /// Everything from full matrices: W of all pixels and channels, Σ = W D Wᵀ, P, traces.
+    #[test]
+    fn small_regions_agree_with_full_matrices() {
+        for method in Method::ALL {
+            let weights = WeightTable::new(method, CfaPattern::Rggb).about([0.6, 1.8]);
+            let (variances, kurtosis) = ([1.5, 2.0, 0.7], 0.9);
+            let place = Place { frame: [9, 8], origin: [0, 0], corner: [0, 2], size: [7, 5] };
+            let found = Sampling::of(&weights, &sites(variances, kurtosis), &place);
+            let n = 35;
+            let class = |s: usize| CfaPattern::Rggb.class((s % 9) as i64, (s / 9) as i64) as usize;
+            let rows = [0, 1, 2].map(|channel| {
+                let mut w = DMatrix::<f64>::zeros(n, 72);
+                for a in 0..n {
+                    let [x, y] = [a % 7, a / 7 + 2];
+                    for ([dx, dy], weight) in weights.kernel(phase(x as i64, y as i64), channel).sites() {
+                        let site = mirror(y.cast_signed() + dy, 8) * 9 + mirror(x.cast_signed() + dx, 9);
+                        w[(a, site)] += weight;
+                    }
+                }
+                w
+            });
+            let d = DMatrix::from_diagonal(&DVector::from_fn(72, |s, _| variances[class(s)]));
+            let p = DMatrix::identity(n, n) - DMatrix::from_element(n, n, 1.0 / n as f64);
+            let c = |i: usize, j: usize| &rows[i] * &d * rows[j].transpose();
+            let q = |i: usize, j: usize| rows[i].transpose() * &p * &rows[j];
+            let free = n as f64 - 1.0;
+            let mut expected = found.clone();
+            for (a, [i, j]) in PAIRS.into_iter().enumerate() {
+                expected.mean_covariance[(i, j)] = c(i, j).sum() / (n * n) as f64;
+                expected.covariance[(i, j)] = (&p * c(i, j)).trace() / free;
+                expected.mean_covariance[(j, i)] = expected.mean_covariance[(i, j)];
+                expected.covariance[(j, i)] = expected.covariance[(i, j)];
+                for (b, [k, l]) in PAIRS.into_iter().enumerate() {
+                    let normal = (&p * c(i, k) * &p * c(l, j)).trace() + (&p * c(i, l) * &p * c(k, j)).trace();
+                    let (one, other) = (q(i, j), q(k, l));
+                    let fourth: f64 =
+                        (0..72).map(|s| kurtosis * variances[class(s)].powi(2) * one[(s, s)] * other[(s, s)]).sum();
+                    expected.spread[a][b] = (normal + fourth) / (free * free);
+                }
+            }
+            assert!(close(&found, &expected, 1e-12), "{method:?}\n{found:?}\n{expected:?}");
+        }
+    }
+
+    /// Far from edges a pixel's expected sample covariance is that of all phases, and the mean's that of a patch.
+    #[test]
+    fn patches_in_the_interior_agree_with_their_gains() {
+        let weights = WeightTable::new(Method::Malvar, CfaPattern::Bggr).about([1.0, 1.0]);
+        let variances = [1.0, 2.0, 3.0];
+        let place = Place { frame: [900, 800], origin: [0, 0], corner: [100, 101], size: [601, 502] };
+        let found = Sampling::of(&weights, &sites(variances, 0.0), &place);
+        let patch = mixture::patch_mean(&weights, phase(100, 101), [601, 502]).covariance(variances);
+        assert!((found.mean_covariance - patch).abs().max() < 1e-10 * patch.max());
+        let pixel = mixture::mean_pixel(&weights).covariance(variances);
+        // An odd extent has one phase more often than the other, by 1/601; the mean takes off a few of 300,000 pixels.
+        assert!((found.covariance - pixel).abs().max() < 2e-3 * pixel.max());
+    }
+
+    #[test]
+    fn far_edges_do_not_matter() {
+        let weights = WeightTable::new(Method::EffectiveColor, CfaPattern::Rggb).about([1.0, 1.0]);
+        let sites = sites([1.0, 2.0, 3.0], 0.2);
+        for corner in [[0, 0], [2, 3], [3, 4], [17, 40], [34, 51]] {
+            let place = Place { frame: [41, 60], origin: [-3, 8], corner, size: [7, 9] };
+            let canonical = place.canonical();
+            assert!(canonical.frame[0] <= 7 + 2 * FAR && canonical.frame[1] <= 9 + 2 * FAR);
+            assert!(close(&Sampling::of(&weights, &sites, &place), &Sampling::of(&weights, &sites, &canonical), 1e-13));
+        }
+    }
+
+    #[test]
+    fn planes_drawn_apart_have_their_textbook_errors() {
+        let found = Sampling::independent(&sites([4.0, 9.0, 16.0], 0.5), 101.0);
+        assert!((found.mean_covariance[(1, 1)] - 9.0 / 101.0).abs() < 1e-15);
+        assert!((found.spread[0][0] - 16.0 * (0.02 + 0.5 / 101.0)).abs() < 1e-14);
+        assert!((found.spread[1][1] - 0.36).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,267 @@
+//! Checks of predictions: they pass frames that are as predicted, fail others, and raise false alarms as often as they
+//! say.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::color::{ColorSettings, Space, ToXyz, White};
+use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::metadata::Scene;
+use cyanometer::mosaic::Mosaic;
+use cyanometer::noise::{AddNoise, NoiseSettings};
+use cyanometer::numerics::significance::{of_chi_square, of_smallest};
+use cyanometer::propagation::Equations;
+use cyanometer::random::Source;
+use cyanometer::stage::MemoryFrame;
+use cyanometer::statistics::check::Verdict;
+use cyanometer::statistics::{Region, RegionReport, measure};
+use rayon::prelude::*;
+use support::{at, expected, sensor, through};
+
+/// The frame of a uniform scene.
+fn scene(size: [usize; 2], electrons: [f32; 3]) -> MemoryFrame {
+    let mut frame = expected(size[0], size[1], |_, _, class| electrons[class as usize]);
+    frame.header.metadata.scene = Some(Scene {
+        source: "test".into(),
+        uniform: true,
+        expected_electrons: Some(electrons.map(f64::from)),
+        vignetting_focal_length_mm: None,
+        patch: None,
+        brightest_e: None,
+    });
+    frame
+}
+
+fn noisy(scene: &MemoryFrame, seed: u64) -> MemoryFrame {
+    let settings = NoiseSettings { seed, sensor_seed: seed, ..Default::default() };
+    through(scene, &AddNoise::new(&scene.header, &settings).unwrap())
+}
+
+fn digitized(frame: &MemoryFrame) -> MemoryFrame {
+    through(frame, &Digitize::new(&frame.header, &AdcSettings::default()).unwrap())
+}
+
+fn demosaicked(codes: &MemoryFrame, method: Method) -> MemoryFrame {
+    let plane = through(codes, &Mosaic::new(&codes.header, None).unwrap());
+    through(&plane, &Demosaic::new(&plane.header, method, Black::Auto, None).unwrap())
+}
+
+fn colored(camera: &MemoryFrame, space: Space) -> MemoryFrame {
+    let settings = ColorSettings {
+        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
+        method: None,
+        space,
+        white: White::D65,
+        white_luminance: None,
+    };
+    through(camera, &ToXyz::new(&camera.header, &settings).unwrap())
+}
+
+fn regions(frame: &MemoryFrame, regions: &[Region], equations: Equations) -> Vec<RegionReport> {
+    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+    measure(&mut source, regions, equations, Some(0.5)).unwrap().regions
+}
+
+fn verdict(frame: &MemoryFrame, equations: Equations) -> Verdict {
+    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+    measure(&mut source, &[], equations, Some(1e-4)).unwrap().check.unwrap()
+}
+
+/// The smallest probability of a region, corrected for the number of tests.
+fn corrected(region: &RegionReport) -> f64 {
+    let smallest = region.tests.iter().map(|test| test.p).fold(1.0, f64::min);
+    of_smallest(smallest, region.tests.len())
+}
+
+const LEVELS: [f64; 2] = [0.05, 0.01];
+
+/// Fails when alarms come more often than the level, or more seldom than `share` of it: `n` trials at rate p have
+/// np ± 3.9 √(np(1 − p)) with a chance of 10⁻⁴ to be outside.
+fn judge(what: &str, corrected: &[f64], share: f64) {
+    let n = corrected.len() as f64;
+    for level in LEVELS {
+        let alarms = corrected.iter().filter(|p| **p < level).count() as f64;
+        let bound = 3.9 * (n * level * (1.0 - level)).sqrt();
+        eprintln!("{what}: {alarms} alarms in {n} at level {level}, expected {}", n * level);
+        assert!(alarms <= n * level + bound, "{what}: {alarms} alarms of {n} at {level}");
+        assert!(alarms >= share * n * level - bound, "{what}: only {alarms} alarms of {n} at {level}");
+    }
+}
+
+const SEEDS: u64 = 2000;
+
+fn over_seeds(law: impl Fn(u64) -> Vec<f64> + Sync + Send) -> Vec<Vec<f64>> {
+    let trials: Vec<Vec<f64>> = (0..SEEDS).into_par_iter().map(law).collect();
+    (0..trials[0].len()).map(|i| trials.iter().map(|trial| trial[i]).collect()).collect()
+}
+
+/// Whole small frames, every stage of one exposure: electrons, ADU, three demosaickings, XYZ and L*a*b*.
+#[test]
+fn whole_frames_raise_false_alarms_at_the_stated_rate() {
+    let scene = scene([24, 18], [3000.0, 9000.0, 20_000.0]);
+    let alarms = over_seeds(|seed| {
+        let electrons = noisy(&scene, seed);
+        let codes = digitized(&electrons);
+        let plane = through(&codes, &Mosaic::new(&codes.header, None).unwrap());
+        let cameras = [Method::Bilinear, Method::EffectiveColor, Method::Malvar].map(|m| demosaicked(&codes, m));
+        let [xyz, lab] = [Space::Xyz, Space::Lab].map(|space| colored(&cameras[1], space));
+        let frames = [electrons, codes, plane].into_iter().chain(cameras).chain([xyz, lab]);
+        frames.map(|frame| corrected(&regions(&frame, &[], Equations::Exact)[0])).collect()
+    });
+    let names = ["electrons", "ADU", "CFA plane", "BI", "ECI", "MHC", "XYZ", "L*a*b*"];
+    for (name, corrected) in names.iter().zip(&alarms) {
+        // Tests of channels that are correlated alarm together, which would make alarms rarer; it does not show.
+        judge(name, corrected, 1.0);
+    }
+}
+
+/// Patches of one frame, far enough apart to be independent: 5×5 of each size in 80 frames.
+#[test]
+fn patches_raise_false_alarms_at_the_stated_rate() {
+    for [width, height] in [[7, 5], [16, 16]] {
+        let pitch = 24;
+        let scene = scene([5 * pitch, 5 * pitch], [3000.0, 9000.0, 20_000.0]);
+        let patches: Vec<Region> =
+            (0..25).map(|i| Region { x: i % 5 * pitch + i % 2, y: i / 5 * pitch + i % 3, width, height }).collect();
+        let trials: Vec<f64> = (0..SEEDS / 25)
+            .into_par_iter()
+            .flat_map(|seed| {
+                let camera = demosaicked(&digitized(&noisy(&scene, seed)), Method::EffectiveColor);
+                regions(&camera, &patches, Equations::Exact).iter().map(corrected).collect::<Vec<_>>()
+            })
+            .collect();
+        // 35 pixels, correlated as they are, have 12 to 24 degrees of freedom: there χ² and Fisher's z lean to caution.
+        judge(&format!("{width}x{height}"), &trials, if width * height < 100 { 0.6 } else { 1.0 });
+    }
+}
+
+/// Exact predictions hold where the paper's do not, on half a million pixels: each method, each stage, dim and bright.
+#[test]
+fn exact_predictions_hold_where_the_papers_fail() {
+    for (seed, electrons) in [[0.0; 3], [400.0, 900.0, 700.0], [9000.0, 14_000.0, 6000.0]].into_iter().enumerate() {
+        let codes = digitized(&noisy(&scene([800, 600], electrons), seed as u64));
+        assert!(verdict(&codes, Equations::Exact).passed, "{electrons:?}");
+        for method in Method::ALL {
+            // In the dark there is no hue.
+            if method == Method::SmoothHue && seed == 0 {
+                continue;
+            }
+            let camera = demosaicked(&codes, method);
+            let found = verdict(&camera, Equations::Exact);
+            assert!(found.passed, "{method:?} {electrons:?}: {found:?}");
+            let xyz = colored(&camera, Space::Xyz);
+            let found = verdict(&xyz, Equations::Exact);
+            assert!(found.passed, "XYZ by {method:?} {electrons:?}: {found:?}");
+            if matches!(method, Method::SmoothHue | Method::EffectiveColor) {
+                assert!(!verdict(&camera, Equations::Paper).passed, "{method:?} {electrons:?}");
+                assert!(!verdict(&xyz, Equations::Paper).passed, "XYZ by {method:?} {electrons:?}");
+            }
+        }
+    }
+}
+
+/// The dark floor: Eq. 11 is 0.53 % below what dark shot noise times non-uniformity makes, 7 standard errors of
+/// 2·10⁶ samples.
+#[test]
+fn the_papers_dark_floor_is_caught() {
+    let scene = scene([1000, 700], [0.0; 3]);
+    let settings = NoiseSettings { seed: 3, sensor_seed: 8, without: vec![Source::Ron], ..Default::default() };
+    let dark = through(&scene, &AddNoise::new(&scene.header, &settings).unwrap());
+    assert!(verdict(&dark, Equations::Exact).passed);
+    assert!(!verdict(&dark, Equations::Paper).passed);
+}
+
+/// Samples that hardly ever leave their code are no normal deviates: without any noise there is one code, and a frame of
+/// it passes, one of the next does not.
+#[test]
+fn frames_without_spread_are_checked_too() {
+    let scene = scene([20, 10], [1000.0, 2000.0, 3000.0]);
+    let all = vec![Source::Dcsn, Source::Dcnu, Source::Ssn, Source::Prnu, Source::Ron];
+    let settings = NoiseSettings { without: all, ..Default::default() };
+    let mut codes = digitized(&through(&scene, &AddNoise::new(&scene.header, &settings).unwrap()));
+    assert!(verdict(&codes, Equations::Exact).passed);
+    codes.samples[77] += 1.0;
+    assert!(!verdict(&codes, Equations::Exact).passed);
+}
+
+/// A wrong matrix, pattern or level is not as predicted.
+#[test]
+fn wrong_predictions_are_caught() {
+    let scene = scene([200, 150], [3000.0, 9000.0, 20_000.0]);
+    let codes = digitized(&noisy(&scene, 5));
+    let mut camera = demosaicked(&codes, Method::Bilinear);
+    assert!(verdict(&camera, Equations::Exact).passed);
+    camera.header.metadata.demosaic.as_mut().unwrap().method = "eci".into();
+    assert!(!verdict(&camera, Equations::Exact).passed);
+    let mut brighter = codes.clone();
+    let levels = brighter.header.metadata.scene.as_mut().unwrap().expected_electrons.as_mut().unwrap();
+    levels[1] *= 1.01;
+    assert!(!verdict(&brighter, Equations::Exact).passed);
+    brighter.header.metadata.scene = None;
+    let refused = measure(&mut brighter, &[], Equations::Exact, Some(0.1)).unwrap_err();
+    assert!(refused.to_string().contains("nothing can be checked"), "{refused}");
+}
+
+/// The mean of a patch scatters from frame to frame as predicted: 2000 frames, each of another sensor, the patch on one
+/// place. The variance of 2000 means has χ² of 1999 degrees of freedom; the bound leaves 10⁻⁴ to chance for all together.
+#[test]
+fn patch_means_scatter_as_predicted() {
+    let scene = scene([26, 24], [3000.0, 9000.0, 20_000.0]);
+    let sizes = [[1, 1], [2, 2], [7, 5], [16, 16]];
+    let place =
+        |[width, height]: [usize; 2], phase: usize| Region { x: 4 + phase % 2, y: 4 + phase / 2, width, height };
+    let patches: Vec<Region> = sizes.into_iter().flat_map(|size| [0, 1, 3].map(|phase| place(size, phase))).collect();
+    let means = |frame: &MemoryFrame| -> Vec<f64> {
+        let mean = |patch: &Region, channel: usize| {
+            let rows = patch.y..patch.y + patch.height;
+            let sites = rows.flat_map(|y| (patch.x..patch.x + patch.width).map(move |x| (x, y)));
+            let sum: f64 = sites.map(|(x, y)| f64::from(at(frame, x, y, channel))).sum();
+            sum / (patch.width * patch.height) as f64
+        };
+        patches.iter().flat_map(|patch| [0, 1, 2].map(|channel| mean(patch, channel))).collect()
+    };
+    for method in Method::ALL {
+        let frame = |seed: u64| {
+            let camera = demosaicked(&digitized(&noisy(&scene, seed + 40_000)), method);
+            [colored(&camera, Space::Xyz), camera]
+        };
+        for stage in 0..2 {
+            let reports = regions(&frame(0)[stage], &patches, Equations::Exact);
+            let predicted: Vec<f64> = reports.into_iter().flat_map(|region| region.patch_mean_std.unwrap()).collect();
+            let all: Vec<Vec<f64>> = (0..SEEDS).into_par_iter().map(|seed| means(&frame(seed)[stage])).collect();
+            let mut smallest = 1.0_f64;
+            for (index, predicted) in predicted.iter().enumerate() {
+                let n = SEEDS as f64;
+                let mean = all.iter().map(|frame| frame[index]).sum::<f64>() / n;
+                let square: f64 = all.iter().map(|frame| (frame[index] - mean).powi(2)).sum();
+                let p = of_chi_square(square / predicted.powi(2), n - 1.0);
+                let patch = patches[index / 3];
+                let ratio = (square / (n - 1.0)).sqrt() / predicted;
+                assert!(
+                    p > 1e-6,
+                    "{method:?} {patch:?} channel {}: scatters by {ratio} of what is predicted",
+                    index % 3
+                );
+                smallest = smallest.min(p);
+            }
+            assert!(of_smallest(smallest, predicted.len()) > 1e-4, "{method:?} {stage}: {smallest}");
+        }
+    }
+}
+
+/// What the paper's way of averaging would say of the same patches: after BI, which keeps 9/16 and 5/8 of the variance of
+/// a photosite, σ/√n is too small by √(4/(9/16)) = 2.67 for red and blue and by √(2/(5/8)) = 1.79 for green.
+#[test]
+fn averaging_as_if_pixels_were_independent_is_caught() {
+    let scene = scene([200, 150], [9000.0; 3]);
+    let camera = demosaicked(&digitized(&noisy(&scene, 1)), Method::Bilinear);
+    let region = regions(&camera, &[Region { x: 20, y: 20, width: 64, height: 64 }], Equations::Exact).remove(0);
+    for (i, keeps) in [(0, (4.0_f64 / (9.0 / 16.0)).sqrt()), (1, (2.0_f64 / (5.0 / 8.0)).sqrt()), (2, 8.0 / 3.0)] {
+        let independent = region.channels[i].predicted_std.unwrap() / 64.0;
+        let ratio = region.patch_mean_std.as_ref().unwrap()[i] / independent;
+        // The rim of the patch leans on sites outside, which takes off a per cent or two.
+        assert!((ratio / keeps - 1.0).abs() < 0.03, "channel {i}: {ratio}, not {keeps}");
+    }
+}
