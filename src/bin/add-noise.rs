@@ -31,7 +31,7 @@ struct Arguments {
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     frame: u32,
     /// Sources to leave out, between commas; their means stay: dcsn, dcnu, ssn, prnu, ron
-    #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = options::choice(&SOURCES))]
+    #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = options::choice(&options::SOURCES))]
     without: Vec<Source>,
     /// Temperature of the sensor in K; by default the sensor's own
     #[arg(long, value_name = "K", value_parser = options::positive, allow_negative_numbers = true)]
@@ -50,14 +50,6 @@ struct Arguments {
     #[command(flatten)]
     general: options::General,
 }
-
-const SOURCES: [(&str, Source); 5] = [
-    ("dcsn", Source::Dcsn),
-    ("dcnu", Source::Dcnu),
-    ("ssn", Source::Ssn),
-    ("prnu", Source::Prnu),
-    ("ron", Source::Ron),
-];
 
 fn main() -> ExitCode {
     cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)

@@ -19,7 +19,7 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
-    #[arg(long, default_value = "eci", value_parser = options::choice(&METHODS))]
+    #[arg(long, default_value = "eci", value_parser = options::choice(&options::METHODS))]
     method: Method,
     /// Black level to remove: auto (from the metadata), none, or a number in the unit of the samples
     #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = options::black, allow_negative_numbers = true)]
@@ -27,30 +27,28 @@ struct Arguments {
     /// Pattern of a plane that carries none, or another than it carries: rggb, bggr, grbg or gbrg
     #[arg(long, value_parser = options::pattern)]
     pattern: Option<CfaPattern>,
+    /// Add a layer with the standard deviation of each pixel, from the sensor's noise model at the pixel's own level
+    #[arg(long)]
+    sigma: bool,
+    #[command(flatten)]
+    sensor: options::SensorChoice,
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
     general: options::General,
 }
 
-const METHODS: [(&str, Method); 8] = [
-    ("bi", Method::Bilinear),
-    ("bilinear", Method::Bilinear),
-    ("shti", Method::SmoothHue),
-    ("smooth-hue", Method::SmoothHue),
-    ("eci", Method::EffectiveColor),
-    ("effective-color", Method::EffectiveColor),
-    ("mhc", Method::Malvar),
-    ("malvar", Method::Malvar),
-];
-
 fn main() -> ExitCode {
     cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let reader = FrameReader::open(&arguments.input.options())?;
+    let mut reader = FrameReader::open(&arguments.input.options())?;
+    arguments.sensor.apply(&mut reader)?;
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
+    if arguments.sigma {
+        stage = stage.with_sigma()?;
+    }
     session.sign(stage.header_mut());
     session.drive(reader, &stage, &arguments.output)?;
     Ok(())

@@ -2,12 +2,11 @@
 
 use clap::Parser;
 use cyanometer::cli::{self, options};
-use cyanometer::color::characterization::CameraMatrix;
 use cyanometer::color::{ColorSettings, Space, ToXyz, White};
-use cyanometer::error::{Error, Result};
+use cyanometer::error::Result;
 use cyanometer::formats::atomic::same_file;
+use cyanometer::formats::data;
 use cyanometer::formats::input::{FrameReader, regular_file};
-use cyanometer::formats::{data, yaml};
 use cyanometer::optics::Exposure;
 use cyanometer::stage::RowSource;
 use std::path::PathBuf;
@@ -29,7 +28,7 @@ struct Arguments {
     #[arg(long, default_value = "xyz", value_parser = options::choice(&[("xyz", Space::Xyz), ("xyy", Space::Xyy), ("lab", Space::Lab), ("srgb", Space::Srgb)]))]
     space: Space,
     /// White of lab and srgb: d65, e, or its absolute X,Y,Z in cd/m2
-    #[arg(long, default_value = "d65", value_name = "d65|e|X,Y,Z", value_parser = white, allow_hyphen_values = true)]
+    #[arg(long, default_value = "d65", value_name = "d65|e|X,Y,Z", value_parser = options::white, allow_hyphen_values = true)]
     white: White,
     /// Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates
     #[arg(long, value_name = "CD_PER_M2", value_parser = options::positive, allow_negative_numbers = true)]
@@ -43,20 +42,16 @@ struct Arguments {
     /// Transmittance of the lens, 0 to 1, for a frame whose metadata do not state it
     #[arg(long, value_name = "FRACTION", value_parser = options::fraction, allow_negative_numbers = true)]
     lens_transmittance: Option<f64>,
+    /// Add a layer with the standard deviation of each pixel, and for xyz one with the covariances, from the sensor's noise
+    /// model at the pixel's own level
+    #[arg(long)]
+    sigma: bool,
+    #[command(flatten)]
+    sensor: options::SensorChoice,
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
     general: options::General,
-}
-
-fn white(text: &str) -> std::result::Result<White, String> {
-    match text {
-        "d65" => Ok(White::D65),
-        "e" => Ok(White::EqualEnergy),
-        numbers => options::three_numbers(numbers)
-            .map(White::Absolute)
-            .map_err(|_| "give d65, e, or the white's X,Y,Z between commas".into()),
-    }
 }
 
 fn main() -> ExitCode {
@@ -65,8 +60,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let shown = arguments.matrix.display().to_string();
-    let matrix: CameraMatrix = yaml::parse_strict(&shown, &data::read_file(&arguments.matrix)?)?;
-    matrix.check().map_err(|problem| Error::format(&shown, problem))?;
+    let matrix = data::load_matrix(&arguments.matrix)?;
     let output = arguments.output.output.as_deref().and_then(regular_file);
     if let (Some((output, name)), Some((matrix, _))) = (output, regular_file(&arguments.matrix))
         && output == matrix
@@ -74,6 +68,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         return Err(same_file(&name, &shown));
     }
     let mut reader = FrameReader::open(&arguments.input.options())?;
+    arguments.sensor.apply(&mut reader)?;
     let metadata = &mut reader.header_mut().metadata;
     let known = metadata.exposure;
     let exposure_s = arguments.exposure.or(known.map(|e| e.exposure_s));
@@ -95,6 +90,9 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         white_luminance: arguments.white_luminance,
     };
     let mut stage = ToXyz::new(reader.header(), &settings)?;
+    if arguments.sigma {
+        stage = stage.with_sigma(reader.header())?;
+    }
     session.sign(stage.header_mut());
     session.drive(reader, &stage, &arguments.output)?;
     Ok(())

@@ -130,18 +130,28 @@ impl<'a, Q: Quantity> Rows<'a, Q> {
         &mut self.samples[start..start + self.width]
     }
 
-    /// The three channels of the frame's row `y`.
+    /// The first three channels of the frame's row `y`.
     ///
     /// # Panics
     ///
     /// When the rows do not have three channels.
     pub fn three(&mut self, y: usize) -> [&mut [f32]; 3] {
-        assert_eq!(self.channels, 3);
-        let start = (y - self.first_row) * 3 * self.width;
-        let row = &mut self.samples[start..start + 3 * self.width];
+        self.three_and_rest(y).0
+    }
+
+    /// The first three channels of the frame's row `y`, and all samples of those that follow.
+    ///
+    /// # Panics
+    ///
+    /// When the rows do not have three channels.
+    pub fn three_and_rest(&mut self, y: usize) -> ([&mut [f32]; 3], &mut [f32]) {
+        assert!(self.channels >= 3);
+        let start = (y - self.first_row) * self.channels * self.width;
+        let row = &mut self.samples[start..start + self.channels * self.width];
         let (first, rest) = row.split_at_mut(self.width);
-        let (second, third) = rest.split_at_mut(self.width);
-        [first, second, third]
+        let (second, rest) = rest.split_at_mut(self.width);
+        let (third, rest) = rest.split_at_mut(self.width);
+        ([first, second, third], rest)
     }
 }
 

@@ -245,6 +245,9 @@ pub struct SamplesRecord {
     /// Colours outside sRGB, clipped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub out_of_gamut: Option<u64>,
+    /// Pixels whose noise cannot be propagated, green being too near its noise to divide by.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub propagation_void: Option<u64>,
 }
 
 impl Metadata {
@@ -318,6 +321,11 @@ impl FrameHeader {
     /// Whether the frame has the three planes R, G and B (or what was made of them).
     pub fn has_three_planes(&self) -> bool {
         self.geometry.channels.iter().map(|name| bare_name(name)).eq(["R", "G", "B"])
+    }
+
+    /// Whether the first planes are R, G and B (or what was made of them), whatever follows.
+    pub fn leads_with_three_planes(&self) -> bool {
+        self.geometry.channels.iter().map(|name| bare_name(name)).take(3).eq(["R", "G", "B"])
     }
 
     /// The sensor, or the error that names the option to give.

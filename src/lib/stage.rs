@@ -47,6 +47,8 @@ pub struct Counts {
     pub undefined_hue: u64,
     /// Colours outside sRGB.
     pub out_of_gamut: u64,
+    /// Pixels whose noise cannot be propagated.
+    pub propagation_void: u64,
 }
 
 impl Counts {
@@ -60,6 +62,7 @@ impl Counts {
             negative: self.negative + other.negative,
             undefined_hue: self.undefined_hue + other.undefined_hue,
             out_of_gamut: self.out_of_gamut + other.out_of_gamut,
+            propagation_void: self.propagation_void + other.propagation_void,
         }
     }
 
@@ -75,6 +78,7 @@ impl Counts {
             negative: some(self.negative),
             undefined_hue: some(self.undefined_hue),
             out_of_gamut: some(self.out_of_gamut),
+            propagation_void: some(self.propagation_void),
         }
     }
 
@@ -91,6 +95,10 @@ impl Counts {
                 "values had no green to divide by, or lay beyond the range of samples; bilinear ones stand in",
             ),
             (self.out_of_gamut, "colours lie outside sRGB and were clipped"),
+            (
+                self.propagation_void,
+                "pixels have a green too near its noise to divide by; their standard deviations say only that they are large",
+            ),
         ]
         .into_iter()
         .filter(|(count, _)| *count > 0)

@@ -5,6 +5,7 @@ pub mod characterization;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{ColorRecord, FrameHeader};
+use crate::propagation::pixels::{self, PixelNoise};
 use crate::stage::{Counts, Stage};
 use crate::units::{Adu, QuantityKind, Tristimulus};
 use nalgebra::{Matrix3, Vector3};
@@ -200,7 +201,12 @@ pub struct ToXyz {
     black: f64,
     white: [f64; 3],
     srgb_from_xyz: Matrix3<f64>,
+    sigma: Option<PixelNoise>,
 }
+
+/// Channels of the layer of covariances of XYZ.
+pub const COVARIANCE_LAYER: [&str; 6] =
+    ["covariance.XX", "covariance.XY", "covariance.XZ", "covariance.YY", "covariance.YZ", "covariance.ZZ"];
 
 impl ToXyz {
     /// The conversion of `input`.
@@ -274,7 +280,60 @@ impl ToXyz {
         let geometry = input.geometry.with_channels(&channels);
         let srgb_from_xyz = if needs_white { linear_srgb_from_xyz(white) } else { Matrix3::identity() };
         let header = FrameHeader { name: input.name.clone(), geometry, metadata };
-        Ok(Self { header, space: settings.space, xyz_from_adu, black, white, srgb_from_xyz })
+        Ok(Self { header, space: settings.space, xyz_from_adu, black, white, srgb_from_xyz, sigma: None })
+    }
+
+    /// Adds a layer with the standard deviation of each channel of each pixel, and for XYZ one with the six covariances,
+    /// from the sensor's noise model at the level of the pixel in `input`. xyY and L*a*b* are taken to first order.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`PixelNoise::of`]; [`Error::Usage`] for sRGB, a picture.
+    pub fn with_sigma(mut self, input: &FrameHeader) -> Result<Self> {
+        let layer = match self.space {
+            Space::Xyz => ["sigma.R", "sigma.G", "sigma.B"],
+            Space::Xyy => ["sigma.x", "sigma.y", "sigma.Y"],
+            Space::Lab => ["sigma.L", "sigma.a", "sigma.b"],
+            Space::Srgb => {
+                return Err(Error::Usage(
+                    "--sigma gives the uncertainty of xyz, xyy or lab; srgb is a picture to look at".into(),
+                ));
+            }
+        };
+        self.sigma = Some(PixelNoise::of(input)?);
+        let channels = &mut self.header.geometry.channels;
+        channels.extend(layer.map(str::to_owned));
+        if self.space == Space::Xyz {
+            channels.extend(COVARIANCE_LAYER.map(str::to_owned));
+        }
+        Ok(self)
+    }
+
+    /// Fills the layers of a pixel, each plane `width` long; gives whether propagation holds.
+    fn fill_sigma(
+        &self,
+        noise: &PixelNoise,
+        [x, y, width]: [usize; 3],
+        rgb: [f64; 3],
+        xyz: [f64; 3],
+        planes: &mut [f32],
+    ) -> bool {
+        let (camera, holds) = noise.covariance([x, y], rgb);
+        let of_xyz = pixels::through(&camera, &self.xyz_from_adu);
+        let covariance = match self.space {
+            Space::Lab => pixels::through(&of_xyz, &lab_about(xyz, self.white).jacobian),
+            Space::Xyy => xyy_about(xyz).map_or([0.0; 6], |local| pixels::through(&of_xyz, &local.jacobian)),
+            Space::Xyz | Space::Srgb => of_xyz,
+        };
+        for (plane, std) in pixels::stds(&covariance).into_iter().enumerate() {
+            planes[plane * width + x] = to_sample(std);
+        }
+        if self.space == Space::Xyz {
+            for (plane, value) in covariance.into_iter().enumerate() {
+                planes[(3 + plane) * width + x] = to_sample(value);
+            }
+        }
+        holds
     }
 
     /// The head of the converted frame, to add to.
@@ -297,10 +356,15 @@ impl Stage for ToXyz {
         let white_xy = [self.white[0] / white_sum, self.white[1] / white_sum];
         for y in output.range() {
             let planes = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
-            let [first, second, third] = output.three(y);
+            let ([first, second, third], layers) = output.three_and_rest(y);
             for x in 0..input.width() {
-                let signal = Vector3::from(planes.map(|plane| f64::from(plane[x]) - self.black));
+                let rgb = planes.map(|plane| f64::from(plane[x]));
+                let signal = Vector3::from(rgb.map(|sample| sample - self.black));
                 let xyz = self.xyz_from_adu * signal;
+                if let Some(noise) = &self.sigma {
+                    let holds = self.fill_sigma(noise, [x, y, input.width()], rgb, xyz.into(), layers);
+                    counts.propagation_void += u64::from(!holds);
+                }
                 let color = match self.space {
                     Space::Xyz => xyz.into(),
                     Space::Xyy => xyy_from_xyz(xyz.into(), white_xy),

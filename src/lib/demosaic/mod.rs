@@ -13,6 +13,7 @@ use crate::cfa::{CfaPattern, Class};
 use crate::error::Result;
 use crate::frame::{Rows, Window, mirror, to_sample};
 use crate::metadata::{DemosaicRecord, FrameHeader};
+use crate::propagation::pixels::PixelNoise;
 use crate::stage::{Counts, Stage};
 use crate::units::{Any, QuantityKind};
 
@@ -92,7 +93,11 @@ pub struct Demosaic {
     pattern: CfaPattern,
     method: Method,
     black: f64,
+    sigma: Option<PixelNoise>,
 }
+
+/// Channels of the layer of standard deviations.
+pub const SIGMA_LAYER: [&str; 3] = ["sigma.R", "sigma.G", "sigma.B"];
 
 impl Demosaic {
     /// The demosaicking of `input`; `pattern` counts where the metadata names none.
@@ -134,7 +139,18 @@ impl Demosaic {
         }
         let geometry = input.geometry.with_channels(&["R", "G", "B"]);
         let header = FrameHeader { geometry, metadata: made, name: input.name.clone() };
-        Ok(Self { header, pattern: cfa, method, black: level })
+        Ok(Self { header, pattern: cfa, method, black: level, sigma: None })
+    }
+
+    /// Adds a layer with the standard deviation of each pixel, from the sensor's noise model at the pixel's own level.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`PixelNoise::of`].
+    pub fn with_sigma(mut self) -> Result<Self> {
+        self.sigma = Some(PixelNoise::of(&self.header)?);
+        self.header.geometry.channels.extend(SIGMA_LAYER.map(str::to_owned));
+        Ok(self)
     }
 
     /// The head of the demosaicked frame, to add to.
@@ -164,12 +180,19 @@ impl Stage for Demosaic {
         let tile = Tile::new(&input, &output, self.reach(), self.black, |y| {
             self.pattern.row_classes(self.header.geometry.origin, y)
         });
-        match self.method {
+        let mut counts = match self.method {
             Method::Bilinear => bilinear::interpolate(&tile, &mut output),
             Method::SmoothHue => smooth_hue::interpolate(&tile, &mut output),
             Method::EffectiveColor => effective_color::interpolate(&tile, &mut output),
             Method::Malvar => malvar::interpolate(&tile, &mut output),
+        };
+        if let Some(noise) = &self.sigma {
+            for y in output.range() {
+                let (planes, rest) = output.three_and_rest(y);
+                counts.propagation_void += noise.fill_stds(y, planes.map(|plane| &*plane), rest);
+            }
         }
+        counts
     }
 }
 

@@ -194,6 +194,21 @@ impl WeightTable {
         }
     }
 
+    /// The weights of R, G and B at the pixels of a phase, as far as they do not hang on hue.
+    pub fn fixed(&self, phase: usize) -> &[Kernel; 3] {
+        &self.fixed[phase]
+    }
+
+    /// What is added to [`Self::fixed`] in proportion to the ratio of the channel's mean to that of green.
+    pub fn of_hue(&self, phase: usize) -> &[Kernel; 3] {
+        &self.of_hue[phase]
+    }
+
+    /// The class of the site `offset` away from a pixel of a phase.
+    pub fn class(&self, phase: usize, offset: [isize; 2]) -> Class {
+        Surroundings { pattern: self.pattern, phase: PHASES[phase] }.class(offset)
+    }
+
     /// Whether the weights hang on the hue of the scene.
     pub fn depends_on_hue(&self) -> bool {
         self.of_hue.iter().flatten().any(|kernel| kernel.sites().next().is_some())

@@ -375,7 +375,7 @@ fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry
     let starts =
         |names: &[&str]| stored.channels.len() > names.len() && stored.channels.iter().zip(names).all(|(a, b)| a == b);
     if !all && quantity != QuantityKind::SpectralRadiance {
-        if starts(&["R", "G", "B"]) {
+        if [["R", "G", "B"], ["x", "y", "Y"], ["L", "a", "b"]].iter().any(|planes| starts(planes)) {
             kept.channels.truncate(3);
         } else if starts(&["Y"]) {
             kept.channels.truncate(1);

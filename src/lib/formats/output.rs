@@ -109,6 +109,9 @@ impl OutputOptions {
                 )));
             }
         };
+        if format == Format::Tiff && header.geometry.channels.iter().any(|name| name.contains('.')) {
+            return Err(Error::Usage("a TIFF has no names for the layers of standard deviations; write an EXR".into()));
+        }
         let quantity = header.metadata.quantity;
         let changed = header.metadata.demosaic.is_some() || header.metadata.correction.is_some();
         let is_codes = quantity == QuantityKind::Adu && !changed;
@@ -201,7 +204,7 @@ impl FrameWriter {
                 let primaries = match header.metadata.quantity {
                     QuantityKind::Xyz => Some(XYZ_PRIMARIES),
                     QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu
-                        if header.has_three_planes() =>
+                        if header.leads_with_three_planes() =>
                     {
                         let matrix = header.metadata.sensor.as_ref().and_then(|sensor| sensor.xyz_from_camera);
                         matrix.and_then(|matrix| color::implied_primaries(&matrix))

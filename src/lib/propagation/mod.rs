@@ -7,6 +7,7 @@ pub mod chain;
 pub mod classes;
 pub mod mixture;
 pub mod paper;
+pub mod pixels;
 pub mod sampling;
 pub mod smooth_hue;
 

@@ -14,9 +14,9 @@
 //! the same amount with every two columns, so large regions follow exactly from small ones.
 
 use super::Prediction;
+use super::pixels::folded;
 use crate::cfa::Class;
 use crate::demosaic::weights::{Kernel, REACH, Weights, phase};
-use crate::frame::mirror;
 use nalgebra::Matrix3;
 
 /// The six covariances of three channels in the order of [`Sampling::spread`].
@@ -115,16 +115,6 @@ fn steps(extent: usize) -> Vec<(usize, f64)> {
     }
     let further = (extent - small) as f64 / 2.0;
     vec![(small, 1.0 - further), (small + 2, further)]
-}
-
-/// The kernel about a pixel of the frame, what lies beyond the edges folded back.
-fn folded(kernel: &Kernel, at: [usize; 2], frame: [usize; 2]) -> Kernel {
-    let back = |offset: isize, axis: usize| {
-        mirror(at[axis].cast_signed() + offset, frame[axis]).cast_signed() - at[axis].cast_signed()
-    };
-    kernel
-        .sites()
-        .fold(Kernel::zero(), |sum, ([x, y], weight)| sum.plus(weight, &Kernel::site([back(x, 0), back(y, 1)])))
 }
 
 /// Sums over the pixels of a rectangle, each of which is additive.
@@ -326,6 +316,7 @@ mod tests {
     use crate::cfa::CfaPattern;
     use crate::demosaic::Method;
     use crate::demosaic::weights::WeightTable;
+    use crate::frame::mirror;
     use crate::numerics::normal::MeanVariance;
     use crate::propagation::mixture;
     use nalgebra::{DMatrix, DVector};

@@ -321,7 +321,9 @@ impl Tally {
         let channels = self.channels.channels();
         let count = self.channels.count;
         let has_rails = !matches!(rails, Rails::None);
-        let whole = (channels == 3 && count > 0).then_some(prediction).flatten().map(|prediction| match prediction {
+        // Layers of standard deviations may follow the three planes of a demosaicked frame.
+        let three = channels == 3 || (channels > 3 && metadata.demosaic.is_some());
+        let whole = (three && count > 0).then_some(prediction).flatten().map(|prediction| match prediction {
             FramePrediction::Planes(classes) => {
                 let mean = classes.map(|class| class.moments.mean);
                 let sampling = Sampling::independent(classes, count as f64);
@@ -343,7 +345,7 @@ impl Tally {
         let channel_report = |index: usize| {
             let name = frame.channel_name(index).to_owned();
             let expectation = match (&whole, planes) {
-                (Some(whole), _) => Some(whole.expectation(index)),
+                (Some(whole), _) if index < 3 => Some(whole.expectation(index)),
                 (None, Some(classes)) if metadata.cfa.is_some() => {
                     self.mixture(classes).map(|prediction| Expectation::of(&prediction, count))
                 }
@@ -385,7 +387,7 @@ impl Tally {
         let tests = match (&whole, planes) {
             _ if !with_tests => Vec::new(),
             (Some(whole), _) => {
-                let names: Vec<String> = reports.iter().map(|channel| channel.name.clone()).collect();
+                let names: Vec<String> = reports.iter().take(3).map(|channel| channel.name.clone()).collect();
                 let mean = [0, 1, 2].map(|i| self.channels.mean[i]);
                 let covariance = covariance.as_ref().map_or_else(Matrix3::zeros, |c| Matrix3::from_fn(|i, j| c[i][j]));
                 whole.tests(&Measured { names: &names, mean, covariance })

@@ -1,0 +1,285 @@
+//! The uncertainty of each pixel of a frame, from the sensor's noise model at the pixel's own level.
+//!
+//! Scenes need not be uniform: each pixel's demosaicked R, G and B tell the signal of the photosites around it, the noise
+//! model their variances, and the weights of its phase (folded back at the edges) its covariance. What varies within the
+//! reach of the weights, three photosites, is taken as level.
+
+use super::{Equations, classes, smooth_hue};
+use crate::cfa::Class;
+use crate::demosaic::Method;
+use crate::demosaic::weights::{Kernel, WeightTable, phase};
+use crate::error::Result;
+use crate::frame::{Geometry, mirror, to_sample};
+use crate::metadata::{AdcRecord, FrameHeader, NoiseRecord};
+use crate::noise::NoiseModel;
+use crate::propagation::sampling::PAIRS;
+use crate::random::Source;
+use crate::units::QuantityKind;
+
+/// The six covariances of a pixel's three channels, in the order of [`PAIRS`].
+pub type Covariance = [f64; 6];
+
+/// Tells the covariance of the demosaicked R, G and B of a pixel from its place and level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PixelNoise {
+    columns: Places,
+    rows: Places,
+    /// Gains of the pixels of each row class and, within, each column class.
+    gains: Vec<PixelGains>,
+    depends_on_hue: bool,
+    variance: LevelVariance,
+    /// What no light reads in the frame, in the unit of its samples.
+    black: f64,
+}
+
+/// Which columns, or rows, are alike: all near the edges differ, those between repeat with the array's period.
+#[derive(Debug, Clone, PartialEq)]
+struct Places {
+    length: usize,
+    reach: usize,
+    /// One place of each kind.
+    examples: Vec<usize>,
+}
+
+impl Places {
+    fn new(length: usize, reach: usize) -> Self {
+        let examples = if length <= 2 * reach + 2 {
+            (0..length).collect()
+        } else {
+            (0..reach + 2).chain(length - reach..length).collect()
+        };
+        Self { length, reach, examples }
+    }
+
+    fn kind(&self, place: usize) -> usize {
+        let Self { length, reach, .. } = *self;
+        if length <= 2 * reach + 2 || place < reach {
+            place
+        } else if place >= length - reach {
+            reach + 2 + place - (length - reach)
+        } else {
+            reach + (place - reach) % 2
+        }
+    }
+}
+
+/// Gains of the variances of the three classes for the six covariances, as polynomials in the pixel's hues: with weights
+/// f + ρ h, cov(k, m) = Σ \[f f + ρ_k h f + ρ_m f h + ρ_k ρ_m h h] σ².
+#[derive(Debug, Clone, PartialEq)]
+struct PixelGains([[[f64; 3]; 4]; 6]);
+
+impl PixelGains {
+    fn new(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
+        let origin = geometry.origin.map(i64::from);
+        let phase = phase(origin[0] + at[0] as i64, origin[1] + at[1] as i64);
+        let folded = |kernel: &Kernel| folded(kernel, at, [geometry.width, geometry.height]);
+        let [fixed, of_hue] = [table.fixed(phase), table.of_hue(phase)].map(|kernels| kernels.each_ref().map(folded));
+        let class = |offset| table.class(phase, offset) as usize;
+        let dot = |a: &Kernel, b: &Kernel| {
+            let mut sums = [0.0; 3];
+            for (offset, weight) in a.sites() {
+                sums[class(offset)] += weight * b.at(offset);
+            }
+            sums
+        };
+        Self(PAIRS.map(|[k, m]| {
+            [
+                dot(&fixed[k], &fixed[m]),
+                dot(&of_hue[k], &fixed[m]),
+                dot(&fixed[k], &of_hue[m]),
+                dot(&of_hue[k], &of_hue[m]),
+            ]
+        }))
+    }
+
+    fn covariance(&self, variances: [f64; 3], hues: Option<[f64; 3]>) -> Covariance {
+        let sum = |gains: &[f64; 3]| gains[0] * variances[0] + gains[1] * variances[1] + gains[2] * variances[2];
+        let mut covariance = [0.0; 6];
+        for ((value, [k, m]), gains) in covariance.iter_mut().zip(PAIRS).zip(&self.0) {
+            *value = sum(&gains[0]);
+            if let Some(hue) = hues {
+                *value += hue[k] * sum(&gains[1]) + hue[m] * sum(&gains[2]) + hue[k] * hue[m] * sum(&gains[3]);
+            }
+        }
+        covariance
+    }
+}
+
+/// The kernel about a pixel of the frame, what lies beyond the edges folded back: sites that coincide add their weights.
+pub(super) fn folded(kernel: &Kernel, at: [usize; 2], frame: [usize; 2]) -> Kernel {
+    let back = |offset: isize, axis: usize| {
+        mirror(at[axis].cast_signed() + offset, frame[axis]).cast_signed() - at[axis].cast_signed()
+    };
+    kernel
+        .sites()
+        .fold(Kernel::zero(), |sum, ([x, y], weight)| sum.plus(weight, &Kernel::site([back(x, 0), back(y, 1)])))
+}
+
+/// Variance of a photosite against its level above black, linear between equally spaced levels.
+///
+/// Variance is a parabola in the level away from saturation, so a table of 1024 steps is off by less than
+/// prnu² step²/4 ≈ 0.02 e² of several hundred.
+#[derive(Debug, Clone, PartialEq)]
+struct LevelVariance {
+    step: f64,
+    values: Vec<f64>,
+}
+
+const STEPS: usize = 1024;
+
+impl LevelVariance {
+    fn new(model: &NoiseModel, adc: Option<&AdcRecord>, dark_frames: u32, largest: f64) -> Self {
+        let step = largest / STEPS as f64;
+        let slope = adc.map_or(1.0, |adc| adc.adu_per_e);
+        let variance = |index: usize| {
+            let expected_e = index as f64 * step / slope;
+            let charge = classes::electrons(model, expected_e, Equations::Exact).moments.variance;
+            match adc {
+                None => charge,
+                // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
+                Some(_) if charge.sqrt() * slope < 0.5 => charge * slope * slope + 1.0 / 12.0,
+                Some(adc) if dark_frames > 0 => {
+                    classes::less_dark(model, adc, expected_e, dark_frames, Equations::Exact).moments.variance
+                }
+                Some(adc) => classes::adu(model, adc, expected_e, Equations::Exact).moments.variance,
+            }
+        };
+        Self { step, values: (0..=STEPS).map(variance).collect() }
+    }
+
+    /// The variance at a level; below zero as at zero, beyond the last as there.
+    fn at(&self, level: f64) -> f64 {
+        let place = (level / self.step).clamp(0.0, STEPS as f64);
+        // A level that is not finite has a neighbour's variance, as its sample has no meaning; `min` and `max` drop NaN.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1024; NaN becomes 0")]
+        let index = (place as usize).min(STEPS - 1);
+        let share = if place.is_nan() { 0.0 } else { place - index as f64 };
+        self.values[index] + share * (self.values[index + 1] - self.values[index])
+    }
+}
+
+impl PixelNoise {
+    /// The noise of the pixels of a demosaicked frame.
+    ///
+    /// # Errors
+    ///
+    /// [`crate::error::Error::MissingKey`] where the metadata name no sensor, exposure or converter;
+    /// [`crate::error::Error::Order`] for a frame that is not demosaicked.
+    pub fn of(frame: &FrameHeader) -> Result<Self> {
+        let metadata = &frame.metadata;
+        let record = metadata.demosaic.as_ref().ok_or_else(|| {
+            frame.out_of_order(
+                format!("it holds {}, and nothing says how it was demosaicked", frame.holds()),
+                "demosaic",
+            )
+        })?;
+        let method = Method::named(&record.method)
+            .ok_or_else(|| frame.refuse(format!("it was demosaicked by `{}`, a method unknown here", record.method)))?;
+        let sensor = frame.sensor()?;
+        let noise = match &metadata.noise {
+            Some(noise) => noise.clone(),
+            None => whole_noise(frame)?,
+        };
+        let model = NoiseModel::of(frame, &noise)?;
+        let dark_frames = metadata.correction.map_or(0, |correction| correction.dark_frames);
+        let (adc, largest, black) = match metadata.quantity {
+            QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
+                (None, sensor.full_well_e, metadata.dark_signal_e.unwrap_or(0.0))
+            }
+            _ => {
+                let adc = metadata.adc.or(Some(AdcRecord {
+                    bits: sensor.bits,
+                    bias_adu: sensor.bias_adu,
+                    adu_per_e: sensor.adu_per_e,
+                }));
+                let largest = sensor.full_well_e * adc.map_or(1.0, |adc| adc.adu_per_e);
+                (adc, largest, metadata.black_level_adu.unwrap_or(0.0))
+            }
+        };
+        let table = WeightTable::new(method, record.cfa);
+        let columns = Places::new(frame.geometry.width, method.reach());
+        let rows = Places::new(frame.geometry.height, method.reach());
+        let gains = rows
+            .examples
+            .iter()
+            .flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]))
+            .map(|at| PixelGains::new(&table, at, &frame.geometry))
+            .collect();
+        let variance = LevelVariance::new(&model, adc.as_ref(), dark_frames, largest);
+        Ok(Self { columns, rows, gains, depends_on_hue: table.depends_on_hue(), variance, black })
+    }
+
+    /// The covariance of the pixel in column `x` and row `y` of the frame, whose samples are `rgb`; and whether
+    /// propagation holds there.
+    ///
+    /// Where smooth hue transition divides by a green that is lost in noise, the covariance is that of the hue which
+    /// green would make at its noise, and says only that it is large.
+    pub fn covariance(&self, [x, y]: [usize; 2], rgb: [f64; 3]) -> (Covariance, bool) {
+        let gains = &self.gains[self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x)];
+        let level = rgb.map(|sample| sample - self.black);
+        let variances = level.map(|level| self.variance.at(level));
+        if !self.depends_on_hue {
+            return (gains.covariance(variances, None), true);
+        }
+        let green = level[Class::Green as usize];
+        let first_order = smooth_hue::FirstOrder::of(level, variances);
+        let floor = variances[Class::Green as usize].sqrt() / 2.0;
+        let divisor = if green > floor { green } else { floor.max(f64::MIN_POSITIVE) };
+        let hues = level.map(|level| {
+            let hue = level.max(0.0) / divisor;
+            if hue.is_finite() { hue } else { 1.0 }
+        });
+        (gains.covariance(variances, Some(hues)), first_order.holds)
+    }
+}
+
+impl PixelNoise {
+    /// Fills three planes of one row with the standard deviations of the pixels whose samples are `rgb`; gives the number
+    /// of those where propagation is void.
+    pub fn fill_stds(&self, y: usize, rgb: [&[f32]; 3], planes: &mut [f32]) -> u64 {
+        let width = rgb[0].len();
+        let mut void = 0;
+        for x in 0..width {
+            let (covariance, holds) = self.covariance([x, y], rgb.map(|plane| f64::from(plane[x])));
+            void += u64::from(!holds);
+            for (plane, std) in stds(&covariance).into_iter().enumerate() {
+                planes[plane * width + x] = to_sample(std);
+            }
+        }
+        void
+    }
+}
+
+/// Everything that the sensor's noise is made of, for a frame whose metadata do not say what was drawn.
+fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
+    let sensor = frame.sensor()?;
+    let temperature_k = sensor.temperature_k;
+    Ok(NoiseRecord {
+        sources: Source::ALL.to_vec(),
+        seed: 0,
+        sensor_seed: 0,
+        frame: 0,
+        temperature_k,
+        dark_e: sensor.dark_current_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
+        poisson: crate::metadata::PoissonKind::Exact,
+        cte: None,
+    })
+}
+
+/// `matrix` Σ `matrix`ᵀ of a covariance in the order of [`PAIRS`].
+pub fn through(covariance: &Covariance, matrix: &nalgebra::Matrix3<f64>) -> Covariance {
+    let whole = symmetric(covariance);
+    let made = matrix * whole * matrix.transpose();
+    PAIRS.map(|[i, j]| made[(i, j)])
+}
+
+/// The symmetric matrix of six covariances.
+pub fn symmetric(covariance: &Covariance) -> nalgebra::Matrix3<f64> {
+    let [rr, rg, rb, gg, gb, bb] = *covariance;
+    nalgebra::Matrix3::new(rr, rg, rb, rg, gg, gb, rb, gb, bb)
+}
+
+/// Standard deviations of the three channels.
+pub fn stds(covariance: &Covariance) -> [f64; 3] {
+    [covariance[0], covariance[3], covariance[5]].map(|variance| variance.max(0.0).sqrt())
+}

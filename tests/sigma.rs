@@ -1,0 +1,240 @@
+//! The uncertainty that a frame carries for each of its pixels, against the scatter of many exposures of many sensors.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::cfa::{CfaPattern, Class};
+use cyanometer::color::{COVARIANCE_LAYER, ColorSettings, Space, ToXyz, White};
+use cyanometer::demosaic::weights::{WeightTable, phase};
+use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::error::Error;
+use cyanometer::frame::mirror;
+use cyanometer::metadata::FrameHeader;
+use cyanometer::mosaic::Mosaic;
+use cyanometer::noise::{AddNoise, NoiseSettings};
+use cyanometer::propagation::Equations;
+use cyanometer::propagation::classes::adu;
+use cyanometer::propagation::pixels::PixelNoise;
+use cyanometer::stage::{MemoryFrame, Stage};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use support::{at, expected, sensor, through};
+
+const WIDTH: usize = 26;
+const HEIGHT: usize = 18;
+
+/// A scene that darkens towards its corners and turns from red to blue across: a tenth within any pixel's reach.
+fn scene() -> MemoryFrame {
+    expected(WIDTH, HEIGHT, |x, y, class| {
+        let (dx, dy) = (x as f32 / WIDTH as f32 - 0.5, y as f32 / HEIGHT as f32 - 0.5);
+        let fall_off = 1.0 / (1.0 + dx * dx + dy * dy).powi(2);
+        let level = [6000.0 - 3000.0 * dx, 9000.0, 12_000.0 + 6000.0 * dx][class as usize];
+        level * fall_off
+    })
+}
+
+fn plane(scene: &MemoryFrame, seed: u64) -> MemoryFrame {
+    let settings = NoiseSettings { seed, sensor_seed: seed, ..Default::default() };
+    let mosaic = through(scene, &Mosaic::new(&scene.header, None).unwrap());
+    let electrons = through(&mosaic, &AddNoise::new(&mosaic.header, &settings).unwrap());
+    through(&electrons, &Digitize::new(&electrons.header, &AdcSettings::default()).unwrap())
+}
+
+fn demosaicking(plane: &MemoryFrame, method: Method) -> Demosaic {
+    Demosaic::new(&plane.header, method, Black::Auto, None).unwrap()
+}
+
+fn demosaicked(plane: &MemoryFrame, method: Method) -> MemoryFrame {
+    through(plane, &demosaicking(plane, method).with_sigma().unwrap())
+}
+
+fn coloring(camera: &FrameHeader, space: Space) -> ToXyz {
+    let settings = ColorSettings {
+        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
+        method: None,
+        space,
+        white: White::D65,
+        white_luminance: None,
+    };
+    ToXyz::new(camera, &settings).unwrap().with_sigma(camera).unwrap()
+}
+
+/// Many exposures of as many sensors, demosaicked with standard deviations or turned into colours with them.
+fn exposures(method: Method, space: Option<Space>) -> Vec<MemoryFrame> {
+    let scene = scene();
+    // What a stage knows does not hang on the seeds.
+    let first = plane(&scene, 0);
+    let camera = demosaicking(&first, method);
+    let with_sigma = demosaicking(&first, method).with_sigma().unwrap();
+    let color = space.map(|space| coloring(camera.header(), space));
+    let expose = |seed: u64| {
+        let plane = plane(&scene, seed);
+        match &color {
+            None => through(&plane, &with_sigma),
+            Some(color) => through(&through(&plane, &camera), color),
+        }
+    };
+    (0..FRAMES).into_par_iter().map(expose).collect()
+}
+
+const FRAMES: u64 = 500;
+
+/// Groups of pixels that a wrong gain would show in: the four phases within, and the rim.
+fn group(x: usize, y: usize) -> usize {
+    let inner = |place: usize, length: usize| (3..length - 3).contains(&place);
+    if inner(x, WIDTH) && inner(y, HEIGHT) { phase(x as i64, y as i64) } else { 4 }
+}
+
+/// Mean of (x − x̄)²/σ² over frames and pixels of each group and channel is 1 − 1/n; its error is that of a variance of
+/// 500 frames by pixels, a quarter of which count since neighbours are correlated: √(2 · 4/(500 · 60)) = 1.6 % for a
+/// phase. Levels that change by a tenth within reach move variances by their curvature, below 1 %.
+#[test]
+fn pixels_scatter_by_their_standard_deviation() {
+    for method in Method::ALL {
+        for space in [None, Some(Space::Xyz), Some(Space::Lab), Some(Space::Xyy)] {
+            let frames = exposures(method, space);
+            let n = FRAMES as f64;
+            let mut sums = [[0.0; 3]; 5];
+            let mut counts = [0.0; 5];
+            for y in 0..HEIGHT {
+                for x in 0..WIDTH {
+                    let group = group(x, y);
+                    counts[group] += 1.0;
+                    for (channel, sum) in sums[group].iter_mut().enumerate() {
+                        let value = |frame: &MemoryFrame| f64::from(at(frame, x, y, channel));
+                        let mean = frames.iter().map(value).sum::<f64>() / n;
+                        let deviate = |frame: &MemoryFrame| {
+                            let sigma = f64::from(at(frame, x, y, 3 + channel));
+                            ((value(frame) - mean) / sigma).powi(2)
+                        };
+                        *sum += frames.iter().map(deviate).sum::<f64>() / (n - 1.0);
+                    }
+                }
+            }
+            for (group, (sums, count)) in sums.iter().zip(counts).enumerate() {
+                for (channel, sum) in sums.iter().enumerate() {
+                    let found = sum / count;
+                    assert!(
+                        (found - 1.0).abs() < 5.0 * 0.016 + 0.01,
+                        "{method:?}, {space:?}, group {group}, channel {channel}: {found}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// With the covariance of XYZ, the squared Mahalanobis distance from the mean is 3 on average.
+#[test]
+fn xyz_scatter_by_their_covariance() {
+    let frames = exposures(Method::EffectiveColor, Some(Space::Xyz));
+    assert_eq!(frames[0].header.geometry.channels[6..], COVARIANCE_LAYER);
+    let n = FRAMES as f64;
+    let (mut sum, mut count) = (0.0, 0.0);
+    for y in 0..HEIGHT {
+        for x in 0..WIDTH {
+            let value = |frame: &MemoryFrame| Vector3::from([0, 1, 2].map(|c| f64::from(at(frame, x, y, c))));
+            let mean = frames.iter().map(value).sum::<Vector3<f64>>() / n;
+            for frame in &frames {
+                let [xx, xy, xz, yy, yz, zz] = [6, 7, 8, 9, 10, 11].map(|c| f64::from(at(frame, x, y, c)));
+                let covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+                let offset = value(frame) - mean;
+                sum += (offset.transpose() * covariance.try_inverse().unwrap() * offset)[0];
+                count += (n - 1.0) / n;
+                // The layer of standard deviations is its diagonal.
+                let sigma = f64::from(at(frame, x, y, 4));
+                assert!((sigma * sigma / yy - 1.0).abs() < 1e-5);
+            }
+        }
+    }
+    // Variance of a squared distance of three dimensions is 6: √(6 · 4/(500 · 468))/3 = 0.3 %, and 1 % for changing levels.
+    assert!((sum / count / 3.0 - 1.0).abs() < 0.025, "{}", sum / count);
+}
+
+/// The gains against weights that are spread out over the sites of small frames one by one.
+#[test]
+fn gains_agree_with_weights_site_by_site() {
+    for (width, height) in [(26, 18), (7, 9), (2, 3)] {
+        for method in Method::ALL {
+            for cfa in CfaPattern::ALL {
+                let mut frame = expected(width, height, |_, _, class| [4000.0, 8000.0, 6000.0][class as usize]);
+                frame.header.geometry.origin = [1, 2];
+                let mosaic = through(&frame, &Mosaic::new(&frame.header, Some(cfa)).unwrap());
+                let settings = NoiseSettings { seed: 1, ..Default::default() };
+                let noisy = AddNoise::new(&mosaic.header, &settings).unwrap().header().clone();
+                let codes = Digitize::new(&noisy, &AdcSettings::default()).unwrap().header().clone();
+                let camera = Demosaic::new(&codes, method, Black::Auto, None).unwrap().header().clone();
+                let noise = PixelNoise::of(&camera).unwrap();
+                let model = cyanometer::noise::NoiseModel::of(&codes, codes.metadata.noise.as_ref().unwrap()).unwrap();
+                let adc = codes.metadata.adc.unwrap();
+                let variances =
+                    [4000.0, 8000.0, 6000.0].map(|e| adu(&model, &adc, e, Equations::Exact).moments.variance);
+                let level = [4000.0, 8000.0, 6000.0].map(|e| e * adc.adu_per_e);
+                let weights = WeightTable::new(method, cfa).about([0.5, 0.75]);
+                for y in 0..height {
+                    for x in 0..width {
+                        let (found, holds) = noise.covariance([x, y], level);
+                        assert!(holds);
+                        let mut on_sites = vec![[0.0; 2]; width * height];
+                        let place = phase(x as i64 + 1, y as i64 + 2);
+                        for channel in [Class::Red, Class::Green] {
+                            for ([dx, dy], weight) in weights.kernel(place, channel as usize).sites() {
+                                let column = mirror(x.cast_signed() + dx, width);
+                                let row = mirror(y.cast_signed() + dy, height);
+                                on_sites[row * width + column][channel as usize] += weight;
+                            }
+                        }
+                        let (mut red, mut green_red) = (0.0, 0.0);
+                        for (site, [of_red, of_green]) in on_sites.iter().enumerate() {
+                            let class = cfa.class((site % width) as i64 + 1, (site / width) as i64 + 2);
+                            red += of_red * of_red * variances[class as usize];
+                            green_red += of_red * of_green * variances[class as usize];
+                        }
+                        // The table of variances is off by less than 10⁻⁵ here.
+                        assert!((found[0] / red - 1.0).abs() < 1e-5, "{method:?} {cfa} {x},{y}: {} {red}", found[0]);
+                        assert!((found[1] - green_red).abs() < 1e-5 * red, "{method:?} {cfa} {x},{y}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Blue twenty times green, green from its noise floor to well above it: everything stays finite, and pixels where
+/// smooth hue transition divides by noise are counted.
+#[test]
+fn greens_lost_in_noise_are_finite_and_counted() {
+    for (green, is_void) in [(0.0, true), (20.0, true), (50.0, true), (1900.0, false)] {
+        let scene = expected(40, 30, |_, _, class| match class {
+            Class::Blue => 20.0 * green,
+            _ => green,
+        });
+        let plane = plane(&scene, 4);
+        let stage = Demosaic::new(&plane.header, Method::SmoothHue, Black::Auto, None).unwrap().with_sigma().unwrap();
+        let (camera, counts) = plane.through(&stage).unwrap();
+        assert!(camera.samples.iter().all(|sample| sample.is_finite()), "{green}");
+        assert_eq!(counts.propagation_void > 600, is_void, "{green}: {}", counts.propagation_void);
+        assert!(is_void || counts.propagation_void == 0);
+    }
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let mut plane = plane(&scene(), 1);
+    plane.header.metadata.sensor = None;
+    let refused = Demosaic::new(&plane.header, Method::Bilinear, Black::Auto, None).unwrap().with_sigma().unwrap_err();
+    assert!(matches!(refused, Error::MissingKey { key: "sensor", .. }), "{refused}");
+}
+
+/// A frame without noise record, as a real camera's, has all of its sensor's noise.
+#[test]
+fn a_frame_without_noise_record_has_its_sensors_noise() {
+    let scene = scene();
+    let plane = plane(&scene, 9);
+    let mut real = plane.clone();
+    real.header.metadata.noise = None;
+    let (known, guessed) = (demosaicked(&plane, Method::Malvar), demosaicked(&real, Method::Malvar));
+    assert_eq!(known.samples, guessed.samples);
+}
