@@ -95,6 +95,7 @@ fn pixels_scatter_by_their_standard_deviation() {
     for method in Method::ALL {
         for space in [None, Some(Space::Xyz), Some(Space::Lab), Some(Space::Xyy)] {
             let frames = exposures(method, space);
+            let sigmas = if space == Some(Space::Xyz) { 9 } else { 3 };
             let n = FRAMES as f64;
             let mut sums = [[0.0; 3]; 5];
             let mut counts = [0.0; 5];
@@ -106,7 +107,7 @@ fn pixels_scatter_by_their_standard_deviation() {
                         let value = |frame: &MemoryFrame| f64::from(at(frame, x, y, channel));
                         let mean = frames.iter().map(value).sum::<f64>() / n;
                         let deviate = |frame: &MemoryFrame| {
-                            let sigma = f64::from(at(frame, x, y, 3 + channel));
+                            let sigma = f64::from(at(frame, x, y, sigmas + channel));
                             ((value(frame) - mean) / sigma).powi(2)
                         };
                         *sum += frames.iter().map(deviate).sum::<f64>() / (n - 1.0);
@@ -130,7 +131,7 @@ fn pixels_scatter_by_their_standard_deviation() {
 #[test]
 fn xyz_scatter_by_their_covariance() {
     let frames = exposures(Method::EffectiveColor, Some(Space::Xyz));
-    assert_eq!(frames[0].header.geometry.channels[6..], COVARIANCE_LAYER);
+    assert_eq!(frames[0].header.geometry.channels[3..9], COVARIANCE_LAYER);
     let n = FRAMES as f64;
     let (mut sum, mut count) = (0.0, 0.0);
     for y in 0..HEIGHT {
@@ -138,13 +139,13 @@ fn xyz_scatter_by_their_covariance() {
             let value = |frame: &MemoryFrame| Vector3::from([0, 1, 2].map(|c| f64::from(at(frame, x, y, c))));
             let mean = frames.iter().map(value).sum::<Vector3<f64>>() / n;
             for frame in &frames {
-                let [xx, xy, xz, yy, yz, zz] = [6, 7, 8, 9, 10, 11].map(|c| f64::from(at(frame, x, y, c)));
+                let [xx, xy, xz, yy, yz, zz] = [3, 4, 5, 6, 7, 8].map(|c| f64::from(at(frame, x, y, c)));
                 let covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
                 let offset = value(frame) - mean;
                 sum += (offset.transpose() * covariance.try_inverse().unwrap() * offset)[0];
                 count += (n - 1.0) / n;
                 // The layer of standard deviations is its diagonal.
-                let sigma = f64::from(at(frame, x, y, 4));
+                let sigma = f64::from(at(frame, x, y, 10));
                 assert!((sigma * sigma / yy - 1.0).abs() < 1e-5);
             }
         }

@@ -301,11 +301,12 @@ impl ToXyz {
             }
         };
         self.sigma = Some(PixelNoise::of(input)?);
+        // In the order in which files have layers.
         let channels = &mut self.header.geometry.channels;
-        channels.extend(layer.map(str::to_owned));
         if self.space == Space::Xyz {
             channels.extend(COVARIANCE_LAYER.map(str::to_owned));
         }
+        channels.extend(layer.map(str::to_owned));
         Ok(self)
     }
 
@@ -325,13 +326,10 @@ impl ToXyz {
             Space::Xyy => xyy_about(xyz).map_or([0.0; 6], |local| pixels::through(&of_xyz, &local.jacobian)),
             Space::Xyz | Space::Srgb => of_xyz,
         };
-        for (plane, std) in pixels::stds(&covariance).into_iter().enumerate() {
-            planes[plane * width + x] = to_sample(std);
-        }
-        if self.space == Space::Xyz {
-            for (plane, value) in covariance.into_iter().enumerate() {
-                planes[(3 + plane) * width + x] = to_sample(value);
-            }
+        let covariances = if self.space == Space::Xyz { &covariance[..] } else { &[] };
+        let layers = covariances.iter().copied().chain(pixels::stds(&covariance));
+        for (plane, value) in layers.enumerate() {
+            planes[plane * width + x] = to_sample(value);
         }
         holds
     }

@@ -403,8 +403,9 @@ fn read_tags(header: &Header) -> ExrTags {
     }
 }
 
-/// The order in which channels are worked on: R, G, B (or Y; x, y, Y; L, a, b) first, the rest as the file has them.
-/// Where all belong to layers, as in `left.R`, what stands behind the last dot counts.
+/// The order in which channels are worked on: R, G, B (or Y; x, y, Y; L, a, b) first, the rest layer by layer as the file
+/// has them, each again R, G, B (or the like) first. Where all belong to layers, as in `left.R`, what stands behind the
+/// last dot counts.
 fn canonical_order(names: &[String]) -> Vec<usize> {
     let place = |wanted: &str| {
         let exact = names.iter().position(|name| name == wanted);
@@ -415,7 +416,21 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
         .find_map(|set| set.iter().map(|name| place(name)).collect())
         .unwrap_or_default();
     let mut order: Vec<usize> = (0..names.len()).collect();
-    order.sort_by_key(|place| leading.iter().position(|leader| leader == place).unwrap_or(leading.len()));
+    let layer = |place: usize| names[place].len() - bare_name(&names[place]).len();
+    let first_of_layer = |place: usize| {
+        let prefix = &names[place].as_bytes()[..layer(place)];
+        names.iter().position(|name| name.as_bytes().starts_with(prefix))
+    };
+    let rank = |place: usize| {
+        ["R", "G", "B", "x", "y", "Y", "L", "a", "b"]
+            .iter()
+            .position(|name| *name == bare_name(&names[place]))
+            .unwrap_or(9)
+    };
+    order.sort_by_key(|&place| {
+        let leads = leading.iter().position(|leader| *leader == place);
+        (leads.unwrap_or(leading.len()), if leads.is_none() { first_of_layer(place) } else { None }, rank(place))
+    });
     order
 }
 
