@@ -52,7 +52,42 @@ def effective_color(cfa, masks):
     return result
 
 
-METHODS = {"bi": bilinear, "shti": smooth_hue, "eci": effective_color}
+# Eighths of Malvar, He and Cutler's filters (ICASSP 2004, Fig. 2): green at red or blue; red (blue) at green with red
+# (blue) beside it, and above and below it; red at blue, blue at red.
+MALVAR_GREEN = [[0, 0, -1, 0, 0], [0, 0, 2, 0, 0], [-1, 2, 4, 2, -1], [0, 0, 2, 0, 0], [0, 0, -1, 0, 0]]
+MALVAR_BESIDE = [[0, 0, 0.5, 0, 0], [0, -1, 0, -1, 0], [-1, 4, 5, 4, -1], [0, -1, 0, -1, 0], [0, 0, 0.5, 0, 0]]
+MALVAR_OPPOSITE = [[0, 0, -1.5, 0, 0], [0, 2, 0, 2, 0], [-1.5, 0, 6, 0, -1.5], [0, 2, 0, 2, 0], [0, 0, -1.5, 0, 0]]
+
+
+def filtered(plane, eighths):
+    height, width = plane.shape
+    rows = [mirror(y, height) for y in range(-2, height + 2)]
+    columns = [mirror(x, width) for x in range(-2, width + 2)]
+    padded = plane[np.ix_(rows, columns)]
+    weights = np.asarray(eighths) / 8
+    return sum(
+        weights[y, x] * padded[y : y + height, x : x + width] for y in range(5) for x in range(5) if weights[y, x]
+    )
+
+
+def mirror(index, length):
+    """...2 1 | 0 1 2...: the edge is not repeated."""
+    index = abs(index) % (2 * (length - 1))
+    return min(index, 2 * (length - 1) - index)
+
+
+def malvar(cfa, masks):
+    beside, above = filtered(cfa, MALVAR_BESIDE), filtered(cfa, np.transpose(MALVAR_BESIDE))
+    opposite = filtered(cfa, MALVAR_OPPOSITE)
+    result = {"G": np.where(masks["G"], cfa, filtered(cfa, MALVAR_GREEN))}
+    for name in "RB":
+        has_beside = masks["G"] & masks[name].any(axis=1, keepdims=True)
+        at_green = np.where(has_beside, beside, above)
+        result[name] = np.where(masks[name], cfa, np.where(masks["G"], at_green, opposite))
+    return result
+
+
+METHODS = {"bi": bilinear, "shti": smooth_hue, "eci": effective_color, "mhc": malvar}
 
 
 class Demosaic(ProgramCase):
@@ -99,6 +134,9 @@ class Demosaic(ProgramCase):
 
     def test_effective_color(self):
         self.check("eci", 100, 0, 4096)
+
+    def test_malvar(self):
+        self.check("mhc", 100, 0, 4096)
 
     def test_signed_values_are_kept(self):
         self.check("bi", 1753, 1700, 1800, [(8, 6)])
