@@ -361,6 +361,69 @@ fn darks_and_transfer_are_taken_back() {
     }
 }
 
+/// Predictions, checks and layers of uncertainty as a shell sees them, and the likely mistakes.
+#[test]
+fn noise_is_predicted_checked_and_carried_along() {
+    let shop = Workshop::new();
+    shop.pipe(
+        "render-radiance --electrons 900,9000,19000 --size 60x50 | add-noise | digitize | mosaic | demosaic -o rgb.exr",
+    );
+    shop.run(
+        "fit-matrix -q --train 20 SAMPLES -o m.yaml"
+            .replace("SAMPLES", &format!("{TREE}/sample_data/skies/sky912.exr"))
+            .as_str(),
+        &[],
+    );
+    assert!(shop.attempt("measure rgb.exr --check", &[]).status.success());
+    let failed = shop.attempt("measure rgb.exr --check --equations paper --level 1", &[]);
+    assert_eq!(failed.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&failed.stdout).contains("not as predicted: 9 tests"));
+    assert!(String::from_utf8_lossy(&failed.stderr).starts_with("measure: rgb.exr: it is not as predicted"));
+    // Layers go to a file, and down a pipe into the next stage, which takes R, G and B of them.
+    shop.pipe("render-radiance --electrons 900,9000,19000 --size 60x50 --cfa rggb | add-noise | digitize -o cfa.exr");
+    shop.pipe("demosaic cfa.exr --sigma | to-xyz --matrix m.yaml --sigma -o xyz.exr");
+    assert_eq!(shop.read("xyz.exr").0.len(), 60 * 50 * 3);
+    let measured = String::from_utf8(shop.run("measure xyz.exr --output-format csv", &[])).unwrap();
+    for channel in ["X", "Z", "covariance.XY", "sigma.R"] {
+        assert!(measured.contains(&format!(",{channel},3000,")), "{channel}: {measured}");
+    }
+    for (line, status, complaint) in [
+        (
+            "demosaic cfa.exr --sigma -o s.tiff",
+            2,
+            "a TIFF has no names for the layers of standard deviations; write an EXR",
+        ),
+        (
+            "to-xyz rgb.exr --matrix m.yaml --space srgb --sigma",
+            2,
+            "--sigma gives the uncertainty of xyz, xyy or lab; srgb is a picture to look at",
+        ),
+        ("predict-noise", 2, "give a spectrum, --electrons R,G,B, --dark or --sweep"),
+        ("predict-noise --dark --sweep 1:10:3lin", 2, "a sweep scales the signal of a scene, but this one is dark"),
+        (
+            "predict-noise --dark --method mhc --equations paper",
+            2,
+            "the paper has no equations for the method mhc; choose bi, shti or eci",
+        ),
+        ("predict-noise --dark --uncertainty 1jnd", 2, "an uncertainty in jnd needs colours; give --matrix FILE"),
+        (
+            "predict-noise --dark --plot curve.jpg",
+            2,
+            "curve.jpg: a plot is written as SVG or PNG; end the name in .svg or .png",
+        ),
+        (
+            "measure cfa.exr --check --region 70,0,5,5",
+            2,
+            "cfa.exr: region 70,0,5,5 does not lie within the frame of 60x50",
+        ),
+    ] {
+        let output = shop.attempt(line, &[]);
+        let program = line.split(' ').next().unwrap();
+        assert_eq!(String::from_utf8_lossy(&output.stderr), format!("{program}: {complaint}\n"), "{line}");
+        assert_eq!(output.status.code(), Some(status), "{line}");
+    }
+}
+
 /// What works, but may not be what was meant.
 #[test]
 fn planes_apart_and_unlike_darks_are_told_of() {

@@ -128,6 +128,10 @@ impl Demosaic {
             known => known,
         };
         let mut made = metadata.becoming(quantity);
+        if metadata.cfa.is_some_and(|known| known != cfa) {
+            // Seen through another pattern than its own, a uniform scene is none.
+            made.scene = None;
+        }
         made.cfa = None;
         made.demosaic = Some(DemosaicRecord { method: method.names()[0].into(), cfa, black: level });
         match quantity {

@@ -8,6 +8,7 @@
 use super::{Method, malvar};
 use crate::cfa::{CfaPattern, Class};
 use nalgebra::Matrix3;
+use std::sync::OnceLock;
 
 /// The farthest row or column that any method's weights reach.
 pub const REACH: isize = 3;
@@ -153,6 +154,12 @@ pub struct WeightTable {
 }
 
 impl WeightTable {
+    /// The weights of `method` on an array of `pattern`, worked out once.
+    pub fn of(method: Method, pattern: CfaPattern) -> &'static Self {
+        static TABLES: [[OnceLock<WeightTable>; 4]; 4] = [const { [const { OnceLock::new() }; 4] }; 4];
+        TABLES[method as usize][pattern as usize].get_or_init(|| Self::new(method, pattern))
+    }
+
     /// The weights of `method` on an array of `pattern`.
     pub fn new(method: Method, pattern: CfaPattern) -> Self {
         let zero = || PHASES.map(|_| Class::ALL.map(|_| Kernel::zero()));

@@ -78,7 +78,7 @@ impl Mixture {
         let record = frame.metadata.demosaic.as_ref()?;
         let mean = sites.map(|site| site.moments.mean - record.black);
         let hues = hues(mean);
-        let weights = WeightTable::new(method, record.cfa).about(hues);
+        let weights = WeightTable::of(method, record.cfa).about(hues);
         let variances = sites.map(|site| site.moments.variance);
         let mut bias = [0.0; 3];
         let covariance = match equations {

@@ -242,7 +242,7 @@ struct Exact {
 
 impl Exact {
     fn new(variances: [f64; 3]) -> Self {
-        let weights = WeightTable::new(Method::EffectiveColor, CfaPattern::Rggb).about([1.0, 1.0]);
+        let weights = WeightTable::of(Method::EffectiveColor, CfaPattern::Rggb).about([1.0, 1.0]);
         Self { weights, variances }
     }
 

@@ -196,14 +196,14 @@ impl PixelNoise {
                 (adc, largest, metadata.black_level_adu.unwrap_or(0.0))
             }
         };
-        let table = WeightTable::new(method, record.cfa);
+        let table = WeightTable::of(method, record.cfa);
         let columns = Places::new(frame.geometry.width, method.reach());
         let rows = Places::new(frame.geometry.height, method.reach());
         let gains = rows
             .examples
             .iter()
             .flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]))
-            .map(|at| PixelGains::new(&table, at, &frame.geometry))
+            .map(|at| PixelGains::new(table, at, &frame.geometry))
             .collect();
         let variance = LevelVariance::new(&model, adc.as_ref(), dark_frames, largest);
         Ok(Self { columns, rows, gains, depends_on_hue: table.depends_on_hue(), variance, black })

@@ -61,7 +61,7 @@ pub fn second_order(
     if method != Method::SmoothHue || !FirstOrder::of(mean, variances).holds {
         return None;
     }
-    let weights = WeightTable::new(method, pattern).about(super::hues(mean));
+    let weights = WeightTable::of(method, pattern).about(super::hues(mean));
     let moments = [0, 1, 2, 3].map(|phase| {
         let linear = mixture::pixel(&weights, phase).covariance(variances);
         of_phase(pattern, phase, mean, variances, third, linear)
