@@ -1,4 +1,4 @@
-//! Throughput of the stages in samples per second, on a frame of 1332×1000 in memory.
+//! Throughput of the stages in samples per second, on a frame of 1332×1000 in memory, and the time of a prediction.
 //!
 //! `cargo bench` prints medians; compare figures of one run only.
 
@@ -14,6 +14,7 @@ use cyanometer::mosaic::Mosaic;
 use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::optics::Exposure;
 use cyanometer::propagation::Equations;
+use cyanometer::propagation::chain::{Chain, ChainSettings};
 use cyanometer::stage::{MemoryFrame, Stage};
 use cyanometer::statistics::measure;
 use cyanometer::units::QuantityKind;
@@ -87,5 +88,29 @@ fn stages(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, stages);
+/// One scene through the whole chain by formula: electrons, ADU, demosaicked, and by the exact moments alone.
+fn predictions(criterion: &mut Criterion) {
+    let Ok(loaded) = data::load_sensor(data::DEFAULT_SENSOR) else { return };
+    let mut group = criterion.benchmark_group("predictions");
+    for method in Method::ALL {
+        let settings = ChainSettings {
+            sensor: loaded.sensor.clone(),
+            exposure: Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 },
+            noise: NoiseSettings::default(),
+            method,
+            pattern: None,
+            color: None,
+            dark_frames: 0,
+            equations: Equations::Exact,
+            patch: None,
+            patch_at: None,
+            wanted: None,
+        };
+        let Ok(mut chain) = Chain::new(settings) else { return };
+        group.bench_function(method.names()[0], |bencher| bencher.iter(|| chain.predict([8000.0, 12_000.0, 20_000.0])));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, stages, predictions);
 criterion_main!(benches);

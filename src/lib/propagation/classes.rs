@@ -111,9 +111,9 @@ pub fn adu(model: &NoiseModel, adc: &AdcRecord, expected_e: f64, equations: Equa
 }
 
 /// Whether rounding adds 1/12 to the variance and −1/120 to the fourth cumulant, Sheppard's corrections, and no more:
-/// what else it does is below e^(−2π²σ²), 10⁻¹⁹ at σ = 1.5 codes, away from both ends of the range by 9 σ.
+/// what else it does is below e^(−2π²σ²), 4·10⁻¹⁴ at σ = 1.25 codes, away from both ends of the range by 9 σ.
 fn is_smooth(mean: f64, sigma: f64, adc: &AdcRecord) -> bool {
-    sigma >= 1.5 && mean > 9.0 * sigma && mean + 9.0 * sigma < f64::from(adc.top_code())
+    sigma >= 1.25 && mean > 9.0 * sigma && mean + 9.0 * sigma < f64::from(adc.top_code())
 }
 
 /// A cause of variance.
@@ -462,7 +462,7 @@ mod tests {
     #[test]
     fn smooth_rounding_is_the_sum_over_codes() {
         let model = NoiseModel { read_noise_e: 15.7, ..paper_model() };
-        for electrons_e in [400.0, 500.5, 3000.0, 30_000.0] {
+        for electrons_e in [0.0, 10.0, 400.0, 500.5, 3000.0, 30_000.0] {
             let found = adu(&model, &ADC, electrons_e, Equations::Exact);
             let charge = electrons(&model, electrons_e, Equations::Exact).moments;
             let (mean, sigma) = (ADC.bias_adu + ADC.adu_per_e * charge.mean, ADC.adu_per_e * charge.std());
