@@ -1,6 +1,7 @@
 //! Colour: from camera signals to CIE XYZ and on to xyY, L*a*b* and a viewable sRGB.
 
 pub mod characterization;
+pub mod difference;
 
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};

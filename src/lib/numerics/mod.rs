@@ -1,5 +1,6 @@
 //! Mathematics that knows no camera.
 
+pub mod distribution;
 pub mod least_squares;
 pub mod moments;
 pub mod normal;

@@ -8,6 +8,7 @@ use super::smooth_hue::FirstOrder;
 use super::{Equations, FramePrediction, Mixture, Prediction, from_sites, mixture, of_plane};
 use crate::adc::{AdcSettings, Digitize};
 use crate::cfa::CfaPattern;
+use crate::color::difference::DELTA_E_PER_JND;
 use crate::color::{ColorSettings, Space, ToXyz};
 use crate::correct::{CorrectFrame, CorrectionSettings};
 use crate::demosaic::weights::PHASES;
@@ -60,9 +61,6 @@ pub enum Uncertainty {
     /// Expected colour difference, in just noticeable differences of 2.3 ΔE*ab.
     Jnd(f64),
 }
-
-/// ΔE*ab of a just noticeable difference [HP2005, Sec. 4.1].
-pub const DELTA_E_PER_JND: f64 = 2.3;
 
 /// The stages of the chain, ready to predict one scene after another.
 #[derive(Debug, Clone)]
