@@ -15,8 +15,8 @@ PATCH, MARGIN = 10, 3
 WITHOUT_NOISE = ["add-noise", "--without", "dcsn,dcnu,ssn,prnu,ron"]
 
 
-def library_radiance():
-    channels = read_planes(sample_data("skies/sky912.exr"))
+def library_radiance(name="sky912"):
+    channels = read_planes(sample_data(f"skies/{name}.exr"))
     return np.stack([channels[f"S0.{nm},000000nm"] for nm in range(360, 831)], axis=-1).astype(np.float64)
 
 
@@ -81,12 +81,38 @@ class Chain(ProgramCase):
         self.assertLess(np.median(np.abs(short / long - 1)[used]), 0.01)
 
 
+def library_meta(name):
+    path = sample_data(f"skies/{name}_meta.csv")
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines))
+
+
 class Reference(unittest.TestCase):
-    def test_luminance_and_chromaticity_of_the_library(self):
-        path = sample_data("skies/sky912_meta.csv")
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-        meta = list(csv.DictReader(lines))
-        xyz = tristimulus(library_radiance()).reshape(912, 3)
+    def agrees_with_its_table(self, name, width, height):
+        radiance, meta = library_radiance(name), library_meta(name)
+        self.assertEqual(radiance.shape, (height, width, 471))
+        self.assertTrue(np.isfinite(radiance).all() and (radiance > 0).all())
+        self.assertEqual([int(row["id"]) for row in meta], list(range(width * height)))
+        xyz = tristimulus(radiance).reshape(width * height, 3)
         np.testing.assert_allclose(xyz[:, 1], [float(row["Y_cd_m2"]) for row in meta], rtol=2e-5)
         stated = [[float(row["x"]), float(row["y"])] for row in meta]
         np.testing.assert_allclose(chromaticity(xyz), stated, atol=1e-5)
+
+    def test_luminance_and_chromaticity_of_the_library(self):
+        self.agrees_with_its_table("sky912", 38, 24)
+
+    def test_luminance_and_chromaticity_of_the_measured_library(self):
+        self.agrees_with_its_table("kider2014", 80, 20)
+
+    def test_measured_library_leaves_the_first_direction_of_each_scan_out(self):
+        originals = [int(row["original_id"]) for row in library_meta("kider2014")]
+        self.assertEqual(originals, [81 * scan + direction for scan in range(20) for direction in range(1, 81)])
+
+    def test_measured_library_keeps_all_digits(self):
+        # A spectrum of the same set that stands beside the library as text.
+        lines = sample_data("skies/measured_blue.csv").read_text(encoding="utf-8").splitlines()
+        self.assertTrue(lines[0].startswith("# Sky radiance, measured; id 1432 of the original set"))
+        digits = [line.split(",")[1] for line in lines if line[0].isdigit()]
+        (number,) = (int(row["id"]) for row in library_meta("kider2014") if row["original_id"] == "1432")
+        spectrum = library_radiance("kider2014").reshape(-1, 471)[number]
+        self.assertEqual([f"{value:.4e}" for value in spectrum], digits)
