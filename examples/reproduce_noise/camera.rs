@@ -2,7 +2,8 @@
 
 use cyanometer::adc::{AdcSettings, Digitize};
 use cyanometer::cfa::Class;
-use cyanometer::color::characterization::{fit_sky_rad_ls, signals};
+use cyanometer::color::characterization::regression::{FitSettings, fit};
+use cyanometer::color::characterization::signals;
 use cyanometer::color::{self, ColorSettings, Space, ToXyz, White};
 use cyanometer::demosaic::{Black, Demosaic, Method};
 use cyanometer::error::{Error, Result};
@@ -55,7 +56,8 @@ impl Camera {
         let grid = WavelengthGrid::default();
         let signals = signals(&library, &loaded.sensor, &loaded.response, &data::load_observer()?, &grid)?;
         let all: Vec<usize> = (0..library.radiance.nrows()).collect();
-        let (xyz_from_camera, _, _) = fit_sky_rad_ls(&signals, &all, "sky912.exr")?;
+        let settings = FitSettings { training: all, ..FitSettings::default() };
+        let xyz_from_camera = fit(&signals, &signals, &settings, None)?.xyz_from_camera;
         let sensor = loaded.sensor;
         let skies = signals.camera.row_iter().map(|row| {
             let full = 0.75 * sensor.full_well_e / row.max();

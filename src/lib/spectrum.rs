@@ -165,6 +165,8 @@ pub struct SpectralLibrary {
     pub wavelength_nm: Vec<f64>,
     /// Spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, shape samples × wavelengths.
     pub radiance: Array2<f64>,
+    /// Samples in a row of the image they come from; all of them for a table.
+    pub columns: usize,
 }
 
 impl SpectralLibrary {

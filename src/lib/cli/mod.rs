@@ -1,5 +1,6 @@
 //! The command line: start, fail, exit, and the options that programs share.
 
+pub mod characterization;
 mod history;
 pub mod options;
 pub mod prediction;

@@ -2,10 +2,13 @@
 
 use crate::cfa::CfaPattern;
 use crate::color::White;
+use crate::color::characterization::evaluation::{self, Filling};
+use crate::color::characterization::regression::Regression;
 use crate::demosaic::{Black, Method};
 use crate::formats::data;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
+use crate::optics::Exposure;
 use crate::random::Source;
 use crate::statistics::Region;
 use crate::units::RadianceUnit;
@@ -23,6 +26,14 @@ pub const METHODS: [(&str, Method); 8] = [
     ("effective-color", Method::EffectiveColor),
     ("mhc", Method::Malvar),
     ("malvar", Method::Malvar),
+];
+
+/// The regressions by their names.
+pub const REGRESSIONS: [(&str, Regression); 4] = [
+    ("sky-rad-ls", Regression::SkyRadLs),
+    ("sky-rad-sppls", Regression::SkyRadSppls),
+    ("max-ign-sppls", Regression::MaxIgnSppls),
+    ("max-ign-positive-sppls", Regression::MaxIgnPositiveSppls),
 ];
 
 /// The sources of noise by their names.
@@ -126,6 +137,51 @@ pub enum ProgressWhen {
     Never,
 }
 
+/// How each sample of a library is exposed.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct SampleExposure {
+    /// Exposure time in s of every sample; with --expose-to, the aperture is chosen instead of the time
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
+    pub exposure: Option<f64>,
+    /// Relative aperture
+    #[arg(long, value_name = "N", default_value_t = 8.0, value_parser = positive, allow_negative_numbers = true)]
+    pub f_number: f64,
+    /// Transmittance of the lens, 0 to 1
+    #[arg(long, value_name = "FRACTION", default_value_t = 1.0, value_parser = fraction, allow_negative_numbers = true)]
+    pub lens_transmittance: f64,
+    /// Expose each sample so that its brightest class fills this fraction of full well; 0.75 where no --exposure is given
+    #[arg(long, value_name = "FRACTION", value_parser = positive, allow_negative_numbers = true)]
+    pub expose_to: Option<f64>,
+}
+
+impl SampleExposure {
+    /// What was chosen.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Exposure::checked`].
+    pub fn chosen(&self) -> crate::error::Result<evaluation::SampleExposure> {
+        // A time that is chosen for each sample makes no odds.
+        let base = Exposure {
+            exposure_s: self.exposure.unwrap_or(1.0),
+            f_number: self.f_number,
+            lens_transmittance: self.lens_transmittance,
+        }
+        .checked()?;
+        Ok(match (self.exposure, self.expose_to) {
+            (Some(_), None) => evaluation::SampleExposure::Fixed(base),
+            (Some(_), Some(fraction)) => evaluation::SampleExposure::Filled { base, fraction, by: Filling::Aperture },
+            (None, fraction) => {
+                let fraction = fraction.unwrap_or(DEFAULT_FILLING);
+                evaluation::SampleExposure::Filled { base, fraction, by: Filling::Time }
+            }
+        })
+    }
+}
+
+/// Share of full well that samples are exposed to where nothing else is said: that of the tests of [HP2005, Sec. 4.1].
+const DEFAULT_FILLING: f64 = 0.75;
+
 /// How the program runs and talks.
 #[derive(Debug, Clone, Args)]
 pub struct General {
@@ -203,6 +259,25 @@ pub fn number(text: &str) -> Result<f64, String> {
 /// What is expected, in words.
 pub fn positive(text: &str) -> Result<f64, String> {
     number(text).ok().filter(|x| *x > 0.0).ok_or_else(|| "give a number above 0".into())
+}
+
+/// Reads a number that is not below zero.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).ok().filter(|x| *x >= 0.0).ok_or_else(|| "give a number that is not below 0".into())
+}
+
+/// Reads the size of a patch, `WIDTHxHEIGHT`, at least 2 pixels and at most 1024 on a side.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn patch(text: &str) -> Result<[usize; 2], String> {
+    let wrong = || "a patch is WIDTHxHEIGHT in pixels, from 2x2 to 1024x1024".to_owned();
+    size(text).ok().filter(|size| size.iter().all(|side| (2..=1024).contains(side))).ok_or_else(wrong)
 }
 
 /// Reads a fraction above 0 and at most 1.

@@ -1,7 +1,7 @@
 //! Color differences in L*a*b*: ΔE*ab, just noticeable differences, ΔE94, ΔE2000; and how they are distributed.
 
 use crate::numerics::distribution::{Distribution, Summary};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// ΔE*ab of a just noticeable difference [HP2005, Sec. 4.1].
 pub const DELTA_E_PER_JND: f64 = 2.3;
@@ -98,7 +98,7 @@ pub struct Differences {
 }
 
 /// How differences by one formula are distributed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DifferenceSummary {
     /// Smallest, mean, median, 95th percentile, largest.
     #[serde(flatten)]
@@ -112,7 +112,7 @@ pub struct DifferenceSummary {
 }
 
 /// What is said of the differences of many pairs of colors.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DifferenceReport {
     /// ΔE*ab.
     pub delta_e_76: DifferenceSummary,

@@ -16,6 +16,25 @@ const MAX_BYTES: u64 = 256 << 20;
 /// A table may have this many numbers: 256 MiB of them.
 const MAX_CELLS: usize = 1 << 25;
 
+/// Reads one column of a table of any kind as text; `name` is the file in messages.
+///
+/// # Errors
+///
+/// [`Error::Format`] for what is no CSV table, or has no such column, naming those that there are.
+pub fn text_column(name: &str, bytes: &[u8], column: &str) -> Result<Vec<String>> {
+    let not_csv = |error: csv::Error| Error::format(name, format!("it is not a CSV table: {error}"));
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
+    let headers = reader.headers().map_err(not_csv)?;
+    let place = headers.iter().position(|header| header == column).ok_or_else(|| {
+        let known: Vec<&str> = headers.iter().collect();
+        Error::format(name, format!("it has no column `{column}`; it has {}", known.join(", ")))
+    })?;
+    reader.records().map(|record| record.map(|row| row[place].to_owned()).map_err(not_csv)).collect()
+}
+
 /// Curves over common wavelengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectralTable {

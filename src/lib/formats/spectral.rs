@@ -116,12 +116,13 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralL
                     }
                 }
             }
-            SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance }
+            SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance, columns: geometry.width }
         }
         Radiances::Table(table) => {
             let unit = unit.or_else(|| table.unit_of(0)).unwrap_or_default();
             let radiance = table.values * unit.in_w_per_cm2_sr_nm();
-            SpectralLibrary { wavelength_nm: table.wavelength_nm, radiance }
+            let columns = radiance.nrows().max(1);
+            SpectralLibrary { wavelength_nm: table.wavelength_nm, radiance, columns }
         }
     };
     match library.radiance.indexed_iter().find(|(_, value)| !value.is_finite()) {

@@ -1,6 +1,6 @@
 //! Distributions of numbers that stream by: extremes, mean, quantiles, shares.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// So many numbers are kept as they are; beyond, they are counted in buckets.
 const KEPT: usize = 1 << 20;
@@ -25,7 +25,7 @@ pub struct Distribution {
 }
 
 /// What is said of a distribution.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Smallest number.
     pub min: f64,

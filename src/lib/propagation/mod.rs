@@ -16,10 +16,10 @@ pub use classes::{adu, electrons};
 use crate::cfa::Class;
 use crate::color;
 use crate::demosaic::Method;
-use crate::demosaic::weights::{WeightTable, Weights};
+use crate::demosaic::weights::{PHASES, WeightTable, Weights};
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind, PredictedRecord};
 use crate::noise::NoiseModel;
-use crate::numerics::normal::MeanVariance;
+use crate::numerics::normal::{self, MeanVariance};
 use crate::transfer::{Transfer, uniform_share};
 use crate::units::QuantityKind;
 use nalgebra::{Matrix3, Vector3};
@@ -120,6 +120,27 @@ impl Mixture {
         let straight = self.through(&local.jacobian, 0.0);
         let bias = local.bias(&self.covariance);
         Self { mean: [0, 1, 2].map(|i| local.value[i] + bias[i]), bias, ..straight }
+    }
+
+    /// Covariance of a pixel of each phase of the filter array; what the second order adds counts for all alike.
+    pub fn phase_covariances(&self) -> [Matrix3<f64>; PHASES.len()] {
+        let variances = self.sites.map(|site| site.moments.variance);
+        let further = self.covariance - mixture::mean_pixel(&self.weights).covariance(variances);
+        std::array::from_fn(|phase| mixture::pixel(&self.weights, phase).covariance(variances) + further)
+    }
+
+    /// Distance of a pixel from where it would be without noise, the phases of the filter array in these shares.
+    ///
+    /// Pixels of each phase are normal, those of all together are not: the mean length is the mean over the phases.
+    pub fn noise_length(&self, shares: [f64; PHASES.len()]) -> MeanVariance {
+        let bias = Vector3::from(self.bias);
+        let (mut mean, mut square) = (0.0, 0.0);
+        for (share, covariance) in shares.into_iter().zip(self.phase_covariances()) {
+            let length = normal::length(&bias, &covariance);
+            mean += share * length.mean;
+            square += share * (length.variance + length.mean.powi(2));
+        }
+        MeanVariance { mean, variance: (square - mean * mean).max(0.0) }
     }
 
     /// Gains of the covariance of the mean of a patch, its corner on `phase`, or on any.

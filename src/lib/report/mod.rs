@@ -1,14 +1,16 @@
 //! Reports: statistics and matrices as text, JSON, YAML and CSV; plots.
 
+pub mod characterization;
 pub mod plot;
 
 mod photon_transfer;
 mod prediction;
+mod trade_off;
 
 pub use photon_transfer::photon_transfer;
 pub use prediction::{prediction, sweep};
+pub use trade_off::trade_off;
 
-use crate::color::characterization::CameraMatrix;
 use crate::error::{Error, Result};
 use crate::statistics::check::{Subject, Test};
 use crate::statistics::{ChannelReport, RegionReport, Report};
@@ -198,43 +200,5 @@ fn table(columns: &[Vec<String>], out: &mut String) {
         let cells: Vec<String> =
             columns.iter().zip(&widths).map(|(column, width)| format!("{:>width$}", column[row])).collect();
         let _ = writeln!(out, "{}", cells.join("  ").trim_end());
-    }
-}
-
-/// Writes a matrix: YAML is the file that `to-xyz` reads.
-///
-/// # Errors
-///
-/// [`Error::Data`] when the form cannot hold it.
-pub fn matrix(matrix: &CameraMatrix, format: ReportFormat) -> Result<String> {
-    match format {
-        ReportFormat::Yaml => serde_yaml::to_string(matrix).map_err(unwritable),
-        ReportFormat::Json => {
-            let value = serde_json::json!({
-                "matrix": matrix.xyz_from_camera,
-                "condition": matrix.condition,
-                "training": matrix.training,
-            });
-            serde_json::to_string_pretty(&value).map(|text| text + "\n").map_err(unwritable)
-        }
-        ReportFormat::Text | ReportFormat::Csv => {
-            let mut out = String::new();
-            let unit = matrix.unit.as_deref().unwrap_or_default();
-            let _ = writeln!(out, "XYZ from R, G, B [{unit}]");
-            for (name, row) in ["X", "Y", "Z"].iter().zip(matrix.xyz_from_camera) {
-                let _ = writeln!(out, "{name} {:>14.6e} {:>14.6e} {:>14.6e}", row[0], row[1], row[2]);
-            }
-            if let Some(condition) = matrix.condition {
-                let _ = writeln!(out, "condition number {condition:.2}");
-            }
-            if let Some(training) = &matrix.training {
-                let [x, y, z] = training.relative_rms.map(|rms| 100.0 * rms);
-                let [dx, dy] = training.max_chromaticity_error;
-                let _ = writeln!(out, "{} samples of {}", training.count, training.library);
-                let _ = writeln!(out, "rms error of X, Y, Z: {x:.3} %, {y:.3} %, {z:.3} %");
-                let _ = writeln!(out, "largest error of x, y: {dx:.5}, {dy:.5}");
-            }
-            Ok(out)
-        }
     }
 }

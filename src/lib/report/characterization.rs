@@ -1,0 +1,377 @@
+//! Reports of fitted matrices and of how well they do.
+
+use super::{ReportFormat, shown, table, unwritable};
+use crate::color::characterization::CameraMatrix;
+use crate::color::characterization::evaluation::SampleEvaluation;
+use crate::color::characterization::noise_aware::TradeOff;
+use crate::color::difference::{Difference, DifferenceReport};
+use crate::error::Result;
+use serde::Serialize;
+use std::fmt::Write;
+
+/// A fitted matrix with what was found out about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Characterization {
+    /// The matrix.
+    pub matrix: CameraMatrix,
+    /// How it does on a library.
+    pub evaluation: Option<Evaluation>,
+    /// Matrices of other noise weights.
+    pub trade_off: Vec<TradeOff>,
+}
+
+/// How a matrix does on a library.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluation {
+    /// What was evaluated, and under which conditions.
+    pub about: About,
+    /// Differences without noise.
+    pub noise_free: DifferenceReport,
+    /// What noise does.
+    pub noise: Option<NoiseReport>,
+    /// Parts of the library.
+    pub groups: Vec<Group>,
+    /// Each sample.
+    pub samples: Vec<SampleEvaluation>,
+    /// Label of each sample, where there are labels.
+    pub labels: Vec<String>,
+}
+
+/// What was evaluated, and under which conditions.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct About {
+    /// The library.
+    pub library: String,
+    /// Samples of it.
+    pub samples: usize,
+    /// How they were exposed.
+    pub exposure: String,
+    /// The white of L*a*b*.
+    pub white: String,
+    /// Demosaicking method.
+    pub demosaic: &'static str,
+    /// Pixels of each sample.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch: Option<[usize; 2]>,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Dark frames whose mean was subtracted.
+    pub dark_frames: u32,
+}
+
+/// What noise does to the samples of a library.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NoiseReport {
+    /// Differences between the mean color of each sample's pixels and the true color.
+    pub patch_mean: DifferenceReport,
+    /// Mean difference of each sample's pixels from the true color.
+    pub pixel_mean: DifferenceReport,
+    /// Standard deviation of these differences over each sample's pixels.
+    pub pixel_std: DifferenceReport,
+    /// Largest of these differences.
+    pub pixel_max: DifferenceReport,
+    /// Mean distance of each sample's pixels from the color that the camera gives without noise.
+    pub noise: DifferenceSummaries,
+    /// Pixels clipped at full well or at the last code.
+    pub clipped: u64,
+}
+
+/// The distance that noise makes, simulated and by formula, ΔE*ab: mean over the samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DifferenceSummaries {
+    /// Simulated.
+    pub simulated_delta_e: f64,
+    /// By formula; none where nothing is predicted.
+    pub predicted_delta_e: Option<f64>,
+    /// Simulated, in just noticeable differences.
+    pub simulated_jnd: f64,
+    /// By formula.
+    pub predicted_jnd: Option<f64>,
+}
+
+/// A part of the library.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Group {
+    /// Its label.
+    pub name: String,
+    /// Samples.
+    pub samples: usize,
+    /// Samples that the matrix was fitted on.
+    pub trained_on: usize,
+    /// Differences without noise.
+    #[serde(flatten)]
+    pub differences: DifferenceReport,
+}
+
+/// Writes what was found; YAML without evaluation is the matrix file itself.
+///
+/// # Errors
+///
+/// [`crate::error::Error::Data`] when the form cannot hold it.
+pub fn characterization(found: &Characterization, format: ReportFormat) -> Result<String> {
+    match format {
+        ReportFormat::Yaml if found.evaluation.is_none() && found.trade_off.is_empty() => matrix(&found.matrix),
+        ReportFormat::Yaml => serde_yaml::to_string(&Whole::of(found)).map_err(unwritable),
+        ReportFormat::Json => {
+            serde_json::to_string_pretty(&Whole::of(found)).map(|text| text + "\n").map_err(unwritable)
+        }
+        ReportFormat::Csv => match &found.evaluation {
+            Some(evaluation) => samples_csv(evaluation),
+            None => trade_off_csv(&found.trade_off),
+        },
+        ReportFormat::Text => Ok(text(found)),
+    }
+}
+
+/// Writes a matrix file.
+///
+/// # Errors
+///
+/// [`crate::error::Error::Data`] when the form cannot hold it.
+pub fn matrix(matrix: &CameraMatrix) -> Result<String> {
+    serde_yaml::to_string(matrix).map_err(unwritable)
+}
+
+/// The report as a document.
+#[derive(Serialize)]
+struct Whole<'a> {
+    matrix: [[f64; 3]; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unit: &'a Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    method: &'a Option<String>,
+    condition: Option<f64>,
+    rank: Option<usize>,
+    training: &'a Option<crate::color::characterization::Training>,
+    uncertainty: &'a Option<crate::color::characterization::MatrixUncertainty>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    evaluation: Option<&'a DifferenceReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    about: Option<&'a About>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    noise: Option<&'a NoiseReport>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    groups: &'a [Group],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    trade_off: &'a [TradeOff],
+}
+
+impl<'a> Whole<'a> {
+    fn of(found: &'a Characterization) -> Self {
+        let evaluation = found.evaluation.as_ref();
+        Self {
+            matrix: found.matrix.xyz_from_camera,
+            unit: &found.matrix.unit,
+            method: &found.matrix.method,
+            condition: found.matrix.condition,
+            rank: found.matrix.rank,
+            training: &found.matrix.training,
+            uncertainty: &found.matrix.uncertainty,
+            evaluation: evaluation.map(|evaluation| &evaluation.noise_free),
+            about: evaluation.map(|evaluation| &evaluation.about),
+            noise: evaluation.and_then(|evaluation| evaluation.noise.as_ref()),
+            groups: evaluation.map(|evaluation| evaluation.groups.as_slice()).unwrap_or_default(),
+            trade_off: &found.trade_off,
+        }
+    }
+}
+
+fn trade_off_csv(curve: &[TradeOff]) -> Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for point in curve {
+        writer.serialize(point).map_err(unwritable)?;
+    }
+    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+}
+
+/// One row per sample.
+fn samples_csv(evaluation: &Evaluation) -> Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let formulas = ["delta_e_76", "jnd", "delta_e_94", "delta_e_2000"];
+    let named =
+        |prefix: &str, names: &[&str]| -> Vec<String> { names.iter().map(|name| format!("{prefix}{name}")).collect() };
+    let mut head: Vec<String> = ["sample", "exposure_s", "f_number"].map(str::to_owned).to_vec();
+    head.extend(named("electrons_", &["R", "G", "B"]));
+    head.extend(named("white_", &["X", "Y", "Z"]));
+    head.extend(named("true_", &["X", "Y", "Z"]));
+    head.extend(named("camera_", &["X", "Y", "Z"]));
+    head.extend(formulas.map(str::to_owned));
+    let with_noise = evaluation.samples.iter().any(|sample| sample.noise.is_some());
+    if with_noise {
+        for what in ["patch_mean_", "pixel_mean_", "pixel_std_", "pixel_max_"] {
+            head.extend(named(what, &formulas));
+        }
+        for what in ["std_", "predicted_std_"] {
+            head.extend(named(what, &["L", "a", "b"]));
+        }
+        head.extend(
+            ["noise_delta_e", "predicted_delta_e", "predicted_delta_e_std", "predicted_patch_delta_e", "clipped"]
+                .map(str::to_owned),
+        );
+    }
+    if !evaluation.labels.is_empty() {
+        head.push("label".into());
+    }
+    writer.write_record(&head).map_err(unwritable)?;
+    let number = |value: f64| value.to_string();
+    let of = |d: &Difference| [d.delta_e_76, d.jnd(), d.delta_e_94, d.delta_e_2000].map(number);
+    for (index, sample) in evaluation.samples.iter().enumerate() {
+        let mut row = vec![sample.sample.to_string()];
+        row.extend([sample.exposure.exposure_s, sample.exposure.f_number].map(number));
+        for three in [sample.electrons, sample.white, sample.xyz, sample.camera_xyz] {
+            row.extend(three.map(number));
+        }
+        row.extend(of(&sample.noise_free));
+        if let Some(noise) = &sample.noise {
+            for difference in [&noise.patch_mean, &noise.pixel_mean, &noise.pixel_std, &noise.pixel_max] {
+                row.extend(of(difference));
+            }
+            row.extend(noise.lab_std.map(number));
+            let maybe = |value: Option<f64>| value.map_or(String::new(), number);
+            row.extend([0, 1, 2].map(|i| maybe(noise.predicted.map(|p| p.lab_std[i]))));
+            row.push(number(noise.noise_delta_e));
+            row.push(maybe(noise.predicted.map(|p| p.delta_e)));
+            row.push(maybe(noise.predicted.map(|p| p.delta_e_std)));
+            row.push(maybe(noise.predicted.map(|p| p.patch_delta_e)));
+            row.push(noise.clipped.to_string());
+        }
+        if let Some(label) = evaluation.labels.get(index) {
+            row.push(label.clone());
+        }
+        writer.write_record(&row).map_err(unwritable)?;
+    }
+    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+}
+
+fn text(found: &Characterization) -> String {
+    let mut out = String::new();
+    matrix_text(&found.matrix, &mut out);
+    if let Some(evaluation) = &found.evaluation {
+        evaluation_text(evaluation, &mut out);
+    }
+    if !found.trade_off.is_empty() {
+        out.push_str("\ntrade-off of errors and noise, rms Delta E*ab of a pixel\n");
+        let column = |heading: &str, of: &dyn Fn(&TradeOff) -> f64| -> Vec<String> {
+            std::iter::once(heading.to_owned())
+                .chain(found.trade_off.iter().map(|point| shown("", Some(of(point)))))
+                .collect()
+        };
+        let columns = [
+            column("noise weight", &|point| point.noise_weight),
+            column("error of the matrix", &|point| point.model_delta_e),
+            column("noise", &|point| point.noise_delta_e),
+            column("together", &|point| point.model_delta_e.hypot(point.noise_delta_e)),
+        ];
+        table(&columns, &mut out);
+    }
+    out
+}
+
+fn matrix_text(matrix: &CameraMatrix, out: &mut String) {
+    let unit = matrix.unit.as_deref().unwrap_or_default();
+    let _ = writeln!(out, "XYZ from R, G, B [{unit}], {}", matrix.method.as_deref().unwrap_or("method unknown"));
+    for (i, (name, row)) in ["X", "Y", "Z"].iter().zip(matrix.xyz_from_camera).enumerate() {
+        let _ = write!(out, "{name} {:>14.6e} {:>14.6e} {:>14.6e}", row[0], row[1], row[2]);
+        let _ = match &matrix.uncertainty {
+            Some(known) => {
+                let [a, b, c] = known.standard_error[i];
+                writeln!(out, "   standard error {a:.1e} {b:.1e} {c:.1e}")
+            }
+            None => writeln!(out),
+        };
+    }
+    if let Some(condition) = matrix.condition {
+        let rank = matrix.rank.map_or(String::new(), |rank| format!(", rank {rank}"));
+        let _ = writeln!(out, "condition number {condition:.2}{rank}");
+    }
+    if let Some(training) = &matrix.training {
+        let [x, y, z] = training.relative_rms.map(|rms| 100.0 * rms);
+        let [dx, dy] = training.max_chromaticity_error;
+        let held = if training.held_out.is_empty() {
+            String::new()
+        } else {
+            format!(", without {}", training.held_out.join(", "))
+        };
+        let kept = training.white_sample.map_or(String::new(), |sample| format!(", sample {sample} kept exact"));
+        let what = if training.samples.is_none() && matrix.method.as_deref().is_some_and(|m| m.starts_with("max-ign")) {
+            "observations of the responses alone, judged on"
+        } else {
+            "samples of"
+        };
+        let _ = writeln!(out, "{} {what} {}{held}{kept}", training.count, training.library);
+        let _ = writeln!(out, "rms error of X, Y, Z: {x:.3} %, {y:.3} %, {z:.3} %");
+        let _ = writeln!(out, "largest error of x, y: {dx:.5}, {dy:.5}");
+    }
+}
+
+/// A table of differences: one row per formula and heading.
+fn differences_text(rows: &[(String, DifferenceReport)], out: &mut String) {
+    let mut columns: Vec<Vec<String>> =
+        ["", "min", "mean", "median", "p95", "max", "<1/10", "<1/4", "<1/2"].map(|heading| vec![heading.into()]).into();
+    for (name, report) in rows {
+        for (formula, found) in report.formulas() {
+            let summary = found.summary;
+            columns[0].push(format!("{name}{formula}"));
+            let numbers = [summary.min, summary.mean, summary.median, summary.p95, summary.max];
+            for (column, number) in columns[1..6].iter_mut().zip(numbers) {
+                column.push(format!("{number:.4}"));
+            }
+            let shares = [found.below_tenth, found.below_quarter, found.below_half];
+            for (column, share) in columns[6..].iter_mut().zip(shares) {
+                column.push(format!("{:.1} %", 100.0 * share));
+            }
+        }
+    }
+    table(&columns, out);
+}
+
+fn evaluation_text(evaluation: &Evaluation, out: &mut String) {
+    let about = &evaluation.about;
+    let _ =
+        writeln!(out, "\n{} samples of {}, {}; white {}", about.samples, about.library, about.exposure, about.white);
+    out.push_str("without noise\n");
+    differences_text(&[(String::new(), evaluation.noise_free)], out);
+    if let (Some(noise), Some([width, height])) = (&evaluation.noise, about.patch) {
+        let _ = writeln!(
+            out,
+            "with noise, {width}x{height} pixels of each sample, {}, seed {}",
+            about.demosaic, about.seed
+        );
+        differences_text(
+            &[
+                ("patch mean ".into(), noise.patch_mean),
+                ("pixel mean ".into(), noise.pixel_mean),
+                ("pixel std ".into(), noise.pixel_std),
+            ],
+            out,
+        );
+        let predicted = noise.noise.predicted_jnd.map_or(String::new(), |jnd| format!(", predicted {jnd:.4}"));
+        let _ = writeln!(
+            out,
+            "noise of a pixel, mean over the samples: {:.4} JND{predicted}; largest difference of a pixel {:.2} JND",
+            noise.noise.simulated_jnd, noise.pixel_max.jnd.summary.max
+        );
+        if noise.clipped > 0 {
+            let _ = writeln!(out, "{} photosites were clipped", noise.clipped);
+        }
+    }
+    if !evaluation.groups.is_empty() {
+        out.push_str("by group, JND without noise\n");
+        let column = |heading: &str, of: &dyn Fn(&Group) -> String| -> Vec<String> {
+            std::iter::once(heading.to_owned()).chain(evaluation.groups.iter().map(of)).collect()
+        };
+        let jnd = |of: fn(&crate::numerics::distribution::Summary) -> f64| {
+            move |group: &Group| format!("{:.4}", of(&group.differences.jnd.summary))
+        };
+        let columns = [
+            column("", &|group| group.name.clone()),
+            column("samples", &|group| group.samples.to_string()),
+            column("trained on", &|group| group.trained_on.to_string()),
+            column("mean", &jnd(|summary| summary.mean)),
+            column("median", &jnd(|summary| summary.median)),
+            column("p95", &jnd(|summary| summary.p95)),
+            column("max", &jnd(|summary| summary.max)),
+        ];
+        table(&columns, out);
+    }
+}
