@@ -2,9 +2,11 @@
 
 pub mod plot;
 
+mod chromaticity;
 mod photon_transfer;
 mod prediction;
 
+pub use chromaticity::{SkyColor, chromaticity};
 pub use photon_transfer::photon_transfer;
 pub use prediction::{prediction, sweep};
 
