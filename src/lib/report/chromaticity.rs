@@ -27,7 +27,7 @@ const LARGEST_CIRCLE: f64 = 32.0;
 /// An arrow points at the sky `kept`, whose color the camera's matrix keeps exactly.
 pub fn chromaticity(skies: &[SkyColor], kept: Option<usize>, observer: &Observer, title: &str) -> Plot {
     let black_bodies = black_bodies(observer);
-    let mut lines = panel(skies);
+    let mut lines = panel(skies, "colors and errors");
     let errors = skies.iter().map(|sky| [sky.xy[0], sky.xy[1], sky.fitted_xy[0], sky.fitted_xy[1]]);
     let places: Vec<[f64; 2]> = skies.iter().map(|sky| sky.xy).collect();
     lines.add("black bodies", Color::Black, Marks::Line(black_bodies.clone()));
@@ -48,7 +48,7 @@ pub fn chromaticity(skies: &[SkyColor], kept: Option<usize>, observer: &Observer
     entire.add("", Color::Blue, Marks::Points(places.clone()));
     lines.inset = Some(Box::new(Inset { panel: entire, corner: Corner::TopLeft, share: 0.46 }));
 
-    let mut circles = panel(skies);
+    let mut circles = panel(skies, "differences ΔE₉₄");
     let largest = skies.iter().map(|sky| sky.delta_e_94).filter(|value| value.is_finite()).fold(0.0, f64::max);
     if largest > 0.0 {
         let scale = LARGEST_CIRCLE / largest;
@@ -63,11 +63,11 @@ pub fn chromaticity(skies: &[SkyColor], kept: Option<usize>, observer: &Observer
     Plot { title: title.into(), panels: vec![lines, circles], arrangement: Arrangement::SideBySide }
 }
 
-fn panel(skies: &[SkyColor]) -> Panel {
+fn panel(skies: &[SkyColor], title: &str) -> Panel {
     let seen = skies.iter().flat_map(|sky| sky.xy.into_iter().chain(sky.fitted_xy)).filter(|value| value.is_finite());
     let [low, high] = seen.fold(SPAN, |[low, high], value| [low.min(value - 0.01), high.max(value + 0.01)]);
     let axis = |label| Axis::linear(label).range(low, high);
-    Panel { equal_scale: true, ..Panel::new(axis("x"), axis("y")) }
+    Panel { title: title.into(), equal_scale: true, ..Panel::new(axis("x"), axis("y")) }
 }
 
 /// From 2000 K upwards, in even steps of 1/T, as the locus runs.
@@ -84,7 +84,7 @@ fn curve([first, last]: [f64; 2], y: fn(f64) -> f64) -> Vec<[f64; 2]> {
 
 /// An arrow from below and the right, where no sky is.
 fn arrow(to: [f64; 2]) -> Arrow {
-    Arrow { from: [to[0] + 0.025, to[1] - 0.03], to, label: "kept exactly".into(), color: Color::Black }
+    Arrow { from: [to[0] + 0.02, to[1] - 0.025], to, label: "kept exactly".into(), color: Color::Black }
 }
 
 /// Round differences up to the largest, with what the legend says: about all, half and a fifth of it.

@@ -160,7 +160,7 @@ impl<'a> Measured<'a> {
         let y_values = panel.series.iter().flat_map(|series| series.marks.ys()).chain(lines);
         let has_bars = panel.series.iter().any(|series| matches!(series.marks, Marks::Bars { .. }));
         let y = Ruler::new(&panel.y, y_values, has_bars);
-        let y_ticks = ticks_upwards(&y, style, cell_height - style.bottom(panel) - style.line);
+        let y_ticks = ticks_upwards(&y, panel, style, cell_height);
         let label_width = |tick: &Tick| tick.label.as_ref().map_or(0.0, |label| font::width(label, style.text));
         let widest = y_ticks.iter().map(label_width).fold(0.0, f64::max);
         let left = style.left(panel, widest);
@@ -187,9 +187,9 @@ impl<'a> Measured<'a> {
     }
 }
 
-/// The ticks of a y axis of some height.
-fn ticks_upwards(ruler: &Ruler, style: Style, height: f64) -> Vec<Tick> {
-    ruler.ticks((height / style.apart[1]).floor())
+/// The ticks of the y axis of a panel in a cell of some height.
+fn ticks_upwards(ruler: &Ruler, panel: &Panel, style: Style, cell_height: f64) -> Vec<Tick> {
+    ruler.ticks(((cell_height - style.bottom(panel) - style.line) / style.apart[1]).floor())
 }
 
 /// The row, from below, and the left end of each label: as near as can be to what it names, beside or above the others.
@@ -383,10 +383,10 @@ impl<'a> Pane<'a> {
         if let Some(inset) = &self.panel.inset {
             cover(self.draw_inset(drawing, inset), &mut covered);
         }
+        self.draw_legend(drawing, &mut covered);
         for arrow in &self.panel.arrows {
             self.draw_arrow(drawing, arrow, &mut covered);
         }
-        self.draw_legend(drawing, &mut covered);
         self.draw_line_labels(drawing, &mut covered);
     }
 
@@ -505,7 +505,7 @@ impl<'a> Pane<'a> {
             let label = tick.label.unwrap_or_default();
             text(drawing, &label, [x, bottom + length + text_size + 3.0], text_size, Anchor::Middle);
         }
-        for tick in ticks_upwards(&self.measured.y, self.style, self.area.height) {
+        for tick in ticks_upwards(&self.measured.y, self.panel, self.style, self.cell.height) {
             let y = self.at_y(tick.place);
             let (grid, mark) = if tick.label.is_some() { (GRID, length) } else { (MINOR_GRID, 0.6 * length) };
             drawing.stroke(Outline::Line(vec![[left, y], [right, y]]), grid);
@@ -677,7 +677,7 @@ impl<'a> Pane<'a> {
         let sizes = &self.panel.circle_sizes;
         let names = named.iter().map(|series| &series.name).chain(sizes.iter().map(|size| &size.label));
         let longest = names.map(|name| font::width(name, TEXT_SIZE)).fold(0.0, f64::max);
-        let largest = sizes.iter().map(|size| drawn_diameter(size)).fold(0.0, f64::max);
+        let largest = sizes.iter().map(drawn_diameter).fold(0.0, f64::max);
         let swatch = f64::max(SWATCH, largest);
         let size_heights = sizes.iter().map(|size| f64::max(LINE, drawn_diameter(size) + 4.0));
         let rows: Vec<f64> = named.iter().map(|_| LINE).chain(size_heights).collect();
