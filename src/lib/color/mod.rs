@@ -2,6 +2,7 @@
 
 pub mod characterization;
 pub mod difference;
+pub mod locus;
 
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};

@@ -3,10 +3,12 @@
 pub mod characterization;
 pub mod plot;
 
+mod chromaticity;
 mod photon_transfer;
 mod prediction;
 mod trade_off;
 
+pub use chromaticity::{SkyColor, chromaticity};
 pub use photon_transfer::photon_transfer;
 pub use prediction::{prediction, sweep};
 pub use trade_off::trade_off;

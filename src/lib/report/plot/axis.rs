@@ -88,6 +88,11 @@ impl Ruler {
         Self { scale, low, high }
     }
 
+    /// From the low end to the high one: the difference of values, or of their decimal logarithms.
+    pub fn span(&self) -> f64 {
+        self.high - self.low
+    }
+
     /// Where a value lies: 0 at the low end, 1 at the high one. `None` for what the axis cannot show.
     pub fn place(&self, value: f64) -> Option<f64> {
         Some((position(self.scale, value)? - self.low) / (self.high - self.low))

@@ -55,6 +55,63 @@ pub struct Panel {
     pub vertical_lines: Vec<ReferenceLine>,
     /// Horizontal lines, at values of y.
     pub horizontal_lines: Vec<ReferenceLine>,
+    /// Arrows, above all series.
+    pub arrows: Vec<Arrow>,
+    /// What the diameters of circles mean, for the legend.
+    pub circle_sizes: Vec<CircleSize>,
+    /// Whether a unit (on logarithmic axes: a factor) is equally long on both axes. The panel becomes narrower or lower;
+    /// where less than a tenth of it would be left, it stays as it is.
+    pub equal_scale: bool,
+    /// A small panel in a corner of this one.
+    pub inset: Option<Box<Inset>>,
+}
+
+/// An arrow from one point of a panel to another. Its ends do not widen the axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arrow {
+    /// Where it begins.
+    pub from: [f64; 2],
+    /// What it points at; the tip stops a few pixels before.
+    pub to: [f64; 2],
+    /// What stands where it begins; may be empty.
+    pub label: String,
+    /// The color.
+    pub color: Color,
+}
+
+/// A circle in the legend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CircleSize {
+    /// Its diameter in pixels.
+    pub diameter: f64,
+    /// What a circle of this size means.
+    pub label: String,
+    /// The color.
+    pub color: Color,
+}
+
+/// A small panel within another, on white.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inset {
+    /// What is shown: without legend, and without an inset of its own.
+    pub panel: Panel,
+    /// Where it is.
+    pub corner: Corner,
+    /// The part of the width and of the height of the frame that it takes with its labels, from 0 to 1.
+    pub share: f64,
+}
+
+/// A corner of a panel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Corner {
+    /// Above, left.
+    TopLeft,
+    /// Above, right.
+    TopRight,
+    /// Below, left.
+    BottomLeft,
+    /// Below, right.
+    BottomRight,
 }
 
 /// Numbers that belong together, and how they are shown.
@@ -90,6 +147,10 @@ pub enum Marks {
     Band(Vec<[f64; 3]>),
     /// A vertical bar with caps at every x; lower ends as for bands.
     ErrorBars(Vec<[f64; 3]>),
+    /// Straight thin lines, each from `[x0, y0]` to `[x1, y1]`: `[x0, y0, x1, y1]`.
+    Segments(Vec<[f64; 4]>),
+    /// Thin circles: `[x, y, diameter]`, the diameter in pixels. See [`Panel::circle_sizes`].
+    Circles(Vec<[f64; 3]>),
 }
 
 /// A shaded range of x, such as a regime of noise.
@@ -171,6 +232,10 @@ impl Panel {
             regions: Vec::new(),
             vertical_lines: Vec::new(),
             horizontal_lines: Vec::new(),
+            arrows: Vec::new(),
+            circle_sizes: Vec::new(),
+            equal_scale: false,
+            inset: None,
         }
     }
 

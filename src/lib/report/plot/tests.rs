@@ -95,6 +95,36 @@ fn histogram() -> Plot {
     Plot::new("Green, 512x512 at 0,0", panel)
 }
 
+/// Segments, circles, arrows and an inset, on axes of equal scale.
+fn diagram() -> Plot {
+    let axis = |label: &str| Axis::linear(label).range(0.0, 10.0);
+    let mut panel = Panel::new(axis("a / mm"), axis("b / mm"));
+    let angles = || (0..24).map(|index| 0.26 * f64::from(index));
+    let spot = |angle: f64| [5.0 + 2.5 * angle.cos(), 4.0 + 1.5 * angle.sin()];
+    let segment = |angle: f64| {
+        let [x, y] = spot(angle);
+        [x, y, x + 0.6 * angle.cos(), y + 0.6]
+    };
+    panel.add("measured", Color::Blue, Marks::Points(angles().map(spot).collect()));
+    panel.add("errors", Color::Gray, Marks::Segments(angles().map(segment).collect()));
+    let circle = |angle: f64| [spot(angle)[0], spot(angle)[1], 3.0 * angle];
+    panel.add("differences", Color::Purple, Marks::Circles(angles().map(circle).collect()));
+    panel.arrows = vec![
+        Arrow { from: [9.0, 5.5], to: spot(0.0), label: "this one".into(), color: Color::Black },
+        Arrow { from: [1.0, 0.2], to: spot(3.12), label: "and that one".into(), color: Color::Black },
+        Arrow { from: [5.0, 5.0], to: [5.0, 12.0], label: String::new(), color: Color::Green },
+    ];
+    panel.circle_sizes = [6.0, 24.0]
+        .map(|diameter| CircleSize { diameter, label: format!("{} mm", diameter / 3.0), color: Color::Purple })
+        .into();
+    panel.equal_scale = true;
+    let mut small = Panel::new(Axis::linear("a / mm"), Axis::log10("c").range(1.0, 1e3));
+    small.add("unseen", Color::Vermillion, Marks::Line((0..10).map(|x| [f64::from(x), 2_f64.powi(x)]).collect()));
+    small.add("", Color::Blue, Marks::Points(vec![[2.0, 100.0], [6.0, 20.0]]));
+    panel.inset = Some(Box::new(Inset { panel: small, corner: Corner::TopRight, share: 0.4 }));
+    Plot::new("Errors", panel)
+}
+
 /// Writes the pictures for looking at: `CYANOMETER_PLOTS=DIR cargo test plot`.
 fn keep(name: &str, plot: &Plot) {
     if let Some(directory) = std::env::var_os("CYANOMETER_PLOTS") {
@@ -192,9 +222,23 @@ fn empty_and_odd_data_make_a_plot_all_the_same() {
                 Marks::Bars { width: 1.0, tops: points.clone() },
                 Marks::Band(ranges.clone()),
                 Marks::ErrorBars(ranges.clone()),
+                Marks::Segments(points.iter().map(|[x, y]| [*x, *y, -y, *x]).collect()),
+                Marks::Circles(ranges.clone()),
             ] {
                 let mut panel = Panel::new(scale.clone(), scale.clone());
                 panel.add("name", Color::Orange, marks);
+                let arrow = |from, to| Arrow { from, to, label: "→".into(), color: Color::Black };
+                panel.arrows = points.iter().map(|at| arrow(*at, [1.0, 1.0])).collect();
+                panel.arrows.push(arrow([1.0; 2], [f64::NAN; 2]));
+                panel.equal_scale = true;
+                panel.circle_sizes = [f64::NAN, -1.0, f64::INFINITY]
+                    .map(|diameter| CircleSize { diameter, label: "none".into(), color: Color::Black })
+                    .into();
+                for share in [f64::NAN, -1.0, 0.02, 0.5, 2.0] {
+                    let inset = Inset { panel: panel.clone(), corner: Corner::BottomLeft, share };
+                    panel.inset = Some(Box::new(inset));
+                    assert_well_formed(&Plot::new("odd", panel.clone()).svg());
+                }
                 panel.vertical_lines = vec![ReferenceLine { at: f64::NAN, label: "nowhere".into() }];
                 panel.horizontal_lines = vec![ReferenceLine { at: -1.0, label: "far".into() }];
                 panel.regions = vec![Region { from: f64::NAN, to: 1.0, label: "nothing".into(), color: Color::Yellow }];
@@ -233,4 +277,94 @@ fn the_extension_chooses_the_format() {
     }
     // Nothing but the two files is left.
     assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn segments_circles_arrows_and_insets_are_drawn() {
+    let plot = diagram();
+    keep("diagram", &plot);
+    let svg = plot.svg();
+    assert_well_formed(&svg);
+    assert!(plot.png().is_ok());
+    for text in ["this one", "and that one", "2 mm", "8 mm", ">1000<"] {
+        assert!(svg.contains(text), "{text}");
+    }
+    // An inset has no legend.
+    assert!(!svg.contains("unseen"));
+    // 24 circles, one for the series in the legend and two for the sizes; the first has no size.
+    assert_eq!(svg.matches("fill=\"none\" stroke=\"#cc79a7\"").count(), 27);
+    assert!(svg.contains("r=\"12\" fill=\"none\" stroke=\"#cc79a7\""));
+    // 24 segments and one in the legend.
+    assert_eq!(svg.matches("fill=\"none\" stroke=\"#777777\"").count(), 25);
+}
+
+/// Left, top, width and height of the frames: the panel's, then the inset's.
+fn frames(plot: &Plot) -> Vec<[f64; 4]> {
+    let svg = plot.svg();
+    let closed = svg.lines().filter(|line| line.contains("Z\" fill=\"none\" stroke=\"#444444\""));
+    let frame = |line: &str| {
+        let path = line.split('"').nth(1).unwrap();
+        let numbers: Vec<f64> = path.split(['M', 'L', 'Z', ' ']).filter_map(|number| number.parse().ok()).collect();
+        [numbers[0], numbers[1], numbers[4] - numbers[0], numbers[5] - numbers[1]]
+    };
+    closed.map(frame).collect()
+}
+
+#[test]
+fn units_are_equally_long_where_asked_for() {
+    let mut plot = diagram();
+    let aspect = |plot: &Plot| frames(plot)[0][2] / frames(plot)[0][3];
+    // To a pixel in some five hundred.
+    assert!((aspect(&plot) - 1.0).abs() < 0.005, "{}", aspect(&plot));
+    plot.panels[0].x = Axis::linear("").range(0.0, 2.5);
+    assert!((aspect(&plot) - 0.25).abs() < 0.005, "{}", aspect(&plot));
+    plot.panels[0].y = Axis::linear("").range(0.0, 0.5);
+    assert!((aspect(&plot) - 5.0).abs() < 0.05, "{}", aspect(&plot));
+    // What would be a line stays as it is, and so do axes that have no common unit.
+    let free = |plot: &Plot| (1.4..1.8).contains(&aspect(plot));
+    plot.panels[0].y = Axis::linear("").range(0.0, 1e-3);
+    assert!(free(&plot));
+    plot.panels[0].y = Axis::log10("").range(1.0, 10.0);
+    assert!(free(&plot));
+}
+
+#[test]
+fn an_inset_lies_in_its_corner() {
+    for (corner, is_left, is_top) in [
+        (Corner::TopLeft, true, true),
+        (Corner::TopRight, false, true),
+        (Corner::BottomLeft, true, false),
+        (Corner::BottomRight, false, false),
+    ] {
+        for equal_scale in [false, true] {
+            let mut plot = diagram();
+            let inset = plot.panels[0].inset.as_mut().unwrap();
+            inset.corner = corner;
+            inset.panel.y = Axis::linear("").range(0.0, 10.0);
+            inset.panel.x = Axis::linear("").range(0.0, 5.0);
+            inset.panel.equal_scale = equal_scale;
+            let [outer, inner] = frames(&plot)[..] else { panic!("two frames") };
+            for axis in [0, 1] {
+                let (before, size) = (inner[axis] - outer[axis], inner[axis + 2]);
+                let after = outer[axis + 2] - before - size;
+                assert!(before > 0.0 && after > 0.0 && size < 0.4 * outer[axis + 2]);
+                // Labels and some room are on the near side.
+                let near = if [is_left, is_top][axis] { before } else { after };
+                assert!(near < 60.0, "{corner:?} {axis} {near}");
+            }
+        }
+    }
+}
+
+#[test]
+fn segments_and_circles_that_an_axis_cannot_show_are_left_out() {
+    let svg = |marks| {
+        let mut panel = Panel::new(Axis::log10("").range(1.0, 100.0), Axis::linear("").range(1.0, 100.0));
+        panel.add("", Color::Blue, marks);
+        Plot::new("", panel).svg()
+    };
+    let segments = vec![[1.0, 1.0, 5.0, 5.0], [0.0, 1.0, 5.0, 5.0], [1.0, f64::NAN, 5.0, 5.0], [1.0, 1.0, 5.0, 1e200]];
+    assert_eq!(svg(Marks::Segments(segments.clone())), svg(Marks::Segments(segments[..1].to_vec())));
+    let circles = vec![[1.0, 1.0, 5.0], [-1.0, 1.0, 5.0], [1.0, 1.0, -5.0], [1.0, 1.0, f64::NAN], [1.0, f64::NAN, 5.0]];
+    assert_eq!(svg(Marks::Circles(circles.clone())), svg(Marks::Circles(circles[..1].to_vec())));
 }
