@@ -10,7 +10,8 @@ use crate::random::Source;
 use crate::statistics::Region;
 use crate::units::RadianceUnit;
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// The demosaicking methods by their short and long names.
@@ -148,6 +149,41 @@ fn threads(text: &str) -> Result<usize, String> {
         Ok(threads @ 1..=1024) => Ok(threads),
         _ => Err("give a whole number from 1 to 1024".into()),
     }
+}
+
+/// A frame to read, or a color given as numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FrameOrColor {
+    /// A file, or `-`.
+    Frame(PathBuf),
+    /// Three numbers.
+    Color([f64; 3]),
+}
+
+impl FrameOrColor {
+    /// Whether the frame comes through the standard input.
+    pub fn is_standard_input(&self) -> bool {
+        *self == Self::Frame("-".into())
+    }
+}
+
+/// A parser for a file or a color: what exists is a file.
+pub fn frame_or_color() -> impl TypedValueParser<Value = FrameOrColor> {
+    OsStringValueParser::new().try_map(|text: OsString| -> Result<FrameOrColor, String> {
+        let path = PathBuf::from(&text);
+        let text = text.to_string_lossy();
+        if text == "-" || path.exists() {
+            return Ok(FrameOrColor::Frame(path));
+        }
+        if let Ok(color) = three_numbers(&text) {
+            return Ok(FrameOrColor::Color(color));
+        }
+        let is_word = |part: &str| part.trim().parse::<f64>().is_err();
+        if text.starts_with('-') || !text.split(',').all(is_word) {
+            return Err("it is no option, no file, and no color, which is three numbers between commas".into());
+        }
+        Ok(FrameOrColor::Frame(path))
+    })
 }
 
 /// Reads `WIDTHxHEIGHT`, both at least 1.
