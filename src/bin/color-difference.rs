@@ -15,8 +15,8 @@ use std::process::ExitCode;
 /// Compare two images or colors by the CIE 1976, 1994 and 2000 formulas
 ///
 /// Each of A and B is an image of XYZ, xyY or L*a*b* (EXR or TIFF, `-` for standard input), or a color: three numbers
-/// between commas. Numbers are XYZ, or L*a*b* with --space lab. What is the name of an existing file is a file. A is the
-/// reference, of which the 1994 formula makes a difference.
+/// between commas. Numbers are XYZ, or L*a*b* with --space lab. The name of a file that exists is a file. A is the
+/// reference: the 1994 formula is not symmetric.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -36,7 +36,7 @@ struct Arguments {
     #[arg(long, value_name = "CD_PER_M2", value_parser = options::positive, allow_negative_numbers = true)]
     white_luminance: Option<f64>,
     /// EXR file for the differences of each pixel, channels delta_e_76, jnd, delta_e_94, delta_e_2000
-    #[arg(long, value_name = "FILE.exr")]
+    #[arg(long, value_name = "FILE.exr", value_parser = options::exr_file())]
     map: Option<PathBuf>,
     /// Form of the report
     #[arg(long, default_value = "text", value_parser = options::choice(&[("text", ReportFormat::Text), ("json", ReportFormat::Json), ("yaml", ReportFormat::Yaml), ("csv", ReportFormat::Csv)]))]

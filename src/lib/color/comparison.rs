@@ -206,7 +206,7 @@ impl<S: RowSource> Comparison<S> {
         let (count, not_finite) = (self.differences.count(), self.differences.not_finite());
         let differences = self.differences.report().ok_or_else(|| {
             Error::Data(format!(
-                "{}: nothing is left to compare with {}; all {not_finite} differences are NaN or infinite",
+                "{}: no pixel can be compared with {}; in every pair a color is NaN or infinite",
                 self.sides[0].name(),
                 self.sides[1].name()
             ))
@@ -376,5 +376,187 @@ fn white(
             in_words(white)
         ))),
         _ => Ok(Some(white)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metadata::{ColorRecord, Metadata};
+    use crate::stage::MemoryFrame;
+
+    const WHITE: [f64; 3] = [3000.0, 3100.0, 3200.0];
+
+    fn frame(quantity: QuantityKind, white: Option<[f64; 3]>, channels: &[&str]) -> MemoryFrame {
+        let mut metadata = Metadata::new(quantity);
+        metadata.color = white.map(|white| ColorRecord {
+            xyz_from_camera: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            method: None,
+            black_adu: 0.0,
+            white: Some(white),
+        });
+        let header = FrameHeader { name: "frame".into(), geometry: Geometry::new(2, 1, channels), metadata };
+        let samples = vec![1.0; header.geometry.row_samples()];
+        MemoryFrame::new(header, samples)
+    }
+
+    fn xyz(white: Option<[f64; 3]>) -> Side<MemoryFrame> {
+        Side::Frame(frame(QuantityKind::Xyz, white, &["R", "G", "B"]))
+    }
+
+    fn lab(white: Option<[f64; 3]>) -> Side<MemoryFrame> {
+        Side::Frame(frame(QuantityKind::Lab, white, &["L", "a", "b"]))
+    }
+
+    const GREY: Side<MemoryFrame> = Side::Color([20.0, 20.0, 20.0]);
+
+    fn white_of(
+        a: Side<MemoryFrame>,
+        b: Side<MemoryFrame>,
+        space: Option<Space>,
+        white: Option<White>,
+        white_luminance: Option<f64>,
+    ) -> Result<Option<[f64; 3]>> {
+        Comparison::new(a, b, &ComparisonSettings { space, white, white_luminance }).map(|made| made.white())
+    }
+
+    #[test]
+    fn the_white_is_the_one_asked_for_else_recorded_else_d65() {
+        let d65 = |luminance| Some(xyz_of_chromaticity(D65_XY, luminance));
+        let other = Some([1.0, 2.0, 3.0]);
+        let found = |a, b| white_of(a, b, None, None, None).unwrap();
+        assert_eq!(found(GREY, GREY), d65(100.0));
+        assert_eq!(found(xyz(Some(WHITE)), GREY), Some(WHITE));
+        assert_eq!(found(GREY, xyz(Some(WHITE))), Some(WHITE));
+        assert_eq!(found(xyz(Some(WHITE)), xyz(other)), Some(WHITE));
+        assert_eq!(found(xyz(None), xyz(other)), other);
+        // L*a*b* cannot be seen under another white; XYZ can.
+        assert_eq!(found(xyz(other), lab(Some(WHITE))), Some(WHITE));
+        assert_eq!(found(lab(Some(WHITE)), lab(None)), None);
+        assert_eq!(white_of(GREY, GREY, Some(Space::Lab), None, None).unwrap(), None);
+        let asked = |white, luminance| white_of(xyz(Some(WHITE)), GREY, None, white, luminance).unwrap();
+        assert_eq!(asked(Some(White::D65), None), d65(3100.0));
+        assert_eq!(asked(Some(White::D65), Some(50.0)), d65(50.0));
+        assert_eq!(asked(Some(White::Absolute([1.0, 2.0, 3.0])), None), other);
+        assert_eq!(asked(None, Some(6200.0)), Some([6000.0, 6200.0, 6400.0]));
+        assert_eq!(white_of(xyz(None), GREY, None, None, Some(80.0)).unwrap(), d65(80.0));
+        assert_eq!(white_of(GREY, GREY, None, Some(White::EqualEnergy), Some(3.0)).unwrap().unwrap()[1], 3.0);
+    }
+
+    #[test]
+    fn whites_that_are_unknown_or_disagree_are_errors() {
+        let other = Some([1.0, 2.0, 3.0]);
+        let absolute = Some(White::Absolute([1.0, 2.0, 3.0]));
+        let refused = |a, b, white, luminance| white_of(a, b, None, white, luminance).unwrap_err();
+        for white in [None, Some(White::D65)] {
+            assert!(matches!(refused(xyz(None), GREY, white, None), Error::MissingKey { key: "color.white", .. }));
+        }
+        assert!(matches!(refused(lab(Some(WHITE)), lab(other), None, None), Error::Format { .. }));
+        assert!(matches!(refused(lab(Some(WHITE)), xyz(None), absolute, None), Error::Format { .. }));
+        assert!(matches!(refused(lab(Some(WHITE)), GREY, None, Some(1.0)), Error::Format { .. }));
+        assert!(matches!(refused(GREY, GREY, absolute, Some(1.0)), Error::Usage(_)));
+        let impossible = Some(White::Absolute([1.0, 0.0, 1.0]));
+        assert!(matches!(refused(GREY, GREY, impossible, None), Error::Usage(_)));
+    }
+
+    #[test]
+    fn frames_say_what_they_hold_or_are_refused() {
+        let space = |quantity, channels: &[&str], stated| {
+            space_of(&frame(quantity, None, channels).header, stated).map_err(|error| error.to_string())
+        };
+        use QuantityKind::{Adu, ColorDifference, Lab, Srgb, Unspecified, Xyy, Xyz};
+        assert_eq!(space(Xyz, &["R", "G", "B", "sigma.R"], Some(Space::Lab)), Ok(Space::Xyz));
+        assert_eq!(space(Lab, &["R", "G", "B"], None), Ok(Space::Lab));
+        assert_eq!(space(Xyy, &["x", "y", "Y"], None), Ok(Space::Xyy));
+        assert_eq!(space(Unspecified, &["left.R", "left.G", "left.B"], None), Ok(Space::Xyz));
+        assert_eq!(space(Unspecified, &["R", "G", "B", "A"], Some(Space::Lab)), Ok(Space::Lab));
+        assert_eq!(space(Unspecified, &["L", "a", "b"], None), Ok(Space::Lab));
+        for (quantity, channels) in [(Unspecified, &["Y"][..]), (Xyz, &["Y"]), (Unspecified, &["C0", "C1", "C2"])] {
+            assert!(space(quantity, channels, None).is_err_and(|error| error.contains("three planes")));
+        }
+        let first = space(Adu, &["R", "G", "B"], None).unwrap_err();
+        assert_eq!(first, "frame: it holds three planes of ADU, not colors; run `to-xyz` first");
+        assert!(space(Srgb, &["R", "G", "B"], None).is_err_and(|error| error.contains("to-xyz --space lab")));
+        assert!(space(ColorDifference, &MAP_CHANNELS, None).is_err());
+    }
+
+    /// xyY and L\*a\*b\* are the same colors as the XYZ that they were made of.
+    #[test]
+    fn a_color_does_not_differ_from_itself_in_another_space() {
+        let color = [700.0, 900.0, 1500.0];
+        let xyy = crate::color::xyy_from_xyz(color, D65_XY);
+        let lab = lab_from_xyz(color, WHITE);
+        for (space, same) in [(Space::Xyy, xyy), (Space::Lab, lab)] {
+            let none = difference([color, same], [Space::Xyz, space], Some(WHITE));
+            assert!(none.delta_e_76 < 1e-10 && none.delta_e_2000 < 1e-10, "{space} {none:?}");
+        }
+    }
+
+    /// Every difference by itself beside what comes out of bands, on one thread and on several; with a NaN and a layer.
+    #[test]
+    fn maps_and_statistics_do_not_depend_on_threads_or_bands() {
+        let (width, height) = (700, 300);
+        let colors = |seed: usize, channels: &[&str]| {
+            let mut made = frame(QuantityKind::Lab, None, channels);
+            made.header.geometry = Geometry::new(width, height, channels);
+            let count = made.header.geometry.row_samples() * height;
+            made.samples = (0..count).map(|i| to_sample(((i * 7919 + seed) % 1009) as f64 / 10.0)).collect();
+            made
+        };
+        let mut reference = colors(3, &["L", "a", "b"]);
+        reference.samples[5] = f32::NAN;
+        let other = colors(11, &["L", "a", "b", "sigma.L"]);
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let sides = [&reference, &other].map(|frame| Side::Frame(frame.clone()));
+                let [a, b] = sides;
+                let mut comparison = Comparison::new(a, b, &ComparisonSettings::default()).unwrap();
+                let mut map = MemoryFrame::new(comparison.map_header().unwrap(), Vec::new());
+                let mut rows_done = 0;
+                comparison.run(Some(&mut map), &mut |rows| rows_done = rows).unwrap();
+                assert_eq!(rows_done, height);
+                (comparison.report().unwrap(), map.samples)
+            })
+        };
+        let (report, map) = run(1);
+        let (again, same_map) = run(3);
+        assert_eq!(report, again);
+        let bits = |samples: &[f32]| samples.iter().map(|sample| sample.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&map), bits(&same_map));
+        assert_eq!((report.count, report.not_finite), ((width * height - 1) as u64, 1));
+        let mut worst: f64 = 0.0;
+        for y in 0..height {
+            for x in 0..width {
+                let at = |frame: &MemoryFrame| {
+                    let row = frame.header.geometry.row_samples();
+                    [0, 1, 2].map(|plane| f64::from(frame.samples[y * row + plane * width + x]))
+                };
+                let pair = Difference::between(at(&reference), at(&other));
+                let expected = [pair.delta_e_2000, pair.delta_e_76, pair.delta_e_94, pair.jnd()].map(to_sample);
+                for (plane, expected) in expected.into_iter().enumerate() {
+                    let found = map[(y * 4 + plane) * width + x];
+                    assert!(found == expected || (found.is_nan() && (x, y) == (5, 0)), "{x} {y} {plane}");
+                }
+                worst = worst.max(pair.delta_e_2000);
+            }
+        }
+        assert_eq!(report.differences.delta_e_2000.summary.max, worst);
+    }
+
+    #[test]
+    fn what_cannot_be_compared_is_refused() {
+        let compare = |a, b| Comparison::new(a, b, &ComparisonSettings::default());
+        let mut wide = frame(QuantityKind::Lab, None, &["L", "a", "b"]);
+        wide.header.geometry.width = 9;
+        wide.header.name = "wide".into();
+        let error = compare(lab(None), Side::Frame(wide)).unwrap_err().to_string();
+        assert_eq!(error, "wide: its size is 9x1, but that of frame is 2x1; compare images of one size");
+        assert!(matches!(compare(GREY, GREY).unwrap().map_header(), Err(Error::Usage(_))));
+        let mut lost = frame(QuantityKind::Lab, None, &["L", "a", "b"]);
+        lost.samples.fill(f32::NAN);
+        let mut comparison = compare(Side::Frame(lost), lab(None)).unwrap();
+        comparison.run(None, &mut |_| ()).unwrap();
+        assert!(matches!(comparison.report(), Err(Error::Data(_))));
     }
 }
