@@ -489,7 +489,7 @@ fn two_colors_are_compared() {
     assert!(close(&found["jnd"]["max"], by_distance / 2.3, 1e-12));
     assert_eq!((&found["white"], &found["count"], &found["not_finite"]), (&().into(), &1.into(), &0.into()));
     // Negative numbers are no options, wherever they stand.
-    let found = shop.difference("--space lab 50,2.6772,-79.7751 -- -50,2.6772,-79.7751");
+    let found = shop.difference("--space lab 50,2.6772,-79.7751 -50,2.6772,-79.7751");
     assert!(close(&found["delta_e_94"]["mean"], 100.0, 1e-9));
     let found = shop.difference("-1,2,3 -1,2,3");
     assert_eq!(found["delta_e_76"]["below_tenth"], 1.0);
@@ -575,7 +575,7 @@ fn images_are_compared_with_images_and_colors() {
 
     // A frame against the color of one of its pixels.
     let (samples, _) = shop.read("xyz8.exr");
-    let color = format!("{},{},{}", samples[0], samples[8], samples[16]);
+    let color = [0, 8, 16].map(|place| f64::from(samples[place]).to_string()).join(",");
     let found = shop.difference(&format!("{color} xyz8.exr --map map.exr"));
     assert_eq!((found["count"].as_u64(), found["delta_e_76"]["min"].as_f64()), (Some(48), Some(0.0)));
     assert_eq!(shop.read("map.exr").0[8], 0.0);
