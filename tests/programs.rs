@@ -749,7 +749,7 @@ const BAD_DATA: i32 = 1;
 const BAD_USAGE: i32 = 2;
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 58] = [
+const MISTAKES: [(&str, i32, &str); 59] = [
     ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
@@ -930,7 +930,7 @@ const MISTAKES: [(&str, i32, &str); 58] = [
         "`map.tiff` is no value for --map <FILE.exr>: end the name in .exr; see `color-difference --help`",
     ),
     (
-        "color-difference xyz.exr 4,5,6 --map map.exr -o map.exr",
+        "color-difference xyz.exr 4,5,6 --map map.exr -o ./map.exr",
         BAD_USAGE,
         "the map and the report have the same place; name a file for each",
     ),
@@ -943,6 +943,11 @@ const MISTAKES: [(&str, i32, &str); 58] = [
         "color-difference 1,2,3 4,5,6 --white 1,1,1 --white-luminance 2",
         BAD_USAGE,
         "--white X,Y,Z has its luminance already; leave out --white-luminance",
+    ),
+    (
+        "color-difference xyz.exr 4,5,6 --map -",
+        BAD_USAGE,
+        "the map and the report have the same place; name a file for each",
     ),
     ("fit-matrix", BAD_USAGE, "<LIBRARY> is missing; see `fit-matrix --help`"),
     ("fit-matrix missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),

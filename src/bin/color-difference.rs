@@ -9,7 +9,7 @@ use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::output::{self, FrameWriter, OutputOptions};
 use cyanometer::report::{self, ReportFormat};
 use cyanometer::stage::{Counts, RowSink};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Compare two images or colors by the CIE 1976, 1994 and 2000 formulas
@@ -57,8 +57,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     if a.is_standard_input() && b.is_standard_input() {
         return Err(Error::Usage("only one of A and B can be the standard input; name a file for the other".into()));
     }
-    let shown = |path: &Option<PathBuf>| path.clone().filter(|path| path != Path::new("-"));
-    if map.is_some() && shown(map) == shown(output) {
+    if map.is_some() && output::same_place(map.as_deref(), output.as_deref()) {
         return Err(Error::Usage("the map and the report have the same place; name a file for each".into()));
     }
     let open = |given: &FrameOrColor| match given {

@@ -346,6 +346,17 @@ pub fn check_output(output: Option<&Path>, inputs: &[(FileId, String)]) -> Resul
     inputs.iter().find(|(input, _)| *input == id).map_or(Ok(()), |(_, input)| Err(same_file(&name, input)))
 }
 
+/// Whether two outputs are one file, or both the standard output.
+pub fn same_place(a: Option<&Path>, b: Option<&Path>) -> bool {
+    let place = |path: Option<&Path>| {
+        let path = path.filter(|path| *path != Path::new("-"))?;
+        let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let beside = || Some(directory.canonicalize().ok()?.join(path.file_name()?));
+        Some(path.canonicalize().ok().or_else(beside).unwrap_or_else(|| path.to_owned()))
+    };
+    place(a) == place(b)
+}
+
 /// Writes a text (a report, a matrix) to a named file or the standard output. `input` is the file that was read, if it
 /// is one.
 ///
