@@ -151,7 +151,7 @@ impl<S: RowSource> Comparison<S> {
     pub fn run(&mut self, mut map: Option<&mut dyn RowSink>, progress: &mut dyn FnMut(usize)) -> Result<()> {
         let Self { sides, spaces, white, geometry, differences } = self;
         let (spaces, white) = (*spaces, *white);
-        let (Some(geometry), true) = (geometry, sides.iter().any(|side| side.frame().is_some())) else {
+        let Some(geometry) = geometry else {
             if let [Side::Color(reference), Side::Color(color)] = sides {
                 differences.add(&[difference([*reference, *color], spaces, white)]);
             }
