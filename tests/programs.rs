@@ -5,9 +5,12 @@
 mod support;
 
 use cyanometer::formats::input::{FrameReader, InputOptions, update_digest};
+use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::formats::yaml::parse_metadata;
-use cyanometer::metadata::Metadata;
-use cyanometer::stage::RowSource;
+use cyanometer::frame::Geometry;
+use cyanometer::metadata::{FrameHeader, Metadata};
+use cyanometer::stage::{Counts, RowSink, RowSource};
+use cyanometer::units::QuantityKind;
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{Read, Write};
@@ -446,6 +449,189 @@ fn planes_apart_and_unlike_darks_are_told_of() {
     );
 }
 
+// --- differences of colors -------------------------------------------------------------------------------------------
+
+impl Workshop {
+    /// What color-difference says in JSON.
+    #[track_caller]
+    fn difference(&self, arguments: &str) -> serde_json::Value {
+        let report = self.run(&format!("color-difference {arguments} --output-format json"), &[]);
+        serde_json::from_slice(&report).unwrap()
+    }
+
+    /// A frame of three planes and one column, a pixel a row.
+    fn write_colors(&self, name: &str, quantity: QuantityKind, pixels: &[[f32; 3]]) {
+        let header = FrameHeader {
+            name: name.into(),
+            geometry: Geometry::new(1, pixels.len(), &["R", "G", "B"]),
+            metadata: Metadata::new(quantity),
+        };
+        let options = OutputOptions { path: Some(self.path(name)), ..Default::default() };
+        let mut writer = FrameWriter::create(&options, &header, &[]).unwrap();
+        writer.write(pixels.as_flattened()).unwrap();
+        writer.finish(Counts::default()).unwrap();
+    }
+}
+
+fn close(found: &serde_json::Value, expected: f64, tolerance: f64) -> bool {
+    found.as_f64().is_some_and(|found| (found - expected).abs() <= tolerance)
+}
+
+/// The first pair of Sharma, Wu and Dalal; and by hand L* = 116 · 0.2^⅓ − 16 of a fifth of the white, whose difference
+/// from white is in lightness alone.
+#[test]
+fn two_colors_are_compared() {
+    let shop = Workshop::new();
+    let found = shop.difference("50,2.6772,-79.7751 50,0,-82.7485 --space lab");
+    assert!(close(&found["delta_e_2000"]["median"], 2.0425, 0.5e-4), "{found}");
+    let by_distance = 2.6772_f64.hypot(82.7485 - 79.7751);
+    assert!(close(&found["delta_e_76"]["max"], by_distance, 1e-12));
+    assert!(close(&found["jnd"]["max"], by_distance / 2.3, 1e-12));
+    assert_eq!((&found["white"], &found["count"], &found["not_finite"]), (&().into(), &1.into(), &0.into()));
+    // Negative numbers are no options, wherever they stand.
+    let found = shop.difference("--space lab 50,2.6772,-79.7751 -50,2.6772,-79.7751");
+    assert!(close(&found["delta_e_94"]["mean"], 100.0, 1e-9));
+    let found = shop.difference("-1,2,3 -1,2,3");
+    assert_eq!(found["delta_e_76"]["below_tenth"], 1.0);
+    // The first is the reference of the 1994 formula, by whose chroma of 50 the second's is weighed.
+    let found = shop.difference("60,30,40 60,0,0 --space lab");
+    assert!(close(&found["delta_e_94"]["mean"], 50.0 / 3.25, 1e-9));
+    let found = shop.difference("60,0,0 60,30,40 --space lab");
+    assert!(close(&found["delta_e_94"]["mean"], 50.0, 1e-9));
+
+    let lightness = 116.0 * 0.2_f64.cbrt() - 16.0;
+    let found = shop.difference("20,20,20 100,100,100 --white e");
+    assert!(close(&found["delta_e_76"]["mean"], 100.0 - lightness, 1e-9));
+    let found = shop.difference("1,2,3 5,10,15 --white 5,10,15");
+    assert!(close(&found["delta_e_76"]["mean"], 100.0 - lightness, 1e-9));
+    let text = String::from_utf8(shop.run("color-difference 20,30,40 21,30,40", &[])).unwrap();
+    let head: Vec<&str> = text.lines().take(4).collect();
+    let expected =
+        ["reference: 20,30,40, XYZ", "compared: 21,30,40, XYZ", "white: XYZ 95.046 100.000 108.906", "pixels: 1"];
+    assert_eq!(head, expected);
+    assert_eq!(text.lines().count(), 9, "{text}");
+    let csv = String::from_utf8(shop.run("color-difference 1,2,3 3,2,1 --output-format csv", &[])).unwrap();
+    let names: Vec<&str> = csv.lines().map(|line| line.split(',').next().unwrap()).collect();
+    assert_eq!(names, ["formula", "delta_e_76", "jnd", "delta_e_94", "delta_e_2000"]);
+    assert_eq!(shop.run("color-difference 1,2,3 3,2,1 --output-format yaml -o report.yaml", &[]), b"");
+    assert!(shop.bytes("report.yaml").starts_with(b"delta_e_76:\n  min: "));
+}
+
+/// Frames of one scene with two noises: XYZ, xyY and L*a*b* give one result, through files and pipes; the map holds what
+/// the statistics are of.
+#[test]
+fn images_are_compared_with_images_and_colors() {
+    let shop = Workshop::with_frames();
+    for seed in [8, 9] {
+        shop.pipe(&format!("add-noise expected.exr --seed {seed} | digitize | mosaic | demosaic -o rgb{seed}.exr"));
+        for space in ["xyz", "xyy", "lab"] {
+            shop.run(&format!("to-xyz rgb{seed}.exr --matrix matrix.yaml --space {space} -o {space}{seed}.exr"), &[]);
+        }
+    }
+    shop.run("to-xyz rgb9.exr --matrix matrix.yaml --sigma -o sigma9.exr", &[]);
+    let whole = shop.difference("xyz8.exr xyz9.exr --map map.exr");
+    assert_eq!(whole["count"], 48);
+    let white = shop.sidecar("xyz8.exr").color.unwrap().white.unwrap();
+    assert!((0..3).all(|i| close(&whole["white"][i], white[i], 1e-9)));
+    assert_eq!(shop.difference("xyz8.exr sigma9.exr"), whole, "further channels do not count");
+    for pair in ["lab8.exr lab9.exr", "xyy8.exr lab9.exr", "lab8.exr xyz9.exr"] {
+        let same = shop.difference(pair);
+        for formula in ["delta_e_76", "jnd", "delta_e_94", "delta_e_2000"] {
+            for key in ["min", "mean", "median", "p95", "max"] {
+                let expected = whole[formula][key].as_f64().unwrap();
+                // L*a*b* of a size of 100 is stored in 24 bits: 4·10⁻⁶ in each coordinate, and differences are at most that far
+                // off by their largest slope, a few.
+                assert!(close(&same[formula][key], expected, 1e-4), "{pair} {formula} {key}");
+            }
+        }
+    }
+    let piped = shop.run("color-difference - xyz9.exr --output-format json", &shop.bytes("xyz8.exr"));
+    assert_eq!(serde_json::from_slice::<serde_json::Value>(&piped).unwrap(), whole);
+
+    let (map, metadata) = shop.read("map.exr");
+    assert_eq!(metadata.quantity, QuantityKind::ColorDifference);
+    let last = metadata.history.last().unwrap();
+    assert_eq!((last.program.as_str(), last.arguments.join(" ")), ("color-difference", "xyz8.exr xyz9.exr".into()));
+    shop.run("measure map.exr", &[]);
+    for (plane, formula) in ["delta_e_2000", "delta_e_76", "delta_e_94", "jnd"].into_iter().enumerate() {
+        let mut pixels: Vec<f64> = map
+            .chunks(4 * 8)
+            .flat_map(|row| &row[8 * plane..8 * (plane + 1)])
+            .map(|&sample| f64::from(sample))
+            .collect();
+        pixels.sort_by(f64::total_cmp);
+        let found = &whole[formula];
+        let mean = pixels.iter().sum::<f64>() / 48.0;
+        let expected =
+            [("min", pixels[0]), ("mean", mean), ("median", (pixels[23] + pixels[24]) / 2.0), ("max", pixels[47])];
+        for (key, expected) in expected {
+            // Half a unit in the last of 24 bits.
+            assert!(close(&found[key], expected, expected * 2f64.powi(-24)), "{formula} {key}");
+        }
+        for (key, limit) in [("below_tenth", 0.1), ("below_quarter", 0.25), ("below_half", 0.5)] {
+            assert!(close(&found[key], pixels.iter().filter(|&&pixel| pixel < limit).count() as f64 / 48.0, 1e-12));
+        }
+    }
+
+    // A frame against the color of one of its pixels.
+    let (samples, _) = shop.read("xyz8.exr");
+    let color = [0, 8, 16].map(|place| f64::from(samples[place]).to_string()).join(",");
+    let found = shop.difference(&format!("{color} xyz8.exr --map map.exr"));
+    assert_eq!((found["count"].as_u64(), found["delta_e_76"]["min"].as_f64()), (Some(48), Some(0.0)));
+    assert_eq!(shop.read("map.exr").0[8], 0.0);
+}
+
+#[test]
+fn images_without_metadata_are_what_space_says() {
+    let shop = Workshop::new();
+    shop.write_colors("a.exr", QuantityKind::Unspecified, &[[50.0, 3.0, 4.0], [50.0, 0.0, f32::NAN], [40.0, 0.0, 0.0]]);
+    let output = shop.attempt("color-difference 50,0,0 a.exr --space lab --map map.exr --output-format json", &[]);
+    assert_eq!(
+        String::from_utf8_lossy(&output.stderr),
+        "color-difference: warning: 1 pixels are NaN or infinite; they are left out of the statistics\n"
+    );
+    assert!(output.status.success());
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&found["count"], &found["not_finite"]), (&2.into(), &1.into()));
+    assert!(close(&found["delta_e_76"]["mean"], 7.5, 1e-12) && close(&found["delta_e_76"]["max"], 10.0, 1e-12));
+    let (map, _) = shop.read("map.exr");
+    assert!(map[4..8].iter().all(|sample| sample.is_nan()) && map[1] == 5.0 && map[9] == 10.0, "{map:?}");
+    assert_eq!(shop.sidecar("map.exr").samples.unwrap().not_finite, Some(1));
+
+    shop.write_colors("b.exr", QuantityKind::Unspecified, &[[100.0; 3], [20.0; 3]]);
+    let found = shop.difference("100,100,100 b.exr --white e --white-luminance 100");
+    assert!(close(&found["delta_e_76"]["max"], 116.0 - 116.0 * 0.2_f64.cbrt(), 1e-9), "{found}");
+    shop.write_colors("c.exr", QuantityKind::Lab, &[[f32::NAN; 3]]);
+    let refused = |line: &str, status: i32, complaint: &str| {
+        let files = shop.files();
+        let output = shop.attempt(line, &[]);
+        assert_eq!(String::from_utf8_lossy(&output.stderr), format!("color-difference: {complaint}\n"), "{line}");
+        assert_eq!((output.status.code(), shop.files()), (Some(status), files), "{line}");
+    };
+    refused(
+        "color-difference b.exr 1,2,3",
+        BAD_DATA,
+        "b.exr: the metadata has no `color.white`; give --white-luminance CD_PER_M2",
+    );
+    refused(
+        "color-difference a.exr b.exr",
+        BAD_DATA,
+        "b.exr: its size is 1x2, but that of a.exr is 1x3; compare images of one size",
+    );
+    refused(
+        "color-difference c.exr 1,2,3 --space lab --map new.exr",
+        BAD_DATA,
+        "c.exr: no pixel can be compared with 1,2,3; in every pair a color is NaN or infinite",
+    );
+    for option in ["--map", "-o"] {
+        let complaint = "b.exr: it is the same file as the input b.exr; name another output";
+        refused(&format!("color-difference 1,2,3 b.exr --white-luminance 9 {option} b.exr"), BAD_USAGE, complaint);
+    }
+    // What is the name of a file is a file.
+    fs::rename(shop.path("b.exr"), shop.path("1,2,3")).unwrap();
+    assert_eq!(shop.difference("1,2,3 4,5,6 --white-luminance 9")["count"], 2);
+}
+
 // --- sidecars ------------------------------------------------------------------------------------------------------
 
 #[test]
@@ -563,7 +749,7 @@ const BAD_DATA: i32 = 1;
 const BAD_USAGE: i32 = 2;
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 46] = [
+const MISTAKES: [(&str, i32, &str); 59] = [
     ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
@@ -708,6 +894,60 @@ const MISTAKES: [(&str, i32, &str); 46] = [
         BAD_USAGE,
         "`xml` is no value for --output-format <OUTPUT_FORMAT>; it is one of text, json, yaml, csv; did you mean `yaml`?; see \
          `measure --help`",
+    ),
+    ("color-difference xyz.exr", BAD_USAGE, "<B> is missing; see `color-difference --help`"),
+    ("color-difference xyz.exr missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
+    (
+        "color-difference xyz.exr 1,2",
+        BAD_USAGE,
+        "`1,2` is no value for <B>: it is no option, no file, and no color, which is three numbers between commas; see \
+         `color-difference --help`",
+    ),
+    (
+        "color-difference rgb.exr xyz.exr",
+        BAD_DATA,
+        "rgb.exr: it holds three demosaicked planes of ADU, not colors; run `to-xyz` first",
+    ),
+    (
+        "color-difference xyz.exr plane.exr",
+        BAD_DATA,
+        "plane.exr: it holds a CFA plane of ADU, not colors; run `to-xyz` first",
+    ),
+    (
+        "color-difference xyz.exr noisy.exr",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons, not colors; run `to-xyz` first",
+    ),
+    ("color-difference - -", BAD_USAGE, "only one of A and B can be the standard input; name a file for the other"),
+    (
+        "color-difference 1,2,3 4,5,6 --map map.exr",
+        BAD_USAGE,
+        "--map needs an image; two colors have no map of differences",
+    ),
+    (
+        "color-difference xyz.exr 4,5,6 --map map.tiff",
+        BAD_USAGE,
+        "`map.tiff` is no value for --map <FILE.exr>: end the name in .exr; see `color-difference --help`",
+    ),
+    (
+        "color-difference xyz.exr 4,5,6 --map map.exr -o ./map.exr",
+        BAD_USAGE,
+        "the map and the report have the same place; name a file for each",
+    ),
+    (
+        "color-difference 1,2,3 4,5,6 --white 1,0,1",
+        BAD_USAGE,
+        "a white of XYZ 1.000000 0.000000 1.000000 is impossible; all three must be above 0",
+    ),
+    (
+        "color-difference 1,2,3 4,5,6 --white 1,1,1 --white-luminance 2",
+        BAD_USAGE,
+        "--white X,Y,Z has its luminance already; leave out --white-luminance",
+    ),
+    (
+        "color-difference xyz.exr 4,5,6 --map -",
+        BAD_USAGE,
+        "the map and the report have the same place; name a file for each",
     ),
     ("fit-matrix", BAD_USAGE, "<LIBRARY> is missing; see `fit-matrix --help`"),
     ("fit-matrix missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),

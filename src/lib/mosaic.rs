@@ -31,6 +31,7 @@ impl Mosaic {
                 | QuantityKind::Lab
                 | QuantityKind::Srgb
                 | QuantityKind::SpectralRadiance
+                | QuantityKind::ColorDifference
         );
         if !input.has_three_planes() || !is_light {
             return Err(input.refuse(format!(

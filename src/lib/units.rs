@@ -123,6 +123,8 @@ pub enum QuantityKind {
     Lab,
     /// sRGB encoded for viewing, 0…1.
     Srgb,
+    /// Differences of colors, by each formula.
+    ColorDifference,
 }
 
 impl QuantityKind {
@@ -135,7 +137,7 @@ impl QuantityKind {
             Self::Adu => "ADU",
             Self::Xyz => "cd m-2",
             Self::Xyy => "1, 1, cd m-2",
-            Self::Lab | Self::Srgb => "1",
+            Self::Lab | Self::Srgb | Self::ColorDifference => "1",
         }
     }
 }
@@ -152,6 +154,7 @@ impl fmt::Display for QuantityKind {
             Self::Xyy => "xyY",
             Self::Lab => "L*a*b*",
             Self::Srgb => "sRGB",
+            Self::ColorDifference => "color differences",
         })
     }
 }

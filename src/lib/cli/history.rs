@@ -3,8 +3,10 @@
 use crate::metadata::HistoryEntry;
 
 /// Options that say where and how the output is stored, or how the program talks: the samples do not depend on them.
-const NOT_RECORDED: [(&str, bool); 8] = [
+const NOT_RECORDED: [(&str, bool); 10] = [
     ("--output", true),
+    ("--output-format", true),
+    ("--map", true),
     ("--format", true),
     ("--compression", true),
     ("--sample-type", true),
@@ -51,5 +53,6 @@ mod tests {
         assert_eq!(recorded("--output=x.exr --seed=7 -vq -qo y.exr --threads 2"), "--seed=7");
         assert_eq!(recorded("-oout.exr -v - --without ron"), "- --without ron");
         assert_eq!(recorded("--compression zip --exposure -1"), "--exposure -1");
+        assert_eq!(recorded("a.exr -1,2,3 --map d.exr --output-format json -o d.json"), "a.exr -1,2,3");
     }
 }

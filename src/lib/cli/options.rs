@@ -13,7 +13,8 @@ use crate::random::Source;
 use crate::statistics::Region;
 use crate::units::RadianceUnit;
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{OsStringValueParser, PathBufValueParser, PossibleValuesParser, TypedValueParser};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// The demosaicking methods by their short and long names.
@@ -206,6 +207,49 @@ fn threads(text: &str) -> Result<usize, String> {
     }
 }
 
+/// A frame to read, or a color given as numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FrameOrColor {
+    /// A file, or `-`.
+    Frame(PathBuf),
+    /// Three numbers.
+    Color([f64; 3]),
+}
+
+impl FrameOrColor {
+    /// Whether the frame comes through the standard input.
+    pub fn is_standard_input(&self) -> bool {
+        *self == Self::Frame("-".into())
+    }
+}
+
+/// A parser for a file or a color: what exists is a file.
+pub fn frame_or_color() -> impl TypedValueParser<Value = FrameOrColor> {
+    OsStringValueParser::new().try_map(|text: OsString| -> Result<FrameOrColor, String> {
+        let path = PathBuf::from(&text);
+        let text = text.to_string_lossy();
+        if text == "-" || path.exists() {
+            return Ok(FrameOrColor::Frame(path));
+        }
+        if let Ok(color) = three_numbers(&text) {
+            return Ok(FrameOrColor::Color(color));
+        }
+        let is_word = |part: &str| part.trim().parse::<f64>().is_err();
+        if text.starts_with('-') || !text.split(',').all(is_word) {
+            return Err("it is no option, no file, and no color, which is three numbers between commas".into());
+        }
+        Ok(FrameOrColor::Frame(path))
+    })
+}
+
+/// A parser for the name of an EXR file to write; other names without an extension may be devices.
+pub fn exr_file() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path: PathBuf| match path.extension() {
+        Some(end) if !end.eq_ignore_ascii_case("exr") => Err("end the name in .exr"),
+        _ => Ok(path),
+    })
+}
+
 /// Reads `WIDTHxHEIGHT`, both at least 1.
 ///
 /// # Errors
@@ -362,4 +406,27 @@ pub fn radiance_unit(text: &str) -> Result<RadianceUnit, String> {
         let names: Vec<&str> = RadianceUnit::ALL.into_iter().map(RadianceUnit::name).collect();
         format!("known units are {}", names.join("; "))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_side_is_a_file_or_a_color() {
+        let read = |text: &str| {
+            let command = clap::Command::new("test")
+                .arg(clap::Arg::new("side").value_parser(frame_or_color()).allow_hyphen_values(true));
+            let matches = command.try_get_matches_from(["test", text]).ok()?;
+            matches.get_one::<FrameOrColor>("side").cloned()
+        };
+        assert_eq!(read("-1.5, 2e1,-3"), Some(FrameOrColor::Color([-1.5, 20.0, -3.0])));
+        assert_eq!(read("-").map(|side| side.is_standard_input()), Some(true));
+        assert_eq!(read("Cargo.toml"), Some(FrameOrColor::Frame("Cargo.toml".into())));
+        // What looks like no color may be a file that is missing; its reader says so.
+        assert_eq!(read("sky,blue.exr"), Some(FrameOrColor::Frame("sky,blue.exr".into())));
+        for wrong in ["1,2", "1,2,3,4", "1,2,x", "inf,1,2", "--spac", "-x"] {
+            assert_eq!(read(wrong), None, "{wrong}");
+        }
+    }
 }

@@ -18,12 +18,14 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// The differences of a color from a reference, both L*a*b*.
+    /// The differences of a color from a reference, both L*a*b*; all NaN where one of them is not finite.
     pub fn between(reference: [f64; 3], color: [f64; 3]) -> Self {
-        Self {
-            delta_e_76: delta_e_76(reference, color),
-            delta_e_94: delta_e_94(reference, color),
-            delta_e_2000: delta_e_2000(reference, color),
+        let [delta_e_76, delta_e_94, delta_e_2000] =
+            [delta_e_76, delta_e_94, delta_e_2000].map(|by: fn([f64; 3], [f64; 3]) -> f64| by(reference, color));
+        if [delta_e_76, delta_e_94, delta_e_2000].iter().all(|value| value.is_finite()) {
+            Self { delta_e_76, delta_e_94, delta_e_2000 }
+        } else {
+            Self { delta_e_76: f64::NAN, delta_e_94: f64::NAN, delta_e_2000: f64::NAN }
         }
     }
 
@@ -88,7 +90,8 @@ pub fn delta_e_2000(reference: [f64; 3], color: [f64; 3]) -> f64 {
     let rotation_angle = 60.0 * (-((mean_hue - 275.0) / 25.0).powi(2)).exp();
     let rotation = -rotation_angle.to_radians().sin() * 2.0 * saturating(chroma);
     let squared = for_lightness.powi(2) + for_chroma.powi(2) + for_hue.powi(2) + rotation * for_chroma * for_hue;
-    squared.max(0.0).sqrt()
+    // Rounding may leave the square of no difference a little below zero; NaN stays.
+    if squared < 0.0 { 0.0 } else { squared.sqrt() }
 }
 
 /// Differences of many pairs of colors.
@@ -223,6 +226,22 @@ mod tests {
         for color in [[0.0; 3], [50.0, 0.0, 0.0], [100.0, -128.0, 127.0], [-3.0, 1e-9, -1e-9]] {
             let none = Difference::between(color, color);
             assert_eq!((none.delta_e_76, none.delta_e_94, none.delta_e_2000), (0.0, 0.0, 0.0));
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_has_no_difference_by_any_formula() {
+        for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e200] {
+            for place in 0..3 {
+                let mut color = [50.0, 10.0, 10.0];
+                color[place] = wrong;
+                for pair in [(color, [50.0, 0.0, 0.0]), ([50.0, 0.0, 0.0], color), (color, color)] {
+                    let none = Difference::between(pair.0, pair.1);
+                    let all = [none.delta_e_76, none.delta_e_94, none.delta_e_2000, none.jnd()];
+                    let is_same = wrong.is_finite() && place == 0 && pair.0 == pair.1;
+                    assert!(is_same || all.iter().all(|value| value.is_nan()), "{pair:?} {all:?}");
+                }
+            }
         }
     }
 

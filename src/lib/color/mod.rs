@@ -1,6 +1,7 @@
 //! Colour: from camera signals to CIE XYZ and on to xyY, L*a*b* and a viewable sRGB.
 
 pub mod characterization;
+pub mod comparison;
 pub mod difference;
 pub mod locus;
 
@@ -11,6 +12,7 @@ use crate::propagation::pixels::{self, PixelNoise};
 use crate::stage::{Counts, Stage};
 use crate::units::{Adu, QuantityKind, Tristimulus};
 use nalgebra::{Matrix3, Vector3};
+use std::fmt;
 
 /// A colour space that frames are given in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +25,17 @@ pub enum Space {
     Lab,
     /// sRGB for viewing.
     Srgb,
+}
+
+impl fmt::Display for Space {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Xyz => "XYZ",
+            Self::Xyy => "xyY",
+            Self::Lab => "L*a*b*",
+            Self::Srgb => "sRGB",
+        })
+    }
 }
 
 /// The white that L*a*b* and sRGB refer to.

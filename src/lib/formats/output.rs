@@ -1,9 +1,9 @@
 //! Writes frames: to named files, whole or not at all, and to pipes.
 
-use super::atomic::{AtomicFile, Target};
+use super::atomic::{AtomicFile, Target, same_file};
 use super::data::hex;
 use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter};
-use super::input::{FileId, U16_FULL_SCALE, XYZ_PRIMARIES, sidecar_path, update_digest};
+use super::input::{FileId, U16_FULL_SCALE, XYZ_PRIMARIES, regular_file, sidecar_path, update_digest};
 use super::tiff::{TiffCompression, TiffSamples, TiffTags, TiffWriter};
 use super::yaml;
 use crate::color;
@@ -113,6 +113,11 @@ impl OutputOptions {
             return Err(Error::Usage("a TIFF has no names for the layers of standard deviations; write an EXR".into()));
         }
         let quantity = header.metadata.quantity;
+        if format == Format::Tiff && quantity == QuantityKind::ColorDifference {
+            return Err(Error::Usage(
+                "a TIFF has no names for the channels of a map of differences; write an EXR".into(),
+            ));
+        }
         let changed = header.metadata.demosaic.is_some() || header.metadata.correction.is_some();
         let is_codes = quantity == QuantityKind::Adu && !changed;
         let default = match format {
@@ -329,6 +334,27 @@ impl FrameWriter {
             Encoder::Tiff(writer) => writer.write_rows(samples),
         }
     }
+}
+
+/// Makes sure that an output, written once all is done, is none of the files `inputs`.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_output(output: Option<&Path>, inputs: &[(FileId, String)]) -> Result<()> {
+    let Some((id, name)) = output.and_then(regular_file) else { return Ok(()) };
+    inputs.iter().find(|(input, _)| *input == id).map_or(Ok(()), |(_, input)| Err(same_file(&name, input)))
+}
+
+/// Whether two outputs are one file, or both the standard output.
+pub fn same_place(a: Option<&Path>, b: Option<&Path>) -> bool {
+    let place = |path: Option<&Path>| {
+        let path = path.filter(|path| *path != Path::new("-"))?;
+        let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let beside = || Some(directory.canonicalize().ok()?.join(path.file_name()?));
+        Some(path.canonicalize().ok().or_else(beside).unwrap_or_else(|| path.to_owned()))
+    };
+    place(a) == place(b)
 }
 
 /// Writes a text (a report, a matrix) to a named file or the standard output. `input` is the file that was read, if it

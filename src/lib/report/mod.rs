@@ -4,11 +4,13 @@ pub mod characterization;
 pub mod plot;
 
 mod chromaticity;
+mod difference;
 mod photon_transfer;
 mod prediction;
 mod trade_off;
 
 pub use chromaticity::{SkyColor, chromaticity};
+pub use difference::difference;
 pub use photon_transfer::photon_transfer;
 pub use prediction::{prediction, sweep};
 pub use trade_off::trade_off;
@@ -120,14 +122,21 @@ fn shown(key: &str, value: Option<f64>) -> String {
     match key {
         "clipped" => format!("{value}"),
         "snr_db" | "z_mean" | "z_std" => format!("{value:.2}"),
-        _ if value == 0.0 => "0".into(),
-        _ if (1e-3..1e7).contains(&value.abs()) => {
-            // Six significant digits.
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a value within -3..7")]
-            let digits = (5.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+        _ => in_digits(value, 6),
+    }
+}
+
+/// A number in so many significant digits.
+fn in_digits(value: f64, significant: u8) -> String {
+    let after_first = significant - 1;
+    match value.abs() {
+        0.0 => "0".into(),
+        1e-3..1e7 => {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a value within 0..9")]
+            let digits = (f64::from(after_first) - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
             format!("{value:.digits$}")
         }
-        _ => format!("{value:.5e}"),
+        _ => format!("{value:.*e}", usize::from(after_first)),
     }
 }
 
