@@ -202,7 +202,7 @@ fn samples_csv(evaluation: &Evaluation) -> Result<String> {
             head.extend(named(what, &formulas));
         }
         for what in ["std_", "predicted_std_"] {
-            head.extend(named(what, &["L", "a", "b"]));
+            head.extend(named(what, &["X", "Y", "Z", "L", "a", "b"]));
         }
         head.extend(
             ["noise_delta_e", "predicted_delta_e", "predicted_delta_e_std", "predicted_patch_delta_e", "clipped"]
@@ -226,8 +226,9 @@ fn samples_csv(evaluation: &Evaluation) -> Result<String> {
             for difference in [&noise.patch_mean, &noise.pixel_mean, &noise.pixel_std, &noise.pixel_max] {
                 row.extend(of(difference));
             }
-            row.extend(noise.lab_std.map(number));
+            row.extend(noise.xyz_std.into_iter().chain(noise.lab_std).map(number));
             let maybe = |value: Option<f64>| value.map_or(String::new(), number);
+            row.extend([0, 1, 2].map(|i| maybe(noise.predicted.map(|p| p.xyz_std[i]))));
             row.extend([0, 1, 2].map(|i| maybe(noise.predicted.map(|p| p.lab_std[i]))));
             row.push(number(noise.noise_delta_e));
             row.push(maybe(noise.predicted.map(|p| p.delta_e)));

@@ -142,6 +142,8 @@ pub struct SampleNoise {
     pub pixel_std: Difference,
     /// Largest of these differences.
     pub pixel_max: Difference,
+    /// Standard deviation of X, Y, Z over the pixels.
+    pub xyz_std: [f64; 3],
     /// Standard deviation of L*, a*, b* over the pixels.
     pub lab_std: [f64; 3],
     /// Mean distance in L*a*b* of the pixels from the color that the camera gives without noise, ΔE*ab.
@@ -155,6 +157,8 @@ pub struct SampleNoise {
 /// The noise of a sample by formula.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedNoise {
+    /// Standard deviation of X, Y, Z over the pixels.
+    pub xyz_std: [f64; 3],
     /// Standard deviation of L*, a*, b* over the pixels.
     pub lab_std: [f64; 3],
     /// Expected distance of a pixel from the color that the camera gives without noise, ΔE*ab.
@@ -332,23 +336,28 @@ impl Evaluator<'_> {
         let labs: Vec<[f64; 3]> = pixels.iter().map(|xyz| lab_from_xyz(*xyz, white)).collect();
         let differences: Vec<Difference> = labs.iter().map(|pixel| Difference::between(lab, *pixel)).collect();
         let (pixel_mean, pixel_std, pixel_max) = moments(&differences);
-        let lab_mean = [0, 1, 2].map(|i| labs.iter().map(|pixel| pixel[i]).sum::<f64>() / count);
-        let lab_std = [0, 1, 2].map(|i| {
-            let squares: f64 = labs.iter().map(|pixel| (pixel[i] - lab_mean[i]).powi(2)).sum();
-            (squares / (count - 1.0).max(1.0)).sqrt()
-        });
-        let prediction = match propagation::of_frame(&chain.lab, Equations::Exact) {
-            Some(FramePrediction::Mixed(mixture)) => Some(predicted(&mixture, &chain.plane, patch, margin)),
+        let std = |values: &[[f64; 3]]| {
+            [0, 1, 2].map(|i| {
+                let mean = values.iter().map(|value| value[i]).sum::<f64>() / count;
+                let squares: f64 = values.iter().map(|value| (value[i] - mean).powi(2)).sum();
+                (squares / (count - 1.0).max(1.0)).sqrt()
+            })
+        };
+        let mixture = |head: &FrameHeader| match propagation::of_frame(head, Equations::Exact) {
+            Some(FramePrediction::Mixed(mixture)) => Some(mixture),
             _ => None,
         };
+        let by_formula = mixture(chain.xyz.header()).zip(mixture(&chain.lab));
+        let by_formula = by_formula.map(|(xyz, lab)| predicted(&xyz, &lab, &chain.plane, patch, margin));
         Ok(SampleNoise {
             patch_mean: Difference::between(lab, lab_from_xyz(mean_xyz, white)),
             pixel_mean,
             pixel_std,
             pixel_max,
-            lab_std,
+            xyz_std: std(&pixels),
+            lab_std: std(&labs),
             noise_delta_e: labs.iter().map(|pixel| delta_e_76(camera_lab, *pixel)).sum::<f64>() / count,
-            predicted: prediction,
+            predicted: by_formula,
             clipped: counts.full_well + counts.clipped_high,
         })
     }
@@ -415,7 +424,7 @@ fn moments(differences: &[Difference]) -> (Difference, Difference, Difference) {
 }
 
 /// The noise of the patch by formula, each phase of the filter array counted as often as it occurs.
-fn predicted(mixture: &Mixture, plane: &FrameHeader, patch: [usize; 2], margin: usize) -> PredictedNoise {
+fn predicted(xyz: &Mixture, lab: &Mixture, plane: &FrameHeader, patch: [usize; 2], margin: usize) -> PredictedNoise {
     let corner = plane.geometry.origin.map(|first| i64::from(first) + margin as i64);
     let mut shares = [0.0; PHASES.len()];
     for y in 0..patch[1].min(2) {
@@ -425,15 +434,17 @@ fn predicted(mixture: &Mixture, plane: &FrameHeader, patch: [usize; 2], margin: 
             shares[phase(corner[0] + x as i64, corner[1] + y as i64)] += times as f64 / (patch[0] * patch[1]) as f64;
         }
     }
-    let covariances = mixture.phase_covariances();
-    let mut covariance = Matrix3::zeros();
-    for (share, of_phase) in shares.iter().zip(&covariances) {
-        covariance += of_phase * *share;
-    }
-    let length = mixture.noise_length(shares);
-    let of_patch = mixture.patch_mean_covariance(Some(phase(corner[0], corner[1])), patch);
+    let std = |mixture: &Mixture| {
+        let covariances = mixture.phase_covariances();
+        let variance =
+            |i: usize| shares.iter().zip(&covariances).map(|(share, of_phase)| share * of_phase[(i, i)]).sum();
+        [0, 1, 2].map(|i| f64::max(variance(i), 0.0).sqrt())
+    };
+    let length = lab.noise_length(shares);
+    let of_patch = lab.patch_mean_covariance(Some(phase(corner[0], corner[1])), patch);
     PredictedNoise {
-        lab_std: [0, 1, 2].map(|i| covariance[(i, i)].max(0.0).sqrt()),
+        xyz_std: std(xyz),
+        lab_std: std(lab),
         delta_e: length.mean,
         delta_e_std: length.std(),
         // The mean is taken of XYZ, so that the curvature of L*a*b* does not bias it.
