@@ -223,3 +223,157 @@ pub fn expected_electrons(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 
     };
     Some(electrons.map(|e| if e.is_finite() { e.max(0.0) } else { 0.0 }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cfa::CfaPattern;
+    use crate::color::{lab_from_xyz, xyy_from_xyz};
+    use crate::frame::Geometry;
+    use crate::metadata::{AdcRecord, ColorRecord, DemosaicRecord, Metadata};
+    use crate::optics::Exposure;
+    use crate::stage::MemoryFrame;
+
+    /// A chart of 5 columns in patches of 8x6.
+    fn chart(width: usize, height: usize, origin: [i32; 2]) -> FrameHeader {
+        let mut metadata = Metadata::new(QuantityKind::Electrons);
+        metadata.scene = Some(Scene {
+            source: "chart".into(),
+            uniform: false,
+            expected_electrons: None,
+            vignetting_focal_length_mm: None,
+            patch: Some([8, 6]),
+            source_width: Some(5),
+            brightest_e: None,
+        });
+        let geometry = Geometry { origin, ..Geometry::new(width, height, &["R", "G", "B"]) };
+        FrameHeader { name: "chart.exr".into(), geometry, metadata }
+    }
+
+    fn with_demosaic(mut frame: FrameHeader, method: &str) -> FrameHeader {
+        frame.metadata.demosaic = Some(DemosaicRecord { method: method.into(), cfa: CfaPattern::Rggb, black: 0.0 });
+        frame
+    }
+
+    #[test]
+    fn patches_are_laid_out_from_the_sensors_corner() {
+        let patches = of_frame(&chart(40, 18, [0, 0]), None).unwrap();
+        assert_eq!(patches.len(), 15);
+        let second_row = Patch { at: [1, 1], sample: Some(6), interior: Region { x: 8, y: 6, width: 8, height: 6 } };
+        assert_eq!(patches[6], second_row);
+        // A rim of the method's reach is left out.
+        let patches = of_frame(&with_demosaic(chart(40, 18, [0, 0]), "shti"), None).unwrap();
+        assert_eq!(patches[6].interior, Region { x: 10, y: 8, width: 4, height: 2 });
+        // The last column and row are cut.
+        let patches = of_frame(&chart(39, 17, [0, 0]), None).unwrap();
+        assert_eq!(patches.iter().map(|patch| patch.sample).collect::<Vec<_>>(), [0, 1, 2, 3, 5, 6, 7, 8].map(Some));
+    }
+
+    #[test]
+    fn a_crop_keeps_the_numbers_of_its_whole_patches() {
+        // Sensor columns 3 to 27 and rows 6 to 16: the patches of columns 1 and 2, row 1.
+        let patches = of_frame(&chart(25, 11, [3, 6]), None).unwrap();
+        let region = |x| Region { x, y: 0, width: 8, height: 6 };
+        assert_eq!(
+            patches,
+            [(1, 6, 5), (2, 7, 13)].map(|(column, sample, x)| Patch {
+                at: [column, 1],
+                sample: Some(sample),
+                interior: region(x)
+            })
+        );
+        // Of another chart the width is known only where the frame shows it whole.
+        let samples = |width, origin| {
+            let patches = of_frame(&chart(width, 6, origin), Some([4, 3])).unwrap();
+            patches.iter().map(|patch| patch.sample).collect::<Vec<_>>()
+        };
+        assert_eq!(samples(8, [0, 0]), [0, 1, 2, 3].map(Some));
+        assert_eq!(samples(9, [0, 0]), [None; 4]);
+        assert_eq!(samples(8, [4, 0]), [None; 4]);
+        // What lies before the sensor's corner is no chart.
+        let patches = of_frame(&chart(24, 6, [-8, 0]), None).unwrap();
+        assert_eq!(
+            patches.iter().map(|patch| (patch.at, patch.interior.x)).collect::<Vec<_>>(),
+            [([0, 0], 8), ([1, 0], 16)]
+        );
+    }
+
+    #[test]
+    fn what_has_no_patches_is_refused() {
+        let complaint = |frame: &FrameHeader, size| of_frame(frame, size).unwrap_err().to_string();
+        let mut plain = chart(40, 18, [0, 0]);
+        for patch in [Some([1, 1]), None] {
+            plain.metadata.scene.as_mut().unwrap().patch = patch;
+            assert!(complaint(&plain, None).contains("give --patches=WxH"));
+        }
+        assert!(complaint(&chart(10, 5, [4, 3]), None).contains("no patch of 8x6 lies whole within the frame of 10x5"));
+        let camera = with_demosaic(chart(40, 18, [0, 0]), "eci");
+        assert!(complaint(&camera, None).contains("patches of 8x6 have no interior"));
+        assert!(complaint(&camera, None).ends_with("they must be 7x7 at least"));
+        assert!(complaint(&camera, Some([41, 7])).contains("lies whole"));
+    }
+
+    /// Every stage leads back to the electrons that it came from; doubles carry the condition of the matrix, about 10.
+    #[test]
+    fn means_of_every_stage_lead_back_to_electrons() {
+        let electrons = [700.0, 1500.0, 2900.0];
+        let mut frame = chart(8, 6, [0, 0]);
+        let check = |frame: &FrameHeader, means: [f64; 3]| {
+            let found = expected_electrons(frame, means).unwrap();
+            for (found, expected) in found.into_iter().zip(electrons) {
+                assert!((found / expected - 1.0).abs() < 1e-12, "{:?}: {found} {expected}", frame.metadata.quantity);
+            }
+        };
+        frame.metadata.dark_signal_e = Some(30.0);
+        check(&frame, electrons.map(|e| e + 30.0));
+        assert_eq!(expected_electrons(&frame, [10.0, f64::NAN, 31.0]), Some([0.0, 0.0, 1.0]));
+        frame.metadata.quantity = QuantityKind::Adu;
+        assert_eq!(expected_electrons(&frame, electrons), None);
+        frame.metadata.adc = Some(AdcRecord { bits: 14, bias_adu: 100.0, adu_per_e: 0.25 });
+        frame.metadata.black_level_adu = Some(107.5);
+        check(&frame, electrons.map(|e| 0.25 * e + 107.5));
+
+        let exposure = Exposure { exposure_s: 0.02, f_number: 5.6, lens_transmittance: 1.0 };
+        let xyz_from_camera = [[0.4, 0.3, 0.2], [0.2, 0.7, 0.1], [0.01, 0.1, 0.9]];
+        let white = [950.0, 1000.0, 1080.0];
+        frame.metadata.exposure = Some(exposure);
+        frame.metadata.color = Some(ColorRecord { xyz_from_camera, method: None, black_adu: 7.0, white: Some(white) });
+        let camera = Vector3::from(electrons.map(|e| 0.25 * e));
+        let xyz: [f64; 3] = (color::matrix(&xyz_from_camera) / exposure.exposure_s_sr() * camera).into();
+        for (quantity, means) in [
+            (QuantityKind::Xyz, xyz),
+            (QuantityKind::Xyy, xyy_from_xyz(xyz, [0.3, 0.3])),
+            (QuantityKind::Lab, lab_from_xyz(xyz, white)),
+        ] {
+            frame.metadata.quantity = quantity;
+            check(&frame, means);
+        }
+        frame.metadata.quantity = QuantityKind::Srgb;
+        assert_eq!(expected_electrons(&frame, electrons), None);
+    }
+
+    /// The same numbers as of the same rectangles; predictions only where the frame was rendered.
+    #[test]
+    fn patches_are_measured_as_regions_are() {
+        let header = chart(37, 18, [2, 0]);
+        let samples: Vec<f32> = (0..37 * 3 * 18).map(|i| ((i * 7919) % 1013) as f32).collect();
+        let frame = || MemoryFrame::new(header.clone(), samples.clone());
+        let patches = measure(&mut frame(), None, Equations::Exact).unwrap();
+        let regions: Vec<Region> = patches.regions.iter().map(|report| report.region).collect();
+        assert_eq!(regions.len(), 9);
+        let plain = super::super::measure(&mut frame(), &regions, Equations::Exact, None).unwrap();
+        for (patch, region) in patches.regions.iter().zip(&plain.regions) {
+            assert!(patch.patch.is_some() && patch.sample.is_some() && region.patch.is_none());
+            assert_eq!(patch.covariance, region.covariance);
+            for (a, b) in patch.channels.iter().zip(&region.channels) {
+                assert_eq!((a.count, a.mean, a.std, a.min, a.max), (b.count, b.mean, b.std, b.min, b.max));
+            }
+        }
+        let mut other = frame();
+        other.header.metadata.scene = None;
+        let unknown = measure(&mut other, Some([8, 6]), Equations::Exact).unwrap();
+        assert!(
+            unknown.regions.iter().flat_map(|region| &region.channels).all(|channel| channel.predicted_std.is_none())
+        );
+    }
+}
