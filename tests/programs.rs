@@ -634,7 +634,7 @@ const BAD_DATA: i32 = 1;
 const BAD_USAGE: i32 = 2;
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 46] = [
+const MISTAKES: [(&str, i32, &str); 52] = [
     ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
@@ -782,7 +782,7 @@ const MISTAKES: [(&str, i32, &str); 46] = [
     (
         "measure --patches=4x3 rgb.exr",
         BAD_USAGE,
-        "rgb.exr: patches of 4x3 have no interior: eci mixes colors up to 3 pixels from their edges; they must be 7x7 at least",
+        "rgb.exr: patches of 4x3 have no interior: eci mixes colours up to 3 pixels from their edges; they must be 7x7 at least",
     ),
     (
         "measure --patches=4 noisy.exr",

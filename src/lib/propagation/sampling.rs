@@ -410,7 +410,6 @@ mod tests {
 
     /// Sums of a dozen terms of one size in doubles: relative 10⁻¹².
     #[test]
-    #[test]
     fn the_law_of_any_moments_follows_from_nine() {
         let sites = [(2.0, 0.3), (5.0, -0.2), (0.7, 1.1)].map(|(variance, excess_kurtosis)| Prediction {
             moments: MeanVariance { mean: 0.0, variance },
