@@ -281,8 +281,8 @@ fn patches_of_a_library_are_as_noisy_as_predicted() {
                 })
                 .collect();
             // Five standard errors of the mean, 1/√n, and of the mean square, √(2/n). A standard deviation of ν degrees
-            // of freedom is expected 1/4ν low, 0.35/√ν of its error: 0.07 for the 25 or more that 14x10 pixels have. With
-            // 70 of them a spread mispredicted by 3 % moves z by 0.35.
+            // of freedom is expected 1/4ν low, 0.35/√ν of its error: 0.07 for 25, fewer than 14x10 pixels have on
+            // average, 44 to 117 by channel and method. With 70 a spread mispredicted by 3 % moves z by 0.35.
             let n = z.len() as f64;
             let mean = z.iter().sum::<f64>() / n;
             let mean_square = z.iter().map(|z| z * z).sum::<f64>() / n;
