@@ -32,6 +32,7 @@ fn expected() -> Result<MemoryFrame> {
         expected_electrons: Some(SKY),
         vignetting_focal_length_mm: None,
         patch: None,
+        source_width: None,
         brightest_e: None,
     });
     let geometry = Geometry::new(1332, 1000, &["R", "G", "B"]);

@@ -30,6 +30,7 @@ fn scene(size: [usize; 2], electrons: [f32; 3]) -> MemoryFrame {
         expected_electrons: Some(electrons.map(f64::from)),
         vignetting_focal_length_mm: None,
         patch: None,
+        source_width: None,
         brightest_e: None,
     });
     frame

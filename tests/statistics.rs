@@ -27,6 +27,7 @@ fn scene(width: usize, height: usize, electrons: [f64; 3]) -> MemoryFrame {
         expected_electrons: Some(samples.map(f64::from)),
         vignetting_focal_length_mm: None,
         patch: None,
+        source_width: None,
         brightest_e: None,
     });
     frame

@@ -108,6 +108,7 @@ fn expected(sensor: &Sensor, size: [usize; 2], electrons: [f64; 3]) -> MemoryFra
         expected_electrons: Some(electrons),
         vignetting_focal_length_mm: None,
         patch: None,
+        source_width: None,
         brightest_e: None,
     });
     let [width, height] = size;

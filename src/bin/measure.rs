@@ -7,7 +7,7 @@ use cyanometer::formats::{input::FrameReader, input::InputOptions, output};
 use cyanometer::propagation::Equations;
 use cyanometer::report::{self, ReportFormat};
 use cyanometer::stage::RowSource;
-use cyanometer::statistics::{Region, measure};
+use cyanometer::statistics::{Region, measure, patches};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -15,7 +15,8 @@ use std::process::ExitCode;
 ///
 /// Predictions are made for uniform scenes, from electrons to XYZ, xyY and L*a*b*. Planes behind a colour filter array
 /// are also measured class by class. With --check, means are tested by z, variances by chi-square with the effective
-/// degrees of freedom of correlated pixels, correlations by Fisher's z.
+/// degrees of freedom of correlated pixels, correlations by Fisher's z. With --patches, the spread of each patch is
+/// predicted at the level of its own means.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -24,6 +25,10 @@ struct Arguments {
     /// Rectangle X,Y,W,H in pixels; may be given more than once; by default the whole frame
     #[arg(long, value_name = "X,Y,W,H", value_parser = options::region, allow_hyphen_values = true)]
     region: Vec<Region>,
+    /// Measure each patch of a chart, as --patch of render-radiance draws them or as WxH says, less the rim that
+    /// demosaicking mixes
+    #[arg(long, value_name = "WxH", num_args = 0..=1, require_equals = true, value_parser = options::size, conflicts_with_all = ["region", "check"])]
+    patches: Option<Option<[usize; 2]>>,
     /// Form of the report
     #[arg(long, default_value = "text", value_parser = options::choice(&[("text", ReportFormat::Text), ("json", ReportFormat::Json), ("yaml", ReportFormat::Yaml), ("csv", ReportFormat::Csv)]))]
     output_format: ReportFormat,
@@ -52,7 +57,10 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&options)?;
     session.report_reader(&reader);
     let level = arguments.check.then_some(arguments.level);
-    let report = measure(&mut reader, &arguments.region, arguments.equations, level)?;
+    let report = match arguments.patches {
+        Some(size) => patches::measure(&mut reader, size, arguments.equations)?,
+        None => measure(&mut reader, &arguments.region, arguments.equations, level)?,
+    };
     output::write_text(
         arguments.output.as_deref(),
         &report::render(&report, arguments.output_format)?,

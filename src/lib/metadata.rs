@@ -93,6 +93,9 @@ pub struct Scene {
     /// Photosites that show one pixel of the source, width and height.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patch: Option<[usize; 2]>,
+    /// Pixels in a row of the source, where each is shown as a patch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source_width: Option<usize>,
     /// Largest expected signal of any class in e⁻, where it was worked out for `--expose-to`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub brightest_e: Option<f64>,

@@ -335,6 +335,10 @@ impl Request {
         let Prepared { sensor, exposure, light, brightest_e, metadata, .. } = prepared;
         let (exposure, brightest_e, mut metadata) = (*exposure, *brightest_e, metadata.clone());
         let of_sensor = [sensor.width as usize, sensor.height as usize];
+        let source_width = match light {
+            Light::Uniform { .. } => None,
+            Light::Image { width, .. } => Some(*width),
+        };
         let (size, patch, source, uniform) = match light {
             Light::Uniform { electrons, source } => {
                 if self.patch.is_some() {
@@ -385,6 +389,7 @@ impl Request {
             expected_electrons: uniform.filter(|_| is_uniform),
             vignetting_focal_length_mm: self.vignetting_focal_length_mm,
             patch: uniform.is_none().then_some(patch),
+            source_width,
             brightest_e,
         });
         let channels: &[&str] = if self.cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };

@@ -89,6 +89,17 @@ pub fn lab_from_xyz(xyz: [f64; 3], white: [f64; 3]) -> [f64; 3] {
     [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
 }
 
+/// XYZ of CIE 1976 L*a*b* about a white, the inverse of [`lab_from_xyz`].
+pub fn xyz_from_lab([lightness, a, b]: [f64; 3], white: [f64; 3]) -> [f64; 3] {
+    const DELTA: f64 = 6.0 / 29.0;
+    let fy = (lightness + 16.0) / 116.0;
+    let f = [fy + a / 500.0, fy, fy - b / 200.0];
+    [0, 1, 2].map(|i| {
+        let t = if f[i] > DELTA { f[i].powi(3) } else { 3.0 * DELTA * DELTA * (f[i] - 4.0 / 29.0) };
+        white[i] * t
+    })
+}
+
 /// What a curved space does to small changes of XYZ about one colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Local {
@@ -421,6 +432,16 @@ mod tests {
         // Below (6/29)³ the curve is a straight line: 24389/27 · t, here t = 0.001.
         let dark = lab_from_xyz(white.map(|value| value / 1000.0), white);
         assert!((dark[0] - 0.903_296_3).abs() < 1e-6);
+    }
+
+    /// Both ways round, on both pieces of f and below zero; doubles round to 10⁻¹⁶ of a white of 100.
+    #[test]
+    fn lab_leads_back_to_xyz() {
+        let white = [95.0, 100.0, 108.0];
+        for xyz in [[20.0, 30.0, 50.0], [0.1, 0.2, 0.05], [-1.0, 0.0, 3.0], white] {
+            let back = xyz_from_lab(lab_from_xyz(xyz, white), white);
+            assert!((0..3).all(|i| (back[i] - xyz[i]).abs() < 1e-12 * 100.0), "{xyz:?} {back:?}");
+        }
     }
 
     #[test]

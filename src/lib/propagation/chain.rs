@@ -216,6 +216,7 @@ impl Chain {
             expected_electrons: Some([0.0; 3]),
             vignetting_focal_length_mm: None,
             patch: None,
+            source_width: None,
             brightest_e: None,
         });
         let geometry = Geometry::new(sensor.width as usize, sensor.height as usize, &["R", "G", "B"]);

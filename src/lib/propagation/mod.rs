@@ -66,6 +66,8 @@ pub struct Mixture {
     pub covariance: Matrix3<f64>,
     /// What each channel is made of, to first order.
     pub weights: Weights,
+    /// Derivatives of these channels with respect to demosaicked R, G and B.
+    pub from_camera: Matrix3<f64>,
     /// Moments of the photosites of R, G and B, in the unit that the weights act on.
     pub sites: [Prediction; 3],
 }
@@ -98,7 +100,14 @@ impl Mixture {
                 paper::demosaicked(method, variances, mean, Some([geometry.width, geometry.height]))?
             }
         };
-        Some(Self { mean: [0, 1, 2].map(|i| mean[i] + bias[i]), bias, covariance, weights, sites })
+        Some(Self {
+            mean: [0, 1, 2].map(|i| mean[i] + bias[i]),
+            bias,
+            covariance,
+            weights,
+            from_camera: Matrix3::identity(),
+            sites,
+        })
     }
 
     /// The same pixels in the channels that are `matrix` times these, less `black`.
@@ -109,6 +118,7 @@ impl Mixture {
             bias: (matrix * Vector3::from(self.bias)).into(),
             covariance: matrix * self.covariance * matrix.transpose(),
             weights: self.weights.through(matrix),
+            from_camera: matrix * self.from_camera,
             sites: self.sites,
         }
     }

@@ -29,7 +29,7 @@ pub enum ReportFormat {
     Json,
     /// YAML.
     Yaml,
-    /// CSV, one row per region and channel.
+    /// CSV, one row per region and channel; patches have their place at the end.
     Csv,
 }
 
@@ -83,7 +83,9 @@ fn values(channel: &ChannelReport) -> [Option<f64>; 10] {
 fn csv(report: &Report) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let head = ["x", "y", "width", "height", "channel", "count"].into_iter().chain(COLUMNS.map(|(key, _)| key));
-    writer.write_record(head).map_err(unwritable)?;
+    let of_patches = report.regions.iter().any(|region| region.patch.is_some());
+    let last: &[&str] = if of_patches { &["sample", "patch_column", "patch_row"] } else { &[] };
+    writer.write_record(head.chain(last.iter().copied())).map_err(unwritable)?;
     for region in &report.regions {
         for channel in region.channels.iter().chain(&region.classes) {
             let place = [region.region.x, region.region.y, region.region.width, region.region.height];
@@ -91,7 +93,11 @@ fn csv(report: &Report) -> Result<String> {
                 .iter()
                 .map(ToString::to_string)
                 .chain([channel.name.clone(), channel.count.to_string()])
-                .chain(values(channel).map(|value| value.map_or(String::new(), |v| v.to_string())));
+                .chain(values(channel).map(|value| value.map_or(String::new(), |v| v.to_string())))
+                .chain(region.patch.into_iter().flat_map(|[column, row]| {
+                    let sample = region.sample.map_or(String::new(), |sample| sample.to_string());
+                    [sample, column.to_string(), row.to_string()]
+                }));
             writer.write_record(cells).map_err(unwritable)?;
         }
     }
@@ -101,6 +107,10 @@ fn csv(report: &Report) -> Result<String> {
 
 fn text(report: &Report) -> String {
     let mut out = String::new();
+    if report.regions.iter().any(|region| region.patch.is_some()) {
+        patches_text(&report.regions, &mut out);
+        return out;
+    }
     for region in &report.regions {
         region_text(region, &mut out);
         tests_text(region, &mut out);
@@ -176,6 +186,54 @@ fn region_text(region: &RegionReport, out: &mut String) {
         }
         table(&columns, out);
     }
+}
+
+/// The classes of a plane, which tell more than their mixture, or the channels.
+fn channels(region: &RegionReport) -> &[ChannelReport] {
+    if region.classes.is_empty() { &region.channels } else { &region.classes }
+}
+
+/// Writes a line per patch: its number, or column and row where that is not known; pixels; mean and spread of R, G and B
+/// or of what was made of them. Layers of standard deviations are left to the other forms.
+fn patches_text(regions: &[RegionReport], out: &mut String) {
+    let Some(first) = regions.first() else { return };
+    let (r, count) = (first.region, regions.len());
+    let _ = writeln!(
+        out,
+        "{count} {}, {}x{} pixels of {} [{}] in each",
+        if count == 1 { "patch" } else { "patches" },
+        r.width,
+        r.height,
+        first.quantity,
+        first.unit
+    );
+    let column = |heading: String, cell: &dyn Fn(&RegionReport) -> String| -> Vec<String> {
+        std::iter::once(heading).chain(regions.iter().map(cell)).collect()
+    };
+    let mut columns = Vec::new();
+    if regions.iter().all(|region| region.sample.is_some()) {
+        columns.push(column("sample".into(), &|region| region.sample.map_or("-".into(), |sample| sample.to_string())));
+    } else {
+        for (axis, heading) in ["column", "row"].into_iter().enumerate() {
+            let cell = |region: &RegionReport| region.patch.map_or("-".into(), |patch| patch[axis].to_string());
+            columns.push(column(heading.into(), &cell));
+        }
+    }
+    columns.push(column("count".into(), &|region| region.count.to_string()));
+    if regions.iter().any(|region| region.not_finite > 0) {
+        columns.push(column("not finite".into(), &|region| region.not_finite.to_string()));
+    }
+    for (index, channel) in channels(first).iter().take(3).enumerate() {
+        for (wanted, (key, heading)) in COLUMNS.into_iter().enumerate() {
+            if ["mean", "std", "z_std"].contains(&key) {
+                let value = |region: &RegionReport| values(&channels(region)[index])[wanted];
+                if regions.iter().any(|region| value(region).is_some()) {
+                    columns.push(column(format!("{} {heading}", channel.name), &|region| shown(key, value(region))));
+                }
+            }
+        }
+    }
+    table(&columns, out);
 }
 
 fn tests_text(region: &RegionReport, out: &mut String) {

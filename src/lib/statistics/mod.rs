@@ -1,6 +1,7 @@
 //! Statistics of frames and regions, beside what propagation predicts.
 
 pub mod check;
+pub mod patches;
 
 use crate::cfa::Class;
 use crate::error::{Error, Result};
@@ -29,6 +30,23 @@ pub struct Region {
 }
 
 impl Region {
+    /// The row after the last.
+    fn end(&self) -> usize {
+        self.y + self.height
+    }
+
+    /// A place of the same sampling law.
+    fn place(&self, frame: &FrameHeader) -> Place {
+        let geometry = &frame.geometry;
+        let whole = Place {
+            frame: [geometry.width, geometry.height],
+            origin: geometry.origin,
+            corner: [self.x, self.y],
+            size: [self.width, self.height],
+        };
+        whole.canonical()
+    }
+
     /// Checks that the region has pixels and lies within a frame.
     ///
     /// # Errors
@@ -64,6 +82,12 @@ pub struct Report {
 pub struct RegionReport {
     /// The rectangle.
     pub region: Region,
+    /// Column and row of the patch in its chart, where patches are measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch: Option<[usize; 2]>,
+    /// Number of the patch, row by row, from 0; where the width of the chart is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample: Option<usize>,
     /// Pixels whose samples are all finite.
     pub count: u64,
     /// Pixels left out because a sample is NaN or infinite.
@@ -189,8 +213,35 @@ pub fn measure(
     for region in regions {
         region.check(&frame)?;
     }
-    let channels = geometry.channels.len();
     let rails = Rails::of(&frame);
+    let tallies = tallies(source, &frame, regions, rails)?;
+    let prediction = propagation::of_frame(&frame, equations);
+    if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+        return Err(Error::Data(format!(
+            "{}: nothing can be checked: charge transfer mixes neighbours, differently from place to place",
+            frame.name
+        )));
+    }
+    let mut samplings = Samplings::default();
+    let regions = regions
+        .iter()
+        .zip(&tallies)
+        .map(|(region, tally)| {
+            let sampling = |mixture: &Mixture| samplings.of(mixture, &frame, *region);
+            tally.report(&frame, *region, rails, prediction.as_ref(), sampling, level.is_some())
+        })
+        .collect();
+    let mut report = Report { regions, check: None };
+    if let Some(level) = level {
+        report.check = Some(Verdict::of(&report, level, &frame.name)?);
+    }
+    Ok(report)
+}
+
+/// Reads a whole frame and sums up its regions, each of which lies within it.
+fn tallies(source: &mut dyn RowSource, frame: &FrameHeader, regions: &[Region], rails: Rails) -> Result<Vec<Tally>> {
+    let geometry = &frame.geometry;
+    let channels = geometry.channels.len();
     let empty = || Tally {
         channels: Moments::new(channels),
         classes: [const { 0 }; 3].map(|_| Moments::new(1)),
@@ -205,44 +256,32 @@ pub fn measure(
         let rows = band_rows.min(geometry.height - first);
         samples.clear();
         source.read(rows, &mut samples)?;
-        for (region, tally) in regions.iter().zip(&mut tallies) {
+        let met =
+            regions.par_iter().zip(&mut tallies).filter(|(region, _)| region.y < first + rows && first < region.end());
+        met.for_each(|(region, tally)| {
+            let seen = region.y.max(first)..region.end().min(first + rows);
             let row_tallies: Vec<Tally> = samples
+                [(seen.start - first) * geometry.row_samples()..(seen.end - first) * geometry.row_samples()]
                 .par_chunks(geometry.row_samples())
                 .enumerate()
-                .filter(|(index, _)| (region.y..region.y + region.height).contains(&(first + index)))
+                .with_min_len((SHARE / region.width).max(1))
                 .map(|(index, row)| {
                     let mut tally = empty();
-                    tally.add_row(&frame, first + index, row, *region, rails);
+                    tally.add_row(frame, seen.start + index, row, *region, rails);
                     tally
                 })
                 .collect();
             for row in &row_tallies {
                 tally.merge(row);
             }
-        }
+        });
         first += rows;
     }
-    let prediction = propagation::of_frame(&frame, equations);
-    if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
-        return Err(Error::Data(format!(
-            "{}: nothing can be checked: charge transfer mixes neighbours, differently from place to place",
-            frame.name
-        )));
-    }
-    let mut samplings = Samplings::default();
-    let regions = regions
-        .iter()
-        .zip(&tallies)
-        .map(|(region, tally)| {
-            tally.report(&frame, *region, rails, prediction.as_ref(), &mut samplings, level.is_some())
-        })
-        .collect();
-    let mut report = Report { regions, check: None };
-    if let Some(level) = level {
-        report.check = Some(Verdict::of(&report, level, &frame.name)?);
-    }
-    Ok(report)
+    Ok(tallies)
 }
+
+/// Pixels of a region that are worth a task of their own.
+const SHARE: usize = 1 << 11;
 
 /// Sampling laws by place: regions of one size and phase share one.
 #[derive(Default)]
@@ -251,24 +290,22 @@ struct Samplings(Vec<(Place, Sampling)>);
 impl Samplings {
     /// The law of a region of a frame of mixed pixels.
     fn of(&mut self, mixture: &Mixture, frame: &FrameHeader, region: Region) -> Sampling {
-        let geometry = &frame.geometry;
-        let place = Place {
-            frame: [geometry.width, geometry.height],
-            origin: geometry.origin,
-            corner: [region.x, region.y],
-            size: [region.width, region.height],
-        }
-        .canonical();
+        let place = region.place(frame);
         if let Some((_, known)) = self.0.iter().find(|(of, _)| *of == place) {
             return known.clone();
         }
         let mut made = Sampling::of(&mixture.weights, &mixture.sites, &place);
-        // What is predicted beyond the weights: the second order of smooth hue transition, or the paper's equations.
-        let variances = mixture.sites.map(|site| site.moments.variance);
-        made.covariance += mixture.covariance - mixture::mean_pixel(&mixture.weights).covariance(variances);
+        made.covariance += beyond_weights(mixture);
         self.0.push((place, made.clone()));
         made
     }
+}
+
+/// What is predicted of the covariance beyond the weights: the second order of smooth hue transition, or the paper's
+/// equations.
+fn beyond_weights(mixture: &Mixture) -> Matrix3<f64> {
+    let variances = mixture.sites.map(|site| site.moments.variance);
+    mixture.covariance - mixture::mean_pixel(&mixture.weights).covariance(variances)
 }
 
 impl Tally {
@@ -309,7 +346,7 @@ impl Tally {
         region: Region,
         rails: Rails,
         prediction: Option<&FramePrediction>,
-        samplings: &mut Samplings,
+        sampling: impl FnOnce(&Mixture) -> Sampling,
         with_tests: bool,
     ) -> RegionReport {
         let metadata = &frame.metadata;
@@ -334,7 +371,7 @@ impl Tally {
                 mean: mixture.mean,
                 covariance: mixture.covariance,
                 sites: mixture.sites.map(|site| site.moments.variance),
-                sampling: samplings.of(mixture, frame, region),
+                sampling: sampling(mixture),
                 is_plane: false,
             },
         });
@@ -397,6 +434,8 @@ impl Tally {
         };
         RegionReport {
             region,
+            patch: None,
+            sample: None,
             count,
             not_finite: self.channels.not_finite,
             quantity: metadata.quantity,

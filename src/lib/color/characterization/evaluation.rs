@@ -266,6 +266,7 @@ impl Evaluator<'_> {
             expected_electrons: Some(electrons),
             vignetting_focal_length_mm: None,
             patch: None,
+            source_width: None,
             brightest_e: None,
         });
         let place = [sample % self.settings.columns, sample / self.settings.columns];
