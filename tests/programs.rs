@@ -1048,7 +1048,11 @@ const MISTAKES: [(&str, i32, &str); 65] = [
     ),
     ("fit-matrix", BAD_USAGE, "<LIBRARY> is missing; see `fit-matrix --help`"),
     ("fit-matrix missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
-    ("fit-matrix SAMPLES/skies/sky912.exr --train 2000", BAD_USAGE, "the library has 912 samples, fewer than 2000"),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --train 2000",
+        BAD_USAGE,
+        "the library has 912 samples to train on, fewer than 2000",
+    ),
     (
         "fit-matrix SAMPLES/skies/sky912.exr --train 0,1",
         BAD_DATA,

@@ -7,6 +7,8 @@ mod camera;
 mod correlation;
 mod figures;
 mod limits;
+#[path = "../support/markdown.rs"]
+mod markdown;
 mod prediction;
 mod report;
 mod sweep;

@@ -5,6 +5,7 @@ use crate::camera::{EXPOSURE, LARGE, METHODS, SMALL};
 use crate::correlation::{NAMES, READINGS, list};
 use crate::figures::{HUE_FRAMES, HueLevel, exact_snr_db, level_with_noise};
 use crate::limits::{EDGE_FRAMES, FRAMES, LEVELS, Limit, SIZE};
+use crate::markdown::{Table, number};
 use crate::prediction::{Sites, effective_share, weights};
 use crate::sweep::TOP_E;
 use crate::{Results, SKY};
@@ -17,29 +18,6 @@ use std::fmt::Write;
 
 /// The maximum signal-to-noise ratios of the paper's X, Y, Z with BI, SHTI, ECI, in dB [HP2005, Secs. 4.2.1–4.2.3].
 const PAPER_SNR_DB: [[f64; 3]; 3] = [[44.2, 43.3, 40.5], [42.0, 43.4, 39.5], [41.7, 42.2, 40.6]];
-
-/// A table of Markdown.
-struct Table {
-    text: String,
-}
-
-impl Table {
-    fn new(heads: &[&str]) -> Self {
-        let rule: String = heads.iter().map(|_| "---|").collect();
-        Self { text: format!("| {} |\n|{rule}\n", heads.join(" | ")) }
-    }
-
-    fn row(&mut self, cells: &[String]) {
-        self.text.push_str(&format!("| {} |\n", cells.join(" | ")));
-    }
-}
-
-/// A number with a true minus sign.
-fn number(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    let is_zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
-    if is_zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
-}
 
 /// A whole number in groups of three.
 fn grouped(value: f64) -> String {

@@ -19,10 +19,13 @@ pub const CHOSEN_BY: &str = "k-medoids, BUILD step, on spectra of unit length";
 ///
 /// # Errors
 ///
-/// [`Error::Data`] where there are fewer candidates, or fewer different ones.
+/// [`Error::Usage`] where there are fewer candidates, [`Error::Data`] where there are fewer different ones.
 pub fn spanning_subset(library: &SpectralLibrary, candidates: &[usize], count: usize) -> Result<Vec<usize>> {
     if count > candidates.len() {
-        return Err(Error::Data(format!("there are {} samples to train on, fewer than {count}", candidates.len())));
+        return Err(Error::Usage(format!(
+            "the library has {} samples to train on, fewer than {count}",
+            candidates.len()
+        )));
     }
     let units: Vec<Vec<f64>> = candidates
         .iter()

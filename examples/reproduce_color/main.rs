@@ -1,0 +1,151 @@
+//! Reproduces the color figures and tables of [HP2005]: Figs. 3 and 8, Tables 3 to 6; and goes on to skies that were not
+//! trained on.
+//!
+//! Writes Markdown and figures into the directory that is named, always the same to the byte: `scripts/reproduce colour`.
+
+#[path = "../support/markdown.rs"]
+mod markdown;
+mod report;
+mod studio;
+
+use cyanometer::color::characterization::evaluation::SampleEvaluation;
+use cyanometer::color::characterization::noise_aware::TradeOff;
+use cyanometer::color::characterization::regression::{Regression, Weights};
+use cyanometer::color::difference::DifferenceReport;
+use cyanometer::demosaic::Method;
+use cyanometer::error::{Error, Result};
+use cyanometer::formats::output::write_text;
+use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot};
+use cyanometer::report::{SkyColor, chromaticity, trade_off};
+use std::path::Path;
+use std::process::ExitCode;
+use studio::Studio;
+
+/// The regressions in the order of Tables 3 and 4, and one more.
+const REGRESSIONS: [(&str, Regression); 4] = [
+    ("MaxIgnSPPLS", Regression::MaxIgnSppls),
+    ("SkyRadLS", Regression::SkyRadLs),
+    ("SkyRadSPPLS", Regression::SkyRadSppls),
+    ("MaxIgnSPPLS, positive", Regression::MaxIgnPositiveSppls),
+];
+
+/// The methods in the order of Tables 5 and 6, and one more.
+const METHODS: [(&str, Method); 4] =
+    [("BI", Method::Bilinear), ("SHTI", Method::SmoothHue), ("ECI", Method::EffectiveColor), ("MHC", Method::Malvar)];
+
+/// A named evaluation of all skies.
+struct Case {
+    name: &'static str,
+    skies: Vec<SampleEvaluation>,
+}
+
+/// A fit on other samples or with other weights, without noise.
+struct Choice {
+    training: String,
+    weights: &'static str,
+    /// SkyRadLS and SkyRadSPPLS.
+    reports: [DifferenceReport; 2],
+}
+
+/// An aerosol, trained on and not.
+struct HeldOut {
+    aerosol: String,
+    count: usize,
+    /// SkyRadLS and SkyRadSPPLS: with the aerosol among the candidates, and without.
+    with: [DifferenceReport; 2],
+    without: [DifferenceReport; 2],
+}
+
+/// All that is reported.
+struct Results {
+    studio: Studio,
+    regressions: Vec<Case>,
+    methods: Vec<Case>,
+    choices: Vec<Choice>,
+    held_out: Vec<HeldOut>,
+    /// The measured skies by matrices fitted to the computed ones.
+    measured: Vec<(&'static str, DifferenceReport)>,
+    /// The measured skies by SkyRadLS fitted to all of themselves.
+    measured_own: DifferenceReport,
+    trade_off: Vec<TradeOff>,
+}
+
+fn main() -> ExitCode {
+    let Some(directory) = std::env::args().nth(1) else {
+        eprintln!("reproduce_color: name the directory to write to");
+        return ExitCode::from(2);
+    };
+    match run(Path::new(&directory)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("reproduce_color: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(directory: &Path) -> Result<()> {
+    let studio = Studio::new()?;
+    let case = |name, regression, method| -> Result<Case> {
+        let matrix = studio.fit(regression, &studio.training, &Weights::Relative)?;
+        Ok(Case { name, skies: studio.evaluate(&studio.skies, &matrix, method, true)? })
+    };
+    let regressions: Vec<Case> =
+        REGRESSIONS.into_iter().map(|(name, r)| case(name, r, Method::EffectiveColor)).collect::<Result<_>>()?;
+    let methods: Vec<Case> =
+        METHODS.into_iter().map(|(name, method)| case(name, Regression::SkyRadSppls, method)).collect::<Result<_>>()?;
+    let (measured, measured_own) = studio.measured_skies()?;
+
+    std::fs::create_dir_all(directory).map_err(|e| Error::disk(&directory.display().to_string(), "make", e))?;
+    let figure = |name: &str, plot: &Plot| -> Result<()> {
+        ["svg", "png"].iter().try_for_each(|end| plot.write(&directory.join(format!("{name}.{end}")), None))
+    };
+    let preserved = &regressions[2];
+    figure("fig3", &colors(&studio, preserved))?;
+    figure("fig8", &noise(preserved))?;
+    let trade = studio.trade_off()?;
+    figure("trade-off", &trade_off(&trade))?;
+    let results = Results {
+        choices: studio.choices()?,
+        held_out: studio.held_out()?,
+        measured,
+        measured_own,
+        trade_off: trade,
+        regressions,
+        methods,
+        studio,
+    };
+    write_text(Some(&directory.join("colour.md")), &report::markdown(&results)?, None)
+}
+
+/// Fig. 3.
+fn colors(studio: &Studio, case: &Case) -> Plot {
+    let xy = |[x, y, z]: [f64; 3]| [x / (x + y + z), y / (x + y + z)];
+    let skies: Vec<SkyColor> = case
+        .skies
+        .iter()
+        .map(|sky| SkyColor { xy: xy(sky.xyz), fitted_xy: xy(sky.camera_xyz), delta_e_94: sky.noise_free.delta_e_94 })
+        .collect();
+    chromaticity(&skies, Some(studio.kept), &studio.observer, "Fig. 3: 912 skies and the errors of SkyRadSPPLS")
+}
+
+/// Fig. 8: observed against predicted noise of X, Y, Z.
+fn noise(case: &Case) -> Plot {
+    let mut panel = Panel::new(Axis::log10("predicted σ, cd m⁻²"), Axis::log10("observed σ, cd m⁻²"));
+    let mut ends = [f64::INFINITY, 0.0];
+    for (index, (name, color)) in
+        [("X", Color::Vermillion), ("Y", Color::Green), ("Z", Color::Blue)].into_iter().enumerate()
+    {
+        let point = |sky: &SampleEvaluation| {
+            let noise = sky.noise?;
+            Some([noise.predicted?.xyz_std[index], noise.xyz_std[index]])
+        };
+        let points: Vec<[f64; 2]> = case.skies.iter().filter_map(point).collect();
+        for [predicted, _] in &points {
+            ends = [ends[0].min(*predicted), ends[1].max(*predicted)];
+        }
+        panel.add(name, color, Marks::Points(points));
+    }
+    panel.add("observed = predicted", Color::Black, Marks::Line(ends.map(|end| [end, end]).to_vec()));
+    Plot::new("Fig. 8: noise of XYZ of 912 skies, ECI, SkyRadSPPLS", panel)
+}
