@@ -92,10 +92,13 @@ struct Arguments {
     /// Levels of the brightest class to go through, in electrons, as CSV; append log or lin
     #[arg(long, value_name = "START:END:COUNT", value_parser = prediction::Sweep::parse)]
     sweep: Option<prediction::Sweep>,
+    /// Predict every spectrum of a library, one row each as CSV; with --expose-to each at an exposure time of its own
+    #[arg(long, conflicts_with_all = ["electrons", "dark", "column", "sample", "sweep", "plot"])]
+    all_samples: bool,
     /// Equations to predict by: exact, or those of the paper
     #[arg(long, default_value = "exact", value_parser = options::choice(&[("exact", Equations::Exact), ("paper", Equations::Paper)]))]
     equations: Equations,
-    /// Form of the report; by default text, and csv for a sweep
+    /// Form of the report; by default text, and csv for a sweep or all samples
     #[arg(long, value_parser = options::choice(&[("text", ReportFormat::Text), ("json", ReportFormat::Json), ("yaml", ReportFormat::Yaml), ("csv", ReportFormat::Csv)]))]
     output_format: Option<ReportFormat>,
     /// Draw the photon transfer curve, with its read, shot and fixed-pattern regimes, as SVG or PNG
@@ -140,6 +143,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         patch_at: a.patch_at,
         wanted: a.uncertainty,
         sweep: a.sweep,
+        all_samples: a.all_samples,
         plot: a.plot.clone(),
     };
     request.predict(session, a.output_format, a.output.as_deref())

@@ -3,17 +3,22 @@
 use super::Session;
 use super::rendering;
 use crate::cfa::{CfaPattern, Class};
+use crate::color::characterization::evaluation::{Filling, SampleExposure};
+use crate::color::characterization::signals;
 use crate::color::{ColorSettings, Space, White};
 use crate::demosaic::Method;
 use crate::error::{Error, Result};
 use crate::formats::input::regular_file;
-use crate::formats::{data, output};
+use crate::formats::{data, output, spectral};
 use crate::noise::NoiseSettings;
+use crate::optics::Exposure;
 use crate::propagation::Equations;
 use crate::propagation::chain::{Chain, ChainPrediction, ChainSettings, Uncertainty};
 use crate::report::plot::{Plot, PlotFormat};
-use crate::report::{self, ReportFormat};
+use crate::report::{self, ReportFormat, SamplePrediction};
 use crate::sensor::Sensor;
+use crate::spectrum::WavelengthGrid;
+use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -46,6 +51,8 @@ pub struct Request {
     pub wanted: Option<Uncertainty>,
     /// Levels to go through.
     pub sweep: Option<Sweep>,
+    /// Whether every sample of a library is predicted.
+    pub all_samples: bool,
     /// File for the photon transfer curve.
     pub plot: Option<PathBuf>,
 }
@@ -139,8 +146,14 @@ impl Request {
         if let Some(plot) = &self.plot {
             PlotFormat::of_path(plot)?;
         }
-        let (mut chain, about, electrons) = self.chain(session)?;
         let input = self.scene.input.as_deref().and_then(regular_file);
+        if self.all_samples {
+            let (about, found) = self.samples(session)?;
+            self.warn(session, found.iter().map(|one| &one.prediction));
+            let text = report::samples(&about, &found, format.unwrap_or(ReportFormat::Csv))?;
+            return output::write_text(path, &text, input.as_ref());
+        }
+        let (mut chain, about, electrons) = self.chain(session)?;
         let text = match self.sweep {
             Some(sweep) => {
                 let found = sweep_levels(&mut chain, sweep, electrons)?;
@@ -184,7 +197,48 @@ impl Request {
             return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
         }
         let color = self.color(session, &sensor)?;
-        let about = About {
+        Ok((self.settled(&sensor, exposure, color)?, self.about(&sensor, exposure), electrons))
+    }
+
+    /// Every sample of a library, each at its own exposure where one is to be chosen.
+    fn samples(&self, session: &Session) -> Result<(About, Vec<SamplePrediction>)> {
+        let Some(input) = &self.scene.input else {
+            return Err(Error::Usage("--all-samples is for a library of spectra; name one".into()));
+        };
+        let loaded = data::load_sensor(&self.scene.sensor)?;
+        let library = spectral::read_library(input, self.scene.radiance_unit)?;
+        let observer = data::load_observer()?;
+        let signals = signals(&library, &loaded.sensor, &loaded.response, &observer, &WavelengthGrid::default())?;
+        let base = Exposure {
+            exposure_s: self.scene.exposure_s,
+            f_number: self.scene.f_number,
+            lens_transmittance: self.scene.lens_transmittance,
+        }
+        .checked()?;
+        let exposing = match self.scene.expose_to {
+            Some(fraction) => SampleExposure::Filled { base, fraction, by: Filling::Time },
+            None => SampleExposure::Fixed(base),
+        };
+        let color = self.color(session, &loaded.sensor)?;
+        let one = |sample: usize| -> Result<SamplePrediction> {
+            let row = signals.camera.row(sample);
+            let per_exposure = [0, 1, 2].map(|class| row[class] / loaded.sensor.adu_per_e);
+            let exposure = exposing.of(per_exposure, loaded.sensor.full_well_e)?;
+            let mut chain = self.settled(&loaded.sensor, exposure, color.clone())?;
+            let prediction = chain.predict(per_exposure.map(|e| e * exposure.exposure_s_sr()))?;
+            Ok(SamplePrediction { sample, exposure, prediction })
+        };
+        let found = (0..library.radiance.nrows()).into_par_iter().map(|sample| {
+            one(sample).map_err(|error| match error {
+                Error::Data(problem) => Error::Data(format!("sample {sample}: {problem}")),
+                other => other,
+            })
+        });
+        Ok((self.about(&loaded.sensor, base), found.collect::<Result<_>>()?))
+    }
+
+    fn about(&self, sensor: &Sensor, exposure: Exposure) -> About {
+        About {
             sensor: sensor.name.clone(),
             exposure_s: exposure.exposure_s,
             f_number: exposure.f_number,
@@ -193,9 +247,12 @@ impl Request {
             pattern: self.pattern.unwrap_or(sensor.cfa),
             equations: self.equations,
             patch: self.patch,
-        };
-        let chain = Chain::new(ChainSettings {
-            sensor,
+        }
+    }
+
+    fn settled(&self, sensor: &Sensor, exposure: Exposure, color: Option<ColorSettings>) -> Result<Chain> {
+        Chain::new(ChainSettings {
+            sensor: sensor.clone(),
             exposure,
             noise: self.noise.clone(),
             method: self.method,
@@ -206,8 +263,7 @@ impl Request {
             patch: self.patch,
             patch_at: self.patch_at,
             wanted: self.wanted,
-        })?;
-        Ok((chain, about, electrons))
+        })
     }
 
     fn color(&self, session: &Session, sensor: &Sensor) -> Result<Option<ColorSettings>> {

@@ -12,7 +12,7 @@ mod trade_off;
 pub use chromaticity::{SkyColor, chromaticity};
 pub use difference::difference;
 pub use photon_transfer::photon_transfer;
-pub use prediction::{prediction, sweep};
+pub use prediction::{SamplePrediction, prediction, samples, sweep};
 pub use trade_off::trade_off;
 
 use crate::error::{Error, Result};

@@ -2,6 +2,7 @@
 
 use super::{ReportFormat, shown, table, unwritable};
 use crate::error::Result;
+use crate::optics::Exposure;
 use crate::propagation::chain::{ChainPrediction, StagePrediction};
 use serde::Serialize;
 use std::fmt::Write;
@@ -44,7 +45,46 @@ pub fn sweep<A: Serialize>(about: &A, found: &[ChainPrediction], format: ReportF
     match format {
         ReportFormat::Json => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
         ReportFormat::Yaml => serde_yaml::to_string(&whole).map_err(unwritable),
-        ReportFormat::Csv | ReportFormat::Text => sweep_csv(found),
+        ReportFormat::Csv | ReportFormat::Text => scenes_csv(&[], found.iter().map(|scene| (Vec::new(), scene))),
+    }
+}
+
+/// What is predicted of one sample of a library.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SamplePrediction {
+    /// Its number.
+    pub sample: usize,
+    /// Its exposure.
+    #[serde(flatten)]
+    pub exposure: Exposure,
+    /// The prediction.
+    #[serde(flatten)]
+    pub prediction: ChainPrediction,
+}
+
+/// Writes budgets of one sample of a library after another.
+///
+/// # Errors
+///
+/// [`crate::error::Error::Data`] when the form cannot hold it.
+pub fn samples<A: Serialize>(about: &A, found: &[SamplePrediction], format: ReportFormat) -> Result<String> {
+    #[derive(Serialize)]
+    struct Whole<'a, A> {
+        #[serde(flatten)]
+        about: &'a A,
+        samples: &'a [SamplePrediction],
+    }
+    let whole = Whole { about, samples: found };
+    match format {
+        ReportFormat::Json => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
+        ReportFormat::Yaml => serde_yaml::to_string(&whole).map_err(unwritable),
+        ReportFormat::Csv | ReportFormat::Text => {
+            let lead = |one: &SamplePrediction| {
+                let Exposure { exposure_s, f_number, .. } = one.exposure;
+                vec![one.sample.to_string(), cell(Some(exposure_s)), cell(Some(f_number))]
+            };
+            scenes_csv(&["sample", "exposure_s", "f_number"], found.iter().map(|one| (lead(one), &one.prediction)))
+        }
     }
 }
 
@@ -82,10 +122,14 @@ fn stages_csv(found: &ChainPrediction) -> Result<String> {
     finish(writer)
 }
 
-/// One row per scene.
-fn sweep_csv(found: &[ChainPrediction]) -> Result<String> {
+/// One row per scene, `lead` in front.
+fn scenes_csv<'a>(
+    lead: &[&str],
+    found: impl Iterator<Item = (Vec<String>, &'a ChainPrediction)> + Clone,
+) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let stages = found.first().map(|scene| scene.stages.as_slice()).unwrap_or_default();
+    let first = found.clone().next().map(|(_, scene)| scene);
+    let stages = first.map(|scene| scene.stages.as_slice()).unwrap_or_default();
     let each = |stage: &StagePrediction| {
         let name = stage.stage;
         let channels = stage.channels.clone();
@@ -93,10 +137,11 @@ fn sweep_csv(found: &[ChainPrediction]) -> Result<String> {
             ["mean", "std", "snr_db", "patch_mean_std"].map(|what| format!("{name}_{channel}_{what}"))
         })
     };
-    let head = ["electrons_R", "electrons_G", "electrons_B"].map(str::to_owned);
-    let delta_e = found.first().and_then(|scene| scene.noise_delta_e).map(|_| "noise_delta_e".to_owned());
-    writer.write_record(head.into_iter().chain(stages.iter().flat_map(each)).chain(delta_e)).map_err(unwritable)?;
-    for scene in found {
+    let head = lead.iter().copied().chain(["electrons_R", "electrons_G", "electrons_B"]).map(str::to_owned);
+    let delta_e = first.and_then(|scene| scene.noise_delta_e).map(|_| ["noise_delta_e", "noise_delta_e_std"]);
+    let delta_e = delta_e.into_iter().flatten().map(str::to_owned);
+    writer.write_record(head.chain(stages.iter().flat_map(each)).chain(delta_e)).map_err(unwritable)?;
+    for (lead, scene) in found {
         let signal = scene.electrons.map(|e| cell(Some(e)));
         let cells = scene.stages.iter().flat_map(|stage| {
             (0..3).flat_map(move |i| {
@@ -104,8 +149,9 @@ fn sweep_csv(found: &[ChainPrediction]) -> Result<String> {
                 [Some(stage.mean[i]), Some(stage.std[i]), stage.snr_db[i], patch].map(cell)
             })
         });
-        let delta_e = scene.noise_delta_e.map(|found| cell(Some(found.mean)));
-        writer.write_record(signal.into_iter().chain(cells).chain(delta_e)).map_err(unwritable)?;
+        let delta_e = scene.noise_delta_e.map(|found| [found.mean, found.std].map(|value| cell(Some(value))));
+        let row = lead.into_iter().chain(signal).chain(cells).chain(delta_e.into_iter().flatten());
+        writer.write_record(row).map_err(unwritable)?;
     }
     finish(writer)
 }

@@ -62,7 +62,7 @@ impl SampleExposure {
     /// # Errors
     ///
     /// [`Error::Data`] for a dark sample, or one that no aperture makes bright enough.
-    fn of(self, per_exposure: [f64; 3], full_well_e: f64) -> Result<Exposure> {
+    pub fn of(self, per_exposure: [f64; 3], full_well_e: f64) -> Result<Exposure> {
         let (base, fraction, by) = match self {
             Self::Fixed(exposure) => return Ok(exposure),
             Self::Filled { base, fraction, by } => (base, fraction, by),
