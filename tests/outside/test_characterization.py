@@ -65,13 +65,15 @@ def stationary(normal, moment, equality=None):
     return solve(whole, np.vstack([moment, right]))[:size]
 
 
-def fitted(camera, xyz, weights=None, ridge=0.0, kept=None):
-    """The matrix of least Σ wᵢ |xᵢ − M ρᵢ|² + ridge; `kept` is a signal and its XYZ."""
+def fitted(camera, xyz, weights=None, ridge=0.0, kept=None, ridge_of=None):
+    """The matrix of least Σ wᵢ |xᵢ − M ρᵢ|² + ridge; `kept` is a signal and its XYZ. The ridge is a share of the sums
+    of squares of these signals, or of `ridge_of`."""
     rho, color = exact(camera), exact(xyz)
     weighted = rho if weights is None else rho * exact(weights)[:, None]
     normal = weighted.T @ rho
+    squares = (np.diag(normal) if ridge_of is None else (exact(ridge_of) ** 2).sum(axis=0)).copy()
     for index in range(3):
-        normal[index, index] *= 1 + Fraction(ridge)
+        normal[index, index] += Fraction(ridge) * squares[index]
     equality = None if kept is None else tuple(exact(np.atleast_2d(side)) for side in kept)
     return stationary(normal, weighted.T @ color, equality).T
 
@@ -240,16 +242,20 @@ class Matrices(Case):
                     self.assertEqual(made["training"]["white_sample"], white)
 
     def test_jackknife(self):
-        for trial, options in enumerate(
-            [[], ["--method", "sky-rad-sppls", "--white-sample", "300"], ["--weights", "relative"]]
-        ):
+        # The ridge stays what it is for all 20 samples.
+        kept_exact = ["--method", "sky-rad-sppls", "--white-sample", "300"]
+        cases = [[], kept_exact, ["--weights", "relative"], ["--ridge", 0.01]]
+        for trial, options in enumerate(cases):
             training = self.draw(20)
             made = self.fit("--train", listed(training), *options)
             camera, xyz = self.camera[training], self.xyz[training]
             weights = xyz[:, 1] ** -2 if trial == 2 else np.ones(20)
             kept = (self.camera[300], self.xyz[300]) if trial == 1 else None
+            ridge = 0.01 if trial == 3 else 0.0
             every = [np.arange(20) != left_out for left_out in range(20)]
-            matrices = np.array([fitted(camera[rest], xyz[rest], weights[rest], kept=kept) for rest in every])
+            matrices = np.array(
+                [fitted(camera[rest], xyz[rest], weights[rest], ridge, kept, camera) for rest in every]
+            )
             deviation = matrices - matrices.mean(axis=0)
             covariance = np.einsum("nij,nik->ijk", deviation, deviation) * 19 / 20
             error = np.sqrt(np.einsum("ijj->ij", covariance))
@@ -298,7 +304,8 @@ class Refusals(Case):
         names = [f"s{number}" for number in range(len(spectra))]
         lines = ["wavelength_nm," + ",".join(names)]
         columns = np.asarray(spectra).T.tolist()
-        lines += [f"{360 + row}," + ",".join(f"{value:.17g}" for value in values) for row, values in enumerate(columns)]
+        for row, values in enumerate(columns):
+            lines.append(",".join([f"{360 + row}", *(f"{value:.17g}" for value in values)]))
         (self.directory / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
         return name
 
@@ -326,8 +333,8 @@ class Refusals(Case):
                     self.refused(1, self.UNDETERMINED, *keep, kept, "--train", "0,1,2,3,4,5", library=name)
 
     def test_matrix_that_gives_no_white(self):
-        # These determine a matrix, if a bad one: it takes the saturated camera to XYZ below 0, so that there is no white
-        # by default. Nobody asked for an evaluation.
+        # These determine a matrix, if a bad one: it takes the saturated camera to XYZ below 0, so that there is no
+        # white by default. Nobody asked for an evaluation.
         triple = [249, 250, 254]
         self.assertLess(scaled_condition(self.camera[triple]), LARGEST_CONDITION)
         made = self.fit("--train", listed(triple))
@@ -490,8 +497,8 @@ class NoiseAware(Case):
     def test_trade_off_is_monotone(self):
         for options in ([], ["--train", "20"], ["--method", "sky-rad-sppls"], ["--exposure", "0.002"]):
             made = self.fit("--noise-weight", "0.05", *WHITE_OPTION, *options)
-            curve = [[point[key] for key in ("noise_weight", "model_delta_e", "noise_delta_e")] for point in made["trade_off"]]
-            weight, model, noise = np.array(curve).T
+            names = ("noise_weight", "model_delta_e", "noise_delta_e")
+            weight, model, noise = (np.array([point[name] for point in made["trade_off"]]) for name in names)
             self.assertGreater(len(weight), 20)
             self.assertIn(0.05, weight)
             self.assertTrue((np.diff(weight) > 0).all(), options)
@@ -511,13 +518,7 @@ class Evaluation(Case):
             ["fit-matrix", self.library, "--evaluate", library, "--output-format", "csv", "-q", *WHITE_OPTION, *options]
         )
         rows = list(csv.DictReader(io.StringIO(done.decode())))
-        columns = {}
-        for name in rows[0]:
-            try:
-                columns[name] = np.array([float(row[name]) for row in rows])
-            except ValueError:
-                columns[name] = [row[name] for row in rows]
-        return columns
+        return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
 
     def summary(self, actual, differences, what):
         expected = {
@@ -633,29 +634,48 @@ class Evaluation(Case):
             self.assertLess(error, 0.02)
             self.assertLess(abs(ratio.mean() - expected), 4 * error, f"{name}: {ratio.mean()} ± {error} for {expected}")
 
-    def test_same_photosites_as_the_chart(self):
+    def compare_with_chart(self, dark_frames):
         width, height, margin, exposure_s = 20, 16, 3, "0.0005"
         self.run_program(["fit-matrix", self.library, "-o", "matrix.yaml", "-q"])
         whole = f"{width + 2 * margin}x{height + 2 * margin}"
-        # Both ways round the same electrons to single precision and draw the same numbers at the same photosites, so the
-        # pixels agree to the bit; what is left is the order of sums over pixels in double precision.
+        codes = [["digitize", "-q"], ["mosaic", "-q"]]
+        corrected = [["correct-frame", "-q"]] if dark_frames else []
+        for frame in range(1, dark_frames + 1):
+            size = f"{38 * (width + 2 * margin)}x{24 * (height + 2 * margin)}"
+            dark = self.run_pipe(
+                ["render-radiance", "--dark", "--size", size, "--exposure", exposure_s, "-q"],
+                ["add-noise", "--seed", 3, "--frame", frame, "-q"],
+                *codes,
+            )
+            (self.directory / f"dark{frame}.exr").write_bytes(dark)
+            corrected[0] += ["--dark", f"dark{frame}.exr"]
+        # Both ways round the same electrons to single precision and draw the same numbers at the same photosites, so
+        # the pixels agree to the bit; what is left is the order of sums over pixels in double precision.
         planes = self.frame(
             ["render-radiance", self.library, "--patch", whole, "--exposure", exposure_s, "-q"],
             ["add-noise", "--seed", 3, "-q"],
-            ["digitize", "-q"],
-            ["mosaic", "-q"],
+            *codes,
+            *corrected,
             ["demosaic", "--method", "eci", "-q"],
             ["to-xyz", "--matrix", "matrix.yaml", "--space", "xyz", "-q"],
         )
         table = self.table(
-            *("--exposure", exposure_s, "--patch", f"{width}x{height}", "--seed", 3, "--demosaic", "eci")
+            *("--exposure", exposure_s, "--patch", f"{width}x{height}", "--seed", 3, "--demosaic", "eci"),
+            *("--dark-frames", dark_frames),
         )
         frame = np.stack([planes[name].astype(np.float64) for name in sorted(planes, reverse=True)], axis=-1)
         patches = frame.reshape(24, height + 2 * margin, 38, width + 2 * margin, 3)
         inner = patches[:, margin:-margin, :, margin:-margin].transpose(0, 2, 1, 3, 4).reshape(912, -1, 3)
         found = np.linalg.norm(lab(inner.mean(axis=1)) - lab(self.xyz), axis=1)
         pixels = np.linalg.norm(lab(inner) - lab(self.xyz)[:, None], axis=2)
+        # Their mean colors are off by as much as predicted, on average.
+        camera_xyz = np.stack([table[f"camera_{axis}"] for axis in "XYZ"], axis=-1)
+        ratio = np.linalg.norm(lab(inner.mean(axis=1)) - lab(camera_xyz), axis=1) / table["predicted_patch_delta_e"]
+        error = ratio.std(ddof=1) / math.sqrt(912)
+        self.assertLess(error, 0.03)
+        self.assertLess(abs(ratio.mean() - 1), 4 * error, f"{ratio.mean()} ± {error}")
         for name, values in [
+            ("noise_delta_e", np.linalg.norm(lab(inner) - lab(camera_xyz)[:, None], axis=2).mean(axis=1)),
             ("patch_mean_delta_e_76", found),
             ("pixel_mean_delta_e_76", pixels.mean(axis=1)),
             ("pixel_std_delta_e_76", pixels.std(axis=1, ddof=1)),
@@ -664,6 +684,12 @@ class Evaluation(Case):
         ]:
             error = np.abs(table[name] - values)
             self.assertLess(error.max(), 1e-9, f"{name} of sample {np.argmax(error)}")
+
+    def test_same_photosites_as_the_chart(self):
+        self.compare_with_chart(0)
+
+    def test_same_photosites_as_the_chart_less_dark_frames(self):
+        self.compare_with_chart(2)
 
 
 if __name__ == "__main__":
