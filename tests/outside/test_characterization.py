@@ -118,8 +118,7 @@ class Case(ProgramCase):
 
     def same_matrix(self, actual, expected, what, tolerance=TOLERANCE):
         actual, expected = np.asarray(actual), np.asarray(expected)
-        scale = np.abs(expected).max(axis=1, keepdims=True)
-        worst = np.max(np.abs(actual - expected) / scale)
+        worst = np.max(np.abs(actual / expected - 1))
         self.assertLess(worst, tolerance, f"{what}: {actual.tolist()} for {expected.tolist()}")
 
     def keeps(self, made, sample, what):
