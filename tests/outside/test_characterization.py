@@ -393,7 +393,7 @@ class Refusals(Case):
         self.refused(2, "no sample 912", "--train", "0,1,912")
         self.refused(2, "no sample 912", "--method", "sky-rad-sppls", "--white-sample", 912)
         self.refused(2, "no sample 1000", "--method", "max-ign-sppls", "--white-sample", 1000)
-        self.refused(1, "fewer than 2000", "--train", 2000)
+        self.refused(2, "fewer than 2000", "--train", 2000)
         self.refused(2, "2 weights do not fit 3", "--train", "0,300,700", "--weights", "1,2")
         column = f"{sample_data('skies/sky912_meta.csv')}:aerosol"
         self.refused(2, "urban5", "--labels", column, "--hold-out", "urban")

@@ -182,7 +182,7 @@ impl Request {
         made.performance = fitting.performance(&fitted)?;
         let evaluation = match &self.evaluate {
             None => None,
-            Some(path) if *path == self.library => Some(fitting.evaluation(&fitted, &seen)?),
+            Some(path) if is_same(path, &self.library) => Some(fitting.evaluation(&fitted, &seen)?),
             Some(path) => Some(fitting.evaluation(&fitted, &see(path, Vec::new())?)?),
         };
         self.write(&Characterization { matrix: made, evaluation, trade_off })
@@ -402,7 +402,8 @@ impl Fitting<'_> {
         }
     }
 
-    /// How the matrix does without noise on its own library; none where that has samples without light.
+    /// How the matrix does without noise on its own library; none where that has samples without light, or the matrix
+    /// gives no white.
     fn performance(&self, fitted: &FittedMatrix) -> Result<Option<Performance>> {
         let settings = EvaluationSettings {
             patch: None,
@@ -410,7 +411,7 @@ impl Fitting<'_> {
         };
         let samples = match evaluate(self.sensor, &self.seen.signals, &settings) {
             Ok(samples) => samples,
-            Err(Error::Data(_)) => return Ok(None),
+            Err(Error::Data(_) | Error::Usage(_)) => return Ok(None),
             Err(error) => return Err(error),
         };
         Ok(noise_free(&samples).map(|differences| Performance {
@@ -472,6 +473,11 @@ impl Fitting<'_> {
         }
         groups.into_iter().flatten().collect()
     }
+}
+
+/// Whether two paths lead to one file.
+fn is_same(one: &Path, other: &Path) -> bool {
+    one == other || one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
 }
 
 /// What noise does to the samples; none where they have none.

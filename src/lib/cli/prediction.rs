@@ -3,7 +3,7 @@
 use super::Session;
 use super::rendering;
 use crate::cfa::{CfaPattern, Class};
-use crate::color::characterization::evaluation::{Filling, SampleExposure};
+use crate::color::characterization::evaluation::{Filling, SampleExposure, of_sample};
 use crate::color::characterization::signals;
 use crate::color::{ColorSettings, Space, White};
 use crate::demosaic::Method;
@@ -228,12 +228,9 @@ impl Request {
             let prediction = chain.predict(per_exposure.map(|e| e * exposure.exposure_s_sr()))?;
             Ok(SamplePrediction { sample, exposure, prediction })
         };
-        let found = (0..library.radiance.nrows()).into_par_iter().map(|sample| {
-            one(sample).map_err(|error| match error {
-                Error::Data(problem) => Error::Data(format!("sample {sample}: {problem}")),
-                other => other,
-            })
-        });
+        let found = (0..library.radiance.nrows())
+            .into_par_iter()
+            .map(|sample| one(sample).map_err(|error| of_sample(sample, error)));
         Ok((self.about(&loaded.sensor, base), found.collect::<Result<_>>()?))
     }
 

@@ -33,7 +33,7 @@ pub struct Fit {
     /// Y − A B.
     pub residuals: DMatrix<f64>,
     /// Covariance of the coefficients of each response, by the jackknife: how they change when single observations are
-    /// left out. None where one of them is indispensable.
+    /// left out, the penalty staying as it is. None where one of them is indispensable.
     pub covariance: Option<Vec<DMatrix<f64>>>,
 }
 
@@ -44,7 +44,8 @@ pub struct Undetermined {
     pub rank: usize,
     /// Unknowns of each response.
     pub unknowns: usize,
-    /// Condition number of what is left to determine, columns scaled to unit length; infinite where there is too little.
+    /// Condition number of what is left to determine beside the equations: the largest singular value of all regressors,
+    /// their columns scaled to unit length, over the smallest of what is left; infinite where there is too little.
     pub condition: f64,
 }
 
@@ -79,9 +80,15 @@ impl Problem<'_> {
         let space = Space::of(self.equality, &lengths, self.responses.ncols()).ok_or_else(|| too_little(0))?;
         let free = space.free.ncols();
         let reduced = &stacked * &space.free;
-        let condition = if reduced.nrows() < free { f64::INFINITY } else { condition(&reduced) };
+        // What is left beside the equations counts relative to all there is: small remainders may be rounding alone.
+        let all = if stacked.is_empty() { 0.0 } else { stacked.singular_values().max() };
+        let left = if reduced.is_empty() { Vec::new() } else { reduced.singular_values().as_slice().to_vec() };
+        let condition = match left.iter().copied().reduce(f64::min) {
+            Some(smallest) if reduced.nrows() >= free => all / smallest,
+            _ => f64::INFINITY,
+        };
         if free > 0 && !(1.0..=LARGEST_CONDITION).contains(&condition) {
-            let rank = if reduced.is_empty() { 0 } else { rank(&reduced) };
+            let rank = left.iter().filter(|&&value| value > all / LARGEST_CONDITION).count();
             return Err(Undetermined { rank: rank + unknowns - free, unknowns, condition });
         }
         let mut right = self.responses.clone().resize_vertically(observed + penalty_rows, 0.0);
@@ -150,14 +157,6 @@ fn unscale(coefficients: &mut DMatrix<f64>, lengths: &[f64]) {
     for (mut row, length) in coefficients.row_iter_mut().zip(lengths) {
         row /= *length;
     }
-}
-
-fn condition(matrix: &DMatrix<f64>) -> f64 {
-    if matrix.is_empty() {
-        return 1.0;
-    }
-    let singular = matrix.singular_values();
-    singular.max() / singular.min()
 }
 
 /// Singular values that are not small beside the largest, columns scaled to unit length.
@@ -268,6 +267,11 @@ mod tests {
         let again = few.rows(0, 1).into_owned();
         let refused = Problem { equality: Some((&again, &value)), ..plain(&few, &few) }.solve().unwrap_err();
         assert_eq!(refused.rank, 2);
+        // Rounding beside the one that is kept determines nothing, though it points everywhere.
+        let near = DMatrix::from_fn(6, 3, |i, j| few[(0, j)] * (1.0 + 1e-9 * scatter(6, 3, 20)[(i, j)]));
+        let of_near = scatter(6, 3, 21);
+        let refused = Problem { equality: Some((&again, &value)), ..plain(&near, &of_near) }.solve().unwrap_err();
+        assert_eq!((refused.rank, refused.unknowns), (1, 3));
         let nothing = DMatrix::zeros(1, 3);
         assert!(Problem { equality: Some((&nothing, &value)), ..plain(&few, &few) }.solve().is_err());
     }

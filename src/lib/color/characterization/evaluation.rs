@@ -180,12 +180,7 @@ pub struct PredictedNoise {
 pub fn evaluate(sensor: &Sensor, signals: &Signals, settings: &EvaluationSettings) -> Result<Vec<SampleEvaluation>> {
     (0..signals.camera.nrows())
         .into_par_iter()
-        .map(|sample| {
-            Evaluator { sensor, signals, settings }.sample(sample).map_err(|error| match error {
-                Error::Data(problem) => Error::Data(format!("sample {sample}: {problem}")),
-                other => other,
-            })
-        })
+        .map(|sample| Evaluator { sensor, signals, settings }.sample(sample).map_err(|error| of_sample(sample, error)))
         .collect()
 }
 
@@ -204,7 +199,8 @@ pub fn pixel_covariances(
     samples
         .par_iter()
         .map(|&sample| {
-            let chain = Evaluator { sensor, signals, settings }.chain(sample, [8, 8])?;
+            let evaluator = Evaluator { sensor, signals, settings };
+            let chain = evaluator.chain(sample, [8, 8]).map_err(|error| of_sample(sample, error))?;
             let Some(FramePrediction::Mixed(mixture)) = propagation::of_frame(&chain.camera, Equations::Exact) else {
                 return Err(Error::Data(format!("the noise of sample {sample} cannot be predicted")));
             };
@@ -212,6 +208,14 @@ pub fn pixel_covariances(
             Ok((mixture.covariance / exposure_s_sr.powi(2), chain.white()?))
         })
         .collect()
+}
+
+/// What is wrong with a sample, with its number.
+pub fn of_sample(sample: usize, error: Error) -> Error {
+    match error {
+        Error::Data(problem) => Error::Data(format!("sample {sample}: {problem}")),
+        other => other,
+    }
 }
 
 struct Evaluator<'a> {

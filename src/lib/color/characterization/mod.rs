@@ -96,7 +96,8 @@ pub struct Training {
     pub max_chromaticity_error: [f64; 2],
 }
 
-/// How well a matrix is known: how it changes when training samples are left out one at a time (the jackknife).
+/// How well a matrix is known: how it changes when training samples are left out one at a time (the jackknife), ridge and
+/// noise terms staying as they are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MatrixUncertainty {
     /// What it comes from.

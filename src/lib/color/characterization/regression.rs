@@ -136,6 +136,9 @@ pub fn fit(
         xyz.row_mut(row).scale_mut(weight.sqrt());
     }
     let kept = match (regression.keeps_a_sample(), settings.kept) {
+        (true, Some(sample)) if signals.camera.row(sample).amax() == 0.0 => {
+            return Err(Error::Data(format!("sample {sample} is dark: it cannot be kept exact")));
+        }
         (true, Some(sample)) => {
             Some((signals.camera.rows(sample, 1).into_owned(), signals.xyz.rows(sample, 1).into_owned()))
         }
@@ -210,8 +213,8 @@ fn refuse(undetermined: Undetermined, count: usize, trained: bool, keeps: bool) 
     let kept = if keeps { " and the one kept exact" } else { "" };
     Error::Data(if condition.is_finite() && rank == unknowns {
         format!(
-            "{count} {what}{kept} do not determine the matrix: their condition number {condition:.1e} is above \
-             {LARGEST_CONDITION:.0e}; give more varied ones"
+            "{count} {what}{kept} do not determine the matrix: with each signal scaled to unit length, their condition \
+             number {condition:.1e} is above {LARGEST_CONDITION:.0e}; give more varied ones"
         )
     } else {
         // The noise-aware fit has the nine elements for unknowns, the others three in each row.
