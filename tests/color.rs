@@ -2,12 +2,12 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use cyanometer::adc::{AdcSettings, Digitize};
-use cyanometer::color::characterization::evaluation::{
+use cyanometer::characterization::evaluation::{
     EvaluationSettings, Filling, SampleEvaluation, SampleExposure, evaluate,
 };
-use cyanometer::color::characterization::regression::{FitSettings, FittedMatrix, Regression, fit, residuals};
-use cyanometer::color::characterization::training::{average_sample, spanning_subset};
-use cyanometer::color::characterization::{Signals, responses, signals};
+use cyanometer::characterization::regression::{FitSettings, FittedMatrix, Regression, fit, residuals};
+use cyanometer::characterization::training::{average_sample, spanning_subset};
+use cyanometer::characterization::{Signals, responses, signals};
 use cyanometer::color::difference::Difference;
 use cyanometer::color::{ColorSettings, Space, White, lab_about, lab_from_xyz, matrix};
 use cyanometer::demosaic::Method;

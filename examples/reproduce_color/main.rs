@@ -8,9 +8,9 @@ mod markdown;
 mod report;
 mod studio;
 
-use cyanometer::color::characterization::evaluation::SampleEvaluation;
-use cyanometer::color::characterization::noise_aware::TradeOff;
-use cyanometer::color::characterization::regression::{Regression, Weights};
+use cyanometer::characterization::evaluation::SampleEvaluation;
+use cyanometer::characterization::noise_aware::TradeOff;
+use cyanometer::characterization::regression::{Regression, Weights};
 use cyanometer::color::difference::DifferenceReport;
 use cyanometer::demosaic::Method;
 use cyanometer::error::{Error, Result};

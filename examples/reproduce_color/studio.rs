@@ -1,13 +1,13 @@
 //! The camera, the skies, and what is done with them.
 
 use crate::{Choice, HeldOut};
-use cyanometer::color::characterization::evaluation::{
+use cyanometer::characterization::evaluation::{
     EvaluationSettings, Filling, SampleEvaluation, SampleExposure, evaluate, noise_free, pixel_covariances,
 };
-use cyanometer::color::characterization::noise_aware::{NoiseTerms, NoisySample, TradeOff};
-use cyanometer::color::characterization::regression::{FitSettings, Regression, Weights, fit};
-use cyanometer::color::characterization::training::{average_sample, spanning_subset};
-use cyanometer::color::characterization::{Signals, responses, signals};
+use cyanometer::characterization::noise_aware::{NoiseTerms, NoisySample, TradeOff};
+use cyanometer::characterization::regression::{FitSettings, Regression, Weights, fit};
+use cyanometer::characterization::training::{average_sample, spanning_subset};
+use cyanometer::characterization::{Signals, responses, signals};
 use cyanometer::color::difference::DifferenceReport;
 use cyanometer::color::{ColorSettings, Space, White};
 use cyanometer::demosaic::Method;

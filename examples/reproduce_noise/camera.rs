@@ -2,8 +2,8 @@
 
 use cyanometer::adc::{AdcSettings, Digitize};
 use cyanometer::cfa::Class;
-use cyanometer::color::characterization::regression::{FitSettings, fit};
-use cyanometer::color::characterization::signals;
+use cyanometer::characterization::regression::{FitSettings, fit};
+use cyanometer::characterization::signals;
 use cyanometer::color::{self, ColorSettings, Space, ToXyz, White};
 use cyanometer::demosaic::{Black, Demosaic, Method};
 use cyanometer::error::{Error, Result};

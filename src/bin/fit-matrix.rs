@@ -1,10 +1,10 @@
 //! `fit-matrix`: a characterisation matrix from a library of spectra, and how well it does.
 
 use clap::Parser;
+use cyanometer::characterization::regression::{Regression, Weights};
 use cyanometer::cli::characterization::{self, Request, TrainingChoice};
 use cyanometer::cli::{self, options};
 use cyanometer::color::White;
-use cyanometer::color::characterization::regression::{Regression, Weights};
 use cyanometer::demosaic::Method;
 use cyanometer::error::Result;
 use cyanometer::formats::data;

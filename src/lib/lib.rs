@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | 0 words | [`error`], [`units`], [`frame`], [`cfa`] | no files, no chance |
 //! | 1 mathematics | [`numerics`], [`random`] | no camera |
-//! | 2 physics | [`spectrum`], [`optics`], [`sensor`], [`metadata`], [`stage`], [`render`], [`transfer`], [`noise`], [`adc`], [`correct`], [`mosaic`], [`demosaic`], [`color`], [`propagation`], [`statistics`] | pure functions of bands and parameters, in the order light meets them |
+//! | 2 physics | [`spectrum`], [`optics`], [`sensor`], [`metadata`], [`stage`], [`render`], [`transfer`], [`noise`], [`adc`], [`correct`], [`mosaic`], [`demosaic`], [`color`], [`propagation`], [`statistics`], [`characterization`] | pure functions of bands and parameters, in the order light meets them |
 //! | 3 files | [`formats`], [`report`] | bytes to frames and back |
 //! | 4 command line | [`cli`] | options, complaints, exit |
 //!
@@ -34,6 +34,7 @@ pub mod numerics;
 pub mod random;
 
 pub mod adc;
+pub mod characterization;
 pub mod color;
 pub mod correct;
 pub mod demosaic;

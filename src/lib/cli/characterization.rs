@@ -1,13 +1,13 @@
 //! The work of `fit-matrix`: from a request to a matrix and what is known of it.
 
 use super::Session;
-use crate::color::characterization::evaluation::{
+use crate::characterization::evaluation::{
     EvaluationSettings, SampleEvaluation, SampleExposure, evaluate, noise_free, noisy, pixel_covariances,
 };
-use crate::color::characterization::noise_aware::{NoiseTerms, NoisySample, TradeOff};
-use crate::color::characterization::regression::{FitSettings, FittedMatrix, Regression, Weights, fit, residuals};
-use crate::color::characterization::training::{CHOSEN_BY, average_sample, spanning_subset};
-use crate::color::characterization::{
+use crate::characterization::noise_aware::{NoiseTerms, NoisySample, TradeOff};
+use crate::characterization::regression::{FitSettings, FittedMatrix, Regression, Weights, fit, residuals};
+use crate::characterization::training::{CHOSEN_BY, average_sample, spanning_subset};
+use crate::characterization::{
     CameraMatrix, MATRIX_SCHEMA, MATRIX_UNIT, Performance, Signals, Training, responses, signals,
 };
 use crate::color::difference::DELTA_E_PER_JND;

@@ -1,9 +1,9 @@
 //! Options that programs share, and how their values are read.
 
 use crate::cfa::CfaPattern;
+use crate::characterization::evaluation::{self, Filling};
+use crate::characterization::regression::Regression;
 use crate::color::White;
-use crate::color::characterization::evaluation::{self, Filling};
-use crate::color::characterization::regression::Regression;
 use crate::demosaic::{Black, Method};
 use crate::formats::data;
 use crate::formats::input::{FrameReader, InputOptions};

@@ -3,8 +3,8 @@
 use super::Session;
 use super::rendering;
 use crate::cfa::{CfaPattern, Class};
-use crate::color::characterization::evaluation::{Filling, SampleExposure, of_sample};
-use crate::color::characterization::signals;
+use crate::characterization::evaluation::{Filling, SampleExposure, of_sample};
+use crate::characterization::signals;
 use crate::color::{ColorSettings, Space, White};
 use crate::demosaic::Method;
 use crate::error::{Error, Result};

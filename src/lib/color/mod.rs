@@ -1,6 +1,5 @@
 //! Colour: from camera signals to CIE XYZ and on to xyY, L*a*b* and a viewable sRGB.
 
-pub mod characterization;
 pub mod comparison;
 pub mod difference;
 pub mod locus;

@@ -2,7 +2,7 @@
 
 use super::csv::SpectralTable;
 use super::yaml;
-use crate::color::characterization::CameraMatrix;
+use crate::characterization::CameraMatrix;
 use crate::error::{Error, Result};
 use crate::sensor::{CurveFile, Sensor, SpectralResponse};
 use crate::spectrum::{Curve, Observer};

@@ -153,6 +153,12 @@ impl Problem<'_> {
     }
 }
 
+/// Rows that add the share `ridge` of each column's own sum of squares to it; none for no ridge.
+pub fn ridge_rows(columns: &DMatrix<f64>, ridge: f64) -> Option<DMatrix<f64>> {
+    let lengths: Vec<f64> = columns.column_iter().map(|column| ridge.sqrt() * column.norm()).collect();
+    (ridge > 0.0).then(|| DMatrix::from_diagonal(&lengths.into()))
+}
+
 fn unscale(coefficients: &mut DMatrix<f64>, lengths: &[f64]) {
     for (mut row, length) in coefficients.row_iter_mut().zip(lengths) {
         row /= *length;

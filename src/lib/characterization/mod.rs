@@ -5,7 +5,7 @@ pub mod noise_aware;
 pub mod regression;
 pub mod training;
 
-use super::difference::DifferenceReport;
+use crate::color::difference::DifferenceReport;
 use crate::error::{Error, Result};
 use crate::optics::Exposure;
 use crate::sensor::{Sensor, SpectralResponse};
@@ -135,7 +135,7 @@ impl CameraMatrix {
         if let Some(unit) = self.unit.as_ref().filter(|unit| *unit != MATRIX_UNIT) {
             return Err(format!("its unit is `{unit}`, but only `{MATRIX_UNIT}` is understood"));
         }
-        if super::matrix(&self.xyz_from_camera).try_inverse().is_none() {
+        if crate::color::matrix(&self.xyz_from_camera).try_inverse().is_none() {
             return Err("its `xyz_from_camera` is singular: three signals would not give three stimuli".into());
         }
         Ok(())

@@ -9,9 +9,8 @@
 //! w = 1/n; w = 0 is the best matrix where there is no noise. With Σᵢ = L Lᵀ each column of L is one more sample, of the
 //! color 0: the sum over all samples is one least-squares problem in the nine elements of M.
 
-use super::regression::FitSettings;
 use crate::color::{lab_about, matrix};
-use crate::numerics::least_squares::{Fit, Problem, Undetermined};
+use crate::numerics::least_squares::{Fit, Problem, Undetermined, ridge_rows};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde::Serialize;
 
@@ -72,13 +71,12 @@ fn rows(jacobian: &Matrix3<f64>, signal: &Vector3<f64>, factor: f64, out: &mut D
 }
 
 impl NoiseTerms {
-    /// Fits the nine elements.
+    /// Fits the nine elements, with one weight of the squared errors for each sample, or none where all are alike.
     pub(super) fn fit(
         &self,
-        camera: &DMatrix<f64>,
-        settings: &FitSettings,
+        weights: &[f64],
+        ridge: f64,
         kept: Option<&(DMatrix<f64>, DMatrix<f64>)>,
-        ridge: &dyn Fn(&DMatrix<f64>, f64) -> Option<DMatrix<f64>>,
     ) -> Result<Fit, Undetermined> {
         let count = self.samples.len();
         let (mut regressors, mut responses) = (DMatrix::zeros(3 * count, 9), DMatrix::zeros(3 * count, 1));
@@ -86,8 +84,7 @@ impl NoiseTerms {
         let mut penalty = DMatrix::zeros(noise_rows, 9);
         for (index, sample) in self.samples.iter().enumerate() {
             let jacobian = sample.jacobian();
-            // Weights scale the camera's signals already.
-            let weight = camera.row(index).norm() / Vector3::from(sample.camera).norm();
+            let weight = weights.get(index).map_or(1.0, |weight| weight.sqrt());
             rows(&jacobian, &sample.camera.into(), weight, &mut regressors, 3 * index);
             let color = jacobian * Vector3::from(sample.xyz) * weight;
             responses.rows_mut(3 * index, 3).copy_from(&color);
@@ -100,7 +97,7 @@ impl NoiseTerms {
                 }
             }
         }
-        if let Some(more) = ridge(&regressors, settings.ridge) {
+        if let Some(more) = ridge_rows(&regressors, ridge) {
             penalty = penalty.resize_vertically(noise_rows + 9, 0.0);
             penalty.rows_mut(noise_rows, 9).copy_from(&more);
         }

@@ -3,7 +3,7 @@
 use super::noise_aware::NoiseTerms;
 use super::{MatrixUncertainty, Signals};
 use crate::error::{Error, Result};
-use crate::numerics::least_squares::{Fit, LARGEST_CONDITION, Problem, Undetermined};
+use crate::numerics::least_squares::{Fit, LARGEST_CONDITION, Problem, Undetermined, ridge_rows};
 use nalgebra::DMatrix;
 
 /// How the matrix is fitted \[FinlaysonDrew1997; HP2005, Sec. 3.6].
@@ -131,7 +131,8 @@ pub fn fit(
     if camera.iter().chain(xyz.iter()).any(|value| !value.is_finite()) {
         return Err(Error::Data("a training sample gives signals that are not finite".into()));
     }
-    for (row, weight) in weights(&settings.weights, &xyz)?.into_iter().enumerate() {
+    let weights = weights(&settings.weights, &xyz)?;
+    for (row, weight) in weights.iter().enumerate() {
         camera.row_mut(row).scale_mut(weight.sqrt());
         xyz.row_mut(row).scale_mut(weight.sqrt());
     }
@@ -151,7 +152,7 @@ pub fn fit(
     let refused = |undetermined: Undetermined| refuse(undetermined, count, trained, kept.is_some());
     let (fit, elements) = match noise {
         None => {
-            let penalty = ridge(&camera, settings.ridge);
+            let penalty = ridge_rows(&camera, settings.ridge);
             let equality = kept.as_ref().map(|(left, right)| (left, right));
             let problem =
                 Problem { regressors: &camera, responses: &xyz, group: 1, penalty: penalty.as_ref(), equality };
@@ -159,7 +160,7 @@ pub fn fit(
             (fit, None)
         }
         Some(terms) => {
-            let fit = terms.fit(&camera, settings, kept.as_ref(), &ridge).map_err(refused)?;
+            let fit = terms.fit(&weights, settings.ridge, kept.as_ref()).map_err(refused)?;
             let elements = fit.coefficients.clone();
             (fit, Some(elements))
         }
@@ -199,12 +200,6 @@ fn weights(weights: &Weights, xyz: &DMatrix<f64>) -> Result<Vec<f64>> {
         }
         Weights::Given(given) => Ok(given.clone()),
     }
-}
-
-/// Rows that add the share `ridge` of each column's sum of squares to it.
-pub(super) fn ridge(columns: &DMatrix<f64>, ridge: f64) -> Option<DMatrix<f64>> {
-    let lengths: Vec<f64> = columns.column_iter().map(|column| ridge.sqrt() * column.norm()).collect();
-    (ridge > 0.0).then(|| DMatrix::from_diagonal(&lengths.into()))
 }
 
 fn refuse(undetermined: Undetermined, count: usize, trained: bool, keeps: bool) -> Error {
