@@ -4,10 +4,12 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::characterization::evaluation::{EvaluationSettings, Filling, SampleExposure, evaluate};
+use cyanometer::characterization::signals;
 use cyanometer::color::{ColorSettings, Space, ToXyz, White};
 use cyanometer::demosaic::{Black, Demosaic, Method};
 use cyanometer::error::Result;
-use cyanometer::formats::data;
+use cyanometer::formats::{data, spectral};
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata, Scene};
 use cyanometer::mosaic::Mosaic;
@@ -15,6 +17,7 @@ use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::optics::Exposure;
 use cyanometer::propagation::Equations;
 use cyanometer::propagation::chain::{Chain, ChainSettings};
+use cyanometer::spectrum::WavelengthGrid;
 use cyanometer::stage::{MemoryFrame, Stage};
 use cyanometer::statistics::measure;
 use cyanometer::units::QuantityKind;
@@ -113,5 +116,42 @@ fn predictions(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, stages, predictions);
+/// The 912 skies through the noisy camera, 20×16 pixels each, with all differences and predictions.
+fn evaluations(criterion: &mut Criterion) {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_data/skies/sky912.exr");
+    let (Ok(loaded), Ok(observer), Ok(library)) =
+        (data::load_sensor(data::DEFAULT_SENSOR), data::load_observer(), spectral::read_library(&path, None))
+    else {
+        return;
+    };
+    let grid = WavelengthGrid::default();
+    let Ok(signals) = signals(&library, &loaded.sensor, &loaded.response, &observer, &grid) else { return };
+    let mut group = criterion.benchmark_group("evaluations");
+    group.throughput(Throughput::Elements(signals.camera.nrows() as u64)).sample_size(10);
+    for method in Method::ALL {
+        let base = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
+        let settings = EvaluationSettings {
+            exposure: SampleExposure::Filled { base, fraction: 0.75, by: Filling::Time },
+            noise: NoiseSettings::default(),
+            method,
+            pattern: None,
+            color: ColorSettings {
+                xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
+                method: None,
+                space: Space::Lab,
+                white: White::D65,
+                white_luminance: None,
+            },
+            patch: Some([20, 16]),
+            columns: library.columns,
+            dark_frames: 0,
+        };
+        group.bench_function(method.names()[0], |bencher| {
+            bencher.iter(|| evaluate(&loaded.sensor, &signals, &settings))
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, stages, predictions, evaluations);
 criterion_main!(benches);

@@ -19,7 +19,7 @@ use cyanometer::metadata::{FrameHeader, Metadata, Scene};
 use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::significance;
 use cyanometer::optics::Exposure;
-use cyanometer::propagation::sampling::{Place, SamplingBasis};
+use cyanometer::propagation::sampling::{Place, Sampling, SamplingBasis};
 use cyanometer::propagation::{self, Equations, FramePrediction, Prediction};
 use cyanometer::sensor::{Sensor, SpectralResponse};
 use cyanometer::spectrum::{Curve, SpectralLibrary, WavelengthGrid};
@@ -264,15 +264,18 @@ fn photosites(sensor: &Sensor, sky: &SampleEvaluation) -> [Prediction; 3] {
 fn the_noise_of_every_sky_is_as_predicted() {
     let (sensor, found, _) = sky_signals();
     let fitted = sky_rad_ls(&found, &(0..912).collect::<Vec<_>>()).unwrap();
-    for (method, seed) in [(Method::Bilinear, 1), (Method::EffectiveColor, 2), (Method::Malvar, 3)] {
+    for (method, seed) in
+        [(Method::Bilinear, 1), (Method::SmoothHue, 4), (Method::EffectiveColor, 2), (Method::Malvar, 3)]
+    {
         let skies = evaluated(&sensor, &found, method, seed);
         let reach = method.reach();
         let size = [20, 16];
         let frame = size.map(|pixels| pixels + 2 * reach);
         // The size of a patch is even, so that all have the same phases.
         let place = Place { frame, origin: [0, 0], corner: [reach; 2], size };
-        let weights = WeightTable::of(method, sensor.cfa).about([1.0; 2]);
-        let basis = SamplingBasis::of(&weights, &place);
+        // Only the weights of smooth hue transition depend on the sky.
+        let weights_of = |hues| WeightTable::of(method, sensor.cfa).about(hues);
+        let common = SamplingBasis::of(&weights_of([1.0; 2]), &place);
         let mut ps = Vec::new();
         for sky in &skies {
             let noise = sky.noise.unwrap();
@@ -283,7 +286,11 @@ fn the_noise_of_every_sky_is_as_predicted() {
             let sites = photosites(&sensor, sky);
             let to_xyz = matrix(&fitted.xyz_from_camera) / sky.exposure.exposure_s_sr();
             let to_lab = lab_about(sky.camera_xyz, sky.white).jacobian * to_xyz;
-            let law = basis.sampling(&sites).through(&to_lab);
+            let law = match method {
+                Method::SmoothHue => Sampling::of(&weights_of(propagation::hues(sky.electrons)), &sites, &place),
+                _ => common.sampling(&sites),
+            };
+            let law = law.through(&to_lab);
             let mean: f64 = [0, 1, 2].map(|i| law.covariance[(i, i)]).iter().sum();
             // Squares stand at 0, 3 and 5 of the six pairs.
             let squares = [0, 3, 5];

@@ -820,7 +820,7 @@ const BAD_DATA: i32 = 1;
 const BAD_USAGE: i32 = 2;
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 65] = [
+const MISTAKES: [(&str, i32, &str); 72] = [
     ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
@@ -1049,6 +1049,38 @@ const MISTAKES: [(&str, i32, &str); 65] = [
     ("fit-matrix", BAD_USAGE, "<LIBRARY> is missing; see `fit-matrix --help`"),
     ("fit-matrix missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
     (
+        "fit-matrix SAMPLES/skies/sky912.exr --hold-out maritime23",
+        BAD_USAGE,
+        "--hold-out names labels; give them with --labels FILE:COLUMN",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --labels SAMPLES/skies/sky912_meta.csv:aerosol --hold-out marine",
+        BAD_USAGE,
+        "no sample has the label `marine`; there are maritime23, none, rural25, rural5, tropospheric50, urban5",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --white-sample 3",
+        BAD_USAGE,
+        "sky-rad-ls keeps no sample exact; leave out --white-sample, or choose another --method",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --method max-ign-sppls --train 20",
+        BAD_USAGE,
+        "max-ign-sppls is fitted on the responses alone; it has no training samples",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --train 5,5,5,5",
+        BAD_DATA,
+        "4 training samples do not determine the matrix: only 1 of the 3 signals they need are independent; give more \
+         varied ones",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --plot x.svg",
+        BAD_USAGE,
+        "--plot draws the trade-off of --noise-weight; give that too",
+    ),
+    ("predict-noise --all-samples", BAD_USAGE, "--all-samples is for a library of spectra; name one"),
+    (
         "fit-matrix SAMPLES/skies/sky912.exr --train 2000",
         BAD_USAGE,
         "the library has 912 samples to train on, fewer than 2000",
@@ -1056,7 +1088,8 @@ const MISTAKES: [(&str, i32, &str); 65] = [
     (
         "fit-matrix SAMPLES/skies/sky912.exr --train 0,1",
         BAD_DATA,
-        "2 training samples cannot determine 3 coefficients per channel; give at least 3",
+        "2 training samples do not determine the matrix: only 2 of the 3 signals they need are independent; give more \
+         varied ones",
     ),
     ("preview expected.exr", BAD_USAGE, "--output <FILE.png> is missing; see `preview --help`"),
     ("preview missing.exr -o picture.png", BAD_DATA, "missing.exr: cannot open: no such file or directory"),

@@ -170,8 +170,13 @@ class Prediction(ProgramCase):
             [(lab(mean + d) - lab(mean - d)) / (2 * d.sum()) for d in np.diag(steps)], axis=1
         )
         self.close(stages["lab"]["covariance"], jacobian @ xyz @ jacobian.T, 1e-6, "Lab")
-        # The mean of noisy colours and their differences, by drawing a million: errors of 10⁻³ of a deviation.
-        draws = self.chance.multivariate_normal(mean, xyz, 1_000_000)
+        # The mean of noisy colours and their differences, by drawing a million, as many on each phase of the array: errors
+        # of 10⁻³ of a deviation.
+        of_phases = [np.asarray(phase["covariance"]) for phase in stages["demosaicked"]["phases"]]
+        self.close(np.mean(of_phases, axis=0), camera, 1e-9, "phases")
+        draws = np.concatenate(
+            [self.chance.multivariate_normal(mean, per_adu @ phase @ per_adu.T, 250_000) for phase in of_phases]
+        )
         ratio = np.cbrt(draws / white)
         colors = np.stack(
             [116 * ratio[:, 1] - 16, 500 * (ratio[:, 0] - ratio[:, 1]), 200 * (ratio[:, 1] - ratio[:, 2])], axis=1

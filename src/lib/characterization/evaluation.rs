@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::{FrameHeader, Metadata, Scene};
 use crate::noise::{AddNoise, NoiseSettings};
+use crate::numerics::normal;
 use crate::optics::Exposure;
 use crate::propagation::{self, Equations, FramePrediction, Mixture};
 use crate::sensor::Sensor;
@@ -77,7 +78,7 @@ impl SampleExposure {
             Filling::Aperture => {
                 // H = t π T / (4N² + 1), solved for N.
                 let squared = (base.exposure_s * PI * base.lens_transmittance / wanted - 1.0) / 4.0;
-                if !(squared > 0.0) {
+                if squared.is_nan() || squared <= 0.0 {
                     return Err(Error::Data(format!(
                         "no aperture fills {fraction} of full well in {} s; give a longer --exposure",
                         base.exposure_s
@@ -353,7 +354,8 @@ impl Evaluator<'_> {
             _ => None,
         };
         let by_formula = mixture(chain.xyz.header()).zip(mixture(&chain.lab));
-        let by_formula = by_formula.map(|(xyz, lab)| predicted(&xyz, &lab, &chain.plane, patch, margin));
+        let by_formula =
+            by_formula.map(|(xyz, lab)| predicted(&xyz, &lab, [camera_lab, white], &chain.plane, patch, margin));
         Ok(SampleNoise {
             patch_mean: Difference::between(lab, lab_from_xyz(mean_xyz, white)),
             pixel_mean,
@@ -429,7 +431,14 @@ fn moments(differences: &[Difference]) -> (Difference, Difference, Difference) {
 }
 
 /// The noise of the patch by formula, each phase of the filter array counted as often as it occurs.
-fn predicted(xyz: &Mixture, lab: &Mixture, plane: &FrameHeader, patch: [usize; 2], margin: usize) -> PredictedNoise {
+fn predicted(
+    xyz: &Mixture,
+    lab: &Mixture,
+    [camera_lab, white]: [[f64; 3]; 2],
+    plane: &FrameHeader,
+    patch: [usize; 2],
+    margin: usize,
+) -> PredictedNoise {
     let corner = plane.geometry.origin.map(|first| i64::from(first) + margin as i64);
     let mut shares = [0.0; PHASES.len()];
     for y in 0..patch[1].min(2) {
@@ -445,15 +454,17 @@ fn predicted(xyz: &Mixture, lab: &Mixture, plane: &FrameHeader, patch: [usize; 2
             |i: usize| shares.iter().zip(&covariances).map(|(share, of_phase)| share * of_phase[(i, i)]).sum();
         [0, 1, 2].map(|i| f64::max(variance(i), 0.0).sqrt())
     };
-    let length = lab.noise_length(shares);
+    // Clipping and rounding move the mean, and so does the curvature of L*a*b*, but for the mean of XYZ.
+    let from_camera = |mean: [f64; 3]| [0, 1, 2].map(|i| mean[i] - camera_lab[i]);
+    let length = lab.noise_length(from_camera(lab.mean), shares);
+    let offset = Vector3::from(from_camera(lab_from_xyz(xyz.mean, white)));
     let of_patch = lab.patch_mean_covariance(Some(phase(corner[0], corner[1])), patch);
     PredictedNoise {
         xyz_std: std(xyz),
         lab_std: std(lab),
         delta_e: length.mean,
         delta_e_std: length.std(),
-        // The mean is taken of XYZ, so that the curvature of L*a*b* does not bias it.
-        patch_delta_e: crate::numerics::normal::length(&Vector3::zeros(), &of_patch).mean,
+        patch_delta_e: normal::length(&offset, &of_patch).mean,
     }
 }
 

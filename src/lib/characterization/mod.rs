@@ -207,6 +207,9 @@ pub fn responses(
     Ok(Signals { camera: columns(camera), xyz: columns(xyz) })
 }
 
+/// Weights of three sums over wavelengths.
+type Three = [Vec<f64>; 3];
+
 /// The wavelengths of a grid, with what a radiance of 1 W cm⁻² sr⁻¹ nm⁻¹ at each adds to the signals of R, G, B and to
 /// X, Y, Z.
 fn weights(
@@ -214,7 +217,7 @@ fn weights(
     response: &SpectralResponse,
     observer: &Observer,
     grid: &WavelengthGrid,
-) -> Result<(Vec<f64>, [Vec<f64>; 3], [Vec<f64>; 3])> {
+) -> Result<(Vec<f64>, Three, Three)> {
     let (wavelengths, widths) = grid.points()?;
     let unit = Exposure { exposure_s: 1.0, f_number: 1.0, lens_transmittance: 1.0 };
     let per_exposure = sensor.adu_per_e / unit.exposure_s_sr();

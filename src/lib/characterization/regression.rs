@@ -191,10 +191,10 @@ fn with_equal_power(rows: &DMatrix<f64>) -> DMatrix<f64> {
 fn weights(weights: &Weights, xyz: &DMatrix<f64>) -> Result<Vec<f64>> {
     match weights {
         Weights::Equal => Ok(Vec::new()),
-        Weights::Relative => match xyz.column(1).iter().position(|y| !(*y > 0.0)) {
-            Some(_) => Err(Error::Data("a training sample has no luminance to be relative to".into())),
-            None => Ok(xyz.column(1).iter().map(|y| y.powi(-2)).collect()),
-        },
+        Weights::Relative if xyz.column(1).iter().all(|y| *y > 0.0) => {
+            Ok(xyz.column(1).iter().map(|y| y.powi(-2)).collect())
+        }
+        Weights::Relative => Err(Error::Data("a training sample has no luminance to be relative to".into())),
         Weights::Given(given) if given.len() != xyz.nrows() => {
             Err(Error::Usage(format!("{} weights do not fit {} training samples", given.len(), xyz.nrows())))
         }

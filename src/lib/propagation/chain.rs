@@ -420,7 +420,7 @@ impl ChainSettings {
     /// The colour difference that noise makes in L*a*b*.
     fn delta_e(&self, mixture: &Mixture) -> NoiseDeltaE {
         let found = match self.equations {
-            Equations::Exact => mixture.noise_length([1.0 / PHASES.len() as f64; PHASES.len()]),
+            Equations::Exact => mixture.noise_length(mixture.bias, [1.0 / PHASES.len() as f64; PHASES.len()]),
             Equations::Paper => normal::length(&Vector3::from(mixture.bias), &mixture.covariance),
         };
         // The mean of a patch is taken of XYZ, so that the curvature of L*a*b* does not bias it.

@@ -139,14 +139,14 @@ impl Mixture {
         std::array::from_fn(|phase| mixture::pixel(&self.weights, phase).covariance(variances) + further)
     }
 
-    /// Distance of a pixel from where it would be without noise, the phases of the filter array in these shares.
+    /// Distance of a pixel from what lies `offset` before the mean, the phases of the filter array in these shares.
     ///
     /// Pixels of each phase are normal, those of all together are not: the mean length is the mean over the phases.
-    pub fn noise_length(&self, shares: [f64; PHASES.len()]) -> MeanVariance {
-        let bias = Vector3::from(self.bias);
+    pub fn noise_length(&self, offset: [f64; 3], shares: [f64; PHASES.len()]) -> MeanVariance {
+        let offset = Vector3::from(offset);
         let (mut mean, mut square) = (0.0, 0.0);
         for (share, covariance) in shares.into_iter().zip(self.phase_covariances()) {
-            let length = normal::length(&bias, &covariance);
+            let length = normal::length(&offset, &covariance);
             mean += share * length.mean;
             square += share * (length.variance + length.mean.powi(2));
         }
