@@ -196,7 +196,6 @@ impl Studio {
     }
 
     /// The measured skies, by matrices that never saw them, and by their own.
-    #[expect(clippy::type_complexity, reason = "a list and one more")]
     pub fn measured_skies(&self) -> Result<(Vec<(&'static str, DifferenceReport)>, DifferenceReport)> {
         let never = crate::REGRESSIONS
             .into_iter()
