@@ -590,6 +590,34 @@ fn two_colors_are_compared() {
 
 /// Frames of one scene with two noises: XYZ, xyY and L*a*b* give one result, through files and pipes; the map holds what
 /// the statistics are of.
+/// A table of spectra is a chart as an image is: six spectra make three columns and two rows of patches, and each patch is
+/// what its spectrum gives alone.
+#[test]
+fn a_table_of_spectra_makes_a_chart() {
+    let shop = Workshop::with_frames();
+    let mut table = String::from("wavelength_nm,a,b,c,d,e,f\n");
+    for nm in (360..=830).step_by(10) {
+        let radiance = |i: i32| f64::from(1 + i) * 1e-6 * (1.0 + 0.3 * (f64::from(nm + 40 * i) / 60.0).sin());
+        let cells: Vec<String> = (0..6).map(|i| radiance(i).to_string()).collect();
+        table.push_str(&format!("{nm},{}\n", cells.join(",")));
+    }
+    fs::write(shop.path("six.csv"), table).unwrap();
+    shop.run("render-radiance six.csv --patch 4x2 --exposure 0.001 -o chart.exr", &[]);
+    let (chart, metadata) = shop.read("chart.exr");
+    // Rows of three planes of 12 columns.
+    assert_eq!(chart.len(), 4 * 3 * 12);
+    let scene = metadata.scene.unwrap();
+    assert_eq!((scene.patch, scene.source_width), (Some([4, 2]), Some(3)));
+    for (index, name) in ["a", "b", "c", "d", "e", "f"].into_iter().enumerate() {
+        shop.run(&format!("render-radiance six.csv --column {name} --size 4x2 --exposure 0.001 -o {name}.exr"), &[]);
+        let (alone, _) = shop.read(&format!("{name}.exr"));
+        for channel in 0..3 {
+            let (x, y) = (4 * (index % 3) + 3, 2 * (index / 3) + 1);
+            assert_eq!(chart[(3 * y + channel) * 12 + x].to_bits(), alone[4 * channel].to_bits(), "{name} {channel}");
+        }
+    }
+}
+
 #[test]
 fn images_are_compared_with_images_and_colors() {
     let shop = Workshop::with_frames();

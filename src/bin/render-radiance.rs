@@ -65,7 +65,7 @@ struct Arguments {
     /// One spectrum of a library, counted from 0 (pixels row by row)
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     sample: Option<usize>,
-    /// Photosites that show one pixel of a spectral image; by default 1x1
+    /// Photosites that show one pixel of a spectral image, by default 1x1; or one spectrum of a table, to show them all
     #[arg(long, value_name = "WxH", value_parser = options::size)]
     patch: Option<[usize; 2]>,
     /// Render only the plane that the mosaic of this pattern keeps: rggb, bggr, grbg or gbrg

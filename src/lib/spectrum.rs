@@ -158,6 +158,12 @@ pub fn fold(sampled_nm: &[f64], grid_nm: &[f64], weights: &[f64]) -> Folded {
     Folded { weights: folded, uncovered }
 }
 
+/// Samples beside each other in a chart of so many that come in no rows of their own: the smallest divisor that makes it at
+/// least as wide as high.
+pub fn chart_columns(samples: usize) -> usize {
+    (1..=samples).find(|&width| samples.is_multiple_of(width) && width * width >= samples).unwrap_or(1)
+}
+
 /// Radiances on one grid of wavelengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectralLibrary {
@@ -165,7 +171,7 @@ pub struct SpectralLibrary {
     pub wavelength_nm: Vec<f64>,
     /// Spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, shape samples × wavelengths.
     pub radiance: Array2<f64>,
-    /// Samples in a row of the image they come from; all of them for a table.
+    /// Samples in a row of the image they come from; [`chart_columns`] for a table.
     pub columns: usize,
 }
 
@@ -204,6 +210,11 @@ mod tests {
         for other in ["R", "S1.550,0nm", "S0.nm", "S0.-1nm", "T.550,0nm"] {
             assert_eq!(channel_wavelength_nm(other), None);
         }
+    }
+
+    #[test]
+    fn charts_are_whole_rectangles_near_a_square() {
+        assert_eq!([1, 2, 4, 12, 912, 1600, 13].map(chart_columns), [1, 2, 2, 4, 38, 40, 13]);
     }
 
     #[test]

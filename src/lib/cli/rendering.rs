@@ -14,7 +14,7 @@ use crate::numerics::quadrature::Rule;
 use crate::optics::{Exposure, Vignetting};
 use crate::render::Rendering;
 use crate::sensor::{Camera, Sensor};
-use crate::spectrum::WavelengthGrid;
+use crate::spectrum::{WavelengthGrid, chart_columns};
 use crate::stage::{Counts, RowSource};
 use crate::units::{QuantityKind, RadianceUnit};
 use std::path::PathBuf;
@@ -266,12 +266,24 @@ impl Request {
         let options = InputOptions { path: self.input.clone(), part: self.part, metadata: None, all_channels: true };
         match spectral::open(&options)? {
             Radiances::Table(table) => {
-                let index = self.choose(&table)?;
                 let name = table.name().to_owned();
-                let unit = self.radiance_unit.or_else(|| table.unit_of(index)).unwrap_or_default();
-                let radiance: Vec<f64> =
-                    table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect();
-                let electrons = checked(camera(&table.wavelength_nm, &name).electrons(&radiance), &name)?;
+                let seen = camera(&table.wavelength_nm, &name);
+                let electrons_of = |index: usize| {
+                    let unit = self.radiance_unit.or_else(|| table.unit_of(index)).unwrap_or_default();
+                    let radiance: Vec<f64> =
+                        table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect();
+                    checked(seen.electrons(&radiance), &name)
+                };
+                let count = table.columns.len();
+                if self.patch.is_some() && count > 1 && self.column.is_none() && self.sample.is_none() {
+                    let all: Vec<[f64; 3]> = (0..count).map(electrons_of).collect::<Result<_>>()?;
+                    let width = chart_columns(count);
+                    let rows: Vec<Vec<[f64; 3]>> = all.chunks(width).map(<[_]>::to_vec).collect();
+                    let rows = ImageRows::Kept(rows.into_iter());
+                    return Ok(Light::Image { rows, factor: 1.0, width, height: count / width, source: name });
+                }
+                let index = self.choose(&table)?;
+                let electrons = electrons_of(index)?;
                 let source = if table.columns.len() > 1 { format!("{name}: {}", table.columns[index]) } else { name };
                 Ok(Light::Uniform { electrons, source })
             }

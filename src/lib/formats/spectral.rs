@@ -5,7 +5,7 @@ use super::data;
 use super::input::{FrameReader, InputOptions, open_named, spool};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
-use crate::spectrum::{SpectralLibrary, channel_wavelength_nm, check_wavelengths};
+use crate::spectrum::{SpectralLibrary, channel_wavelength_nm, chart_columns, check_wavelengths};
 use crate::stage::RowSource;
 use crate::units::RadianceUnit;
 use ndarray::Array2;
@@ -121,7 +121,7 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralL
         Radiances::Table(table) => {
             let unit = unit.or_else(|| table.unit_of(0)).unwrap_or_default();
             let radiance = table.values * unit.in_w_per_cm2_sr_nm();
-            let columns = radiance.nrows().max(1);
+            let columns = chart_columns(radiance.nrows());
             SpectralLibrary { wavelength_nm: table.wavelength_nm, radiance, columns }
         }
     };
