@@ -848,7 +848,7 @@ const BAD_DATA: i32 = 1;
 const BAD_USAGE: i32 = 2;
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 72] = [
+const MISTAKES: [(&str, i32, &str); 74] = [
     ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
@@ -1106,6 +1106,16 @@ const MISTAKES: [(&str, i32, &str); 72] = [
         "fit-matrix SAMPLES/skies/sky912.exr --plot x.svg",
         BAD_USAGE,
         "--plot draws the trade-off of --noise-weight; give that too",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --evaluate SAMPLES/skies/sky912.exr --expose-to 1.5",
+        BAD_USAGE,
+        "`1.5` is no value for --expose-to <FRACTION>: give a fraction above 0 and at most 1; see `fit-matrix --help`",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --white 0,0,0",
+        BAD_USAGE,
+        "a white of XYZ 0 0 0 is impossible; all three must be above 0",
     ),
     ("predict-noise --all-samples", BAD_USAGE, "--all-samples is for a library of spectra; name one"),
     (

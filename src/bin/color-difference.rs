@@ -5,7 +5,7 @@ use cyanometer::cli::{self, options, options::FrameOrColor};
 use cyanometer::color::comparison::{Comparison, ComparisonSettings, Side};
 use cyanometer::color::{Space, White};
 use cyanometer::error::{Error, Result};
-use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::formats::input::{FrameReader, InputOptions, sidecar_path};
 use cyanometer::formats::output::{self, FrameWriter, OutputOptions};
 use cyanometer::report::{self, ReportFormat};
 use cyanometer::stage::{Counts, RowSink};
@@ -73,7 +73,9 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     }
     comparison.frames().for_each(|frame| session.report_reader(frame));
     let inputs: Vec<_> = comparison.frames().filter_map(FrameReader::file).collect();
-    output::check_output(output.as_deref(), &inputs)?;
+    let read = [a, b].into_iter().filter_map(FrameOrColor::path);
+    let sidecar = map.as_deref().map(sidecar_path);
+    output::check_outputs(&[output.as_deref(), map.as_deref(), sidecar.as_deref()], &read.collect::<Vec<_>>())?;
     let mut writer = None;
     if let Some(map) = map {
         let mut header = comparison.map_header()?;

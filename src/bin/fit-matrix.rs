@@ -44,7 +44,8 @@ struct Arguments {
     /// Ridge: share of each signal's own sum of squares that is added to it
     #[arg(long, default_value_t = 0.0, value_name = "SHARE", value_parser = options::not_negative, allow_negative_numbers = true)]
     ridge: f64,
-    /// Weigh the noise of pixels against errors of color: 1 for single pixels, 1/N for means of N; adds the trade-off curve
+    /// Minimize squared Delta E*ab, with noise weighed in by WEIGHT: 1 for single pixels, 1/N for means of N; adds the
+    /// trade-off curve
     #[arg(long, value_name = "WEIGHT", value_parser = options::not_negative, allow_negative_numbers = true)]
     noise_weight: Option<f64>,
     /// Labels of the samples: a column of a CSV table with one row a sample
@@ -73,6 +74,9 @@ struct Arguments {
     /// Seed of the noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Seed of the sensor's fixed patterns
+    #[arg(long, default_value_t = 0)]
+    sensor_seed: u64,
     /// Noise sources to leave out, between commas: dcsn, dcnu, ssn, prnu, ron
     #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = options::choice(&options::SOURCES))]
     without: Vec<Source>,
@@ -82,7 +86,7 @@ struct Arguments {
     /// White of L*a*b*: d65, e, or its absolute X,Y,Z in cd/m2
     #[arg(long, default_value = "d65", value_name = "d65|e|X,Y,Z", value_parser = options::white, allow_hyphen_values = true)]
     white: White,
-    /// Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates
+    /// Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates, by the sensor file's matrix
     #[arg(long, value_name = "CD_PER_M2", value_parser = options::positive, allow_negative_numbers = true)]
     white_luminance: Option<f64>,
     /// Form of what goes to standard output; by default yaml, and text with --evaluate or --noise-weight
@@ -91,7 +95,7 @@ struct Arguments {
     /// Draw the trade-off of --noise-weight, as SVG or PNG
     #[arg(long, value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
-    /// Matrix file to write
+    /// Matrix file to write, as YAML; reports go to standard output
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -118,7 +122,12 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         hold_out: a.hold_out.clone(),
         evaluate: a.evaluate.clone(),
         exposure: a.exposure.chosen()?,
-        noise: NoiseSettings { seed: a.seed, without: a.without.clone(), ..NoiseSettings::default() },
+        noise: NoiseSettings {
+            seed: a.seed,
+            sensor_seed: a.sensor_seed,
+            without: a.without.clone(),
+            ..NoiseSettings::default()
+        },
         method: a.demosaic,
         white: a.white,
         white_luminance: a.white_luminance,

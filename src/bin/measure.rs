@@ -54,6 +54,10 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let options = InputOptions { all_channels: true, ..arguments.input.options() };
+    output::check_outputs(
+        &[arguments.output.as_deref()],
+        &options.path.iter().map(PathBuf::as_path).collect::<Vec<_>>(),
+    )?;
     let mut reader = FrameReader::open(&options)?;
     session.report_reader(&reader);
     let level = arguments.check.then_some(arguments.level);

@@ -24,7 +24,7 @@ CLASSES = "RGB"
 # this tolerance is used.
 TOLERANCE = 1e-9
 # From this condition number, columns scaled to unit length, samples count as dependent.
-LARGEST_CONDITION = 1e6
+LARGEST_CONDITION = 1e4
 
 
 def camera_signals(radiance):
@@ -331,14 +331,12 @@ class Refusals(Case):
                 with self.subTest(size=size, kept=kept):
                     self.refused(1, self.UNDETERMINED, *keep, kept, "--train", "0,1,2,3,4,5", library=name)
 
-    def test_matrix_that_gives_no_white(self):
-        # These determine a matrix, if a bad one: it takes the saturated camera to XYZ below 0, so that there is no
-        # white by default. Nobody asked for an evaluation.
+    def test_samples_whose_last_digits_decide(self):
+        # Three skies so alike that a change of the sixth digit, as far as radiances are known, changes the matrix by more
+        # than a hundredth of itself.
         triple = [249, 250, 254]
-        self.assertLess(scaled_condition(self.camera[triple]), LARGEST_CONDITION)
-        made = self.fit("--train", listed(triple))
-        color = self.camera[triple] @ np.asarray(made["matrix"]).T
-        np.testing.assert_allclose(color, self.xyz[triple], rtol=1e-9)
+        self.assertGreater(scaled_condition(self.camera[triple]), LARGEST_CONDITION)
+        self.refused(1, self.UNDETERMINED, "--train", listed(triple))
 
     def test_samples_in_different_amounts(self):
         # The same light, brighter and darker, is one sample still.

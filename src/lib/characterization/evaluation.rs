@@ -4,7 +4,7 @@ use super::Signals;
 use crate::adc::{AdcSettings, Digitize};
 use crate::cfa::CfaPattern;
 use crate::color::difference::{Difference, DifferenceReport, Differences, delta_e_76};
-use crate::color::{ColorSettings, Space, ToXyz, lab_from_xyz, matrix};
+use crate::color::{ColorSettings, Space, ToXyz, White, lab_from_xyz, matrix};
 use crate::correct::{CorrectFrame, CorrectionSettings, LessDarks};
 use crate::demosaic::weights::{PHASES, phase};
 use crate::demosaic::{Black, Demosaic, Method};
@@ -151,7 +151,7 @@ pub struct SampleNoise {
     pub noise_delta_e: f64,
     /// The same by formula; none where nothing is predicted.
     pub predicted: Option<PredictedNoise>,
-    /// Samples clipped at full well or at the last code.
+    /// Photosites of the patch and its margins clipped at full well or at the last code.
     pub clipped: u64,
 }
 
@@ -211,6 +211,20 @@ pub fn pixel_covariances(
         .collect()
 }
 
+/// Signal electrons of R, G, B that a sample gives per s sr.
+///
+/// # Errors
+///
+/// [`Error::Data`] where they are negative or not finite.
+pub fn per_exposure(signals: &Signals, sample: usize, sensor: &Sensor) -> Result<[f64; 3]> {
+    let row = signals.camera.row(sample);
+    let electrons = [0, 1, 2].map(|class| row[class] / sensor.adu_per_e);
+    if electrons.iter().all(|e| (0.0..f64::INFINITY).contains(e)) {
+        return Ok(electrons);
+    }
+    Err(Error::Data("its radiance is negative or not finite".into()))
+}
+
 /// What is wrong with a sample, with its number.
 pub fn of_sample(sample: usize, error: Error) -> Error {
     match error {
@@ -249,11 +263,7 @@ impl Chain {
 impl Evaluator<'_> {
     /// Expected electrons of a sample, and what it is exposed to.
     fn exposed(&self, sample: usize) -> Result<(Exposure, [f64; 3])> {
-        let row = self.signals.camera.row(sample);
-        let per_exposure = [0, 1, 2].map(|class| row[class] / self.sensor.adu_per_e);
-        if per_exposure.iter().any(|e| !(0.0..f64::INFINITY).contains(e)) {
-            return Err(Error::Data("its radiance is negative or not finite".into()));
-        }
+        let per_exposure = per_exposure(self.signals, sample, self.sensor)?;
         let exposure = self.settings.exposure.of(per_exposure, self.sensor.full_well_e)?;
         Ok((exposure, per_exposure.map(|e| e * exposure.exposure_s_sr())))
     }
@@ -294,9 +304,23 @@ impl Evaluator<'_> {
         let codes = correct.as_ref().map_or(digitize.header(), Stage::header);
         let demosaic = Demosaic::new(codes, self.settings.method, Black::Auto, None)?;
         let camera = demosaic.header().clone();
-        let made = |space| ToXyz::new(&camera, &ColorSettings { space, ..self.settings.color.clone() });
+        let white_luminance = self.settings.color.white_luminance.or_else(|| self.saturation(&camera));
+        let made =
+            |space| ToXyz::new(&camera, &ColorSettings { space, white_luminance, ..self.settings.color.clone() });
         let (xyz, lab) = (made(Space::Xyz)?, made(Space::Lab)?.header().clone());
         Ok(Chain { exposure, electrons, plane, noisy, digitize, correct, demosaic, camera, xyz, lab })
+    }
+
+    /// The luminance at which equal signals reach the top code, by the matrix of the sensor's own file: a matrix that is
+    /// judged shall not set the white that it is judged by. None for a sensor without one, and a white of its own.
+    fn saturation(&self, camera: &FrameHeader) -> Option<f64> {
+        if matches!(self.settings.color.white, White::Absolute(_)) {
+            return None;
+        }
+        let metadata = &camera.metadata;
+        let range = metadata.white_level_adu? - metadata.black_level_adu.unwrap_or(0.0);
+        let xyz_from_adu = matrix(&self.sensor.xyz_from_camera?) / metadata.exposure?.exposure_s_sr();
+        Some((xyz_from_adu * Vector3::repeat(range)).y)
     }
 
     fn sample(&self, sample: usize) -> Result<SampleEvaluation> {
@@ -365,7 +389,8 @@ impl Evaluator<'_> {
             lab_std: std(&labs),
             noise_delta_e: labs.iter().map(|pixel| delta_e_76(camera_lab, *pixel)).sum::<f64>() / count,
             predicted: by_formula,
-            clipped: counts.full_well + counts.clipped_high,
+            // What fills a photosite mostly reaches the last code too.
+            clipped: counts.full_well.max(counts.clipped_high),
         })
     }
 

@@ -132,6 +132,11 @@ pub fn fit(
         return Err(Error::Data("a training sample gives signals that are not finite".into()));
     }
     let weights = weights(&settings.weights, &xyz)?;
+    if let Some(sample) =
+        settings.training.iter().filter(|_| trained).find(|&&sample| signals.camera.row(sample).min() < 0.0)
+    {
+        return Err(Error::Data(format!("sample {sample} gives a negative signal; leave it out of --train")));
+    }
     for (row, weight) in weights.iter().enumerate() {
         camera.row_mut(row).scale_mut(weight.sqrt());
         xyz.row_mut(row).scale_mut(weight.sqrt());

@@ -14,7 +14,6 @@ use crate::color::difference::DELTA_E_PER_JND;
 use crate::color::{ColorSettings, Space, White};
 use crate::demosaic::Method;
 use crate::error::{Error, Result};
-use crate::formats::input::regular_file;
 use crate::formats::{csv, data, output, spectral};
 use crate::noise::NoiseSettings;
 use crate::report::characterization::{
@@ -153,13 +152,8 @@ impl Request {
     /// Those of readers and writers; [`Error::Data`] where the matrix is not determined; [`Error::Usage`] where the request
     /// makes no sense.
     pub fn run(&self, session: &Session) -> Result<()> {
-        if let Some(plot) = &self.plot {
-            PlotFormat::of_path(plot)?;
-            if self.noise_weight.is_none() {
-                return Err(Error::Usage("--plot draws the trade-off of --noise-weight; give that too".into()));
-            }
-        }
         let loaded = data::load_sensor(&self.sensor)?;
+        self.check(&loaded.sensor)?;
         let observer = data::load_observer()?;
         let grid = WavelengthGrid::default();
         let see = |path: &Path, labels: Vec<String>| -> Result<Seen> {
@@ -185,24 +179,64 @@ impl Request {
             Some(path) if is_same(path, &self.library) => Some(fitting.evaluation(&fitted, &seen)?),
             Some(path) => Some(fitting.evaluation(&fitted, &see(path, Vec::new())?)?),
         };
+        if let Some(evaluation) = &evaluation {
+            let full = evaluation.samples.iter().filter(|s| s.electrons.iter().any(|e| *e > loaded.sensor.full_well_e));
+            match full.count() {
+                0 => {}
+                count => session.warn(&format!(
+                    "{count} samples exceed full well at their exposure; the differences without noise do not show it"
+                )),
+            }
+        }
         self.write(&Characterization { matrix: made, evaluation, trade_off })
     }
 
+    /// What can be refused before any work.
+    fn check(&self, sensor: &Sensor) -> Result<()> {
+        if let Some(plot) = &self.plot {
+            PlotFormat::of_path(plot)?;
+            if self.noise_weight.is_none() {
+                return Err(Error::Usage("--plot draws the trade-off of --noise-weight; give that too".into()));
+            }
+        }
+        if self.format == Some(ReportFormat::Csv) && !self.has_report() {
+            return Err(Error::Usage(
+                "csv has one row for each sample of --evaluate LIBRARY, or for each weight of --noise-weight; give one of \
+                 them too"
+                    .into(),
+            ));
+        }
+        if let White::Absolute(white) = self.white
+            && !white.iter().all(|value| *value > 0.0)
+        {
+            let [x, y, z] = white;
+            return Err(Error::Usage(format!("a white of XYZ {x} {y} {z} is impossible; all three must be above 0")));
+        }
+        let own = data::sensor_files(&self.sensor, sensor);
+        let labels = self.labels.as_ref().map(|(file, _)| file);
+        let inputs: Vec<&Path> = std::iter::once(&self.library)
+            .chain(&self.evaluate)
+            .chain(labels)
+            .chain(&own)
+            .map(PathBuf::as_path)
+            .collect();
+        output::check_outputs(&[self.output.as_deref(), self.plot.as_deref()], &inputs)
+    }
+
+    fn has_report(&self) -> bool {
+        self.evaluate.is_some() || self.noise_weight.is_some()
+    }
+
     fn write(&self, found: &Characterization) -> Result<()> {
-        let input = regular_file(&self.library);
         let to_file = self.output.as_deref().filter(|path| *path != Path::new("-"));
         if let Some(path) = to_file {
-            output::write_text(Some(path), &matrix(&found.matrix)?, input.as_ref())?;
+            output::write_text(Some(path), &matrix(&found.matrix)?, None)?;
         }
         if let Some(plot) = &self.plot {
-            report::trade_off(&found.trade_off).write(plot, input.as_ref())?;
+            report::trade_off(&found.trade_off).write(plot, None)?;
         }
-        let has_report = found.evaluation.is_some() || !found.trade_off.is_empty();
-        let format = self.format.unwrap_or(if has_report { ReportFormat::Text } else { ReportFormat::Yaml });
-        if format == ReportFormat::Csv && !has_report {
-            return Err(Error::Usage("csv has one row for each sample of --evaluate LIBRARY; give that too".into()));
-        }
-        if to_file.is_none() || has_report || format != ReportFormat::Yaml {
+        let format = self.format.unwrap_or(if self.has_report() { ReportFormat::Text } else { ReportFormat::Yaml });
+        if to_file.is_none() || self.has_report() || format != ReportFormat::Yaml {
             output::write_text(None, &characterization(found, format)?, None)?;
         }
         Ok(())
@@ -234,6 +268,9 @@ impl Request {
         }
         let is_held = |sample: &usize| seen.labels.get(*sample).is_some_and(|label| self.hold_out.contains(label));
         let candidates: Vec<usize> = (0..available).filter(|sample| !is_held(sample)).collect();
+        if candidates.is_empty() {
+            return Err(Error::Usage("all samples are held out; none is left to train on".into()));
+        }
         let mut chosen = None;
         let training = match &self.train {
             _ if !self.regression.is_trained() => {
@@ -258,6 +295,11 @@ impl Request {
             }
         };
         let kept = match (self.regression.keeps_a_sample(), self.white_sample) {
+            (true, Some(sample)) if is_held(&sample) => {
+                return Err(Error::Usage(format!(
+                    "sample {sample} is held out; keep another exact with --white-sample"
+                )));
+            }
             (true, Some(sample)) => Some(sample),
             (true, None) => Some(average_sample(&seen.signals, &candidates)?),
             (false, None) => None,
@@ -305,7 +347,9 @@ impl Request {
         };
         match self.white_luminance {
             Some(luminance) => format!("{name} of {luminance} cd/m2"),
-            None => format!("{name}, as bright as saturates the camera at the sample's exposure"),
+            None => format!(
+                "{name}, as bright as saturates the camera at the sample's exposure, by the sensor file's matrix"
+            ),
         }
     }
 
@@ -376,7 +420,8 @@ impl Fitting<'_> {
             method: Some(regression.name().into()),
             unit: Some(MATRIX_UNIT.into()),
             xyz_from_camera: fitted.xyz_from_camera,
-            condition: Some(fitted.condition),
+            // None where a ridge stands in for signals that are missing.
+            condition: Some(fitted.condition).filter(|condition| condition.is_finite()),
             rank: Some(fitted.rank),
             training: Some(Training {
                 library: self.seen.name.clone(),
@@ -447,7 +492,9 @@ impl Fitting<'_> {
 
     /// The samples that were trained on and the others; and those of each label.
     fn groups(&self, samples: &[SampleEvaluation]) -> Vec<Group> {
-        let is_trained = |sample: &&SampleEvaluation| self.settings.training.contains(&sample.sample);
+        let is_trained = |sample: &&SampleEvaluation| {
+            self.settings.kept == Some(sample.sample) || self.settings.training.contains(&sample.sample)
+        };
         let group = |name: String, members: Vec<&SampleEvaluation>| {
             let trained_on = members.iter().filter(|sample| is_trained(sample)).count();
             noise_free(members.iter().copied()).map(|differences| Group {

@@ -15,7 +15,7 @@ use crate::units::RadianceUnit;
 use clap::Args;
 use clap::builder::{OsStringValueParser, PathBufValueParser, PossibleValuesParser, TypedValueParser};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The demosaicking methods by their short and long names.
 pub const METHODS: [(&str, Method); 8] = [
@@ -151,7 +151,7 @@ pub struct SampleExposure {
     #[arg(long, value_name = "FRACTION", default_value_t = 1.0, value_parser = fraction, allow_negative_numbers = true)]
     pub lens_transmittance: f64,
     /// Expose each sample so that its brightest class fills this fraction of full well; 0.75 where no --exposure is given
-    #[arg(long, value_name = "FRACTION", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "FRACTION", value_parser = fraction, allow_negative_numbers = true)]
     pub expose_to: Option<f64>,
 }
 
@@ -217,6 +217,14 @@ pub enum FrameOrColor {
 }
 
 impl FrameOrColor {
+    /// The file of a frame.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Frame(path) => Some(path),
+            Self::Color(_) => None,
+        }
+    }
+
     /// Whether the frame comes through the standard input.
     pub fn is_standard_input(&self) -> bool {
         *self == Self::Frame("-".into())

@@ -3,7 +3,7 @@
 use super::Session;
 use super::rendering;
 use crate::cfa::{CfaPattern, Class};
-use crate::characterization::evaluation::{Filling, SampleExposure, of_sample};
+use crate::characterization::evaluation::{Filling, SampleExposure, of_sample, per_exposure};
 use crate::characterization::signals;
 use crate::color::{ColorSettings, Space, White};
 use crate::demosaic::Method;
@@ -20,7 +20,7 @@ use crate::sensor::Sensor;
 use crate::spectrum::WavelengthGrid;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What is to be predicted, and how.
 #[derive(Debug, Clone)]
@@ -137,15 +137,15 @@ impl Request {
     /// # Errors
     ///
     /// Those of readers, sensor and matrix files and of the chain.
-    pub fn predict(
-        &self,
-        session: &Session,
-        format: Option<ReportFormat>,
-        path: Option<&std::path::Path>,
-    ) -> Result<()> {
+    pub fn predict(&self, session: &Session, format: Option<ReportFormat>, path: Option<&Path>) -> Result<()> {
         if let Some(plot) = &self.plot {
             PlotFormat::of_path(plot)?;
         }
+        let sensor = data::load_sensor(&self.scene.sensor)?.sensor;
+        let own = data::sensor_files(&self.scene.sensor, &sensor);
+        let inputs: Vec<&Path> =
+            self.scene.input.iter().chain(&self.matrix).chain(&own).map(PathBuf::as_path).collect();
+        output::check_outputs(&[path, self.plot.as_deref()], &inputs)?;
         let input = self.scene.input.as_deref().and_then(regular_file);
         if self.all_samples {
             let (about, found) = self.samples(session)?;
@@ -221,8 +221,7 @@ impl Request {
         };
         let color = self.color(session, &loaded.sensor)?;
         let one = |sample: usize| -> Result<SamplePrediction> {
-            let row = signals.camera.row(sample);
-            let per_exposure = [0, 1, 2].map(|class| row[class] / loaded.sensor.adu_per_e);
+            let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;
             let exposure = exposing.of(per_exposure, loaded.sensor.full_well_e)?;
             let mut chain = self.settled(&loaded.sensor, exposure, color.clone())?;
             let prediction = chain.predict(per_exposure.map(|e| e * exposure.exposure_s_sr()))?;

@@ -100,6 +100,17 @@ pub fn load_matrix(path: &Path) -> Result<CameraMatrix> {
     Ok(matrix)
 }
 
+/// The files that a sensor of this name or path is read from, where they are the user's own.
+pub fn sensor_files(name: &str, sensor: &Sensor) -> Vec<PathBuf> {
+    let path = Path::new(name);
+    if !path.is_file() {
+        return Vec::new();
+    }
+    let curves = [Some(&sensor.quantum_efficiency), sensor.cover_glass.as_ref()];
+    let beside = |file: &str| path.parent().unwrap_or(Path::new("")).join(file);
+    std::iter::once(path.to_owned()).chain(curves.into_iter().flatten().map(|curve| beside(&curve.file))).collect()
+}
+
 /// The CIE 1931 2° observer, built in.
 ///
 /// # Errors

@@ -341,7 +341,7 @@ impl FrameWriter {
 /// # Errors
 ///
 /// [`Error::Usage`].
-pub fn check_output(output: Option<&Path>, inputs: &[(FileId, String)]) -> Result<()> {
+fn check_output(output: Option<&Path>, inputs: &[(FileId, String)]) -> Result<()> {
     let Some((id, name)) = output.and_then(regular_file) else { return Ok(()) };
     inputs.iter().find(|(input, _)| *input == id).map_or(Ok(()), |(_, input)| Err(same_file(&name, input)))
 }
@@ -355,6 +355,24 @@ pub fn same_place(a: Option<&Path>, b: Option<&Path>) -> bool {
         Some(path.canonicalize().ok().or_else(beside).unwrap_or_else(|| path.to_owned()))
     };
     place(a) == place(b)
+}
+
+/// Makes sure, before any work, that outputs are neither files that are read, nor sidecars of these, nor one another.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> {
+    let guarded: Vec<(FileId, String)> =
+        inputs.iter().flat_map(|path| [regular_file(path), regular_file(&sidecar_path(path))]).flatten().collect();
+    let named: Vec<&Path> = outputs.iter().copied().flatten().filter(|path| *path != Path::new("-")).collect();
+    for (index, output) in named.iter().enumerate() {
+        check_output(Some(output), &guarded)?;
+        if named[..index].iter().any(|other| same_place(Some(other), Some(output))) {
+            return Err(Error::Usage(format!("{}: two outputs cannot be one file", output.display())));
+        }
+    }
+    Ok(())
 }
 
 /// Writes a text (a report, a matrix) to a named file or the standard output. `input` is the file that was read, if it

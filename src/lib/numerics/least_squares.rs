@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 
-/// Condition number from which regressors count as dependent: radiances are known to about six digits, and noise of that
-/// size then changes the solution by as much as itself.
-pub const LARGEST_CONDITION: f64 = 1e6;
+/// Condition number from which regressors count as dependent: radiances are known to about six digits, and errors of that
+/// size would change the solution by a hundredth of itself.
+pub const LARGEST_CONDITION: f64 = 1e4;
 
 /// Finds B that minimises ‖A B − Y‖² + ‖P B‖² where C B = D holds exactly.
 #[derive(Debug, Clone, Copy)]

@@ -281,6 +281,9 @@ fn matrix_text(matrix: &CameraMatrix, out: &mut String) {
             None => writeln!(out),
         };
     }
+    if matrix.uncertainty.is_none() && matrix.training.is_some() {
+        out.push_str("no standard errors: without any one of the samples the matrix would not be determined\n");
+    }
     if let Some(condition) = matrix.condition {
         let rank = matrix.rank.map_or(String::new(), |rank| format!(", rank {rank}"));
         let _ = writeln!(out, "condition number {condition:.2}{rank}");
@@ -353,7 +356,7 @@ fn evaluation_text(evaluation: &Evaluation, out: &mut String) {
             noise.noise.simulated_jnd, noise.pixel_max.jnd.summary.max
         );
         if noise.clipped > 0 {
-            let _ = writeln!(out, "{} photosites were clipped", noise.clipped);
+            let _ = writeln!(out, "{} photosites of the patches and their margins were clipped", noise.clipped);
         }
     }
     if !evaluation.groups.is_empty() {
