@@ -6,3 +6,4 @@ pub mod moments;
 pub mod normal;
 pub mod quadrature;
 pub mod significance;
+pub mod vectors;
