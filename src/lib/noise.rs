@@ -9,11 +9,14 @@ use crate::cfa::Class;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
-use crate::random::{Draws, Source};
+use crate::numerics::vectors::{self, Instructions, Kernel};
+use crate::random::philox::{BLOCK, LANES};
+use crate::random::poisson::Table;
+use crate::random::{Run, RunWords, Source};
 use crate::stage::{Counts, Stage};
 use crate::transfer::{Transfer, uniform_share};
 use crate::units::{Electrons, ExpectedElectrons, QuantityKind};
-use rand_distr::{Distribution, Poisson, StandardNormal};
+use std::sync::Arc;
 
 /// The numbers that the noise of a photosite follows from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,6 +88,32 @@ pub struct AddNoise {
     model: NoiseModel,
     record: NoiseRecord,
     transfer: Option<Transfer>,
+    tables: Tables,
+    instructions: Instructions,
+}
+
+/// Counts at rates that are known beforehand: those of the dark signal, and of light where the scene is uniform.
+#[derive(Debug, Clone, Default)]
+struct Tables {
+    dark: Option<Arc<Table>>,
+    light: [Option<Arc<Table>>; 3],
+}
+
+impl Tables {
+    /// The tables that a frame is large enough for.
+    fn of(frame: &FrameHeader, model: &NoiseModel) -> Self {
+        /// Photosites from which on a table saves more than it costs.
+        const WORTHWHILE: usize = 1 << 17;
+        let geometry = &frame.geometry;
+        if model.poisson != PoissonKind::Exact || geometry.width * geometry.height < WORTHWHILE {
+            return Self::default();
+        }
+        let table = |rate: f64| Table::new(to_sample(rate)).map(Arc::new);
+        let scene = frame.metadata.scene.as_ref().filter(|scene| scene.uniform && model.signal_shot);
+        let light = scene.and_then(|scene| scene.expected_electrons).map(|rates| rates.map(table));
+        let dark = if model.dark_shot { table(model.dark_e) } else { None };
+        Self { dark, light: light.unwrap_or_default() }
+    }
 }
 
 /// The dark signal is left out where its variance is below this share of that of the read noise: the total standard
@@ -164,8 +193,15 @@ impl AddNoise {
         let model = NoiseModel::of(input, &record)?;
         metadata.dark_signal_e = Some(dark_e * rectified_mean(model.dcnu) * settings.cte.map_or(1.0, uniform_share));
         metadata.noise = Some(record.clone());
+        let tables = Tables::of(input, &model);
         let header = FrameHeader { metadata, ..input.clone() };
-        Ok(Self { header, model, record, transfer })
+        Ok(Self { header, model, record, transfer, tables, instructions: Instructions::widest() })
+    }
+
+    /// Draws on a narrower set of instructions than the widest there is; the noise is the same.
+    pub fn on(mut self, instructions: Instructions) -> Self {
+        self.instructions = instructions;
+        self
     }
 
     /// The head of the noisy frame, to add to.
@@ -213,37 +249,6 @@ pub fn rectified_mean_square(sigma: f64) -> f64 {
     if sigma <= 0.0 { 1.0 } else { (1.0 + sigma * sigma) * cumulative(1.0 / sigma) + sigma * density(1.0 / sigma) }
 }
 
-/// Draws counts at one rate after another, keeping what a rate needs while it stays the same.
-struct Counter {
-    kind: PoissonKind,
-    rate: f64,
-    exact: Option<Poisson<f64>>,
-}
-
-impl Counter {
-    fn new(kind: PoissonKind) -> Self {
-        Self { kind, rate: 0.0, exact: None }
-    }
-
-    /// A count at `rate`, which is not negative; a rate of 0 gives 0, NaN stays NaN.
-    #[expect(clippy::float_cmp, reason = "the very same rate, to use again what was set up for it")]
-    fn draw(&mut self, rate: f64, draws: &mut Draws) -> f64 {
-        if rate == 0.0 || rate.is_nan() {
-            return rate;
-        }
-        if self.kind == PoissonKind::Gaussian {
-            let normal: f64 = StandardNormal.sample(draws);
-            return rate + rate.sqrt() * normal;
-        }
-        if rate != self.rate || self.exact.is_none() {
-            self.rate = rate;
-            self.exact = Poisson::new(rate).ok();
-        }
-        // Only rates beyond 10¹⁹ are refused, where a count is its rate to the last bit of a double.
-        self.exact.as_ref().map_or(rate, |poisson| poisson.sample(draws))
-    }
-}
-
 impl Stage for AddNoise {
     type Input = ExpectedElectrons;
     type Output = Electrons;
@@ -257,30 +262,34 @@ impl Stage for AddNoise {
     }
 
     fn apply(&self, input: Window<'_, ExpectedElectrons>, mut output: Rows<'_, Electrons>) -> Counts {
-        let mut counts = Counts::default();
         let rows = output.range();
+        let Some(transfer) = &self.transfer else {
+            let draw = Expose { noise: self, input, output };
+            return vectors::run_on(self.instructions, draw);
+        };
+        let mut counts = Counts::default();
+        let (mut words, mut charge, mut noise) = (RunWords::default(), vec![0.0; input.width()], [0.0; BLOCK]);
         for channel in 0..input.channels() {
-            let Some(transfer) = &self.transfer else {
-                for y in rows.clone() {
-                    let noisy = output.row(y, channel);
-                    let line = self.line(y, channel);
-                    line.charges(input.row(y.cast_signed(), channel), &mut counts, |x, charge, counts| {
-                        noisy[x] = line.read(x, charge, counts);
-                    });
-                }
-                continue;
-            };
             let mut passage = transfer.passage();
             // The rows above are drawn again, and counted in the band that they belong to.
             for y in rows.start.saturating_sub(transfer.reach())..rows.end {
                 let line = self.line(y, channel);
-                let mut of_row = Counts::default();
-                let entering = passage.entering(y);
-                line.charges(input.row(y.cast_signed(), channel), &mut of_row, |x, charge, _| entering[x] = charge);
+                let expected = input.row(y.cast_signed(), channel);
+                let charges = Charges { line: &line, expected, charge: &mut charge };
+                let of_row = vectors::run_on(self.instructions, charges);
+                for (entering, &charge) in passage.entering(y).iter_mut().zip(&charge) {
+                    *entering = f64::from(charge);
+                }
                 if y >= rows.start {
                     counts = counts.plus(of_row);
-                    for (x, (&charge, noisy)) in passage.leaving(y).iter().zip(output.row(y, channel)).enumerate() {
-                        *noisy = line.read(x, charge, &mut counts);
+                    let noisy = output.row(y, channel);
+                    for (noisy, &charge) in noisy.iter_mut().zip(passage.leaving(y)) {
+                        *noisy = to_sample(charge);
+                    }
+                    for (block, noisy) in noisy.chunks_mut(BLOCK).enumerate() {
+                        let run = line.run(block * BLOCK, noisy.len());
+                        run.make_temporal(&mut words);
+                        counts.not_finite += line.read(&run, &words, &mut noise, noisy);
                     }
                 }
             }
@@ -293,6 +302,7 @@ impl Stage for AddNoise {
 struct Line<'a> {
     model: &'a NoiseModel,
     record: &'a NoiseRecord,
+    tables: &'a Tables,
     /// Row of the sensor, and column of the frame's first.
     row: i32,
     first_column: i32,
@@ -310,74 +320,198 @@ impl AddNoise {
         let [first_column, y0] = geometry.origin;
         #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
         let row = y0.wrapping_add(y as i32);
-        Line { model: &self.model, record: &self.record, row, first_column, classes }
+        Line { model: &self.model, record: &self.record, tables: &self.tables, row, first_column, classes }
+    }
+}
+
+/// Makes rows of a noisy exposure without charge transfer.
+struct Expose<'a> {
+    noise: &'a AddNoise,
+    input: Window<'a, ExpectedElectrons>,
+    output: Rows<'a, Electrons>,
+}
+
+impl Kernel for Expose<'_> {
+    type Output = Counts;
+
+    #[inline(always)]
+    fn run(self) -> Counts {
+        let Self { noise, input, mut output } = self;
+        let mut counts = Counts::default();
+        let mut scratch = Scratch::default();
+        for y in output.range() {
+            for channel in 0..input.channels() {
+                let line = noise.line(y, channel);
+                let expected = input.row(y.cast_signed(), channel);
+                let noisy = output.row(y, channel);
+                for (block, (expected, noisy)) in expected.chunks(BLOCK).zip(noisy.chunks_mut(BLOCK)).enumerate() {
+                    let run = line.run(block * BLOCK, expected.len());
+                    run.make_temporal(&mut scratch.words);
+                    line.charges(&run, &mut scratch, expected, noisy, &mut counts);
+                    counts.not_finite += line.read(&run, &scratch.words, &mut scratch.normals, noisy);
+                }
+            }
+        }
+        counts
+    }
+}
+
+/// Makes the charge of one row, before it is transferred.
+struct Charges<'a> {
+    line: &'a Line<'a>,
+    expected: &'a [f32],
+    charge: &'a mut [f32],
+}
+
+impl Kernel for Charges<'_> {
+    type Output = Counts;
+
+    #[inline(always)]
+    fn run(self) -> Counts {
+        let mut counts = Counts::default();
+        let mut scratch = Scratch::default();
+        for (block, (expected, charge)) in self.expected.chunks(BLOCK).zip(self.charge.chunks_mut(BLOCK)).enumerate() {
+            let run = self.line.run(block * BLOCK, expected.len());
+            run.make_temporal(&mut scratch.words);
+            self.line.charges(&run, &mut scratch, expected, charge, &mut counts);
+        }
+        counts
+    }
+}
+
+/// Memory for the numbers of a run.
+struct Scratch {
+    words: RunWords,
+    rates: [f32; BLOCK],
+    light: [f32; BLOCK],
+    dark: [f32; BLOCK],
+    normals: [f32; BLOCK],
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        let empty = [0.0; BLOCK];
+        Self { words: RunWords::default(), rates: empty, light: empty, dark: empty, normals: empty }
     }
 }
 
 impl Line<'_> {
-    #[inline(always)]
-    fn draws(&self, x: usize, source: Source) -> Draws {
+    /// The draws of `photosites` photosites from column `x` of the frame on.
+    fn run(&self, x: usize, photosites: usize) -> Run {
         let record = self.record;
-        let (seed, frame) =
-            if source.is_fixed_pattern() { (record.sensor_seed, 0) } else { (record.seed, record.frame) };
         #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
         let column = self.first_column.wrapping_add(x as i32);
-        Draws::new(seed, frame, source, self.classes[x % 2] as u8, column, self.row)
+        Run {
+            seed: record.seed,
+            sensor_seed: record.sensor_seed,
+            frame: record.frame,
+            place: [column, self.row],
+            classes: self.classes.map(|class| class as u8),
+            length: photosites.next_multiple_of(LANES),
+        }
     }
 
+    /// Draws the charge of each photosite, light and dark, clipped at full well. The run's temporal words are made.
     #[inline(always)]
-    fn normal(&self, x: usize, source: Source) -> f64 {
-        StandardNormal.sample(&mut self.draws(x, source))
-    }
-
-    /// Draws the charge of each photosite, light and dark, clipped at full well.
-    #[inline(always)]
-    fn charges(&self, expected: &[f32], counts: &mut Counts, mut put: impl FnMut(usize, f64, &mut Counts)) {
+    fn charges(&self, run: &Run, scratch: &mut Scratch, expected: &[f32], charge: &mut [f32], counts: &mut Counts) {
         let model = self.model;
-        let mut light_counters = [Counter::new(model.poisson), Counter::new(model.poisson)];
-        let mut dark_counter = Counter::new(model.poisson);
-        for (x, &expected) in expected.iter().enumerate() {
-            let sensitivity = |source: Source, sigma: f64| (1.0 + sigma * self.normal(x, source)).max(0.0);
-            let mut rate = f64::from(expected);
-            if rate < 0.0 {
-                counts.negative += 1;
-                rate = 0.0;
+        let Scratch { words, rates, light, dark, normals } = scratch;
+        let [rates, light, dark, normals] = [rates, light, dark, normals].map(|numbers| &mut numbers[..run.length]);
+        let mut negative = 0_u32;
+        for (rate, &expected) in rates.iter_mut().zip(expected) {
+            negative += u32::from(expected < 0.0);
+            *rate = if expected < 0.0 { 0.0 } else { expected };
+        }
+        // What fills the run up looks like the rest, so that it takes no path of its own.
+        for index in expected.len()..run.length {
+            rates[index] = rates[index.saturating_sub(2)];
+        }
+        counts.negative += u64::from(negative);
+
+        self.shot(model.signal_shot, Source::Ssn, run, words, rates, light);
+        // No count stands for a rate that is no number.
+        for (light, &rate) in light.iter_mut().zip(&*rates) {
+            *light = if rate.is_nan() { rate } else { *light };
+        }
+        if model.prnu > 0.0 || model.dcnu > 0.0 {
+            run.make_pattern(words);
+        }
+        if model.prnu > 0.0 {
+            run.normals(words, Source::Prnu, normals);
+            scale(light, to_sample(model.prnu), normals);
+        }
+        if model.dark_e > 0.0 {
+            rates.fill(to_sample(model.dark_e));
+            self.shot(model.dark_shot, Source::Dcsn, run, words, rates, dark);
+            if model.dcnu > 0.0 {
+                run.normals(words, Source::Dcnu, normals);
+                scale(dark, to_sample(model.dcnu), normals);
             }
-            let mut light = if model.signal_shot {
-                light_counters[x % 2].draw(rate, &mut self.draws(x, Source::Ssn))
-            } else {
-                rate
-            };
-            if model.prnu > 0.0 {
-                light *= sensitivity(Source::Prnu, model.prnu);
+            for (light, &dark) in light.iter_mut().zip(&*dark) {
+                *light += dark;
             }
-            let mut charge = light;
-            if model.dark_e > 0.0 {
-                let mut dark = if model.dark_shot {
-                    dark_counter.draw(model.dark_e, &mut self.draws(x, Source::Dcsn))
-                } else {
-                    model.dark_e
-                };
-                if model.dcnu > 0.0 {
-                    dark *= sensitivity(Source::Dcnu, model.dcnu);
-                }
-                charge += dark;
+        }
+        let full_well = to_sample(model.full_well_e);
+        let mut full = 0_u32;
+        for (charge, &light) in charge.iter_mut().zip(&*light) {
+            full += u32::from(light > full_well);
+            *charge = if light > full_well { full_well } else { light };
+        }
+        counts.full_well += u64::from(full);
+    }
+
+    /// Fills `numbers` with counts at `rates`, or with the rates themselves where there is no shot noise.
+    #[inline(always)]
+    fn shot(&self, is_drawn: bool, source: Source, run: &Run, words: &RunWords, rates: &[f32], numbers: &mut [f32]) {
+        if !is_drawn {
+            numbers.copy_from_slice(rates);
+        } else if self.model.poisson == PoissonKind::Gaussian {
+            run.normals(words, source, numbers);
+            for (number, &rate) in numbers.iter_mut().zip(rates) {
+                *number = rate + rate.sqrt() * *number;
             }
-            if charge > model.full_well_e {
-                charge = model.full_well_e;
-                counts.full_well += 1;
-            }
-            put(x, charge, counts);
+        } else if let Some(tables) = self.tables_at(source, rates) {
+            run.counts_of(words, source, tables, numbers);
+        } else {
+            run.counts(words, source, rates, numbers);
         }
     }
 
-    /// Reads a packet of charge out.
+    /// The tables of the run's rates, where all its photosites have those.
     #[inline(always)]
-    fn read(&self, x: usize, mut charge: f64, counts: &mut Counts) -> f32 {
+    fn tables_at(&self, source: Source, rates: &[f32]) -> Option<[&Table; 2]> {
+        let tables = match source {
+            Source::Dcsn => [self.tables.dark.as_deref(); 2],
+            _ => self.classes.map(|class| self.tables.light[class as usize].as_deref()),
+        };
+        let [Some(even), Some(odd)] = tables else { return None };
+        let known = [even.rate(), odd.rate()];
+        let differs = |pair: &[f32; 2]| (pair[0] != known[0]) | (pair[1] != known[1]);
+        let any = rates.as_chunks::<2>().0.iter().fold(false, |any, pair| any | differs(pair));
+        (!any).then_some([even, odd])
+    }
+
+    /// Reads packets of charge out; gives the number of samples that are not finite.
+    #[inline(always)]
+    fn read(&self, run: &Run, words: &RunWords, normals: &mut [f32; BLOCK], charge: &mut [f32]) -> u64 {
         if self.model.read_noise_e > 0.0 {
-            charge += self.model.read_noise_e * self.normal(x, Source::Ron);
+            let normals = &mut normals[..run.length];
+            run.normals(words, Source::Ron, normals);
+            let rms = to_sample(self.model.read_noise_e);
+            for (charge, &normal) in charge.iter_mut().zip(&*normals) {
+                *charge += rms * normal;
+            }
         }
-        counts.not_finite += u64::from(!charge.is_finite());
-        to_sample(charge)
+        let not_finite = charge.iter().fold(0_u32, |count, charge| count + u32::from(!charge.is_finite()));
+        u64::from(not_finite)
+    }
+}
+
+/// Multiplies each number by max(0, 1 + σ n).
+#[inline(always)]
+fn scale(numbers: &mut [f32], sigma: f32, normals: &[f32]) {
+    for (number, &normal) in numbers.iter_mut().zip(normals) {
+        let sensitivity = 1.0 + sigma * normal;
+        *number *= if sensitivity > 0.0 { sensitivity } else { 0.0 };
     }
 }
