@@ -419,9 +419,10 @@ fn a_source_left_out_leaves_the_other_draws_alone() {
                 let light = part(&shot) * or(Source::Prnu, part(&response) / expected, 1.0);
                 let dark = or(Source::Dcsn, part(&dark_shot), dark_e) * part(&dark_response) / dark_e;
                 let sum = light + dark + or(Source::Ron, part(&read), 0.0);
-                // Each of the samples involved is rounded to half of 2⁻²³ of itself: two factors, one quotient of
-                // the light and its like of the dark, and the sum.
-                let bound = 4.0 * 0.5 * f64::from(f32::EPSILON) * (light + dark + 60.0);
+                // Samples are rounded to half of 2⁻²³ of themselves, and so is each step of the sum: of the light two
+                // factors, their product and the quotient that stands for one of them, as much of the dark, and
+                // the two sums.
+                let bound = 6.0 * 0.5 * f64::from(f32::EPSILON) * (light + dark + 60.0);
                 assert!((f64::from(sample) - sum).abs() <= bound, "{left_out:?}, sample {i}: {sample} {sum}");
             }
         }
