@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import kernels
 import measuring
-import plots
 import programs
 
 PARTS = {
@@ -123,6 +122,15 @@ def page(topics, drawn, settings, command):
     return "\n".join(lines).rstrip() + "\n"
 
 
+def draw(topics, folder):
+    try:
+        import plots
+    except ImportError as problem:
+        print(f"bench: no plots: {problem}", file=sys.stderr)
+        return {}
+    return plots.draw(topics, folder)
+
+
 def main():
     chosen = arguments()
     whole = not chosen.only and not chosen.quick
@@ -145,7 +153,7 @@ def main():
         shutil.rmtree(folder)
     output.mkdir(parents=True, exist_ok=True)
     first = {topic.name: topic for topic in reversed(topics)}
-    drawn = plots.draw(first, output / "benchmarks")
+    drawn = draw(first, output / "benchmarks")
     command = " ".join(["scripts/bench", *sys.argv[1:]])
     (output / "benchmarks.md").write_text(page(topics, drawn, settings, command), encoding="utf-8")
     print(f"Written: {output / 'benchmarks.md'}", file=sys.stderr)

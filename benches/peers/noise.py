@@ -50,8 +50,8 @@ def pyxel(width, height):
         "shape": rates.shape,
         "time_step": Quantity(0.033, unit="s"),
         "temperature": temperature,
-        "pixel_area": Quantity(6.8**2, unit="um2"),
-        "figure_of_merit": Quantity(0.068558, unit="nA/cm2"),
+        "pixel_area": Quantity(6.8**2, unit="um2 / pix"),
+        "figure_of_merit": Quantity(0.068558, unit="nA / cm2"),
         "band_gap": calculate_band_gap(temperature=temperature, material="silicon"),
         "band_gap_room_temperature": calculate_band_gap(temperature=Quantity(300.0, unit="K"), material="silicon"),
     }
