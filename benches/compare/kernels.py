@@ -5,7 +5,7 @@ import subprocess
 import measuring
 from tables import Topic, figures, goal
 
-HEADS = ["what", "ours", "peer", "ratio", "goal"]
+HEADS = ["what", "peer", "ours, Mpix/s", "peer, Mpix/s", "ratio", "goal"]
 ONE_CORE = "In memory, one core, CPU time; in turns, run by run."
 
 # Least ratios to numpy's noise of a CFA plane, by the set of instructions.
@@ -27,12 +27,12 @@ def speed(size, seconds):
     return pixels(size) / seconds / 1e6
 
 
-def compare(topic, size, times, what, mine, peer, least=None):
-    """A row of speeds in Mpix/s, where both ran."""
+def compare(topic, size, times, what, mine, peer, least=None, label=None):
+    """A row of speeds in Mpix/s, where both ran; `label` names the peer where its key does not."""
     if mine in times and peer in times:
         ratio = times[peer] / times[mine]
         cells = [figures(speed(size, times[mine])), figures(speed(size, times[peer])), figures(ratio)]
-        topic.rows.append([what, *cells, goal(ratio, least) if least else ""])
+        topic.rows.append([what, label or peer, *cells, goal(ratio, least) if least else ""])
 
 
 def noise(settings):
@@ -53,15 +53,15 @@ def noise(settings):
         "PRNU, DCNU and read noise. numpy: the default `Generator`, seeded, one array a source. rand_distr: its `Poisson` "
         "and `StandardNormal` on our keyed generator, photosite by photosite, built for the baseline. Pyxel: the functions of "
         "its models of shot noise, dark current, PRNU and read noise, on arrays; four draws, for its non-uniformity of "
-        "dark current is one number a frame and is left out. Millions of photosites a second.",
+        "dark current is one number a frame and is left out.",
         HEADS,
     )
     for name in sets:
-        compare(topic, size, times, f"CFA plane, {name}, numpy", f"ours {name}", "numpy", NOISE_GOALS.get(name))
+        compare(topic, size, times, f"CFA plane, {name}", f"ours {name}", "numpy", NOISE_GOALS.get(name))
     widest = f"ours {sets[-1]}"
-    compare(topic, size, times, "CFA plane, rand_distr on the same keyed generator", widest, "rand_distr", 8)
-    compare(topic, size, times, "CFA plane, Pyxel's models", widest, "Pyxel")
-    compare(topic, size, times, "three planes, numpy", "ours three", "numpy three")
+    compare(topic, size, times, f"CFA plane, {sets[-1]}", widest, "rand_distr", 8)
+    compare(topic, size, times, f"CFA plane, {sets[-1]}", widest, "Pyxel")
+    compare(topic, size, times, f"three planes, {sets[-1]}", "ours three", "numpy three", label="numpy")
     topic.missing(failures)
     topic.plots = {name: speed(size, seconds) for name, seconds in times.items() if "three" not in name}
     return topic
@@ -82,17 +82,17 @@ def demosaic(settings):
         f"{ONE_CORE} {size} photosites behind R G / G B. Ours: 32-bit codes in, black removed, three signed 32-bit planes "
         "out. OpenCV: `cvtColor`, bilinear, 16-bit codes in and out, one thread. colour-demosaicing: bilinear, doubles. "
         "LibRaw: linear, 16 bits, by rawpy from a DNG of the same codes; its whole processing of the unpacked plane is in "
-        "the time. Millions of photosites a second.",
+        "the time.",
         HEADS,
     )
     for name in sets:
         least = 1.2 if name == sets[-1] else None
-        compare(topic, size, times, f"bilinear, {name}, OpenCV", f"ours {name}", "OpenCV", least)
-    compare(topic, size, times, "bilinear, colour-demosaicing", f"ours {sets[-1]}", "colour-demosaicing")
-    compare(topic, size, times, "bilinear, LibRaw", f"ours {sets[-1]}", "LibRaw")
-    compare(topic, size, times, "ECI, OpenCV's bilinear", "ours eci", "OpenCV", 0.5)
-    compare(topic, size, times, "SHTI, OpenCV's bilinear", "ours shti", "OpenCV")
-    compare(topic, size, times, "MHC, OpenCV's bilinear", "ours mhc", "OpenCV")
+        compare(topic, size, times, f"bilinear, {name}", f"ours {name}", "OpenCV", least)
+    compare(topic, size, times, f"bilinear, {sets[-1]}", f"ours {sets[-1]}", "colour-demosaicing")
+    compare(topic, size, times, f"bilinear, {sets[-1]}", f"ours {sets[-1]}", "LibRaw")
+    for method, least in (("eci", 0.5), ("shti", None), ("mhc", None)):
+        what = f"{method.upper()}, {sets[-1]}"
+        compare(topic, size, times, what, f"ours {method}", "OpenCV", least, label="OpenCV, bilinear")
     topic.missing(failures)
     topic.plots = {name: speed(size, seconds) for name, seconds in times.items()}
     return topic
@@ -109,11 +109,11 @@ def matrix(settings):
         "matrix",
         "Matrix in memory",
         f"{ONE_CORE} {size} pixels. Ours: 32-bit planes in and out, arithmetic in doubles, black removed, NaN counted. numpy "
-        "and OpenCV: 32 bits, into an array that is made once. colour: `vecmul`, doubles. Millions of pixels a second.",
+        "and OpenCV: 32 bits, into an array that is made once. colour: `vecmul`, doubles.",
         HEADS,
     )
     for name in peers:
-        compare(topic, size, times, f"3×3 matrix, {name}", "ours", name)
+        compare(topic, size, times, "3×3 matrix", "ours", name)
     topic.missing(failures)
     return topic
 
@@ -128,7 +128,7 @@ def copy(settings):
         "copy",
         "Light kernels beside copying",
         f"{ONE_CORE} {size} pixels, 32-bit. The peer is `memcpy` of the samples that the kernel reads, into a buffer that is "
-        "made once: a ratio of 1 means as fast as copying. Millions of pixels a second.",
+        "made once: a ratio of 1 means as fast as copying.",
         HEADS,
     )
     names = {
@@ -138,7 +138,7 @@ def copy(settings):
         "moments-plane": "moments, one plane",
     }
     for kernel, copied in pairs.items():
-        compare(topic, size, times, names[kernel], kernel, copied, 0.7)
+        compare(topic, size, times, names[kernel], kernel, copied, 0.7, label="memcpy")
     topic.missing(failures)
     return topic
 
@@ -155,13 +155,13 @@ def spectral(settings):
         "Spectral images in memory",
         f"{ONE_CORE} {size} pixels of 471 bands, 32-bit, to the electrons of three classes. Ours sums in doubles, from rows "
         "of planes as an EXR holds them. numpy: `tensordot` in 32 bits (OpenBLAS), once on planes, once on images whose "
-        "bands lie side by side. Millions of pixels a second.",
+        "bands lie side by side.",
         HEADS,
     )
     best = min((name for name in times if name.startswith("numpy")), key=times.get, default=None)
     for name in sets:
         for peer in ("numpy, planes", "numpy, pixels"):
             least = 3 if name == sets[-1] and peer == best else None
-            compare(topic, size, times, f"{name}, {peer}", f"ours {name}", peer, least)
+            compare(topic, size, times, name, f"ours {name}", peer, least)
     topic.missing(failures)
     return topic

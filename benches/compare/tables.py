@@ -22,8 +22,8 @@ class Topic:
 
     def markdown(self, level="##"):
         """The topic; its numbers aligned to the right."""
-        width = max(len(self.heads), *(len(row) for row in self.rows)) if self.rows else len(self.heads)
-        right = ["---" if column in (0, width - 1) and column != 1 else "---:" for column in range(width)]
+        words = ("what", "peer", "goal", "stage", "up to", "program", "frame")
+        right = ["---" if head.startswith(words) and not head.endswith("/s") and ", s" not in head else "---:" for head in self.heads]
         lines = [f"{level} {self.title}", "", self.text, ""]
         lines += [row_of(self.heads), row_of(right)] + [row_of(row) for row in self.rows] + [""]
         lines += [f"- {note}" for note in self.notes] + ([""] if self.notes else [])
