@@ -80,10 +80,11 @@ class Worker:
         return line
 
     def turn(self):
-        """CPU seconds of one run."""
+        """CPU and clock seconds of one run."""
         self.process.stdin.write("\n")
         self.process.stdin.flush()
-        return float(self.answer().split()[0])
+        cpu_s, clock_s = self.answer().split()
+        return float(cpu_s), float(clock_s)
 
     def close(self):
         for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
@@ -118,7 +119,7 @@ def in_turns(workers, repeats):
                 if name in failures:
                     continue
                 try:
-                    taken[name].append(worker.turn())
+                    taken[name].append(worker.turn()[0])
                 except (Failed, OSError) as problem:
                     failures[name] = str(problem)
         return {name: statistics.median(values) for name, values in taken.items() if name not in failures}, failures
