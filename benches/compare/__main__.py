@@ -74,15 +74,17 @@ def machine():
     memory = ""
     if meminfo.exists():
         memory = f", {int(meminfo.read_text(encoding='utf-8').split()[1]) / 1024**2:.0f} GiB of memory"
+    used = ", ".join(kernels.instruction_sets())
     return [
         f"{name}, {measuring.cores()} cores{memory}, {platform.system()} {platform.release().split('-')[0]}",
-        f"instruction sets of the processor: {', '.join(vectors) or 'not known'}; used: {', '.join(kernels.instruction_sets())}",
+        f"instruction sets of the processor: {', '.join(vectors) or 'not known'}; ours by name: {used}",
     ]
 
 
 def versions():
     ours = subprocess.run([measuring.BIN / "add-noise", "--version"], check=True, capture_output=True, text=True).stdout
-    revision = subprocess.run(["git", "describe", "--always", "--dirty"], capture_output=True, text=True, cwd=measuring.ROOT)
+    describe = ["git", "describe", "--always", "--dirty"]
+    revision = subprocess.run(describe, capture_output=True, text=True, cwd=measuring.ROOT)
     rust = subprocess.run(["rustc", "--version"], check=True, capture_output=True, text=True).stdout
     lines = [f"cyanometer {ours.split()[-1]} ({revision.stdout.strip() or 'no revision'}), {' '.join(rust.split()[:2])}"]
     found = []
@@ -99,15 +101,15 @@ def page(topics, drawn, settings, command):
     lines = [
         "# Benchmarks",
         "",
-        f"Made by `{command}` on {datetime.date.today():%-d %B %Y}; each table by `scripts/bench --only NAME`, with the name that "
-        "stands below it. Do not edit: run it again.",
+        f"Made by `{command}` on {datetime.date.today():%-d %B %Y}; each table alone by the command below it. "
+        "Do not edit: run it again.",
         "",
         *(f"- {line}" for line in machine() + versions()),
         "",
-        f"Ours and peers take turns, run by run; figures are medians of {settings.repeats} runs unless a table says otherwise, "
-        "ratios those of the medians. Ratios above 1 mean that ours is faster. Speeds of one machine at one time: compare within "
-        "a table only. Peers run as they install, without settings of their own; their sources are in "
-        "`benches/peers`.",
+        f"Ours and peers take turns, run by run; figures are medians of {settings.repeats} runs, ratios those of the "
+        "medians; peaks of memory are the largest. Ratios above 1 mean that ours is faster. Speeds are those of one machine "
+        "at one time: compare within a table only. Peers run as they install, without settings of their own; what each "
+        "does stands in `benches/peers`. Kernels in memory are also timed by `cargo bench`.",
         "",
     ]
     shown = set()

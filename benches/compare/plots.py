@@ -1,5 +1,7 @@
 """Draws the plots of the page as SVG."""
 
+import math
+
 import matplotlib
 
 matplotlib.use("Agg")
@@ -48,7 +50,7 @@ def label(name, topic):
     kind = name.removeprefix("ours ")
     if topic == "demosaic" and kind in ("shti", "eci", "mhc"):
         return f"cyanometer, {kind.upper()}"
-    return f"cyanometer, {kind}"
+    return f"cyanometer, bilinear, {kind}" if topic == "demosaic" else f"cyanometer, {kind}"
 
 
 def by_pixels(topic, folder, column, name, what, scale):
@@ -62,10 +64,10 @@ def by_pixels(topic, folder, column, name, what, scale):
     axis.set_ylabel(what)
     axis.grid(True, which="major", color="#dddddd")
     for formatted in (axis.xaxis, axis.yaxis):
-        formatted.set_major_formatter(matplotlib.ticker.StrMethodFormatter("{x:g}"))
+        formatted.set_major_formatter(matplotlib.ticker.StrMethodFormatter("{x:.10g}"))
         formatted.set_minor_formatter(matplotlib.ticker.NullFormatter())
-    low, high = axis.get_ylim()
-    axis.set_ylim(10 ** (int(f"{low:e}".split("e")[1])), 10 ** (int(f"{high:e}".split("e")[1]) + 1))
+    values = [y for line in axis.lines for y in line.get_ydata()]
+    axis.set_ylim(10 ** math.floor(math.log10(min(values))), 10 ** math.ceil(math.log10(max(values))))
     axis.legend(frameon=False)
     return save(figure, folder, name)
 
@@ -94,10 +96,10 @@ def draw(topics, folder):
     if "pixels" in topics and topics["pixels"].plots["ours"]:
         topic = topics["pixels"]
         by_pixels(topic, folder, 1, "time", "clock, ns per pixel", lambda seconds, pixels: seconds / pixels * 1e9)
-        by_pixels(topic, folder, 2, "memory", "peak resident memory, MiB", lambda mebibytes, _: max(mebibytes, 0.1))
+        by_pixels(topic, folder, 2, "memory", "peak resident memory, MiB", lambda mebibytes, _: mebibytes)
         drawn["pixels"] = [
             ("time.svg", "Clock time per pixel of the whole chain against the size of the frame"),
-            ("memory.svg", "Peak memory of any process of the chain against the size of the frame"),
+            ("memory.svg", "Peak memory of the chain against the size of the frame: ours, seven processes together"),
         ]
     if "threads" in topics and any(topics["threads"].plots.values()):
         threads(topics["threads"], folder)

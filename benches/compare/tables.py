@@ -22,8 +22,8 @@ class Topic:
 
     def markdown(self, level="##"):
         """The topic; its numbers aligned to the right."""
-        words = ("what", "peer", "goal", "stage", "up to", "program", "frame")
-        right = ["---" if head.startswith(words) and not head.endswith("/s") and ", s" not in head else "---:" for head in self.heads]
+        words = ("what", "peer", "goal", "goal by the clock", "stage", "up to", "program", "frame")
+        right = ["---" if head in words else "---:" for head in self.heads]
         lines = [f"{level} {self.title}", "", self.text, ""]
         lines += [row_of(self.heads), row_of(right)] + [row_of(row) for row in self.rows] + [""]
         lines += [f"- {note}" for note in self.notes] + ([""] if self.notes else [])
