@@ -9,6 +9,7 @@ import importlib.metadata
 import pathlib
 import platform
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -135,6 +136,7 @@ def draw(topics, folder):
 
 def main():
     chosen = arguments()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("bench: stopped"))
     whole = not chosen.only and not chosen.quick
     output = chosen.output or (measuring.ROOT / "docs" if whole else measuring.ROOT / measuring.TARGET / "bench")
     folder = pathlib.Path(tempfile.mkdtemp(prefix="bench-", dir=measuring.ROOT / measuring.TARGET))

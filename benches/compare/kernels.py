@@ -50,10 +50,10 @@ def noise(settings):
         "Noise in memory",
         f"{ONE_CORE} {size} photosites, light a ramp from 10 to 30 000 e⁻, 73.2 e⁻ of dark signal, 32-bit samples out. All "
         "but Pyxel draw five numbers for each photosite: Poisson numbers of light and dark current, normal numbers of "
-        "PRNU, DCNU and read noise. numpy: the default `Generator`, seeded, one array a source. Three planes count as one pixel. rand_distr: its `Poisson` "
-        "and `StandardNormal` on our keyed generator, photosite by photosite, built for the baseline. Pyxel: the functions "
-        "of its models of shot noise, dark current, PRNU and read noise, on arrays; four draws, for its non-uniformity of "
-        "dark current is one number a frame and is left out.",
+        "PRNU, DCNU and read noise. Three planes count as one pixel. numpy: the default `Generator`, seeded, one array a "
+        "source. rand_distr: its `Poisson` and `StandardNormal` on our keyed generator, photosite by photosite, built for "
+        "the baseline. Pyxel: the functions of its models of shot noise, dark current, PRNU and read noise, on arrays; "
+        "four draws, for its non-uniformity of dark current is one number a frame and is left out.",
         HEADS,
     )
     for name in sets:

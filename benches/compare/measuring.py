@@ -161,7 +161,13 @@ def pipeline(commands, folder, count=None, variables=None, output=None):
                     reading.close()
                 reading = process.stdout
                 processes.append(process)
-        statuses = [process.wait() for process in processes]
+        try:
+            statuses = [process.wait() for process in processes]
+        except BaseException:
+            for process in processes:
+                process.terminate()
+                process.wait()
+            raise
         clock_s = time.perf_counter() - start
         if any(statuses):
             errors.seek(0)
