@@ -39,8 +39,11 @@ const RAMP_E: [f64; 2] = [10.0, 30_000.0];
 /// One run over the whole frame.
 type Kernel = Box<dyn FnMut()>;
 
-/// Names of the kernels, and what makes them for a frame of some width and height.
-const KERNELS: [(&str, fn(usize, usize) -> Result<Kernel>); 14] = [
+/// Makes a kernel for a frame of some width and height.
+type Maker = fn(usize, usize) -> Result<Kernel>;
+
+/// Names of the kernels, and what makes them.
+const KERNELS: [(&str, Maker); 14] = [
     ("noise-plane", |width, height| noise(cfa_plane(width, height)?)),
     ("noise-three", |width, height| noise(expected(width, height)?)),
     ("noise-rand-distr", noise_by_rand_distr),

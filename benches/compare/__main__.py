@@ -107,13 +107,14 @@ def page(topics, drawn, settings, command):
         "",
         *(f"- {line}" for line in machine() + versions()),
         "",
-        f"Ours and peers take turns, run by run; figures are medians of {settings.repeats} runs, ratios those of the "
+        f"Ours and peers take turns, run by run; figures are medians (runs of each: {settings.repeats}), ratios those of the "
         "medians; peaks of memory are the largest. Ratios above 1 mean that ours is faster. Speeds are those of one machine "
         "at one time: compare within a table only. Peers run as they install, without settings of their own; what each "
         "does stands in `benches/peers`. Kernels in memory are also timed by `cargo bench`.",
         "",
     ]
-    shown = set()
+    if settings.quick:
+        lines += ["**A quick run, to see that all works: smaller frames and few runs. Its figures are not to be quoted.**", ""]
     for index, topic in enumerate(topics):
         lines.append(topic.markdown())
         last_of_name = all(later.name != topic.name for later in topics[index + 1 :])
@@ -121,7 +122,6 @@ def page(topics, drawn, settings, command):
             for file, caption in drawn.get(topic.name, []):
                 lines += [f"![{caption}](benchmarks/{file})", "", f"*{caption}.*", ""]
             lines += [f"`scripts/bench --only {topic.name}`", ""]
-            shown.add(topic.name)
     return "\n".join(lines).rstrip() + "\n"
 
 

@@ -308,7 +308,7 @@ def pixels(settings):
         clocks, cpus, memories = zip(*steady)
         spread = percent(clocks)
         topic.notes.append(
-            f"From 1 Mpix up, clock time per pixel differs by {spread:.0f} % and CPU time by {percent(cpus):.0f} %; the "
+            f"From 1 to {topic.plots['ours'][-1][0] / 1e6:.0f} Mpix, clock time per pixel differs by {spread:.0f} % and CPU time by {percent(cpus):.0f} %; the "
             f"goal of at most 20 % by the clock is {'reached' if spread <= 20 else 'not reached'}. The memory of the largest "
             f"stage lies between {min(memories):.1f} and {max(memories):.1f} MiB."
         )
