@@ -1,0 +1,287 @@
+//! Times one kernel in memory on one thread, for `scripts/bench`.
+//!
+//!     bench_kernels KERNEL WIDTHxHEIGHT REPEATS [--step]
+//!     bench_kernels --instructions
+//!
+//! After a run that is not counted it prints `ready`, then a line for each repeat: CPU seconds of the process, and clock
+//! seconds. With `--step` each repeat waits for a line on standard input, so that several programs can take turns.
+//! `--instructions` prints the sets of vector instructions that can be chosen here.
+//!
+//! A stage goes over a frame in bands, as programs do, from one buffer to another that are made once. The light is a ramp
+//! from 10 to 30 000 e⁻ over the whole frame, so that no two photosites that are neighbours expect the same.
+
+use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::cfa::{CfaPattern, Class};
+use cyanometer::color::{ColorSettings, Space, ToXyz, White};
+use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::error::{Error, Result};
+use cyanometer::formats::data;
+use cyanometer::frame::{Geometry, Rows, Window, to_sample};
+use cyanometer::metadata::{FrameHeader, Metadata};
+use cyanometer::mosaic::Mosaic;
+use cyanometer::noise::{AddNoise, NoiseSettings};
+use cyanometer::numerics::moments::Moments;
+use cyanometer::numerics::vectors::Instructions;
+use cyanometer::optics::Exposure;
+use cyanometer::random::{Draws, Source};
+use cyanometer::spectrum::WavelengthGrid;
+use cyanometer::stage::{MemoryFrame, Stage};
+use cyanometer::units::QuantityKind;
+use rand_distr::{Distribution, Poisson, StandardNormal};
+use std::hint::black_box;
+use std::io::{BufRead, Write};
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Light at the first and the last photosite, e⁻.
+const RAMP_E: [f64; 2] = [10.0, 30_000.0];
+
+/// One run over the whole frame.
+type Kernel = Box<dyn FnMut()>;
+
+/// Makes a kernel for a frame of some width and height.
+type Maker = fn(usize, usize) -> Result<Kernel>;
+
+/// Names of the kernels, and what makes them.
+const KERNELS: [(&str, Maker); 14] = [
+    ("noise-plane", |width, height| noise(cfa_plane(width, height)?)),
+    ("noise-three", |width, height| noise(expected(width, height)?)),
+    ("noise-rand-distr", noise_by_rand_distr),
+    ("copy", |width, height| Ok(copy(cfa_plane(width, height)?.samples))),
+    ("copy-three", |width, height| Ok(copy(expected(width, height)?.samples))),
+    ("adc", |width, height| {
+        let plane = cfa_plane(width, height)?;
+        Ok(over(Digitize::new(&plane.header, &AdcSettings::default())?, plane))
+    }),
+    ("bilinear", |width, height| interpolation(Method::Bilinear, width, height)),
+    ("shti", |width, height| interpolation(Method::SmoothHue, width, height)),
+    ("eci", |width, height| interpolation(Method::EffectiveColor, width, height)),
+    ("mhc", |width, height| interpolation(Method::Malvar, width, height)),
+    ("matrix", matrix),
+    ("moments", moments),
+    ("moments-plane", |width, height| Ok(moments_of(cfa_plane(width, height)?))),
+    ("spectral", spectral),
+];
+
+/// The default exposure of `render-radiance`.
+const EXPOSURE: Exposure = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
+
+/// Three planes of the ramp.
+fn expected(width: usize, height: usize) -> Result<MemoryFrame> {
+    let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+    metadata.sensor = Some(data::load_sensor(data::DEFAULT_SENSOR)?.sensor);
+    metadata.exposure = Some(EXPOSURE);
+    let step = (RAMP_E[1] - RAMP_E[0]) / ((width * height).max(2) - 1) as f64;
+    let mut samples = Vec::with_capacity(3 * width * height);
+    for y in 0..height {
+        for _ in 0..3 {
+            samples.extend((0..width).map(|x| to_sample(RAMP_E[0] + step * (y * width + x) as f64)));
+        }
+    }
+    let geometry = Geometry::new(width, height, &["R", "G", "B"]);
+    Ok(MemoryFrame::new(FrameHeader { name: "ramp".into(), geometry, metadata }, samples))
+}
+
+fn cfa_plane(width: usize, height: usize) -> Result<MemoryFrame> {
+    let three = expected(width, height)?;
+    Ok(three.through(&Mosaic::new(&three.header, Some(CfaPattern::Rggb))?)?.0)
+}
+
+fn codes(width: usize, height: usize) -> Result<MemoryFrame> {
+    let plane = cfa_plane(width, height)?;
+    Ok(plane.through(&Digitize::new(&plane.header, &AdcSettings::default())?)?.0)
+}
+
+fn demosaicked(width: usize, height: usize) -> Result<MemoryFrame> {
+    let plane = codes(width, height)?;
+    Ok(plane.through(&Demosaic::new(&plane.header, Method::Bilinear, Black::Auto, None)?)?.0)
+}
+
+/// A stage on a frame, band by band.
+fn over<S: Stage + 'static>(stage: S, input: MemoryFrame) -> Kernel {
+    let from = input.header.geometry.clone();
+    let to = stage.header().geometry.clone();
+    let rows = from.band_rows(1).min(to.band_rows(1));
+    let mut output = vec![0.0; to.row_samples() * to.height];
+    Box::new(move || {
+        for (band, samples) in output.chunks_mut(rows * to.row_samples()).enumerate() {
+            let window = Window::new(from.height, 0, from.width, from.channels.len(), &input.samples);
+            stage.apply(window, Rows::new(band * rows, to.width, to.channels.len(), samples));
+        }
+        black_box(&output);
+    })
+}
+
+fn noise(frame: MemoryFrame) -> Result<Kernel> {
+    Ok(over(AddNoise::new(&frame.header, &NoiseSettings::default())?, frame))
+}
+
+fn copy(samples: Vec<f32>) -> Kernel {
+    let mut output = vec![0.0; samples.len()];
+    Box::new(move || {
+        output.copy_from_slice(black_box(&samples));
+        black_box(&output);
+    })
+}
+
+fn interpolation(method: Method, width: usize, height: usize) -> Result<Kernel> {
+    let plane = codes(width, height)?;
+    Ok(over(Demosaic::new(&plane.header, method, Black::Auto, None)?, plane))
+}
+
+fn matrix(width: usize, height: usize) -> Result<Kernel> {
+    let rgb = demosaicked(width, height)?;
+    let settings = ColorSettings {
+        xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
+        method: None,
+        space: Space::Xyz,
+        white: White::D65,
+        white_luminance: None,
+    };
+    Ok(over(ToXyz::new(&rgb.header, &settings)?, rgb))
+}
+
+/// Mean, extremes and covariance of three planes.
+fn moments(width: usize, height: usize) -> Result<Kernel> {
+    Ok(moments_of(demosaicked(width, height)?))
+}
+
+fn moments_of(frame: MemoryFrame) -> Kernel {
+    let geometry = frame.header.geometry.clone();
+    Box::new(move || {
+        let mut moments = Moments::new(geometry.channels.len());
+        for row in frame.samples.chunks_exact(geometry.row_samples()) {
+            let planes: Vec<&[f32]> = row.chunks_exact(geometry.width).collect();
+            moments.add(&planes);
+        }
+        black_box(&moments);
+    })
+}
+
+/// Spectral radiances at 471 wavelengths to the electrons of three classes, from rows as an EXR holds them.
+fn spectral(width: usize, height: usize) -> Result<Kernel> {
+    let loaded = data::load_sensor(data::DEFAULT_SENSOR)?;
+    let (wavelengths_nm, _) = WavelengthGrid::default().points()?;
+    let weights = loaded.response.weights_on(&loaded.sensor, &EXPOSURE, &WavelengthGrid::default())?;
+    let (camera, _) = weights.camera(&wavelengths_nm);
+    let bands = wavelengths_nm.len();
+    let samples: Vec<f32> = (0..width * height * bands).map(|i| to_sample(1e-6 * (1.0 + (i % 97) as f64))).collect();
+    let mut output = vec![[0.0; 3]; width * height];
+    let mut radiance = vec![0.0; bands];
+    Ok(Box::new(move || {
+        for (row, made) in samples.chunks_exact(width * bands).zip(output.chunks_exact_mut(width)) {
+            for (x, electrons) in made.iter_mut().enumerate() {
+                for (band, value) in radiance.iter_mut().enumerate() {
+                    *value = f64::from(row[band * width + x]);
+                }
+                *electrons = camera.electrons(&radiance);
+            }
+        }
+        black_box(&output);
+    }))
+}
+
+/// The noise of a CFA plane as one writes it down with rand_distr, on the same generator with the same keys.
+fn noise_by_rand_distr(width: usize, height: usize) -> Result<Kernel> {
+    let plane = cfa_plane(width, height)?;
+    let sensor = data::load_sensor(data::DEFAULT_SENSOR)?.sensor;
+    let dark_e = sensor.dark_current_e_per_s(sensor.temperature_k) * EXPOSURE.exposure_s;
+    let refused = |_| Error::Data("rand_distr refuses a rate".into());
+    let dark_shot = Poisson::new(dark_e).map_err(refused)?;
+    let mut output = vec![0.0; plane.samples.len()];
+    Ok(Box::new(move || {
+        for (y, (rates, noisy)) in plane.samples.chunks(width).zip(output.chunks_mut(width)).enumerate() {
+            let classes = CfaPattern::Rggb.row_classes([0, 0], y);
+            for (x, (&rate, noisy)) in rates.iter().zip(noisy).enumerate() {
+                *noisy = photosite(f64::from(rate), classes[x % 2], [x, y], &dark_shot, &sensor);
+            }
+        }
+        black_box(&output);
+    }))
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "frames are narrower than 2³¹")]
+fn photosite(
+    rate: f64,
+    class: Class,
+    [x, y]: [usize; 2],
+    dark_shot: &Poisson<f64>,
+    sensor: &cyanometer::sensor::Sensor,
+) -> f32 {
+    let draws = |source| Draws::new(0, 0, source, class as u8, x as i32, y as i32);
+    let normal = |source| -> f64 { StandardNormal.sample(&mut draws(source)) };
+    let light = Poisson::new(rate).map_or(rate, |shot| shot.sample(&mut draws(Source::Ssn)));
+    let light = light * (1.0 + sensor.prnu * normal(Source::Prnu)).max(0.0);
+    let dark = dark_shot.sample(&mut draws(Source::Dcsn)) * (1.0 + sensor.dcnu * normal(Source::Dcnu)).max(0.0);
+    to_sample((light + dark).min(sensor.full_well_e) + sensor.read_noise_e * normal(Source::Ron))
+}
+
+#[cfg(unix)]
+fn cpu_s() -> f64 {
+    use nix::time::{ClockId, clock_gettime};
+    clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID)
+        .map_or(f64::NAN, |time| time.tv_sec() as f64 + 1e-9 * time.tv_nsec() as f64)
+}
+
+#[cfg(not(unix))]
+fn cpu_s() -> f64 {
+    f64::NAN
+}
+
+fn repeat(mut kernel: Kernel, repeats: usize, step: bool) -> std::io::Result<()> {
+    let mut output = std::io::stdout().lock();
+    let mut turns = std::io::stdin().lock().lines();
+    kernel();
+    writeln!(output, "ready")?;
+    output.flush()?;
+    for _ in 0..repeats {
+        if step && turns.next().transpose()?.is_none() {
+            break;
+        }
+        let (cpu_before_s, start) = (cpu_s(), Instant::now());
+        kernel();
+        writeln!(output, "{:.6} {:.6}", cpu_s() - cpu_before_s, start.elapsed().as_secs_f64())?;
+        output.flush()?;
+    }
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let (words, step) = match &words[..] {
+        ["--instructions"] => {
+            let names: Vec<&str> =
+                Instructions::ALL.into_iter().filter(|set| set.are_available()).map(Instructions::name).collect();
+            let told = writeln!(std::io::stdout(), "{}", names.join(" "));
+            return if told.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+        }
+        [words @ .., "--step"] => (words, true),
+        words => (words, false),
+    };
+    let parsed = match words {
+        [name, size, repeats] => {
+            let kernel = KERNELS.iter().find(|(known, _)| known == name);
+            let size = size.split_once('x').and_then(|(w, h)| w.parse().ok().zip(h.parse().ok()));
+            kernel.zip(size).zip(repeats.parse().ok())
+        }
+        _ => None,
+    };
+    let Some((((_, make), (width, height)), repeats)) = parsed else {
+        let names: Vec<&str> = KERNELS.iter().map(|(name, _)| *name).collect();
+        eprintln!("usage: bench_kernels KERNEL WIDTHxHEIGHT REPEATS [--step]; kernels: {}", names.join(", "));
+        return ExitCode::from(2);
+    };
+    let done = make(width, height).map(|kernel| repeat(kernel, repeats, step));
+    match done {
+        Ok(Ok(())) => ExitCode::SUCCESS,
+        Ok(Err(error)) => {
+            eprintln!("bench_kernels: {error}");
+            ExitCode::FAILURE
+        }
+        Err(error) => {
+            eprintln!("bench_kernels: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
