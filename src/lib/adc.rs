@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{AdcRecord, FrameHeader};
+use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::stage::{Counts, Stage};
 use crate::units::{Adu, Electrons, QuantityKind};
 
@@ -84,6 +85,24 @@ impl Digitize {
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
     }
+
+    /// What [`Stage::apply`] does, on one set of instructions; the bits are the same on all of them.
+    pub fn apply_on(
+        &self,
+        instructions: Instructions,
+        input: Window<'_, Electrons>,
+        mut output: Rows<'_, Adu>,
+    ) -> Counts {
+        let mut counts = Counts::default();
+        for y in output.range() {
+            for channel in 0..input.channels() {
+                let (charges, codes) = (input.row(y.cast_signed(), channel), output.row(y, channel));
+                let of_row = vectors::run_on(instructions, Row { adc: self.adc, charges, codes });
+                counts = counts.plus(of_row);
+            }
+        }
+        counts
+    }
 }
 
 impl Stage for Digitize {
@@ -94,21 +113,85 @@ impl Stage for Digitize {
         &self.header
     }
 
-    fn apply(&self, input: Window<'_, Electrons>, mut output: Rows<'_, Adu>) -> Counts {
-        let mut counts = Counts::default();
+    fn apply(&self, input: Window<'_, Electrons>, output: Rows<'_, Adu>) -> Counts {
+        self.apply_on(Instructions::widest(), input, output)
+    }
+}
+
+/// Half of the numbers that doubles hold to the unit: added and taken away, it rounds what is below it to a whole number.
+const WHOLE: f64 = (1_u64 << 52) as f64;
+
+/// Digitizes a row.
+struct Row<'a> {
+    adc: AdcRecord,
+    charges: &'a [f32],
+    codes: &'a mut [f32],
+}
+
+impl Kernel for Row<'_> {
+    type Output = Counts;
+
+    #[inline(always)]
+    fn run(self) -> Counts {
+        let AdcRecord { bias_adu, adu_per_e, .. } = self.adc;
         let top = f64::from(self.adc.top_code());
-        for y in output.range() {
-            for channel in 0..input.channels() {
-                for (&charge, code) in input.row(y.cast_signed(), channel).iter().zip(output.row(y, channel)) {
-                    let level = (self.adc.bias_adu + self.adc.adu_per_e * f64::from(charge)).round();
-                    counts.clipped_low += u64::from(level < 0.0);
-                    counts.clipped_high += u64::from(level > top);
-                    counts.not_finite += u64::from(level.is_nan());
-                    // Rounding makes −0 of small negative levels; code 0 is one code, also to a digest.
-                    *code = to_sample(level.clamp(0.0, top) + 0.0);
+        let (mut low, mut high, mut nan) = (0_u64, 0_u64, 0_u64);
+        for (&charge, code) in self.charges.iter().zip(self.codes) {
+            let level = bias_adu + adu_per_e * f64::from(charge);
+            // Ties go away from zero, so that these levels round to −1 and less, and to more than the largest code.
+            low += u64::from(level <= -0.5);
+            high += u64::from(level >= top + 0.5);
+            nan += u64::from(level.is_nan());
+            // Comparisons and not `clamp`: a NaN passes, and −0 becomes the one code 0, also to a digest.
+            let above = if level <= 0.0 { 0.0 } else { level };
+            let within = if above > top { top } else { above };
+            // To even at ties; the difference is exact, and one half only where a tie went down.
+            let even = (within + WHOLE) - WHOLE;
+            let tie = if within - even >= 0.5 { 1.0 } else { 0.0 };
+            *code = to_sample(even + tie);
+        }
+        Counts { clipped_low: low, clipped_high: high, not_finite: nan, ..Counts::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The definition, one charge at a time.
+    fn plain(adc: &AdcRecord, charge: f32, counts: &mut Counts) -> f32 {
+        let top = f64::from(adc.top_code());
+        let level = (adc.bias_adu + adc.adu_per_e * f64::from(charge)).round();
+        counts.clipped_low += u64::from(level < 0.0);
+        counts.clipped_high += u64::from(level > top);
+        counts.not_finite += u64::from(level.is_nan());
+        to_sample(level.clamp(0.0, top) + 0.0)
+    }
+
+    /// Ties and their neighbours at every code of 16 bits, the ends of the range, and floats of all sizes.
+    #[test]
+    fn codes_are_those_of_the_plain_version_on_every_set_of_instructions() {
+        let ties = (-4..=2 * 65_540).map(|halves: i32| 0.5 * halves as f32);
+        let mut charges: Vec<f32> = ties.flat_map(|tie| [tie.next_down(), tie, tie.next_up()]).collect();
+        // A step that is prime to 2³² leads through all kinds of bits: NaN, infinities, subnormals and both signs.
+        charges.extend((0..50_000_u32).map(|i| f32::from_bits(i.wrapping_mul(2_654_435_769))));
+        charges.extend([f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -0.0, 0.0, f32::MIN, f32::MAX, 1e-45, -1e-45]);
+        // The double below one half is what adding one half and cutting off would make a 1 of.
+        for (bias_adu, adu_per_e) in [(0.0, 1.0), (0.5_f64.next_down(), 1.0), (-0.5, 1.0), (102.4, 0.1), (-17.3, 3e-4)] {
+            for bits in [1, 12, 16] {
+                let adc = AdcRecord { bits, bias_adu, adu_per_e };
+                let mut expected = Counts::default();
+                let plain: Vec<u32> =
+                    charges.iter().map(|&charge| plain(&adc, charge, &mut expected).to_bits()).collect();
+                for set in Instructions::ALL {
+                    let mut codes = vec![0.0; charges.len()];
+                    let counts = vectors::run_on(set, Row { adc, charges: &charges, codes: &mut codes });
+                    assert_eq!(counts, expected);
+                    let differing = (0..plain.len()).find(|&i| codes[i].to_bits() != plain[i] && !codes[i].is_nan());
+                    assert_eq!(differing.map(|i| (charges[i], codes[i])), None, "{set:?} {adc:?}");
+                    assert!(codes.iter().zip(&charges).all(|(code, charge)| code.is_nan() == charge.is_nan()));
                 }
             }
         }
-        counts
     }
 }

@@ -7,6 +7,7 @@ pub mod locus;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{ColorRecord, FrameHeader};
+use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::propagation::pixels::{self, PixelNoise};
 use crate::stage::{Counts, Stage};
 use crate::units::{Adu, QuantityKind, Tristimulus};
@@ -363,18 +364,23 @@ impl ToXyz {
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
     }
-}
 
-impl Stage for ToXyz {
-    type Input = Adu;
-    type Output = Tristimulus;
-
-    fn header(&self) -> &FrameHeader {
-        &self.header
-    }
-
-    fn apply(&self, input: Window<'_, Adu>, mut output: Rows<'_, Tristimulus>) -> Counts {
+    /// What [`Stage::apply`] does, on one set of instructions; the bits are the same on all of them.
+    pub fn apply_on(
+        &self,
+        instructions: Instructions,
+        input: Window<'_, Adu>,
+        mut output: Rows<'_, Tristimulus>,
+    ) -> Counts {
         let mut counts = Counts::default();
+        if self.space == Space::Xyz && self.sigma.is_none() {
+            for y in output.range() {
+                let rgb = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
+                let (xyz_from_adu, black, xyz) = (&self.xyz_from_adu, self.black, output.three(y));
+                counts.not_finite += vectors::run_on(instructions, XyzRow { xyz_from_adu, black, rgb, xyz });
+            }
+            return counts;
+        }
         let white_sum: f64 = self.white.iter().sum();
         let white_xy = [self.white[0] / white_sum, self.white[1] / white_sum];
         for y in output.range() {
@@ -403,6 +409,48 @@ impl Stage for ToXyz {
             }
         }
         counts
+    }
+}
+
+impl Stage for ToXyz {
+    type Input = Adu;
+    type Output = Tristimulus;
+
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn apply(&self, input: Window<'_, Adu>, output: Rows<'_, Tristimulus>) -> Counts {
+        self.apply_on(Instructions::widest(), input, output)
+    }
+}
+
+/// XYZ of a row, in doubles; gives the pixels that are not finite.
+struct XyzRow<'a> {
+    xyz_from_adu: &'a Matrix3<f64>,
+    black: f64,
+    rgb: [&'a [f32]; 3],
+    xyz: [&'a mut [f32]; 3],
+}
+
+impl Kernel for XyzRow<'_> {
+    type Output = u64;
+
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "six planes advance together")]
+    fn run(self) -> u64 {
+        let Self { xyz_from_adu: m, black, rgb: [red, green, blue], xyz: [to_x, to_y, to_z] } = self;
+        let width = to_x.len();
+        let (red, green, blue) = (&red[..width], &green[..width], &blue[..width]);
+        let (to_y, to_z) = (&mut to_y[..width], &mut to_z[..width]);
+        let mut not_finite = 0;
+        for index in 0..width {
+            let [r, g, b] = [red[index], green[index], blue[index]].map(|sample| f64::from(sample) - black);
+            let [x, y, z] = [0, 1, 2].map(|row| m[(row, 0)] * r + m[(row, 1)] * g + m[(row, 2)] * b);
+            not_finite += u64::from(!(x.is_finite() & y.is_finite() & z.is_finite()));
+            (to_x[index], to_y[index], to_z[index]) = (to_sample(x), to_sample(y), to_sample(z));
+        }
+        not_finite
     }
 }
 
