@@ -126,7 +126,12 @@ fn kernels(criterion: &mut Criterion) -> Result<()> {
         time(criterion, method.names()[0], &plane, &stage, &|set, input, output| stage.apply_on(set, input, output));
     }
     let rgb = header(QuantityKind::Adu, &["R", "G", "B"], None);
-    for (name, space) in [("to-xyz", Space::Xyz), ("to-xyz, xyy", Space::Xyy), ("to-xyz, lab", Space::Lab), ("to-xyz, srgb", Space::Srgb)] {
+    for (name, space) in [
+        ("to-xyz", Space::Xyz),
+        ("to-xyz, xyy", Space::Xyy),
+        ("to-xyz, lab", Space::Lab),
+        ("to-xyz, srgb", Space::Srgb),
+    ] {
         let settings = ColorSettings {
             xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
             method: None,

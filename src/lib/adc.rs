@@ -94,10 +94,11 @@ impl Digitize {
         mut output: Rows<'_, Adu>,
     ) -> Counts {
         let mut counts = Counts::default();
+        let limits = Limits::of(&self.adc);
         for y in output.range() {
             for channel in 0..input.channels() {
                 let (charges, codes) = (input.row(y.cast_signed(), channel), output.row(y, channel));
-                let of_row = vectors::run_on(instructions, Row { adc: self.adc, charges, codes });
+                let of_row = vectors::run_on(instructions, Row { adc: self.adc, limits, charges, codes });
                 counts = counts.plus(of_row);
             }
         }
@@ -118,12 +119,55 @@ impl Stage for Digitize {
     }
 }
 
-/// Half of the numbers that doubles hold to the unit: added and taken away, it rounds what is below it to a whole number.
+/// Added to a number from 0 to 2⁵¹ and taken away, it leaves the nearest whole number: doubles have no fractions there.
 const WHOLE: f64 = (1_u64 << 52) as f64;
+
+/// The charges from which levels are clipped: levels rise with the charge, also as doubles.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    /// The largest charge whose level rounds to less than 0.
+    low: f32,
+    /// The smallest charge whose level rounds to more than the largest code.
+    high: f32,
+}
+
+impl Limits {
+    /// Those of a converter. Ties go away from zero, so that −½ rounds to less than 0.
+    fn of(adc: &AdcRecord) -> Self {
+        let top = f64::from(adc.top_code());
+        let first = |holds: &dyn Fn(f64) -> bool| first_float(|charge| holds(adc.level(charge)));
+        Self { low: first(&|level| level > -0.5).next_down(), high: first(&|level| level >= top + 0.5) }
+    }
+}
+
+/// The smallest float for which something holds that holds for all larger ones, infinity among them.
+fn first_float(holds: impl Fn(f32) -> bool) -> f32 {
+    // Floats in their order are those of sign and size taken as whole numbers.
+    let float = |rank: i64| {
+        let size = f32::from_bits(u32::try_from(rank.unsigned_abs()).unwrap_or(u32::MAX));
+        if rank < 0 { -size } else { size }
+    };
+    let infinity = i64::from(f32::INFINITY.to_bits());
+    let (mut below, mut above) = (-infinity, infinity);
+    while above - below > 1 {
+        let between = below + (above - below) / 2;
+        if holds(float(between)) { above = between } else { below = between }
+    }
+    float(above)
+}
+
+impl AdcRecord {
+    /// The level of a charge, in ADU, before it is rounded.
+    #[inline(always)]
+    fn level(&self, charge: f32) -> f64 {
+        self.bias_adu + self.adu_per_e * f64::from(charge)
+    }
+}
 
 /// Digitizes a row.
 struct Row<'a> {
     adc: AdcRecord,
+    limits: Limits,
     charges: &'a [f32],
     codes: &'a mut [f32],
 }
@@ -133,24 +177,26 @@ impl Kernel for Row<'_> {
 
     #[inline(always)]
     fn run(self) -> Counts {
-        let AdcRecord { bias_adu, adu_per_e, .. } = self.adc;
-        let top = f64::from(self.adc.top_code());
-        let (mut low, mut high, mut nan) = (0_u64, 0_u64, 0_u64);
-        for (&charge, code) in self.charges.iter().zip(self.codes) {
-            let level = bias_adu + adu_per_e * f64::from(charge);
-            // Ties go away from zero, so that these levels round to −1 and less, and to more than the largest code.
-            low += u64::from(level <= -0.5);
-            high += u64::from(level >= top + 0.5);
-            nan += u64::from(level.is_nan());
-            // Comparisons and not `clamp`: a NaN passes, and −0 becomes the one code 0, also to a digest.
-            let above = if level <= 0.0 { 0.0 } else { level };
-            let within = if above > top { top } else { above };
-            // To even at ties; the difference is exact, and one half only where a tie went down.
+        let Self { adc, limits, charges, codes } = self;
+        let top = f64::from(adc.top_code());
+        for (&charge, code) in charges.iter().zip(codes) {
+            let level = adc.level(charge);
+            // Comparisons that a NaN passes.
+            let above = if 0.0 > level { 0.0 } else { level };
+            let within = if top < above { top } else { above };
+            // To even at ties, and 0 of −0; the difference is exact, and one half only where a tie went down.
             let even = (within + WHOLE) - WHOLE;
             let tie = if within - even >= 0.5 { 1.0 } else { 0.0 };
             *code = to_sample(even + tie);
         }
-        Counts { clipped_low: low, clipped_high: high, not_finite: nan, ..Counts::default() }
+        // Apart, as vectors hold twice as many floats as doubles.
+        let (mut low, mut high, mut nan) = (0_u32, 0_u32, 0_u32);
+        for &charge in charges {
+            low += u32::from(charge <= limits.low);
+            high += u32::from(charge >= limits.high);
+            nan += u32::from(charge.is_nan());
+        }
+        Counts { clipped_low: low.into(), clipped_high: high.into(), not_finite: nan.into(), ..Counts::default() }
     }
 }
 
@@ -177,15 +223,17 @@ mod tests {
         charges.extend((0..50_000_u32).map(|i| f32::from_bits(i.wrapping_mul(2_654_435_769))));
         charges.extend([f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -0.0, 0.0, f32::MIN, f32::MAX, 1e-45, -1e-45]);
         // The double below one half is what adding one half and cutting off would make a 1 of.
-        for (bias_adu, adu_per_e) in [(0.0, 1.0), (0.5_f64.next_down(), 1.0), (-0.5, 1.0), (102.4, 0.1), (-17.3, 3e-4)] {
+        for (bias_adu, adu_per_e) in [(0.0, 1.0), (0.5_f64.next_down(), 1.0), (-0.5, 1.0), (102.4, 0.1), (-17.3, 3e-4)]
+        {
             for bits in [1, 12, 16] {
                 let adc = AdcRecord { bits, bias_adu, adu_per_e };
+                let limits = Limits::of(&adc);
                 let mut expected = Counts::default();
                 let plain: Vec<u32> =
                     charges.iter().map(|&charge| plain(&adc, charge, &mut expected).to_bits()).collect();
                 for set in Instructions::ALL {
                     let mut codes = vec![0.0; charges.len()];
-                    let counts = vectors::run_on(set, Row { adc, charges: &charges, codes: &mut codes });
+                    let counts = vectors::run_on(set, Row { adc, limits, charges: &charges, codes: &mut codes });
                     assert_eq!(counts, expected);
                     let differing = (0..plain.len()).find(|&i| codes[i].to_bits() != plain[i] && !codes[i].is_nan());
                     assert_eq!(differing.map(|i| (charges[i], codes[i])), None, "{set:?} {adc:?}");

@@ -188,6 +188,11 @@ pub fn matrix(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| rows[i][j])
 }
 
+/// A 3×3 matrix as its rows, the inverse of [`matrix`].
+fn rows_of(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)]))
+}
+
 /// Chromaticities of the primaries that a matrix implies (XYZ of its columns) and of their sum; none where one has none.
 pub fn implied_primaries(xyz_from_camera: &[[f64; 3]; 3]) -> Option<[[f64; 2]; 4]> {
     let matrix = matrix(xyz_from_camera);
@@ -374,9 +379,10 @@ impl ToXyz {
     ) -> Counts {
         let mut counts = Counts::default();
         if self.space == Space::Xyz && self.sigma.is_none() {
+            let xyz_from_adu = rows_of(&self.xyz_from_adu);
             for y in output.range() {
                 let rgb = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
-                let (xyz_from_adu, black, xyz) = (&self.xyz_from_adu, self.black, output.three(y));
+                let (black, xyz) = (self.black, output.three(y));
                 counts.not_finite += vectors::run_on(instructions, XyzRow { xyz_from_adu, black, rgb, xyz });
             }
             return counts;
@@ -427,7 +433,7 @@ impl Stage for ToXyz {
 
 /// XYZ of a row, in doubles; gives the pixels that are not finite.
 struct XyzRow<'a> {
-    xyz_from_adu: &'a Matrix3<f64>,
+    xyz_from_adu: [[f64; 3]; 3],
     black: f64,
     rgb: [&'a [f32]; 3],
     xyz: [&'a mut [f32]; 3],
@@ -443,12 +449,19 @@ impl Kernel for XyzRow<'_> {
         let width = to_x.len();
         let (red, green, blue) = (&red[..width], &green[..width], &blue[..width]);
         let (to_y, to_z) = (&mut to_y[..width], &mut to_z[..width]);
+        let [[rx, gx, bx], [ry, gy, by], [rz, gz, bz]] = m;
         let mut not_finite = 0;
         for index in 0..width {
-            let [r, g, b] = [red[index], green[index], blue[index]].map(|sample| f64::from(sample) - black);
-            let [x, y, z] = [0, 1, 2].map(|row| m[(row, 0)] * r + m[(row, 1)] * g + m[(row, 2)] * b);
+            let r = f64::from(red[index]) - black;
+            let g = f64::from(green[index]) - black;
+            let b = f64::from(blue[index]) - black;
+            let x = rx * r + gx * g + bx * b;
+            let y = ry * r + gy * g + by * b;
+            let z = rz * r + gz * g + bz * b;
             not_finite += u64::from(!(x.is_finite() & y.is_finite() & z.is_finite()));
-            (to_x[index], to_y[index], to_z[index]) = (to_sample(x), to_sample(y), to_sample(z));
+            to_x[index] = to_sample(x);
+            to_y[index] = to_sample(y);
+            to_z[index] = to_sample(z);
         }
         not_finite
     }

@@ -1,6 +1,6 @@
 //! Bilinear interpolation: each missing sample is the mean of its nearest neighbours of that class [HP2005, Sec. 6.1].
 
-use super::rows::{Line, Planes, Sites, pick};
+use super::rows::{Line, Planes, pick};
 use crate::numerics::vectors::Kernel;
 
 /// Fills a row of the output from the photosites above it, in it and below it.
@@ -8,7 +8,7 @@ use crate::numerics::vectors::Kernel;
 /// With samples of at most M in size, a mean is off by at most 2·2⁻²⁴ M from that of the same samples in doubles.
 pub(super) struct Row<'a> {
     pub(super) cfa: [Line<'a>; 3],
-    pub(super) sites: Sites<'a>,
+    pub(super) masks: &'a [u32],
     pub(super) planes: Planes<'a>,
 }
 
@@ -21,7 +21,7 @@ impl Kernel for Row<'_> {
         let [above, line, below] = self.cfa;
         let [own, green, other] = self.planes;
         let width = own.len();
-        let (green, other, masks) = (&mut green[..width], &mut other[..width], self.sites.masks(width));
+        let (green, other, masks) = (&mut green[..width], &mut other[..width], &self.masks[..width]);
         let [above_left, up, above_right] = [-1, 0, 1].map(|by| &above.beside(by)[..width]);
         let [left, here, right] = [-1, 0, 1].map(|by| &line.beside(by)[..width]);
         let [below_left, down, below_right] = [-1, 0, 1].map(|by| &below.beside(by)[..width]);

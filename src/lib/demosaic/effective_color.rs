@@ -1,7 +1,7 @@
 //! Effective colour interpolation: everything through the differences K_R = G − R and K_B = G − B
 //! [HP2005, Sec. 6.3; PeiTam2003].
 
-use super::rows::{Line, Planes, Sites, pick};
+use super::rows::{Line, Planes, pick};
 use crate::numerics::vectors::Kernel;
 
 /// The differences K of a row from five rows of photosites; what it gives at green sites is not used.
@@ -24,8 +24,8 @@ impl Kernel for Differences<'_> {
     fn run(self) {
         let Self { cfa: [above2, above, line, below, below2], to } = self;
         let width = to.len();
-        let [left2, left, here, right, right2] = [-2, -1, 0, 1, 2].map(|by| &line.beside(by)[..width]);
-        let [up2, up, down, down2] = [above2, above, below, below2].map(|line| &line.beside(0)[..width]);
+        let [left2, left, here, right, right2] = [-2, -1, 0, 1, 2].map(|by| &line.wider(by)[..width]);
+        let [up2, up, down, down2] = [above2, above, below, below2].map(|line| &line.wider(0)[..width]);
         for x in 0..width {
             let near = (left[x] + right[x]) + (up[x] + down[x]);
             let far = (left2[x] + right2[x]) + (up2[x] + down2[x]);
@@ -40,7 +40,7 @@ impl Kernel for Differences<'_> {
 pub(super) struct Row<'a> {
     pub(super) cfa: Line<'a>,
     pub(super) differences: [Line<'a>; 3],
-    pub(super) sites: Sites<'a>,
+    pub(super) masks: &'a [u32],
     pub(super) planes: Planes<'a>,
 }
 
@@ -53,7 +53,7 @@ impl Kernel for Row<'_> {
         let [above, line, below] = self.differences;
         let [own, green, other] = self.planes;
         let width = own.len();
-        let (green, other, masks) = (&mut green[..width], &mut other[..width], self.sites.masks(width));
+        let (green, other, masks) = (&mut green[..width], &mut other[..width], &self.masks[..width]);
         let cfa = &self.cfa.beside(0)[..width];
         let [above_left, up, above_right] = [-1, 0, 1].map(|by| &above.beside(by)[..width]);
         let [left, here, right] = [-1, 0, 1].map(|by| &line.beside(by)[..width]);

@@ -1,7 +1,7 @@
 //! The linear method of Malvar, He and Cutler: bilinear interpolation corrected by the curvature of the class that was
 //! measured \[MHC2004].
 
-use super::rows::{Line, Planes, Sites, pick};
+use super::rows::{Line, Planes, pick};
 use super::weights::Kernel;
 use crate::cfa::Class;
 use crate::numerics::vectors;
@@ -15,7 +15,7 @@ use crate::numerics::vectors;
 /// With samples of at most M in size, values are off by at most 10·2⁻²⁴ M from those of the same samples in doubles.
 pub(super) struct Row<'a> {
     pub(super) cfa: [Line<'a>; 5],
-    pub(super) sites: Sites<'a>,
+    pub(super) masks: &'a [u32],
     pub(super) planes: Planes<'a>,
 }
 
@@ -28,7 +28,7 @@ impl vectors::Kernel for Row<'_> {
         let [above2, above, line, below, below2] = self.cfa;
         let [own, green, other] = self.planes;
         let width = own.len();
-        let (green, other, masks) = (&mut green[..width], &mut other[..width], self.sites.masks(width));
+        let (green, other, masks) = (&mut green[..width], &mut other[..width], &self.masks[..width]);
         let [up2, down2] = [above2, below2].map(|line| &line.beside(0)[..width]);
         let [above_left, up, above_right] = [-1, 0, 1].map(|by| &above.beside(by)[..width]);
         let [left2, left, here, right, right2] = [-2, -1, 0, 1, 2].map(|by| &line.beside(by)[..width]);

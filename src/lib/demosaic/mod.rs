@@ -21,7 +21,7 @@ use crate::numerics::vectors::{self, Instructions};
 use crate::propagation::pixels::PixelNoise;
 use crate::stage::{Counts, Stage};
 use crate::units::{Any, QuantityKind};
-use rows::{Ring, Sites, mend};
+use rows::{Planes, Ring, masks, mend, strips};
 
 /// A way to interpolate the missing classes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -180,74 +180,88 @@ impl Demosaic {
         counts
     }
 
-    /// Row by row: loads the photosites that a row of the output reaches, derives what the method takes means of, and
-    /// fills the row.
+    /// Strip by strip, row by row: loads the photosites that a row of the output reaches, derives what the method takes
+    /// means of, and fills the row.
     fn interpolate(&self, instructions: Instructions, input: &Window<'_>, output: &mut Rows<'_>) -> Counts {
-        let (width, reach, rows) = (input.width(), self.reach(), output.range());
-        let mut counts = Counts::default();
-        let mut cfa = Ring::new(width);
-        // Hues or differences of each row, and green beside hues.
-        let mut derived = Ring::new(if reach > 1 { width } else { 0 });
-        let mut greens = Ring::new(if self.method == Method::SmoothHue { width } else { 0 });
-        let alternating = Sites::alternating(width);
-        let mut to_load = rows.start.cast_signed() - reach.cast_signed();
-        let mut to_derive = rows.start.cast_signed() - 1;
-        for row in rows {
-            let y = row.cast_signed();
-            while to_load <= y + reach.cast_signed() {
-                cfa.load(instructions, to_load, input.row(to_load, 0), self.black);
-                to_load += 1;
+        let (reach, rows) = (self.reach().cast_signed(), output.range());
+        let mut mended = 0;
+        let mut cfa = Ring::new();
+        // Hues or differences, and green beside hues.
+        let [mut derived, mut greens] = [Ring::new(), Ring::new()];
+        for strip in strips(input.width()) {
+            for ring in [&mut cfa, &mut derived, &mut greens] {
+                ring.begin(strip.len());
             }
-            while to_derive <= y + 1 {
-                self.derive(instructions, to_derive, &cfa, &mut greens, &mut derived);
-                to_derive += 1;
-            }
-            let classes = self.pattern.row_classes(self.header.geometry.origin, row);
-            let parity = usize::from(classes[0] == Class::Green);
-            let sites = Sites::new(&alternating, parity);
-            let [red, green, blue] = output.three(row);
-            let [own, other] = if classes[parity] == Class::Red { [red, blue] } else { [blue, red] };
-            let planes = [&mut *own, &mut *green, &mut *other];
-            let needs_mending = match self.method {
-                Method::Bilinear => {
-                    vectors::run_on(instructions, bilinear::Row { cfa: cfa.about(y), sites, planes });
-                    cfa.has_large(y, reach)
+            let mut to_load = rows.start.cast_signed() - reach;
+            let mut to_derive = rows.start.cast_signed() - 1;
+            for row in rows.clone() {
+                let y = row.cast_signed();
+                while to_load <= y + reach {
+                    cfa.load(instructions, to_load, input.row(to_load, 0), strip.start, self.black);
+                    to_load += 1;
                 }
-                Method::SmoothHue => {
-                    let (hues, green) = (derived.about(y), greens.line(y));
-                    vectors::run_on(instructions, smooth_hue::Row { cfa: cfa.line(y), green, hues, sites, planes })
+                while to_derive <= y + 1 {
+                    self.derive(instructions, to_derive, &cfa, &mut greens, &mut derived);
+                    to_derive += 1;
                 }
-                Method::EffectiveColor => {
-                    let differences = derived.about(y);
-                    let kernel = effective_color::Row { cfa: cfa.line(y), differences, sites, planes };
-                    vectors::run_on(instructions, kernel);
-                    cfa.has_large(y, reach)
+                let classes = self.pattern.row_classes(self.header.geometry.origin, row);
+                let parity = usize::from(classes[0] == Class::Green);
+                let [red, green, blue] = output.three(row).map(|plane| &mut plane[strip.clone()]);
+                let [own, other] = if classes[parity] == Class::Red { [red, blue] } else { [blue, red] };
+                let planes = [&mut *own, &mut *green, &mut *other];
+                if self.fill(instructions, [&cfa, &greens, &derived], y, masks(parity, strip.len()), planes) {
+                    mended += mend(cfa.about(y), parity, [own, green, other]);
                 }
-                Method::Malvar => {
-                    vectors::run_on(instructions, malvar::Row { cfa: cfa.about(y), sites, planes });
-                    cfa.has_large(y, reach)
-                }
-            };
-            if needs_mending {
-                let mended = mend(cfa.about(y), parity, [own, green, other]);
-                // Bilinear values are no stand-ins for themselves.
-                counts.undefined_hue += if self.method == Method::Bilinear { 0 } else { mended };
             }
         }
-        counts
+        // Bilinear values are no stand-ins for themselves.
+        let undefined_hue = if self.method == Method::Bilinear { 0 } else { mended };
+        Counts { undefined_hue, ..Counts::default() }
     }
 
     /// Derives the row `y`, of which the photosites around it are loaded.
     fn derive(&self, instructions: Instructions, y: isize, cfa: &Ring, greens: &mut Ring, derived: &mut Ring) {
         match self.method {
             Method::Bilinear | Method::Malvar => {}
-            Method::SmoothHue => greens.fill(y, |green| {
-                let cfa = cfa.about(y);
-                derived.fill(y, |hue| vectors::run_on(instructions, smooth_hue::Hues { cfa, green, hue }));
-            }),
-            Method::EffectiveColor => derived.fill(y, |to| {
-                vectors::run_on(instructions, effective_color::Differences { cfa: cfa.about(y), to });
-            }),
+            Method::SmoothHue => {
+                let (green, hue) = (greens.wider_mut(y), derived.wider_mut(y));
+                vectors::run_on(instructions, smooth_hue::Hues { cfa: cfa.about(y), green, hue });
+            }
+            Method::EffectiveColor => {
+                let (cfa, to) = (cfa.about(y), derived.wider_mut(y));
+                vectors::run_on(instructions, effective_color::Differences { cfa, to });
+            }
+        }
+    }
+
+    /// Fills the row `y`; tells whether it may hold values that are not finite.
+    fn fill(
+        &self,
+        instructions: Instructions,
+        [cfa, greens, derived]: [&Ring; 3],
+        y: isize,
+        masks: &[u32],
+        planes: Planes<'_>,
+    ) -> bool {
+        let has_large = cfa.has_large(y, self.reach());
+        match self.method {
+            Method::Bilinear => {
+                vectors::run_on(instructions, bilinear::Row { cfa: cfa.about(y), masks, planes });
+                has_large
+            }
+            Method::SmoothHue => {
+                let (cfa, green, hues) = (cfa.line(y), greens.line(y), derived.about(y));
+                vectors::run_on(instructions, smooth_hue::Row { cfa, green, hues, masks, planes })
+            }
+            Method::EffectiveColor => {
+                let (cfa, differences) = (cfa.line(y), derived.about(y));
+                vectors::run_on(instructions, effective_color::Row { cfa, differences, masks, planes });
+                has_large
+            }
+            Method::Malvar => {
+                vectors::run_on(instructions, malvar::Row { cfa: cfa.about(y), masks, planes });
+                has_large
+            }
         }
     }
 }

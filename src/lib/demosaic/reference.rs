@@ -94,15 +94,14 @@ fn scattered(seed: u32) -> impl Iterator<Item = u32> {
     })
 }
 
-const SIZES: [[usize; 2]; 8] = [[2, 2], [2, 5], [3, 2], [3, 3], [5, 4], [17, 9], [64, 6], [131, 7]];
+const SIZES: [[usize; 2]; 9] = [[2, 2], [2, 5], [3, 2], [3, 3], [5, 4], [17, 9], [131, 7], [577, 4], [1025, 3]];
 
-/// All methods on all patterns and sizes.
+/// All methods on all patterns and sizes; 577 and 1025 columns are cut into strips.
 fn for_all(samples: impl Fn(u32) -> f32, black: f64, check: impl Fn(&Plane<'_>, Method, &str)) {
     for method in Method::ALL {
         for pattern in CfaPattern::ALL {
             for [width, height] in SIZES {
-                let samples: Vec<f32> =
-                    scattered(width as u32).take(width * height).map(&samples).collect();
+                let samples: Vec<f32> = scattered(width as u32).take(width * height).map(&samples).collect();
                 let plane = Plane { samples: &samples, width, height, black, pattern };
                 check(&plane, method, &format!("{method:?} {pattern} {width}x{height}"));
             }
@@ -127,7 +126,9 @@ fn bound(method: Method, largest: f64, value: f64) -> f64 {
 #[test]
 fn the_filters_are_as_near_their_plain_versions_as_their_roundings_allow() {
     // With 10-bit fractions and a black level that is no float; positive where a quotient's error is bounded.
-    for (offset, methods) in [(2000.0, &Method::ALL[..]), (-1.0e3, &[Method::Bilinear, Method::EffectiveColor, Method::Malvar])] {
+    for (offset, methods) in
+        [(2000.0, &Method::ALL[..]), (-1.0e3, &[Method::Bilinear, Method::EffectiveColor, Method::Malvar])]
+    {
         let sample = |bits: u32| (bits % 4_194_304) as f32 / 1024.0 + offset;
         for_all(sample, 102.345_678_9, |plane, method, what| {
             if !methods.contains(&method) {
@@ -184,32 +185,40 @@ fn every_set_of_instructions_gives_the_same_bits() {
 /// and the measured sample stays what it is.
 #[test]
 fn what_is_far_from_a_strange_sample_does_not_feel_it() {
-    for_all(|bits| (bits >> 20) as f32 + 1.0, 0.0, |plane, method, what| {
-        let (expected, _) = plane.filtered(method, Instructions::widest());
-        for strange in [f32::NAN, f32::NEG_INFINITY, f32::MAX] {
-            let mut samples = plane.samples.to_vec();
-            let [column, row] = [plane.width / 2, plane.height / 2];
-            samples[row * plane.width + column] = strange;
-            let (made, _) = Plane { samples: &samples, ..*plane }.filtered(method, Instructions::widest());
-            for (index, (made, expected)) in made.iter().zip(&expected).enumerate() {
-                let (x, y, class) = (index % plane.width, index / plane.width / 3, index / plane.width % 3);
-                if x.abs_diff(column).max(y.abs_diff(row)) > method.reach() {
-                    assert_eq!(made.to_bits(), expected.to_bits(), "{what}: {x},{y}");
-                }
-                if [x, y] == [column, row] && class == plane.class(x.cast_signed(), y.cast_signed()) as usize {
-                    assert_eq!(made.to_bits(), strange.to_bits(), "{what}: {x},{y}");
+    for_all(
+        |bits| (bits >> 20) as f32 + 1.0,
+        0.0,
+        |plane, method, what| {
+            let (expected, _) = plane.filtered(method, Instructions::widest());
+            for strange in [f32::NAN, f32::NEG_INFINITY, f32::MAX] {
+                let mut samples = plane.samples.to_vec();
+                let [column, row] = [plane.width / 2, plane.height / 2];
+                samples[row * plane.width + column] = strange;
+                let (made, _) = Plane { samples: &samples, ..*plane }.filtered(method, Instructions::widest());
+                for (index, (made, expected)) in made.iter().zip(&expected).enumerate() {
+                    let (x, y, class) = (index % plane.width, index / plane.width / 3, index / plane.width % 3);
+                    if x.abs_diff(column).max(y.abs_diff(row)) > method.reach() {
+                        assert_eq!(made.to_bits(), expected.to_bits(), "{what}: {x},{y}");
+                    }
+                    if [x, y] == [column, row] && class == plane.class(x.cast_signed(), y.cast_signed()) as usize {
+                        assert_eq!(made.to_bits(), strange.to_bits(), "{what}: {x},{y}");
+                    }
                 }
             }
-        }
-    });
+        },
+    );
 }
 
 /// Means of the largest floats are the largest float; what lies beyond the range has the bilinear value and is counted.
 #[test]
 fn means_of_large_samples_do_not_overflow() {
-    for_all(|_| f32::MAX, 0.0, |plane, method, what| {
-        let (made, counts) = plane.filtered(method, Instructions::widest());
-        assert!(made.iter().all(|&sample| sample == f32::MAX), "{what}");
-        assert!(method != Method::Bilinear || counts == Counts::default(), "{what}");
-    });
+    for_all(
+        |_| f32::MAX,
+        0.0,
+        |plane, method, what| {
+            let (made, counts) = plane.filtered(method, Instructions::widest());
+            assert!(made.iter().all(|&sample| sample == f32::MAX), "{what}");
+            assert!(method != Method::Bilinear || counts == Counts::default(), "{what}");
+        },
+    );
 }

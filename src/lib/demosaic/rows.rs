@@ -1,8 +1,9 @@
-//! Rows of one plane on their way through a filter: a few at a time, the last over the first, with mirrored margins, so
-//! that the inner loops have neither edges nor branches.
+//! Rows of one plane on their way through a filter: a few at a time, the last over the first, strip by strip of columns,
+//! with margins, so that the inner loops have neither edges nor branches and stay in the level-1 cache.
 
 use crate::frame::{mirror, to_sample};
 use crate::numerics::vectors::{self, Instructions, Kernel};
+use std::ops::Range;
 
 /// Columns of margin on either side: no method reaches farther.
 const MARGIN: usize = 3;
@@ -10,43 +11,70 @@ const MARGIN: usize = 3;
 /// Rows that a ring holds: those that the farthest reaching method looks at, up to a power of two.
 const DEPTH: usize = 8;
 
+/// Columns of a strip at most: even, so that all strips begin with the same class.
+const STRIP: usize = 512;
+
 /// Where samples begin to be large: sums of samples below it, of any method, stay far below the largest float.
 const LARGE: f32 = 1.329_228e36; // 2¹²⁰
 
-/// The last rows of a plane.
+/// Cuts `width` columns into strips of about the same size, whole vectors but for the last.
+pub(super) fn strips(width: usize) -> impl Iterator<Item = Range<usize>> {
+    let size = width.div_ceil(width.div_ceil(STRIP)).next_multiple_of(64);
+    (0..width).step_by(size).map(move |first| first..(first + size).min(width))
+}
+
+/// The last rows of a strip of a plane.
 pub(super) struct Ring {
+    /// Columns of the strip.
     width: usize,
     samples: Vec<f32>,
     /// Whether a row holds large samples, or any that are not finite.
     is_large: [bool; DEPTH],
 }
 
-/// One row of a plane and its margins.
+/// One row of a strip and its margins.
 #[derive(Clone, Copy)]
 pub(super) struct Line<'a>(&'a [f32]);
 
 impl<'a> Line<'a> {
-    /// The row seen from `by` columns beside each: its columns, `by` added.
+    /// The columns of the strip, each moved by `by`.
     #[inline(always)]
     pub(super) fn beside(self, by: isize) -> &'a [f32] {
         let width = self.0.len() - 2 * MARGIN;
         &self.0[MARGIN.wrapping_add_signed(by)..][..width]
     }
 
-    /// The sample of column `x`, which may lie in the margin.
+    /// The columns of the strip and one more on either side, each moved by `by`.
+    #[inline(always)]
+    pub(super) fn wider(self, by: isize) -> &'a [f32] {
+        let width = self.0.len() - 2 * MARGIN;
+        &self.0[(MARGIN - 1).wrapping_add_signed(by)..][..width + 2]
+    }
+
+    /// The sample of the strip's column `x`, which may lie in the margin.
     fn at(self, x: isize) -> f64 {
         f64::from(self.0[MARGIN.wrapping_add_signed(x)])
     }
 }
 
 impl Ring {
-    /// Room for rows of `width` columns.
-    pub(super) fn new(width: usize) -> Self {
-        Self { width, samples: vec![0.0; DEPTH * (width + 2 * MARGIN)], is_large: [false; DEPTH] }
+    /// Room for rows of any strip.
+    pub(super) fn new() -> Self {
+        Self { width: 0, samples: vec![0.0; DEPTH * (STRIP + 2 * MARGIN)], is_large: [false; DEPTH] }
+    }
+
+    /// Begins a strip of `width` columns.
+    pub(super) fn begin(&mut self, width: usize) {
+        self.width = width;
     }
 
     fn place(y: isize) -> usize {
         y.rem_euclid(DEPTH.cast_signed()).cast_unsigned()
+    }
+
+    fn line_mut(&mut self, y: isize) -> &mut [f32] {
+        let stride = self.width + 2 * MARGIN;
+        &mut self.samples[Self::place(y) * stride..][..stride]
     }
 
     /// The row `y`, one of the last that were filled.
@@ -60,22 +88,25 @@ impl Ring {
         std::array::from_fn(|index| self.line(y + index.cast_signed() - (ROWS / 2).cast_signed()))
     }
 
-    /// Fills the columns of row `y` by a function, and mirrors its margins.
-    pub(super) fn fill<T>(&mut self, y: isize, make: impl FnOnce(&mut [f32]) -> T) -> T {
-        let stride = self.width + 2 * MARGIN;
-        let line = &mut self.samples[Self::place(y) * stride..][..stride];
-        let made = make(&mut line[MARGIN..MARGIN + self.width]);
-        for x in 1..=MARGIN {
-            line[MARGIN - x] = line[MARGIN + mirror(-x.cast_signed(), self.width)];
-            let right = self.width - 1 + x;
-            line[MARGIN + right] = line[MARGIN + mirror(right.cast_signed(), self.width)];
-        }
-        made
+    /// The columns of row `y` and one more on either side, to be filled.
+    pub(super) fn wider_mut(&mut self, y: isize) -> &mut [f32] {
+        let width = self.width;
+        &mut self.line_mut(y)[MARGIN - 1..][..width + 2]
     }
 
-    /// Fills row `y` with samples less a black level.
-    pub(super) fn load(&mut self, instructions: Instructions, y: isize, samples: &[f32], black: f64) {
-        let is_large = self.fill(y, |to| vectors::run_on(instructions, Subtract { samples, black, to }));
+    /// Fills row `y` of the strip that begins at column `first` with the samples of a whole row less a black level.
+    pub(super) fn load(&mut self, instructions: Instructions, y: isize, row: &[f32], first: usize, black: f64) {
+        let end = (first + self.width + MARGIN).min(row.len());
+        let begin = first.saturating_sub(MARGIN);
+        let line = self.line_mut(y);
+        // Where a column of the row stands in the line.
+        let place = |column: usize| column + MARGIN - first;
+        let (samples, to) = (&row[begin..end], &mut line[place(begin)..place(end)]);
+        let is_large = vectors::run_on(instructions, Subtract { samples, black, to });
+        for index in (0..place(begin)).chain(place(end)..line.len()) {
+            let column = (index + first).cast_signed() - MARGIN.cast_signed();
+            line[index] = line[place(mirror(column, row.len()))];
+        }
         self.is_large[Self::place(y)] = is_large;
     }
 
@@ -126,29 +157,24 @@ impl Excess {
     }
 }
 
-/// For each column of a row, all bits where its photosite measured red or blue, none where it measured green.
-#[derive(Clone, Copy)]
-pub(super) struct Sites<'a>(&'a [u32]);
-
-impl<'a> Sites<'a> {
-    /// Room for [`Self::new`] over `width` columns.
-    pub(super) fn alternating(width: usize) -> Vec<u32> {
-        (0..=width).map(|x| if x % 2 == 0 { u32::MAX } else { 0 }).collect()
+/// All bits and none in turn.
+static ALTERNATING: [u32; STRIP + 1] = {
+    let mut masks = [0; STRIP + 1];
+    let mut x = 0;
+    while x <= STRIP {
+        masks[x] = u32::MAX;
+        x += 2;
     }
+    masks
+};
 
-    /// Red or blue at the columns of parity `parity`, from [`Self::alternating`].
-    pub(super) fn new(alternating: &'a [u32], parity: usize) -> Self {
-        Self(&alternating[parity..][..alternating.len() - 1])
-    }
-
-    /// The first `width` columns.
-    #[inline(always)]
-    pub(super) fn masks(self, width: usize) -> &'a [u32] {
-        &self.0[..width]
-    }
+/// For each of the first `width` columns, all bits where the photosite measured red or blue, at columns of parity
+/// `parity`, and none where it measured green.
+pub(super) fn masks(parity: usize, width: usize) -> &'static [u32] {
+    &ALTERNATING[parity..][..width]
 }
 
-/// Of two values, the first where the mask of [`Sites`] is set.
+/// Of two values, the first where the mask is set.
 #[inline(always)]
 pub(super) fn pick(mask: u32, chrominance: f32, green: f32) -> f32 {
     f32::from_bits((chrominance.to_bits() & mask) | (green.to_bits() & !mask))
