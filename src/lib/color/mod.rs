@@ -513,6 +513,35 @@ mod tests {
         assert!((srgb_encode(0.214_041_140_482_232_55) - 0.5).abs() < 1e-12);
     }
 
+    /// Also where one colour of a pixel is no number, at every place of a vector.
+    #[test]
+    fn rows_of_xyz_are_the_products_of_the_matrix_on_every_set_of_instructions() {
+        let matrix = Matrix3::new(8.7e-4, 4.5e-5, 4.4e-5, 3.7e-4, 3.1e-4, -2.6e-5, 1.0e-4, -1.6e-4, 5.3e-4);
+        let plane = |seed: usize| -> Vec<f32> {
+            let strange = [f32::NAN, f32::INFINITY, f32::MAX];
+            let sample = |x: usize| if x % 37 == seed { strange[x % 3] } else { (x * 7919 % 4096 * seed) as f32 };
+            (0..331).map(sample).collect()
+        };
+        let planes = [1, 2, 3].map(plane);
+        for set in Instructions::ALL {
+            let mut made = [(); 3].map(|()| vec![0.0; 331]);
+            let rgb = planes.each_ref().map(|plane| &plane[..]);
+            let xyz = made.each_mut().map(|plane| &mut plane[..]);
+            let row = XyzRow { xyz_from_adu: rows_of(&matrix), black: 102.3, rgb, xyz };
+            let not_finite = vectors::run_on(set, row);
+            let mut expected = 0;
+            for x in 0..331 {
+                let value = matrix * Vector3::from(planes.each_ref().map(|plane| f64::from(plane[x]) - 102.3));
+                expected += u64::from(value.iter().any(|value| !value.is_finite()));
+                for (made, value) in made.iter().zip(&value) {
+                    let sample = to_sample(*value);
+                    assert!(made[x].to_bits() == sample.to_bits() || made[x].is_nan() && sample.is_nan());
+                }
+            }
+            assert_eq!(not_finite, expected);
+        }
+    }
+
     #[test]
     fn a_matrix_implies_its_columns_as_primaries() {
         let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
