@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{AdcRecord, FrameHeader};
+use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::stage::{Counts, Stage};
 use crate::units::{Adu, Electrons, QuantityKind};
 
@@ -84,6 +85,25 @@ impl Digitize {
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
     }
+
+    /// What [`Stage::apply`] does, on one set of instructions; the bits are the same on all of them.
+    pub fn apply_on(
+        &self,
+        instructions: Instructions,
+        input: Window<'_, Electrons>,
+        mut output: Rows<'_, Adu>,
+    ) -> Counts {
+        let mut counts = Counts::default();
+        let limits = Limits::of(&self.adc);
+        for y in output.range() {
+            for channel in 0..input.channels() {
+                let (charges, codes) = (input.row(y.cast_signed(), channel), output.row(y, channel));
+                let of_row = vectors::run_on(instructions, Row { adc: self.adc, limits, charges, codes });
+                counts = counts.plus(of_row);
+            }
+        }
+        counts
+    }
 }
 
 impl Stage for Digitize {
@@ -94,21 +114,132 @@ impl Stage for Digitize {
         &self.header
     }
 
-    fn apply(&self, input: Window<'_, Electrons>, mut output: Rows<'_, Adu>) -> Counts {
-        let mut counts = Counts::default();
-        let top = f64::from(self.adc.top_code());
-        for y in output.range() {
-            for channel in 0..input.channels() {
-                for (&charge, code) in input.row(y.cast_signed(), channel).iter().zip(output.row(y, channel)) {
-                    let level = (self.adc.bias_adu + self.adc.adu_per_e * f64::from(charge)).round();
-                    counts.clipped_low += u64::from(level < 0.0);
-                    counts.clipped_high += u64::from(level > top);
-                    counts.not_finite += u64::from(level.is_nan());
-                    // Rounding makes −0 of small negative levels; code 0 is one code, also to a digest.
-                    *code = to_sample(level.clamp(0.0, top) + 0.0);
+    fn apply(&self, input: Window<'_, Electrons>, output: Rows<'_, Adu>) -> Counts {
+        self.apply_on(Instructions::widest(), input, output)
+    }
+}
+
+/// Added to a number from 0 to 2⁵¹ and taken away, it leaves the nearest whole number: doubles have no fractions there.
+const WHOLE: f64 = (1_u64 << 52) as f64;
+
+/// The charges from which levels are clipped: levels rise with the charge, also as doubles.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    /// The largest charge whose level rounds to less than 0.
+    low: f32,
+    /// The smallest charge whose level rounds to more than the largest code.
+    high: f32,
+}
+
+impl Limits {
+    /// Those of a converter. Ties go away from zero, so that −½ rounds to less than 0.
+    fn of(adc: &AdcRecord) -> Self {
+        let top = f64::from(adc.top_code());
+        let first = |holds: &dyn Fn(f64) -> bool| first_float(|charge| holds(adc.level(charge)));
+        Self { low: first(&|level| level > -0.5).next_down(), high: first(&|level| level >= top + 0.5) }
+    }
+}
+
+/// The smallest float for which something holds that holds for all larger ones, infinity among them.
+fn first_float(holds: impl Fn(f32) -> bool) -> f32 {
+    // Floats in their order are those of sign and size taken as whole numbers.
+    let float = |rank: i64| {
+        let size = f32::from_bits(u32::try_from(rank.unsigned_abs()).unwrap_or(u32::MAX));
+        if rank < 0 { -size } else { size }
+    };
+    let infinity = i64::from(f32::INFINITY.to_bits());
+    let (mut below, mut above) = (-infinity, infinity);
+    while above - below > 1 {
+        let between = below + (above - below) / 2;
+        if holds(float(between)) { above = between } else { below = between }
+    }
+    float(above)
+}
+
+impl AdcRecord {
+    /// The level of a charge, in ADU, before it is rounded.
+    #[inline(always)]
+    fn level(&self, charge: f32) -> f64 {
+        self.bias_adu + self.adu_per_e * f64::from(charge)
+    }
+}
+
+/// Digitizes a row.
+struct Row<'a> {
+    adc: AdcRecord,
+    limits: Limits,
+    charges: &'a [f32],
+    codes: &'a mut [f32],
+}
+
+impl Kernel for Row<'_> {
+    type Output = Counts;
+
+    #[inline(always)]
+    fn run(self) -> Counts {
+        let Self { adc, limits, charges, codes } = self;
+        let top = f64::from(adc.top_code());
+        for (&charge, code) in charges.iter().zip(codes) {
+            let level = adc.level(charge);
+            // Comparisons that a NaN passes.
+            let above = if 0.0 > level { 0.0 } else { level };
+            let within = if top < above { top } else { above };
+            // To even at ties, and 0 of −0; the difference is exact, and one half only where a tie went down.
+            let even = (within + WHOLE) - WHOLE;
+            let tie = if within - even >= 0.5 { 1.0 } else { 0.0 };
+            *code = to_sample(even + tie);
+        }
+        // Apart, as vectors hold twice as many floats as doubles.
+        let (mut low, mut high, mut nan) = (0_u32, 0_u32, 0_u32);
+        for &charge in charges {
+            low += u32::from(charge <= limits.low);
+            high += u32::from(charge >= limits.high);
+            nan += u32::from(charge.is_nan());
+        }
+        Counts { clipped_low: low.into(), clipped_high: high.into(), not_finite: nan.into(), ..Counts::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The definition, one charge at a time.
+    fn plain(adc: &AdcRecord, charge: f32, counts: &mut Counts) -> f32 {
+        let top = f64::from(adc.top_code());
+        let level = (adc.bias_adu + adc.adu_per_e * f64::from(charge)).round();
+        counts.clipped_low += u64::from(level < 0.0);
+        counts.clipped_high += u64::from(level > top);
+        counts.not_finite += u64::from(level.is_nan());
+        to_sample(level.clamp(0.0, top) + 0.0)
+    }
+
+    /// Ties and their neighbours at every code of 16 bits, the ends of the range, and floats of all sizes.
+    #[test]
+    fn codes_are_those_of_the_plain_version_on_every_set_of_instructions() {
+        let ties = (-4..=2 * 65_540).map(|halves: i32| 0.5 * halves as f32);
+        let mut charges: Vec<f32> = ties.flat_map(|tie| [tie.next_down(), tie, tie.next_up()]).collect();
+        // A step that is prime to 2³² leads through all kinds of bits: NaN, infinities, subnormals and both signs.
+        charges.extend((0..50_000_u32).map(|i| f32::from_bits(i.wrapping_mul(2_654_435_769))));
+        charges.extend([f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -0.0, 0.0, f32::MIN, f32::MAX, 1e-45, -1e-45]);
+        // The double below one half is what adding one half and cutting off would make a 1 of.
+        for (bias_adu, adu_per_e) in [(0.0, 1.0), (0.5_f64.next_down(), 1.0), (-0.5, 1.0), (102.4, 0.1), (-17.3, 3e-4)]
+        {
+            for bits in [1, 12, 16] {
+                let adc = AdcRecord { bits, bias_adu, adu_per_e };
+                let limits = Limits::of(&adc);
+                let mut expected = Counts::default();
+                let plain: Vec<u32> =
+                    charges.iter().map(|&charge| plain(&adc, charge, &mut expected).to_bits()).collect();
+                for set in Instructions::ALL {
+                    let mut codes = vec![0.0; charges.len()];
+                    let counts = vectors::run_on(set, Row { adc, limits, charges: &charges, codes: &mut codes });
+                    assert_eq!(counts, expected);
+                    let differing = (0..plain.len()).find(|&i| codes[i].to_bits() != plain[i] && !codes[i].is_nan());
+                    assert_eq!(differing.map(|i| (charges[i], codes[i])), None, "{set:?} {adc:?}");
+                    assert!(codes.iter().zip(&charges).all(|(code, charge)| code.is_nan() == charge.is_nan()));
                 }
             }
         }
-        counts
     }
 }

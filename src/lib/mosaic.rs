@@ -4,6 +4,7 @@ use crate::cfa::CfaPattern;
 use crate::error::Result;
 use crate::frame::{Rows, Window};
 use crate::metadata::FrameHeader;
+use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::stage::{Counts, Stage};
 use crate::units::{Any, QuantityKind};
 
@@ -53,6 +54,16 @@ impl Mosaic {
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
     }
+
+    /// What [`Stage::apply`] does, on one set of instructions; the bits are the same on all of them.
+    pub fn apply_on(&self, instructions: Instructions, input: Window<'_>, mut output: Rows<'_>) -> Counts {
+        for y in output.range() {
+            let classes = self.pattern.row_classes(self.header.geometry.origin, y);
+            let [even, odd] = classes.map(|class| input.row(y.cast_signed(), class as usize));
+            vectors::run_on(instructions, Alternate { even, odd, to: output.row(y, 0) });
+        }
+        Counts::default()
+    }
 }
 
 impl Stage for Mosaic {
@@ -63,14 +74,29 @@ impl Stage for Mosaic {
         &self.header
     }
 
-    fn apply(&self, input: Window<'_>, mut output: Rows<'_>) -> Counts {
-        for y in output.range() {
-            let classes = self.pattern.row_classes(self.header.geometry.origin, y);
-            let kept = classes.map(|class| input.row(y.cast_signed(), class as usize));
-            for (x, sample) in output.row(y, 0).iter_mut().enumerate() {
-                *sample = kept[x % 2][x];
-            }
+    fn apply(&self, input: Window<'_>, output: Rows<'_>) -> Counts {
+        self.apply_on(Instructions::widest(), input, output)
+    }
+}
+
+/// Columns by columns from two rows: the even ones of the first, the odd ones of the second.
+struct Alternate<'a> {
+    even: &'a [f32],
+    odd: &'a [f32],
+    to: &'a mut [f32],
+}
+
+impl Kernel for Alternate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (pairs, last) = self.to.as_chunks_mut::<2>();
+        for ((to, even), odd) in pairs.iter_mut().zip(self.even.as_chunks::<2>().0).zip(self.odd.as_chunks::<2>().0) {
+            *to = [even[0], odd[1]];
         }
-        Counts::default()
+        if let ([last], [.., sample]) = (last, self.even) {
+            *last = *sample;
+        }
     }
 }

@@ -7,6 +7,7 @@ pub mod locus;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{ColorRecord, FrameHeader};
+use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::propagation::pixels::{self, PixelNoise};
 use crate::stage::{Counts, Stage};
 use crate::units::{Adu, QuantityKind, Tristimulus};
@@ -187,6 +188,11 @@ pub fn matrix(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| rows[i][j])
 }
 
+/// A 3×3 matrix as its rows, the inverse of [`matrix`].
+fn rows_of(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)]))
+}
+
 /// Chromaticities of the primaries that a matrix implies (XYZ of its columns) and of their sum; none where one has none.
 pub fn implied_primaries(xyz_from_camera: &[[f64; 3]; 3]) -> Option<[[f64; 2]; 4]> {
     let matrix = matrix(xyz_from_camera);
@@ -363,18 +369,24 @@ impl ToXyz {
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
     }
-}
 
-impl Stage for ToXyz {
-    type Input = Adu;
-    type Output = Tristimulus;
-
-    fn header(&self) -> &FrameHeader {
-        &self.header
-    }
-
-    fn apply(&self, input: Window<'_, Adu>, mut output: Rows<'_, Tristimulus>) -> Counts {
+    /// What [`Stage::apply`] does, on one set of instructions; the bits are the same on all of them.
+    pub fn apply_on(
+        &self,
+        instructions: Instructions,
+        input: Window<'_, Adu>,
+        mut output: Rows<'_, Tristimulus>,
+    ) -> Counts {
         let mut counts = Counts::default();
+        if self.space == Space::Xyz && self.sigma.is_none() {
+            let xyz_from_adu = rows_of(&self.xyz_from_adu);
+            for y in output.range() {
+                let rgb = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
+                let (black, xyz) = (self.black, output.three(y));
+                counts.not_finite += vectors::run_on(instructions, XyzRow { xyz_from_adu, black, rgb, xyz });
+            }
+            return counts;
+        }
         let white_sum: f64 = self.white.iter().sum();
         let white_xy = [self.white[0] / white_sum, self.white[1] / white_sum];
         for y in output.range() {
@@ -403,6 +415,55 @@ impl Stage for ToXyz {
             }
         }
         counts
+    }
+}
+
+impl Stage for ToXyz {
+    type Input = Adu;
+    type Output = Tristimulus;
+
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn apply(&self, input: Window<'_, Adu>, output: Rows<'_, Tristimulus>) -> Counts {
+        self.apply_on(Instructions::widest(), input, output)
+    }
+}
+
+/// XYZ of a row, in doubles; gives the pixels that are not finite.
+struct XyzRow<'a> {
+    xyz_from_adu: [[f64; 3]; 3],
+    black: f64,
+    rgb: [&'a [f32]; 3],
+    xyz: [&'a mut [f32]; 3],
+}
+
+impl Kernel for XyzRow<'_> {
+    type Output = u64;
+
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "six planes advance together")]
+    fn run(self) -> u64 {
+        let Self { xyz_from_adu: m, black, rgb: [red, green, blue], xyz: [to_x, to_y, to_z] } = self;
+        let width = to_x.len();
+        let (red, green, blue) = (&red[..width], &green[..width], &blue[..width]);
+        let (to_y, to_z) = (&mut to_y[..width], &mut to_z[..width]);
+        let [[rx, gx, bx], [ry, gy, by], [rz, gz, bz]] = m;
+        let mut not_finite = 0;
+        for index in 0..width {
+            let r = f64::from(red[index]) - black;
+            let g = f64::from(green[index]) - black;
+            let b = f64::from(blue[index]) - black;
+            let x = rx * r + gx * g + bx * b;
+            let y = ry * r + gy * g + by * b;
+            let z = rz * r + gz * g + bz * b;
+            not_finite += u64::from(!(x.is_finite() & y.is_finite() & z.is_finite()));
+            to_x[index] = to_sample(x);
+            to_y[index] = to_sample(y);
+            to_z[index] = to_sample(z);
+        }
+        not_finite
     }
 }
 
@@ -450,6 +511,35 @@ mod tests {
         assert!((srgb_encode(1.0) - 1.0).abs() < 1e-15);
         // Middle grey of IEC 61966-2-1: linear 0.2140 is code 127.5/255.
         assert!((srgb_encode(0.214_041_140_482_232_55) - 0.5).abs() < 1e-12);
+    }
+
+    /// Also where one colour of a pixel is no number, at every place of a vector.
+    #[test]
+    fn rows_of_xyz_are_the_products_of_the_matrix_on_every_set_of_instructions() {
+        let matrix = Matrix3::new(8.7e-4, 4.5e-5, 4.4e-5, 3.7e-4, 3.1e-4, -2.6e-5, 1.0e-4, -1.6e-4, 5.3e-4);
+        let plane = |seed: usize| -> Vec<f32> {
+            let strange = [f32::NAN, f32::INFINITY, f32::MAX];
+            let sample = |x: usize| if x % 37 == seed { strange[x % 3] } else { (x * 7919 % 4096 * seed) as f32 };
+            (0..331).map(sample).collect()
+        };
+        let planes = [1, 2, 3].map(plane);
+        for set in Instructions::ALL {
+            let mut made = [(); 3].map(|()| vec![0.0; 331]);
+            let rgb = planes.each_ref().map(|plane| &plane[..]);
+            let xyz = made.each_mut().map(|plane| &mut plane[..]);
+            let row = XyzRow { xyz_from_adu: rows_of(&matrix), black: 102.3, rgb, xyz };
+            let not_finite = vectors::run_on(set, row);
+            let mut expected = 0;
+            for x in 0..331 {
+                let value = matrix * Vector3::from(planes.each_ref().map(|plane| f64::from(plane[x]) - 102.3));
+                expected += u64::from(value.iter().any(|value| !value.is_finite()));
+                for (made, value) in made.iter().zip(&value) {
+                    let sample = to_sample(*value);
+                    assert!(made[x].to_bits() == sample.to_bits() || made[x].is_nan() && sample.is_nan());
+                }
+            }
+            assert_eq!(not_finite, expected);
+        }
     }
 
     #[test]

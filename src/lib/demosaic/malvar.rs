@@ -1,63 +1,55 @@
 //! The linear method of Malvar, He and Cutler: bilinear interpolation corrected by the curvature of the class that was
 //! measured \[MHC2004].
 
-use super::Tile;
+use super::rows::{Line, Planes, pick};
 use super::weights::Kernel;
 use crate::cfa::Class;
-use crate::frame::{Rows, to_sample};
-use crate::stage::Counts;
+use crate::numerics::vectors;
 
-/// Fills the rows of `output` from `tile`, whose margin is at least 2.
+/// Fills a row of the output from five rows of photosites.
 ///
 /// At a red or blue site, green is the mean of its four neighbours and half the curvature of the class measured there,
 /// and the opposite class the mean of four diagonal neighbours and three quarters of that curvature; at a green site,
 /// red and blue are the mean of their two neighbours and five eighths of the curvature of green.
-pub(super) fn interpolate(tile: &Tile, output: &mut Rows<'_>) -> Counts {
-    let mut counts = Counts::default();
-    for y in output.range() {
-        let row = y.cast_signed();
-        let (class, parity) = tile.chrominance(row);
-        let other = if class == Class::Red { Class::Blue } else { Class::Red };
-        let [far_above, above, line, below, far_below] = [-2, -1, 0, 1, 2].map(|dy| tile.line(row + dy));
-        let planes = output.three(y);
-        #[expect(clippy::needless_range_loop, reason = "the three planes advance together")]
-        for index in 0..tile.width {
-            let x = index.cast_signed();
-            let here = line.at(x);
-            let far_sides = line.at(x - 2) + line.at(x + 2);
-            let far_ends = far_above.at(x) + far_below.at(x);
-            let sides = line.at(x - 1) + line.at(x + 1);
-            let ends = above.at(x) + below.at(x);
-            let diagonals = above.at(x - 1) + above.at(x + 1) + below.at(x - 1) + below.at(x + 1);
-            let (own, green, opposite) = if x & 1 == parity {
-                let curvature = 4.0 * here - far_sides - far_ends;
-                (here, (2.0 * (sides + ends) + curvature) / 8.0, (2.0 * diagonals + 1.5 * curvature) / 8.0)
-            } else {
-                let beside = 5.0 * here - diagonals - far_sides + 0.5 * far_ends;
-                let above_and_below = 5.0 * here - diagonals - far_ends + 0.5 * far_sides;
-                ((4.0 * sides + beside) / 8.0, here, (4.0 * ends + above_and_below) / 8.0)
-            };
-            let mut keep = |class: Class, value: f64, bilinear: f64| {
-                let mut sample = to_sample(value);
-                if !sample.is_finite() {
-                    // The corrections of samples near the end of the range may lie beyond it; their mean does not.
-                    sample = to_sample(bilinear);
-                    counts.undefined_hue += u64::from(sample.is_finite());
-                }
-                planes[class as usize][index] = sample;
-            };
-            if x & 1 == parity {
-                keep(class, own, own);
-                keep(Class::Green, green, (sides + ends) / 4.0);
-                keep(other, opposite, diagonals / 4.0);
-            } else {
-                keep(class, own, sides / 2.0);
-                keep(Class::Green, green, green);
-                keep(other, opposite, ends / 2.0);
-            }
+///
+/// With samples of at most M in size, values are off by at most 10·2⁻²⁴ M from those of the same samples in doubles.
+pub(super) struct Row<'a> {
+    pub(super) cfa: [Line<'a>; 5],
+    pub(super) masks: &'a [u32],
+    pub(super) planes: Planes<'a>,
+}
+
+impl vectors::Kernel for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "many rows advance together")]
+    fn run(self) {
+        let [above2, above, line, below, below2] = self.cfa;
+        let [own, green, other] = self.planes;
+        let width = own.len();
+        let (green, other, masks) = (&mut green[..width], &mut other[..width], &self.masks[..width]);
+        let [up2, down2] = [above2, below2].map(|line| &line.beside(0)[..width]);
+        let [above_left, up, above_right] = [-1, 0, 1].map(|by| &above.beside(by)[..width]);
+        let [left2, left, here, right, right2] = [-2, -1, 0, 1, 2].map(|by| &line.beside(by)[..width]);
+        let [below_left, down, below_right] = [-1, 0, 1].map(|by| &below.beside(by)[..width]);
+        for x in 0..width {
+            let far_sides = left2[x] + right2[x];
+            let far_ends = up2[x] + down2[x];
+            let sides = left[x] + right[x];
+            let ends = up[x] + down[x];
+            let diagonals = (above_left[x] + below_left[x]) + (above_right[x] + below_right[x]);
+            let curvature = (0.5 * here[x] - 0.125 * far_sides) - 0.125 * far_ends;
+            let green_here = 0.25 * (sides + ends) + curvature;
+            let opposite = 0.25 * diagonals + 1.5 * curvature;
+            let around = 0.625 * here[x] - 0.125 * diagonals;
+            let beside = 0.5 * sides + ((around - 0.125 * far_sides) + 0.0625 * far_ends);
+            let above_and_below = 0.5 * ends + ((around - 0.125 * far_ends) + 0.0625 * far_sides);
+            own[x] = pick(masks[x], here[x], beside);
+            green[x] = pick(masks[x], green_here, here[x]);
+            other[x] = pick(masks[x], opposite, above_and_below);
         }
     }
-    counts
 }
 
 /// Eighths of the 5×5 kernels of \[MHC2004, Fig. 2], top left quarter and centre lines: green at red or blue; red or

@@ -1,21 +1,27 @@
 //! Demosaicking: the two classes that each photosite did not measure, from its neighbours [HP2005, App. A].
 //!
-//! One file a method. Each works on a tile: some rows of the CFA plane as doubles, black level removed, edges mirrored
-//! without repeating the edge sample, which keeps the phase of the filter array.
+//! One file a method. Each fills a row of the output from a few rows of the CFA plane, black level removed, edges
+//! mirrored without repeating the edge sample, which keeps the phase of the filter array. Interpolation is in 32-bit
+//! floats; each file says how far it may lie from the same in doubles.
 
 mod bilinear;
 mod effective_color;
 mod malvar;
+#[cfg(test)]
+mod reference;
+mod rows;
 mod smooth_hue;
 pub mod weights;
 
 use crate::cfa::{CfaPattern, Class};
 use crate::error::Result;
-use crate::frame::{Rows, Window, mirror, to_sample};
+use crate::frame::{Rows, Window};
 use crate::metadata::{DemosaicRecord, FrameHeader};
+use crate::numerics::vectors::{self, Instructions};
 use crate::propagation::pixels::PixelNoise;
 use crate::stage::{Counts, Stage};
 use crate::units::{Any, QuantityKind};
+use rows::{Planes, Ring, masks, mend, strips};
 
 /// A way to interpolate the missing classes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -161,6 +167,103 @@ impl Demosaic {
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
     }
+
+    /// What [`Stage::apply`] does, on one set of instructions; the bits are the same on all of them.
+    pub fn apply_on(&self, instructions: Instructions, input: Window<'_>, mut output: Rows<'_>) -> Counts {
+        let mut counts = self.interpolate(instructions, &input, &mut output);
+        if let Some(noise) = &self.sigma {
+            for y in output.range() {
+                let (planes, rest) = output.three_and_rest(y);
+                counts.propagation_void += noise.fill_stds(y, planes.map(|plane| &*plane), rest);
+            }
+        }
+        counts
+    }
+
+    /// Strip by strip, row by row: loads the photosites that a row of the output reaches, derives what the method takes
+    /// means of, and fills the row.
+    fn interpolate(&self, instructions: Instructions, input: &Window<'_>, output: &mut Rows<'_>) -> Counts {
+        let (reach, rows) = (self.reach().cast_signed(), output.range());
+        let mut mended = 0;
+        let mut cfa = Ring::new();
+        // Hues or differences, and green beside hues.
+        let [mut derived, mut greens] = [Ring::new(), Ring::new()];
+        for strip in strips(input.width()) {
+            for ring in [&mut cfa, &mut derived, &mut greens] {
+                ring.begin(strip.len());
+            }
+            let mut to_load = rows.start.cast_signed() - reach;
+            let mut to_derive = rows.start.cast_signed() - 1;
+            for row in rows.clone() {
+                let y = row.cast_signed();
+                while to_load <= y + reach {
+                    cfa.load(instructions, to_load, input.row(to_load, 0), strip.start, self.black);
+                    to_load += 1;
+                }
+                while to_derive <= y + 1 {
+                    self.derive(instructions, to_derive, &cfa, &mut greens, &mut derived);
+                    to_derive += 1;
+                }
+                let classes = self.pattern.row_classes(self.header.geometry.origin, row);
+                let parity = usize::from(classes[0] == Class::Green);
+                let [red, green, blue] = output.three(row).map(|plane| &mut plane[strip.clone()]);
+                let [own, other] = if classes[parity] == Class::Red { [red, blue] } else { [blue, red] };
+                let planes = [&mut *own, &mut *green, &mut *other];
+                if self.fill(instructions, [&cfa, &greens, &derived], y, masks(parity, strip.len()), planes) {
+                    mended += mend(cfa.about(y), parity, [own, green, other]);
+                }
+            }
+        }
+        // Bilinear values are no stand-ins for themselves.
+        let undefined_hue = if self.method == Method::Bilinear { 0 } else { mended };
+        Counts { undefined_hue, ..Counts::default() }
+    }
+
+    /// Derives the row `y`, of which the photosites around it are loaded.
+    fn derive(&self, instructions: Instructions, y: isize, cfa: &Ring, greens: &mut Ring, derived: &mut Ring) {
+        match self.method {
+            Method::Bilinear | Method::Malvar => {}
+            Method::SmoothHue => {
+                let (green, hue) = (greens.wider_mut(y), derived.wider_mut(y));
+                vectors::run_on(instructions, smooth_hue::Hues { cfa: cfa.about(y), green, hue });
+            }
+            Method::EffectiveColor => {
+                let (cfa, to) = (cfa.about(y), derived.wider_mut(y));
+                vectors::run_on(instructions, effective_color::Differences { cfa, to });
+            }
+        }
+    }
+
+    /// Fills the row `y`; tells whether it may hold values that are not finite.
+    fn fill(
+        &self,
+        instructions: Instructions,
+        [cfa, greens, derived]: [&Ring; 3],
+        y: isize,
+        masks: &[u32],
+        planes: Planes<'_>,
+    ) -> bool {
+        let has_large = cfa.has_large(y, self.reach());
+        match self.method {
+            Method::Bilinear => {
+                vectors::run_on(instructions, bilinear::Row { cfa: cfa.about(y), masks, planes });
+                has_large
+            }
+            Method::SmoothHue => {
+                let (cfa, green, hues) = (cfa.line(y), greens.line(y), derived.about(y));
+                vectors::run_on(instructions, smooth_hue::Row { cfa, green, hues, masks, planes })
+            }
+            Method::EffectiveColor => {
+                let (cfa, differences) = (cfa.line(y), derived.about(y));
+                vectors::run_on(instructions, effective_color::Row { cfa, differences, masks, planes });
+                has_large
+            }
+            Method::Malvar => {
+                vectors::run_on(instructions, malvar::Row { cfa: cfa.about(y), masks, planes });
+                has_large
+            }
+        }
+    }
 }
 
 /// What no light reads once `subtracted` is off; a frame of unknown black counts as black-free after a subtraction.
@@ -180,189 +283,15 @@ impl Stage for Demosaic {
         self.method.reach()
     }
 
-    fn apply(&self, input: Window<'_>, mut output: Rows<'_>) -> Counts {
-        let tile = Tile::new(&input, &output, self.reach(), self.black, |y| {
-            self.pattern.row_classes(self.header.geometry.origin, y)
-        });
-        let mut counts = match self.method {
-            Method::Bilinear => bilinear::interpolate(&tile, &mut output),
-            Method::SmoothHue => smooth_hue::interpolate(&tile, &mut output),
-            Method::EffectiveColor => effective_color::interpolate(&tile, &mut output),
-            Method::Malvar => malvar::interpolate(&tile, &mut output),
-        };
-        if let Some(noise) = &self.sigma {
-            for y in output.range() {
-                let (planes, rest) = output.three_and_rest(y);
-                counts.propagation_void += noise.fill_stds(y, planes.map(|plane| &*plane), rest);
-            }
-        }
-        counts
+    fn apply(&self, input: Window<'_>, output: Rows<'_>) -> Counts {
+        self.apply_on(Instructions::widest(), input, output)
     }
-}
-
-/// Rows of one plane as doubles with a margin of mirrored samples on every side.
-struct Tile {
-    /// The frame's row that comes first, margin included.
-    first_row: isize,
-    margin: usize,
-    width: usize,
-    samples: Vec<f64>,
-    /// For each row, the classes of the frame's even and odd columns.
-    classes: Vec<[Class; 2]>,
-}
-
-/// One row of a plane, indexed by the frame's column, which may lie in the margin.
-#[derive(Clone, Copy)]
-struct Line<'a> {
-    samples: &'a [f64],
-    margin: usize,
-}
-
-impl Line<'_> {
-    #[inline(always)]
-    fn at(&self, x: isize) -> f64 {
-        self.samples[x.wrapping_add_unsigned(self.margin).cast_unsigned()]
-    }
-
-    /// Mean of the samples on either side.
-    #[inline(always)]
-    fn sides(&self, x: isize) -> f64 {
-        (self.at(x - 1) + self.at(x + 1)) / 2.0
-    }
-}
-
-impl Tile {
-    fn new(
-        input: &Window<'_>,
-        output: &Rows<'_>,
-        reach: usize,
-        black: f64,
-        classes: impl Fn(usize) -> [Class; 2],
-    ) -> Self {
-        let (rows, width) = (output.range(), input.width());
-        let first_row = rows.start.cast_signed() - reach.cast_signed();
-        let last_row = rows.end.cast_signed() + reach.cast_signed();
-        let height = input.frame_height();
-        let mut tile = Self::empty(first_row, (last_row - first_row).cast_unsigned(), reach, width);
-        for (index, y) in (first_row..last_row).enumerate() {
-            let from = input.row(y, 0);
-            let line = tile.line_mut(index);
-            for (sample, &value) in line[reach..reach + width].iter_mut().zip(from) {
-                *sample = f64::from(value) - black;
-            }
-            for x in 1..=reach {
-                line[reach - x] = line[reach + mirror(-x.cast_signed(), width)];
-                line[reach + width - 1 + x] = line[reach + mirror((width - 1 + x).cast_signed(), width)];
-            }
-            tile.classes.push(classes(mirror(y, height)));
-        }
-        tile
-    }
-
-    /// Rows of zeros without classes.
-    fn empty(first_row: isize, rows: usize, margin: usize, width: usize) -> Self {
-        let samples = vec![0.0; rows * (width + 2 * margin)];
-        Self { first_row, margin, width, samples, classes: Vec::with_capacity(rows) }
-    }
-
-    fn line_mut(&mut self, index: usize) -> &mut [f64] {
-        let stride = self.width + 2 * self.margin;
-        &mut self.samples[index * stride..(index + 1) * stride]
-    }
-
-    /// The frame's row `y`, which may lie in the margin.
-    fn line(&self, y: isize) -> Line<'_> {
-        let stride = self.width + 2 * self.margin;
-        let index = (y - self.first_row).cast_unsigned();
-        Line { samples: &self.samples[index * stride..(index + 1) * stride], margin: self.margin }
-    }
-
-    /// The class of the photosite at the frame's column `x` and row `y`.
-    fn class(&self, x: isize, y: isize) -> Class {
-        self.classes[(y - self.first_row).cast_unsigned()][usize::from(x & 1 != 0)]
-    }
-
-    /// Where row `y` has its chrominance, red or blue: the class, and the parity of its columns.
-    fn chrominance(&self, y: isize) -> (Class, isize) {
-        match self.class(0, y) {
-            Class::Green => (self.class(1, y), 1),
-            class => (class, 0),
-        }
-    }
-
-    /// Makes a plane of the same place from a function of the photosite, `inner` rows and columns narrower.
-    fn derive(&self, inner: usize, mut row: impl FnMut(isize, &mut [f64])) -> Self {
-        let margin = self.margin - inner;
-        let rows = self.classes.len() - 2 * inner;
-        let first_row = self.first_row + inner.cast_signed();
-        let mut derived = Self::empty(first_row, rows, margin, self.width);
-        for index in 0..rows {
-            row(first_row + index.cast_signed(), derived.line_mut(index));
-        }
-        derived.classes.extend_from_slice(&self.classes[inner..inner + rows]);
-        derived
-    }
-
-    /// The columns of a derived plane's lines, first to last.
-    fn columns(&self, inner: usize) -> std::ops::Range<isize> {
-        let margin = (self.margin - inner).cast_signed();
-        -margin..self.width.cast_signed() + margin
-    }
-}
-
-/// Interpolates red and blue in a domain of hues, as SHTI and ECI both do.
-///
-/// `green` holds green everywhere, `hue` the hue of each chrominance photosite; `restore(green, hue)` is the value that
-/// a hue stands for. A value that is not finite although its samples are is replaced by the bilinear one and counted.
-fn restore_from_hues(
-    tile: &Tile,
-    green: &Tile,
-    hue: &Tile,
-    output: &mut Rows<'_>,
-    restore: impl Fn(f64, f64) -> f64,
-) -> Counts {
-    let mut counts = Counts::default();
-    for y in output.range() {
-        let row = y.cast_signed();
-        let (class, parity) = tile.chrominance(row);
-        let other = if class == Class::Red { Class::Blue } else { Class::Red };
-        let [cfa, cfa_above, cfa_below] = [row, row - 1, row + 1].map(|y| tile.line(y));
-        let [hues, above, below] = [row, row - 1, row + 1].map(|y| hue.line(y));
-        let greens = green.line(row);
-        let mut planes = output.three(y);
-        let vertical = |above: Line<'_>, below: Line<'_>, x| (above.at(x) + below.at(x)) / 2.0;
-        let diagonal = |above: Line<'_>, below: Line<'_>, x| (above.sides(x) + below.sides(x)) / 2.0;
-        #[expect(clippy::needless_range_loop, reason = "the three planes advance together")]
-        for index in 0..tile.width {
-            let x = index.cast_signed();
-            let green = greens.at(x);
-            let (own, opposite) = if x & 1 == parity {
-                (cfa.at(x), restore(green, diagonal(above, below, x)))
-            } else {
-                (restore(green, hues.sides(x)), restore(green, vertical(above, below, x)))
-            };
-            let mut keep = |class: Class, value: f64, bilinear: &dyn Fn() -> f64| {
-                let mut sample = to_sample(value);
-                if !sample.is_finite() {
-                    sample = to_sample(bilinear());
-                    counts.undefined_hue += u64::from(sample.is_finite());
-                }
-                planes[class as usize][index] = sample;
-            };
-            keep(class, own, &|| cfa.sides(x));
-            keep(other, opposite, &|| {
-                if x & 1 == parity { diagonal(cfa_above, cfa_below, x) } else { vertical(cfa_above, cfa_below, x) }
-            });
-            keep(Class::Green, green, &|| (cfa.sides(x) + vertical(cfa_above, cfa_below, x)) / 2.0);
-        }
-    }
-    counts
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::Geometry;
+    use crate::frame::{Geometry, to_sample};
     use crate::metadata::Metadata;
     use crate::stage::MemoryFrame;
 
