@@ -157,6 +157,20 @@ fn first_float(holds: impl Fn(f32) -> bool) -> f32 {
 }
 
 impl AdcRecord {
+    /// The code of a charge; NaN of NaN.
+    #[inline(always)]
+    fn code(&self, charge: f32) -> f32 {
+        let top = f64::from(self.top_code());
+        let level = self.level(charge);
+        // Comparisons that a NaN passes.
+        let above = if 0.0 > level { 0.0 } else { level };
+        let within = if top < above { top } else { above };
+        // To even at ties, and 0 of −0; the difference is exact, and one half only where a tie went down.
+        let even = (within + WHOLE) - WHOLE;
+        let tie = if within - even >= 0.5 { 1.0 } else { 0.0 };
+        to_sample(even + tie)
+    }
+
     /// The level of a charge, in ADU, before it is rounded.
     #[inline(always)]
     fn level(&self, charge: f32) -> f64 {
@@ -172,31 +186,63 @@ struct Row<'a> {
     codes: &'a mut [f32],
 }
 
+/// Samples whose doubts are looked for together.
+const LANES: usize = 16;
+
+impl Row<'_> {
+    /// How far a level in single precision may be off, in ADU, where it lies within the codes: bias and slope are rounded,
+    /// then their product with the charge and the sum, each by 2⁻²⁴ of itself, and none is larger than bias and top code
+    /// together; twice that.
+    fn doubt(&self) -> f64 {
+        2.0 * 5.0 * (self.adc.bias_adu.abs() + f64::from(self.adc.top_code())) * 0.5 * f64::from(f32::EPSILON)
+    }
+}
+
 impl Kernel for Row<'_> {
     type Output = Counts;
 
     #[inline(always)]
     fn run(self) -> Counts {
+        /// Added to a number from 0 to 2²² and taken away, it leaves the nearest whole number.
+        const WHOLE: f32 = 8_388_608.0;
+        let doubt = self.doubt();
         let Self { adc, limits, charges, codes } = self;
-        let top = f64::from(adc.top_code());
-        for (&charge, code) in charges.iter().zip(codes) {
-            let level = adc.level(charge);
-            // Comparisons that a NaN passes.
-            let above = if 0.0 > level { 0.0 } else { level };
-            let within = if top < above { top } else { above };
-            // To even at ties, and 0 of −0; the difference is exact, and one half only where a tie went down.
-            let even = (within + WHOLE) - WHOLE;
-            let tie = if within - even >= 0.5 { 1.0 } else { 0.0 };
-            *code = to_sample(even + tie);
-        }
-        // Apart, as vectors hold twice as many floats as doubles.
         let (mut low, mut high, mut nan) = (0_u32, 0_u32, 0_u32);
         for &charge in charges {
             low += u32::from(charge <= limits.low);
             high += u32::from(charge >= limits.high);
             nan += u32::from(charge.is_nan());
         }
-        Counts { clipped_low: low.into(), clipped_high: high.into(), not_finite: nan.into(), ..Counts::default() }
+        let counts =
+            Counts { clipped_low: low.into(), clipped_high: high.into(), not_finite: nan.into(), ..Counts::default() };
+        let settled = charges.len() / LANES * LANES;
+        let (bias, slope, top) = (to_sample(adc.bias_adu), to_sample(adc.adu_per_e), to_sample(adc.top_code().into()));
+        let is_worthwhile = doubt < 0.01 && slope.is_normal();
+        let (charges, last) = charges.split_at(if is_worthwhile { settled } else { 0 });
+        let (codes, last_codes) = codes.split_at_mut(charges.len());
+        let sure = to_sample(0.5 - doubt);
+        let chunks = charges.as_chunks::<LANES>().0.iter().zip(codes.as_chunks_mut::<LANES>().0);
+        for (charges, codes) in chunks {
+            let mut unsure = 0_u32;
+            for (&charge, code) in charges.iter().zip(&mut *codes) {
+                let level = bias + slope * charge;
+                let above = if level > 0.0 { level } else { 0.0 };
+                let within = if above < top { above } else { top };
+                let nearest = (within + WHOLE) - WHOLE;
+                *code = nearest;
+                // A charge that is no number is in doubt too.
+                unsure |= u32::from(!((within - nearest).abs() < sure) | level.is_nan());
+            }
+            if unsure != 0 {
+                for (&charge, code) in charges.iter().zip(codes) {
+                    *code = adc.code(charge);
+                }
+            }
+        }
+        for (&charge, code) in last.iter().zip(last_codes) {
+            *code = adc.code(charge);
+        }
+        counts
     }
 }
 
