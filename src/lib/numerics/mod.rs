@@ -6,4 +6,5 @@ pub mod moments;
 pub mod normal;
 pub mod quadrature;
 pub mod significance;
+pub mod sums;
 pub mod vectors;
