@@ -4,6 +4,7 @@ pub mod distribution;
 pub mod least_squares;
 pub mod moments;
 pub mod normal;
+pub mod planes;
 pub mod quadrature;
 pub mod significance;
 pub mod sums;

@@ -52,7 +52,7 @@ pub fn render(report: &Report, format: ReportFormat) -> Result<String> {
 }
 
 /// Column headings of the text and CSV forms, with the number of significant digits of text.
-const COLUMNS: [(&str, &str); 10] = [
+const COLUMNS: [(&str, &str); 12] = [
     ("mean", "mean"),
     ("std", "std"),
     ("min", "min"),
@@ -63,9 +63,11 @@ const COLUMNS: [(&str, &str); 10] = [
     ("predicted_std", "pred. std"),
     ("z_mean", "z mean"),
     ("z_std", "z std"),
+    ("mean_error", "mean err."),
+    ("std_error", "std err."),
 ];
 
-fn values(channel: &ChannelReport) -> [Option<f64>; 10] {
+fn values(channel: &ChannelReport) -> [Option<f64>; 12] {
     [
         channel.mean,
         channel.std,
@@ -77,6 +79,8 @@ fn values(channel: &ChannelReport) -> [Option<f64>; 10] {
         channel.predicted_std,
         channel.z_mean,
         channel.z_std,
+        channel.mean_error,
+        channel.std_error,
     ]
 }
 
@@ -132,6 +136,7 @@ fn shown(key: &str, value: Option<f64>) -> String {
     match key {
         "clipped" => format!("{value}"),
         "snr_db" | "z_mean" | "z_std" => format!("{value:.2}"),
+        "mean_error" | "std_error" => in_digits(value, 2),
         _ => in_digits(value, 6),
     }
 }

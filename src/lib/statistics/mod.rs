@@ -142,6 +142,12 @@ pub struct ChannelReport {
     /// (std / expected − 1) over its sampling error, that of independent samples √((2 + κ n⁄(n−1)) / 4n), κ the excess
     /// kurtosis.
     pub z_std: Option<f64>,
+    /// Standard error of the mean: s/√n_eff. Where a prediction knows how demosaicked neighbours are correlated, n_eff is
+    /// its effective number; elsewhere samples count as independent, in a CFA plane within each class.
+    pub mean_error: Option<f64>,
+    /// Standard error of the standard deviation: with a prediction s times its relative one, elsewhere s/√(2(n − 1)), that
+    /// of independent normal samples; in a CFA plane from those of its classes.
+    pub std_error: Option<f64>,
 }
 
 /// What one region has seen so far.
@@ -378,7 +384,11 @@ impl Tally {
                 _ => None,
             };
             let clipped = has_rails.then_some(self.channels.beyond[index]);
-            ChannelReport::new(name, &self.channels, index, black, clipped, expectation)
+            let mut report = ChannelReport::new(name, &self.channels, index, black, clipped, expectation);
+            if metadata.cfa.is_some() && channels == 1 {
+                (report.mean_error, report.std_error) = self.plane_errors();
+            }
+            report
         };
         let reports: Vec<ChannelReport> = (0..channels).map(channel_report).collect();
         let classes = match metadata.cfa {
@@ -456,6 +466,25 @@ impl Tally {
             whole.tests(&Measured { names: &names, mean: [moments.mean[0]; 3], covariance })
         })
         .collect()
+    }
+
+    /// Standard errors of mean and standard deviation of a CFA plane, whose classes have shares w that are not drawn.
+    ///
+    /// x̄ = Σ w x̄ₖ,  s² ≈ Σ w (sₖ² + (x̄ₖ − x̄)²),  so that to first order
+    /// var x̄ = Σ w² sₖ²/nₖ,  var s² = Σ w² (2 sₖ⁴/(nₖ − 1) + 4 (x̄ₖ − x̄)² sₖ²/nₖ)
+    fn plane_errors(&self) -> (Option<f64>, Option<f64>) {
+        let total = self.channels.count as f64;
+        let (mut of_mean, mut of_variance) = (0.0, 0.0);
+        for class in self.classes.iter().filter(|class| class.count > 0) {
+            let Some(variance) = class.covariance(0, 0) else { return (None, None) };
+            let (n, offset) = (class.count as f64, class.mean[0] - self.channels.mean[0]);
+            let share = (n / total).powi(2);
+            of_mean += share * variance / n;
+            of_variance += share * (2.0 * variance * variance / (n - 1.0) + 4.0 * offset * offset * variance / n);
+        }
+        let std = self.channels.std(0);
+        let of_std = std.map(|std| if std > 0.0 { of_variance.sqrt() / (2.0 * std) } else { 0.0 });
+        (std.map(|_| of_mean.sqrt()), of_std)
     }
 
     /// The prediction for a plane in which the classes are mixed as the region has them.
@@ -554,6 +583,12 @@ impl ChannelReport {
             (ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
         };
         let spread = expectation.filter(|expected| expected.std > 0.0);
+        let n = count as f64;
+        // Errors of independent normal samples, relative to their standard deviation.
+        let independent = (1.0 / n.sqrt(), (2.0 * (n - 1.0)).sqrt().recip());
+        let known = |expected: Expectation| (expected.mean_error / expected.sample_std, expected.std_error);
+        let is_known = |errors: &(f64, f64)| errors.0.is_finite() && errors.1.is_finite();
+        let (mean_error, std_error) = expectation.map(known).filter(is_known).unwrap_or(independent);
         Self {
             name,
             count,
@@ -567,6 +602,8 @@ impl ChannelReport {
             predicted_std: expectation.map(|expected| expected.std),
             z_mean: mean.zip(spread).map(|(mean, expected)| (mean - expected.mean) / expected.mean_error),
             z_std: std.zip(spread).map(|(std, expected)| (std / expected.sample_std - 1.0) / expected.std_error),
+            mean_error: std.map(|std| std * mean_error),
+            std_error: std.map(|std| std * std_error),
         }
     }
 }
