@@ -3,7 +3,7 @@
 use super::sums::{self, Limits, Sums};
 
 /// Samples of a channel that are summed about one center.
-pub const BLOCK: usize = 2048;
+pub const BLOCK: usize = 4096;
 
 /// Count, means, extremes and sums of products of deviations of `channels` variables observed together.
 ///
@@ -448,8 +448,8 @@ mod tests {
         }
     }
 
-    /// Worst case of a sum of 256 terms on one lane is 256 · 2⁻⁵³ = 3·10⁻¹⁴ of it, which a center √15 standard deviations
-    /// away makes 16 times as much: 5·10⁻¹³; what is seen is about 10⁻¹⁵.
+    /// Worst case of a sum of 512 terms on one lane is 512 · 2⁻⁵³ = 6·10⁻¹⁴ of it, which a center √15 standard deviations
+    /// away makes 16 times as much: 9·10⁻¹³; what is seen is about 10⁻¹⁵.
     #[test]
     fn sums_are_as_good_as_two_passes_wherever_the_level_and_the_first_sample() {
         for row in [37, 2654, 5000] {
@@ -484,7 +484,7 @@ mod tests {
     #[test]
     fn samples_that_take_turns_are_told_apart() {
         for bad in [usize::MAX, 4000] {
-            let line: Vec<f32> = (0..5001)
+            let line: Vec<f32> = (0..9001)
                 .map(|x| if x == bad { f32::INFINITY } else { [10.0, 700.0][x % 2] + deviate(0, x) })
                 .collect();
             let mut found = [Moments::new(1), Moments::new(1)];

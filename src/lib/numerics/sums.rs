@@ -4,7 +4,7 @@
 //! lanes. A block in which anything is NaN
 //! or infinite shows by sums that are not finite, since no sum over finite 32-bit samples overflows a double.
 
-use super::vectors::{self, Kernel};
+use super::vectors::{self, Instructions, Kernel};
 
 /// Lanes of the sums.
 pub const LANES: usize = 8;
@@ -77,7 +77,7 @@ impl Lanes {
             self.min[lane] = if samples[lane] < self.min[lane] { samples[lane] } else { self.min[lane] };
         }
         for lane in 0..LANES {
-            self.max[lane] = if samples[lane] > self.max[lane] { samples[lane] } else { self.max[lane] };
+            self.max[lane] = if self.max[lane] >= samples[lane] { self.max[lane] } else { samples[lane] };
         }
         deviations
     }
@@ -245,7 +245,8 @@ pub fn together<const VARIABLES: usize, const PAIRS: usize>(
 ) -> ([Sums; VARIABLES], [f64; PAIRS]) {
     const { assert!(PAIRS == VARIABLES * (VARIABLES - 1) / 2) };
     assert!(samples.iter().all(|line| line.len() == samples[0].len()));
-    vectors::run(Together { samples, centers })
+    let widest = if VARIABLES == 1 { narrow() } else { Instructions::widest() };
+    vectors::run_on(widest, Together { samples, centers })
 }
 
 /// Σ (x − c₀)(y − c₁) over two variables, all of one length.
@@ -255,7 +256,13 @@ pub fn product(samples: [&[f32]; 2], centers: [f64; 2]) -> f64 {
 
 /// Sums over the samples at even and at odd places.
 pub fn alternating(samples: &[f32], centers: [f64; 2]) -> [Sums; 2] {
-    vectors::run(Alternating { samples, centers })
+    vectors::run_on(narrow(), Alternating { samples, centers })
+}
+
+/// What sums of one variable run on: at 512 bits the compiler packs smallest and largest samples into one vector and takes
+/// them out again, which costs more than the width brings.
+fn narrow() -> Instructions {
+    Instructions::widest().min(Instructions::Avx2)
 }
 
 #[cfg(test)]
