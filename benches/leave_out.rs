@@ -82,7 +82,8 @@ fn wavelengths(criterion: &mut Criterion) {
 
 fn stages(criterion: &mut Criterion) {
     let three = header(QuantityKind::ExpectedElectrons, &["R", "G", "B"]);
-    let row: Vec<f32> = SIGNAL.iter().flat_map(|e| std::iter::repeat_n(cyanometer::frame::to_sample(*e), SIZE[0])).collect();
+    let row: Vec<f32> =
+        SIGNAL.iter().flat_map(|e| std::iter::repeat_n(cyanometer::frame::to_sample(*e), SIZE[0])).collect();
     let light = MemoryFrame::new(three, row.repeat(SIZE[1]));
     let noise = |frame: &MemoryFrame, temperature_k: Option<f64>| {
         let settings = NoiseSettings { temperature_k, ..NoiseSettings::default() };

@@ -41,7 +41,8 @@ fn of_classes(samples: &[f32]) -> [Moments; 3] {
 }
 
 fn moments(criterion: &mut Criterion) {
-    for (name, channels) in [("moments of one plane", 1), ("moments of three planes", 3), ("moments of five planes", 5)] {
+    for (name, channels) in [("moments of one plane", 1), ("moments of three planes", 3), ("moments of five planes", 5)]
+    {
         let samples = codes(channels);
         let mut copied = vec![0.0; samples.len()];
         let mut group = criterion.benchmark_group(name);

@@ -23,7 +23,12 @@ use support::*;
 
 const SIGNAL: [f64; 3] = [4448.1, 16_599.3, 30_000.7];
 
-fn rendered(size: [usize; 2], patch: [usize; 2], vignetting: Option<Vignetting>, cfa: Option<CfaPattern>) -> MemoryFrame {
+fn rendered(
+    size: [usize; 2],
+    patch: [usize; 2],
+    vignetting: Option<Vignetting>,
+    cfa: Option<CfaPattern>,
+) -> MemoryFrame {
     let channels: &[&str] = if cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
     let mut header = header(QuantityKind::ExpectedElectrons, Geometry::new(size[0], size[1], channels));
     header.metadata.cfa = cfa;
@@ -77,7 +82,8 @@ fn wavelengths_that_no_class_responds_to_add_nothing() {
     let all = loaded.response.electron_weights(&loaded.sensor, &EXPOSURE, &all_nm, &widths);
     let radiance = |nm: f64| 1e-6 * (1.5 + (nm / 37.0).sin());
     for (all, kept_weights) in all.iter().zip(&kept.weights) {
-        let sum = |nm: &[f64], weights: &[f64]| -> f64 { nm.iter().zip(weights).map(|(nm, w)| w * radiance(*nm)).sum() };
+        let sum =
+            |nm: &[f64], weights: &[f64]| -> f64 { nm.iter().zip(weights).map(|(nm, w)| w * radiance(*nm)).sum() };
         assert_eq!(sum(&all_nm, all).to_bits(), sum(&kept.wavelengths_nm, kept_weights).to_bits());
     }
     // The same of the planes of a spectral image.

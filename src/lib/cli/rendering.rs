@@ -457,7 +457,11 @@ impl Request {
         let is_negligible = vignetting.as_ref().is_some_and(Vignetting::is_negligible);
         let vignetting = vignetting.filter(|_| !is_negligible);
         if is_negligible {
-            metadata.leave_out("render-radiance", "vignetting", "it changes no sample by half a unit in the last place");
+            metadata.leave_out(
+                "render-radiance",
+                "vignetting",
+                "it changes no sample by half a unit in the last place",
+            );
         }
         if self.cfa.is_some() {
             metadata.leave_out("render-radiance", "two of the three planes at each photosite", "the mosaic drops them");

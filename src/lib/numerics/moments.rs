@@ -104,14 +104,7 @@ impl Moments {
         self.merge_finite(block.count, &block.center, &block.sums, &block.products, [&block.min, &block.max]);
     }
 
-    fn merge_finite(
-        &mut self,
-        count: u64,
-        origin: &[f64],
-        offset: &[f64],
-        comoments: &[f64],
-        [min, max]: [&[f64]; 2],
-    ) {
+    fn merge_finite(&mut self, count: u64, origin: &[f64], offset: &[f64], comoments: &[f64], [min, max]: [&[f64]; 2]) {
         if count == 0 {
             return;
         }
@@ -402,8 +395,7 @@ mod tests {
 
     /// Means and covariances of the finite observations, by two passes in doubles with compensated sums.
     fn two_passes(lines: &[Vec<f32>; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
-        let kept: Vec<usize> =
-            (0..lines[0].len()).filter(|&x| lines.iter().all(|line| line[x].is_finite())).collect();
+        let kept: Vec<usize> = (0..lines[0].len()).filter(|&x| lines.iter().all(|line| line[x].is_finite())).collect();
         let sum = |values: &mut dyn Iterator<Item = f64>| {
             let (mut sum, mut lost) = (0.0_f64, 0.0);
             for value in values {

@@ -116,14 +116,8 @@ mod tests {
             let count = width.min(PIXELS);
             for set in Instructions::ALL {
                 let mut sums = [[0.0; PIXELS]; 3];
-                let kernel = Weighted {
-                    samples: &samples,
-                    stride: width,
-                    first: 0,
-                    planes: &weighted,
-                    sums: &mut sums,
-                    count,
-                };
+                let kernel =
+                    Weighted { samples: &samples, stride: width, first: 0, planes: &weighted, sums: &mut sums, count };
                 run_on(set, kernel);
                 assert!((0..count).all(|x| [0, 1, 2].map(|k| sums[k][x]) == plain[x]));
             }

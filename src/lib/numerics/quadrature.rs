@@ -105,8 +105,12 @@ mod tests {
             let (estimate, error) = (rule.relative_error(fine, coarse).unwrap(), (fine / exact - 1.0).abs());
             assert!((estimate / error - 1.0).abs() < 0.01, "{rule:?}: {estimate:e} {error:e}");
         }
-        let doubling = [1, 2, 3, 4, 5].map(|points| [Rule::Rectangle, Rule::Simpson].map(|rule| rule.can_double(points)));
+        let doubling =
+            [1, 2, 3, 4, 5].map(|points| [Rule::Rectangle, Rule::Simpson].map(|rule| rule.can_double(points)));
         assert_eq!(doubling, [[false; 2], [false; 2], [true, false], [false; 2], [true; 2]]);
-        assert_eq!((Rule::Rectangle.relative_error(0.0, 0.0), Rule::Rectangle.relative_error(0.0, 1.0)), (Some(0.0), None));
+        assert_eq!(
+            (Rule::Rectangle.relative_error(0.0, 0.0), Rule::Rectangle.relative_error(0.0, 1.0)),
+            (Some(0.0), None)
+        );
     }
 }
