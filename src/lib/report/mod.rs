@@ -29,7 +29,7 @@ pub enum ReportFormat {
     Json,
     /// YAML.
     Yaml,
-    /// CSV, one row per region and channel; patches have their place at the end.
+    /// CSV, one row per region and channel; patches have their place after the predictions.
     Csv,
 }
 
@@ -86,22 +86,28 @@ fn values(channel: &ChannelReport) -> [Option<f64>; 12] {
 
 fn csv(report: &Report) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let head = ["x", "y", "width", "height", "channel", "count"].into_iter().chain(COLUMNS.map(|(key, _)| key));
+    // Columns that were there first keep their places.
+    let (first, errors) = COLUMNS.split_at(10);
+    let keys = |columns: &[(&'static str, &'static str)]| columns.iter().map(|(key, _)| *key).collect::<Vec<_>>();
+    let head = ["x", "y", "width", "height", "channel", "count"].into_iter().chain(keys(first));
     let of_patches = report.regions.iter().any(|region| region.patch.is_some());
     let last: &[&str] = if of_patches { &["sample", "patch_column", "patch_row"] } else { &[] };
-    writer.write_record(head.chain(last.iter().copied())).map_err(unwritable)?;
+    writer.write_record(head.chain(last.iter().copied()).chain(keys(errors))).map_err(unwritable)?;
     for region in &report.regions {
         for channel in region.channels.iter().chain(&region.classes) {
+            let numbers = values(channel).map(|value| value.map_or(String::new(), |v| v.to_string()));
+            let (first, errors) = numbers.split_at(10);
             let place = [region.region.x, region.region.y, region.region.width, region.region.height];
             let cells = place
                 .iter()
                 .map(ToString::to_string)
                 .chain([channel.name.clone(), channel.count.to_string()])
-                .chain(values(channel).map(|value| value.map_or(String::new(), |v| v.to_string())))
+                .chain(first.iter().cloned())
                 .chain(region.patch.into_iter().flat_map(|[column, row]| {
                     let sample = region.sample.map_or(String::new(), |sample| sample.to_string());
                     [sample, column.to_string(), row.to_string()]
-                }));
+                }))
+                .chain(errors.iter().cloned());
             writer.write_record(cells).map_err(unwritable)?;
         }
     }

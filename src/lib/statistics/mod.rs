@@ -645,6 +645,26 @@ mod tests {
         assert_eq!(means, [Some(10.0), Some(20.0), Some(30.0)]);
     }
 
+    /// Of independent normal samples 1/√n and 1/√(2(n − 1)) of the standard deviation; of a plane, those of its classes.
+    #[test]
+    fn errors_are_those_of_independent_samples() {
+        let noise = |i: usize| ((i * 7919 + i * i * 31) % 1009) as f32 / 1009.0;
+        let report = measure(&mut frame(&["Y"], 40, 30, noise), &[], Equations::Exact, None).unwrap();
+        let channel = &report.regions[0].channels[0];
+        let std = channel.std.unwrap();
+        assert!((channel.mean_error.unwrap() / std * 1200_f64.sqrt() - 1.0).abs() < 1e-12);
+        assert!((channel.std_error.unwrap() / std * 2398_f64.sqrt() - 1.0).abs() < 1e-12);
+        // Classes 100 apart: the error of the mean is that of their own scatter, not of their distance.
+        let mut plane = frame(&["Y"], 40, 30, |i| noise(i) + 100.0 * [1.0, 2.0, 2.0, 3.0][(i / 40 % 2) * 2 + i % 2]);
+        plane.header.metadata.cfa = Some(CfaPattern::Rggb);
+        let report = measure(&mut plane, &[], Equations::Exact, None).unwrap();
+        let (whole, classes) = (&report.regions[0].channels[0], &report.regions[0].classes);
+        let of_classes = |k: usize| classes[k].mean_error.unwrap() * [0.25, 0.5, 0.25][k];
+        let expected = (0..3).map(|k| of_classes(k).powi(2)).sum::<f64>().sqrt();
+        assert!((whole.mean_error.unwrap() / expected - 1.0).abs() < 1e-9);
+        assert!(whole.std.unwrap() > 70.0 && whole.std_error.unwrap() < 0.01);
+    }
+
     #[test]
     fn one_sample_has_a_mean_and_no_spread() {
         let report = measure(&mut frame(&["Y"], 1, 1, |_| 7.0), &[], Equations::Exact, None).unwrap();
