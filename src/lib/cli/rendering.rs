@@ -288,9 +288,9 @@ impl Request {
                     let coarse = coarse.as_ref().map(|weights| weights.camera(sampled_nm).0);
                     Seen { camera, coarse, rule: grid.quadrature }
                 };
-                let light;
-                (light, quadrature_error) = self.open_light(session, camera, &mut input, &mut metadata)?;
-                light
+                let (opened, error) = self.open_light(session, camera, &mut input, &mut metadata)?;
+                quadrature_error = error;
+                opened
             }
         };
         let mut brightest_e = None;

@@ -357,6 +357,8 @@ impl Block {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::needless_range_loop, reason = "channels index several arrays")]
+
     use super::*;
 
     #[test]

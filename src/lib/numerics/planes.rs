@@ -1,5 +1,10 @@
 //! Weighted sums over planes of samples: the integral over wavelength of every pixel of a spectral image.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over pixels that the compiler turns into vectors index several arrays"
+)]
+
 use super::vectors::{self, Kernel};
 
 /// Pixels that are summed together: their sums, three doubles each, stay in the level-1 cache.

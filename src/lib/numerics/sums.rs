@@ -4,6 +4,11 @@
 //! lanes. A block in which anything is NaN
 //! or infinite shows by sums that are not finite, since no sum over finite 32-bit samples overflows a double.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over lanes that the compiler turns into vectors index several arrays"
+)]
+
 use super::vectors::{self, Instructions, Kernel};
 
 /// Lanes of the sums.
