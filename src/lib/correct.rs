@@ -80,6 +80,9 @@ impl CorrectFrame {
         let black_left = known_black.and_then(less).or(is_subtracted.then_some(0.0));
         metadata.black_level_adu = black_left.map(restored);
         metadata.white_level_adu = metadata.white_level_adu.and_then(less).map(restored);
+        if is_subtracted && darks.is_empty() && black_adu == 0.0 {
+            metadata.leave_out("correct-frame", "subtraction of the black level", "it is zero");
+        }
         let dark_frames = u32::try_from(darks.len()).unwrap_or(u32::MAX);
         metadata.correction = Some(CorrectionRecord { black_adu, dark_frames, cte });
         let header = FrameHeader { metadata, ..input.clone() };
@@ -178,14 +181,20 @@ impl Stage for CorrectFrame {
         let mut counts = Counts::default();
         let rows = output.range();
         for channel in 0..input.channels() {
-            let mut store = |corrected: f64, sample: &mut f32| {
+            let store = |corrected: f64, sample: &mut f32, counts: &mut Counts| {
                 counts.not_finite += u64::from(!corrected.is_finite());
                 *sample = to_sample(corrected);
             };
             let Some(transfer) = &self.transfer else {
                 for y in rows.clone() {
+                    if self.black_adu == 0.0 {
+                        let (codes, samples) = (input.row(y.cast_signed(), channel), output.row(y, channel));
+                        samples.copy_from_slice(codes);
+                        counts.not_finite += codes.iter().filter(|code| !code.is_finite()).count() as u64;
+                        continue;
+                    }
                     for (&code, sample) in input.row(y.cast_signed(), channel).iter().zip(output.row(y, channel)) {
-                        store(f64::from(code) - self.black_adu, sample);
+                        store(f64::from(code) - self.black_adu, sample, &mut counts);
                     }
                 }
                 continue;
@@ -197,7 +206,7 @@ impl Stage for CorrectFrame {
                 }
                 if y >= rows.start {
                     for (&charge, sample) in passage.leaving(y).iter().zip(output.row(y, channel)) {
-                        store(charge + self.bias_adu, sample);
+                        store(charge + self.bias_adu, sample, &mut counts);
                     }
                 }
             }

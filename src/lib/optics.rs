@@ -86,6 +86,14 @@ impl Vignetting {
         Self { columns: squares(width), rows: squares(height) }
     }
 
+    /// Whether it darkens no photosite by as much as half a unit in the last place of a sample, 2⁻²⁵ of it: a field of
+    /// (almost) no extent.
+    pub fn is_negligible(&self) -> bool {
+        let largest = |squares: &[f64]| squares.iter().copied().fold(0.0, f64::max);
+        let least = (1.0 + largest(&self.columns) + largest(&self.rows)).powi(2).recip();
+        1.0 - least < f64::from(f32::EPSILON) / 4.0
+    }
+
     /// cos⁴θ of each photosite in row `y`.
     pub fn row(&self, y: usize) -> impl Iterator<Item = f64> {
         let vertical = 1.0 + self.rows[y];

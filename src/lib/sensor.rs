@@ -2,6 +2,8 @@
 
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
+use crate::numerics::planes::WeightedPlane;
+use crate::numerics::quadrature::Rule;
 use crate::optics::Exposure;
 use crate::spectrum::{Curve, WavelengthGrid, fold};
 use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, LIGHT_M_PER_S, M_PER_NM, PLANCK_J_S};
@@ -237,6 +239,22 @@ impl Camera {
     /// Signal electrons of R, G and B from a radiance in W cm⁻² sr⁻¹ nm⁻¹.
     pub fn electrons(&self, radiance: &[f64]) -> [f64; 3] {
         self.weights.each_ref().map(|weights| weights.iter().zip(radiance).map(|(w, l)| w * l).sum())
+    }
+
+    /// The planes of a spectral image that this camera sees, `channels` the place of each wavelength and `factor` the W
+    /// cm⁻² sr⁻¹ nm⁻¹ of a sample of 1. Planes to which no class responds are left out: they would add zeros.
+    pub fn planes(&self, channels: &[usize], factor: f64) -> Vec<WeightedPlane> {
+        let weights = (0..channels.len()).map(|i| self.weights.each_ref().map(|class| class[i] * factor));
+        let planes = channels.iter().zip(weights).map(|(&plane, weights)| WeightedPlane { plane, weights });
+        planes.filter(|plane| plane.weights != [0.0; 3]).collect()
+    }
+
+    /// Relative error of [`Self::electrons`] of R, G and B by `rule`, as the same camera at twice the step tells it; none
+    /// where no estimate is possible.
+    pub fn quadrature_error(&self, rule: Rule, at_twice_the_step: &Self, radiance: &[f64]) -> Option<[f64; 3]> {
+        let (fine, coarse) = (self.electrons(radiance), at_twice_the_step.electrons(radiance));
+        let [red, green, blue] = [0, 1, 2].map(|k| rule.relative_error(fine[k], coarse[k]));
+        Some([red?, green?, blue?])
     }
 }
 

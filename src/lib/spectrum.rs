@@ -54,6 +54,15 @@ impl WavelengthGrid {
     }
 }
 
+impl WavelengthGrid {
+    /// Every second wavelength, for an estimate of the error; none where the rule does not fit these.
+    pub fn doubled(&self) -> Option<Self> {
+        let (wavelengths, _) = self.points().ok()?;
+        let doubled = Self { step_nm: 2.0 * self.step_nm, ..*self };
+        self.quadrature.can_double(wavelengths.len()).then_some(doubled)
+    }
+}
+
 /// A function of wavelength, known at some wavelengths and linear between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {

@@ -129,6 +129,9 @@ struct About {
     equations: Equations,
     #[serde(skip_serializing_if = "Option::is_none")]
     patch: Option<[usize; 2]>,
+    /// Of the expected electrons of R, G and B, relative; where a spectrum was summed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quadrature_error: Option<[f64; 3]>,
 }
 
 impl Request {
@@ -163,7 +166,7 @@ impl Request {
             None => {
                 let found = chain.predict(electrons)?;
                 self.warn(session, std::iter::once(&found));
-                report::prediction(&about, &found, format.unwrap_or(ReportFormat::Text))?
+                report::prediction(&about, &found, about.quadrature_error, format.unwrap_or(ReportFormat::Text))?
             }
         };
         if let Some(plot) = &self.plot {
@@ -192,12 +195,13 @@ impl Request {
         if scene.input.is_none() && scene.electrons.is_none() {
             scene.electrons = Some([1.0; 3]);
         }
-        let (sensor, exposure, electrons) = scene.uniform(session)?;
+        let rendering::Uniform { sensor, exposure, electrons, quadrature_error } = scene.uniform(session)?;
         if self.sweep.is_some() && electrons == [0.0; 3] {
             return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
         }
         let color = self.color(session, &sensor)?;
-        Ok((self.settled(&sensor, exposure, color)?, self.about(&sensor, exposure), electrons))
+        let about = About { quadrature_error, ..self.about(&sensor, exposure) };
+        Ok((self.settled(&sensor, exposure, color)?, about, electrons))
     }
 
     /// Every sample of a library, each at its own exposure where one is to be chosen.
@@ -243,6 +247,7 @@ impl Request {
             pattern: self.pattern.unwrap_or(sensor.cfa),
             equations: self.equations,
             patch: self.patch,
+            quadrature_error: None,
         }
     }
 

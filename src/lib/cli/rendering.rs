@@ -10,6 +10,7 @@ use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::formats::{csv::SpectralTable, data};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata, Scene};
+use crate::numerics::planes::{WeightedPlane, weighted_sums};
 use crate::numerics::quadrature::Rule;
 use crate::optics::{Exposure, Vignetting};
 use crate::render::Rendering;
@@ -114,6 +115,7 @@ struct Prepared {
     exposure: Exposure,
     light: Light,
     brightest_e: Option<f64>,
+    quadrature_error: Option<[f64; 3]>,
     metadata: Metadata,
     input: Option<(FileId, String)>,
 }
@@ -128,27 +130,70 @@ enum ImageRows {
 /// Rows of a spectral image as signal electrons.
 struct SpectralRows {
     reader: FrameReader,
-    spectral: SpectralChannels,
-    camera: Camera,
+    planes: Vec<WeightedPlane>,
     samples: Vec<f32>,
+    /// The first row, where it was read to judge the sum over wavelengths.
+    ahead: Option<Vec<[f64; 3]>>,
 }
 
 impl SpectralRows {
     fn next(&mut self) -> Result<Vec<[f64; 3]>> {
+        if let Some(row) = self.ahead.take() {
+            return Ok(row);
+        }
         self.samples.clear();
         self.reader.read(1, &mut self.samples)?;
-        let width = self.reader.header().geometry.width;
-        let factor = self.spectral.unit.in_w_per_cm2_sr_nm();
-        let mut radiance = vec![0.0; self.spectral.channels.len()];
-        (0..width)
-            .map(|x| {
-                for (value, channel) in radiance.iter_mut().zip(&self.spectral.channels) {
-                    *value = f64::from(self.samples[channel * width + x]) * factor;
-                }
-                checked(self.camera.electrons(&radiance), &self.reader.header().name)
-            })
-            .collect()
+        let header = self.reader.header();
+        let mut row = Vec::with_capacity(header.geometry.width);
+        weighted_sums(&self.samples, header.geometry.width, &self.planes, |electrons| row.push(electrons));
+        row.into_iter().map(|electrons| checked(electrons, &header.name)).collect()
     }
+
+    /// Reads the first row ahead, and gives the radiance of its brightest pixel.
+    fn brightest_ahead(&mut self, spectral: &SpectralChannels) -> Result<Vec<f64>> {
+        let row = self.next()?;
+        let radiance = self.radiance(spectral, brightest(&row));
+        self.ahead = Some(row);
+        Ok(radiance)
+    }
+
+    /// The radiance of a pixel of the row that was read last, W cm⁻² sr⁻¹ nm⁻¹.
+    fn radiance(&self, spectral: &SpectralChannels, x: usize) -> Vec<f64> {
+        let (width, factor) = (self.reader.header().geometry.width, spectral.unit.in_w_per_cm2_sr_nm());
+        spectral.channels.iter().map(|channel| f64::from(self.samples[channel * width + x]) * factor).collect()
+    }
+}
+
+/// The place of the brightest of some pixels.
+fn brightest(electrons: &[[f64; 3]]) -> usize {
+    let largest = |x: usize| electrons[x].iter().copied().fold(0.0, f64::max);
+    (0..electrons.len()).max_by(|&a, &b| largest(a).total_cmp(&largest(b)).then(b.cmp(&a))).unwrap_or_default()
+}
+
+/// What a camera makes of radiances on one set of wavelengths, and the same at twice the step.
+struct Seen {
+    camera: Camera,
+    coarse: Option<Camera>,
+    rule: Rule,
+}
+
+impl Seen {
+    fn quadrature_error(&self, radiance: &[f64]) -> Option<[f64; 3]> {
+        self.camera.quadrature_error(self.rule, self.coarse.as_ref()?, radiance)
+    }
+}
+
+/// A uniform scene behind a camera.
+#[derive(Debug, Clone)]
+pub struct Uniform {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// The exposure.
+    pub exposure: Exposure,
+    /// Signal electrons of R, G and B.
+    pub electrons: [f64; 3],
+    /// Estimated relative error of them by the sum over wavelengths; none where no spectrum was summed or none is possible.
+    pub quadrature_error: Option<[f64; 3]>,
 }
 
 /// Electrons that can be.
@@ -177,12 +222,13 @@ impl Request {
     /// # Errors
     ///
     /// As [`Self::render`]; [`Error::Usage`] for a spectral image of which no sample was chosen.
-    pub fn uniform(&self, session: &Session) -> Result<(Sensor, Exposure, [f64; 3])> {
+    pub fn uniform(&self, session: &Session) -> Result<Uniform> {
         let prepared = self.prepare(session)?;
         match prepared.light {
             Light::Uniform { electrons, .. } => {
                 let factor = if self.expose_to.is_some() { prepared.exposure.exposure_s } else { 1.0 };
-                Ok((prepared.sensor, prepared.exposure, electrons.map(|e| e * factor)))
+                let Prepared { sensor, exposure, quadrature_error, .. } = prepared;
+                Ok(Uniform { sensor, exposure, electrons: electrons.map(|e| e * factor), quadrature_error })
             }
             Light::Image { source, .. } => {
                 Err(Error::Usage(format!("{source}: it holds many spectra; choose one with --sample N")))
@@ -207,6 +253,7 @@ impl Request {
         }
         let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
         let mut input = self.input.as_deref().and_then(regular_file);
+        let mut quadrature_error = None;
         let mut light = match self.electrons {
             Some(electrons) => {
                 let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
@@ -225,6 +272,8 @@ impl Request {
                         "no class responds there",
                     );
                 }
+                let coarse = grid.doubled();
+                let coarse = coarse.and_then(|grid| loaded.response.weights_on(&loaded.sensor, &exposure, &grid).ok());
                 let camera = |sampled_nm: &[f64], name: &str| {
                     let (camera, uncovered) = weights.camera(sampled_nm);
                     if uncovered > 1e-6 {
@@ -236,9 +285,12 @@ impl Request {
                             100.0 * uncovered
                         ));
                     }
-                    camera
+                    let coarse = coarse.as_ref().map(|weights| weights.camera(sampled_nm).0);
+                    Seen { camera, coarse, rule: grid.quadrature }
                 };
-                self.open_light(session, camera, &mut input)?
+                let (opened, error) = self.open_light(session, camera, &mut input, &mut metadata)?;
+                quadrature_error = error;
+                opened
             }
         };
         let mut brightest_e = None;
@@ -253,39 +305,48 @@ impl Request {
             brightest_e = Some(fraction * loaded.sensor.full_well_e);
             session.note(&format!("exposure {} s", exposure.exposure_s));
         }
-        Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, metadata, input })
+        if let Some([red, green, blue]) = quadrature_error {
+            session.note(&format!(
+                "the sum over wavelengths is off by about {red:.1e} of R, {green:.1e} of G, {blue:.1e} of B, as twice the \
+                 step tells"
+            ));
+        }
+        metadata.quadrature_error = quadrature_error;
+        Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, quadrature_error, metadata, input })
     }
 
-    /// Opens the radiance; gives a pixel's electrons at the exposure that `camera` was made for.
+    /// Opens the radiance; gives a pixel's electrons at the exposure that `camera` was made for, and the error of the sum
+    /// over wavelengths.
     fn open_light(
         &self,
         session: &Session,
-        camera: impl Fn(&[f64], &str) -> Camera,
+        camera: impl Fn(&[f64], &str) -> Seen,
         input: &mut Option<(FileId, String)>,
-    ) -> Result<Light> {
+        metadata: &mut Metadata,
+    ) -> Result<(Light, Option<[f64; 3]>)> {
         let options = InputOptions { path: self.input.clone(), part: self.part, metadata: None, all_channels: true };
         match spectral::open(&options)? {
             Radiances::Table(table) => {
                 let name = table.name().to_owned();
                 let seen = camera(&table.wavelength_nm, &name);
-                let electrons_of = |index: usize| {
+                let radiance_of = |index: usize| -> Vec<f64> {
                     let unit = self.radiance_unit.or_else(|| table.unit_of(index)).unwrap_or_default();
-                    let radiance: Vec<f64> =
-                        table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect();
-                    checked(seen.electrons(&radiance), &name)
+                    table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect()
                 };
+                let electrons_of = |index: usize| checked(seen.camera.electrons(&radiance_of(index)), &name);
                 let count = table.columns.len();
                 if self.patch.is_some() && count > 1 && self.column.is_none() && self.sample.is_none() {
                     let all: Vec<[f64; 3]> = (0..count).map(electrons_of).collect::<Result<_>>()?;
                     let width = chart_columns(count);
+                    let error = seen.quadrature_error(&radiance_of(brightest(&all[..width])));
                     let rows: Vec<Vec<[f64; 3]>> = all.chunks(width).map(<[_]>::to_vec).collect();
                     let rows = ImageRows::Kept(rows.into_iter());
-                    return Ok(Light::Image { rows, factor: 1.0, width, height: count / width, source: name });
+                    return Ok((Light::Image { rows, factor: 1.0, width, height: count / width, source: name }, error));
                 }
                 let index = self.choose(&table)?;
                 let electrons = electrons_of(index)?;
                 let source = if table.columns.len() > 1 { format!("{name}: {}", table.columns[index]) } else { name };
-                Ok(Light::Uniform { electrons, source })
+                Ok((Light::Uniform { electrons, source }, seen.quadrature_error(&radiance_of(index))))
             }
             Radiances::Image(reader) => {
                 if self.column.is_some() {
@@ -295,17 +356,24 @@ impl Request {
                 *input = reader.file();
                 let header = reader.header().clone();
                 let spectral = SpectralChannels::of(&header, self.radiance_unit)?;
-                let camera = camera(&spectral.wavelength_nm, &header.name);
+                let seen = camera(&spectral.wavelength_nm, &header.name);
+                let planes = seen.camera.planes(&spectral.channels, spectral.unit.in_w_per_cm2_sr_nm());
+                let all = spectral.channels.len();
+                if planes.len() < all {
+                    metadata.leave_out(
+                        "render-radiance",
+                        format!("{} of {all} spectral planes", all - planes.len()),
+                        "no class responds to them",
+                    );
+                }
                 let Geometry { width, height, .. } = header.geometry;
-                let mut rows = SpectralRows { reader: *reader, spectral, camera, samples: Vec::new() };
+                let mut rows = SpectralRows { reader: *reader, planes, samples: Vec::new(), ahead: None };
                 match self.sample {
-                    None => Ok(Light::Image {
-                        rows: ImageRows::Streamed(Box::new(rows)),
-                        factor: 1.0,
-                        width,
-                        height,
-                        source: header.name,
-                    }),
+                    None => {
+                        let error = seen.quadrature_error(&rows.brightest_ahead(&spectral)?);
+                        let rows = ImageRows::Streamed(Box::new(rows));
+                        Ok((Light::Image { rows, factor: 1.0, width, height, source: header.name }, error))
+                    }
                     Some(sample) if sample >= width * height => Err(Error::Usage(format!(
                         "{}: there is no sample {sample}; it has samples 0 to {}",
                         header.name,
@@ -316,7 +384,9 @@ impl Request {
                             rows.next()?;
                         }
                         let electrons = rows.next()?[sample % width];
-                        Ok(Light::Uniform { electrons, source: format!("{}: sample {sample}", header.name) })
+                        let radiance = rows.radiance(&spectral, sample % width);
+                        let source = format!("{}: sample {sample}", header.name);
+                        Ok((Light::Uniform { electrons, source }, seen.quadrature_error(&radiance)))
                     }
                 }
             }
@@ -384,6 +454,18 @@ impl Request {
         let vignetting = self
             .vignetting_focal_length_mm
             .map(|focal_length| Vignetting::new(size[0], size[1], sensor.pixel_pitch_um, focal_length));
+        let is_negligible = vignetting.as_ref().is_some_and(Vignetting::is_negligible);
+        let vignetting = vignetting.filter(|_| !is_negligible);
+        if is_negligible {
+            metadata.leave_out(
+                "render-radiance",
+                "vignetting",
+                "it changes no sample by half a unit in the last place",
+            );
+        }
+        if self.cfa.is_some() {
+            metadata.leave_out("render-radiance", "two of the three planes at each photosite", "the mosaic drops them");
+        }
         if vignetting.is_none() && patch[0] * patch[1] > 1 {
             metadata.leave_out(
                 "render-radiance",
@@ -399,7 +481,7 @@ impl Request {
             source,
             uniform: is_uniform,
             expected_electrons: uniform.filter(|_| is_uniform),
-            vignetting_focal_length_mm: self.vignetting_focal_length_mm,
+            vignetting_focal_length_mm: self.vignetting_focal_length_mm.filter(|_| !is_negligible),
             patch: uniform.is_none().then_some(patch),
             source_width,
             brightest_e,

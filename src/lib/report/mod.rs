@@ -29,7 +29,7 @@ pub enum ReportFormat {
     Json,
     /// YAML.
     Yaml,
-    /// CSV, one row per region and channel; patches have their place at the end.
+    /// CSV, one row per region and channel; patches have their place after the predictions.
     Csv,
 }
 
@@ -52,7 +52,7 @@ pub fn render(report: &Report, format: ReportFormat) -> Result<String> {
 }
 
 /// Column headings of the text and CSV forms, with the number of significant digits of text.
-const COLUMNS: [(&str, &str); 10] = [
+const COLUMNS: [(&str, &str); 12] = [
     ("mean", "mean"),
     ("std", "std"),
     ("min", "min"),
@@ -63,9 +63,11 @@ const COLUMNS: [(&str, &str); 10] = [
     ("predicted_std", "pred. std"),
     ("z_mean", "z mean"),
     ("z_std", "z std"),
+    ("mean_error", "mean err."),
+    ("std_error", "std err."),
 ];
 
-fn values(channel: &ChannelReport) -> [Option<f64>; 10] {
+fn values(channel: &ChannelReport) -> [Option<f64>; 12] {
     [
         channel.mean,
         channel.std,
@@ -77,27 +79,35 @@ fn values(channel: &ChannelReport) -> [Option<f64>; 10] {
         channel.predicted_std,
         channel.z_mean,
         channel.z_std,
+        channel.mean_error,
+        channel.std_error,
     ]
 }
 
 fn csv(report: &Report) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let head = ["x", "y", "width", "height", "channel", "count"].into_iter().chain(COLUMNS.map(|(key, _)| key));
+    // Columns that were there first keep their places.
+    let (first, errors) = COLUMNS.split_at(10);
+    let keys = |columns: &[(&'static str, &'static str)]| columns.iter().map(|(key, _)| *key).collect::<Vec<_>>();
+    let head = ["x", "y", "width", "height", "channel", "count"].into_iter().chain(keys(first));
     let of_patches = report.regions.iter().any(|region| region.patch.is_some());
     let last: &[&str] = if of_patches { &["sample", "patch_column", "patch_row"] } else { &[] };
-    writer.write_record(head.chain(last.iter().copied())).map_err(unwritable)?;
+    writer.write_record(head.chain(last.iter().copied()).chain(keys(errors))).map_err(unwritable)?;
     for region in &report.regions {
         for channel in region.channels.iter().chain(&region.classes) {
+            let numbers = values(channel).map(|value| value.map_or(String::new(), |v| v.to_string()));
+            let (first, errors) = numbers.split_at(10);
             let place = [region.region.x, region.region.y, region.region.width, region.region.height];
             let cells = place
                 .iter()
                 .map(ToString::to_string)
                 .chain([channel.name.clone(), channel.count.to_string()])
-                .chain(values(channel).map(|value| value.map_or(String::new(), |v| v.to_string())))
+                .chain(first.iter().cloned())
                 .chain(region.patch.into_iter().flat_map(|[column, row]| {
                     let sample = region.sample.map_or(String::new(), |sample| sample.to_string());
                     [sample, column.to_string(), row.to_string()]
-                }));
+                }))
+                .chain(errors.iter().cloned());
             writer.write_record(cells).map_err(unwritable)?;
         }
     }
@@ -132,6 +142,7 @@ fn shown(key: &str, value: Option<f64>) -> String {
     match key {
         "clipped" => format!("{value}"),
         "snr_db" | "z_mean" | "z_std" => format!("{value:.2}"),
+        "mean_error" | "std_error" => in_digits(value, 2),
         _ => in_digits(value, 6),
     }
 }

@@ -7,12 +7,18 @@ use crate::propagation::chain::{ChainPrediction, StagePrediction};
 use serde::Serialize;
 use std::fmt::Write;
 
-/// Writes the budget of one scene; `about` says what it was predicted for.
+/// Writes the budget of one scene; `about` says what it was predicted for. Text also shows the relative error of the sum
+/// over wavelengths, which the other forms have from `about`.
 ///
 /// # Errors
 ///
 /// [`crate::error::Error::Data`] when the form cannot hold it.
-pub fn prediction<A: Serialize>(about: &A, found: &ChainPrediction, format: ReportFormat) -> Result<String> {
+pub fn prediction<A: Serialize>(
+    about: &A,
+    found: &ChainPrediction,
+    quadrature_error: Option<[f64; 3]>,
+    format: ReportFormat,
+) -> Result<String> {
     #[derive(Serialize)]
     struct Whole<'a, A> {
         #[serde(flatten)]
@@ -25,7 +31,7 @@ pub fn prediction<A: Serialize>(about: &A, found: &ChainPrediction, format: Repo
         ReportFormat::Json => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
         ReportFormat::Yaml => serde_yaml::to_string(&whole).map_err(unwritable),
         ReportFormat::Csv => stages_csv(found),
-        ReportFormat::Text => Ok(text(found)),
+        ReportFormat::Text => Ok(text(found, quadrature_error)),
     }
 }
 
@@ -156,10 +162,16 @@ fn scenes_csv<'a>(
     finish(writer)
 }
 
-fn text(found: &ChainPrediction) -> String {
+fn text(found: &ChainPrediction, quadrature_error: Option<[f64; 3]>) -> String {
     let mut out = String::new();
     let [red, green, blue] = found.electrons.map(|e| shown("mean", Some(e)));
     let _ = writeln!(out, "expected signal: R {red}, G {green}, B {blue} e-");
+    if let Some([red, green, blue]) = quadrature_error {
+        let _ = writeln!(
+            out,
+            "relative error of the sum over wavelengths, by doubling the step: R {red:.1e}, G {green:.1e}, B {blue:.1e}"
+        );
+    }
     for stage in &found.stages {
         stage_text(stage, &mut out);
     }

@@ -5,8 +5,10 @@ pub mod patches;
 
 use crate::cfa::Class;
 use crate::error::{Error, Result};
+use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
-use crate::numerics::moments::Moments;
+use crate::numerics::moments::{self, Moments};
+use crate::numerics::sums::Limits;
 use crate::propagation::sampling::{Place, Sampling};
 use crate::propagation::{self, Equations, FramePrediction, Mixture, Prediction, mixture};
 use crate::stage::RowSource;
@@ -140,6 +142,12 @@ pub struct ChannelReport {
     /// (std / expected − 1) over its sampling error, that of independent samples √((2 + κ n⁄(n−1)) / 4n), κ the excess
     /// kurtosis.
     pub z_std: Option<f64>,
+    /// Standard error of the mean: s/√n_eff. Where a prediction knows how demosaicked neighbours are correlated, n_eff is
+    /// its effective number; elsewhere samples count as independent, in a CFA plane within each class.
+    pub mean_error: Option<f64>,
+    /// Standard error of the standard deviation: with a prediction s times its relative one, elsewhere s/√(2(n − 1)), that
+    /// of independent normal samples; in a CFA plane from those of its classes.
+    pub std_error: Option<f64>,
 }
 
 /// What one region has seen so far.
@@ -147,48 +155,27 @@ pub struct ChannelReport {
 struct Tally {
     channels: Moments,
     classes: [Moments; 3],
-    clipped: Vec<u64>,
-    clipped_classes: [u64; 3],
 }
 
-/// Which samples count as clipped.
-#[derive(Debug, Clone, Copy)]
-enum Rails {
-    None,
-    /// At or beyond either.
-    Codes(f32, f32),
-    /// At or above.
-    FullWell(f32),
-}
-
-impl Rails {
-    fn of(frame: &FrameHeader) -> Self {
-        let metadata = &frame.metadata;
-        // What transfer or its undoing has mixed lies at no rail any more; nor does a code less a dark frame's.
-        let transferred = metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
-        if metadata.correction.is_some() || (transferred && metadata.quantity == QuantityKind::Electrons) {
-            return Self::None;
-        }
-        match metadata.quantity {
-            QuantityKind::Adu if metadata.demosaic.is_none() => match metadata.white_level_adu {
-                Some(white) => Self::Codes(0.0, crate::frame::to_sample(white)),
-                None => Self::None,
-            },
-            QuantityKind::Electrons if metadata.demosaic.is_none() => match &metadata.sensor {
-                Some(sensor) => Self::FullWell(crate::frame::to_sample(sensor.full_well_e)),
-                None => Self::None,
-            },
-            _ => Self::None,
-        }
+/// Which samples of a frame count as clipped: codes at or beyond either end, electrons at full well or above.
+fn rails(frame: &FrameHeader) -> Limits {
+    let metadata = &frame.metadata;
+    // What transfer or its undoing has mixed lies at no rail any more; nor does a code less a dark frame's.
+    let transferred = metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
+    if metadata.correction.is_some() || (transferred && metadata.quantity == QuantityKind::Electrons) {
+        return Limits::NONE;
     }
-
-    fn count(self, samples: impl Iterator<Item = f32>) -> u64 {
-        match self {
-            Self::None => 0,
-            Self::Codes(low, high) => samples.filter(|&s| s <= low || s >= high).count() as u64,
-            Self::FullWell(top) => samples.filter(|&s| s >= top).count() as u64,
+    let limits = match metadata.quantity {
+        QuantityKind::Adu if metadata.demosaic.is_none() => {
+            metadata.white_level_adu.map(|white| Limits { low: 0.0, high: to_sample(white) })
         }
-    }
+        QuantityKind::Electrons if metadata.demosaic.is_none() => {
+            let full_well_e = metadata.sensor.as_ref().map(|sensor| sensor.full_well_e);
+            full_well_e.map(|e| Limits { high: to_sample(e), ..Limits::NONE })
+        }
+        _ => None,
+    };
+    limits.unwrap_or(Limits::NONE)
 }
 
 /// Reads a whole frame and works out the statistics of its regions.
@@ -213,7 +200,7 @@ pub fn measure(
     for region in regions {
         region.check(&frame)?;
     }
-    let rails = Rails::of(&frame);
+    let rails = rails(&frame);
     let tallies = tallies(source, &frame, regions, rails)?;
     let prediction = propagation::of_frame(&frame, equations);
     if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
@@ -239,16 +226,14 @@ pub fn measure(
 }
 
 /// Reads a whole frame and sums up its regions, each of which lies within it.
-fn tallies(source: &mut dyn RowSource, frame: &FrameHeader, regions: &[Region], rails: Rails) -> Result<Vec<Tally>> {
+///
+/// Each row of a region is summed by itself and merged in order, whatever the threads: the rows of one region side by side
+/// where regions are few, or regions side by side.
+fn tallies(source: &mut dyn RowSource, frame: &FrameHeader, regions: &[Region], rails: Limits) -> Result<Vec<Tally>> {
     let geometry = &frame.geometry;
-    let channels = geometry.channels.len();
-    let empty = || Tally {
-        channels: Moments::new(channels),
-        classes: [const { 0 }; 3].map(|_| Moments::new(1)),
-        clipped: vec![0; channels],
-        clipped_classes: [0; 3],
-    };
+    let empty = || Tally::new(geometry.channels.len());
     let mut tallies: Vec<Tally> = regions.iter().map(|_| empty()).collect();
+    let mut of_rows: Vec<Tally> = Vec::new();
     let band_rows = geometry.band_rows(geometry.step_rows(source.natural_rows()));
     let mut samples = Vec::new();
     let mut first = 0;
@@ -256,32 +241,40 @@ fn tallies(source: &mut dyn RowSource, frame: &FrameHeader, regions: &[Region], 
         let rows = band_rows.min(geometry.height - first);
         samples.clear();
         source.read(rows, &mut samples)?;
-        let met =
-            regions.par_iter().zip(&mut tallies).filter(|(region, _)| region.y < first + rows && first < region.end());
-        met.for_each(|(region, tally)| {
-            let seen = region.y.max(first)..region.end().min(first + rows);
-            let row_tallies: Vec<Tally> = samples
-                [(seen.start - first) * geometry.row_samples()..(seen.end - first) * geometry.row_samples()]
-                .par_chunks(geometry.row_samples())
-                .enumerate()
-                .with_min_len((SHARE / region.width).max(1))
-                .map(|(index, row)| {
-                    let mut tally = empty();
-                    tally.add_row(frame, seen.start + index, row, *region, rails);
-                    tally
-                })
-                .collect();
-            for row in &row_tallies {
-                tally.merge(row);
+        let row = |y: usize| &samples[(y - first) * geometry.row_samples()..][..geometry.row_samples()];
+        let seen = |region: &Region| region.y.max(first)..region.end().min(first + rows);
+        if regions.len() < rayon::current_num_threads() {
+            for (region, tally) in regions.iter().zip(&mut tallies) {
+                let seen = seen(region);
+                if seen.len() > of_rows.len() {
+                    of_rows.resize_with(seen.len(), empty);
+                }
+                let rows = of_rows[..seen.len()].par_iter_mut().zip(seen.clone());
+                rows.with_min_len((SHARE / region.width).max(1)).for_each(|(of_row, y)| {
+                    of_row.clear();
+                    of_row.add_row(frame, y, row(y), *region, rails);
+                });
+                for of_row in &of_rows[..seen.len()] {
+                    tally.merge(of_row);
+                }
             }
-        });
+        } else {
+            let met = regions.par_iter().zip(&mut tallies).filter(|(region, _)| !seen(region).is_empty());
+            met.for_each_init(empty, |of_row, (region, tally)| {
+                for y in seen(region) {
+                    of_row.clear();
+                    of_row.add_row(frame, y, row(y), *region, rails);
+                    tally.merge(of_row);
+                }
+            });
+        }
         first += rows;
     }
     Ok(tallies)
 }
 
 /// Pixels of a region that are worth a task of their own.
-const SHARE: usize = 1 << 11;
+const SHARE: usize = 1 << 14;
 
 /// Sampling laws by place: regions of one size and phase share one.
 #[derive(Default)]
@@ -309,21 +302,29 @@ fn beyond_weights(mixture: &Mixture) -> Matrix3<f64> {
 }
 
 impl Tally {
-    fn add_row(&mut self, frame: &FrameHeader, y: usize, row: &[f32], region: Region, rails: Rails) {
+    fn new(channels: usize) -> Self {
+        Self { channels: Moments::new(channels), classes: [const { 1 }; 3].map(Moments::new) }
+    }
+
+    fn clear(&mut self) {
+        self.channels.clear();
+        self.classes.iter_mut().for_each(Moments::clear);
+    }
+
+    /// Takes in a row of a region; the moments of a CFA plane are merged from those of its two classes.
+    fn add_row(&mut self, frame: &FrameHeader, y: usize, row: &[f32], region: Region, rails: Limits) {
         let width = frame.geometry.width;
-        let lines: Vec<&[f32]> = row.chunks_exact(width).map(|line| &line[region.x..region.x + region.width]).collect();
-        self.channels.add(&lines);
-        for (clipped, line) in self.clipped.iter_mut().zip(&lines) {
-            *clipped += rails.count(line.iter().copied());
+        let line = |channel: usize| &row[channel * width + region.x..][..region.width];
+        let Some(pattern) = frame.metadata.cfa.filter(|_| self.channels.channels() == 1) else {
+            return self.channels.add_within(region.width, line, rails);
+        };
+        let classes = pattern.row_classes(frame.geometry.origin, y);
+        let classes = [0, 1].map(|parity| classes[(region.x + parity) % 2] as usize);
+        if let Ok(moments) = self.classes.get_disjoint_mut(classes) {
+            moments::add_alternating(moments, line(0), rails);
         }
-        if let (Some(pattern), [line]) = (frame.metadata.cfa, lines.as_slice()) {
-            let classes = pattern.row_classes(frame.geometry.origin, y);
-            for (parity, class) in classes.into_iter().enumerate() {
-                let skip = (parity + region.x) % 2;
-                let sites: Vec<f32> = line.iter().skip(skip).step_by(2).copied().collect();
-                self.classes[class as usize].add(&[&sites]);
-                self.clipped_classes[class as usize] += rails.count(sites.into_iter());
-            }
+        for class in classes {
+            self.channels.merge(&self.classes[class]);
         }
     }
 
@@ -332,19 +333,13 @@ impl Tally {
         for (mine, theirs) in self.classes.iter_mut().zip(&row.classes) {
             mine.merge(theirs);
         }
-        for (mine, theirs) in self.clipped.iter_mut().zip(&row.clipped) {
-            *mine += theirs;
-        }
-        for (mine, theirs) in self.clipped_classes.iter_mut().zip(row.clipped_classes) {
-            *mine += theirs;
-        }
     }
 
     fn report(
         &self,
         frame: &FrameHeader,
         region: Region,
-        rails: Rails,
+        rails: Limits,
         prediction: Option<&FramePrediction>,
         sampling: impl FnOnce(&Mixture) -> Sampling,
         with_tests: bool,
@@ -357,7 +352,7 @@ impl Tally {
         };
         let channels = self.channels.channels();
         let count = self.channels.count;
-        let has_rails = !matches!(rails, Rails::None);
+        let has_rails = !rails.high.is_nan();
         // Layers of standard deviations may follow the three planes of a demosaicked frame.
         let three = channels == 3 || (channels > 3 && metadata.demosaic.is_some());
         let whole = (three && count > 0).then_some(prediction).flatten().map(|prediction| match prediction {
@@ -388,8 +383,12 @@ impl Tally {
                 }
                 _ => None,
             };
-            let clipped = has_rails.then_some(self.clipped[index]);
-            ChannelReport::new(name, &self.channels, index, black, clipped, expectation)
+            let clipped = has_rails.then_some(self.channels.beyond[index]);
+            let mut report = ChannelReport::new(name, &self.channels, index, black, clipped, expectation);
+            if metadata.cfa.is_some() && channels == 1 {
+                (report.mean_error, report.std_error) = self.plane_errors();
+            }
+            report
         };
         let reports: Vec<ChannelReport> = (0..channels).map(channel_report).collect();
         let classes = match metadata.cfa {
@@ -397,8 +396,8 @@ impl Tally {
                 .into_iter()
                 .map(|class| {
                     let index = class as usize;
-                    let clipped = has_rails.then_some(self.clipped_classes[index]);
                     let moments = &self.classes[index];
+                    let clipped = has_rails.then_some(moments.beyond[0]);
                     let expectation = planes.map(|classes| Expectation::of(&classes[index], moments.count));
                     ChannelReport::new(class.letter().into(), moments, 0, black, clipped, expectation)
                 })
@@ -467,6 +466,25 @@ impl Tally {
             whole.tests(&Measured { names: &names, mean: [moments.mean[0]; 3], covariance })
         })
         .collect()
+    }
+
+    /// Standard errors of mean and standard deviation of a CFA plane, whose classes have shares w that are not drawn.
+    ///
+    /// x̄ = Σ w x̄ₖ,  s² ≈ Σ w (sₖ² + (x̄ₖ − x̄)²),  so that to first order
+    /// var x̄ = Σ w² sₖ²/nₖ,  var s² = Σ w² (2 sₖ⁴/(nₖ − 1) + 4 (x̄ₖ − x̄)² sₖ²/nₖ)
+    fn plane_errors(&self) -> (Option<f64>, Option<f64>) {
+        let total = self.channels.count as f64;
+        let (mut of_mean, mut of_variance) = (0.0, 0.0);
+        for class in self.classes.iter().filter(|class| class.count > 0) {
+            let Some(variance) = class.covariance(0, 0) else { return (None, None) };
+            let (n, offset) = (class.count as f64, class.mean[0] - self.channels.mean[0]);
+            let share = (n / total).powi(2);
+            of_mean += share * variance / n;
+            of_variance += share * (2.0 * variance * variance / (n - 1.0) + 4.0 * offset * offset * variance / n);
+        }
+        let std = self.channels.std(0);
+        let of_std = std.map(|std| if std > 0.0 { of_variance.sqrt() / (2.0 * std) } else { 0.0 });
+        (std.map(|_| of_mean.sqrt()), of_std)
     }
 
     /// The prediction for a plane in which the classes are mixed as the region has them.
@@ -565,6 +583,12 @@ impl ChannelReport {
             (ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
         };
         let spread = expectation.filter(|expected| expected.std > 0.0);
+        let n = count as f64;
+        // Errors of independent normal samples, relative to their standard deviation.
+        let independent = (1.0 / n.sqrt(), (2.0 * (n - 1.0)).sqrt().recip());
+        let known = |expected: Expectation| (expected.mean_error / expected.sample_std, expected.std_error);
+        let is_known = |errors: &(f64, f64)| errors.0.is_finite() && errors.1.is_finite();
+        let (mean_error, std_error) = expectation.map(known).filter(is_known).unwrap_or(independent);
         Self {
             name,
             count,
@@ -578,6 +602,8 @@ impl ChannelReport {
             predicted_std: expectation.map(|expected| expected.std),
             z_mean: mean.zip(spread).map(|(mean, expected)| (mean - expected.mean) / expected.mean_error),
             z_std: std.zip(spread).map(|(std, expected)| (std / expected.sample_std - 1.0) / expected.std_error),
+            mean_error: std.map(|std| std * mean_error),
+            std_error: std.map(|std| std * std_error),
         }
     }
 }
@@ -617,6 +643,26 @@ mod tests {
         let report = measure(&mut plane, &[region], Equations::Exact, None).unwrap();
         let means: Vec<_> = report.regions[0].classes.iter().map(|class| class.mean).collect();
         assert_eq!(means, [Some(10.0), Some(20.0), Some(30.0)]);
+    }
+
+    /// Of independent normal samples 1/√n and 1/√(2(n − 1)) of the standard deviation; of a plane, those of its classes.
+    #[test]
+    fn errors_are_those_of_independent_samples() {
+        let noise = |i: usize| ((i * 7919 + i * i * 31) % 1009) as f32 / 1009.0;
+        let report = measure(&mut frame(&["Y"], 40, 30, noise), &[], Equations::Exact, None).unwrap();
+        let channel = &report.regions[0].channels[0];
+        let std = channel.std.unwrap();
+        assert!((channel.mean_error.unwrap() / std * 1200_f64.sqrt() - 1.0).abs() < 1e-12);
+        assert!((channel.std_error.unwrap() / std * 2398_f64.sqrt() - 1.0).abs() < 1e-12);
+        // Classes 100 apart: the error of the mean is that of their own scatter, not of their distance.
+        let mut plane = frame(&["Y"], 40, 30, |i| noise(i) + 100.0 * [1.0, 2.0, 2.0, 3.0][(i / 40 % 2) * 2 + i % 2]);
+        plane.header.metadata.cfa = Some(CfaPattern::Rggb);
+        let report = measure(&mut plane, &[], Equations::Exact, None).unwrap();
+        let (whole, classes) = (&report.regions[0].channels[0], &report.regions[0].classes);
+        let of_classes = |k: usize| classes[k].mean_error.unwrap() * [0.25, 0.5, 0.25][k];
+        let expected = (0..3).map(|k| of_classes(k).powi(2)).sum::<f64>().sqrt();
+        assert!((whole.mean_error.unwrap() / expected - 1.0).abs() < 1e-9);
+        assert!(whole.std.unwrap() > 70.0 && whole.std_error.unwrap() < 0.01);
     }
 
     #[test]

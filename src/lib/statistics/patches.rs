@@ -3,7 +3,7 @@
 //! The scene is not uniform, but each patch is, and its means tell the level: the expected electrons are worked back from
 //! them, and spread and covariance are predicted at these. The means are used up by that, and are not tested.
 
-use super::{Rails, Region, RegionReport, Report, Samplings, Tally, beyond_weights, tallies};
+use super::{Region, RegionReport, Report, Samplings, Tally, beyond_weights, rails, tallies};
 use crate::cfa::Class;
 use crate::color;
 use crate::demosaic::Method;
@@ -97,7 +97,7 @@ pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: 
     let frame = source.header().clone();
     let patches = of_frame(&frame, size)?;
     let regions: Vec<Region> = patches.iter().map(|patch| patch.interior).collect();
-    let rails = Rails::of(&frame);
+    let rails = rails(&frame);
     let tallies = tallies(source, &frame, &regions, rails)?;
     let mut reports: Vec<RegionReport> = match propagation::of_frame(&frame, equations) {
         Some(known) => {
