@@ -49,9 +49,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| {
-        arguments.general.clone().in_pipeline(arguments.input.is_pipe())
-    };
+    let general = |arguments: &Arguments| arguments.general.clone().in_pipeline(arguments.input.is_pipe());
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 

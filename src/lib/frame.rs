@@ -52,21 +52,17 @@ impl Geometry {
     pub fn band_rows(&self, step: usize) -> usize {
         let row_bytes = self.row_bytes();
         // Wide frames get at least 8 rows, so that a halo of 3 does not double the work, while these bytes hold them.
-        let fitting = (band_bytes() / row_bytes).max((WIDE_BYTES / row_bytes).min(8));
+        let fitting = (BAND_BYTES / row_bytes).max((WIDE_BYTES / row_bytes).min(8));
         (fitting / step * step).max(step).min(self.height.max(1))
     }
 }
 
-/// The size that a band aims at: a few of them fit a level-2 cache, and the memory of a program stays a few of them.
-pub const BAND_BYTES: usize = 1 << 19;
+/// The size that a band aims at: it fits a level-2 cache, and the memory of a program stays a few of them.
+pub const BAND_BYTES: usize = 1 << 20;
 /// What 8 rows of a wide frame may take.
 const WIDE_BYTES: usize = 8 << 20;
 /// What the rows that a source decodes together may take.
 const STEP_BYTES: usize = 4 << 20;
-
-fn band_bytes() -> usize {
-    std::env::var("TMP_BAND").ok().and_then(|t| t.parse().ok()).unwrap_or(BAND_BYTES)
-}
 
 /// The rows of a frame that a stage can see: those it makes, and a halo above and below.
 #[derive(Debug, Clone, Copy)]

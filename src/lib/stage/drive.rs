@@ -260,3 +260,122 @@ fn write_behind(sink: &mut dyn RowSink, made: &Receiver<Made>, give_back: &Sende
 fn ended(thread: ScopedJoinHandle<'_, Result<()>>) -> Result<()> {
     thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Geometry;
+    use crate::metadata::{FrameHeader, Metadata};
+    use crate::units::{Any, QuantityKind};
+
+    /// A frame whose samples are the numbers of their rows, some of which cannot be read.
+    struct Numbered {
+        header: FrameHeader,
+        next: usize,
+        fails_at: usize,
+        may_wait: bool,
+    }
+
+    impl RowSource for Numbered {
+        fn header(&self) -> &FrameHeader {
+            &self.header
+        }
+
+        fn natural_rows(&self) -> usize {
+            1
+        }
+
+        fn may_wait(&self) -> bool {
+            self.may_wait
+        }
+
+        fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+            for row in self.next..self.next + rows {
+                if row == self.fails_at {
+                    return Err(self.header.refuse("the source fails"));
+                }
+                samples.resize(samples.len() + self.header.geometry.width, row as f32);
+            }
+            self.next += rows;
+            Ok(())
+        }
+    }
+
+    /// Takes rows up to one, and knows how many.
+    struct Taking {
+        header: FrameHeader,
+        rows: usize,
+        fails_at: usize,
+    }
+
+    impl RowSink for Taking {
+        fn write(&mut self, samples: &[f32]) -> Result<()> {
+            for row in samples.chunks_exact(self.header.geometry.width) {
+                if self.rows == self.fails_at {
+                    return Err(self.header.refuse("the sink fails"));
+                }
+                let height = self.header.geometry.height;
+                let sum = self.rows.saturating_sub(1) + (self.rows + 1).min(height - 1);
+                assert!(row.iter().all(|sample| *sample == sum as f32), "row {}", self.rows);
+                self.rows += 1;
+            }
+            Ok(())
+        }
+    }
+
+    /// The sum of the rows above and below, or of the edge itself.
+    struct Neighbors(FrameHeader);
+
+    impl Stage for Neighbors {
+        type Input = Any;
+        type Output = Any;
+
+        fn header(&self) -> &FrameHeader {
+            &self.0
+        }
+
+        fn reach(&self) -> usize {
+            1
+        }
+
+        fn apply(&self, input: Window<'_>, mut output: Rows<'_>) -> Counts {
+            for y in output.range() {
+                let rows = [y.saturating_sub(1), (y + 1).min(self.0.geometry.height - 1)];
+                let [above, below] = rows.map(|y| input.row(y.cast_signed(), 0));
+                for ((sum, a), b) in output.row(y, 0).iter_mut().zip(above).zip(below) {
+                    *sum = a + b;
+                }
+            }
+            Counts { negative: output.range().len() as u64, ..Counts::default() }
+        }
+    }
+
+    /// However a frame is driven, the same rows leave, and the error is that of the first band that goes wrong.
+    #[test]
+    fn threads_change_neither_rows_nor_errors() {
+        let never = usize::MAX;
+        // Bands of 8 rows.
+        let geometry = Geometry::new(40_000, 83, &["Y"]);
+        let header = FrameHeader { name: "rows".into(), geometry, metadata: Metadata::new(QuantityKind::Unspecified) };
+        for (source_fails, sink_fails) in
+            [(never, never), (40, never), (never, 24), (40, 16), (16, 40), (0, 0), (82, 82)]
+        {
+            let drive = |threads: usize, may_wait: bool| {
+                let mut source = Numbered { header: header.clone(), next: 0, fails_at: source_fails, may_wait };
+                let mut sink = Taking { header: header.clone(), rows: 0, fails_at: sink_fails };
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let done = pool.install(|| run(&Neighbors(header.clone()), &mut source, &mut sink, &mut |_| ()));
+                (done.map_err(|error| error.to_string()), sink.rows)
+            };
+            let alone = drive(1, false);
+            for (threads, may_wait) in [(1, true), (2, false), (2, true), (5, false)] {
+                assert_eq!(drive(threads, may_wait), alone, "{source_fails} {sink_fails} {threads} {may_wait}");
+            }
+            if (source_fails, sink_fails) == (never, never) {
+                assert_eq!(alone, (Ok(Counts { negative: 83, ..Counts::default() }), 83));
+            } else {
+                assert!(alone.0.unwrap_err().contains(if source_fails <= sink_fails { "source" } else { "sink" }));
+            }
+        }
+    }
+}
