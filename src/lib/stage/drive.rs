@@ -8,8 +8,8 @@ use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
 use std::thread::{self, ScopedJoinHandle};
 
 /// Bands of each side that are under way at a time where reading, computing and writing overlap: one that is read or
-/// written, one that is computed on, and one that waits.
-const UNDER_WAY: usize = 3;
+/// written while the other is computed on.
+const UNDER_WAY: usize = 2;
 
 /// Drives a whole frame through a stage, band by band; memory is a few bands whatever the height.
 ///
