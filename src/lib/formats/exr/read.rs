@@ -170,7 +170,7 @@ impl ExrReader {
         let taken = match &mut self.input {
             Input::Pipe(input) => {
                 let taken = append(input.peek(block, left));
-                input.take(taken * block);
+                input.skip(taken * block);
                 taken
             }
             Input::File { reader, position, length, offsets } => {
@@ -178,7 +178,7 @@ impl ExrReader {
                     return Ok(false);
                 }
                 let taken = append(reader.peek(block, offsets.run(first, block, left)));
-                reader.take(taken * block);
+                reader.skip(taken * block);
                 *position += (taken * block) as u64;
                 taken
             }

@@ -23,7 +23,7 @@ impl<R: Read> ReadAhead<R> {
     /// The next bytes, whole blocks of `block` bytes: at least one, at most `blocks`, as many as there are at hand or one
     /// read gives; none where the stream ends before, where reading fails, or where a block is too large to be held.
     ///
-    /// They stay to be taken, by [`Self::take`] or as a [`Read`]er, which then also tells what failed.
+    /// They stay to be taken, by [`Self::skip`] or as a [`Read`]er, which then also tells what failed.
     pub fn peek(&mut self, block: usize, blocks: usize) -> &[u8] {
         if self.end - self.start < block {
             let wanted = (CAPACITY / block).min(blocks) * block;
@@ -43,7 +43,7 @@ impl<R: Read> ReadAhead<R> {
     }
 
     /// Takes bytes that were looked at.
-    pub fn take(&mut self, bytes: usize) {
+    pub fn skip(&mut self, bytes: usize) {
         self.start += bytes;
     }
 }
@@ -123,7 +123,7 @@ mod tests {
                 if taken == 0 {
                     break;
                 }
-                reader.take(taken);
+                reader.skip(taken);
             }
             assert!(reader.peek(CAPACITY + 1, 1).is_empty(), "a block that is too large to be held");
             reader.read_to_end(&mut seen).unwrap();
