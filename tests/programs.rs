@@ -4,14 +4,14 @@
 
 mod support;
 
-use cyanometer::formats::input::{FrameReader, InputOptions, update_digest};
+use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::formats::yaml::parse_metadata;
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata};
 use cyanometer::stage::{Counts, RowSink, RowSource};
 use cyanometer::units::QuantityKind;
-use sha2::{Digest, Sha256};
+use sha2::Digest;
 use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -330,6 +330,32 @@ fn threads_change_no_byte() {
     }
     let report = shop.run("measure --output-format json --threads 1", &alone);
     assert_eq!(shop.run("measure --output-format json --threads 3", &alone), report);
+}
+
+/// In a pipeline each program has one thread; alone, or where it is told to, it has more.
+#[test]
+fn frames_through_a_pipe_take_one_thread() {
+    let shop = Workshop::with_frames();
+    let is_alone = |line: &str, input: Stdio, output: Stdio| {
+        let done = shop.command(line).stdin(input).stdout(output).stderr(Stdio::piped()).output().unwrap();
+        assert!(done.status.success(), "{line}");
+        !String::from_utf8_lossy(&done.stderr).contains("one thread, as frames pass through a pipe")
+    };
+    let file = || Stdio::from(File::open(shop.path("noisy.exr")).unwrap());
+    let place = || Stdio::from(File::create(shop.path("place.exr")).unwrap());
+    assert!(is_alone("digitize -v", file(), place()));
+    assert!(is_alone("digitize noisy.exr -v", Stdio::piped(), place()));
+    assert!(!is_alone("digitize noisy.exr -v", file(), Stdio::piped()));
+    assert!(!is_alone("render-radiance --dark --size 3x2 -v", Stdio::null(), Stdio::piped()));
+    assert!(is_alone("digitize -v --threads 2", file(), Stdio::piped()));
+    // What goes down these pipes is no frame.
+    assert!(is_alone("measure noisy.exr -v", file(), Stdio::piped()));
+    assert!(is_alone("color-difference xyz.exr 1,2,3 -v", file(), Stdio::piped()));
+    assert!(is_alone("predict-noise --electrons 1,2,3 -v", file(), Stdio::piped()));
+    let output = shop.attempt("measure -v", &shop.bytes("noisy.exr"));
+    assert!(
+        String::from_utf8_lossy(&output.stderr).starts_with("measure: one thread, as frames pass through a pipe; ")
+    );
 }
 
 /// Rows leave before the last has come: half of a frame goes in, and some of the result comes out.
@@ -767,11 +793,8 @@ fn the_sidecar_tells_what_was_done_and_what_came_of_it() {
     for name in ["expected.exr", "noisy.exr", "codes.tiff", "plane.exr", "rgb.exr", "xyz.exr"] {
         let mut sidecar = shop.sidecar(name);
         let (samples, _) = shop.read(name);
-        let mut digest = Sha256::new();
-        update_digest(&mut digest, &samples);
-        let digest: String = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
         let record = sidecar.samples.take().unwrap();
-        assert_eq!(record.digest, format!("sha256:{digest}"), "{name}");
+        assert_eq!(record.digest, format!("blake3:{}", blake3::hash(&bytes_of(&samples)).to_hex()), "{name}");
         let count = |is: &dyn Fn(f32) -> bool| {
             let count = samples.iter().filter(|&&sample| is(sample)).count() as u64;
             (count > 0).then_some(count)
@@ -1146,6 +1169,35 @@ fn mistakes_are_answered_in_one_line() {
         assert!(output.stdout.is_empty(), "{line}");
         assert_eq!(shop.files(), files, "{line} leaves something behind");
     }
+}
+
+/// Sidecars of earlier versions hold SHA-256; a digest of either kind that does not match is a warning.
+#[test]
+fn digests_of_both_kinds_are_compared() {
+    let shop = Workshop::with_frames();
+    let text = String::from_utf8(shop.bytes("noisy.exr.yaml")).unwrap();
+    let (samples, metadata) = shop.read("noisy.exr");
+    let digest = metadata.samples.unwrap().digest;
+    let sha256 =
+        sha2::Sha256::digest(bytes_of(&samples)).iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"));
+    for (digest_now, is_right) in [
+        (digest.clone(), true),
+        (format!("sha256:{sha256}"), true),
+        (format!("sha256:{}", sha256.replace('0', "1")), false),
+        (digest.replace('0', "1"), false),
+        (sha256, false),
+    ] {
+        fs::write(shop.path("noisy.exr.yaml"), text.replace(&digest, &digest_now)).unwrap();
+        for threads in 1..=2 {
+            let done = shop.attempt(&format!("digitize noisy.exr --threads {threads}"), &[]);
+            let said = String::from_utf8_lossy(&done.stderr);
+            assert_eq!(said.contains("one of the two was changed"), !is_right, "{digest_now}: {said}");
+        }
+    }
+}
+
+fn bytes_of(samples: &[f32]) -> Vec<u8> {
+    samples.iter().flat_map(|sample| sample.to_le_bytes()).collect()
 }
 
 /// What is read is not written over, whatever it is called; devices are written to, not replaced.

@@ -49,7 +49,10 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
+    let general = |arguments: &Arguments| {
+        arguments.general.clone().in_pipeline([&arguments.a, &arguments.b].into_iter().any(FrameOrColor::is_pipe))
+    };
+    cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {

@@ -55,7 +55,10 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
+    let general = |arguments: &Arguments| {
+        arguments.general.clone().in_pipeline(arguments.input.is_pipe() || arguments.output.is_pipe())
+    };
+    cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {

@@ -239,6 +239,10 @@ impl<S: RowSource> RowSource for LessDarks<'_, S> {
         self.darks.iter().map(S::natural_rows).fold(self.frame.natural_rows(), usize::max)
     }
 
+    fn may_wait(&self) -> bool {
+        self.frame.may_wait() || self.darks.iter().any(S::may_wait)
+    }
+
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
         let start = samples.len();
         self.frame.read(rows, samples)?;

@@ -45,20 +45,24 @@ impl Geometry {
     /// Rows to ask a source for together that decodes `natural` of them at a time: so many, unless they are too large to
     /// hold more than once.
     pub fn step_rows(&self, natural: usize) -> usize {
-        if natural * self.row_bytes() <= 4 * BAND_BYTES { natural } else { 1 }
+        if natural * self.row_bytes() <= STEP_BYTES { natural } else { 1 }
     }
 
     /// Rows of a band that holds about [`BAND_BYTES`], a multiple of `step`, at least one step.
     pub fn band_rows(&self, step: usize) -> usize {
         let row_bytes = self.row_bytes();
-        // Wide frames get at least 8 rows, so that a halo of 3 does not double the work, while 8 MiB hold them.
-        let fitting = (BAND_BYTES / row_bytes).max((8 * BAND_BYTES / row_bytes).min(8));
+        // Wide frames get at least 8 rows, so that a halo of 3 does not double the work, while these bytes hold them.
+        let fitting = (BAND_BYTES / row_bytes).max((WIDE_BYTES / row_bytes).min(8));
         (fitting / step * step).max(step).min(self.height.max(1))
     }
 }
 
-/// The size that a band aims at: a few of them fit a level-2 cache, and the memory of a program stays a few of them.
+/// The size that a band aims at: it fits a level-2 cache, and the memory of a program stays a few of them.
 pub const BAND_BYTES: usize = 1 << 20;
+/// What 8 rows of a wide frame may take.
+const WIDE_BYTES: usize = 8 << 20;
+/// What the rows that a source decodes together may take.
+const STEP_BYTES: usize = 4 << 20;
 
 /// The rows of a frame that a stage can see: those it makes, and a halo above and below.
 #[derive(Debug, Clone, Copy)]

@@ -228,8 +228,8 @@ pub struct HistoryEntry {
 /// What is known only after the last row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SamplesRecord {
-    /// `sha256:` and the digest of all samples as little-endian 32-bit floats, rows top to bottom, in each row channel
-    /// by channel.
+    /// `blake3:`, or `sha256:` in older sidecars, and the digest of all samples as little-endian 32-bit floats, rows top
+    /// to bottom, in each row channel by channel.
     pub digest: String,
     /// Photosites whose charge was clipped at full well.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -62,11 +62,8 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         }
     };
     let general = general(&arguments);
-    if let Some(threads) = general.threads {
-        // Only a second pool in one process could fail.
-        drop(rayon::ThreadPoolBuilder::new().num_threads(threads).build_global());
-    }
     let session = Session { program, general };
+    session.settle_threads();
     match body(&arguments, &session) {
         Ok(()) | Err(Error::ClosedPipe) => ExitCode::SUCCESS,
         Err(error) => {
@@ -145,6 +142,19 @@ impl Session {
     pub fn note(&self, text: &str) {
         if self.general.verbose {
             complain(self.program, text);
+        }
+    }
+
+    /// Settles how many threads work: what was asked for; or one where frames come or go through a pipe, at whose other end
+    /// another program has a processor of its own; or all.
+    fn settle_threads(&self) {
+        let General { threads, pipeline, .. } = self.general;
+        let Some(count) = threads.or(pipeline.then_some(1)) else { return };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(count);
+        // One thread is this one: no other is started. Only a second pool in one process could fail.
+        drop(if count == 1 { pool.use_current_thread() } else { pool }.build_global());
+        if threads.is_none() {
+            self.note("one thread, as frames pass through a pipe; --threads gives it more");
         }
     }
 

@@ -8,6 +8,7 @@ use crate::demosaic::{Black, Method};
 use crate::formats::data;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
+use crate::formats::pipe;
 use crate::optics::Exposure;
 use crate::random::Source;
 use crate::statistics::Region;
@@ -70,6 +71,11 @@ pub struct Input {
 }
 
 impl Input {
+    /// Whether the frame comes through a pipe.
+    pub fn is_pipe(&self) -> bool {
+        pipe::is_input(self.input.as_deref())
+    }
+
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
         InputOptions { path: self.input.clone(), part: self.part, metadata: self.metadata.clone(), all_channels: false }
@@ -116,6 +122,11 @@ pub struct Output {
 }
 
 impl Output {
+    /// Whether the frame goes through a pipe.
+    pub fn is_pipe(&self) -> bool {
+        pipe::is_output(self.output.as_deref())
+    }
+
     /// Where and how to write.
     pub fn options(&self) -> OutputOptions {
         OutputOptions {
@@ -186,9 +197,13 @@ const DEFAULT_FILLING: f64 = 0.75;
 /// How the program runs and talks.
 #[derive(Debug, Clone, Args)]
 pub struct General {
-    /// Threads to use; by default all. The result does not depend on it
+    /// Threads to use; by default one where frames come or go through a pipe, as each program of a pipeline has its own, and
+    /// otherwise all. The result does not depend on it
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
+    /// Whether frames come or go through a pipe.
+    #[arg(skip)]
+    pub pipeline: bool,
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
@@ -198,6 +213,13 @@ pub struct General {
     /// Progress bar on standard error
     #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = choice(&[("auto", ProgressWhen::Auto), ("always", ProgressWhen::Always), ("never", ProgressWhen::Never)]))]
     pub progress: ProgressWhen,
+}
+
+impl General {
+    /// The same for a program whose frames come or go through a pipe, or do not.
+    pub fn in_pipeline(self, pipeline: bool) -> Self {
+        Self { pipeline, ..self }
+    }
 }
 
 fn threads(text: &str) -> Result<usize, String> {
@@ -223,6 +245,11 @@ impl FrameOrColor {
             Self::Frame(path) => Some(path),
             Self::Color(_) => None,
         }
+    }
+
+    /// Whether it is a frame that comes through a pipe.
+    pub fn is_pipe(&self) -> bool {
+        self.path().is_some_and(|path| pipe::is_input(Some(path)))
     }
 
     /// Whether the frame comes through the standard input.

@@ -4,6 +4,7 @@
 //! Devices, named pipes and the standard output are written as they are.
 
 use super::input::{FileId, file_id};
+use super::pipe;
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, IsTerminal, Read, Seek, SeekFrom, Write};
@@ -166,6 +167,7 @@ impl Target {
             let spool = tempfile::tempfile().map_err(|e| Error::disk(&name, "write", e))?;
             Kind::Spooled { spool: BufWriter::with_capacity(1 << 16, spool), output }
         } else {
+            pipe::enlarge(&output);
             Kind::Stream(BufWriter::with_capacity(1 << 16, output))
         };
         Ok(Self { name, path: None, kind })

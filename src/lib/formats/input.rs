@@ -1,7 +1,9 @@
 //! Opens frames: EXR and TIFF, files and pipes, with the metadata that belongs to them.
 
-use super::data::{hex, read_file};
+use super::data::read_file;
+use super::digest::SamplesDigest;
 use super::exr::{ExrReader, Primaries, is_streamable};
+use super::pipe;
 use super::tiff::TiffReader;
 use super::yaml;
 use crate::error::{Error, Result};
@@ -11,7 +13,6 @@ use crate::optics::Exposure;
 use crate::spectrum::channel_wavelength_nm;
 use crate::stage::RowSource;
 use crate::units::QuantityKind;
-use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, IsTerminal, Read, Seek, SeekFrom};
 use std::os::fd::AsFd;
@@ -67,7 +68,7 @@ enum Rows {
 struct DigestCheck {
     expected: String,
     sidecar: String,
-    digest: Sha256,
+    digest: SamplesDigest,
 }
 
 impl FrameReader {
@@ -106,9 +107,9 @@ impl FrameReader {
             notes.push(format!("{name}: channels {dropped} are left out"));
         }
         let check = metadata.samples.as_ref().zip(sidecar).map(|(samples, sidecar)| DigestCheck {
+            digest: SamplesDigest::like(&samples.digest),
             expected: samples.digest.clone(),
             sidecar,
-            digest: Sha256::new(),
         });
         let is_integer = stored_as.starts_with('u');
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_integer).then_some(U16_FULL_SCALE);
@@ -142,8 +143,7 @@ impl FrameReader {
             return None;
         }
         let DigestCheck { expected, sidecar, digest } = self.check.take()?;
-        let found = format!("sha256:{}", hex(&digest.finalize()));
-        (found != expected).then(|| {
+        (digest.finish() != expected).then(|| {
             format!(
                 "{}: its samples are not those that {sidecar} describes; one of the two was changed",
                 self.header.name
@@ -164,6 +164,10 @@ impl RowSource for FrameReader {
         }
     }
 
+    fn may_wait(&self) -> bool {
+        matches!(&self.file, Rows::Exr(reader) if reader.is_stream())
+    }
+
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
         let whole = self.stored.row_samples();
         let kept = self.header.geometry.row_samples();
@@ -180,7 +184,7 @@ impl RowSource for FrameReader {
             }
         }
         if let Some(check) = &mut self.check {
-            update_digest(&mut check.digest, &into[start..]);
+            check.digest.update(&into[start..]);
         }
         if let Some(divisor) = self.divisor {
             into[start..].iter_mut().for_each(|sample| *sample /= divisor);
@@ -193,17 +197,6 @@ impl RowSource for FrameReader {
         self.buffer = buffer;
         self.rows_read += rows;
         Ok(())
-    }
-}
-
-/// Adds samples to a digest, as little-endian 32-bit floats.
-pub fn update_digest(digest: &mut Sha256, samples: &[f32]) {
-    let mut bytes = [0; 4096];
-    for some in samples.chunks(bytes.len() / 4) {
-        for (to, sample) in bytes.as_chunks_mut().0.iter_mut().zip(some) {
-            *to = sample.to_le_bytes();
-        }
-        digest.update(&bytes[..some.len() * 4]);
     }
 }
 
@@ -298,7 +291,8 @@ fn sort_out(mut input: File, name: &str, part: usize, id: Option<FileId>) -> Res
         if part != 0 {
             return Err(Error::Usage(format!("{name}: it has no part {part}; it has a single one")));
         }
-        let whole = io::Cursor::new(head).chain(io::BufReader::with_capacity(1 << 16, input));
+        pipe::enlarge(&input);
+        let whole = io::Cursor::new(head).chain(input);
         return Ok((Rows::Exr(Box::new(ExrReader::stream(Box::new(whole), name)?)), None));
     } else {
         input = spool(&mut io::Cursor::new(&head).chain(&mut input), name)?;

@@ -1,9 +1,9 @@
 //! Writes frames: to named files, whole or not at all, and to pipes.
 
 use super::atomic::{AtomicFile, Target, same_file};
-use super::data::hex;
+use super::digest::SamplesDigest;
 use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter};
-use super::input::{FileId, U16_FULL_SCALE, XYZ_PRIMARIES, regular_file, sidecar_path, update_digest};
+use super::input::{FileId, U16_FULL_SCALE, XYZ_PRIMARIES, regular_file, sidecar_path};
 use super::tiff::{TiffCompression, TiffSamples, TiffTags, TiffWriter};
 use super::yaml;
 use crate::color;
@@ -13,7 +13,6 @@ use crate::metadata::FrameHeader;
 use crate::stage::{Counts, RowSink};
 use crate::units::QuantityKind;
 use half::f16;
-use sha2::{Digest, Sha256};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -177,7 +176,7 @@ pub struct FrameWriter {
     header: FrameHeader,
     name: String,
     /// The digest of what a reader will get, and the sidecar's path; only for named files.
-    record: Option<(Sha256, PathBuf)>,
+    record: Option<(SamplesDigest, PathBuf)>,
     encoding: Encoding,
     stored: Vec<f32>,
 }
@@ -199,7 +198,7 @@ impl FrameWriter {
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
         let target = Target::open(path, needs_seek, inputs)?;
         let name = target.name().to_owned();
-        let record = target.named_file().map(|path| (Sha256::new(), sidecar_path(path)));
+        let record = target.named_file().map(|path| (SamplesDigest::new(), sidecar_path(path)));
         let metadata = yaml::write_metadata(&header.metadata)?;
         let software = Some(format!("cyanometer {}", env!("CARGO_PKG_VERSION")));
         let geometry = &header.geometry;
@@ -271,7 +270,7 @@ impl FrameWriter {
         let sidecar = match self.record {
             Some((digest, path)) => {
                 let mut metadata = self.header.metadata;
-                metadata.samples = Some(counts.record(format!("sha256:{}", hex(&digest.finalize()))));
+                metadata.samples = Some(counts.record(digest.finish()));
                 let mut file = AtomicFile::create(&path)?;
                 let text = yaml::write_metadata(&metadata)?;
                 file.write_all(text.as_bytes())
@@ -288,6 +287,9 @@ impl FrameWriter {
     }
 }
 
+/// What f16 rounds to infinity, from halfway between the largest f16 and the next power of two on.
+const F16_OVERFLOW: f32 = 65520.0;
+
 /// What samples are multiplied with before they become 16-bit integers.
 fn u16_scale(quantity: QuantityKind, samples: TiffSamples) -> f32 {
     if samples == TiffSamples::U16 && quantity == QuantityKind::Srgb { U16_FULL_SCALE } else { 1.0 }
@@ -295,7 +297,7 @@ fn u16_scale(quantity: QuantityKind, samples: TiffSamples) -> f32 {
 
 impl RowSink for FrameWriter {
     fn write(&mut self, samples: &[f32]) -> Result<()> {
-        let overflows = |sample: &&f32| sample.is_finite() && f16::from_f32(**sample).is_infinite();
+        let overflows = |sample: &&f32| (F16_OVERFLOW..f32::INFINITY).contains(&sample.abs());
         if matches!(self.encoding, Encoding::Exr(ExrSamples::F16, _))
             && let Some(sample) = samples.iter().find(overflows)
         {
@@ -310,7 +312,7 @@ impl RowSink for FrameWriter {
                 Encoding::Exr(ExrSamples::F16, _) => None,
                 Encoding::Tiff(TiffSamples::U16, _) => Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16)),
                 _ => {
-                    update_digest(digest, samples);
+                    digest.update(samples);
                     return self.encode(samples);
                 }
             };
@@ -321,7 +323,7 @@ impl RowSink for FrameWriter {
                     to_sample(f64::from((sample * scale).round_ties_even().clamp(0.0, U16_FULL_SCALE)).max(0.0))
                 }
             }));
-            update_digest(digest, &self.stored);
+            digest.update(&self.stored);
         }
         self.encode(samples)
     }

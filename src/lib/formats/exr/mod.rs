@@ -1,10 +1,13 @@
 //! OpenEXR: scanline files written, scanline and tiled files read, in bands, from files and from pipes.
 //!
 //! The crate `exr` parses headers and (de)compresses blocks; the order of reading and writing is ours, so that rows
-//! stream by and a pipe needs no seek.
+//! stream by and a pipe needs no seek. Uncompressed scanlines, which is what pipes carry, are moved without the crate.
 
 mod read;
+mod read_ahead;
+mod straight;
 mod write;
+mod write_behind;
 
 pub use read::{ExrReader, is_streamable};
 pub use write::{ExrWriter, TablePatch, patch_table};
@@ -21,6 +24,16 @@ pub enum ExrSamples {
     F32,
     /// 16-bit float.
     F16,
+}
+
+impl ExrSamples {
+    /// Bytes of a sample.
+    fn bytes(self) -> usize {
+        match self {
+            Self::F32 => 4,
+            Self::F16 => 2,
+        }
+    }
 }
 
 /// How blocks are compressed, all without loss.

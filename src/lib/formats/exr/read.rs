@@ -1,5 +1,7 @@
 //! Reads EXR parts, from files by their offset tables and from pipes as blocks come.
 
+use super::read_ahead::ReadAhead;
+use super::straight::{Offsets, Straight};
 use super::{ExrTags, METADATA_ATTRIBUTE, PARALLEL_BLOCK_BYTES};
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, bare_name, to_sample};
@@ -14,7 +16,7 @@ use exr::meta::{BlockDescription, MetaData, magic_number};
 use half::f16;
 use rayon::prelude::*;
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek};
+use std::io::{self, Read};
 
 /// A block (a tile, or the scanlines that are compressed together) may take this much memory, not more.
 const MAX_BLOCK_BYTES: usize = 1 << 30;
@@ -31,6 +33,8 @@ pub struct ExrReader {
     tags: ExrTags,
     /// For each channel of the geometry, its place in the file's list.
     order: Vec<usize>,
+    /// Where rows need no decoding: how they are laid out.
+    straight: Option<Straight>,
     stored_as: &'static str,
     rows_read: usize,
     /// Decoded rows that were not asked for yet.
@@ -39,9 +43,9 @@ pub struct ExrReader {
 
 enum Input {
     /// Blocks come as they come.
-    Pipe(Box<dyn Read>),
+    Pipe(ReadAhead<Box<dyn Read + Send>>),
     /// Blocks are found by the offset table; `position` is where the reader stands.
-    File { reader: BufReader<File>, position: u64, length: u64, offsets: Vec<u64> },
+    File { reader: ReadAhead<File>, position: u64, length: u64, offsets: Offsets },
 }
 
 impl ExrReader {
@@ -52,10 +56,10 @@ impl ExrReader {
     /// [`Error::Format`] for what is damaged or not supported, naming it.
     pub fn open(file: File, name: &str, part: usize) -> Result<Self> {
         let length = file.metadata().map_err(|e| Error::disk(name, "read", e))?.len();
-        let mut reader = BufReader::with_capacity(1 << 16, file);
+        let mut reader = ReadAhead::new(file);
         let meta = read_meta(&mut reader, name)?;
         let (order, geometry, tags, stored_as) = describe(&meta, part, name)?;
-        let mut offsets = Vec::new();
+        let mut offsets = Offsets::new();
         for (index, header) in meta.headers.iter().enumerate() {
             // An entry takes 8 bytes, and its block at least 8 more.
             if header.chunk_count as u64 > length / 16 {
@@ -67,21 +71,9 @@ impl ExrReader {
             }
         }
         let position = reader.stream_position().map_err(|e| Error::disk(name, "read", e))?;
+        check_offsets(&offsets, length, name)?;
         let input = Input::File { reader, position, length, offsets };
-        let reader = Self {
-            input,
-            name: name.into(),
-            meta,
-            part,
-            geometry,
-            tags,
-            order,
-            stored_as,
-            rows_read: 0,
-            ahead: vec![],
-        };
-        reader.check_offsets()?;
-        Ok(reader)
+        Ok(Self::new(input, name, meta, part, (order, geometry, tags, stored_as)))
     }
 
     /// Opens a stream that cannot seek: scanlines in increasing order, a single part.
@@ -89,7 +81,8 @@ impl ExrReader {
     /// # Errors
     ///
     /// [`Error::Format`] for what is damaged, not supported, or needs a seek.
-    pub fn stream(mut input: Box<dyn Read>, name: &str) -> Result<Self> {
+    pub fn stream(input: Box<dyn Read + Send>, name: &str) -> Result<Self> {
+        let mut input = ReadAhead::new(input);
         let meta = read_meta(&mut input, name)?;
         let (order, geometry, tags, stored_as) = describe(&meta, 0, name)?;
         if meta.headers[0].line_order != LineOrder::Increasing {
@@ -99,19 +92,19 @@ impl ExrReader {
             ));
         }
         skip_table(&mut input, meta.headers[0].chunk_count, name)?;
-        let input = Input::Pipe(input);
-        Ok(Self {
-            input,
-            name: name.into(),
-            meta,
-            part: 0,
-            geometry,
-            tags,
-            order,
-            stored_as,
-            rows_read: 0,
-            ahead: vec![],
-        })
+        Ok(Self::new(Input::Pipe(input), name, meta, 0, (order, geometry, tags, stored_as)))
+    }
+
+    fn new(input: Input, name: &str, meta: MetaData, part: usize, description: Description) -> Self {
+        let (order, geometry, tags, stored_as) = description;
+        let straight = Straight::of(&meta, part, &order);
+        let name = name.into();
+        Self { input, name, meta, part, geometry, tags, order, straight, stored_as, rows_read: 0, ahead: Vec::new() }
+    }
+
+    /// Whether it reads a stream that cannot seek.
+    pub fn is_stream(&self) -> bool {
+        matches!(self.input, Input::Pipe(_))
     }
 
     fn header(&self) -> &Header {
@@ -150,6 +143,9 @@ impl ExrReader {
         samples.extend(self.ahead.drain(..from_ahead));
         while samples.len() < end {
             let start = samples.len();
+            if self.read_straight((end - start) / row, samples)? {
+                continue;
+            }
             self.read_row_of_blocks(samples)?;
             if samples.len() > end {
                 self.ahead.extend_from_slice(&samples[end..]);
@@ -158,6 +154,37 @@ impl ExrReader {
             debug_assert!(samples.len() > start);
         }
         Ok(())
+    }
+
+    /// Takes some of the next `rows` rows that need no decoding; says whether there were any. What is not as it should be is
+    /// left to [`Self::next_chunk`], which has the words for it.
+    fn read_straight(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<bool> {
+        let Some(straight) = &self.straight else { return Ok(false) };
+        let (first, block) = (self.rows_read, straight.block_bytes);
+        let left = self.geometry.height - first;
+        let mut append = |blocks: &[u8]| {
+            let fit = |(index, block): &(usize, &[u8])| straight.is_row(block, first + index);
+            let fitting = blocks.chunks_exact(block).take(rows).enumerate().take_while(fit);
+            fitting.map(|(_, block)| straight.append(block, samples)).count()
+        };
+        let taken = match &mut self.input {
+            Input::Pipe(input) => {
+                let taken = append(input.peek(block, left));
+                input.skip(taken * block);
+                taken
+            }
+            Input::File { reader, position, length, offsets } => {
+                if !go_to(offsets.at(first), position, reader, *length, &self.name)? {
+                    return Ok(false);
+                }
+                let taken = append(reader.peek(block, offsets.run(first, block, left)));
+                reader.skip(taken * block);
+                *position += (taken * block) as u64;
+                taken
+            }
+        };
+        self.rows_read += taken;
+        Ok(taken > 0)
     }
 
     /// Decodes the next block of scanlines, or row of tiles.
@@ -201,15 +228,12 @@ impl ExrReader {
         let chunk = match &mut self.input {
             Input::Pipe(input) => Chunk::read(input, &self.meta).map_err(|e| damaged(name, &e))?,
             Input::File { reader, position, length, offsets } => {
-                let offset = offsets[index];
-                let delta = i64::try_from(offset).ok().zip(i64::try_from(*position).ok()).map(|(to, from)| to - from);
-                let Some(delta) = delta.filter(|_| offset < *length) else {
+                if !go_to(offsets.at(index), position, reader, *length, name)? {
                     return Err(Error::format(name, "its table of blocks points outside the file; it is damaged"));
-                };
-                reader.seek_relative(delta).map_err(|e| Error::disk(name, "read", e))?;
+                }
                 let mut counted = Counted { inner: reader, count: 0 };
                 let chunk = Chunk::read(&mut counted, &self.meta).map_err(|e| damaged(name, &e))?;
-                *position = offset + counted.count;
+                *position += counted.count;
                 chunk
             }
         };
@@ -275,20 +299,29 @@ impl ExrReader {
         }
         Ok(())
     }
+}
 
-    /// Every block of the part must have a place of its own within the file.
-    fn check_offsets(&self) -> Result<()> {
-        let Input::File { offsets, length, .. } = &self.input else { return Ok(()) };
-        let mut sorted = offsets.clone();
-        sorted.sort_unstable();
-        if sorted.first() == Some(&0) || sorted.last().is_some_and(|last| last >= length) {
-            return Err(cut_short(&self.name));
-        }
-        if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
-            return Err(Error::format(&self.name, "two entries of its table of blocks are the same; it is damaged"));
-        }
-        Ok(())
+/// Every block of a part must have a place of its own within the file.
+fn check_offsets(offsets: &Offsets, length: u64, name: &str) -> Result<()> {
+    let (extent, twice) = offsets.extent();
+    if extent.is_some_and(|(first, last)| first == 0 || last >= length) {
+        return Err(cut_short(name));
     }
+    if twice {
+        return Err(Error::format(name, "two entries of its table of blocks are the same; it is damaged"));
+    }
+    Ok(())
+}
+
+/// Goes to `offset` from `position`, where the reader stands; says whether that lies within the file.
+fn go_to(offset: u64, position: &mut u64, reader: &mut ReadAhead<File>, length: u64, name: &str) -> Result<bool> {
+    let delta = i64::try_from(offset).ok().zip(i64::try_from(*position).ok()).map(|(to, from)| to - from);
+    let Some(delta) = delta.filter(|_| offset < length) else { return Ok(false) };
+    if delta != 0 {
+        reader.seek_relative(delta).map_err(|e| Error::disk(name, "read", e))?;
+        *position = offset;
+    }
+    Ok(true)
 }
 
 /// Whether the bytes are the start of an EXR file that can be read without seeking: one part of scanlines.
@@ -309,8 +342,8 @@ fn read_meta(input: &mut impl Read, name: &str) -> Result<MetaData> {
     Ok(meta)
 }
 
-fn read_table(input: &mut impl Read, entries: usize, name: &str) -> Result<Vec<u64>> {
-    let mut table = Vec::new();
+fn read_table(input: &mut impl Read, entries: usize, name: &str) -> Result<Offsets> {
+    let mut table = Offsets::new();
     let mut entry = [0; 8];
     for _ in 0..entries {
         input.read_exact(&mut entry).map_err(|e| Error::disk(name, "read", e))?;

@@ -1,5 +1,7 @@
 //! Writes scanline EXR files; without compression they need no seek.
 
+use super::straight::encode;
+use super::write_behind::WriteBehind;
 use super::{ExrCompression, ExrSamples, ExrTags, METADATA_ATTRIBUTE, PARALLEL_BLOCK_BYTES};
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, to_sample};
@@ -12,7 +14,6 @@ use exr::meta::attribute::{
 };
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::meta::{BlockDescription, Requirements, magic_number};
-use half::f16;
 use rayon::prelude::*;
 use std::io::{self, Seek, SeekFrom, Write};
 
@@ -20,7 +21,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 ///
 /// Without compression every size is known, so header and offset table come first and nothing is patched.
 pub struct ExrWriter<W> {
-    output: W,
+    output: WriteBehind<W>,
     name: String,
     header: Header,
     samples: ExrSamples,
@@ -28,7 +29,7 @@ pub struct ExrWriter<W> {
     /// For each of the file's channels, its place in the geometry.
     order: Vec<usize>,
     rows_taken: usize,
-    /// Bytes of the rows of a block that is not full yet.
+    /// Bytes of the rows of a block that is to be compressed and not full yet.
     partial: Vec<u8>,
     /// Where each compressed block went.
     offsets: Vec<u64>,
@@ -74,7 +75,7 @@ impl<W: Write> ExrWriter<W> {
         // An uncompressed block is one row: y coordinate and size in 4 bytes each, then the samples.
         let block_bytes = 8 + header.max_block_byte_size() as u64;
         let mut writer = Self {
-            output,
+            output: WriteBehind::new(output),
             name: name.into(),
             header,
             samples,
@@ -105,38 +106,46 @@ impl<W: Write> ExrWriter<W> {
     ///
     /// [`Error::Disk`] where writing fails.
     pub fn write(&mut self, samples: &[f32]) -> Result<()> {
+        let is_compressed = self.header.compression != Compression::Uncompressed;
         for row in samples.chunks_exact(self.geometry.row_samples()) {
-            if self.header.compression == Compression::Uncompressed {
-                let mut bytes = std::mem::take(&mut self.partial);
-                bytes.clear();
-                let y = self.row_coordinate(self.rows_taken);
-                let size = i32::try_from(self.header.max_block_byte_size()).unwrap_or(i32::MAX);
-                bytes.extend_from_slice(&y.to_le_bytes());
-                bytes.extend_from_slice(&size.to_le_bytes());
-                self.encode(row, &mut bytes);
-                self.put(&bytes)?;
-                self.partial = bytes;
-                self.rows_taken += 1;
-            } else {
-                let mut bytes = std::mem::take(&mut self.partial);
-                self.encode(row, &mut bytes);
-                self.partial = bytes;
+            if is_compressed {
+                self.gather(row);
                 self.rows_taken += 1;
                 self.compress_full_blocks()?;
+            } else {
+                self.put_row(row).map_err(|e| Error::disk(&self.name, "write", e))?;
+                self.rows_taken += 1;
             }
         }
         Ok(())
     }
 
-    /// Appends a row in the file's order of channels and sample type, little-endian.
-    fn encode(&self, row: &[f32], bytes: &mut Vec<u8>) {
-        let width = self.geometry.width;
+    /// Writes a row as a block, in the file's order of channels.
+    fn put_row(&mut self, row: &[f32]) -> io::Result<()> {
+        let size = i32::try_from(self.header.max_block_byte_size()).unwrap_or(i32::MAX);
+        self.output.write_all(&self.row_coordinate(self.rows_taken).to_le_bytes())?;
+        self.output.write_all(&size.to_le_bytes())?;
+        let (width, bytes) = (self.geometry.width, self.samples.bytes());
         for &channel in &self.order {
-            let line = &row[channel * width..(channel + 1) * width];
-            match self.samples {
-                ExrSamples::F32 => bytes.extend(line.iter().flat_map(|sample| sample.to_le_bytes())),
-                ExrSamples::F16 => bytes.extend(line.iter().flat_map(|&sample| f16::from_f32(sample).to_le_bytes())),
+            let mut line = &row[channel * width..(channel + 1) * width];
+            while !line.is_empty() {
+                let room = self.output.room(bytes)?;
+                let (now, later) = line.split_at(line.len().min(room.len() / bytes));
+                encode(now, self.samples, &mut room[..now.len() * bytes]);
+                self.output.add(now.len() * bytes);
+                line = later;
             }
+        }
+        Ok(())
+    }
+
+    /// Appends a row to what is to be compressed, in the file's order of channels.
+    fn gather(&mut self, row: &[f32]) {
+        let (width, bytes) = (self.geometry.width, self.samples.bytes());
+        for &channel in &self.order {
+            let start = self.partial.len();
+            self.partial.resize(start + width * bytes, 0);
+            encode(&row[channel * width..(channel + 1) * width], self.samples, &mut self.partial[start..]);
         }
     }
 
@@ -193,12 +202,12 @@ impl<W: Write> ExrWriter<W> {
     /// # Errors
     ///
     /// [`Error::Disk`] where writing fails.
-    pub fn finish(mut self) -> Result<(W, Option<TablePatch>)> {
+    pub fn finish(self) -> Result<(W, Option<TablePatch>)> {
         assert_eq!(self.rows_taken, self.geometry.height, "a frame was ended before its last row");
-        self.output.flush().map_err(|e| Error::disk(&self.name, "write", e))?;
+        let output = self.output.finish().map_err(|e| Error::disk(&self.name, "write", e))?;
         let table = self.offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
         let patch = (self.header.compression != Compression::Uncompressed).then_some((self.table_at, table));
-        Ok((self.output, patch))
+        Ok((output, patch))
     }
 }
 
@@ -227,8 +236,7 @@ fn file_header(
 ) -> Result<Header> {
     let too_large = || Error::Data(format!("{name}: the frame is larger than an EXR file can hold"));
     let limit = i32::MAX as usize;
-    let sample_bytes = if samples == ExrSamples::F32 { 4 } else { 2 };
-    if geometry.width > limit || geometry.height > limit || geometry.row_samples() * sample_bytes * 32 > limit {
+    if geometry.width > limit || geometry.height > limit || geometry.row_samples() * samples.bytes() * 32 > limit {
         return Err(too_large());
     }
     let text = |string: &String| Text::from_slice_unchecked(string.as_bytes());

@@ -1,17 +1,24 @@
 //! A stage maps bands to bands; [`run`] drives one from a source of rows to a sink.
 
+mod drive;
+
+pub use drive::run;
+
 use crate::error::Result;
 use crate::frame::{Rows, Window};
 use crate::metadata::{FrameHeader, SamplesRecord};
 use crate::units::Quantity;
-use rayon::prelude::*;
 
 /// Rows of a frame, top to bottom.
-pub trait RowSource {
+pub trait RowSource: Send {
     /// Geometry and metadata.
     fn header(&self) -> &FrameHeader;
     /// The number of rows that the source makes together; asking for multiples of it saves work.
     fn natural_rows(&self) -> usize;
+    /// Whether the rows come from another program, which may take any time to give them.
+    fn may_wait(&self) -> bool {
+        false
+    }
     /// Appends the next `rows` rows, laid out as `[row][channel][column]`.
     ///
     /// # Errors
@@ -21,7 +28,7 @@ pub trait RowSource {
 }
 
 /// Takes rows, top to bottom.
-pub trait RowSink {
+pub trait RowSink: Send {
     /// Takes whole rows, laid out as `[row][channel][column]`.
     ///
     /// # Errors
@@ -126,59 +133,6 @@ pub trait Stage: Sync {
     ///
     /// What a row becomes must not depend on how the frame is cut into bands.
     fn apply(&self, input: Window<'_, Self::Input>, output: Rows<'_, Self::Output>) -> Counts;
-}
-
-/// Drives a whole frame through a stage, band by band; memory is a few bands whatever the height.
-///
-/// Bands are cut into as many pieces as there are threads. `progress` hears of the rows done so far.
-///
-/// # Errors
-///
-/// Those of the source and the sink.
-pub fn run<S: Stage>(
-    stage: &S,
-    source: &mut dyn RowSource,
-    sink: &mut dyn RowSink,
-    progress: &mut dyn FnMut(usize),
-) -> Result<Counts> {
-    let input = source.header().geometry.clone();
-    let output = &stage.header().geometry;
-    let (height, reach) = (input.height, stage.reach());
-    let step = output.step_rows(input.step_rows(source.natural_rows()));
-    let band_rows = input.band_rows(step).min(output.band_rows(step));
-    let mut window: Vec<f32> = Vec::new();
-    let (mut window_first, mut read) = (0, 0);
-    let mut made: Vec<f32> = Vec::new();
-    let mut counts = Counts::default();
-    let mut first = 0;
-    while first < height {
-        let end = (first + band_rows).min(height);
-        let needed = (end + reach).min(height);
-        if needed > read {
-            // What a source decodes together is asked for together, the halo included.
-            let wanted = (needed - read).next_multiple_of(step).min(height - read);
-            source.read(wanted, &mut window)?;
-            read += wanted;
-        }
-        made.resize((end - first) * output.row_samples(), 0.0);
-        let piece_rows = (end - first).div_ceil(rayon::current_num_threads());
-        counts = made
-            .par_chunks_mut(piece_rows * output.row_samples())
-            .enumerate()
-            .map(|(piece, samples)| {
-                let rows = Rows::new(first + piece * piece_rows, output.width, output.channels.len(), samples);
-                stage.apply(Window::new(height, window_first, input.width, input.channels.len(), &window), rows)
-            })
-            .reduce(Counts::default, Counts::plus)
-            .plus(counts);
-        sink.write(&made)?;
-        first = end;
-        progress(first);
-        let keep_from = first.saturating_sub(reach).max(window_first);
-        window.drain(..(keep_from - window_first) * input.row_samples());
-        window_first = keep_from;
-    }
-    Ok(counts)
 }
 
 /// A whole frame in memory: source and sink for tests and small work.
