@@ -64,7 +64,7 @@ fn every_set_of_instructions_draws_the_same_noise() {
 #[test]
 fn a_scene_known_to_be_uniform_draws_the_same_noise() {
     let levels = [7.5, 1234.5, 25_000.0];
-    let frame = expected(531, 300, |_, _, class| levels[class as usize] as f32);
+    let frame = expected(531, 300, |_, _, class| cyanometer::frame::to_sample(levels[class as usize]));
     let mut known = frame.clone();
     known.header.metadata.scene = Some(Scene {
         source: "uniform".into(),

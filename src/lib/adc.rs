@@ -231,7 +231,7 @@ impl Kernel for Row<'_> {
                 let nearest = (within + WHOLE) - WHOLE;
                 *code = nearest;
                 // A charge that is no number is in doubt too.
-                unsure |= u32::from(!((within - nearest).abs() < sure) | level.is_nan());
+                unsure |= u32::from(((within - nearest).abs() >= sure) | level.is_nan());
             }
             if unsure != 0 {
                 for (&charge, code) in charges.iter().zip(codes) {

@@ -443,7 +443,6 @@ impl Kernel for XyzRow<'_> {
     type Output = u64;
 
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "six planes advance together")]
     fn run(self) -> u64 {
         let Self { xyz_from_adu: m, black, rgb: [red, green, blue], xyz: [to_x, to_y, to_z] } = self;
         let width = to_x.len();

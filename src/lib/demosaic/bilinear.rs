@@ -16,7 +16,6 @@ impl Kernel for Row<'_> {
     type Output = ();
 
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "many rows advance together")]
     fn run(self) {
         let [above, line, below] = self.cfa;
         let [own, green, other] = self.planes;

@@ -20,7 +20,6 @@ impl Kernel for Differences<'_> {
     type Output = ();
 
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "many rows advance together")]
     fn run(self) {
         let Self { cfa: [above2, above, line, below, below2], to } = self;
         let width = to.len();
@@ -48,7 +47,6 @@ impl Kernel for Row<'_> {
     type Output = ();
 
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "many rows advance together")]
     fn run(self) {
         let [above, line, below] = self.differences;
         let [own, green, other] = self.planes;

@@ -23,7 +23,6 @@ impl vectors::Kernel for Row<'_> {
     type Output = ();
 
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "many rows advance together")]
     fn run(self) {
         let [above2, above, line, below, below2] = self.cfa;
         let [own, green, other] = self.planes;

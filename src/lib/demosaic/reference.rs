@@ -101,7 +101,8 @@ fn for_all(samples: impl Fn(u32) -> f32, black: f64, check: impl Fn(&Plane<'_>, 
     for method in Method::ALL {
         for pattern in CfaPattern::ALL {
             for [width, height] in SIZES {
-                let samples: Vec<f32> = scattered(width as u32).take(width * height).map(&samples).collect();
+                let samples: Vec<f32> =
+                    scattered(u32::try_from(width).unwrap()).take(width * height).map(&samples).collect();
                 let plane = Plane { samples: &samples, width, height, black, pattern };
                 check(&plane, method, &format!("{method:?} {pattern} {width}x{height}"));
             }

@@ -18,7 +18,6 @@ impl Kernel for Hues<'_> {
     type Output = ();
 
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "many rows advance together")]
     fn run(self) {
         let Self { cfa: [above, line, below], green, hue } = self;
         let width = green.len();
@@ -50,7 +49,6 @@ impl Kernel for Row<'_> {
     type Output = bool;
 
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "many rows advance together")]
     fn run(self) -> bool {
         let [above, line, below] = self.hues;
         let [own, green, other] = self.planes;

@@ -7,6 +7,8 @@
 //!
 //! Error of the body: |ẑ − Φ⁻¹(u)| < 10⁻⁶, half of it from what the lower half of the word would add at its rim.
 
+#![expect(clippy::excessive_precision, reason = "coefficients have the digits that they were published or found with")]
+
 use super::philox::LANES;
 
 /// Upper halves of words whose tail is at least this many 2⁻³² belong to the body: 1.38·10⁻⁴, |z| ≤ 3.63.

@@ -54,6 +54,7 @@ pub(super) fn fill(
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_possible_truncation, reason = "small numbers of photosites")]
 mod tests {
     use super::*;
 

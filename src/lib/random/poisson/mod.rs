@@ -164,7 +164,7 @@ fn exponential(x: f32) -> f32 {
 pub(super) fn fill(counts: &mut [f32], rates: &[f32], high: &[u32], low: impl Fn(usize) -> u32) {
     let mut unsure = [0; BLOCK];
     let unsure = &mut unsure[..rates.len()];
-    let within = |rate: f32| (rate >= EXPANSION_FROM) & (rate <= EXPANSION_TO);
+    let within = |rate: f32| (EXPANSION_FROM..=EXPANSION_TO).contains(&rate);
     if rates.iter().fold(true, |all, &rate| all & within(rate)) {
         by_expansion(counts, unsure, rates, high);
     } else {
@@ -214,6 +214,7 @@ fn settle(rate: f32, high: u32, low: u32) -> f32 {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_possible_truncation, reason = "small numbers of photosites, and shares of 2³²")]
 mod tests {
     use super::*;
     use crate::random::philox::philox4x32_10;

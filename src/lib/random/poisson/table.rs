@@ -112,6 +112,7 @@ fn of_cell(cells: &[(f32, u32); CELLS], high: u32) -> (f32, u32) {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_possible_truncation, reason = "small numbers of photosites")]
 mod tests {
     use super::*;
     use crate::random::philox::fill as fill_words;
