@@ -12,10 +12,11 @@ use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::random::philox::{BLOCK, LANES};
 use crate::random::poisson::Table;
-use crate::random::{Run, RunWords, Source};
+use crate::random::{Run, RunWords, Source, spans};
 use crate::stage::{Counts, Stage};
 use crate::transfer::{Transfer, uniform_share};
 use crate::units::{Electrons, ExpectedElectrons, QuantityKind};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The numbers that the noise of a photosite follows from.
@@ -286,10 +287,10 @@ impl Stage for AddNoise {
                     for (noisy, &charge) in noisy.iter_mut().zip(passage.leaving(y)) {
                         *noisy = to_sample(charge);
                     }
-                    for (block, noisy) in noisy.chunks_mut(BLOCK).enumerate() {
-                        let run = line.run(block * BLOCK, noisy.len());
+                    for span in spans(line.first_column, noisy.len()) {
+                        let run = line.run(&span);
                         run.make_temporal(&mut words);
-                        counts.not_finite += line.read(&run, &words, &mut noise, noisy);
+                        counts.not_finite += line.read(&run, &words, &mut noise, &mut noisy[span]);
                     }
                 }
             }
@@ -344,8 +345,9 @@ impl Kernel for Expose<'_> {
                 let line = noise.line(y, channel);
                 let expected = input.row(y.cast_signed(), channel);
                 let noisy = output.row(y, channel);
-                for (block, (expected, noisy)) in expected.chunks(BLOCK).zip(noisy.chunks_mut(BLOCK)).enumerate() {
-                    let run = line.run(block * BLOCK, expected.len());
+                for span in spans(line.first_column, expected.len()) {
+                    let run = line.run(&span);
+                    let (expected, noisy) = (&expected[span.clone()], &mut noisy[span]);
                     run.make_temporal(&mut scratch.words);
                     line.charges(&run, &mut scratch, expected, noisy, &mut counts);
                     counts.not_finite += line.read(&run, &scratch.words, &mut scratch.normals, noisy);
@@ -370,8 +372,9 @@ impl Kernel for Charges<'_> {
     fn run(self) -> Counts {
         let mut counts = Counts::default();
         let mut scratch = Scratch::default();
-        for (block, (expected, charge)) in self.expected.chunks(BLOCK).zip(self.charge.chunks_mut(BLOCK)).enumerate() {
-            let run = self.line.run(block * BLOCK, expected.len());
+        for span in spans(self.line.first_column, self.expected.len()) {
+            let run = self.line.run(&span);
+            let (expected, charge) = (&self.expected[span.clone()], &mut self.charge[span]);
             run.make_temporal(&mut scratch.words);
             self.line.charges(&run, &mut scratch, expected, charge, &mut counts);
         }
@@ -396,18 +399,18 @@ impl Default for Scratch {
 }
 
 impl Line<'_> {
-    /// The draws of `photosites` photosites from column `x` of the frame on.
-    fn run(&self, x: usize, photosites: usize) -> Run {
+    /// The draws of the photosites in a span of the frame's columns.
+    fn run(&self, span: &Range<usize>) -> Run {
         let record = self.record;
         #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
-        let column = self.first_column.wrapping_add(x as i32);
+        let column = self.first_column.wrapping_add(span.start as i32);
         Run {
             seed: record.seed,
             sensor_seed: record.sensor_seed,
             frame: record.frame,
             place: [column, self.row],
-            classes: self.classes.map(|class| class as u8),
-            length: photosites.next_multiple_of(LANES),
+            classes: [span.start, span.start + 1].map(|x| self.classes[x % 2] as u8),
+            length: span.len().next_multiple_of(LANES),
         }
     }
 
@@ -470,7 +473,7 @@ impl Line<'_> {
             for (number, &rate) in numbers.iter_mut().zip(rates) {
                 *number = rate + rate.sqrt() * *number;
             }
-        } else if let Some(tables) = self.tables_at(source, rates) {
+        } else if let Some(tables) = self.tables_at(source, run, rates) {
             run.counts_of(words, source, tables, numbers);
         } else {
             run.counts(words, source, rates, numbers);
@@ -479,10 +482,10 @@ impl Line<'_> {
 
     /// The tables of the run's rates, where all its photosites have those.
     #[inline(always)]
-    fn tables_at(&self, source: Source, rates: &[f32]) -> Option<[&Table; 2]> {
+    fn tables_at(&self, source: Source, run: &Run, rates: &[f32]) -> Option<[&Table; 2]> {
         let tables = match source {
             Source::Dcsn => [self.tables.dark.as_deref(); 2],
-            _ => self.classes.map(|class| self.tables.light[class as usize].as_deref()),
+            _ => run.classes.map(|class| self.tables.light[usize::from(class)].as_deref()),
         };
         let [Some(even), Some(odd)] = tables else { return None };
         let known = [even.rate(), odd.rate()];

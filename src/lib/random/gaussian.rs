@@ -63,14 +63,24 @@ pub(super) fn is_in_tail(high: u32) -> bool {
 }
 
 /// Quantile by the upper half of a word, in the body.
+#[cfg(test)]
+pub(super) fn body(high: u32) -> f32 {
+    from_zeta(zeta(high), high)
+}
+
+/// ζ of the upper half of a word, less 3.75.
 #[inline(always)]
-pub fn body(high: u32) -> f32 {
-    let tail = tail(high);
-    // Both are below 2³¹, and convert as signed numbers, which every set of instructions can.
-    let share = tail.cast_signed() as f32 + 0.5;
-    let from_median = (0x7fff_ffff - tail).cast_signed() as f32 + 0.5;
+fn zeta(high: u32) -> f32 {
+    // Below 2³¹, it converts as a signed number, which every set of instructions can.
+    let share = tail(high).cast_signed() as f32 + 0.5;
     let y = share * TWO_TO_MINUS_30 * (1.0 - share * (0.25 * TWO_TO_MINUS_30));
-    let zeta = -logarithm(y) - 3.75;
+    -logarithm(y) - 3.75
+}
+
+/// The quantile by ζ.
+#[inline(always)]
+fn from_zeta(zeta: f32, high: u32) -> f32 {
+    let from_median = (0x7fff_ffff - tail(high)).cast_signed() as f32 + 0.5;
     let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10] = QUANTILE;
     let square = zeta * zeta;
     let fourth = square * square;
@@ -80,6 +90,18 @@ pub fn body(high: u32) -> f32 {
     let sum = low + fourth * (middle + last * fourth);
     let size = from_median * (0.5 * TWO_TO_MINUS_30) * sum;
     f32::from_bits(size.to_bits() | (!high & 0x8000_0000))
+}
+
+/// Quantiles by the upper halves of words, in the body.
+#[inline(always)]
+pub(super) fn bodies(normals: &mut [f32], high: &[u32]) {
+    // In two loops, so that each keeps its coefficients in registers.
+    for (normal, &high) in normals.iter_mut().zip(high) {
+        *normal = zeta(high);
+    }
+    for (normal, &high) in normals.iter_mut().zip(high) {
+        *normal = from_zeta(*normal, high);
+    }
 }
 
 const TWO_TO_MINUS_30: f32 = 1.0 / 1_073_741_824.0;
@@ -186,9 +208,7 @@ const FAR: Rational = (
 /// [`LANES`].
 #[inline(always)]
 pub(super) fn fill(normals: &mut [f32], high: &[u32], low: impl Fn(usize) -> u32) {
-    for (normal, &high) in normals.iter_mut().zip(high) {
-        *normal = body(high);
-    }
+    bodies(normals, high);
     let (normals, high) = (normals.as_chunks_mut::<LANES>().0, high.as_chunks::<LANES>().0);
     for (first, (normals, high)) in normals.iter_mut().zip(high).enumerate() {
         if high.iter().fold(false, |any, &high| any | is_in_tail(high)) {

@@ -12,6 +12,7 @@ use poisson::Table;
 use rand_core::TryRng;
 use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
+use std::ops::Range;
 
 /// A source of noise, as the paper lists them (Sec. 3.3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -100,15 +101,17 @@ impl TryRng for Draws {
 
 /// A run of photosites of one row, at most [`BLOCK`], whose draws are made together.
 ///
-/// Two Philox blocks a photosite hold all words that its five draws need but in one case of a thousand:
+/// One and a half Philox blocks a photosite hold all words that its five draws need but in one case of a thousand:
 ///
-/// | key, third word of the counter | fourth word | words |
-/// |---|---|---|
-/// | seed, frame | class · 2¹⁶ | SSN, DCSN and RON high, RON low |
-/// | seed, frame | class · 2¹⁶ + 1 | SSN and DCSN low, made only where the high words leave a count in doubt |
-/// | sensor seed, 0 | 2²⁴ + class · 2¹⁶ | DCNU high and low, PRNU high and low |
+/// | key | first word of the counter | third | fourth | words |
+/// |---|---|---|---|---|
+/// | seed | column | frame | class · 2¹⁶ | SSN, DCSN and RON high, RON low |
+/// | seed | column | frame | class · 2¹⁶ + 1 | SSN and DCSN low |
+/// | sensor seed | column less bit 7 | 0 | 2²⁴ + class · 2¹⁶ | DCNU and PRNU high where bit 7 is 0, then where it is 1 |
+/// | sensor seed | column less bit 7 | 0 | 2²⁴ + class · 2¹⁶ + 1 | their low words |
 ///
-/// The first two words of the counter are column and row on the sensor. Each draw has a 64-bit word of its own.
+/// The second word of the counter is the row; column and row are those on the sensor. Each draw has a 64-bit word of its
+/// own; low words that have a block of their own are made only where the high ones do not settle a number.
 #[derive(Debug, Clone, Copy)]
 pub struct Run {
     /// Seed of the temporal noise.
@@ -121,20 +124,39 @@ pub struct Run {
     pub place: [i32; 2],
     /// Sensor classes of the first photosite and of the second; they alternate.
     pub classes: [u8; 2],
-    /// Photosites, a multiple of [`LANES`].
+    /// Photosites, a multiple of [`LANES`]. Those that follow the last of [`spans`] get any words.
     pub length: usize,
 }
+
+/// Cuts the columns of a row, the first of which is `column` on the sensor, into runs: each within [`BLOCK`] columns of
+/// the sensor that share their patterns' words.
+pub fn spans(column: i32, width: usize) -> impl Iterator<Item = Range<usize>> {
+    let offset = column.rem_euclid(COLUMNS) as usize;
+    let ends = (1..).map(move |block| (block * BLOCK).saturating_sub(offset).min(width));
+    let starts = std::iter::once(0).chain(ends.clone());
+    starts.zip(ends).take_while(|(start, end)| start < end).map(|(start, end)| start..end)
+}
+
+/// [`BLOCK`] as a number of columns.
+#[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "256")]
+const COLUMNS: i32 = BLOCK as i32;
+
+/// Columns between two photosites that share a block of their patterns.
+const HALF: usize = BLOCK / 2;
 
 /// Memory for the words of a run.
 #[derive(Debug)]
 pub struct RunWords {
     temporal: Words,
-    pattern: Words,
+    /// What two photosites share.
+    shared: Words,
+    /// High words of DCNU and PRNU.
+    pattern: [[u32; BLOCK]; 2],
 }
 
 impl Default for RunWords {
     fn default() -> Self {
-        Self { temporal: [[0; BLOCK]; 4], pattern: [[0; BLOCK]; 4] }
+        Self { temporal: [[0; BLOCK]; 4], shared: [[0; BLOCK]; 4], pattern: [[0; BLOCK]; 2] }
     }
 }
 
@@ -145,27 +167,56 @@ impl Run {
         self.classes.map(|class| u32::from(class) << 16)
     }
 
+    /// Column and row of a photosite as words of a counter.
+    #[expect(clippy::cast_possible_truncation, reason = "a run is short, and columns wrap as a sensor's do")]
+    fn counter(&self, index: usize) -> [u32; 2] {
+        let [x, y] = self.place.map(i32::cast_unsigned);
+        [x.wrapping_add(index as u32), y]
+    }
+
     /// Makes the words of the temporal sources.
     #[inline(always)]
     pub fn make_temporal(&self, words: &mut RunWords) {
-        let [x, y] = self.place.map(i32::cast_unsigned);
+        let [x, y] = self.counter(0);
         philox::fill(&mut words.temporal, self.length, halves(self.seed), [x, y, self.frame], self.fourth());
     }
 
-    /// Makes the words of the fixed patterns.
+    /// Makes the high words of the fixed patterns.
     #[inline(always)]
     pub fn make_pattern(&self, words: &mut RunWords) {
-        let [x, y] = self.place.map(i32::cast_unsigned);
-        let fourth = self.fourth().map(|class| class | PATTERN);
-        philox::fill(&mut words.pattern, self.length, halves(self.sensor_seed), [x, y, 0], fourth);
+        let first = self.place[0].rem_euclid(COLUMNS) as usize;
+        let end = (first + self.length).min(BLOCK);
+        let is_in_one_half = first / HALF == (end - 1) / HALF;
+        let made = if is_in_one_half { first % HALF..(end - 1) % HALF + 1 } else { 0..HALF };
+        let [even, odd] = self.fourth().map(|class| class | PATTERN);
+        let fourth = if (first - made.start).is_multiple_of(2) { [even, odd] } else { [odd, even] };
+        #[expect(clippy::cast_possible_truncation, reason = "below 256")]
+        let x = (self.place[0].cast_unsigned() & !(BLOCK as u32 - 1)) + made.start as u32;
+        let y = self.place[1].cast_unsigned();
+        philox::fill(&mut words.shared, made.len(), halves(self.sensor_seed), [x, y, 0], fourth);
+        for half in first / HALF..=(end - 1) / HALF {
+            let columns = first.max(half * HALF)..end.min((half + 1) * HALF);
+            let from = columns.start - half * HALF - made.start..columns.end - half * HALF - made.start;
+            for (source, pattern) in words.pattern.iter_mut().enumerate() {
+                pattern[columns.start - first..columns.end - first]
+                    .copy_from_slice(&words.shared[2 * half + source][from.clone()]);
+            }
+        }
     }
 
     /// The low words of SSN and DCSN.
     fn low(&self, index: usize) -> [u32; 4] {
-        let [x, y] = self.place.map(i32::cast_unsigned);
-        #[expect(clippy::cast_possible_truncation, reason = "a run is short, and columns wrap as a sensor's do")]
-        let counter = [x.wrapping_add(index as u32), y, self.frame, self.fourth()[index % 2] | 1];
-        philox4x32_10(counter, halves(self.seed))
+        let [x, y] = self.counter(index);
+        philox4x32_10([x, y, self.frame, self.fourth()[index % 2] | 1], halves(self.seed))
+    }
+
+    /// The low words of DCNU and PRNU.
+    fn pattern_low(&self, index: usize) -> [u32; 2] {
+        let [x, y] = self.counter(index);
+        let bit = HALF as u32;
+        let counter = [x & !bit, y, 0, self.fourth()[index % 2] | PATTERN | 1];
+        let [a, b, c, d] = philox4x32_10(counter, halves(self.sensor_seed));
+        if x & bit == 0 { [a, b] } else { [c, d] }
     }
 
     /// Fills `numbers` with standard normal numbers of RON, DCNU or PRNU, or of the word that SSN and DCSN have.
@@ -177,8 +228,8 @@ impl Run {
             Source::Ssn => gaussian::fill(numbers, &temporal[0][..length], |index| self.low(index)[0]),
             Source::Dcsn => gaussian::fill(numbers, &temporal[1][..length], |index| self.low(index)[1]),
             Source::Ron => gaussian::fill(numbers, &temporal[2][..length], |index| temporal[3][index]),
-            Source::Dcnu => gaussian::fill(numbers, &pattern[0][..length], |index| pattern[1][index]),
-            Source::Prnu => gaussian::fill(numbers, &pattern[2][..length], |index| pattern[3][index]),
+            Source::Dcnu => gaussian::fill(numbers, &pattern[0][..length], |index| self.pattern_low(index)[0]),
+            Source::Prnu => gaussian::fill(numbers, &pattern[1][..length], |index| self.pattern_low(index)[1]),
         }
     }
 
@@ -200,8 +251,45 @@ impl Run {
 
 #[cfg(test)]
 mod tests {
+    use super::philox::LANES;
     use super::*;
     use rand_core::Rng;
+
+    /// Every photosite has the same high words wherever the run begins that they are made in, those of the documented
+    /// blocks.
+    #[test]
+    fn words_belong_to_photosites() {
+        let width = 700;
+        for column in [0, 1, 100, 127, 128, 129, 250, 255, 256, -3, -300, i32::MAX - 100] {
+            let mut covered = 0;
+            for span in spans(column, width) {
+                assert_eq!(span.start, covered);
+                covered = span.end;
+                let place = [column.wrapping_add(i32::try_from(span.start).unwrap()), -7];
+                let length = span.len().next_multiple_of(LANES);
+                let run = Run { seed: 3, sensor_seed: 1 << 40, frame: 9, place, classes: [2, 1], length };
+                let mut words = RunWords::default();
+                run.make_temporal(&mut words);
+                run.make_pattern(&mut words);
+                for index in 0..span.len() {
+                    let x = place[0].wrapping_add(i32::try_from(index).unwrap()).cast_unsigned();
+                    let y = (-7_i32).cast_unsigned();
+                    let class = [2_u32, 1][index % 2] << 16;
+                    let temporal = philox4x32_10([x, y, 9, class], [3, 0]);
+                    assert_eq!(words.temporal.map(|word| word[index]), temporal);
+                    let block = |last: u32| philox4x32_10([x & !128, y, 0, (1 << 24) | class | last], [0, 1 << 8]);
+                    let slot = if x & 128 == 0 { 0 } else { 2 };
+                    assert_eq!(
+                        words.pattern.map(|word| word[index]),
+                        [block(0)[slot], block(0)[slot + 1]],
+                        "{column} {index}"
+                    );
+                    assert_eq!(run.pattern_low(index), [block(1)[slot], block(1)[slot + 1]]);
+                }
+            }
+            assert_eq!(covered, width);
+        }
+    }
 
     #[test]
     fn every_part_of_the_name_changes_the_draw() {

@@ -54,9 +54,8 @@ const LEFT_OUT: [f32; 2] = [0.05, 3.0e-3];
 #[inline(always)]
 fn by_expansion(counts: &mut [f32], unsure: &mut [u32], rates: &[f32], high: &[u32]) {
     let mut normals = [0.0; BLOCK];
-    for (normal, &high) in normals.iter_mut().zip(high) {
-        *normal = gaussian::body(high);
-    }
+    let normals = &mut normals[..high.len()];
+    gaussian::bodies(normals, high);
     let lanes = counts.iter_mut().zip(unsure).zip(rates).zip(normals.iter().zip(high));
     for (((count, unsure), &rate), (&normal, &high)) in lanes {
         let (x, whole, doubt) = single(rate, normal);
