@@ -34,7 +34,7 @@ struct Mean {
 
 pub fn study(study: &Study) -> Result<Section> {
     let camera = &study.camera;
-    let (size, frames) = if study.quick { ([96, 64], 8) } else { ([384, 256], 64) };
+    let (size, frames) = if study.quick { ([96, 64], 8_usize) } else { ([384, 256], 64) };
     let pixels = size[0] * size[1];
     let mut chain = camera.chain(METHOD, Equations::Exact, false)?;
     let prediction = chain.predict(SKY)?;

@@ -16,7 +16,7 @@ use cyanometer::optics::Exposure;
 use cyanometer::propagation::Equations;
 use cyanometer::propagation::chain::{Chain, ChainSettings};
 use cyanometer::sensor::{Sensor, SpectralResponse};
-use cyanometer::spectrum::{Observer, SpectralLibrary, WavelengthGrid};
+use cyanometer::spectrum::{SpectralLibrary, WavelengthGrid};
 use cyanometer::stage::MemoryFrame;
 use cyanometer::units::QuantityKind;
 use std::path::{Path, PathBuf};
@@ -31,11 +31,10 @@ pub const SKY: [f64; 3] = [4448.0, 16_599.0, 30_000.0];
 pub const METHODS: [(&str, Method); 4] =
     [("BI", Method::Bilinear), ("SHTI", Method::SmoothHue), ("ECI", Method::EffectiveColor), ("MHC", Method::Malvar)];
 
-/// Sensor, observer, skies, and the matrix fitted to them.
+/// Sensor, skies, and the matrix fitted to them.
 pub struct Camera {
     pub sensor: Sensor,
     pub response: SpectralResponse,
-    pub observer: Observer,
     pub skies: SpectralLibrary,
     pub signals: Signals,
     pub responses: Signals,
@@ -67,7 +66,7 @@ impl Camera {
             white: White::D65,
             white_luminance: None,
         };
-        Ok(Self { sensor, response, observer, skies, signals, responses, color })
+        Ok(Self { sensor, response, skies, signals, responses, color })
     }
 
     /// The head of a frame of expected electrons; `uniform` are those of a uniform scene.

@@ -14,7 +14,7 @@ use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::frame::to_sample;
 use cyanometer::propagation::{Equations, mixture};
 use cyanometer::random::philox::philox4x32_10;
-use cyanometer::report::plot::{Arrangement, Axis, Color, Marks, Panel, Plot};
+use cyanometer::report::plot::{Arrangement, Arrow, Axis, Color, Marks, Panel, Plot};
 use cyanometer::stage::{MemoryFrame, RowSource};
 use std::hint::black_box;
 use std::path::Path;
@@ -142,23 +142,15 @@ pub fn study(study: &Study) -> Result<Section> {
 fn trade(errors: &[Vec<f64>], judged: usize, noise: &[f64]) -> Panel {
     let points: Vec<Choice> =
         (0..METHODS.len()).map(|i| Choice::new(METHODS[i].0, noise[i], errors[i][judged])).collect();
-    let mut panel =
-        pareto::panel("bias against color noise", "expected ΔE*ab of noise", "rms error / rms signal", &[], 1.0);
-    let all = || points.iter();
-    let front: Vec<[f64; 2]> = pareto::front(all()).into_iter().map(|c| [c.time, c.error]).collect();
-    panel.x = Axis::linear(&panel.x.label);
-    panel.y = Axis::linear(&panel.y.label);
-    panel.series.clear();
-    panel.add("no method beats these in both", Color::Gray, Marks::Line(front));
-    panel.add("", Color::Blue, Marks::Points(all().map(|c| [c.time, c.error]).collect()));
-    for choice in all() {
-        let at = [choice.time, choice.error];
-        panel.arrows.push(cyanometer::report::plot::Arrow {
-            from: at,
-            to: at,
-            label: choice.label.clone(),
-            color: Color::Blue,
-        });
+    let mut panel = Panel::new(Axis::linear("expected ΔE*ab of noise"), Axis::linear("rms error / rms signal"));
+    panel.title = "bias against color noise".into();
+    let place = |choice: &Choice| [choice.time, choice.error];
+    let front: Vec<[f64; 2]> = pareto::front(points.iter()).into_iter().map(place).collect();
+    panel.add("beaten by none in both", Color::Gray, Marks::Line(front));
+    panel.add("", Color::Blue, Marks::Points(points.iter().map(place).collect()));
+    for choice in &points {
+        let at = place(choice);
+        panel.arrows.push(Arrow { from: at, to: at, label: choice.label.clone(), color: Color::Blue });
     }
     panel
 }

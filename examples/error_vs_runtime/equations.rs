@@ -72,7 +72,7 @@ pub fn study(study: &Study) -> Result<Section> {
     }
     let mut works: Vec<Work<'_>> = Vec::new();
     for (_, _, chain) in &mut chains {
-        works.push(Box::new(|| {
+        works.push(Box::new(move || {
             black_box(chain.predict(black_box(LEVELS[2].1))?);
             Ok(())
         }));

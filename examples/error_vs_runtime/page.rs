@@ -55,18 +55,20 @@ pub fn digits(value: f64, count: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".into() } else { "–".into() };
     }
-    #[expect(clippy::cast_possible_truncation, reason = "logarithms of doubles are within ±324")]
-    let magnitude = {
-        // Of the rounded number: 0.9996 has the magnitude of 1.
-        let rough = value.abs().log10().floor();
-        let step = 10_f64.powf(rough - count as f64 + 1.0);
-        ((value.abs() / step).round() * step).log10().mul_add(1.0, 1e-12).floor() as i32
+    let (mantissa, magnitude) = {
+        let text = format!("{value:.*e}", count - 1);
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        (mantissa.parse().unwrap_or(value), exponent.parse().unwrap_or(0_i32))
     };
     if (-4..7).contains(&magnitude) {
-        let decimals = usize::try_from(count as i64 - 1 - i64::from(magnitude)).unwrap_or(0);
-        return number(value, decimals);
+        let decimals = i64::try_from(count).unwrap_or(0) - 1 - i64::from(magnitude);
+        return number(mantissa * 10_f64.powi(magnitude), usize::try_from(decimals).unwrap_or(0));
     }
-    let mantissa = number(value / 10_f64.powi(magnitude), count - 1);
+    power(number(mantissa, count - 1), magnitude)
+}
+
+/// A mantissa and a power of ten.
+fn power(mantissa: String, magnitude: i32) -> String {
     let exponent: String = magnitude.to_string().chars().map(raised).collect();
     if mantissa == "1" { format!("10{exponent}") } else { format!("{mantissa}·10{exponent}") }
 }
@@ -92,11 +94,11 @@ pub fn percent(fraction: f64) -> String {
     format!("{} %", digits(100.0 * fraction, 2))
 }
 
-/// A power of ten, or a small whole number as it is.
+/// A power of ten from 10⁴ on, any other number as it is.
 pub fn count(value: usize) -> String {
-    let power = (value as f64).log10();
-    if value >= 10_000 && power.fract() < 1e-9 {
-        digits(value as f64 * 1.0, 1).replace("1·", "")
+    let magnitude = value.max(1).ilog10();
+    if magnitude >= 4 && value == 10_usize.pow(magnitude) {
+        power("1".into(), magnitude.cast_signed())
     } else {
         value.to_string()
     }

@@ -4,7 +4,7 @@ use crate::Study;
 use crate::bench::Work;
 use crate::camera::{Camera, EXPOSURE, codes, demosaicked, exposed, mosaicked};
 use crate::markdown::Table;
-use crate::page::{Section, digits, time};
+use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::adc::{AdcSettings, Digitize};
 use cyanometer::color::difference::delta_e_76;
@@ -162,7 +162,7 @@ pub fn study(study: &Study) -> Result<Section> {
         "arithmetic",
         "XYZ: rms of relative errors",
         "largest",
-        "codes that differ",
+        "pixels off by a code",
         "ΔE\\*ab, mean",
         "ΔE\\*ab, largest",
         "time per pixel",
@@ -189,7 +189,7 @@ pub fn study(study: &Study) -> Result<Section> {
              interpolation, matrix. The reference is a plain version in double precision, written in the example; beside it \
              the same source in single precision, and the stages of the programs (samples in 32 bits, `mosaic | digitize | demosaic \
              --method bi | to-xyz`). Relative errors are those of X, Y and Z, over the largest of each. Pixels whose ΔE\\*ab is \
-             above 0.001 are counted as codes that differ: a level too near a tie rounded the other way. Double precision \
+             above 0.001 count as off by a code: a level too near a tie was rounded the other way. Double precision \
              stands at the foot of the plot.",
             size[0], size[1]
         ),
@@ -200,7 +200,7 @@ pub fn study(study: &Study) -> Result<Section> {
              code of green is {} of Y; they take {} per pixel, the plain version {} in double and {} in single precision.",
             digits(errors[2].largest, 2),
             digits(errors[2].relative, 2),
-            digits(code, 2),
+            percent(code),
             time(times[2] / pixels),
             time(times[0] / pixels),
             time(times[1] / pixels),

@@ -132,7 +132,7 @@ pub fn study(study: &Study) -> Result<Section> {
     table.row(&["formula, σ of the codes".into(), "–".into(), "0".into(), "0".into(), "–".into(), time(formula[0])]);
     table.row(&["formula, all stages".into(), "–".into(), "0".into(), "0".into(), "–".into(), time(formula[1])]);
     let largest = found.last().ok_or_else(|| Error::Data("no sizes".into()))?;
-    let z = (largest.error - 0.0) / largest.expected;
+    let z = largest.error / largest.expected;
     // Time grows with n, the error falls as its root.
     let tenth_percent = largest.photosites as f64 * (largest.expected / 1e-3).powi(2);
     let tenth_time = largest.time * tenth_percent / largest.photosites as f64;
