@@ -3,6 +3,7 @@
 use crate::Study;
 use crate::bench::Work;
 use crate::camera::{METHODS, SKY, demosaicked, mosaicked};
+use crate::labels::Shape;
 use crate::markdown::{Table, number};
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
@@ -38,7 +39,7 @@ pub fn study(study: &Study) -> Result<Section> {
         scene(study, size, "stripes, 12 pixels", |x, y| stripes(x * size[0] as f64, y * size[0] as f64, 12.0)),
         scene(study, size, "stripes, 3 pixels", |x, y| stripes(x * size[0] as f64, y * size[0] as f64, 3.0)),
     ];
-    let texture = Texture::new(study.seed(5));
+    let texture = Texture::new(study.seed(5), size[0]);
     scenes.push(scene(study, size, "1/f texture", |x, y| texture.at(x, y)));
     if let Some(path) = &study.scene {
         scenes.push(picture(study, path)?);
@@ -80,13 +81,19 @@ pub fn study(study: &Study) -> Result<Section> {
     };
     let x = "CPU time per pixel, ns";
     let structure = pareto::panel(
+        Shape::Beside,
         &format!("bias: {}", scenes[judged].name),
-        x,
-        "rms error / rms signal",
+        [x, "rms error / rms signal"],
         &points(&|i| errors[i][judged]),
         1e-9,
     );
-    let color = pareto::panel("color noise: clear sky", x, "expected ΔE*ab of noise", &points(&|i| noise[i]), 1e-9);
+    let color = pareto::panel(
+        Shape::Beside,
+        "color noise: clear sky",
+        [x, "expected ΔE*ab of noise"],
+        &points(&|i| noise[i]),
+        1e-9,
+    );
     let mut plot = Plot::new("Demosaicking methods", structure);
     plot.panels.push(color);
     plot.panels.push(trade(&errors, judged, &noise));
@@ -111,8 +118,8 @@ pub fn study(study: &Study) -> Result<Section> {
         method: format!(
             "Expected electrons without noise, mosaicked and demosaicked (`demosaic --method bi|shti|eci|mhc`), against the scene \
              itself, all pixels but {RIM} at the rim: root of the mean square of the errors of the three classes over that of the \
-             signal. The ramp is straight with constant hues; stripes are gray sines at 27° to the rows; the texture is noise of \
-             amplitude 1/f with as much structure in hue as a tenth of that in light, from a fixed seed. Noise gain is σ of a \
+             signal. The ramp is straight with constant hues; stripes are gray sines at 27° to the rows; the texture is noise \
+             whose amplitude falls as 1/f down to periods of about 4 pixels, a tenth as strong in hue as in light, from a fixed seed. Noise gain is σ of a \
              pixel over that of a photosite where all classes are alike; the color noise is the expected ΔE\\*ab of a pixel of a \
              clear sky (`predict-noise`, exact). Time on a frame of {}×{} in memory.",
             size[0], size[1]
@@ -184,15 +191,16 @@ fn picture(study: &Study, path: &Path) -> Result<Scene> {
     Ok(Scene { name, truth })
 }
 
-/// Octaves of smooth noise, each of half the period and half the amplitude of the one before: power 1/f² per area, as
-/// natural scenes have.
+/// Octaves of smooth noise, all of the same strength, down to nodes two pixels apart: amplitudes fall as 1/f, as those of
+/// natural scenes do, until a lens takes what is finer.
 struct Texture {
     seed: u64,
+    octaves: u32,
 }
 
 impl Texture {
-    fn new(seed: u64) -> Self {
-        Self { seed }
+    fn new(seed: u64, width: usize) -> Self {
+        Self { seed, octaves: (width / 6).ilog2() + 1 }
     }
 
     /// A number from −1 to 1 that belongs to a node of a lattice.
@@ -212,14 +220,14 @@ impl Texture {
             let (s, t) = (ease(u.fract()), ease(v.fract()));
             let node = |di: u32, dj: u32| self.node(layer, octave, i + di, j + dj);
             let mix = |a: f64, b: f64, t: f64| a + t * (b - a);
-            mix(mix(node(0, 0), node(1, 0), s), mix(node(0, 1), node(1, 1), s), t) / 2_f64.powi(octave.cast_signed())
+            mix(mix(node(0, 0), node(1, 0), s), mix(node(0, 1), node(1, 1), s), t)
         };
-        (0..9).map(octave).sum()
+        (0..self.octaves).map(octave).sum()
     }
 
     fn at(&self, x: f64, y: f64) -> [f64; 3] {
-        let light = 0.45 * (0.6 * self.layer(0, x, y)).exp();
-        let hue = |layer: u32| (0.06 * self.layer(layer, x, y)).exp();
+        let light = 0.3 * (0.35 * self.layer(0, x, y)).exp();
+        let hue = |layer: u32| (0.035 * self.layer(layer, x, y)).exp();
         [0.7 * light * hue(1), light, 1.3 * light * hue(2)]
     }
 }

@@ -9,6 +9,7 @@ mod bench;
 mod camera;
 mod demosaicking;
 mod equations;
+mod labels;
 #[path = "../support/markdown.rs"]
 mod markdown;
 mod page;
@@ -116,8 +117,8 @@ fn head(study: &Study) -> String {
     let mut text = String::from("# Error against run time\n\n");
     let _ = writeln!(
         text,
-        "Made by `scripts/error-vs-runtime`{} on {}, {}. All numbers but the times come from fixed seeds and are the same at \
-         every run.\n",
+        "Made by `scripts/error-vs-runtime`{} on {}, {}. All errors come from fixed seeds and are the same at every run; \
+         times are not.\n",
         if study.quick { " `--quick`: small frames, rough times," } else { "" },
         machine(),
         date(),

@@ -1,6 +1,7 @@
 //! Choices on a plane of run time and error, and the front of those that no other beats.
 
-use cyanometer::report::plot::{Arrow, Axis, Color, Marks, Panel};
+use crate::labels::{self, Canvas, Shape};
+use cyanometer::report::plot::{Axis, Color, Marks, Panel, Series};
 
 /// A setting that a user may choose.
 #[derive(Clone)]
@@ -50,15 +51,15 @@ pub fn front<'a>(choices: impl Iterator<Item = &'a Choice>) -> Vec<&'a Choice> {
 }
 
 /// A panel of choices with their front. Errors below `foot` are shown there: a logarithmic axis has no zero.
-pub fn panel(title: &str, time: &str, error: &str, groups: &[Group], foot: f64) -> Panel {
+pub fn panel(shape: Shape, title: &str, [time, error]: [&str; 2], groups: &[Group], foot: f64) -> Panel {
     let shown = |choice: &Choice| [choice.time, choice.error.max(foot)];
     let all = || groups.iter().flat_map(|group| &group.choices).filter(|choice| choice.error.is_finite());
     let range = |place: usize| {
         let (low, high) = all().map(shown).fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), point| {
             (low.min(point[place]), high.max(point[place]))
         });
-        // Room for labels, more where decades are few.
-        let room = (high / low).max(10.0).powf(0.1);
+        // Room for labels.
+        let room = (high / low).max(3.0).powf(0.1);
         (low / room, high * room)
     };
     let (x, y) = (range(0), range(1));
@@ -77,15 +78,16 @@ pub fn panel(title: &str, time: &str, error: &str, groups: &[Group], foot: f64) 
         steps.insert(0, [first, y.1]);
         steps.push([x.1, last]);
     }
-    panel.add("Pareto front", Color::Gray, Marks::Line(steps));
     for (index, group) in groups.iter().enumerate() {
-        let color = Color::of_index(index);
-        panel.add(&group.name, color, Marks::Points(group.choices.iter().map(shown).collect()));
-        for choice in group.choices.iter().filter(|choice| !choice.label.is_empty() && choice.error.is_finite()) {
-            // An arrow of no length is a label at its place.
-            let at = shown(choice);
-            panel.arrows.push(Arrow { from: at, to: at, label: choice.label.clone(), color });
-        }
+        panel.add(&group.name, Color::of_index(index), Marks::Points(group.choices.iter().map(shown).collect()));
     }
+    let points: Vec<[f64; 2]> = all().map(shown).collect();
+    // Names on the front find their places first.
+    let is_best = |choice: &&Choice| front(all()).iter().any(|best| std::ptr::eq(*best, *choice));
+    let (mut first, others): (Vec<&Choice>, Vec<&Choice>) = all().filter(|c| !c.label.is_empty()).partition(is_best);
+    first.extend(others);
+    let named: Vec<([f64; 2], &str)> = first.into_iter().map(|c| (shown(c), c.label.as_str())).collect();
+    labels::write(&mut panel, Canvas { ends: [x, y], shape }, &named, &points, &steps);
+    panel.series.insert(0, Series { name: "Pareto front".into(), color: Color::Gray, marks: Marks::Line(steps) });
     panel
 }

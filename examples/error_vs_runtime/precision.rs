@@ -3,6 +3,7 @@
 use crate::Study;
 use crate::bench::Work;
 use crate::camera::{Camera, EXPOSURE, codes, demosaicked, exposed, mosaicked};
+use crate::labels::Shape;
 use crate::markdown::Table;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
@@ -156,7 +157,13 @@ pub fn study(study: &Study) -> Result<Section> {
     let groups: Vec<Group> = (0..3)
         .map(|i| Group::new("", vec![Choice::new(names[i], times[i] * 1e9 / pixels, errors[i].largest)]))
         .collect();
-    let panel = pareto::panel("", "CPU time per pixel, ns", "largest ΔE*ab against double precision", &groups, 1e-7);
+    let panel = pareto::panel(
+        Shape::Alone,
+        "",
+        ["CPU time per pixel, ns", "largest ΔE*ab against double precision"],
+        &groups,
+        1e-7,
+    );
     let plot = Plot::new("Precision from electrons to XYZ, BI", panel);
     let mut table = Table::new(&[
         "arithmetic",

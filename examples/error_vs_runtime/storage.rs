@@ -3,6 +3,7 @@
 use crate::Study;
 use crate::bench::Work;
 use crate::camera::{Camera, codes, demosaicked, exposed, mosaicked};
+use crate::labels::Shape;
 use crate::markdown::{Table, number};
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
@@ -45,7 +46,7 @@ fn compression_name(kind: CompressionKind) -> &'static str {
 }
 
 pub fn study(study: &Study) -> Result<Section> {
-    let size = if study.quick { [160, 120] } else { [800, 600] };
+    let size = if study.quick { [160, 120] } else { [640, 480] };
     let directory = tempfile::tempdir().map_err(|e| Error::disk("a temporary directory", "make", e))?;
     let plane = sky(&study.camera, size, study.seed(7))?;
     let xyz = study.camera.xyz(&demosaicked(&plane, Method::EffectiveColor)?)?;
@@ -69,20 +70,38 @@ pub fn study(study: &Study) -> Result<Section> {
     let x = "CPU time to write and read a sample, ns";
     let mut plot = Plot::new(
         "Storage: size against time",
-        pareto::panel("codes of 12 bits, CFA plane", x, "bits per sample", &groups(&of_codes_ways, &|w| w.bits), 1e-9),
+        pareto::panel(
+            Shape::Stacked,
+            "codes of 12 bits, CFA plane",
+            [x, "bits per sample"],
+            &groups(&of_codes_ways, &|w| w.bits),
+            1e-9,
+        ),
     );
-    plot.panels.push(pareto::panel("XYZ", x, "bits per sample", &groups(&of_xyz_ways, &|w| w.bits), 1e-9));
+    plot.panels.push(pareto::panel(
+        Shape::Stacked,
+        "XYZ",
+        [x, "bits per sample"],
+        &groups(&of_xyz_ways, &|w| w.bits),
+        1e-9,
+    ));
     let mut errors = Plot::new(
         "Storage: error against time (lossless at the foot)",
         pareto::panel(
+            Shape::Stacked,
             "codes of 12 bits, CFA plane",
-            x,
-            "largest error, ADU",
+            [x, "largest error, ADU"],
             &groups(&of_codes_ways, &|w| w.error),
             1e-2,
         ),
     );
-    errors.panels.push(pareto::panel("XYZ", x, "largest ΔE*ab", &groups(&of_xyz_ways, &|w| w.error), 1e-4));
+    errors.panels.push(pareto::panel(
+        Shape::Stacked,
+        "XYZ",
+        [x, "largest ΔE*ab"],
+        &groups(&of_xyz_ways, &|w| w.error),
+        1e-4,
+    ));
 
     let table = |ways: &[Way], unit: &str| {
         let mut table = Table::new(&[
@@ -226,27 +245,27 @@ fn judge(
 
 fn advice(codes: &[Way], xyz: &[Way]) -> String {
     let name = |way: &Way| format!("{} with `{}`", GROUPS[way.group], compression_name(way.compression));
-    let cost = |way: &Way| time(way.write + way.read);
-    let fastest = |ways: &mut dyn Iterator<Item = &Way>| -> String {
-        let best = ways.min_by(|a, b| (a.write + a.read).total_cmp(&(b.write + b.read)));
+    let cost = |way: &Way| way.write + way.read;
+    let least = |ways: &[Way], of: &dyn Fn(&Way) -> f64| -> String {
+        let best = ways.iter().filter(|way| way.error == 0.0).min_by(|a, b| of(a).total_cmp(&of(b)));
         best.map_or(String::new(), |way| {
-            format!("{} ({} a sample, {} bits)", name(way), cost(way), number(way.bits, 1))
+            format!("{} ({} a sample, {} bits)", name(way), time(cost(way)), number(way.bits, 1))
         })
     };
-    let smallest = |ways: &mut dyn Iterator<Item = &Way>| -> String {
-        let best = ways.min_by(|a, b| a.bits.total_cmp(&b.bits));
-        best.map_or(String::new(), |way| {
-            format!("{} ({} a sample, {} bits)", name(way), cost(way), number(way.bits, 1))
-        })
+    let three = |ways: &[Way]| {
+        format!(
+            "fastest is {}, smallest {}, and the least product of both has {}",
+            least(ways, &cost),
+            least(ways, &|way| way.bits),
+            least(ways, &|way| way.bits * cost(way)),
+        )
     };
     let half = |ways: &[Way]| ways.iter().find(|way| way.group == 1).map_or(f64::NAN, |way| way.error);
     format!(
-        "Codes: {} is the fastest without loss and {} the smallest. XYZ: {} the fastest without loss, {} the smallest. \
-         16-bit floats cost up to {} ADU of codes and ΔE {} of colors: enough for pictures, not for codes.",
-        fastest(&mut codes.iter().filter(|way| way.error == 0.0)),
-        smallest(&mut codes.iter().filter(|way| way.error == 0.0)),
-        fastest(&mut xyz.iter().filter(|way| way.error == 0.0)),
-        smallest(&mut xyz.iter().filter(|way| way.error == 0.0)),
+        "Without loss, codes: {}. XYZ: {}. 16-bit floats cost up to {} ADU of codes and ΔE {} of colors: enough for pictures, \
+         not for codes, which 16-bit integers hold exactly.",
+        three(codes),
+        three(xyz),
         digits(half(codes), 2),
         digits(half(xyz), 2),
     )

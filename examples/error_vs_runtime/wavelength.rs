@@ -3,6 +3,7 @@
 use crate::Study;
 use crate::bench::{Work, quantile};
 use crate::camera::{Camera, EXPOSURE, sample_data};
+use crate::labels::Shape;
 use crate::markdown::Table;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
@@ -114,9 +115,9 @@ pub fn study(study: &Study) -> Result<Section> {
             })
             .collect();
         panels.push(pareto::panel(
+            Shape::Stacked,
             scene.name,
-            "CPU time per spectrum, µs",
-            "relative error of electrons",
+            ["CPU time per spectrum, µs", "relative error of electrons"],
             &groups,
             1e-12,
         ));
