@@ -1,6 +1,6 @@
 //! Names beside points, where they cover neither points nor each other.
 
-use cyanometer::report::plot::{Arrow, Color, Marks, Panel};
+use cyanometer::report::plot::{Arrow, Color, Marks, Panel, Series};
 
 /// How large a panel is drawn; the layout does not say, so these are near enough.
 #[derive(Clone, Copy)]
@@ -65,12 +65,13 @@ impl Rect {
     }
 }
 
-const CHARACTER: f64 = 7.9;
+/// A line's end stays so far from its label.
+const SHORT: f64 = 7.0;
 const HALF_LINE: f64 = 6.5;
 /// From where an arrow begins to its label.
 const BESIDE: f64 = 5.0;
 /// Points with the same name share it within so many pixels.
-const NEAR: f64 = 50.0;
+const NEAR: f64 = 26.0;
 
 /// Writes names beside points; names that find no room there stand off, at the end of a thin line. `line` is better not
 /// covered, `points` must not be.
@@ -86,7 +87,7 @@ pub fn write(panel: &mut Panel, canvas: Canvas, named: &[([f64; 2], &str)], poin
         if reached.iter().any(|(other, place)| *other == name && distance(*place, at) < NEAR) {
             continue;
         }
-        let half = [0.5 * CHARACTER * name.chars().count() as f64, HALF_LINE];
+        let half = [0.5 * width(name), HALF_LINE];
         let mut best: Option<(f64, Rect, bool)> = None;
         for (ring, reach) in [0.0, 14.0, 28.0, 44.0, 62.0, 82.0].into_iter().enumerate() {
             for turn in 0..16 {
@@ -107,7 +108,7 @@ pub fn write(panel: &mut Panel, canvas: Canvas, named: &[([f64; 2], &str)], poin
                 // Beside is better than above, near than far.
                 let cost = reach + 6.0 * out[1].abs() + 30.0 * (crossed + threaded.count()) as f64;
                 if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-                    best = Some((cost, rect, ring > 1));
+                    best = Some((cost, rect, ring > 0));
                 }
             }
         }
@@ -115,7 +116,8 @@ pub fn write(panel: &mut Panel, canvas: Canvas, named: &[([f64; 2], &str)], poin
         if is_off {
             // To the nearest point of the label's edge.
             let end = [0, 1].map(|i| at[i].clamp(rect.center[i] - rect.half[i], rect.center[i] + rect.half[i]));
-            leaders.push([at[0], at[1], end[0], end[1]]);
+            let part = 1.0 - (SHORT / distance(at, end).max(SHORT));
+            leaders.push([at[0], at[1], at[0] + part * (end[0] - at[0]), at[1] + part * (end[1] - at[1])]);
         }
         written.push((rect, name));
         reached.push((name, at));
@@ -125,17 +127,26 @@ pub fn write(panel: &mut Panel, canvas: Canvas, named: &[([f64; 2], &str)], poin
         [from[0], from[1], to[0], to[1]]
     });
     // Below the points, which are drawn later.
-    let leaders = cyanometer::report::plot::Series {
-        name: String::new(),
-        color: Color::Gray,
-        marks: Marks::Segments(segments.collect()),
-    };
+    let marks = Marks::Segments(segments.collect());
+    let leaders = Series { name: String::new(), color: Color::Gray, marks };
     panel.series.insert(0, leaders);
     for (rect, name) in written {
         // An arrow of no length is a text to the right of its place.
         let place = canvas.value([rect.center[0] - rect.half[0] - BESIDE, rect.center[1]]);
         panel.arrows.push(Arrow { from: place, to: place, label: name.to_owned(), color: Color::Black });
     }
+}
+
+/// How wide a text of 13 pixels is in DejaVu Sans; the widest of each kind of letter.
+fn width(text: &str) -> f64 {
+    let of = |c: char| match c {
+        ' ' | '.' | ',' | 'i' | 'l' => 4.3,
+        'm' | 'M' | 'W' | 'w' | '=' => 12.0,
+        'A'..='Z' => 9.8,
+        '⁰' | '¹' | '²'..='³' | '⁴'..='⁹' => 5.3,
+        _ => 8.3,
+    };
+    text.chars().map(of).sum()
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {

@@ -134,6 +134,9 @@ pub fn study(study: &Study) -> Result<Section> {
         [values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max)]
     };
     let (never, choices) = (ends(&|t| t.measured), ends(&|t| if t.choose > 0.0 { t.choose } else { f64::NAN }));
+    let count_with = |measured: f64| {
+        found.iter().find(|t| t.measured == measured).map_or("no number".to_owned(), |t| t.count.to_string())
+    };
     let longest = found.iter().map(|t| t.fit).filter(|t| t.is_finite()).fold(0.0, f64::max);
     Ok(Section {
         title: "Training spectra of the matrix".into(),
@@ -150,16 +153,18 @@ pub fn study(study: &Study) -> Result<Section> {
         advice: format!(
             "Where all spectra are at hand, fit on all: {} and mean ΔE {}, without the {} to {} that choosing takes. Where each \
              must be measured first, {} chosen ones come within 25 % of that, and so does every larger number; drawn by lot it \
-             takes {} for 90 % of the sets. Measured skies, which no fit has seen, have mean ΔE {} to {} whatever the number: \
-             there the kind of spectra counts, not how many.",
+             takes {} for 90 % of the sets. Measured skies, which no fit has seen, have their \
+             lowest mean ΔE ({}) with {} and their highest ({}) with {}: more computed spectra do not make up for another kind.",
             time(longest),
             digits(whole, 3),
             time(choices[0]),
             time(choices[1]),
             near(&|t| t.chosen),
             near(&|t| t.drawn[1]),
-            digits(never[0], 2),
-            digits(never[1], 2),
+            digits(never[0], 3),
+            count_with(never[0]),
+            digits(never[1], 3),
+            count_with(never[1]),
         ),
     })
 }

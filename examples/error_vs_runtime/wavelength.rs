@@ -143,6 +143,8 @@ pub fn study(study: &Study) -> Result<Section> {
         black_box(ready.electrons(black_box(sky)));
         Ok(())
     })])?;
+    let pairs = all.iter().flat_map(|settings| settings.iter().zip(&settings[STEPS_NM.len()..]).take(STEPS_NM.len()));
+    let apart = pairs.map(|(a, b)| (a.error - b.error).abs()).fold(0.0, f64::max);
     let points = scenes.iter().map(|scene| scene.wavelength_nm.len().to_string()).collect::<Vec<_>>();
     Ok(Section {
         title: "Wavelength step and rule of summation".into(),
@@ -153,7 +155,8 @@ pub fn study(study: &Study) -> Result<Section> {
              measured skies and {} lamps with {}, {} and {} samples. The error is that of the worst class of each spectrum, \
              relative to that class; 95 % of the spectra have less. The time is that of one spectrum by itself: weights, \
              folding, sum. Once the weights are folded onto the samples of a library, each further spectrum takes {}, whatever \
-             step and rule. Ending at 800 nm instead of 830 nm costs {}.",
+             step and rule. Rectangles and trapezoids differ by at most {} of the signal, for \
+             hardly anything responds at either end. Ending at 800 nm instead of 830 nm costs {}.",
             scenes[0].spectra.len(),
             scenes[1].spectra.len(),
             scenes[2].spectra.len(),
@@ -161,6 +164,7 @@ pub fn study(study: &Study) -> Result<Section> {
             points[1],
             points[2],
             time(further[0]),
+            percent(apart),
             percent(cut(camera, &scenes[0])?),
         ),
         figures: vec![("wavelength".into(), "Error of electrons against time, by step and rule".into(), plot)],
