@@ -154,10 +154,11 @@ pub fn study(study: &Study) -> Result<Section> {
         figures: vec![("equations".into(), "Error of σ against time, by equations".into(), plot)],
         tables: vec![(String::new(), table)],
         advice: format!(
-            "Take the exact equations, the default: in the lit scenes they are within {} of the simulation, which cannot tell \
-             them from the truth; the paper's are off by {} there. The paper's take at most {}, the exact ones {}, and {} for SHTI, \
+            "Take the exact equations, the default: in the lit scenes they are within {} of the simulation, whose own standard error \
+             is {} and more; the paper's are off by {} there. The paper's take at most {}, the exact ones {}, and {} for SHTI, \
              which also goes to second order. A simulation of 100×100 pixels takes {} and scatters by {}.",
             percent(exact_error),
+            percent((2.0 * pixels).sqrt().recip()),
             paper.join(", "),
             time(longest("paper")),
             time(linear),

@@ -143,7 +143,7 @@ pub fn study(study: &Study) -> Result<Section> {
         method: format!(
             "SkyRadLS, errors relative to luminance (`fit-matrix --train COUNT --weights relative`), judged without noise on all \
              {total} skies, each at three quarters of full well. Spectra are chosen by k-medoids, as the program does, or drawn by \
-             lot {draws} times. The time to fit includes the jackknife uncertainty that the matrix file states. Sets \
+             lot {draws} times. Choosing is timed once. The time to fit includes the jackknife uncertainty that the matrix file states. Sets \
              whose signals are too much alike determine no matrix and are refused. The {} measured \
              skies are judged by the same matrices.",
             library.radiance.nrows()
