@@ -133,7 +133,7 @@ pub fn study(study: &Study) -> Result<Section> {
     let paper: Vec<String> = ways
         .iter()
         .filter(|way| way.name == "paper")
-        .map(|way| format!("{} {}", METHODS[way.method].0, percent(lit(way))))
+        .map(|way| format!("{} ({})", percent(lit(way)), METHODS[way.method].0))
         .collect();
     let longest = |name| of(name, &f64::max, 0.0, &|way: &Way| way.time);
     let not_hue = |way: &&Way| way.name == "exact" && METHODS[way.method].1 != Method::SmoothHue;
