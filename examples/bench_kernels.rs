@@ -21,6 +21,7 @@ use cyanometer::metadata::{FrameHeader, Metadata};
 use cyanometer::mosaic::Mosaic;
 use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::moments::Moments;
+use cyanometer::numerics::planes::weighted_sums;
 use cyanometer::numerics::vectors::Instructions;
 use cyanometer::optics::Exposure;
 use cyanometer::random::{Draws, Source};
@@ -97,18 +98,19 @@ fn demosaicked(width: usize, height: usize) -> Result<MemoryFrame> {
     Ok(plane.through(&Demosaic::new(&plane.header, Method::Bilinear, Black::Auto, None)?)?.0)
 }
 
-/// A stage on a frame, band by band.
+/// A stage on a frame, band by band, into a buffer that the next band uses again, as programs do.
 fn over<S: Stage + 'static>(stage: S, input: MemoryFrame) -> Kernel {
     let from = input.header.geometry.clone();
     let to = stage.header().geometry.clone();
     let rows = from.band_rows(1).min(to.band_rows(1));
-    let mut output = vec![0.0; to.row_samples() * to.height];
+    let mut output = vec![0.0; rows * to.row_samples()];
     Box::new(move || {
-        for (band, samples) in output.chunks_mut(rows * to.row_samples()).enumerate() {
+        for first in (0..to.height).step_by(rows) {
+            let samples = &mut output[..rows.min(to.height - first) * to.row_samples()];
             let window = Window::new(from.height, 0, from.width, from.channels.len(), &input.samples);
-            stage.apply(window, Rows::new(band * rows, to.width, to.channels.len(), samples));
+            stage.apply(window, Rows::new(first, to.width, to.channels.len(), samples));
+            black_box(&output);
         }
-        black_box(&output);
     })
 }
 
@@ -166,16 +168,12 @@ fn spectral(width: usize, height: usize) -> Result<Kernel> {
     let (camera, _) = weights.camera(&wavelengths_nm);
     let bands = wavelengths_nm.len();
     let samples: Vec<f32> = (0..width * height * bands).map(|i| to_sample(1e-6 * (1.0 + (i % 97) as f64))).collect();
-    let mut output = vec![[0.0; 3]; width * height];
-    let mut radiance = vec![0.0; bands];
+    let planes = camera.planes(&(0..bands).collect::<Vec<usize>>(), 1.0);
+    let mut output = Vec::with_capacity(width * height);
     Ok(Box::new(move || {
-        for (row, made) in samples.chunks_exact(width * bands).zip(output.chunks_exact_mut(width)) {
-            for (x, electrons) in made.iter_mut().enumerate() {
-                for (band, value) in radiance.iter_mut().enumerate() {
-                    *value = f64::from(row[band * width + x]);
-                }
-                *electrons = camera.electrons(&radiance);
-            }
+        output.clear();
+        for row in samples.chunks_exact(width * bands) {
+            weighted_sums(row, width, &planes, |electrons| output.push(electrons));
         }
         black_box(&output);
     }))

@@ -16,6 +16,7 @@ import tempfile
 from dataclasses import dataclass
 
 import kernels
+import leaving_out
 import measuring
 import programs
 
@@ -30,6 +31,7 @@ PARTS = {
     "pixels": programs.pixels,
     "stages": programs.stages,
     "threads": programs.threads,
+    "leave_out": leaving_out.leave_out,
 }
 PACKAGES = ["numpy", "colour-science", "colour-demosaicing", "opencv-python-headless", "rawpy", "pyxel-sim"]
 

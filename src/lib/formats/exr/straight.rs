@@ -190,7 +190,7 @@ mod tests {
             let twice = offsets.len() == 2 && offsets[0] == offsets[1];
             assert_eq!(kept.extent(), (ends, twice), "{offsets:?}");
             for index in 0..offsets.len() {
-                let follow = offsets[index..].windows(2).take_while(|pair| pair[0] + 10 == pair[1]).count();
+                let follow = offsets[index..].windows(2).take_while(|pair| pair[0].wrapping_add(10) == pair[1]).count();
                 let most = offsets.len() - index;
                 assert_eq!(kept.run(index, 10, most), 1 + follow, "{offsets:?} {index}");
                 assert_eq!(kept.run(index, 10, 1), 1);
