@@ -144,6 +144,10 @@ const COLUMNS: i32 = BLOCK as i32;
 /// Columns between two photosites that share a block of their patterns.
 const HALF: usize = BLOCK / 2;
 
+/// The bit of a column in which two such photosites differ.
+#[expect(clippy::cast_possible_truncation, reason = "128")]
+const HALF_BIT: u32 = HALF as u32;
+
 /// Memory for the words of a run.
 #[derive(Debug)]
 pub struct RunWords {
@@ -213,10 +217,9 @@ impl Run {
     /// The low words of DCNU and PRNU.
     fn pattern_low(&self, index: usize) -> [u32; 2] {
         let [x, y] = self.counter(index);
-        let bit = HALF as u32;
-        let counter = [x & !bit, y, 0, self.fourth()[index % 2] | PATTERN | 1];
+        let counter = [x & !HALF_BIT, y, 0, self.fourth()[index % 2] | PATTERN | 1];
         let [a, b, c, d] = philox4x32_10(counter, halves(self.sensor_seed));
-        if x & bit == 0 { [a, b] } else { [c, d] }
+        if x & HALF_BIT == 0 { [a, b] } else { [c, d] }
     }
 
     /// Fills `numbers` with standard normal numbers of RON, DCNU or PRNU, or of the word that SSN and DCSN have.

@@ -201,15 +201,21 @@ pub fn measure(
         region.check(&frame)?;
     }
     let rails = rails(&frame);
-    let tallies = tallies(source, &frame, regions, rails)?;
+    // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
     let prediction = propagation::of_frame(&frame, equations);
+    let mut samplings = Samplings::default();
+    if let Some(FramePrediction::Mixed(mixture)) = &prediction {
+        for region in regions {
+            samplings.of(mixture, &frame, *region);
+        }
+    }
+    let tallies = tallies(source, &frame, regions, rails)?;
     if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
         return Err(Error::Data(format!(
             "{}: nothing can be checked: charge transfer mixes neighbours, differently from place to place",
             frame.name
         )));
     }
-    let mut samplings = Samplings::default();
     let regions = regions
         .iter()
         .zip(&tallies)
