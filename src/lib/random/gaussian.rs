@@ -3,7 +3,7 @@
 //! The number that a 64-bit word w stands for is u = (w + ½)/2⁶⁴; its quantile lies within ±9.2. A word and its
 //! complement give quantiles of opposite sign, to the bit. In the body of the distribution (|z| < 3.6) the upper half
 //! of the word decides, in single precision; in the tails all 64 bits do, in double precision. There the quantile is
-//! taken with AS 241 [Wichura1988], whose relative error is below 10⁻¹⁵.
+//! taken with AS 241 \[Wichura1988], whose relative error is below 10⁻¹⁵.
 //!
 //! Error of the body: |ẑ − Φ⁻¹(u)| < 10⁻⁶, half of it from what the lower half of the word would add at its rim.
 
@@ -120,7 +120,7 @@ pub fn quantile(word: u64) -> f64 {
     if is_lower { -size } else { size }
 }
 
-/// Φ⁻¹(1 − `share`) for a share of at most ½: AS 241 (PPND16) [Wichura1988].
+/// Φ⁻¹(1 − `share`) for a share of at most ½: AS 241 (PPND16) \[Wichura1988].
 fn upper_quantile(share: f64) -> f64 {
     let ratio = |r: f64, numerator: &[f64; 8], denominator: &[f64; 8]| {
         let sum = |coefficients: &[f64; 8]| coefficients.iter().rev().fold(0.0, |sum, c| sum * r + c);

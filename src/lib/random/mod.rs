@@ -124,7 +124,7 @@ pub struct Run {
     pub place: [i32; 2],
     /// Sensor classes of the first photosite and of the second; they alternate.
     pub classes: [u8; 2],
-    /// Photosites, a multiple of [`LANES`]. Those that follow the last of [`spans`] get any words.
+    /// Photosites, a multiple of [`LANES`](philox::LANES). Those that follow the last of [`spans`] get any words.
     pub length: usize,
 }
 

@@ -6,7 +6,7 @@ use super::super::gaussian;
 /// where it is the smaller one.
 ///
 /// Below a rate of 200, the series of probabilities outward from `count`, the first by Loader's saddle-point form
-/// [Loader2000]; above, Temme's uniform expansion of the incomplete gamma ratio [Temme1979; DLMF 8.12],
+/// \[Loader2000]; above, Temme's uniform expansion of the incomplete gamma ratio [Temme1979; DLMF 8.12],
 ///
 /// P(X ≤ k) = Q(a, λ) = ½ erfc(η √(a/2)) + R,   a = k + 1,   ½η² = μ − ln(1 + μ),   μ = (λ − a)/a,
 /// R = exp(−½ a η²)/√(2πa) Σ c_j(η) a^−j.
@@ -48,7 +48,7 @@ fn by_series(count: f64, rate: f64) -> (f64, f64) {
     }
 }
 
-/// Probability of `count` at `rate`: exp(−δ(k) − k·(μ − ln(1+μ)))/√(2πk), μ = (λ − k)/k [Loader2000].
+/// Probability of `count` at `rate`: exp(−δ(k) − k·(μ − ln(1+μ)))/√(2πk), μ = (λ − k)/k \[Loader2000].
 fn probability(count: f64, rate: f64) -> f64 {
     if count == 0.0 {
         return libm::exp(-rate);

@@ -25,7 +25,7 @@ const EXPANSION_TO: f32 = 4_194_304.0;
 ///
 /// λ + √λ z + (2 + z²)/6 − (2z + z³)/72 λ^−½ + (−16 + 7z² + 3z⁴)/810 λ⁻¹ + (2684 z − 548 z³ − 207 z⁵)/155520 λ^−3/2
 ///
-/// The first terms are those of [Giles2016]; the last was found the same way, as a series in λ^−½ of the inverse of the
+/// The first terms are those of \[Giles2016]; the last was found the same way, as a series in λ^−½ of the inverse of the
 /// incomplete gamma ratio. Next comes a term of λ⁻².
 pub(super) fn expansion(rate: f64, z: f64) -> f64 {
     let (root, square) = (rate.sqrt(), z * z);
