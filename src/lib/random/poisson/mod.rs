@@ -169,11 +169,16 @@ pub(super) fn fill(counts: &mut [f32], rates: &[f32], high: &[u32], low: impl Fn
     } else {
         of_all_rates(counts, unsure, rates, high);
     }
+    for_unsure(unsure, |index| counts[index] = settle(rates[index], high[index], low(index)));
+}
+
+/// Calls `mend` with the place of every flag that is not 0, in order; few are.
+#[inline(always)]
+fn for_unsure(unsure: &[u32], mut mend: impl FnMut(usize)) {
     for (first, flags) in unsure.as_chunks::<LANES>().0.iter().enumerate() {
         if flags.iter().fold(0, |any, flag| any | flag) != 0 {
             for (lane, _) in flags.iter().enumerate().filter(|(_, flag)| **flag != 0) {
-                let index = first * LANES + lane;
-                counts[index] = settle(rates[index], high[index], low(index));
+                mend(first * LANES + lane);
             }
         }
     }

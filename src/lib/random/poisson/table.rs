@@ -1,7 +1,7 @@
 //! Counts at one rate, looked up.
 
 use super::exact::{quantile, tails};
-use super::{BLOCK, LANES, settle};
+use super::{BLOCK, for_unsure, settle};
 
 /// The counts of all words at one rate, by the upper halves of the words.
 ///
@@ -82,14 +82,7 @@ pub(in crate::random) fn fill(counts: &mut [f32], tables: [&Table; 2], high: &[u
     let mut unsure = [0; BLOCK];
     let unsure = &mut unsure[..high.len()];
     look_up(counts, unsure, tables, high);
-    for (first, flags) in unsure.as_chunks::<LANES>().0.iter().enumerate() {
-        if flags.iter().fold(0, |any, flag| any | flag) != 0 {
-            for (lane, _) in flags.iter().enumerate().filter(|(_, flag)| **flag != 0) {
-                let index = first * LANES + lane;
-                counts[index] = tables[index % 2].search(high[index], || low(index));
-            }
-        }
-    }
+    for_unsure(unsure, |index| counts[index] = tables[index % 2].search(high[index], || low(index)));
 }
 
 /// One by one, on the baseline: wide vectors fetch from tables more slowly than scalars do.
