@@ -2,8 +2,11 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Bytes that are held at most: eight rows of three planes of a large sensor, few enough to stay in a level-2 cache.
+/// Bytes that are held: eight rows of three planes of a large sensor, few enough to stay in a level-2 cache.
 const CAPACITY: usize = 1 << 18;
+
+/// A block that takes more is held all the same, up to this: a row of 471 bands of a wide spectral image.
+const LARGEST: usize = 1 << 24;
 
 /// Reads a file or stream through a buffer that whole blocks can be looked at in before they are taken.
 pub(super) struct ReadAhead<R> {
@@ -21,12 +24,15 @@ impl<R: Read> ReadAhead<R> {
     }
 
     /// The next bytes, whole blocks of `block` bytes: at least one, at most `blocks`, as many as there are at hand or one
-    /// read gives; none where the stream ends before, where reading fails, or where a block is too large to be held.
+    /// read gives; none where the stream ends before, where reading fails, or where a block is larger than 16 MiB.
     ///
     /// They stay to be taken, by [`Self::skip`] or as a [`Read`]er, which then also tells what failed.
     pub fn peek(&mut self, block: usize, blocks: usize) -> &[u8] {
         if self.end - self.start < block {
-            let wanted = (CAPACITY / block).min(blocks) * block;
+            if self.bytes.len() < block && block <= LARGEST {
+                self.bytes.resize(block, 0);
+            }
+            let wanted = (self.bytes.len() / block).min(blocks) * block;
             self.bytes.copy_within(self.start..self.end, 0);
             (self.start, self.end) = (0, self.end - self.start);
             while self.end < block.min(wanted) {
@@ -109,15 +115,15 @@ mod tests {
     #[test]
     fn blocks_come_whole_and_what_is_left_is_read_as_it_is() {
         let bytes: Vec<u8> = (0..=255).cycle().take(3 * CAPACITY + 5).collect();
-        for trickles in [false, true] {
+        for (trickles, block) in [(false, 1000), (true, 1000), (false, CAPACITY + 9), (true, CAPACITY + 9)] {
             let inner: Box<dyn Read> =
                 if trickles { Box::new(Trickle(bytes.as_slice())) } else { Box::new(bytes.as_slice()) };
             let mut reader = ReadAhead::new(inner);
             let mut seen = vec![0; 3];
             reader.read_exact(&mut seen).unwrap();
             loop {
-                let blocks = reader.peek(1000, 9);
-                assert!(blocks.len().is_multiple_of(1000) && blocks.len() <= 9000);
+                let blocks = reader.peek(block, 9);
+                assert!(blocks.len().is_multiple_of(block) && blocks.len() <= 9 * block);
                 seen.extend_from_slice(blocks);
                 let taken = blocks.len();
                 if taken == 0 {
@@ -125,7 +131,7 @@ mod tests {
                 }
                 reader.skip(taken);
             }
-            assert!(reader.peek(CAPACITY + 1, 1).is_empty(), "a block that is too large to be held");
+            assert!(reader.peek(LARGEST + 1, 1).is_empty(), "a block that is too large to be held");
             reader.read_to_end(&mut seen).unwrap();
             assert!(seen == bytes);
         }
