@@ -48,19 +48,23 @@ impl Geometry {
         if natural * self.row_bytes() <= STEP_BYTES { natural } else { 1 }
     }
 
-    /// Rows of a band that holds about [`BAND_BYTES`], a multiple of `step`, at least one step.
-    pub fn band_rows(&self, step: usize) -> usize {
+    /// Rows of a band for so many threads, a multiple of `step`, at least one step.
+    pub fn band_rows(&self, step: usize, threads: usize) -> usize {
         let row_bytes = self.row_bytes();
-        // Wide frames get at least 8 rows, so that a halo of 3 does not double the work, while these bytes hold them.
-        let fitting = (BAND_BYTES / row_bytes).max((WIDE_BYTES / row_bytes).min(8));
+        let band_bytes = if threads > 1 { SHARED_BAND_BYTES } else { BAND_BYTES };
+        // Wide frames get at least 4 rows, so that the halo does not become most of the work, while these bytes hold them.
+        let fitting = (band_bytes / row_bytes).max((WIDE_BYTES / row_bytes).min(4));
         (fitting / step * step).max(step).min(self.height.max(1))
     }
 }
 
-/// The size that a band aims at: it fits a level-2 cache, and the memory of a program stays a few of them.
-pub const BAND_BYTES: usize = 1 << 20;
-/// What 8 rows of a wide frame may take.
-const WIDE_BYTES: usize = 8 << 20;
+/// The size that a band aims at: those before and after a stage fit a level-2 cache, and memory that is touched for the
+/// first time, which costs more than most arithmetic, stays little.
+const BAND_BYTES: usize = 1 << 17;
+/// The size of bands that several threads read, compute and write: large enough that handing them on costs little.
+const SHARED_BAND_BYTES: usize = 1 << 20;
+/// What 4 rows of a wide frame may take.
+const WIDE_BYTES: usize = 4 << 20;
 /// What the rows that a source decodes together may take.
 const STEP_BYTES: usize = 4 << 20;
 
@@ -194,11 +198,14 @@ mod tests {
     }
 
     #[test]
-    fn bands_hold_about_a_megabyte_in_whole_steps() {
+    fn bands_hold_what_fits_the_cache_in_whole_steps() {
+        let frame = Geometry::new(1_024, 2_000, &["R", "G", "B"]);
+        assert_eq!([1, 2].map(|threads| frame.band_rows(1, threads)), [10, 85]);
+        assert_eq!([1, 2].map(|threads| frame.band_rows(32, threads)), [32, 64]);
         let frame = Geometry::new(30_000, 2_000, &["R", "G", "B"]);
-        assert_eq!(frame.band_rows(1), 8);
-        assert_eq!(frame.band_rows(32), 32);
-        assert_eq!(Geometry::new(10, 7, &["Y"]).band_rows(16), 7);
+        assert_eq!([1, 2].map(|threads| frame.band_rows(1, threads)), [4, 4]);
+        assert_eq!(frame.band_rows(32, 1), 32);
+        assert_eq!(Geometry::new(10, 7, &["Y"]).band_rows(16, 1), 7);
         // A block of 32 such rows takes 11.5 MB: it is taken row by row; a small one whole.
         assert_eq!(frame.step_rows(32), 1);
         assert_eq!(Geometry::new(1_332, 1_000, &["R", "G", "B"]).step_rows(32), 32);

@@ -158,7 +158,7 @@ impl<S: RowSource> Comparison<S> {
             return Ok(());
         };
         let natural = sides.iter().filter_map(Side::frame).map(S::natural_rows).fold(1, usize::max);
-        let band_rows = geometry.band_rows(geometry.step_rows(natural));
+        let band_rows = geometry.band_rows(geometry.step_rows(natural), 1);
         let mut bands = [Vec::new(), Vec::new()];
         let mut made = Vec::new();
         let mut first = 0;

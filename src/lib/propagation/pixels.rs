@@ -110,9 +110,7 @@ pub(super) fn folded(kernel: &Kernel, at: [usize; 2], frame: [usize; 2]) -> Kern
     let back = |offset: isize, axis: usize| {
         mirror(at[axis].cast_signed() + offset, frame[axis]).cast_signed() - at[axis].cast_signed()
     };
-    kernel
-        .sites()
-        .fold(Kernel::zero(), |sum, ([x, y], weight)| sum.plus(weight, &Kernel::site([back(x, 0), back(y, 1)])))
+    Kernel::of_sites(kernel.sites().map(|([x, y], weight)| ([back(x, 0), back(y, 1)], weight)))
 }
 
 /// Variance of a photosite against its level above black, linear between equally spaced levels.

@@ -70,9 +70,6 @@ impl Place {
 /// From so many pixels on an edge is out of reach, whatever the phase.
 const FAR: usize = REACH.unsigned_abs() + 1;
 
-/// The smallest extent from which sums grow in proportion: two row sums of covariances reach 4 · [`REACH`] apart.
-const SMALL: usize = 4 * REACH.unsigned_abs() + 4;
-
 impl Sampling {
     /// Of `count` pixels of three planes that are drawn apart.
     pub fn independent(classes: &[Prediction; 3], count: f64) -> Self {
@@ -92,7 +89,8 @@ impl Sampling {
     /// Of a rectangle of demosaicked pixels with `weights` on photosites of such moments.
     pub fn of(weights: &Weights, sites: &[Prediction; 3], place: &Place) -> Self {
         let count = place.size[0] as f64 * place.size[1] as f64;
-        let [columns, rows] = place.size.map(steps);
+        let reach = weights.reach();
+        let [columns, rows] = place.size.map(|extent| steps(extent, reach));
         let mut sums = Sums::zero();
         for &(width, width_share) in &columns {
             for &(height, height_share) in &rows {
@@ -191,9 +189,11 @@ impl SamplingBasis {
     }
 }
 
-/// The extents whose sums, in these shares, make up that of `extent`: itself, or two small ones of its parity.
-fn steps(extent: usize) -> Vec<(usize, f64)> {
-    let small = SMALL + (extent + SMALL) % 2;
+/// The extents whose sums, in these shares, make up that of `extent`: itself, or two small ones of its parity, from which
+/// on sums grow in proportion. Two row sums of covariances reach four times as far apart as weights do.
+fn steps(extent: usize, reach: isize) -> Vec<(usize, f64)> {
+    let small = 4 * reach.unsigned_abs() + 4;
+    let small = small + (extent + small) % 2;
     if extent <= small + 2 {
         return vec![(extent, 1.0)];
     }
@@ -267,28 +267,38 @@ impl Sums {
             }
         }
         let mut sums = Self::zero();
-        let far = 2 * REACH;
+        let mut of_pairs = [[0.0; 6]; 6];
+        let far = 2 * weights.reach();
         let mut row_sums = vec![Matrix3::zeros(); pixels.len()];
         for (index, pixel) in pixels.iter().enumerate() {
             let [x, y] = [(index % width).cast_signed(), (index / width).cast_signed()];
-            sums.variance += pixel.covariance(pixel, [0, 0], variances);
-            for other_y in (y - far).max(0)..(y + far + 1).min(height.cast_signed()) {
-                for other_x in (x - far).max(0)..(x + far + 1).min(width.cast_signed()) {
-                    let other = &pixels[(other_y * width.cast_signed() + other_x).cast_unsigned()];
-                    let covariance = pixel.covariance(other, [other_x - x, other_y - y], variances);
+            let itself = pixel.covariance(pixel, [0, 0], variances);
+            sums.variance += itself;
+            row_sums[index] += itself;
+            add_products(&mut sums.products, &itself);
+            // Each pair of two pixels once: the other way round its covariance is the transpose, C(b, a) = C(a, b)ᵀ.
+            for other_y in y..(y + far + 1).min(height.cast_signed()) {
+                let first = if other_y == y { x + 1 } else { (x - far).max(0) };
+                for other_x in first..(x + far + 1).min(width.cast_signed()) {
+                    let other = (other_y * width.cast_signed() + other_x).cast_unsigned();
+                    let covariance = pixel.covariance(&pixels[other], [other_x - x, other_y - y], variances);
                     row_sums[index] += covariance;
-                    add_products(&mut sums.products, |[i, j], [k, l]| {
-                        covariance[(i, k)] * covariance[(j, l)] + covariance[(i, l)] * covariance[(j, k)]
-                    });
+                    row_sums[other] += covariance.transpose();
+                    add_products(&mut of_pairs, &covariance);
                 }
+            }
+        }
+        // The transpose of a covariance gives its table of products transposed.
+        for (a, row) in sums.products.iter_mut().enumerate() {
+            for (b, products) in row.iter_mut().enumerate() {
+                *products += of_pairs[a][b] + of_pairs[b][a];
             }
         }
         for r in &row_sums {
             sums.total += r;
             // 1ᵀ(C_ik C_lj + C_lj C_ik)1 = Σ r_ki r_lj + r_jl r_ik, and the same with k and l exchanged.
-            add_products(&mut sums.row_products, |[i, j], [k, l]| {
-                r[(k, i)] * r[(l, j)] + r[(j, l)] * r[(i, k)] + r[(l, i)] * r[(k, j)] + r[(j, k)] * r[(i, l)]
-            });
+            add_products(&mut sums.row_products, r);
+            add_products(&mut sums.row_products, &r.transpose());
         }
         sums.add_fourths(&pixels, place, weights, fourths);
         sums
@@ -350,10 +360,11 @@ impl Sums {
     }
 }
 
-fn add_products(table: &mut [[f64; 6]; 6], product: impl Fn([usize; 2], [usize; 2]) -> f64) {
-    for (row, pair) in table.iter_mut().zip(PAIRS) {
-        for (entry, other) in row.iter_mut().zip(PAIRS) {
-            *entry += product(pair, other);
+/// Adds C_ik C_jl + C_il C_jk for all pairs ij (rows) and kl (columns).
+fn add_products(table: &mut [[f64; 6]; 6], c: &Matrix3<f64>) {
+    for (row, [i, j]) in table.iter_mut().zip(PAIRS) {
+        for (entry, [k, l]) in row.iter_mut().zip(PAIRS) {
+            *entry += c[(i, k)] * c[(j, l)] + c[(i, l)] * c[(j, k)];
         }
     }
 }
@@ -437,15 +448,17 @@ mod tests {
     /// Large regions follow from small ones: against going through all pairs, with edges near, far and at the rim.
     #[test]
     fn large_regions_follow_from_small_ones() {
-        let weights = WeightTable::new(Method::EffectiveColor, CfaPattern::Grbg).about([1.0, 1.0]);
         let sites = sites([1.0, 2.0, 3.0], 0.4);
-        for (frame, corner, size) in
-            [([27, 30], [0, 0], [27, 30]), ([60, 40], [3, 1], [25, 26]), ([32, 33], [5, 2], [27, 31])]
-        {
-            let place = Place { frame, origin: [1, -2], corner, size };
-            let count = (size[0] * size[1]) as f64;
-            let whole = Sums::of(&weights, &sites, &place).sampling(count);
-            assert!(close(&Sampling::of(&weights, &sites, &place), &whole, 1e-11), "{place:?}");
+        for method in Method::ALL {
+            let weights = WeightTable::new(method, CfaPattern::Grbg).about([1.0, 0.8]);
+            for (frame, corner, size) in
+                [([27, 30], [0, 0], [27, 30]), ([60, 40], [3, 1], [25, 26]), ([32, 33], [5, 2], [27, 31])]
+            {
+                let place = Place { frame, origin: [1, -2], corner, size };
+                let count = (size[0] * size[1]) as f64;
+                let whole = Sums::of(&weights, &sites, &place).sampling(count);
+                assert!(close(&Sampling::of(&weights, &sites, &place), &whole, 1e-11), "{method:?} {place:?}");
+            }
         }
     }
 

@@ -26,7 +26,7 @@ pub fn run<S: Stage>(
     progress: &mut dyn FnMut(usize),
 ) -> Result<Counts> {
     let threads = rayon::current_num_threads();
-    let bands = Bands::new(stage, source);
+    let bands = Bands::new(stage, source, threads);
     if threads > 1 && bands.are_several() {
         overlapped(stage, bands, sink, progress, threads)
     } else {
@@ -60,7 +60,7 @@ struct Band {
 }
 
 impl<'a> Bands<'a> {
-    fn new<S: Stage>(stage: &S, source: &'a mut dyn RowSource) -> Self {
+    fn new<S: Stage>(stage: &S, source: &'a mut dyn RowSource, threads: usize) -> Self {
         let input = &source.header().geometry;
         let output = &stage.header().geometry;
         let step = output.step_rows(input.step_rows(source.natural_rows()));
@@ -68,7 +68,7 @@ impl<'a> Bands<'a> {
             height: input.height,
             reach: stage.reach(),
             step,
-            band_rows: input.band_rows(step).min(output.band_rows(step)),
+            band_rows: input.band_rows(step, threads).min(output.band_rows(step, threads)),
             row_samples: input.row_samples(),
             first: 0,
             read: 0,
@@ -354,8 +354,8 @@ mod tests {
     #[test]
     fn threads_change_neither_rows_nor_errors() {
         let never = usize::MAX;
-        // Bands of 8 rows.
-        let geometry = Geometry::new(40_000, 83, &["Y"]);
+        // Bands of 4 rows, for one thread as for several.
+        let geometry = Geometry::new(70_000, 83, &["Y"]);
         let header = FrameHeader { name: "rows".into(), geometry, metadata: Metadata::new(QuantityKind::Unspecified) };
         for (source_fails, sink_fails) in
             [(never, never), (40, never), (never, 24), (40, 16), (16, 40), (0, 0), (82, 82)]

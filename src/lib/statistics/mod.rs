@@ -240,7 +240,7 @@ fn tallies(source: &mut dyn RowSource, frame: &FrameHeader, regions: &[Region], 
     let empty = || Tally::new(geometry.channels.len());
     let mut tallies: Vec<Tally> = regions.iter().map(|_| empty()).collect();
     let mut of_rows: Vec<Tally> = Vec::new();
-    let band_rows = geometry.band_rows(geometry.step_rows(source.natural_rows()));
+    let band_rows = geometry.band_rows(geometry.step_rows(source.natural_rows()), 1);
     let mut samples = Vec::new();
     let mut first = 0;
     while first < geometry.height {

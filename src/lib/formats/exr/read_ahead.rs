@@ -3,7 +3,7 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// Bytes that are held: eight rows of three planes of a large sensor, few enough to stay in a level-2 cache.
-const CAPACITY: usize = 1 << 18;
+const CAPACITY: usize = 1 << 17;
 
 /// A block that takes more is held all the same, up to this: a row of 471 bands of a wide spectral image.
 const LARGEST: usize = 1 << 24;

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 /// Bytes that are gathered: few enough to stay in a level-2 cache.
-const CAPACITY: usize = 1 << 18;
+const CAPACITY: usize = 1 << 17;
 
 /// Gathers what is written, and lets it be made in place.
 pub(super) struct WriteBehind<W> {
