@@ -22,13 +22,16 @@ use cyanometer::mosaic::Mosaic;
 use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::moments::Moments;
 use cyanometer::numerics::planes::weighted_sums;
-use cyanometer::numerics::vectors::Instructions;
+use cyanometer::numerics::vectors::{self, Instructions};
 use cyanometer::optics::Exposure;
-use cyanometer::random::{Draws, Source};
+use cyanometer::random::Source;
+use cyanometer::random::philox::philox4x32_10;
 use cyanometer::spectrum::WavelengthGrid;
 use cyanometer::stage::{MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
 use rand_distr::{Distribution, Poisson, StandardNormal};
+use rand_core::TryRng;
+use std::convert::Infallible;
 use std::hint::black_box;
 use std::io::{BufRead, Write};
 use std::process::ExitCode;
@@ -44,7 +47,7 @@ type Kernel = Box<dyn FnMut()>;
 type Maker = fn(usize, usize) -> Result<Kernel>;
 
 /// Names of the kernels, and what makes them.
-const KERNELS: [(&str, Maker); 14] = [
+const KERNELS: [(&str, Maker); 15] = [
     ("noise-plane", |width, height| noise(cfa_plane(width, height)?)),
     ("noise-three", |width, height| noise(expected(width, height)?)),
     ("noise-rand-distr", noise_by_rand_distr),
@@ -62,6 +65,7 @@ const KERNELS: [(&str, Maker); 14] = [
     ("moments", moments),
     ("moments-plane", |width, height| Ok(moments_of(cfa_plane(width, height)?))),
     ("spectral", spectral),
+    ("spectral-read", spectral_read),
 ];
 
 /// The default exposure of `render-radiance`.
@@ -167,7 +171,7 @@ fn spectral(width: usize, height: usize) -> Result<Kernel> {
     let weights = loaded.response.weights_on(&loaded.sensor, &EXPOSURE, &WavelengthGrid::default())?;
     let (camera, _) = weights.camera(&wavelengths_nm);
     let bands = wavelengths_nm.len();
-    let samples: Vec<f32> = (0..width * height * bands).map(|i| to_sample(1e-6 * (1.0 + (i % 97) as f64))).collect();
+    let samples = spectral_samples(width, height, bands);
     let planes = camera.planes(&(0..bands).collect::<Vec<usize>>(), 1.0);
     let mut output = Vec::with_capacity(width * height);
     Ok(Box::new(move || {
@@ -177,6 +181,35 @@ fn spectral(width: usize, height: usize) -> Result<Kernel> {
         }
         black_box(&output);
     }))
+}
+
+fn spectral_samples(width: usize, height: usize, bands: usize) -> Vec<f32> {
+    (0..width * height * bands).map(|i| to_sample(1e-6 * (1.0 + (i % 97) as f64))).collect()
+}
+
+/// Reading the samples of such an image, and nothing more than adding them up: what memory allows.
+fn spectral_read(width: usize, height: usize) -> Result<Kernel> {
+    let samples = spectral_samples(width, height, WavelengthGrid::default().points()?.0.len());
+    Ok(Box::new(move || {
+        black_box(vectors::run(Reading(&samples)));
+    }))
+}
+
+struct Reading<'a>(&'a [f32]);
+
+impl vectors::Kernel for Reading<'_> {
+    type Output = [f32; 128];
+
+    #[inline(always)]
+    fn run(self) -> [f32; 128] {
+        let mut sums = [0.0; 128];
+        for samples in self.0.as_chunks().0 {
+            for (sum, sample) in sums.iter_mut().zip::<&[f32; 128]>(samples) {
+                *sum += sample;
+            }
+        }
+        sums
+    }
 }
 
 /// The noise of a CFA plane as one writes it down with rand_distr, on the same generator with the same keys.
@@ -198,7 +231,7 @@ fn noise_by_rand_distr(width: usize, height: usize) -> Result<Kernel> {
     }))
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "frames are narrower than 2³¹")]
+#[expect(clippy::cast_possible_truncation, reason = "frames are narrower than 2³²")]
 fn photosite(
     rate: f64,
     class: Class,
@@ -206,12 +239,52 @@ fn photosite(
     dark_shot: &Poisson<f64>,
     sensor: &cyanometer::sensor::Sensor,
 ) -> f32 {
-    let draws = |source| Draws::new(0, 0, source, class as u8, x as i32, y as i32);
+    let draws = |source| Draws::new(source, class, x as u32, y as u32);
     let normal = |source| -> f64 { StandardNormal.sample(&mut draws(source)) };
     let light = Poisson::new(rate).map_or(rate, |shot| shot.sample(&mut draws(Source::Ssn)));
     let light = light * (1.0 + sensor.prnu * normal(Source::Prnu)).max(0.0);
     let dark = dark_shot.sample(&mut draws(Source::Dcsn)) * (1.0 + sensor.dcnu * normal(Source::Dcnu)).max(0.0);
     to_sample((light + dark).min(sensor.full_well_e) + sensor.read_noise_e * normal(Source::Ron))
+}
+
+/// Words of one photosite and source for `rand_distr`, which takes as many as it needs: a stream of Philox blocks.
+struct Draws {
+    counter: [u32; 4],
+    block: [u32; 4],
+    used: usize,
+}
+
+impl Draws {
+    fn new(source: Source, class: Class, x: u32, y: u32) -> Self {
+        let counter = [x, y, 0, u32::from(source as u8) << 24 | u32::from(class as u8) << 16];
+        Self { counter, block: [0; 4], used: 4 }
+    }
+}
+
+impl TryRng for Draws {
+    type Error = Infallible;
+
+    fn try_next_u32(&mut self) -> std::result::Result<u32, Infallible> {
+        if self.used == self.block.len() {
+            self.block = philox4x32_10(self.counter, [0, 0]);
+            self.counter[3] = self.counter[3].wrapping_add(1);
+            self.used = 0;
+        }
+        self.used += 1;
+        Ok(self.block[self.used - 1])
+    }
+
+    fn try_next_u64(&mut self) -> std::result::Result<u64, Infallible> {
+        let low = u64::from(self.try_next_u32()?);
+        Ok(u64::from(self.try_next_u32()?) << 32 | low)
+    }
+
+    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> std::result::Result<(), Infallible> {
+        for chunk in bytes.chunks_mut(4) {
+            chunk.copy_from_slice(&self.try_next_u32()?.to_le_bytes()[..chunk.len()]);
+        }
+        Ok(())
+    }
 }
 
 #[cfg(unix)]

@@ -69,6 +69,7 @@ impl Workshop {
         let mut words = line.split(' ');
         let mut command = Command::new(path_of(words.next().unwrap()));
         command.args(words).current_dir(self.directory.path()).env_remove("CYANOMETER_DATA");
+        command.env_remove("CYANOMETER_VECTORS");
         command
     }
 
@@ -1168,6 +1169,20 @@ fn mistakes_are_answered_in_one_line() {
         assert_eq!(output.status.code(), Some(status), "{line}");
         assert!(output.stdout.is_empty(), "{line}");
         assert_eq!(shop.files(), files, "{line} leaves something behind");
+    }
+}
+
+#[test]
+fn an_unknown_set_of_instructions_is_a_mistake() {
+    let shop = Workshop::with_frames();
+    for (name, is_known) in [("avx2", true), ("baseline", true), ("sse9", false), ("", false)] {
+        let output = shop.command("mosaic expected.exr").env("CYANOMETER_VECTORS", name).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let complaint = format!(
+            "mosaic: CYANOMETER_VECTORS={name} names no instructions; give one of baseline, avx2, avx512\n"
+        );
+        assert_eq!(said, if is_known { "" } else { &complaint });
+        assert_eq!(output.status.code(), Some(if is_known { 0 } else { 2 }));
     }
 }
 

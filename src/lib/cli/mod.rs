@@ -14,6 +14,7 @@ use crate::formats::atomic::remove_pending;
 use crate::formats::input::FrameReader;
 use crate::formats::output::FrameWriter;
 use crate::metadata::FrameHeader;
+use crate::numerics::vectors::Instructions;
 use crate::stage::{Counts, RowSource, Stage, run};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches};
@@ -64,7 +65,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     let general = general(&arguments);
     let session = Session { program, general };
     session.settle_threads();
-    match body(&arguments, &session) {
+    match Instructions::allowed().and_then(|_| body(&arguments, &session)) {
         Ok(()) | Err(Error::ClosedPipe) => ExitCode::SUCCESS,
         Err(error) => {
             complain(program, &error.to_string());

@@ -103,10 +103,13 @@ impl Ring {
         let place = |column: usize| column + MARGIN - first;
         let (samples, to) = (&row[begin..end], &mut line[place(begin)..place(end)]);
         let single = to_sample(black);
+        // A difference of floats that is rounded to a double on its way to a float is the same float, as doubles have more
+        // than twice the digits; a black level that is no float is taken off in doubles.
         let is_large = if f64::from(single).to_bits() == black.to_bits() {
-            vectors::run_on(instructions, SubtractFloat { samples, black: single, to })
+            vectors::run_on(instructions, Subtract { samples, less_black: |sample| sample - single, to })
         } else {
-            vectors::run_on(instructions, Subtract { samples, black, to })
+            let less_black = |sample| to_sample(f64::from(sample) - black);
+            vectors::run_on(instructions, Subtract { samples, less_black, to })
         };
         for index in (0..place(begin)).chain(place(end)..line.len()) {
             let column = (index + first).cast_signed() - MARGIN.cast_signed();
@@ -122,43 +125,21 @@ impl Ring {
     }
 }
 
-/// Subtracts a black level, in doubles, as it need not be a float; tells whether large samples are left.
-struct Subtract<'a> {
+/// Takes the black level off samples; tells whether large ones are left.
+struct Subtract<'a, F> {
     samples: &'a [f32],
-    black: f64,
+    less_black: F,
     to: &'a mut [f32],
 }
 
-impl Kernel for Subtract<'_> {
+impl<F: Fn(f32) -> f32> Kernel for Subtract<'_, F> {
     type Output = bool;
 
     #[inline(always)]
     fn run(self) -> bool {
         let mut large = Excess::default();
         for (to, &sample) in self.to.iter_mut().zip(self.samples) {
-            *to = to_sample(f64::from(sample) - self.black);
-            large.note(*to, LARGE);
-        }
-        large.is_found()
-    }
-}
-
-/// The same for a black level that is a float: a difference of floats that is rounded to a double on its way to a float
-/// is the same float, as doubles have more than twice the digits.
-struct SubtractFloat<'a> {
-    samples: &'a [f32],
-    black: f32,
-    to: &'a mut [f32],
-}
-
-impl Kernel for SubtractFloat<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        let mut large = Excess::default();
-        for (to, &sample) in self.to.iter_mut().zip(self.samples) {
-            *to = sample - self.black;
+            *to = (self.less_black)(sample);
             large.note(*to, LARGE);
         }
         large.is_found()

@@ -5,6 +5,7 @@
 //! product and a sum into one rounding nor reorders floating-point sums, so a kernel that calls no function of the
 //! platform's mathematics library gives what its plain version gives.
 
+use crate::error::{Error, Result};
 use std::sync::OnceLock;
 
 /// The environment variable that keeps programs from using the widest vectors: `baseline`, `avx2` or `avx512`.
@@ -49,12 +50,24 @@ impl Instructions {
         }
     }
 
+    /// The widest that [`VARIABLE`] allows; none where it is not set.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where it names none.
+    pub fn allowed() -> Result<Option<Self>> {
+        let Some(name) = std::env::var_os(VARIABLE) else { return Ok(None) };
+        let named = Self::ALL.into_iter().find(|set| name.to_str() == Some(set.name()));
+        let names = Self::ALL.map(Self::name).join(", ");
+        let refuse = || Error::Usage(format!("{VARIABLE}={} names no instructions; give one of {names}", name.display()));
+        named.map(Some).ok_or_else(refuse)
+    }
+
     /// The widest that this processor has and [`VARIABLE`] allows.
     pub fn widest() -> Self {
         static WIDEST: OnceLock<Instructions> = OnceLock::new();
         *WIDEST.get_or_init(|| {
-            let allowed = std::env::var(VARIABLE).ok();
-            let allowed = Self::ALL.into_iter().find(|set| allowed.as_deref() == Some(set.name()));
+            let allowed = Self::allowed().unwrap_or_default();
             let fits = |set: &Self| set.are_available() && allowed.is_none_or(|allowed| *set <= allowed);
             Self::ALL.into_iter().rev().find(fits).unwrap_or(Self::Baseline)
         })

@@ -9,9 +9,7 @@ pub mod poisson;
 
 use philox::{BLOCK, Words, halves, philox4x32_10};
 use poisson::Table;
-use rand_core::TryRng;
 use serde::{Deserialize, Serialize};
-use std::convert::Infallible;
 use std::ops::Range;
 
 /// A source of noise, as the paper lists them (Sec. 3.3).
@@ -43,59 +41,6 @@ impl Source {
     /// Whether the source repeats from frame to frame of one sensor.
     pub fn is_fixed_pattern(self) -> bool {
         matches!(self, Self::Dcnu | Self::Prnu)
-    }
-}
-
-/// The draws of one photosite from one source: a short stream of Philox blocks.
-///
-/// The key is the seed. The counter is `[x, y, frame, source · 2²⁴ + class · 2¹⁶ + block]` with `x` and `y` the
-/// photosite's column and row on the sensor; a fixed pattern has the sensor's seed for key and frame 0.
-#[derive(Debug, Clone)]
-pub struct Draws {
-    key: [u32; 2],
-    counter: [u32; 4],
-    block: [u32; 4],
-    used: usize,
-}
-
-impl Draws {
-    /// The stream of `source` in the photosite at `(x, y)` of `class`.
-    pub fn new(seed: u64, frame: u32, source: Source, class: u8, x: i32, y: i32) -> Self {
-        let counter =
-            [x.cast_unsigned(), y.cast_unsigned(), frame, u32::from(source as u8) << 24 | u32::from(class) << 16];
-        Self { key: halves(seed), counter, block: [0; 4], used: 4 }
-    }
-
-    fn word(&mut self) -> u32 {
-        if self.used == 4 {
-            self.block = philox4x32_10(self.counter, self.key);
-            // 2¹⁶ blocks are 2¹⁸ words; no distribution here comes near that, and wrapping would only repeat words.
-            let block = self.counter[3].wrapping_add(1) & 0xFFFF;
-            self.counter[3] = self.counter[3] & 0xFFFF_0000 | block;
-            self.used = 0;
-        }
-        self.used += 1;
-        self.block[self.used - 1]
-    }
-}
-
-impl TryRng for Draws {
-    type Error = Infallible;
-
-    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
-        Ok(self.word())
-    }
-
-    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
-        let low = u64::from(self.word());
-        Ok(u64::from(self.word()) << 32 | low)
-    }
-
-    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
-        for chunk in bytes.chunks_mut(4) {
-            chunk.copy_from_slice(&self.word().to_le_bytes()[..chunk.len()]);
-        }
-        Ok(())
     }
 }
 
@@ -256,7 +201,6 @@ impl Run {
 mod tests {
     use super::philox::LANES;
     use super::*;
-    use rand_core::Rng;
 
     /// Every photosite has the same high words wherever the run begins that they are made in, those of the documented
     /// blocks.
@@ -291,23 +235,6 @@ mod tests {
                 }
             }
             assert_eq!(covered, width);
-        }
-    }
-
-    #[test]
-    fn every_part_of_the_name_changes_the_draw() {
-        let first = |mut draws: Draws| draws.next_u64();
-        let base = first(Draws::new(1, 2, Source::Ssn, 0, 3, 4));
-        assert_eq!(base, first(Draws::new(1, 2, Source::Ssn, 0, 3, 4)));
-        for other in [
-            Draws::new(1 << 32, 2, Source::Ssn, 0, 3, 4),
-            Draws::new(1, 3, Source::Ssn, 0, 3, 4),
-            Draws::new(1, 2, Source::Ron, 0, 3, 4),
-            Draws::new(1, 2, Source::Ssn, 1, 3, 4),
-            Draws::new(1, 2, Source::Ssn, 0, 4, 3),
-            Draws::new(1, 2, Source::Ssn, 0, -3, 4),
-        ] {
-            assert_ne!(base, first(other));
         }
     }
 }
