@@ -1175,12 +1175,11 @@ fn mistakes_are_answered_in_one_line() {
 #[test]
 fn an_unknown_set_of_instructions_is_a_mistake() {
     let shop = Workshop::with_frames();
-    for (name, is_known) in [("avx2", true), ("baseline", true), ("sse9", false), ("", false)] {
+    for (name, is_known) in [("avx2", true), ("baseline", true), ("", true), ("sse9", false)] {
         let output = shop.command("mosaic expected.exr").env("CYANOMETER_VECTORS", name).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
-        let complaint = format!(
-            "mosaic: CYANOMETER_VECTORS={name} names no instructions; give one of baseline, avx2, avx512\n"
-        );
+        let complaint =
+            format!("mosaic: CYANOMETER_VECTORS={name} names no instructions; give one of baseline, avx2, avx512\n");
         assert_eq!(said, if is_known { "" } else { &complaint });
         assert_eq!(output.status.code(), Some(if is_known { 0 } else { 2 }));
     }

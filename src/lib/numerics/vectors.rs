@@ -56,10 +56,11 @@ impl Instructions {
     ///
     /// [`Error::Usage`] where it names none.
     pub fn allowed() -> Result<Option<Self>> {
-        let Some(name) = std::env::var_os(VARIABLE) else { return Ok(None) };
+        let Some(name) = std::env::var_os(VARIABLE).filter(|name| !name.is_empty()) else { return Ok(None) };
         let named = Self::ALL.into_iter().find(|set| name.to_str() == Some(set.name()));
         let names = Self::ALL.map(Self::name).join(", ");
-        let refuse = || Error::Usage(format!("{VARIABLE}={} names no instructions; give one of {names}", name.display()));
+        let refuse =
+            || Error::Usage(format!("{VARIABLE}={} names no instructions; give one of {names}", name.display()));
         named.map(Some).ok_or_else(refuse)
     }
 
