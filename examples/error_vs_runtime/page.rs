@@ -2,7 +2,7 @@
 
 use crate::markdown::{Table, number};
 use cyanometer::error::Result;
-use cyanometer::report::plot::Plot;
+use cyanometer::report::plot::{Plot, power_of_ten};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -64,7 +64,10 @@ pub fn digits(value: f64, count: usize) -> String {
         let decimals = i64::try_from(count).unwrap_or(0) - 1 - i64::from(magnitude);
         return number(mantissa * 10_f64.powi(magnitude), usize::try_from(decimals).unwrap_or(0));
     }
-    power(number(mantissa, count - 1), magnitude)
+    match (number(mantissa, count - 1).as_str(), power_of_ten(magnitude)) {
+        ("1", power) => power,
+        (mantissa, power) => format!("{mantissa}·{power}"),
+    }
 }
 
 /// A mantissa and a power of ten.
@@ -98,7 +101,7 @@ pub fn percent(fraction: f64) -> String {
 pub fn count(value: usize) -> String {
     let magnitude = value.max(1).ilog10();
     if magnitude >= 4 && value == 10_usize.pow(magnitude) {
-        power("1".into(), magnitude.cast_signed())
+        power_of_ten(magnitude.cast_signed())
     } else {
         value.to_string()
     }

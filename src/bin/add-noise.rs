@@ -52,9 +52,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| {
-        arguments.general.clone().in_pipeline(arguments.input.is_pipe() || arguments.output.is_pipe())
-    };
+    let general = |arguments: &Arguments| arguments.general.between(&arguments.input, &arguments.output);
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 

@@ -216,6 +216,11 @@ pub struct General {
 }
 
 impl General {
+    /// The same for a program that makes a frame of a frame.
+    pub fn between(&self, input: &Input, output: &Output) -> Self {
+        self.clone().in_pipeline(input.is_pipe() || output.is_pipe())
+    }
+
     /// The same for a program whose frames come or go through a pipe, or do not.
     pub fn in_pipeline(self, pipeline: bool) -> Self {
         Self { pipeline, ..self }

@@ -218,7 +218,8 @@ fn decade_label(digit: i32, decade: i32) -> String {
     }
 }
 
-fn power_of_ten(exponent: i32) -> String {
+/// A power of ten as one writes it: 10⁻⁷.
+pub fn power_of_ten(exponent: i32) -> String {
     let raise = |c| match c {
         '-' => '⁻',
         '0' => '⁰',

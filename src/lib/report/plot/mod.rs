@@ -11,7 +11,7 @@ mod layout;
 use crate::error::{Error, Result};
 use crate::formats::input::FileId;
 use crate::formats::output::write_bytes;
-pub use axis::{Axis, Scale};
+pub use axis::{Axis, Scale, power_of_ten};
 use std::path::Path;
 
 /// A figure: one panel or several.
