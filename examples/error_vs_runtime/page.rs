@@ -70,28 +70,6 @@ pub fn digits(value: f64, count: usize) -> String {
     }
 }
 
-/// A mantissa and a power of ten.
-fn power(mantissa: String, magnitude: i32) -> String {
-    let exponent: String = magnitude.to_string().chars().map(raised).collect();
-    if mantissa == "1" { format!("10{exponent}") } else { format!("{mantissa}·10{exponent}") }
-}
-
-fn raised(c: char) -> char {
-    match c {
-        '-' => '⁻',
-        '0' => '⁰',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        '4' => '⁴',
-        '5' => '⁵',
-        '6' => '⁶',
-        '7' => '⁷',
-        '8' => '⁸',
-        _ => '⁹',
-    }
-}
-
 /// A fraction as per cent.
 pub fn percent(fraction: f64) -> String {
     format!("{} %", digits(100.0 * fraction, 2))
