@@ -104,9 +104,27 @@ pub fn run_on<K: Kernel>(instructions: Instructions, kernel: K) -> K::Output {
     kernel.run()
 }
 
+/// Has the processor fetch a value into its caches, where that can be asked for.
+#[inline(always)]
+pub fn prefetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    on_x86::prefetch(value);
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
+}
+
 #[cfg(target_arch = "x86_64")]
 mod on_x86 {
     use super::{Instructions, Kernel};
+    use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+
+    /// Has the line of the cache fetched that a value begins in.
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "the instruction takes a pointer")]
+    pub(super) fn prefetch<T>(value: &T) {
+        // SAFETY: a hint, which changes nothing that a program sees; every x86-64 has it.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast()) }
+    }
 
     #[target_feature(enable = "avx2")]
     fn avx2<K: Kernel>(kernel: K) -> K::Output {
