@@ -102,16 +102,20 @@ struct Tables {
 
 impl Tables {
     /// The tables that a frame is large enough for.
-    fn of(frame: &FrameHeader, model: &NoiseModel) -> Self {
+    fn of(frame: &FrameHeader, model: &NoiseModel, instructions: Instructions) -> Self {
         /// Photosites from which on a table saves more than it costs.
         const WORTHWHILE: usize = 1 << 17;
+        /// Rates from which on the widest vectors work counts out faster than they are looked up.
+        const FEW: f64 = 10.0;
         let geometry = &frame.geometry;
         if model.poisson != PoissonKind::Exact || geometry.width * geometry.height < WORTHWHILE {
             return Self::default();
         }
         let table = |rate: f64| Table::new(to_sample(rate)).map(Arc::new);
         let scene = frame.metadata.scene.as_ref().filter(|scene| scene.uniform && model.signal_shot);
-        let light = scene.and_then(|scene| scene.expected_electrons).map(|rates| rates.map(table));
+        let rates = scene.and_then(|scene| scene.expected_electrons);
+        let is_slow = |rates: &[f64; 3]| instructions == Instructions::Avx512 && rates.iter().all(|&rate| rate >= FEW);
+        let light = rates.filter(|rates| !is_slow(rates)).map(|rates| rates.map(table));
         let dark = if model.dark_shot { table(model.dark_e) } else { None };
         Self { dark, light: light.unwrap_or_default() }
     }
@@ -194,14 +198,16 @@ impl AddNoise {
         let model = NoiseModel::of(input, &record)?;
         metadata.dark_signal_e = Some(dark_e * rectified_mean(model.dcnu) * settings.cte.map_or(1.0, uniform_share));
         metadata.noise = Some(record.clone());
-        let tables = Tables::of(input, &model);
+        let instructions = Instructions::widest();
+        let tables = Tables::of(input, &model, instructions);
         let header = FrameHeader { metadata, ..input.clone() };
-        Ok(Self { header, model, record, transfer, tables, instructions: Instructions::widest() })
+        Ok(Self { header, model, record, transfer, tables, instructions })
     }
 
     /// Draws on a narrower set of instructions than the widest there is; the noise is the same.
     pub fn on(mut self, instructions: Instructions) -> Self {
         self.instructions = instructions;
+        self.tables = Tables::of(&self.header, &self.model, instructions);
         self
     }
 
@@ -304,7 +310,6 @@ struct Line<'a> {
     model: &'a NoiseModel,
     record: &'a NoiseRecord,
     tables: &'a Tables,
-    instructions: Instructions,
     /// Row of the sensor, and column of the frame's first.
     row: i32,
     first_column: i32,
@@ -322,8 +327,8 @@ impl AddNoise {
         let [first_column, y0] = geometry.origin;
         #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
         let row = y0.wrapping_add(y as i32);
-        let Self { model, record, tables, instructions, .. } = self;
-        Line { model, record, tables, instructions: *instructions, row, first_column, classes }
+        let Self { model, record, tables, .. } = self;
+        Line { model, record, tables, row, first_column, classes }
     }
 }
 
@@ -485,17 +490,12 @@ impl Line<'_> {
     /// The tables of the run's rates, where all its photosites have those.
     #[inline(always)]
     fn tables_at(&self, source: Source, run: &Run, rates: &[f32]) -> Option<[&Table; 2]> {
-        /// Rates from which on the widest vectors work counts out faster than they are looked up.
-        const FEW: f32 = 10.0;
         let tables = match source {
             Source::Dcsn => [self.tables.dark.as_deref(); 2],
             _ => run.classes.map(|class| self.tables.light[usize::from(class)].as_deref()),
         };
         let [Some(even), Some(odd)] = tables else { return None };
         let known = [even.rate(), odd.rate()];
-        if self.instructions == Instructions::Avx512 && source == Source::Ssn && known.iter().all(|&rate| rate >= FEW) {
-            return None;
-        }
         let differs = |pair: &[f32; 2]| (pair[0] != known[0]) | (pair[1] != known[1]);
         let any = rates.as_chunks::<2>().0.iter().fold(false, |any, pair| any | differs(pair));
         (!any).then_some([even, odd])
