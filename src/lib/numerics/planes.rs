@@ -46,6 +46,7 @@ struct Pixels<'a> {
     planes: &'a [WeightedPlane],
 }
 
+/// Sums pixels on one set of instructions, as many side by side as its registers hold.
 fn sum_on(instructions: Instructions, pixels: Pixels<'_>, sums: &mut [[f64; PIXELS]; 3]) {
     match instructions {
         Instructions::Baseline => vectors::run_on(instructions, Weighted::<FEW_SIDE_BY_SIDE> { pixels, sums }),
@@ -86,7 +87,7 @@ fn add<const N: usize, const P: usize>(
     let [red, green, blue] = sums;
     let count = red.len();
     let blocks = count / P;
-    let (by_line, by_next) = [lines, next].map(|lines| lines.map(|line| line.as_chunks::<P>().0)).into();
+    let [by_line, by_next] = [lines, next].map(|lines| lines.map(|line| line.as_chunks::<P>().0));
     for lines in by_line.iter().chain(&by_next) {
         // Told once, it need not be looked after at every block.
         assert!(lines.len() == blocks);

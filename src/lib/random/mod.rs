@@ -237,4 +237,33 @@ mod tests {
             assert_eq!(covered, width);
         }
     }
+
+    #[test]
+    fn every_part_of_the_name_changes_the_draw() {
+        let words_of = |run: Run| {
+            let mut words = RunWords::default();
+            run.make_temporal(&mut words);
+            run.make_pattern(&mut words);
+            (words.temporal.map(|word| word[0]), words.pattern.map(|word| word[0]))
+        };
+        let base = Run { seed: 1, sensor_seed: 5, frame: 2, place: [3, 4], classes: [0, 1], length: LANES };
+        let (temporal, pattern) = words_of(base);
+        assert_eq!(words_of(base), (temporal, pattern));
+        for other in [Run { seed: 1 << 32, ..base }, Run { frame: 3, ..base }] {
+            let (other_temporal, other_pattern) = words_of(other);
+            assert!(other_temporal.iter().zip(temporal).all(|(other, word)| *other != word));
+            assert_eq!(other_pattern, pattern, "a fixed pattern is that of the sensor");
+        }
+        let (other_temporal, other_pattern) = words_of(Run { sensor_seed: 5 << 32, ..base });
+        assert_eq!(other_temporal, temporal);
+        assert!(other_pattern.iter().zip(pattern).all(|(other, word)| *other != word));
+        for other in [Run { classes: [1, 0], ..base }, Run { place: [4, 3], ..base }, Run { place: [-3, 4], ..base }] {
+            let (other_temporal, other_pattern) = words_of(other);
+            assert!(other_temporal.iter().zip(temporal).all(|(other, word)| *other != word));
+            assert!(other_pattern.iter().zip(pattern).all(|(other, word)| *other != word));
+        }
+        // Sources: all words of a photosite are different ones.
+        let all: std::collections::BTreeSet<u32> = temporal.into_iter().chain(pattern).collect();
+        assert_eq!(all.len(), temporal.len() + pattern.len());
+    }
 }

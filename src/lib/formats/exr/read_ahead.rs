@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Bytes that are held: eight rows of three planes of a large sensor, few enough to stay in a level-2 cache.
+/// Bytes that are held: four rows of three planes of a large sensor, few enough to stay in a level-2 cache.
 const CAPACITY: usize = 1 << 17;
 
 /// A block that takes more is held all the same, up to this: a row of 471 bands of a wide spectral image.
