@@ -5,17 +5,19 @@
 //! bands. `cargo bench --bench kernels -- bi` runs the cases whose name holds "bi"; compare figures of one run only.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::camera::optics::Exposure;
 use cyanometer::cfa::CfaPattern;
-use cyanometer::color::{ColorSettings, Space, ToXyz, White};
-use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::color::{Space, White};
 use cyanometer::error::Result;
 use cyanometer::frame::{Geometry, Rows, Window};
 use cyanometer::metadata::{FrameHeader, Metadata};
-use cyanometer::mosaic::Mosaic;
 use cyanometer::numerics::vectors::Instructions;
-use cyanometer::optics::Exposure;
-use cyanometer::stage::{Counts, RowSink, RowSource, Stage, run};
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::{Counts, RowSink, RowSource, Stage, run};
 use cyanometer::units::QuantityKind;
 use std::hint::black_box;
 use std::time::Duration;

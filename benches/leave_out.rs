@@ -1,19 +1,19 @@
 //! What leaving out saves: each piece of work with and without what a scene does not need; their ratio is the saving.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use cyanometer::camera::optics::{Exposure, Vignetting};
 use cyanometer::cfa::CfaPattern;
-use cyanometer::correct::{CorrectFrame, CorrectionSettings};
-use cyanometer::demosaic::Black;
 use cyanometer::error::Result;
 use cyanometer::formats::data;
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata};
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::planes::{WeightedPlane, weighted_sums};
-use cyanometer::optics::{Exposure, Vignetting};
-use cyanometer::render::Rendering;
-use cyanometer::stage::{MemoryFrame, RowSink};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::render::Rendering;
+use cyanometer::stream::{MemoryFrame, RowSink};
 use cyanometer::units::QuantityKind;
 use std::hint::black_box;
 

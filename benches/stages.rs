@@ -3,23 +3,25 @@
 //! `cargo bench` prints medians; compare figures of one run only.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use cyanometer::adc::{AdcSettings, Digitize};
-use cyanometer::characterization::evaluation::{EvaluationSettings, Filling, SampleExposure, evaluate};
-use cyanometer::characterization::signals;
-use cyanometer::color::{ColorSettings, Space, ToXyz, White};
-use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::analysis::characterization::evaluation::{EvaluationSettings, Filling, SampleExposure, evaluate};
+use cyanometer::analysis::characterization::signals;
+use cyanometer::analysis::statistics::measure;
+use cyanometer::camera::optics::Exposure;
+use cyanometer::chain::{Chain, ChainSettings};
+use cyanometer::color::{Space, White};
 use cyanometer::error::Result;
 use cyanometer::formats::{data, spectral};
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata, Scene};
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings};
-use cyanometer::optics::Exposure;
 use cyanometer::propagation::Equations;
-use cyanometer::propagation::chain::{Chain, ChainSettings};
 use cyanometer::spectrum::WavelengthGrid;
-use cyanometer::stage::{MemoryFrame, Stage};
-use cyanometer::statistics::measure;
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::{MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
 
 /// A clear sky at three quarters of full well.

@@ -10,24 +10,26 @@
 //! A stage goes over a frame in bands, as programs do, from one buffer to another that are made once. The light is a ramp
 //! from 10 to 30 000 e⁻ over the whole frame, so that no two photosites that are neighbours expect the same.
 
-use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::camera::optics::Exposure;
 use cyanometer::cfa::{CfaPattern, Class};
-use cyanometer::color::{ColorSettings, Space, ToXyz, White};
-use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::color::{Space, White};
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::data;
 use cyanometer::frame::{Geometry, Rows, Window, to_sample};
 use cyanometer::metadata::{FrameHeader, Metadata};
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::moments::Moments;
 use cyanometer::numerics::planes::weighted_sums;
 use cyanometer::numerics::vectors::{self, Instructions};
-use cyanometer::optics::Exposure;
 use cyanometer::random::Source;
 use cyanometer::random::philox::philox4x32_10;
 use cyanometer::spectrum::WavelengthGrid;
-use cyanometer::stage::{MemoryFrame, Stage};
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::{MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
 use rand_core::TryRng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
@@ -237,7 +239,7 @@ fn photosite(
     class: Class,
     [x, y]: [usize; 2],
     dark_shot: &Poisson<f64>,
-    sensor: &cyanometer::sensor::Sensor,
+    sensor: &cyanometer::camera::sensor::Sensor,
 ) -> f32 {
     let draws = |source| Draws::new(source, class, x as u32, y as u32);
     let normal = |source| -> f64 { StandardNormal.sample(&mut draws(source)) };

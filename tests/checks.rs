@@ -5,19 +5,21 @@
 
 mod support;
 
-use cyanometer::adc::{AdcSettings, Digitize};
-use cyanometer::color::{ColorSettings, Space, ToXyz, White};
-use cyanometer::correct::{CorrectFrame, CorrectionSettings, LessDarks};
-use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::analysis::statistics::check::Verdict;
+use cyanometer::analysis::statistics::{Region, RegionReport, measure};
+use cyanometer::color::{Space, White};
 use cyanometer::metadata::Scene;
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::significance::{of_chi_square, of_smallest};
 use cyanometer::propagation::Equations;
 use cyanometer::random::Source;
-use cyanometer::stage::{MemoryFrame, Stage, run};
-use cyanometer::statistics::check::Verdict;
-use cyanometer::statistics::{Region, RegionReport, measure};
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings, LessDarks};
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::{MemoryFrame, Stage, run};
 use rayon::prelude::*;
 use support::{at, expected, sensor, through};
 

@@ -1,29 +1,30 @@
 //! Characterisation on the sky library, and on a camera whose matrix is known.
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-use cyanometer::adc::{AdcSettings, Digitize};
-use cyanometer::characterization::evaluation::{
+use cyanometer::analysis::characterization::evaluation::{
     EvaluationSettings, Filling, SampleEvaluation, SampleExposure, evaluate,
 };
-use cyanometer::characterization::regression::{FitSettings, FittedMatrix, Regression, fit, residuals};
-use cyanometer::characterization::training::{average_sample, spanning_subset};
-use cyanometer::characterization::{Signals, responses, signals};
+use cyanometer::analysis::characterization::regression::{FitSettings, FittedMatrix, Regression, fit, residuals};
+use cyanometer::analysis::characterization::training::{average_sample, spanning_subset};
+use cyanometer::analysis::characterization::{Signals, responses, signals};
+use cyanometer::camera::optics::Exposure;
+use cyanometer::camera::sensor::{Sensor, SpectralResponse};
 use cyanometer::color::difference::Difference;
-use cyanometer::color::{ColorSettings, Space, White, lab_about, lab_from_xyz, matrix};
-use cyanometer::demosaic::Method;
-use cyanometer::demosaic::weights::WeightTable;
+use cyanometer::color::{Space, White, lab_about, lab_from_xyz, matrix};
 use cyanometer::error::Result;
 use cyanometer::formats::{data, spectral};
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata, Scene};
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::significance;
-use cyanometer::optics::Exposure;
 use cyanometer::propagation::sampling::{Place, Sampling, SamplingBasis};
 use cyanometer::propagation::{self, Equations, FramePrediction, Prediction};
-use cyanometer::sensor::{Sensor, SpectralResponse};
 use cyanometer::spectrum::{Curve, SpectralLibrary, WavelengthGrid};
-use cyanometer::stage::Stage;
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::demosaic::weights::WeightTable;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::to_xyz::ColorSettings;
+use cyanometer::stream::Stage;
 use cyanometer::units::QuantityKind;
 use std::path::Path;
 
@@ -253,7 +254,7 @@ fn photosites(sensor: &Sensor, sky: &SampleEvaluation) -> [Prediction; 3] {
     let noisy = AddNoise::new(&frame, &NoiseSettings::default()).unwrap();
     let codes = Digitize::new(noisy.header(), &AdcSettings::default()).unwrap();
     match propagation::of_frame(codes.header(), Equations::Exact) {
-        Some(FramePrediction::Planes(sites)) => sites,
+        Ok(FramePrediction::Planes(sites)) => sites,
         other => panic!("{other:?}"),
     }
 }

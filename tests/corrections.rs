@@ -5,15 +5,18 @@
 
 mod support;
 
+use cyanometer::camera::optics::Vignetting;
+use cyanometer::camera::sensor::silicon_band_gap_ev;
 use cyanometer::cfa::{CfaPattern, Class};
 use cyanometer::color::matrix;
-use cyanometer::demosaic::weights::{Kernel, PHASES, WeightTable};
-use cyanometer::demosaic::{Black, Demosaic, Method};
 use cyanometer::frame::{Geometry, mirror};
-use cyanometer::optics::Vignetting;
-use cyanometer::propagation::mixture;
+use cyanometer::propagation::gains;
 use cyanometer::propagation::paper::{self, Coefficients};
-use cyanometer::sensor::silicon_band_gap_ev;
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::stencil::PHASES;
+use cyanometer::stages::demosaic::stencil::Stencil;
+use cyanometer::stages::demosaic::weights::WeightTable;
+use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::units::QuantityKind;
 use nalgebra::Matrix3;
 use support::{TREE, frame, header, sensor, through};
@@ -30,7 +33,7 @@ fn says(text: &str) {
 /// The share of variance that a channel keeps at equal variances of the photosites.
 fn kept(method: Method) -> Matrix3<f64> {
     let weights = WeightTable::new(method, CfaPattern::Rggb).about([1.0, 1.0]);
-    mixture::mean_pixel(&weights).covariance([1.0; 3])
+    gains::mean_pixel(&weights).covariance([1.0; 3])
 }
 
 const MV_PER_E: f64 = 0.018;
@@ -173,7 +176,7 @@ fn the_term_of_correlation_has_a_variance() {
 fn differences_about_one_site_are_correlated() {
     let weights = WeightTable::new(Method::EffectiveColor, CfaPattern::Rggb).about([1.0, 1.0]);
     let red = (0..PHASES.len()).find(|&phase| weights.class(phase, [0, 0]) == Class::Red).unwrap();
-    let mean_k = weights.kernel(red, Class::Green as usize).clone().plus(-1.0, &Kernel::site([0, 0]));
+    let mean_k = weights.kernel(red, Class::Green as usize).clone().plus(-1.0, &Stencil::site([0, 0]));
     let variance: f64 = mean_k.sites().map(|(_, weight)| weight * weight).sum();
     assert!((variance - 9.0 / 16.0).abs() < 1e-15);
     says("9/16 σ², not the 3/8 σ² of Eq. 53");

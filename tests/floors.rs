@@ -1,10 +1,11 @@
-//! The house has floors: the sources are read, and a module that uses a higher floor than its own is told so.
+//! The house has floors: the sources are read, and a module that uses a higher floor than its own is told so, as are files
+//! that use each other.
 
 #![allow(clippy::unwrap_used, reason = "a source that cannot be read shall stop the test")]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 const TREE: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -118,13 +119,13 @@ fn braces_length(text: &str) -> usize {
 
 /// The floor of each module, from the table on the library's front page.
 fn floors() -> BTreeMap<String, usize> {
-    let front = fs::read_to_string(Path::new(TREE).join("src/lib/lib.rs")).unwrap();
+    let front = fs::read_to_string(std::path::Path::new(TREE).join("src/lib/lib.rs")).unwrap();
     let mut floors = BTreeMap::new();
     for line in front.lines().filter_map(|line| line.strip_prefix("//! | ")) {
-        let Some(floor) = line.chars().next().and_then(|c| c.to_digit(10)) else { continue };
+        let Ok(floor) = line.split(' ').next().unwrap().parse::<usize>() else { continue };
         let modules = line.split('|').nth(1).unwrap();
         for name in modules.split('`').skip(1).step_by(2) {
-            let twice = floors.insert(name.to_owned(), floor as usize);
+            let twice = floors.insert(name.to_owned(), floor);
             assert_eq!(twice, None, "{name} stands twice in the table of lib.rs");
         }
     }
@@ -132,79 +133,236 @@ fn floors() -> BTreeMap<String, usize> {
     floors
 }
 
-/// The top-level module that a source belongs to, and how deep the source lies in it.
-fn place(path: &str) -> (&str, usize) {
-    let inside = path.strip_prefix("src/lib/").unwrap().trim_end_matches(".rs");
-    let parts: Vec<&str> = inside.split('/').filter(|part| *part != "mod").collect();
-    (parts[0], parts.len())
+/// A path in the sources: `a::b::C` as its parts.
+type Path = Vec<String>;
+
+/// The modules of the library and what they use of each other.
+struct House {
+    /// The file of each module, by its path from the root of the library; the root itself is left out.
+    modules: BTreeMap<Path, Source>,
+    /// What a module hands on under a name: `pub use`.
+    faces: BTreeMap<Path, Path>,
 }
 
-fn identifier(text: &str) -> &str {
-    let end = text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len());
-    &text[..end]
+/// A module's use of another: where, and what is named.
+struct Use {
+    line: usize,
+    of: Path,
 }
 
-/// The top-level modules that a piece of code names, each with its line.
-fn uses(code: &str, depth: usize) -> Vec<(usize, String)> {
-    // From a module `depth` deep, that many `super::` lead to the root, as `crate::` does.
-    let roots = ["crate::".to_owned(), "super::".repeat(depth)];
+/// The paths that a tree of `use` names: `a::{b, c::d as e}` is `a::b`, `a::c::d`.
+fn expanded(tree: &str) -> Vec<String> {
+    let tree = tree.trim();
+    let Some(brace) = tree.find('{') else {
+        let end = tree.find(" as ").unwrap_or(tree.len());
+        return if tree.is_empty() { Vec::new() } else { vec![tree[..end].to_owned()] };
+    };
+    let (before, group) = (&tree[..brace], &tree[brace + 1..tree.rfind('}').unwrap_or(tree.len())]);
+    let mut depth = 0;
+    let parts = group.split(|c| {
+        depth += i32::from(c == '{') - i32::from(c == '}');
+        c == ',' && depth == 0
+    });
+    parts.flat_map(expanded).map(|part| format!("{before}{part}")).collect()
+}
+
+/// The `use` declarations of a piece of code: line, whether they hand on, tree.
+fn declarations(code: &str) -> Vec<(usize, bool, &str)> {
     let mut found = Vec::new();
-    for root in &roots {
-        for (start, _) in code.match_indices(root.as_str()) {
-            let before = code[..start].chars().next_back().unwrap_or(' ');
-            if before.is_alphanumeric() || before == '_' || before == ':' {
-                continue;
-            }
-            let line = code[..start].lines().count().max(1);
-            let after = &code[start + root.len()..];
-            if after.starts_with('{') {
-                let group = &after[1..braces_length(after) - 1];
-                let mut depth = 0;
-                let heads = group.split(|c| {
-                    depth += i32::from(c == '{') - i32::from(c == '}');
-                    c == ',' && depth == 0
-                });
-                found.extend(heads.map(|head| (line, identifier(head.trim()).to_owned())));
-            } else {
-                found.push((line, identifier(after).to_owned()));
-            }
+    for (start, _) in code.match_indices("use ") {
+        let before = code[..start].trim_end_matches(' ');
+        let first = before.rsplit('\n').next().unwrap_or("");
+        let hands_on = first.trim_start().starts_with("pub");
+        if first.trim().is_empty() || hands_on {
+            let tree = &code[start + 4..];
+            found.push((
+                code[..start].matches('\n').count() + 1,
+                hands_on,
+                &tree[..tree.find(';').unwrap_or(tree.len())],
+            ));
         }
     }
-    found.retain(|(_, name)| !name.is_empty());
     found
+}
+
+/// All paths of two parts and more that a piece of code spells out, but for those of its `use` declarations.
+fn spelled_out(code: &str) -> Vec<(usize, String)> {
+    let mut found = Vec::new();
+    let mut rest = 0;
+    while let Some(colons) = code[rest..].find("::").map(|at| rest + at) {
+        let is_part = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+        let start = code[..colons].rfind(|c| !is_part(c)).map_or(0, |at| at + 1);
+        let end = code[colons..].find(|c| !is_part(c)).map_or(code.len(), |at| colons + at);
+        let line = code[..start].rsplit('\n').next().unwrap_or("").trim_start().to_owned();
+        let is_declared = line.starts_with("use ") || line.starts_with("pub") && line.contains("use ");
+        // `pub(in path)` says who may see, not what is used.
+        if !is_declared && !line.ends_with("(in ") {
+            found.push((code[..start].matches('\n').count() + 1, code[start..end].trim_end_matches(':').to_owned()));
+        }
+        rest = end.max(colons + 2);
+    }
+    found
+}
+
+impl House {
+    fn of_library() -> Self {
+        let mut modules = BTreeMap::new();
+        for source in sources("src/lib") {
+            let inside = source.path.strip_prefix("src/lib/").unwrap().trim_end_matches(".rs");
+            let path: Path = inside.split('/').filter(|part| *part != "mod").map(str::to_owned).collect();
+            if path != ["lib"] && path.last().unwrap() != "tests" {
+                let code = without_tests(&source.code);
+                modules.insert(path, Source { code, ..source });
+            }
+        }
+        let mut house = Self { modules, faces: BTreeMap::new() };
+        let mut faces = BTreeMap::new();
+        for (module, source) in &house.modules {
+            for (_, _, tree) in declarations(&source.code).into_iter().filter(|(_, hands_on, _)| *hands_on) {
+                for of in expanded(tree).iter().filter_map(|path| house.absolute(module, path)) {
+                    let name = module.iter().chain(of.last()).cloned().collect();
+                    faces.insert(name, of);
+                }
+            }
+        }
+        house.faces = faces;
+        house
+    }
+
+    /// A path as it is spelled in a module, from the root of the library; none where it leads out of it.
+    fn absolute(&self, module: &Path, spelled: &str) -> Option<Path> {
+        let mut parts: Vec<&str> = spelled.split("::").collect();
+        let mut base = match parts[0] {
+            "crate" => Vec::new(),
+            "self" | "super" => module.clone(),
+            child => {
+                let of_child: Path = module.iter().map(String::as_str).chain([child]).map(str::to_owned).collect();
+                return self
+                    .modules
+                    .contains_key(&of_child)
+                    .then(|| module.iter().map(String::as_str).chain(parts).map(str::to_owned).collect());
+            }
+        };
+        while let Some(&first) = parts.first().filter(|part| ["crate", "self", "super"].contains(part)) {
+            if first == "super" {
+                base.pop();
+            }
+            parts.remove(0);
+        }
+        Some(base.into_iter().chain(parts.into_iter().map(str::to_owned)).collect())
+    }
+
+    /// The module that defines what a path from the root names, through the faces of others.
+    fn defining(&self, path: &Path) -> Option<&Path> {
+        for length in (1..=path.len()).rev() {
+            if let Some((module, _)) = self.modules.get_key_value(&path[..length]) {
+                let face = path.get(..=length).and_then(|named| self.faces.get(named));
+                let behind = |of: &Path| of.iter().chain(&path[length + 1..]).cloned().collect::<Path>();
+                return face.map_or(Some(module), |of| self.defining(&behind(of)));
+            }
+        }
+        None
+    }
+
+    /// What a module uses of others; what it hands on is used by those who take it.
+    fn uses(&self, module: &Path) -> Vec<Use> {
+        let code = &self.modules[module].code;
+        let mut imported: BTreeMap<String, Path> = BTreeMap::new();
+        let mut named: Vec<(usize, Path)> = Vec::new();
+        for (line, hands_on, tree) in declarations(code) {
+            for path in expanded(tree).iter().filter_map(|path| self.absolute(module, path)) {
+                if path.last().is_some_and(|last| last == "self") {
+                    continue;
+                }
+                if !hands_on {
+                    named.push((line, path.clone()));
+                }
+                imported.insert(path.last().cloned().unwrap_or_default(), path);
+            }
+            // `a::{self, b}` names the module a.
+            for path in expanded(tree).iter().filter_map(|path| path.strip_suffix("::self")) {
+                let Some(path) = self.absolute(module, path) else { continue };
+                imported.insert(path.last().cloned().unwrap_or_default(), path);
+            }
+        }
+        for (line, spelled) in spelled_out(code) {
+            let (first, rest) = spelled.split_once("::").unwrap_or((&spelled, ""));
+            match imported.get(first) {
+                Some(of) => {
+                    named.push((line, of.iter().cloned().chain(rest.split("::").map(str::to_owned)).collect()));
+                }
+                None => named.extend(self.absolute(module, &spelled).map(|path| (line, path))),
+            }
+        }
+        let defined =
+            named.into_iter().filter_map(|(line, path)| Some(Use { line, of: self.defining(&path)?.clone() }));
+        defined.filter(|used| used.of != *module).collect()
+    }
 }
 
 #[test]
 fn no_module_uses_a_higher_floor() {
-    let floors = floors();
+    let (house, floors) = (House::of_library(), floors());
     let mut wrong = Vec::new();
     let mut uses_seen = 0;
-    for source in sources("src/lib") {
-        let (module, depth) = place(&source.path);
-        if module == "lib" {
-            continue;
-        }
-        let Some(&floor) = floors.get(module) else {
-            wrong.push(format!("{}: {module} is not in the table of lib.rs", source.path));
+    for (module, source) in &house.modules {
+        let Some(&floor) = floors.get(&module[0]) else {
+            wrong.push(format!("{}: {} is not in the table of lib.rs", source.path, module[0]));
             continue;
         };
-        for (line, used) in uses(&without_tests(&source.code), depth) {
+        for Use { line, of } in house.uses(module) {
             uses_seen += 1;
-            match floors.get(&used) {
-                Some(&other) if other > floor => {
-                    wrong.push(format!("{}:{line}: {module} (floor {floor}) uses {used} (floor {other})", source.path))
-                }
-                _ => {}
+            let Some(&other) = floors.get(&of[0]) else { continue };
+            if other > floor {
+                wrong.push(format!("{}:{line}: floor {floor} uses {} (floor {other})", source.path, of.join("::")));
             }
         }
     }
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
-    assert!(uses_seen > 50, "only {uses_seen} uses were seen: the reading of sources is broken");
+    assert!(uses_seen > 500, "only {uses_seen} uses were seen: the reading of sources is broken");
+}
+
+/// Each row of the table is needed: on every floor but the ground something uses the floor below.
+#[test]
+fn every_floor_stands_on_a_lower_one() {
+    let (house, floors) = (House::of_library(), floors());
+    let top = floors.values().copied().max().unwrap();
+    for floor in 1..=top {
+        let on_it = house.modules.keys().filter(|module| floors.get(&module[0]) == Some(&floor));
+        let lower: BTreeSet<usize> =
+            on_it.flat_map(|module| house.uses(module)).map(|used| floors[&used.of[0]]).collect();
+        assert!(lower.iter().any(|&other| other < floor), "floor {floor} uses nothing below: {lower:?}");
+    }
+}
+
+/// Files use each other in one direction.
+#[test]
+fn no_files_use_each_other_in_a_circle() {
+    let house = House::of_library();
+    let uses: BTreeMap<&Path, BTreeSet<Path>> = house
+        .modules
+        .keys()
+        .map(|module| (module, house.uses(module).into_iter().map(|used| used.of).collect()))
+        .collect();
+    // Takes away, again and again, what uses nothing that is left: what stays is in a circle or above one.
+    let mut left: BTreeSet<&Path> = uses.keys().copied().collect();
+    while let Some(free) = left.iter().find(|module| !uses[**module].iter().any(|used| left.contains(used))).copied() {
+        left.remove(free);
+    }
+    let shown: Vec<String> = left
+        .iter()
+        .map(|module| {
+            let used: Vec<String> =
+                uses[*module].iter().filter(|used| left.contains(used)).map(|used| used.join("::")).collect();
+            format!("{} uses {}", module.join("::"), used.join(", "))
+        })
+        .collect();
+    assert!(shown.is_empty(), "in a circle, or above one:\n{}", shown.join("\n"));
 }
 
 #[test]
 fn the_table_lists_the_modules_that_there_are() {
-    let front = fs::read_to_string(Path::new(TREE).join("src/lib/lib.rs")).unwrap();
+    let front = fs::read_to_string(std::path::Path::new(TREE).join("src/lib/lib.rs")).unwrap();
     let mut declared: Vec<&str> = front
         .lines()
         .filter_map(|line| line.strip_prefix("pub mod ").or(line.strip_prefix("mod ")))
@@ -250,11 +408,21 @@ fn nothing_is_left_to_do_in_the_sources() {
 
 #[test]
 fn the_reader_of_sources_sees_what_is_there() {
-    let text = "use crate::{a::{b, c}, d};\n// crate::e\nlet s = \"crate::f\"; let q = '\"'; super::g::h();\n\
-                #[cfg(test)]\nmod tests { use crate::i; }\nfn j<'a>() { super::super::k(); my_crate::l(); }\n";
-    let code = without_tests(&without_comments_and_strings(text));
-    let names = |depth| -> Vec<String> { uses(&code, depth).into_iter().map(|(_, n)| n).collect() };
-    assert_eq!(names(1), ["a", "d", "g", "super"]);
-    assert_eq!(names(2), ["a", "d", "k"]);
-    assert_eq!(uses(&code, 2)[2].0, 6);
+    let text = "use crate::{a::{b, C}, d};\n// crate::e\nlet s = \"crate::f\"; let q = '\"'; super::g::h();\n\
+                #[cfg(test)]\nmod tests { use crate::i; }\npub(in crate::a) fn j<'a>() { b::K::new(); other::l(); }\n\
+                pub use inner::M;\nfn n() { inner::o(); crate::g::M; }\n";
+    let source = |name: &str, code: &str| {
+        let path: Path = name.split("::").map(str::to_owned).collect();
+        let code = without_tests(&without_comments_and_strings(code));
+        (path, Source { path: name.to_owned(), code })
+    };
+    let mut house = House {
+        modules: ["a", "a::b", "d", "e", "f", "g", "i", "here::inner"].map(|name| source(name, "")).into(),
+        faces: BTreeMap::new(),
+    };
+    house.modules.extend([source("here", text)]);
+    house.faces.insert(vec!["g".into(), "M".into()], vec!["here".into(), "inner".into(), "M".into()]);
+    let seen: Vec<String> =
+        house.uses(&vec!["here".into()]).iter().map(|used| format!("{} {}", used.line, used.of.join("::"))).collect();
+    assert_eq!(seen, ["1 a::b", "1 a", "1 d", "3 g", "6 a::b", "8 here::inner", "8 here::inner"]);
 }

@@ -4,20 +4,22 @@
 
 mod support;
 
-use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::camera::optics::Vignetting;
 use cyanometer::cfa::{CfaPattern, Class};
-use cyanometer::color::{ColorSettings, Space, ToXyz, White};
-use cyanometer::correct::{CorrectFrame, CorrectionSettings, LessDarks};
-use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::color::{Space, White};
 use cyanometer::formats::yaml::{parse_metadata, write_metadata};
 use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::metadata::{FrameHeader, PoissonKind};
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings, rectified_mean, rectified_mean_square};
-use cyanometer::optics::Vignetting;
 use cyanometer::random::Source;
-use cyanometer::render::Rendering;
-use cyanometer::stage::{MemoryFrame, RowSource, Stage};
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings, LessDarks};
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings, rectified_mean, rectified_mean_square};
+use cyanometer::stages::render::Rendering;
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::{MemoryFrame, RowSource, Stage};
 use cyanometer::units::QuantityKind;
 use proptest::prelude::*;
 use support::*;

@@ -4,20 +4,20 @@
 
 mod support;
 
-use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::camera::optics::Vignetting;
 use cyanometer::cfa::CfaPattern;
-use cyanometer::correct::{CorrectFrame, CorrectionSettings};
-use cyanometer::demosaic::Black;
 use cyanometer::formats::data::load_sensor;
 use cyanometer::frame::Geometry;
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::planes::{WeightedPlane, weighted_sums};
-use cyanometer::optics::Vignetting;
 use cyanometer::propagation::{self, Equations, FramePrediction};
-use cyanometer::render::Rendering;
 use cyanometer::spectrum::WavelengthGrid;
-use cyanometer::stage::MemoryFrame;
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::render::Rendering;
+use cyanometer::stream::MemoryFrame;
 use cyanometer::units::QuantityKind;
 use support::*;
 
@@ -132,7 +132,7 @@ fn dark_signal_far_below_the_read_noise_is_nothing() {
     let light = expected(4, 4, |_, _, class| [4448.0, 16_599.0, 30_000.0][class as usize]);
     let settings = NoiseSettings { temperature_k: Some(150.0), ..NoiseSettings::default() };
     let stage = AddNoise::new(&light.header, &settings).unwrap();
-    let header = cyanometer::stage::Stage::header(&stage);
+    let header = cyanometer::stream::Stage::header(&stage);
     assert!(header.metadata.left_out.iter().any(|entry| entry.what.starts_with("dark signal")));
     let dark_e = sensor().dark_current_e_per_s(150.0) * EXPOSURE.exposure_s;
     assert!(dark_e > 0.0 && dark_e < 1e-9 * sensor().read_noise_e.powi(2));
@@ -151,7 +151,7 @@ fn dark_signal_far_below_the_read_noise_is_nothing() {
     record.dark_e = dark_e;
     record.sources = cyanometer::random::Source::ALL.to_vec();
     let classes = |header| match propagation::of_frame(header, Equations::Exact) {
-        Some(FramePrediction::Planes(classes)) => classes,
+        Ok(FramePrediction::Planes(classes)) => classes,
         _ => panic!("planes of photosites are predicted"),
     };
     for (with, without) in classes(&with).iter().zip(&classes(&without)) {
@@ -170,7 +170,7 @@ fn a_black_level_of_zero_is_nothing_to_subtract() {
         CorrectFrame::new(&codes.header, &settings, &[]).unwrap()
     };
     let stage = correct(0.0);
-    let header = cyanometer::stage::Stage::header(&stage);
+    let header = cyanometer::stream::Stage::header(&stage);
     assert!(header.metadata.left_out.iter().any(|entry| entry.what.contains("black")));
     let (corrected, counts) = through_cuts(&codes, &stage, &[5]);
     assert_eq!(counts.not_finite, 12);

@@ -6,12 +6,12 @@ mod support;
 
 use cyanometer::cfa::Class;
 use cyanometer::metadata::{PoissonKind, Scene};
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::vectors::Instructions;
 use cyanometer::random::Source;
 use cyanometer::random::poisson::{quantile, tails};
-use cyanometer::stage::MemoryFrame;
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stream::MemoryFrame;
 use support::*;
 
 /// Rates of every path: none, few, about the switch at 10, many, too many for single precision, and what is no rate.

@@ -9,7 +9,7 @@ use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::formats::yaml::parse_metadata;
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata};
-use cyanometer::stage::{Counts, RowSink, RowSource};
+use cyanometer::stream::{Counts, RowSink, RowSource};
 use cyanometer::units::QuantityKind;
 use sha2::Digest;
 use std::fs::{self, File};

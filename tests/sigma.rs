@@ -4,20 +4,24 @@
 
 mod support;
 
-use cyanometer::adc::{AdcSettings, Digitize};
 use cyanometer::cfa::{CfaPattern, Class};
-use cyanometer::color::{COVARIANCE_LAYER, ColorSettings, Space, ToXyz, White};
-use cyanometer::demosaic::weights::{WeightTable, phase};
-use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::color::{Space, White};
 use cyanometer::error::Error;
 use cyanometer::frame::mirror;
 use cyanometer::metadata::FrameHeader;
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::propagation::Equations;
-use cyanometer::propagation::classes::adu;
+use cyanometer::propagation::Photosite;
 use cyanometer::propagation::pixels::PixelNoise;
-use cyanometer::stage::{MemoryFrame, Stage};
+use cyanometer::sigma::{COVARIANCE_LAYER, WithSigma};
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::stencil::phase;
+use cyanometer::stages::demosaic::weights::WeightTable;
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::{MemoryFrame, Stage};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use support::{at, expected, sensor, through};
@@ -47,10 +51,10 @@ fn demosaicking(plane: &MemoryFrame, method: Method) -> Demosaic {
 }
 
 fn demosaicked(plane: &MemoryFrame, method: Method) -> MemoryFrame {
-    through(plane, &demosaicking(plane, method).with_sigma().unwrap())
+    through(plane, &WithSigma::of_demosaicking(demosaicking(plane, method)).unwrap())
 }
 
-fn coloring(camera: &FrameHeader, space: Space) -> ToXyz {
+fn coloring(camera: &FrameHeader, space: Space) -> WithSigma<ToXyz> {
     let settings = ColorSettings {
         xyz_from_camera: sensor().xyz_from_camera.unwrap(),
         method: None,
@@ -58,7 +62,7 @@ fn coloring(camera: &FrameHeader, space: Space) -> ToXyz {
         white: White::D65,
         white_luminance: None,
     };
-    ToXyz::new(camera, &settings).unwrap().with_sigma(camera).unwrap()
+    WithSigma::of_conversion(ToXyz::new(camera, &settings).unwrap(), camera).unwrap()
 }
 
 /// Many exposures of as many sensors, demosaicked with standard deviations or turned into colours with them.
@@ -67,7 +71,7 @@ fn exposures(method: Method, space: Option<Space>) -> Vec<MemoryFrame> {
     // What a stage knows does not hang on the seeds.
     let first = plane(&scene, 0);
     let camera = demosaicking(&first, method);
-    let with_sigma = demosaicking(&first, method).with_sigma().unwrap();
+    let with_sigma = WithSigma::of_demosaicking(demosaicking(&first, method)).unwrap();
     let color = space.map(|space| coloring(camera.header(), space));
     let expose = |seed: u64| {
         let plane = plane(&scene, seed);
@@ -168,10 +172,12 @@ fn gains_agree_with_weights_site_by_site() {
                 let codes = Digitize::new(&noisy, &AdcSettings::default()).unwrap().header().clone();
                 let camera = Demosaic::new(&codes, method, Black::Auto, None).unwrap().header().clone();
                 let noise = PixelNoise::of(&camera).unwrap();
-                let model = cyanometer::noise::NoiseModel::of(&codes, codes.metadata.noise.as_ref().unwrap()).unwrap();
+                let model =
+                    cyanometer::stages::noise::NoiseModel::of(&codes, codes.metadata.noise.as_ref().unwrap()).unwrap();
                 let adc = codes.metadata.adc.unwrap();
-                let variances =
-                    [4000.0, 8000.0, 6000.0].map(|e| adu(&model, &adc, e, Equations::Exact).moments.variance);
+                let variances = [4000.0, 8000.0, 6000.0].map(|e| {
+                    Photosite::of_electrons(model, Equations::Exact).digitized(adc).moments(e).moments.variance
+                });
                 let level = [4000.0, 8000.0, 6000.0].map(|e| e * adc.adu_per_e);
                 let weights = WeightTable::new(method, cfa).about([0.5, 0.75]);
                 for y in 0..height {
@@ -213,7 +219,7 @@ fn greens_lost_in_noise_are_finite_and_counted() {
             _ => green,
         });
         let plane = plane(&scene, 4);
-        let stage = Demosaic::new(&plane.header, Method::SmoothHue, Black::Auto, None).unwrap().with_sigma().unwrap();
+        let stage = WithSigma::of_demosaicking(demosaicking(&plane, Method::SmoothHue)).unwrap();
         let (camera, counts) = plane.through(&stage).unwrap();
         assert!(camera.samples.iter().all(|sample| sample.is_finite()), "{green}");
         assert_eq!(counts.propagation_void > 600, is_void, "{green}: {}", counts.propagation_void);
@@ -225,7 +231,7 @@ fn greens_lost_in_noise_are_finite_and_counted() {
 fn what_is_missing_is_named() {
     let mut plane = plane(&scene(), 1);
     plane.header.metadata.sensor = None;
-    let refused = Demosaic::new(&plane.header, Method::Bilinear, Black::Auto, None).unwrap().with_sigma().unwrap_err();
+    let refused = WithSigma::of_demosaicking(demosaicking(&plane, Method::Bilinear)).unwrap_err();
     assert!(matches!(refused, Error::MissingKey { key: "sensor", .. }), "{refused}");
 }
 

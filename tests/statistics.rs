@@ -5,15 +5,15 @@
 
 mod support;
 
-use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::analysis::statistics::{ChannelReport, measure};
 use cyanometer::cfa::Class;
 use cyanometer::metadata::{PoissonKind, Scene};
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::propagation::Equations;
 use cyanometer::random::Source;
-use cyanometer::stage::MemoryFrame;
-use cyanometer::statistics::{ChannelReport, measure};
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stream::MemoryFrame;
 use support::{expected, sensor, through_blocks};
 
 /// The frame of a uniform scene.

@@ -7,14 +7,14 @@ use crate::labels::Shape;
 use crate::markdown::{Table, number};
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
-use cyanometer::demosaic::Method;
+use cyanometer::chain::StagePrediction;
 use cyanometer::error::{Error, Result};
 use cyanometer::frame::to_sample;
 use cyanometer::numerics::moments::Moments;
-use cyanometer::propagation::chain::StagePrediction;
 use cyanometer::propagation::{Equations, FramePrediction, of_frame};
 use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot};
-use cyanometer::stage::MemoryFrame;
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stream::MemoryFrame;
 
 /// The channel that is judged, red: a quarter of the photosites measure it.
 const CHANNEL: usize = 0;
@@ -79,7 +79,7 @@ pub fn study(study: &Study) -> Result<Section> {
         let seed = study.seed(9) + 1000 + repeat;
         let (rgb, taken) = timed(|| shot(seed, seed))?;
         if mixture.is_none()
-            && let Some(FramePrediction::Mixed(mixed)) = of_frame(&rgb.header, Equations::Exact)
+            && let Ok(FramePrediction::Pixels(mixed)) = of_frame(&rgb.header, Equations::Exact)
         {
             mixture = Some(mixed);
         }

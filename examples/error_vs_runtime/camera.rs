@@ -1,23 +1,25 @@
 //! The camera that all studies use: the default sensor at the default exposure, and frames in memory.
 
-use cyanometer::adc::{AdcSettings, Digitize};
-use cyanometer::characterization::regression::{FitSettings, Weights, fit};
-use cyanometer::characterization::{Signals, responses, signals};
-use cyanometer::color::{ColorSettings, Space, ToXyz, White};
-use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::analysis::characterization::regression::{FitSettings, Weights, fit};
+use cyanometer::analysis::characterization::{Signals, responses, signals};
+use cyanometer::camera::optics::Exposure;
+use cyanometer::camera::sensor::{Sensor, SpectralResponse};
+use cyanometer::chain::{Chain, ChainSettings};
+use cyanometer::color::{Space, White};
 use cyanometer::error::Result;
 use cyanometer::formats::{data, spectral};
 use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::metadata::{FrameHeader, Metadata, Scene};
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::moments::Moments;
-use cyanometer::optics::Exposure;
 use cyanometer::propagation::Equations;
-use cyanometer::propagation::chain::{Chain, ChainSettings};
-use cyanometer::sensor::{Sensor, SpectralResponse};
 use cyanometer::spectrum::{SpectralLibrary, WavelengthGrid};
-use cyanometer::stage::MemoryFrame;
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::MemoryFrame;
 use cyanometer::units::QuantityKind;
 use std::path::{Path, PathBuf};
 

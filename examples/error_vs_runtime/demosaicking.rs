@@ -8,15 +8,16 @@ use crate::markdown::{Table, number};
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::cfa::CfaPattern;
-use cyanometer::demosaic::weights::WeightTable;
-use cyanometer::demosaic::{Black, Demosaic};
 use cyanometer::error::Result;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::frame::to_sample;
-use cyanometer::propagation::{Equations, mixture};
+use cyanometer::propagation::{Equations, gains};
 use cyanometer::random::philox::philox4x32_10;
 use cyanometer::report::plot::{Arrangement, Arrow, Axis, Color, Marks, Panel, Plot};
-use cyanometer::stage::{MemoryFrame, RowSource};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::Demosaic;
+use cyanometer::stages::demosaic::weights::WeightTable;
+use cyanometer::stream::{MemoryFrame, RowSource};
 use std::hint::black_box;
 use std::path::Path;
 
@@ -56,7 +57,7 @@ pub fn study(study: &Study) -> Result<Section> {
     let mut noise = Vec::new();
     for (_, method) in METHODS {
         let weights = WeightTable::new(method, CfaPattern::Rggb).about([1.0; 2]);
-        let covariance = mixture::mean_pixel(&weights).covariance([1.0; 3]);
+        let covariance = gains::mean_pixel(&weights).covariance([1.0; 3]);
         gains.push([0, 1, 2].map(|i| covariance[(i, i)].sqrt()));
         let prediction = study.camera.chain(method, Equations::Exact, true)?.predict(SKY)?;
         noise.push(prediction.noise_delta_e.map_or(f64::NAN, |delta| delta.mean));

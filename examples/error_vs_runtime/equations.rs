@@ -7,11 +7,11 @@ use crate::labels::Shape;
 use crate::markdown::Table;
 use crate::page::{Section, percent, time};
 use crate::pareto::{self, Choice, Group};
-use cyanometer::demosaic::Method;
+use cyanometer::chain::{Chain, ChainPrediction};
 use cyanometer::error::Result;
 use cyanometer::propagation::Equations;
-use cyanometer::propagation::chain::{Chain, ChainPrediction};
 use cyanometer::report::plot::Plot;
+use cyanometer::stages::demosaic::Method;
 use std::hint::black_box;
 
 /// Scenes: names, and e⁻ of R, G and B.

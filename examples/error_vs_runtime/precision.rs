@@ -7,14 +7,14 @@ use crate::labels::Shape;
 use crate::markdown::Table;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
-use cyanometer::adc::{AdcSettings, Digitize};
 use cyanometer::color::difference::delta_e_76;
 use cyanometer::color::{self, D65_XY, lab_from_xyz, xyz_of_chromaticity};
-use cyanometer::demosaic::Method;
 use cyanometer::error::{Error, Result};
 use cyanometer::frame::{mirror, to_sample};
 use cyanometer::report::plot::Plot;
-use cyanometer::stage::MemoryFrame;
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stream::MemoryFrame;
 use std::hint::black_box;
 use std::ops::{Add, Mul, Sub};
 
@@ -114,7 +114,7 @@ pub fn study(study: &Study) -> Result<Section> {
     let size = if study.quick { [128, 96] } else { [640, 480] };
     let electrons = noisy(camera, size, study.seed(6))?;
     let digitized = Digitize::new(&electrons.header, &AdcSettings::default())?;
-    let head = cyanometer::stage::Stage::header(&digitized);
+    let head = cyanometer::stream::Stage::header(&digitized);
     let adc = head.metadata.adc.ok_or_else(|| Error::Data("the converter left no record".into()))?;
     let matrix = color::matrix(&camera.color.xyz_from_camera) / EXPOSURE.exposure_s_sr();
     let constants = Constants {

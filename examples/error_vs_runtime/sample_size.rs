@@ -7,14 +7,14 @@ use crate::labels::Shape;
 use crate::markdown::{Table, number};
 use crate::page::{Section, count, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
-use cyanometer::demosaic::Method;
 use cyanometer::error::{Error, Result};
 use cyanometer::frame::to_sample;
-use cyanometer::noise::NoiseModel;
 use cyanometer::numerics::moments::Moments;
-use cyanometer::propagation::{self, Equations};
+use cyanometer::propagation::{Equations, Photosite};
 use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot};
-use cyanometer::stage::MemoryFrame;
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::noise::NoiseModel;
+use cyanometer::stream::MemoryFrame;
 use std::hint::black_box;
 
 /// Signal electrons; those of green of the clear sky.
@@ -44,12 +44,12 @@ pub fn study(study: &Study) -> Result<Section> {
     let (record, adc) =
         noisy.header.metadata.noise.as_ref().zip(adc).ok_or_else(|| Error::Data("the stages left no record".into()))?;
     let model = NoiseModel::of(&noisy.header, record)?;
-    let predicted = propagation::adu(&model, &adc, LEVEL_E, Equations::Exact);
+    let predicted = Photosite::of_electrons(model, Equations::Exact).digitized(adc).moments(LEVEL_E);
     let sigma = predicted.moments.std();
     let mut chain = camera.chain(Method::Bilinear, Equations::Exact, true)?;
     let mut works: Vec<Work<'_>> = vec![
         Box::new(|| {
-            black_box(propagation::adu(&model, &adc, black_box(LEVEL_E), Equations::Exact));
+            black_box(Photosite::of_electrons(model, Equations::Exact).digitized(adc).moments(black_box(LEVEL_E)));
             Ok(())
         }),
         Box::new(|| {

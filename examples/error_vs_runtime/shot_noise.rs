@@ -10,12 +10,12 @@ use crate::pareto::{self, Choice, Group};
 use cyanometer::error::Result;
 use cyanometer::frame::to_sample;
 use cyanometer::metadata::{FrameHeader, PoissonKind, Scene};
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::normal::cumulative;
 use cyanometer::numerics::significance::of_chi_square;
 use cyanometer::random::{Source, poisson::tails};
 use cyanometer::report::plot::Plot;
-use cyanometer::stage::MemoryFrame;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stream::MemoryFrame;
 use std::hint::black_box;
 
 const RATES: [f64; 6] = [0.5, 5.0, 50.0, 500.0, 5000.0, 30_000.0];

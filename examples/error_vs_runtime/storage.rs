@@ -9,13 +9,13 @@ use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::color::difference::delta_e_76;
 use cyanometer::color::{D65_XY, lab_from_xyz, xyz_of_chromaticity};
-use cyanometer::demosaic::Method;
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::output::{CompressionKind, FrameWriter, OutputOptions, SampleKind};
 use cyanometer::frame::to_sample;
 use cyanometer::report::plot::Plot;
-use cyanometer::stage::{Counts, MemoryFrame, RowSink, RowSource};
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stream::{Counts, MemoryFrame, RowSink, RowSource};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 

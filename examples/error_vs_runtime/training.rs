@@ -7,19 +7,22 @@ use crate::labels::Shape;
 use crate::markdown::Table;
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
-use cyanometer::characterization::evaluation::{EvaluationSettings, Filling, SampleExposure, evaluate, noise_free};
-use cyanometer::characterization::regression::{FitSettings, Weights, fit};
-use cyanometer::characterization::training::spanning_subset;
-use cyanometer::characterization::{Signals, signals};
+use cyanometer::analysis::characterization::evaluation::{
+    EvaluationSettings, Filling, SampleExposure, evaluate, noise_free,
+};
+use cyanometer::analysis::characterization::regression::{FitSettings, Weights, fit};
+use cyanometer::analysis::characterization::training::spanning_subset;
+use cyanometer::analysis::characterization::{Signals, signals};
+use cyanometer::color::Space;
 use cyanometer::color::difference::DELTA_E_PER_JND;
-use cyanometer::color::{ColorSettings, Space};
-use cyanometer::demosaic::Method;
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::{data, spectral};
-use cyanometer::noise::NoiseSettings;
 use cyanometer::random::philox::philox4x32_10;
 use cyanometer::report::plot::Plot;
 use cyanometer::spectrum::WavelengthGrid;
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::noise::NoiseSettings;
+use cyanometer::stages::to_xyz::ColorSettings;
 use std::hint::black_box;
 
 const COUNTS: [usize; 11] = [3, 4, 5, 7, 10, 20, 40, 80, 160, 320, 912];

@@ -3,7 +3,7 @@
 use crate::markdown::{Table, number};
 use crate::studio::{EXPOSURE_S, FILLING, PATCH, TRAINING};
 use crate::{Case, Results};
-use cyanometer::characterization::evaluation::{SampleEvaluation, noise_free, noisy};
+use cyanometer::analysis::characterization::evaluation::{SampleEvaluation, noise_free, noisy};
 use cyanometer::color::difference::{Difference, DifferenceReport, DifferenceSummary};
 use cyanometer::error::{Error, Result};
 use cyanometer::numerics::distribution::Distribution;
@@ -79,7 +79,7 @@ fn missing() -> Error {
 }
 
 fn found(case: &Case, formula: Formula) -> Result<Found> {
-    let with = |of: fn(&cyanometer::characterization::evaluation::SampleNoise) -> Difference| {
+    let with = |of: fn(&cyanometer::analysis::characterization::evaluation::SampleNoise) -> Difference| {
         noisy(&case.skies, of).map(|report| formula.of(&report)).ok_or_else(missing)
     };
     Ok(Found {

@@ -1,22 +1,23 @@
 //! The camera, the skies, and what is done with them.
 
 use crate::{Choice, HeldOut};
-use cyanometer::characterization::evaluation::{
+use cyanometer::analysis::characterization::evaluation::{
     EvaluationSettings, Filling, SampleEvaluation, SampleExposure, evaluate, noise_free, pixel_covariances,
 };
-use cyanometer::characterization::noise_aware::{NoiseTerms, NoisySample, TradeOff};
-use cyanometer::characterization::regression::{FitSettings, Regression, Weights, fit};
-use cyanometer::characterization::training::{average_sample, spanning_subset};
-use cyanometer::characterization::{Signals, responses, signals};
+use cyanometer::analysis::characterization::noise_aware::{NoiseTerms, NoisySample, TradeOff};
+use cyanometer::analysis::characterization::regression::{FitSettings, Regression, Weights, fit};
+use cyanometer::analysis::characterization::training::{average_sample, spanning_subset};
+use cyanometer::analysis::characterization::{Signals, responses, signals};
+use cyanometer::camera::optics::Exposure;
+use cyanometer::camera::sensor::Sensor;
 use cyanometer::color::difference::DifferenceReport;
-use cyanometer::color::{ColorSettings, Space, White};
-use cyanometer::demosaic::Method;
+use cyanometer::color::{Space, White};
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::{csv, data, spectral};
-use cyanometer::noise::NoiseSettings;
-use cyanometer::optics::Exposure;
-use cyanometer::sensor::Sensor;
 use cyanometer::spectrum::{Observer, SpectralLibrary, WavelengthGrid};
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::noise::NoiseSettings;
+use cyanometer::stages::to_xyz::ColorSettings;
 use std::path::Path;
 
 /// Pixels of each sky, columns and rows: the paper's 15 × 20.

@@ -3,9 +3,9 @@
 use crate::camera::{Camera, LARGE, METHODS, SMALL};
 use crate::prediction::{Equation, Sites, of_frame, roots};
 use crate::sweep::Level;
-use cyanometer::demosaic::Method;
 use cyanometer::propagation::Equations;
 use cyanometer::propagation::paper::{Coefficients, effective_color};
+use cyanometer::stages::demosaic::Method;
 
 /// The three statistics of Table 7.
 #[derive(Clone, Copy)]

@@ -1,22 +1,24 @@
 //! The paper's camera: frames drawn in memory by the same stages as the programs', and the moments of their samples.
 
-use cyanometer::adc::{AdcSettings, Digitize};
+use cyanometer::analysis::characterization::regression::{FitSettings, fit};
+use cyanometer::analysis::characterization::signals;
+use cyanometer::camera::optics::Exposure;
+use cyanometer::camera::sensor::Sensor;
 use cyanometer::cfa::Class;
-use cyanometer::characterization::regression::{FitSettings, fit};
-use cyanometer::characterization::signals;
-use cyanometer::color::{self, ColorSettings, Space, ToXyz, White};
-use cyanometer::demosaic::{Black, Demosaic, Method};
+use cyanometer::color::{self, Space, White};
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::{data, spectral};
 use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::metadata::{AdcRecord, FrameHeader, Metadata, Scene};
-use cyanometer::mosaic::Mosaic;
-use cyanometer::noise::{AddNoise, NoiseModel, NoiseSettings};
 use cyanometer::numerics::moments::Moments;
-use cyanometer::optics::Exposure;
-use cyanometer::sensor::Sensor;
 use cyanometer::spectrum::WavelengthGrid;
-use cyanometer::stage::{MemoryFrame, Stage};
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseModel, NoiseSettings};
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::{MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
 use nalgebra::Matrix3;
 use std::path::Path;

@@ -2,11 +2,12 @@
 
 use crate::prediction::PATTERN;
 use cyanometer::cfa::Class;
-use cyanometer::demosaic::Method;
-use cyanometer::demosaic::weights::{PHASES, WeightTable};
 use cyanometer::numerics::moments::Moments;
-use cyanometer::propagation::mixture;
+use cyanometer::propagation::gains;
 use cyanometer::propagation::paper::Coefficients;
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::demosaic::stencil::PHASES;
+use cyanometer::stages::demosaic::weights::WeightTable;
 use nalgebra::{Matrix3, Vector3};
 
 /// The coefficients in the order of Table 8, then those of Eq. 20.
@@ -68,10 +69,10 @@ impl Covariances {
         let class = |class: Class| {
             let phases: Vec<usize> = (0..PHASES.len()).filter(|&phase| weights.class(phase, [0, 0]) == class).collect();
             let sum: Matrix3<f64> =
-                phases.iter().map(|&phase| mixture::pixel(&weights, phase).covariance(variances)).sum();
+                phases.iter().map(|&phase| gains::pixel(&weights, phase).covariance(variances)).sum();
             sum / phases.len() as f64
         };
-        Self { classes: Class::ALL.map(class), all: mixture::mean_pixel(&weights).covariance(variances) }
+        Self { classes: Class::ALL.map(class), all: gains::mean_pixel(&weights).covariance(variances) }
     }
 
     /// Of the pixels of a frame.

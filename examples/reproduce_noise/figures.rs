@@ -4,11 +4,12 @@ use crate::agreement::index_of;
 use crate::camera::{self, Camera, LARGE, SMALL};
 use crate::prediction::{Equation, Sites, effective_share, of_frame, roots, weights};
 use crate::sweep::Level;
-use cyanometer::demosaic::{Black, Method};
 use cyanometer::error::Result;
 use cyanometer::propagation::smooth_hue::{FirstOrder, VOID_BELOW};
-use cyanometer::propagation::{Equations, mixture};
+use cyanometer::propagation::{Equations, gains};
 use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot, ReferenceLine, Region};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::Method;
 
 /// What X, Y and Z are drawn in.
 const COLORS: [Color; 3] = [Color::Vermillion, Color::Green, Color::Blue];
@@ -21,7 +22,7 @@ const ENDLESS: [usize; 2] = [1 << 16; 2];
 pub fn exact_xyz(camera: &Camera, method: Method, electrons: [f64; 3]) -> [f64; 3] {
     let sites = Sites::of(camera, electrons, Equations::Exact);
     let weights = weights(method, &sites).through(&camera.xyz_from_adu);
-    roots(&mixture::mean_pixel(&weights).covariance(sites.variance))
+    roots(&gains::mean_pixel(&weights).covariance(sites.variance))
 }
 
 /// Signal over noise of X, Y and Z in dB by exact moments, of a large frame.
@@ -188,7 +189,7 @@ pub fn hue_levels(camera: &Camera, first_seed: u64) -> Result<Vec<HueLevel>> {
         with_dark.mean = sites.mean.map(|mean| mean + slope * camera.model.dark_e);
         let exact = |sites: &Sites| {
             let weights = weights(Method::SmoothHue, sites);
-            roots(&mixture::mean_pixel(&weights).covariance(sites.variance))[blue] / slope
+            roots(&gains::mean_pixel(&weights).covariance(sites.variance))[blue] / slope
         };
         let by_paper = |sites: &Sites| roots(&Equation::Shti15.covariance(sites, ENDLESS))[blue] / slope;
         found.push(HueLevel {

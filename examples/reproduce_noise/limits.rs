@@ -2,11 +2,12 @@
 
 use crate::camera::{self, Camera, METHODS, SMALL};
 use crate::prediction::{Equation, Sites, effective_share, independent, of_frame, weights};
-use cyanometer::demosaic::{Black, Method};
 use cyanometer::error::Result;
 use cyanometer::numerics::moments::Moments;
-use cyanometer::propagation::mixture;
-use cyanometer::propagation::{self, Equations};
+use cyanometer::propagation::gains;
+use cyanometer::propagation::{Equations, Photosite};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::Method;
 use nalgebra::Matrix3;
 
 /// Levels at which approximations are looked at, e⁻.
@@ -108,7 +109,8 @@ fn of_one(moments: &Moments, channel: usize) -> (f64, f64) {
 
 fn cases(camera: &Camera) -> Vec<Case<'_>> {
     let exact = |level: f64| Sites::of(camera, [level; 3], Equations::Exact);
-    let electrons = move |level: f64, equations| propagation::electrons(&camera.model, level, equations).moments;
+    let electrons =
+        move |level: f64, equations| Photosite::of_electrons(camera.model, equations).moments(level).moments;
     let single = |approximate: f64, exact: f64| Some(Variances { approximate, exact, of_frame: exact, share: 1.0 });
     // Where green is not above its noise the first order is void.
     let holds = move |method: Method, sites: &Sites| {
@@ -123,7 +125,7 @@ fn cases(camera: &Camera) -> Vec<Case<'_>> {
             let size = [1 << 16; 2];
             holds(equation.method(), &sites).then(|| Variances {
                 approximate: equation.covariance(&sites, size)[(index, index)],
-                exact: mixture::mean_pixel(&weights).covariance(sites.variance)[(index, index)],
+                exact: gains::mean_pixel(&weights).covariance(sites.variance)[(index, index)],
                 of_frame: of_frame(equation.method(), &sites, SIZE)[(index, index)],
                 share: effective_share(&weights, sites.variance)[index],
             })
@@ -137,7 +139,7 @@ fn cases(camera: &Camera) -> Vec<Case<'_>> {
             let sites = exact(level);
             let matrix = &camera.xyz_from_adu;
             let weights = weights(method, &sites);
-            let rgb = mixture::mean_pixel(&weights).covariance(sites.variance);
+            let rgb = gains::mean_pixel(&weights).covariance(sites.variance);
             let xyz = |covariance: Matrix3<f64>| (matrix * covariance * matrix.transpose())[(index, index)];
             holds(method, &sites).then(|| Variances {
                 approximate: independent(matrix, &rgb)[(index, index)],
@@ -155,8 +157,8 @@ fn cases(camera: &Camera) -> Vec<Case<'_>> {
             let sites = exact(level);
             let weights = weights(method, &sites);
             let count = (SMALL[0] * SMALL[1]) as f64;
-            let exact = mixture::mean_patch_mean(&weights, SMALL).covariance(sites.variance)[(index, index)];
-            let pixel = mixture::mean_pixel(&weights).covariance(sites.variance)[(index, index)];
+            let exact = gains::mean_patch_mean(&weights, SMALL).covariance(sites.variance)[(index, index)];
+            let pixel = gains::mean_pixel(&weights).covariance(sites.variance)[(index, index)];
             Some(Variances { approximate: pixel / count, exact, of_frame: exact, share: 1.0 })
         }),
         observed: Box::new(move |pool| of_one(&pool.patches[crate::agreement::index_of(method)], index)),
@@ -257,7 +259,7 @@ pub fn edges(camera: &Camera, first_seed: u64) -> Result<Vec<Edge>> {
     let mut found = Vec::new();
     for (sums, method) in sums.iter().zip(METHODS) {
         let weights = weights(method, &sites);
-        let large = mixture::mean_pixel(&weights).covariance(sites.variance);
+        let large = gains::mean_pixel(&weights).covariance(sites.variance);
         let small = of_frame(method, &sites, SMALL);
         let share = effective_share(&weights, sites.variance);
         for (channel, name) in [(0, "R, B"), (1, "G")] {

@@ -2,11 +2,12 @@
 
 use crate::camera::Camera;
 use cyanometer::cfa::CfaPattern;
-use cyanometer::demosaic::Method;
-use cyanometer::demosaic::weights::{PHASES, REACH, WeightTable, Weights, phase};
 use cyanometer::frame::mirror;
-use cyanometer::propagation::mixture::{self, Gains};
-use cyanometer::propagation::{self, Equations, paper};
+use cyanometer::propagation::gains::{self, Gains};
+use cyanometer::propagation::{Equations, Photosite, paper};
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::demosaic::stencil::{PHASES, REACH, phase};
+use cyanometer::stages::demosaic::weights::{WeightTable, Weights};
 use nalgebra::Matrix3;
 
 /// Pattern of the sensor.
@@ -89,7 +90,8 @@ impl Sites {
     pub fn of(camera: &Camera, electrons: [f64; 3], equations: Equations) -> Self {
         let adc = &camera.adc;
         let black = adc.bias_adu + adc.adu_per_e * camera.model.dark_e;
-        let moments = electrons.map(|e| propagation::adu(&camera.model, adc, e, equations).moments);
+        let moments =
+            electrons.map(|e| Photosite::of_electrons(camera.model, equations).digitized(*adc).moments(e).moments);
         Self { mean: moments.map(|m| m.mean - black), variance: moments.map(|m| m.variance) }
     }
 }
@@ -106,7 +108,7 @@ pub fn of_frame(method: Method, sites: &Sites, size: [usize; 2]) -> Matrix3<f64>
     let weights = weights(method, sites);
     let count = (size[0] * size[1]) as f64;
     let pixel = frame_pixel(&weights, size).covariance(sites.variance);
-    let mean = mixture::mean_patch_mean(&weights, size).covariance(sites.variance);
+    let mean = gains::mean_patch_mean(&weights, size).covariance(sites.variance);
     (pixel - mean) * (count / (count - 1.0))
 }
 
@@ -158,7 +160,7 @@ pub fn effective_share(weights: &Weights, variance: [f64; 3]) -> [f64; 3] {
     for phase in 0..4 {
         for y in -reach..=reach {
             for x in -reach..=reach {
-                let covariance = mixture::autocovariance(weights, phase, [x, y]).covariance(variance);
+                let covariance = gains::autocovariance(weights, phase, [x, y]).covariance(variance);
                 for channel in 0..3 {
                     squares[channel] += covariance[(channel, channel)].powi(2) / 4.0;
                     if [x, y] == [0, 0] {

@@ -9,11 +9,11 @@ use crate::markdown::{Table, number};
 use crate::prediction::{Sites, effective_share, weights};
 use crate::sweep::TOP_E;
 use crate::{Results, SKY};
-use cyanometer::demosaic::Method;
 use cyanometer::error::{Error, Result};
 use cyanometer::propagation::Equations;
 use cyanometer::propagation::paper::Coefficients;
 use cyanometer::propagation::smooth_hue::FirstOrder;
+use cyanometer::stages::demosaic::Method;
 use std::fmt::Write;
 
 /// The maximum signal-to-noise ratios of the paper's X, Y, Z with BI, SHTI, ECI, in dB [HP2005, Secs. 4.2.1–4.2.3].

@@ -1,9 +1,9 @@
 //! Levels of light from the foot of the range to its top, each simulated at two sizes of frame.
 
 use crate::camera::{self, Camera, LARGE, METHODS, SMALL};
-use cyanometer::demosaic::Black;
 use cyanometer::error::Result;
 use cyanometer::numerics::moments::Moments;
+use cyanometer::stages::black::Black;
 
 /// What one frame showed: standard deviations of three channels at every stage.
 pub struct Shot {

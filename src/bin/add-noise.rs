@@ -5,10 +5,10 @@ use cyanometer::cli::{self, options};
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::metadata::PoissonKind;
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::propagation::{self, Equations};
 use cyanometer::random::Source;
-use cyanometer::stage::RowSource;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
 /// Draw one noisy exposure from expected electrons

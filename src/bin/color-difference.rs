@@ -1,14 +1,14 @@
 //! `color-difference`: how far images or colors differ to the eye.
 
 use clap::Parser;
+use cyanometer::analysis::comparison::{Comparison, ComparisonSettings, Side};
 use cyanometer::cli::{self, options, options::FrameOrColor};
-use cyanometer::color::comparison::{Comparison, ComparisonSettings, Side};
 use cyanometer::color::{Space, White};
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::input::{FrameReader, InputOptions, sidecar_path};
 use cyanometer::formats::output::{self, FrameWriter, OutputOptions};
 use cyanometer::report::{self, ReportFormat};
-use cyanometer::stage::{Counts, RowSink};
+use cyanometer::stream::{Counts, RowSink};
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -2,11 +2,11 @@
 
 use clap::Parser;
 use cyanometer::cli::{self, options};
-use cyanometer::correct::{CorrectFrame, CorrectionSettings};
-use cyanometer::demosaic::Black;
 use cyanometer::error::Result;
 use cyanometer::formats::input::{FrameReader, InputOptions};
-use cyanometer::stage::RowSource;
+use cyanometer::stages::black::Black;
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

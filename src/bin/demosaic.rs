@@ -3,10 +3,12 @@
 use clap::Parser;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::cli::{self, options};
-use cyanometer::demosaic::{Black, Demosaic, Method};
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
-use cyanometer::stage::RowSource;
+use cyanometer::sigma::WithSigma;
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
 /// Interpolate the two classes that each photosite did not measure
@@ -47,10 +49,11 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
     arguments.sensor.apply(&mut reader)?;
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
-    if arguments.sigma {
-        stage = stage.with_sigma()?;
-    }
     session.sign(stage.header_mut());
-    session.drive(reader, &stage, &arguments.output)?;
+    if arguments.sigma {
+        session.drive(reader, &WithSigma::of_demosaicking(stage)?, &arguments.output)?;
+    } else {
+        session.drive(reader, &stage, &arguments.output)?;
+    }
     Ok(())
 }

@@ -1,12 +1,12 @@
 //! `digitize`: codes from electrons.
 
 use clap::Parser;
-use cyanometer::adc::{AdcSettings, Digitize};
 use cyanometer::cli::{self, options};
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::propagation::{self, Equations};
-use cyanometer::stage::RowSource;
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
 /// Turn electrons into the codes of the analogue-to-digital converter (ADU)

@@ -1,16 +1,16 @@
 //! `fit-matrix`: a characterisation matrix from a library of spectra, and how well it does.
 
 use clap::Parser;
-use cyanometer::characterization::regression::{Regression, Weights};
+use cyanometer::analysis::characterization::regression::{Regression, Weights};
 use cyanometer::cli::characterization::{self, Request, TrainingChoice};
 use cyanometer::cli::{self, options};
 use cyanometer::color::White;
-use cyanometer::demosaic::Method;
 use cyanometer::error::Result;
 use cyanometer::formats::data;
-use cyanometer::noise::NoiseSettings;
 use cyanometer::random::Source;
 use cyanometer::report::ReportFormat;
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::noise::NoiseSettings;
 use cyanometer::units::RadianceUnit;
 use std::path::PathBuf;
 use std::process::ExitCode;

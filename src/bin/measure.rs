@@ -1,13 +1,13 @@
 //! `measure`: statistics of a frame beside what propagation predicts.
 
 use clap::Parser;
+use cyanometer::analysis::statistics::{Region, measure, patches};
 use cyanometer::cli::{self, options};
 use cyanometer::error::Result;
 use cyanometer::formats::{input::FrameReader, input::InputOptions, output};
 use cyanometer::propagation::Equations;
 use cyanometer::report::{self, ReportFormat};
-use cyanometer::stage::RowSource;
-use cyanometer::statistics::{Region, measure, patches};
+use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -5,8 +5,8 @@ use cyanometer::cfa::CfaPattern;
 use cyanometer::cli::{self, options};
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
-use cyanometer::mosaic::Mosaic;
-use cyanometer::stage::RowSource;
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
 /// Keep of three planes what a Bayer colour filter array lets through

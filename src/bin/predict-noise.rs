@@ -2,16 +2,16 @@
 
 use clap::Parser;
 use cyanometer::cfa::CfaPattern;
+use cyanometer::chain::Uncertainty;
 use cyanometer::cli::{self, options, prediction, rendering};
 use cyanometer::color::White;
-use cyanometer::demosaic::Method;
 use cyanometer::error::Result;
 use cyanometer::formats::data;
-use cyanometer::noise::NoiseSettings;
 use cyanometer::propagation::Equations;
-use cyanometer::propagation::chain::Uncertainty;
 use cyanometer::random::Source;
 use cyanometer::report::ReportFormat;
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::noise::NoiseSettings;
 use cyanometer::units::RadianceUnit;
 use std::path::PathBuf;
 use std::process::ExitCode;

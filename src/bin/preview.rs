@@ -1,11 +1,11 @@
 //! `preview`: a PNG picture of any frame.
 
 use clap::Parser;
+use cyanometer::analysis::statistics::Region;
 use cyanometer::cli::{self, options};
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::picture::{PictureSettings, Range, write_png};
-use cyanometer::statistics::Region;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

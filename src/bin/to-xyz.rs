@@ -1,14 +1,16 @@
 //! `to-xyz`: colours from sensor RGB.
 
 use clap::Parser;
+use cyanometer::camera::optics::Exposure;
 use cyanometer::cli::{self, options};
-use cyanometer::color::{ColorSettings, Space, ToXyz, White};
+use cyanometer::color::{Space, White};
 use cyanometer::error::Result;
 use cyanometer::formats::atomic::same_file;
 use cyanometer::formats::data;
 use cyanometer::formats::input::{FrameReader, regular_file};
-use cyanometer::optics::Exposure;
-use cyanometer::stage::RowSource;
+use cyanometer::sigma::WithSigma;
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -91,10 +93,12 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         white_luminance: arguments.white_luminance,
     };
     let mut stage = ToXyz::new(reader.header(), &settings)?;
-    if arguments.sigma {
-        stage = stage.with_sigma(reader.header())?;
-    }
     session.sign(stage.header_mut());
-    session.drive(reader, &stage, &arguments.output)?;
+    if arguments.sigma {
+        let stage = WithSigma::of_conversion(stage, reader.header())?;
+        session.drive(reader, &stage, &arguments.output)?;
+    } else {
+        session.drive(reader, &stage, &arguments.output)?;
+    }
     Ok(())
 }

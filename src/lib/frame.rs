@@ -127,6 +127,11 @@ impl<'a, Q: Quantity> Rows<'a, Q> {
         Self { first_row, width, channels, samples, quantity: PhantomData }
     }
 
+    /// The same rows, to be filled by another for a while.
+    pub fn reborrow(&mut self) -> Rows<'_, Q> {
+        Rows { samples: &mut *self.samples, ..*self }
+    }
+
     /// The frame's rows that are to be filled.
     pub fn range(&self) -> std::ops::Range<usize> {
         self.first_row..self.first_row + self.samples.len() / (self.width * self.channels)

@@ -6,22 +6,31 @@
 //!
 //! | floor | modules | what they know |
 //! |---|---|---|
-//! | 0 words | [`error`], [`units`], [`frame`], [`cfa`] | no files, no chance |
+//! | 0 words | [`error`], [`units`], [`cfa`], [`frame`] | no files, no chance |
 //! | 1 mathematics | [`numerics`], [`random`] | no camera |
-//! | 2 physics | [`spectrum`], [`optics`], [`sensor`], [`metadata`], [`stage`], [`render`], [`transfer`], [`noise`], [`adc`], [`correct`], [`mosaic`], [`demosaic`], [`color`], [`propagation`], [`statistics`], [`characterization`] | pure functions of bands and parameters, in the order light meets them |
-//! | 3 files | [`formats`], [`report`] | bytes to frames and back |
-//! | 4 command line | [`cli`] | options, complaints, exit |
+//! | 2 light and camera | [`spectrum`], [`color`], [`camera`] | curves, color spaces, lens and sensor in numbers; no frame |
+//! | 3 frames in motion | [`metadata`], [`stream`] | what is known of a frame, and how its rows move |
+//! | 4 stages | [`stages`] | what each step does to rows, in the order in which light meets them |
+//! | 5 prediction | [`propagation`] | moments by formula, from the head of a frame |
+//! | 6 the chain | [`chain`], [`sigma`] | stages and predictions together |
+//! | 7 analysis | [`analysis`] | statistics beside predictions, differences, matrices |
+//! | 8 files | [`formats`] | bytes to frames and back |
+//! | 9 reports | [`report`] | tables and figures |
+//! | 10 command line | [`cli`] | options, complaints, exit |
 //!
 //! # The chain
 //!
-//! Every step is a [`stage::Stage`]: a value with a method from band to band. [`stage::run`] drives one from a
-//! [`stage::RowSource`] to a [`stage::RowSink`]; memory is a few bands whatever the height of the frame. Each sees the
-//! frame's head, [`metadata::FrameHeader`], and refuses a frame that comes at the wrong time.
+//! What turns one frame into another, band by band, is a [`stream::Stage`]: a value with a method from band to band.
+//! [`stream::run`] drives one from a [`stream::RowSource`] to a [`stream::RowSink`]; memory is a few bands whatever the
+//! height of the frame. Each sees the frame's head, [`metadata::FrameHeader`], and refuses a frame that comes at the wrong
+//! time. Rendering starts a chain, so that it is no stage but fills a sink; statistics end one.
 //!
 //! # Units
 //!
 //! Wavelengths in nm, spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, charge in electrons, codes in ADU, luminance in cd m⁻².
-//! Samples are 32-bit floats whose quantity is in the type of the window on them; scalars are doubles with the unit in the name.
+//! Samples are 32-bit floats. Stages that take one quantity alone say so in the type of the window on them; where a stage
+//! serves several, as the mosaic does, the head of the frame tells which it is. Scalars are doubles with the unit in the
+//! name.
 //!
 //! Sources are cited as `[HP2005, Eq. 11]`; the keys resolve in `docs/references.md`.
 
@@ -33,24 +42,24 @@ pub mod units;
 pub mod numerics;
 pub mod random;
 
-pub mod adc;
-pub mod characterization;
+pub mod camera;
 pub mod color;
-pub mod correct;
-pub mod demosaic;
-pub mod metadata;
-pub mod mosaic;
-pub mod noise;
-pub mod optics;
-pub mod propagation;
-pub mod render;
-pub mod sensor;
 pub mod spectrum;
-pub mod stage;
-pub mod statistics;
-pub mod transfer;
+
+pub mod metadata;
+pub mod stream;
+
+pub mod stages;
+
+pub mod propagation;
+
+pub mod chain;
+pub mod sigma;
+
+pub mod analysis;
 
 pub mod formats;
+
 pub mod report;
 
 pub mod cli;

@@ -1,11 +1,11 @@
 //! What is known about a frame: its quantity, its camera, and everything that was done to it.
 
+use crate::camera::optics::Exposure;
+use crate::camera::sensor::Sensor;
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, bare_name};
-use crate::optics::Exposure;
 use crate::random::Source;
-use crate::sensor::Sensor;
 use crate::units::QuantityKind;
 use serde::{Deserialize, Serialize};
 use serde_yaml::Mapping;
@@ -147,6 +147,13 @@ pub struct AdcRecord {
     pub bias_adu: f64,
     /// Slope in ADU per e⁻.
     pub adu_per_e: f64,
+}
+
+impl AdcRecord {
+    /// The converter of a sensor as the sensor's description has it.
+    pub fn of_sensor(sensor: &Sensor) -> Self {
+        Self { bits: sensor.bits, bias_adu: sensor.bias_adu, adu_per_e: sensor.adu_per_e }
+    }
 }
 
 /// What was taken back of a frame of codes.

@@ -3,14 +3,14 @@
 #![allow(dead_code, reason = "each file of tests takes what it needs")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
+use cyanometer::camera::optics::Exposure;
+use cyanometer::camera::sensor::Sensor;
 use cyanometer::cfa::Class;
 use cyanometer::error::Result;
 use cyanometer::formats::data::load_sensor;
 use cyanometer::frame::{Geometry, Rows, Window};
 use cyanometer::metadata::{FrameHeader, Metadata};
-use cyanometer::optics::Exposure;
-use cyanometer::sensor::Sensor;
-use cyanometer::stage::{Counts, MemoryFrame, RowSink, RowSource, Stage, run};
+use cyanometer::stream::{Counts, MemoryFrame, RowSink, RowSource, Stage, run};
 use cyanometer::units::QuantityKind;
 use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};

@@ -1,28 +1,29 @@
 //! The work of `fit-matrix`: from a request to a matrix and what is known of it.
 
 use super::Session;
-use crate::characterization::evaluation::{
+use crate::analysis::characterization::evaluation::{
     EvaluationSettings, SampleEvaluation, SampleExposure, evaluate, noise_free, noisy, pixel_covariances,
 };
-use crate::characterization::noise_aware::{NoiseTerms, NoisySample, TradeOff};
-use crate::characterization::regression::{FitSettings, FittedMatrix, Regression, Weights, fit, residuals};
-use crate::characterization::training::{CHOSEN_BY, average_sample, spanning_subset};
-use crate::characterization::{
+use crate::analysis::characterization::noise_aware::{NoiseTerms, NoisySample, TradeOff};
+use crate::analysis::characterization::regression::{FitSettings, FittedMatrix, Regression, Weights, fit, residuals};
+use crate::analysis::characterization::training::{CHOSEN_BY, average_sample, spanning_subset};
+use crate::analysis::characterization::{
     CameraMatrix, MATRIX_SCHEMA, MATRIX_UNIT, Performance, Signals, Training, responses, signals,
 };
+use crate::camera::sensor::Sensor;
 use crate::color::difference::DELTA_E_PER_JND;
-use crate::color::{ColorSettings, Space, White};
-use crate::demosaic::Method;
+use crate::color::{Space, White};
 use crate::error::{Error, Result};
 use crate::formats::{csv, data, output, spectral};
-use crate::noise::NoiseSettings;
 use crate::report::characterization::{
     About, Characterization, DifferenceSummaries, Evaluation, Group, NoiseReport, characterization, matrix,
 };
 use crate::report::plot::PlotFormat;
 use crate::report::{self, ReportFormat};
-use crate::sensor::Sensor;
 use crate::spectrum::{SpectralLibrary, WavelengthGrid};
+use crate::stages::demosaic::Method;
+use crate::stages::noise::NoiseSettings;
+use crate::stages::to_xyz::ColorSettings;
 use crate::units::RadianceUnit;
 use std::path::{Path, PathBuf};
 

@@ -8,14 +8,14 @@ pub mod rendering;
 
 pub use history::history_entry;
 
-use crate::correct::LessDarks;
 use crate::error::{Error, Result};
 use crate::formats::atomic::remove_pending;
 use crate::formats::input::FrameReader;
 use crate::formats::output::FrameWriter;
 use crate::metadata::FrameHeader;
 use crate::numerics::vectors::Instructions;
-use crate::stage::{Counts, RowSource, Stage, run};
+use crate::stages::correct::LessDarks;
+use crate::stream::{Counts, RowSource, Stage, run};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};

@@ -1,17 +1,18 @@
 //! Options that programs share, and how their values are read.
 
+use crate::analysis::characterization::evaluation::{self, Filling};
+use crate::analysis::characterization::regression::Regression;
+use crate::analysis::statistics::Region;
+use crate::camera::optics::Exposure;
 use crate::cfa::CfaPattern;
-use crate::characterization::evaluation::{self, Filling};
-use crate::characterization::regression::Regression;
 use crate::color::White;
-use crate::demosaic::{Black, Method};
 use crate::formats::data;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::formats::pipe;
-use crate::optics::Exposure;
 use crate::random::Source;
-use crate::statistics::Region;
+use crate::stages::black::Black;
+use crate::stages::demosaic::Method;
 use crate::units::RadianceUnit;
 use clap::Args;
 use clap::builder::{OsStringValueParser, PathBufValueParser, PossibleValuesParser, TypedValueParser};

@@ -2,6 +2,8 @@
 
 use super::Session;
 use super::options::Output;
+use crate::camera::optics::{Exposure, Vignetting};
+use crate::camera::sensor::{Camera, Sensor};
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
 use crate::formats::input::{FileId, FrameReader, InputOptions, regular_file};
@@ -12,11 +14,9 @@ use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata, Scene};
 use crate::numerics::planes::{WeightedPlane, weighted_sums};
 use crate::numerics::quadrature::Rule;
-use crate::optics::{Exposure, Vignetting};
-use crate::render::Rendering;
-use crate::sensor::{Camera, Sensor};
 use crate::spectrum::{WavelengthGrid, chart_columns};
-use crate::stage::{Counts, RowSource};
+use crate::stages::render::Rendering;
+use crate::stream::{Counts, RowSource};
 use crate::units::{QuantityKind, RadianceUnit};
 use std::path::PathBuf;
 

@@ -2,9 +2,9 @@
 
 use super::csv::SpectralTable;
 use super::yaml;
-use crate::characterization::CameraMatrix;
+use crate::analysis::characterization::CameraMatrix;
+use crate::camera::sensor::{CurveFile, Sensor, SpectralResponse};
 use crate::error::{Error, Result};
-use crate::sensor::{CurveFile, Sensor, SpectralResponse};
 use crate::spectrum::{Curve, Observer};
 use sha2::{Digest, Sha256};
 use std::fs::File;

@@ -10,7 +10,7 @@ use crate::color;
 use crate::error::{Error, Result};
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
-use crate::stage::{Counts, RowSink};
+use crate::stream::{Counts, RowSink};
 use crate::units::QuantityKind;
 use half::f16;
 use std::io::{self, Write};

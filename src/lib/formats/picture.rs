@@ -2,12 +2,12 @@
 
 use super::atomic::Target;
 use super::input::FileId;
+use crate::analysis::statistics::Region;
 use crate::color::{linear_srgb_from_xyz, srgb_encode};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
-use crate::stage::RowSource;
-use crate::statistics::Region;
+use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};

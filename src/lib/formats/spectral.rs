@@ -6,7 +6,7 @@ use super::input::{FrameReader, InputOptions, open_named, spool};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::spectrum::{SpectralLibrary, channel_wavelength_nm, chart_columns, check_wavelengths};
-use crate::stage::RowSource;
+use crate::stream::RowSource;
 use crate::units::RadianceUnit;
 use ndarray::Array2;
 use std::io::{self, Read, Seek};

@@ -5,10 +5,11 @@
 //! which put in the mean number of neighbours, 2.66, where the mean of its inverse, 5/12, belongs; and Eq. 58, whose
 //! 80 for green should be 82.
 
-use super::mixture;
+use super::gains;
 use crate::cfa::{CfaPattern, Class};
-use crate::demosaic::Method;
-use crate::demosaic::weights::{Kernel, PHASES, WeightTable, Weights};
+use crate::stages::demosaic::Method;
+use crate::stages::demosaic::stencil::{PHASES, Stencil};
+use crate::stages::demosaic::weights::{WeightTable, Weights};
 use nalgebra::Matrix3;
 use serde::Serialize;
 
@@ -162,7 +163,7 @@ impl Coefficients {
     /// of the K that it is restored with.
     pub fn simulated(variances: [f64; 3]) -> Self {
         let exact = Exact::new(variances);
-        let here = Kernel::site([0, 0]);
+        let here = Stencil::site([0, 0]);
         let channel = |at: Class, of: Class| exact.kernel(at, of);
         let mean_of_k = |at: Class, own: Class| match at {
             // Green = X + mean of K where X is measured; X = green − mean of K elsewhere.
@@ -197,7 +198,7 @@ impl Coefficients {
             let k = mean_of_k(green, own);
             quotient(interpolated(class) - own - k, 2.0 * (own * k).sqrt())
         });
-        let here = Kernel::site([0, 0]);
+        let here = Stencil::site([0, 0]);
         let r3 = both.map(|(class, _, _)| exact.correlation(class, &exact.kernel(class, Class::Green), &here));
         let k = [0, 1].map(|i| difference(interpolated(both[i].0), both[i].2, r3[i]));
         let r1_prime = [0, 1].map(|i| {
@@ -211,7 +212,7 @@ impl Coefficients {
             let rest = interpolated(other) + k[i] / 4.0 - exact.variance(other, own);
             quotient(rest, (interpolated(other) * k[i]).sqrt())
         });
-        let covariance = mixture::mean_pixel(&exact.weights).covariance(variances);
+        let covariance = gains::mean_pixel(&exact.weights).covariance(variances);
         let correlation = |a: Class, b: Class| {
             let [a, b] = [a as usize, b as usize];
             quotient(covariance[(a, b)], (covariance[(a, a)] * covariance[(b, b)]).sqrt())
@@ -253,17 +254,17 @@ impl Exact {
     }
 
     /// The weights of channel `of` at the sites of class `at`.
-    fn kernel(&self, at: Class, of: Class) -> Kernel {
+    fn kernel(&self, at: Class, of: Class) -> Stencil {
         self.weights.kernel(self.phase(at), of as usize).clone()
     }
 
     /// The covariance of two sums of sites about a site of class `at`.
-    fn covariance(&self, at: Class, a: &Kernel, b: &Kernel) -> f64 {
+    fn covariance(&self, at: Class, a: &Stencil, b: &Stencil) -> f64 {
         let variance = |offset| self.variances[self.weights.class(self.phase(at), offset) as usize];
         a.sites().map(|(offset, weight)| weight * b.at(offset) * variance(offset)).sum()
     }
 
-    fn correlation(&self, at: Class, a: &Kernel, b: &Kernel) -> f64 {
+    fn correlation(&self, at: Class, a: &Stencil, b: &Stencil) -> f64 {
         let square = self.covariance(at, a, a) * self.covariance(at, b, b);
         quotient(self.covariance(at, a, b), square.sqrt())
     }
@@ -351,7 +352,7 @@ mod tests {
     fn effective_coefficients_make_the_equations_exact() {
         for variances in [[1.0, 1.0, 1.0], [2.0, 3.0, 5.0], [0.3, 10.0, 0.01], [40.0, 0.5, 3.0]] {
             let weights = WeightTable::new(Method::EffectiveColor, CfaPattern::Gbrg).about([1.0, 1.0]);
-            let exact = mixture::mean_pixel(&weights).covariance(variances);
+            let exact = gains::mean_pixel(&weights).covariance(variances);
             let paper = effective_color(variances, &Coefficients::effective(variances));
             assert!((exact - paper).abs().max() < 1e-12 * exact.max(), "{variances:?} {exact} {paper}");
         }

@@ -4,20 +4,20 @@
 //! model their variances, and the weights of its phase (folded back at the edges) its covariance. What varies within the
 //! reach of the weights, three photosites, is taken as level.
 
-use super::{Equations, classes, smooth_hue};
+use super::covariance::{Covariance, PAIRS};
+use super::moments::Equations;
+use super::photosite::Photosite;
+use super::smooth_hue;
 use crate::cfa::Class;
-use crate::demosaic::Method;
-use crate::demosaic::weights::{Kernel, WeightTable, phase};
 use crate::error::Result;
-use crate::frame::{Geometry, mirror, to_sample};
+use crate::frame::Geometry;
 use crate::metadata::{AdcRecord, FrameHeader, NoiseRecord};
-use crate::noise::NoiseModel;
-use crate::propagation::sampling::PAIRS;
 use crate::random::Source;
+use crate::stages::demosaic::Method;
+use crate::stages::demosaic::stencil::{Stencil, phase};
+use crate::stages::demosaic::weights::WeightTable;
+use crate::stages::noise::NoiseModel;
 use crate::units::QuantityKind;
-
-/// The six covariances of a pixel's three channels, in the order of [`PAIRS`].
-pub type Covariance = [f64; 6];
 
 /// Tells the covariance of the demosaicked R, G and B of a pixel from its place and level.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,10 +72,10 @@ impl PixelGains {
     fn new(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
         let origin = geometry.origin.map(i64::from);
         let phase = phase(origin[0] + at[0] as i64, origin[1] + at[1] as i64);
-        let folded = |kernel: &Kernel| folded(kernel, at, [geometry.width, geometry.height]);
-        let [fixed, of_hue] = [table.fixed(phase), table.of_hue(phase)].map(|kernels| kernels.each_ref().map(folded));
+        let folded = |stencil: &Stencil| stencil.folded(at, [geometry.width, geometry.height]);
+        let [fixed, of_hue] = [table.fixed(phase), table.of_hue(phase)].map(|stencils| stencils.each_ref().map(folded));
         let class = |offset| table.class(phase, offset) as usize;
-        let dot = |a: &Kernel, b: &Kernel| {
+        let dot = |a: &Stencil, b: &Stencil| {
             let mut sums = [0.0; 3];
             for (offset, weight) in a.sites() {
                 sums[class(offset)] += weight * b.at(offset);
@@ -105,14 +105,6 @@ impl PixelGains {
     }
 }
 
-/// The kernel about a pixel of the frame, what lies beyond the edges folded back: sites that coincide add their weights.
-pub(super) fn folded(kernel: &Kernel, at: [usize; 2], frame: [usize; 2]) -> Kernel {
-    let back = |offset: isize, axis: usize| {
-        mirror(at[axis].cast_signed() + offset, frame[axis]).cast_signed() - at[axis].cast_signed()
-    };
-    Kernel::of_sites(kernel.sites().map(|([x, y], weight)| ([back(x, 0), back(y, 1)], weight)))
-}
-
 /// Variance of a photosite against its level above black, linear between equally spaced levels.
 ///
 /// Variance is a parabola in the level away from saturation, so a table of 1024 steps is off by less than
@@ -126,20 +118,17 @@ struct LevelVariance {
 const STEPS: usize = 1024;
 
 impl LevelVariance {
-    fn new(model: &NoiseModel, adc: Option<&AdcRecord>, dark_frames: u32, largest: f64) -> Self {
+    fn new(photosite: &Photosite, largest: f64) -> Self {
         let step = largest / STEPS as f64;
-        let slope = adc.map_or(1.0, |adc| adc.adu_per_e);
+        let slope = photosite.slope();
         let variance = |index: usize| {
             let expected_e = index as f64 * step / slope;
-            let charge = classes::electrons(model, expected_e, Equations::Exact).moments.variance;
-            match adc {
-                None => charge,
-                // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
-                Some(_) if charge.sqrt() * slope < 0.5 => charge * slope * slope + 1.0 / 12.0,
-                Some(adc) if dark_frames > 0 => {
-                    classes::less_dark(model, adc, expected_e, dark_frames, Equations::Exact).moments.variance
-                }
-                Some(adc) => classes::adu(model, adc, expected_e, Equations::Exact).moments.variance,
+            let charge = photosite.electrons(expected_e).moments.variance;
+            // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
+            if photosite.adc.is_some() && charge.sqrt() * slope < 0.5 {
+                charge * slope * slope + 1.0 / 12.0
+            } else {
+                photosite.moments(expected_e).moments.variance
             }
         };
         Self { step, values: (0..=STEPS).map(variance).collect() }
@@ -180,20 +169,18 @@ impl PixelNoise {
         };
         let model = NoiseModel::of(frame, &noise)?;
         let dark_frames = metadata.correction.map_or(0, |correction| correction.dark_frames);
-        let (adc, largest, black) = match metadata.quantity {
+        let photosite = Photosite::of_electrons(model, Equations::Exact);
+        let (photosite, black) = match metadata.quantity {
             QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
-                (None, sensor.full_well_e, metadata.dark_signal_e.unwrap_or(0.0))
+                (photosite, metadata.dark_signal_e.unwrap_or(0.0))
             }
             _ => {
-                let adc = metadata.adc.or(Some(AdcRecord {
-                    bits: sensor.bits,
-                    bias_adu: sensor.bias_adu,
-                    adu_per_e: sensor.adu_per_e,
-                }));
-                let largest = sensor.full_well_e * adc.map_or(1.0, |adc| adc.adu_per_e);
-                (adc, largest, metadata.black_level_adu.unwrap_or(0.0))
+                let adc = metadata.adc.unwrap_or_else(|| AdcRecord::of_sensor(sensor));
+                let codes = photosite.digitized(adc).less_dark_frames(dark_frames);
+                (codes, metadata.black_level_adu.unwrap_or(0.0))
             }
         };
+        let largest = sensor.full_well_e * photosite.slope();
         let table = WeightTable::of(method, record.cfa);
         let columns = Places::new(frame.geometry.width, method.reach());
         let rows = Places::new(frame.geometry.height, method.reach());
@@ -203,7 +190,7 @@ impl PixelNoise {
             .flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]))
             .map(|at| PixelGains::new(table, at, &frame.geometry))
             .collect();
-        let variance = LevelVariance::new(&model, adc.as_ref(), dark_frames, largest);
+        let variance = LevelVariance::new(&photosite, largest);
         Ok(Self { columns, rows, gains, depends_on_hue: table.depends_on_hue(), variance, black })
     }
 
@@ -231,23 +218,6 @@ impl PixelNoise {
     }
 }
 
-impl PixelNoise {
-    /// Fills three planes of one row with the standard deviations of the pixels whose samples are `rgb`; gives the number
-    /// of those where propagation is void.
-    pub fn fill_stds(&self, y: usize, rgb: [&[f32]; 3], planes: &mut [f32]) -> u64 {
-        let width = rgb[0].len();
-        let mut void = 0;
-        for x in 0..width {
-            let (covariance, holds) = self.covariance([x, y], rgb.map(|plane| f64::from(plane[x])));
-            void += u64::from(!holds);
-            for (plane, std) in stds(&covariance).into_iter().enumerate() {
-                planes[plane * width + x] = to_sample(std);
-            }
-        }
-        void
-    }
-}
-
 /// Everything that the sensor's noise is made of, for a frame whose metadata do not say what was drawn.
 fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
     let sensor = frame.sensor()?;
@@ -262,22 +232,4 @@ fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
         poisson: crate::metadata::PoissonKind::Exact,
         cte: None,
     })
-}
-
-/// `matrix` Σ `matrix`ᵀ of a covariance in the order of [`PAIRS`].
-pub fn through(covariance: &Covariance, matrix: &nalgebra::Matrix3<f64>) -> Covariance {
-    let whole = symmetric(covariance);
-    let made = matrix * whole * matrix.transpose();
-    PAIRS.map(|[i, j]| made[(i, j)])
-}
-
-/// The symmetric matrix of six covariances.
-pub fn symmetric(covariance: &Covariance) -> nalgebra::Matrix3<f64> {
-    let [rr, rg, rb, gg, gb, bb] = *covariance;
-    nalgebra::Matrix3::new(rr, rg, rb, rg, gg, gb, rb, gb, bb)
-}
-
-/// Standard deviations of the three channels.
-pub fn stds(covariance: &Covariance) -> [f64; 3] {
-    [covariance[0], covariance[3], covariance[5]].map(|variance| variance.max(0.0).sqrt())
 }

@@ -13,15 +13,13 @@
 //! All these are sums over pixels of what lies around them. Once a region is wider than what its rim sees, they grow by
 //! the same amount with every two columns, so large regions follow exactly from small ones.
 
-use super::Prediction;
-use super::pixels::folded;
+use super::covariance::PAIRS;
+use super::moments::Prediction;
 use crate::cfa::Class;
-use crate::demosaic::weights::{Kernel, REACH, Weights, phase};
 use crate::numerics::normal::MeanVariance;
+use crate::stages::demosaic::stencil::{REACH, Stencil, phase};
+use crate::stages::demosaic::weights::Weights;
 use nalgebra::{Matrix3, SMatrix};
-
-/// The six covariances of three channels in the order of [`Sampling::spread`].
-pub const PAIRS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
 
 /// What sample means and covariances of a region are expected to be, and how they scatter.
 #[derive(Debug, Clone, PartialEq)]
@@ -262,7 +260,7 @@ impl Sums {
                 let at = [place.corner[0] + column, place.corner[1] + row];
                 let [x, y] = on_sensor(at);
                 let phase = phase(x, y);
-                let kernels = [0, 1, 2].map(|channel| folded(weights.kernel(phase, channel), at, place.frame));
+                let kernels = [0, 1, 2].map(|channel| weights.kernel(phase, channel).folded(at, place.frame));
                 pixels.push(Pixel::new(&kernels, |offset| weights.class(phase, offset)));
             }
         }
@@ -372,11 +370,11 @@ fn add_products(table: &mut [[f64; 6]; 6], c: &Matrix3<f64>) {
 /// One pixel: the sites it is made of, with the weights of the three channels, and the same by offset.
 struct Pixel {
     sites: Vec<([isize; 2], Class, [f64; 3])>,
-    kernels: [Kernel; 3],
+    kernels: [Stencil; 3],
 }
 
 impl Pixel {
-    fn new(kernels: &[Kernel; 3], class: impl Fn([isize; 2]) -> Class) -> Self {
+    fn new(kernels: &[Stencil; 3], class: impl Fn([isize; 2]) -> Class) -> Self {
         let all = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| [x, y]));
         let sites = all
             .map(|offset| (offset, class(offset), kernels.each_ref().map(|kernel| kernel.at(offset))))
@@ -409,10 +407,10 @@ impl Pixel {
 mod tests {
     use super::*;
     use crate::cfa::CfaPattern;
-    use crate::demosaic::Method;
-    use crate::demosaic::weights::WeightTable;
     use crate::frame::mirror;
-    use crate::propagation::mixture;
+    use crate::propagation::gains;
+    use crate::stages::demosaic::Method;
+    use crate::stages::demosaic::weights::WeightTable;
     use nalgebra::{DMatrix, DVector};
 
     fn sites(variances: [f64; 3], excess_kurtosis: f64) -> [Prediction; 3] {
@@ -513,9 +511,9 @@ mod tests {
         let variances = [1.0, 2.0, 3.0];
         let place = Place { frame: [900, 800], origin: [0, 0], corner: [100, 101], size: [601, 502] };
         let found = Sampling::of(&weights, &sites(variances, 0.0), &place);
-        let patch = mixture::patch_mean(&weights, phase(100, 101), [601, 502]).covariance(variances);
+        let patch = gains::patch_mean(&weights, phase(100, 101), [601, 502]).covariance(variances);
         assert!((found.mean_covariance - patch).abs().max() < 1e-10 * patch.max());
-        let pixel = mixture::mean_pixel(&weights).covariance(variances);
+        let pixel = gains::mean_pixel(&weights).covariance(variances);
         // An odd extent has one phase more often than the other, by 1/601; the mean takes off a few of 300,000 pixels.
         assert!((found.covariance - pixel).abs().max() < 2e-3 * pixel.max());
     }

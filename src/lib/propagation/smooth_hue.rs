@@ -4,12 +4,19 @@
 //! expectation of (1 + a)ᵖ/((1 + u)(1 + v)) is expanded to the fourth order in noise over signal, by the second and third
 //! joint cumulants of a, u and v, which are sums over the weights of green.
 
-use super::mixture;
+use super::gains;
 use crate::cfa::{CfaPattern, Class};
-use crate::demosaic::Method;
-use crate::demosaic::weights::{Kernel, PHASES, WeightTable, greens_of_hue};
+use crate::stages::demosaic::Method;
+use crate::stages::demosaic::stencil::{PHASES, Stencil};
+use crate::stages::demosaic::weights::{WeightTable, greens_of_hue};
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
+
+/// Ratios of red and of blue to green; 1 where green is not above zero and there is no hue.
+pub fn hues(mean: [f64; 3]) -> [f64; 2] {
+    let green = mean[Class::Green as usize];
+    [Class::Red, Class::Blue].map(|class| if green > 0.0 { mean[class as usize] / green } else { 1.0 })
+}
 
 /// How far green is from where smooth hue transition would divide by zero.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -61,9 +68,9 @@ pub fn second_order(
     if method != Method::SmoothHue || !FirstOrder::of(mean, variances).holds {
         return None;
     }
-    let weights = WeightTable::of(method, pattern).about(super::hues(mean));
+    let weights = WeightTable::of(method, pattern).about(hues(mean));
     let moments = [0, 1, 2, 3].map(|phase| {
-        let linear = mixture::pixel(&weights, phase).covariance(variances);
+        let linear = gains::pixel(&weights, phase).covariance(variances);
         of_phase(pattern, phase, mean, variances, third, linear)
     });
     let centre = moments.iter().map(|(mean, _)| mean).sum::<Vector3<f64>>() / 4.0;
@@ -95,7 +102,7 @@ fn of_phase(
     let chrominances = [Class::Red, Class::Blue].map(|class| (class, greens_of_hue(pattern, phase, class)));
     let (mut means, mut covariance) = (Vector3::from(mean), linear);
     // Mean over the neighbours of E (1 + a)ᵖ/(1 + uᵢ) − 1. All expectations are kept less 1, so that nothing cancels.
-    let average = |power: u32, here: &Kernel, around: &[Kernel]| {
+    let average = |power: u32, here: &Stencil, around: &[Stencil]| {
         around.iter().map(|kernel| noise.quotient(power, here, kernel, None)).sum::<f64>() / around.len() as f64
     };
     for (class, (here, around)) in chrominances.iter().filter(|(_, (_, around))| !around.is_empty()) {
@@ -146,7 +153,7 @@ struct GreenNoise<'a, C> {
 
 impl<C: Fn([isize; 2]) -> Class> GreenNoise<'_, C> {
     /// Joint cumulant of two or three sums of greens.
-    fn cumulant(&self, forms: &[&Kernel]) -> f64 {
+    fn cumulant(&self, forms: &[&Stencil]) -> f64 {
         let Some((first, rest)) = forms.split_first() else { return 0.0 };
         let greens = first.sites().filter(|(offset, _)| (self.class)(*offset) == Class::Green);
         let sum: f64 =
@@ -159,8 +166,8 @@ impl<C: Fn([isize; 2]) -> Class> GreenNoise<'_, C> {
     /// ½ Σ fᵢⱼ κᵢⱼ + ⅙ Σ fᵢⱼₖ κᵢⱼₖ + ⅛ Σ fᵢⱼₖₗ κᵢⱼ κₖₗ
     ///
     /// with the derivatives f at the means, which are products of factorials.
-    fn quotient(&self, power: u32, a: &Kernel, u: &Kernel, v: Option<&Kernel>) -> f64 {
-        let forms: Vec<&Kernel> = [a, u].into_iter().chain(v).collect();
+    fn quotient(&self, power: u32, a: &Stencil, u: &Stencil, v: Option<&Stencil>) -> f64 {
+        let forms: Vec<&Stencil> = [a, u].into_iter().chain(v).collect();
         let variables = forms.len();
         let derivative = |indices: &[usize]| {
             let order = |variable: usize| indices.iter().filter(|&&index| index == variable).count();
@@ -198,8 +205,8 @@ mod tests {
         let mean = [0.5, 1.0, 2.0];
         let variances = [2e-10, 3e-10, 5e-10];
         let second = second_order(Method::SmoothHue, CfaPattern::Grbg, mean, variances, 0.0).unwrap();
-        let weights = WeightTable::new(Method::SmoothHue, CfaPattern::Grbg).about(super::super::hues(mean));
-        let first = mixture::mean_pixel(&weights).covariance(variances);
+        let weights = WeightTable::new(Method::SmoothHue, CfaPattern::Grbg).about(super::hues(mean));
+        let first = gains::mean_pixel(&weights).covariance(variances);
         assert!((second.covariance - first).abs().max() < 1e-8 * first.max(), "{} {first}", second.covariance);
         assert!(second.bias.iter().all(|bias| bias.abs() < 1e-9));
         assert_eq!(second_order(Method::Bilinear, CfaPattern::Grbg, mean, variances, 0.0), None);
@@ -232,8 +239,8 @@ mod tests {
         {
             assert!((found - simulated).abs() < 5.0 * error, "{found} {simulated}");
         }
-        let weights = WeightTable::new(Method::SmoothHue, CfaPattern::Rggb).about(super::super::hues(mean));
-        let first = mixture::mean_pixel(&weights).covariance(variances);
+        let weights = WeightTable::new(Method::SmoothHue, CfaPattern::Rggb).about(super::hues(mean));
+        let first = gains::mean_pixel(&weights).covariance(variances);
         assert!(simulated[(0, 0)] / first[(0, 0)] > 1.008 && simulated[(2, 2)] / first[(2, 2)] > 1.008, "{first}");
     }
 
@@ -242,7 +249,7 @@ mod tests {
     #[test]
     fn quotients_have_the_moments_of_their_series() {
         let class = |_: [isize; 2]| Class::Green;
-        let (none, one) = (Kernel::zero(), Kernel::site([0, 0]));
+        let (none, one) = (Stencil::zero(), Stencil::site([0, 0]));
         let (s, k) = (0.01, 0.001);
         let normal = GreenNoise { class: &class, second: s, third: 0.0 };
         assert!((normal.quotient(1, &none, &one, None) - (s + 3.0 * s * s)).abs() < 1e-15);

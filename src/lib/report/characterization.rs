@@ -1,9 +1,9 @@
 //! Reports of fitted matrices and of how well they do.
 
 use super::{ReportFormat, shown, table, unwritable};
-use crate::characterization::CameraMatrix;
-use crate::characterization::evaluation::SampleEvaluation;
-use crate::characterization::noise_aware::TradeOff;
+use crate::analysis::characterization::CameraMatrix;
+use crate::analysis::characterization::evaluation::SampleEvaluation;
+use crate::analysis::characterization::noise_aware::TradeOff;
 use crate::color::difference::{Difference, DifferenceReport};
 use crate::error::Result;
 use serde::Serialize;
@@ -142,8 +142,8 @@ struct Whole<'a> {
     method: &'a Option<String>,
     condition: Option<f64>,
     rank: Option<usize>,
-    training: &'a Option<crate::characterization::Training>,
-    uncertainty: &'a Option<crate::characterization::MatrixUncertainty>,
+    training: &'a Option<crate::analysis::characterization::Training>,
+    uncertainty: &'a Option<crate::analysis::characterization::MatrixUncertainty>,
     #[serde(skip_serializing_if = "Option::is_none")]
     evaluation: Option<&'a DifferenceReport>,
     #[serde(skip_serializing_if = "Option::is_none")]

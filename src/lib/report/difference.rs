@@ -1,7 +1,7 @@
 //! Reports of color differences.
 
 use super::{ReportFormat, in_digits, table, unwritable};
-use crate::color::comparison::ComparisonReport;
+use crate::analysis::comparison::ComparisonReport;
 use crate::color::difference::DifferenceSummary;
 use crate::error::Result;
 use std::fmt::Write;

@@ -15,9 +15,9 @@ pub use photon_transfer::photon_transfer;
 pub use prediction::{SamplePrediction, prediction, samples, sweep};
 pub use trade_off::trade_off;
 
+use crate::analysis::statistics::check::{Subject, Test};
+use crate::analysis::statistics::{ChannelReport, RegionReport, Report};
 use crate::error::{Error, Result};
-use crate::statistics::check::{Subject, Test};
-use crate::statistics::{ChannelReport, RegionReport, Report};
 use std::fmt::Write;
 
 /// The form of a report.

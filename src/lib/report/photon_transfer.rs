@@ -1,8 +1,8 @@
 //! The photon transfer curve: noise against signal, and which cause rules where.
 
 use super::plot::{Axis, Color, Marks, Panel, Plot, ReferenceLine, Region};
-use crate::propagation::chain::ChainPrediction;
-use crate::propagation::classes::Cause;
+use crate::chain::ChainPrediction;
+use crate::propagation::budget::Cause;
 
 /// Draws the noise of one class in electrons against its signal, from predictions of one level after another, with the
 /// ranges where read-out and dark signal, shot noise, or the fixed pattern of the response is the largest.

@@ -1,9 +1,9 @@
 //! Reports of noise budgets.
 
 use super::{ReportFormat, shown, table, unwritable};
+use crate::camera::optics::Exposure;
+use crate::chain::{ChainPrediction, StagePrediction};
 use crate::error::Result;
-use crate::optics::Exposure;
-use crate::propagation::chain::{ChainPrediction, StagePrediction};
 use serde::Serialize;
 use std::fmt::Write;
 

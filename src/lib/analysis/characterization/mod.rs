@@ -1,0 +1,232 @@
+//! Characterisation: the matrix from camera signals to XYZ, fitted on known radiances or on the responses alone.
+
+pub mod evaluation;
+pub mod noise_aware;
+pub mod regression;
+pub mod training;
+
+use crate::camera::optics::Exposure;
+use crate::camera::sensor::{Sensor, SpectralResponse};
+use crate::color::difference::DifferenceReport;
+use crate::error::{Error, Result};
+use crate::spectrum::{Observer, SpectralLibrary, WavelengthGrid, fold};
+use crate::units::{CM2_PER_M2, LUMINOUS_EFFICACY_LM_PER_W};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// The schema that matrix files name.
+pub const MATRIX_SCHEMA: &str = "cyanometer-matrix/1";
+/// The unit of the elements of a matrix.
+pub const MATRIX_UNIT: &str = "cd m-2 per (ADU s-1 sr-1)";
+
+/// A matrix file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraMatrix {
+    /// `cyanometer-matrix/1`.
+    pub schema: String,
+    /// Name of the sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<String>,
+    /// What covers the sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter: Option<String>,
+    /// Method of the fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<String>,
+    /// Unit of the elements.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// Rows X, Y, Z; columns R, G, B: XYZ from ADU above black, per s sr of exposure.
+    pub xyz_from_camera: [[f64; 3]; 3],
+    /// Condition number of the training signals.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<f64>,
+    /// Number of independent training signals.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rank: Option<usize>,
+    /// What it was fitted on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub training: Option<Training>,
+    /// How well it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<MatrixUncertainty>,
+    /// How well it does without noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub performance: Option<Performance>,
+    /// The observer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observer: Option<String>,
+    /// The wavelengths summed over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wavelengths: Option<WavelengthGrid>,
+}
+
+/// What a matrix was fitted on, and how well.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Training {
+    /// The library.
+    pub library: String,
+    /// Samples used, counted from 0; absent where all were, or where the responses alone were fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<Vec<usize>>,
+    /// How they were chosen, where a number of them was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chosen_by: Option<String>,
+    /// Labels of samples that were kept out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held_out: Vec<String>,
+    /// Number of samples, or of wavelengths, that were fitted.
+    pub count: usize,
+    /// How samples were weighted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<String>,
+    /// Ridge, relative to the signals' own sums of squares.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ridge: Option<f64>,
+    /// Weight of noise, where it was weighed against the error of colors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_weight: Option<f64>,
+    /// The sample of the library whose color is kept exact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub white_sample: Option<usize>,
+    /// Relative rms error of X, Y and Z over the samples, each relative to the sample's own value; over all samples of the
+    /// library where the responses alone were fitted.
+    pub relative_rms: [f64; 3],
+    /// Largest error of the chromaticities x and y over the same samples.
+    pub max_chromaticity_error: [f64; 2],
+}
+
+/// How well a matrix is known: how it changes when training samples are left out one at a time (the jackknife), ridge and
+/// noise terms staying as they are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MatrixUncertainty {
+    /// What it comes from.
+    pub method: String,
+    /// Standard error of each element of `xyz_from_camera`.
+    pub standard_error: [[f64; 3]; 3],
+    /// Covariance of the three elements of the rows X, Y and Z.
+    pub covariance: [[[f64; 3]; 3]; 3],
+}
+
+/// How well a matrix does without noise on a library.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Performance {
+    /// The library.
+    pub library: String,
+    /// Samples of it.
+    pub samples: u64,
+    /// The white of L*a*b*, in words.
+    pub white: String,
+    /// Differences between the colors that the camera gives and the true ones.
+    #[serde(flatten)]
+    pub differences: DifferenceReport,
+}
+
+impl CameraMatrix {
+    /// Checks schema and numbers.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong, in words.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        if self.schema != MATRIX_SCHEMA {
+            return Err(format!("its schema is `{}`, not `{MATRIX_SCHEMA}`", self.schema));
+        }
+        if let Some(unit) = self.unit.as_ref().filter(|unit| *unit != MATRIX_UNIT) {
+            return Err(format!("its unit is `{unit}`, but only `{MATRIX_UNIT}` is understood"));
+        }
+        if crate::color::matrix(&self.xyz_from_camera).try_inverse().is_none() {
+            return Err("its `xyz_from_camera` is singular: three signals would not give three stimuli".into());
+        }
+        Ok(())
+    }
+}
+
+/// Radiances as the camera and as the observer see them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Signals {
+    /// Expected ADU above black per s sr, shape samples × 3.
+    pub camera: DMatrix<f64>,
+    /// Absolute XYZ, Y in cd m⁻², shape samples × 3.
+    pub xyz: DMatrix<f64>,
+}
+
+/// Works out what camera and observer make of every radiance of a library.
+///
+/// X = K_m Σ_j L_j x̄_j Δλ, K_m = 683 lm W⁻¹, L in W m⁻² sr⁻¹ nm⁻¹.
+///
+/// # Errors
+///
+/// Those of the grid; [`Error::Data`] where the library leaves out more than 10⁻³ of what camera or observer respond to.
+pub fn signals(
+    library: &SpectralLibrary,
+    sensor: &Sensor,
+    response: &SpectralResponse,
+    observer: &Observer,
+    grid: &WavelengthGrid,
+) -> Result<Signals> {
+    let (wavelengths, camera, matching) = weights(sensor, response, observer, grid)?;
+    let project = |weights: &[f64], what: &str| -> Result<Vec<f64>> {
+        let folded = fold(&library.wavelength_nm, &wavelengths, weights);
+        if folded.uncovered > 1e-3 {
+            return Err(Error::Data(format!(
+                "the library does not cover {:.1} % of what {what} responds to between {} and {} nm",
+                100.0 * folded.uncovered,
+                grid.start_nm,
+                grid.end_nm
+            )));
+        }
+        let dot = |row: ndarray::ArrayView1<'_, f64>| row.iter().zip(&folded.weights).map(|(l, w)| l * w).sum();
+        Ok(library.radiance.rows().into_iter().map(dot).collect())
+    };
+    let columns = |all: [Vec<f64>; 3], what: &str| -> Result<DMatrix<f64>> {
+        let mut made = DMatrix::zeros(library.radiance.nrows(), 3);
+        for (j, weights) in all.iter().enumerate() {
+            for (i, value) in project(weights, what)?.into_iter().enumerate() {
+                made[(i, j)] = value;
+            }
+        }
+        Ok(made)
+    };
+    Ok(Signals { camera: columns(camera, "the camera")?, xyz: columns(matching, "the observer")? })
+}
+
+/// Camera and observer at single wavelengths: what maximum ignorance is fitted on.
+///
+/// # Errors
+///
+/// Those of the grid.
+pub fn responses(
+    sensor: &Sensor,
+    response: &SpectralResponse,
+    observer: &Observer,
+    grid: &WavelengthGrid,
+) -> Result<Signals> {
+    let (wavelengths, camera, xyz) = weights(sensor, response, observer, grid)?;
+    let columns = |weights: [Vec<f64>; 3]| DMatrix::from_fn(wavelengths.len(), 3, |i, j| weights[j][i]);
+    Ok(Signals { camera: columns(camera), xyz: columns(xyz) })
+}
+
+/// Weights of three sums over wavelengths.
+type Three = [Vec<f64>; 3];
+
+/// The wavelengths of a grid, with what a radiance of 1 W cm⁻² sr⁻¹ nm⁻¹ at each adds to the signals of R, G, B and to
+/// X, Y, Z.
+fn weights(
+    sensor: &Sensor,
+    response: &SpectralResponse,
+    observer: &Observer,
+    grid: &WavelengthGrid,
+) -> Result<(Vec<f64>, Three, Three)> {
+    let (wavelengths, widths) = grid.points()?;
+    let unit = Exposure { exposure_s: 1.0, f_number: 1.0, lens_transmittance: 1.0 };
+    let per_exposure = sensor.adu_per_e / unit.exposure_s_sr();
+    let camera = response
+        .electron_weights(sensor, &unit, &wavelengths, &widths)
+        .map(|class| class.into_iter().map(|electrons| electrons * per_exposure).collect());
+    let matching = observer.matching.each_ref().map(|curve| -> Vec<f64> {
+        let weight = |(&nm, width): (&f64, &f64)| LUMINOUS_EFFICACY_LM_PER_W * CM2_PER_M2 * curve.at(nm) * width;
+        wavelengths.iter().zip(&widths).map(weight).collect()
+    });
+    Ok((wavelengths, camera, matching))
+}

@@ -1,0 +1,5 @@
+//! What is found out about frames and cameras: statistics beside predictions, differences, matrices.
+
+pub mod characterization;
+pub mod comparison;
+pub mod statistics;

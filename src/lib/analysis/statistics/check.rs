@@ -1,0 +1,245 @@
+//! Is what was measured what was predicted? Tests of means, variances and correlations.
+
+use crate::error::{Error, Result};
+use crate::numerics::significance;
+use crate::propagation::Unpredictable;
+use crate::propagation::covariance::PAIRS;
+use crate::propagation::sampling::Sampling;
+use nalgebra::Matrix3;
+use serde::Serialize;
+
+/// What a test is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Subject {
+    /// The mean of a channel: z.
+    Mean,
+    /// The variance of a channel: χ².
+    Variance,
+    /// The correlation of two channels: Fisher's z.
+    Correlation,
+    /// Mean and variance together of a channel of which hardly a sample should leave its code: Markov's inequality.
+    Deviation,
+}
+
+/// One test of one prediction.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Test {
+    /// What is tested.
+    pub subject: Subject,
+    /// The channel, or the two.
+    pub channels: Vec<String>,
+    /// What was measured.
+    pub measured: f64,
+    /// What is expected of a sample of this size.
+    pub expected: f64,
+    /// Deviation over its standard error.
+    pub z: Option<f64>,
+    /// Effective degrees of freedom of a variance or a correlation.
+    pub degrees_of_freedom: Option<f64>,
+    /// Probability of a deviation at least as large by chance.
+    pub p: f64,
+}
+
+/// The verdict on all tests together.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Verdict {
+    /// Chance of a false alarm that is accepted.
+    pub level: f64,
+    /// Number of tests.
+    pub tests: usize,
+    /// Smallest probability.
+    pub smallest_p: f64,
+    /// The same, corrected for the number of tests: 1 − (1 − p)ⁿ.
+    pub corrected_p: f64,
+    /// Whether it is no smaller than the level.
+    pub passed: bool,
+}
+
+impl Verdict {
+    /// The verdict on the regions of a frame, each its tests and the pixels that are not finite; `why` says what keeps
+    /// predictions from being made, where something does.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Data`] where there is nothing to test.
+    pub fn of<'a>(
+        regions: impl Iterator<Item = (&'a [Test], u64)> + Clone,
+        level: f64,
+        frame: &str,
+        why: Option<Unpredictable>,
+    ) -> Result<Self> {
+        if regions.clone().next().is_none() || regions.clone().any(|(tests, _)| tests.is_empty()) {
+            let why = why.map_or(String::new(), |why| format!("; here {why}"));
+            return Err(Error::Data(format!(
+                "{frame}: nothing can be checked: a prediction needs a uniform scene and metadata that say what was done \
+                 to it, up to XYZ, xyY or L*a*b*{why}"
+            )));
+        }
+        if let Some((_, not_finite)) = regions.clone().find(|(_, not_finite)| *not_finite > 0) {
+            return Err(Error::Data(format!(
+                "{frame}: nothing can be checked: {not_finite} pixels are NaN or infinite"
+            )));
+        }
+        let all = regions.flat_map(|(tests, _)| tests);
+        let (tests, smallest_p) = all.fold((0, 1.0_f64), |(count, least), test| (count + 1, least.min(test.p)));
+        let corrected_p = significance::of_smallest(smallest_p, tests);
+        Ok(Self { level, tests, smallest_p, corrected_p, passed: corrected_p >= level })
+    }
+
+    /// Nothing where the check is passed.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Data`] where it is not.
+    pub fn judge(self, frame: &str) -> Result<()> {
+        if self.passed {
+            return Ok(());
+        }
+        Err(Error::Data(format!(
+            "{frame}: it is not as predicted: the least likely of {} statistics has p = {:.2e}, corrected for their number \
+             {:.2e}, below the level {:e}",
+            self.tests, self.smallest_p, self.corrected_p, self.level
+        )))
+    }
+}
+
+/// What was measured of channels that were observed together.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Measured<'a> {
+    pub names: &'a [String],
+    pub mean: [f64; 3],
+    pub covariance: Matrix3<f64>,
+}
+
+/// What is expected of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Expected<'a> {
+    /// Mean.
+    pub mean: [f64; 3],
+    /// Variance of a photosite in steps² of what it is counted in, e⁻ or ADU: where it is so small that nearly all
+    /// samples are the same, sums of them are not normal.
+    pub site_variances: [f64; 3],
+    /// How samples scatter.
+    pub sampling: &'a Sampling,
+    /// Whether the channels are the classes of the photosites themselves.
+    pub is_plane: bool,
+}
+
+/// Fewer samples off their usual step than this make sums that are no normal deviates.
+const RARE: f64 = 25.0;
+
+/// Tests the channels `0..count` and their correlations.
+pub(super) fn tests(measured: &Measured<'_>, expected: &Expected<'_>) -> Vec<Test> {
+    let sampling = expected.sampling;
+    let channels = measured.names.len();
+    let least = expected.site_variances.iter().copied().fold(f64::INFINITY, f64::min);
+    let is_rare = |i: usize| sampling.count * if expected.is_plane { expected.site_variances[i] } else { least } < RARE;
+    let mut found = Vec::new();
+    for i in 0..channels {
+        if is_rare(i) {
+            found.push(deviation(measured, expected, i));
+        } else {
+            found.push(mean(measured, expected, i));
+            if sampling.count > 1.0 {
+                found.push(variance(measured, sampling, i));
+            }
+        }
+    }
+    for (index, [i, j]) in PAIRS.into_iter().enumerate() {
+        // Four pixels are the fewest whose correlation says anything.
+        if i != j && j < channels && !is_rare(i) && !is_rare(j) && sampling.count >= 4.0 {
+            found.push(correlation(measured, sampling, index));
+        }
+    }
+    found
+}
+
+/// Where a pair of channels stands in [`PAIRS`].
+pub(super) fn pair(channels: [usize; 2]) -> usize {
+    PAIRS.iter().position(|known| *known == channels).unwrap_or_default()
+}
+
+fn mean(measured: &Measured<'_>, expected: &Expected<'_>, i: usize) -> Test {
+    let error = expected.sampling.mean_covariance[(i, i)].sqrt();
+    let z = (measured.mean[i] - expected.mean[i]) / error;
+    Test {
+        subject: Subject::Mean,
+        channels: vec![measured.names[i].clone()],
+        measured: measured.mean[i],
+        expected: expected.mean[i],
+        z: Some(z),
+        degrees_of_freedom: None,
+        p: significance::of_normal(z),
+    }
+}
+
+/// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946].
+fn variance(measured: &Measured<'_>, sampling: &Sampling, i: usize) -> Test {
+    let expected = sampling.covariance[(i, i)];
+    let pair = pair([i, i]);
+    let scatter = sampling.spread[pair][pair];
+    let freedom = 2.0 * expected * expected / scatter;
+    let found = measured.covariance[(i, i)];
+    Test {
+        subject: Subject::Variance,
+        channels: vec![measured.names[i].clone()],
+        measured: found,
+        expected,
+        z: Some((found - expected) / scatter.sqrt()),
+        degrees_of_freedom: Some(freedom),
+        p: significance::of_chi_square(freedom * found / expected, freedom),
+    }
+}
+
+/// artanh r about artanh ρ + ρ/2ν, with variance 1/(ν − 2), as of ν + 1 independent normal pairs \[Fisher1921].
+///
+/// The effective ν makes 1/ν the variance to first order: r = s_ij/√(s_ii s_jj) varies as its differential does,
+/// dr = ds_ij/√(s_ii s_jj) − ½ r (ds_ii/s_ii + ds_jj/s_jj), and artanh r by dr/(1 − ρ²).
+fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Test {
+    let [i, j] = PAIRS[index];
+    let correlation = |c: &Matrix3<f64>| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
+    let (found, expected) = (correlation(&measured.covariance), correlation(&sampling.covariance));
+    let c = &sampling.covariance;
+    let terms = [
+        (index, 1.0 / (c[(i, i)] * c[(j, j)]).sqrt()),
+        (pair([i, i]), -0.5 * expected / c[(i, i)]),
+        (pair([j, j]), -0.5 * expected / c[(j, j)]),
+    ];
+    let variance: f64 =
+        terms.iter().flat_map(|(a, f)| terms.iter().map(move |(b, g)| f * g * sampling.spread[*a][*b])).sum();
+    let freedom = (1.0 - expected * expected).powi(2) / variance;
+    let centre = expected.atanh() + expected / (2.0 * freedom);
+    let z = (found.clamp(-1.0, 1.0).atanh() - centre) * (freedom - 2.0).max(f64::MIN_POSITIVE).sqrt();
+    Test {
+        subject: Subject::Correlation,
+        channels: vec![measured.names[i].clone(), measured.names[j].clone()],
+        measured: found,
+        expected,
+        z: Some(z),
+        degrees_of_freedom: Some(freedom),
+        p: significance::of_normal(z),
+    }
+}
+
+/// Where hardly a sample should deviate: P(mean square deviation ≥ d²) ≤ E d²/d² by Markov's inequality. What single
+/// precision rounds off is no deviation.
+fn deviation(measured: &Measured<'_>, expected: &Expected<'_>, i: usize) -> Test {
+    let n = expected.sampling.count;
+    let offset = measured.mean[i] - expected.mean[i];
+    let spread = if n > 1.0 { measured.covariance[(i, i)] * (n - 1.0) / n } else { 0.0 };
+    let found = offset * offset + spread;
+    let population =
+        expected.sampling.covariance[(i, i)] * (n - 1.0).max(0.0) / n + expected.sampling.mean_covariance[(i, i)];
+    let rounding = (4.0 * f64::from(f32::EPSILON) * expected.mean[i].abs()).powi(2);
+    let p = if found <= population + rounding { 1.0 } else { (population / found).min(1.0) };
+    Test {
+        subject: Subject::Deviation,
+        channels: vec![measured.names[i].clone()],
+        measured: found.sqrt(),
+        expected: population.sqrt(),
+        z: None,
+        degrees_of_freedom: None,
+        p,
+    }
+}

@@ -1,0 +1,382 @@
+//! Patches of a chart: a frame that shows each pixel of a source as a rectangle of photosites, measured patch by patch.
+//!
+//! The scene is not uniform, but each patch is, and its means tell the level: the expected electrons are worked back from
+//! them, and spread and covariance are predicted at these. The means are used up by that, and are not tested.
+
+use super::{Region, RegionReport, Report, Samplings, Tally, beyond_weights, rails, tallies};
+use crate::cfa::Class;
+use crate::color;
+use crate::error::{Error, Result};
+use crate::metadata::{FrameHeader, Scene};
+use crate::propagation::sampling::{Place, Sampling, SamplingBasis};
+use crate::propagation::{self, Equations, FramePrediction, PixelMoments};
+use crate::stages::demosaic::Method;
+use crate::stages::demosaic::stencil::REACH;
+use crate::stages::demosaic::weights::WeightTable;
+use crate::stream::RowSource;
+use crate::units::QuantityKind;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// A patch that lies whole within a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Patch {
+    /// Column and row in the chart.
+    pub at: [usize; 2],
+    /// Number, row by row, from 0; where the width of the chart is known.
+    pub sample: Option<usize>,
+    /// What demosaicking has not mixed with the neighbours.
+    pub interior: Region,
+}
+
+/// The whole patches of a frame, of `size` photosites or of what the metadata say, laid out from the sensor's corner.
+///
+/// The chart is as wide as the source that the metadata name; a frame that names none, but starts at the sensor's corner
+/// and ends with a whole patch, is the chart.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where the size is not known, where a patch has no interior, and where no patch is whole.
+pub fn of_frame(frame: &FrameHeader, size: Option<[usize; 2]>) -> Result<Vec<Patch>> {
+    let usage = |problem: String| Error::Usage(format!("{}: {problem}", frame.name));
+    let scene = frame.metadata.scene.as_ref();
+    let recorded = scene.and_then(|scene| scene.patch).filter(|patch| *patch != [1, 1]);
+    let Some(size) = size.or(recorded) else {
+        return Err(usage("its metadata tell of no patches of several photosites; give --patches=WxH".into()));
+    };
+    let [width, height] = size;
+    let method = frame.metadata.demosaic.as_ref().map(|record| record.method.as_str());
+    let margin = method.map_or(0, |name| Method::named(name).map_or(REACH.unsigned_abs(), Method::reach));
+    let least = 2 * margin + 1;
+    if width.min(height) < least {
+        return Err(usage(format!(
+            "patches of {width}x{height} have no interior: {} mixes colours up to {margin} pixels from their edges; they \
+             must be {least}x{least} at least",
+            method.unwrap_or_default()
+        )));
+    }
+    let geometry = &frame.geometry;
+    let of_source = scene.filter(|_| recorded == Some(size)).and_then(|scene| scene.source_width);
+    let of_frame = (geometry.origin == [0, 0] && geometry.width.is_multiple_of(width)).then(|| geometry.width / width);
+    let columns = of_source.or(of_frame);
+    let columns_of_patches = whole(geometry.origin[0], geometry.width, width);
+    let mut patches = Vec::new();
+    for (row, y) in whole(geometry.origin[1], geometry.height, height) {
+        for &(column, x) in &columns_of_patches {
+            let interior =
+                Region { x: x + margin, y: y + margin, width: width - 2 * margin, height: height - 2 * margin };
+            let sample = columns.map(|columns| row * columns + column);
+            patches.push(Patch { at: [column, row], sample, interior });
+        }
+    }
+    if patches.is_empty() {
+        return Err(usage(format!(
+            "no patch of {width}x{height} lies whole within the frame of {}x{}",
+            geometry.width, geometry.height
+        )));
+    }
+    Ok(patches)
+}
+
+/// Along one axis of a frame, the patches that lie whole within it: number, and first sample in the frame.
+fn whole(origin: i32, length: usize, size: usize) -> Vec<(usize, usize)> {
+    let (origin, length, size) = (i64::from(origin), length as i64, size as i64);
+    let first = (origin + size - 1).div_euclid(size).max(0);
+    let end = (origin + length).div_euclid(size);
+    let place = |index: i64| Some((usize::try_from(index).ok()?, usize::try_from(index * size - origin).ok()?));
+    (first..end).filter_map(place).collect()
+}
+
+/// Reads a whole frame and works out the statistics of the interiors of its patches.
+///
+/// Where the scene is uniform, or not rendered, predictions are those of the frame, or none.
+///
+/// # Errors
+///
+/// Those of [`of_frame`] and of the source.
+pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: Equations) -> Result<Report> {
+    let frame = source.header().clone();
+    let patches = of_frame(&frame, size)?;
+    let regions: Vec<Region> = patches.iter().map(|patch| patch.interior).collect();
+    let rails = rails(&frame);
+    let tallies = tallies(source, &frame, &regions, rails)?;
+    let mut unpredicted = None;
+    let mut reports: Vec<RegionReport> = match propagation::of_frame(&frame, equations) {
+        Ok(known) => {
+            let mut samplings = Samplings::default();
+            let tallies = tallies.iter().zip(regions);
+            tallies
+                .map(|(tally, region)| {
+                    let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, region);
+                    tally.report(&frame, region, rails, Some(&known), sampling, false)
+                })
+                .collect()
+        }
+        Err(why) => {
+            unpredicted = Some(why);
+            let laws = Laws::of(&frame, &regions);
+            let tallies = tallies.par_iter().zip(&regions);
+            tallies
+                .map(|(tally, region)| {
+                    let prediction = tally.prediction(&frame, equations);
+                    let sampling = |mixture: &PixelMoments| laws.sampling(mixture, region.place(&frame));
+                    let mut report = tally.report(&frame, *region, rails, prediction.as_ref(), sampling, false);
+                    for channel in report.channels.iter_mut().chain(&mut report.classes) {
+                        (channel.predicted_mean, channel.z_mean) = (None, None);
+                    }
+                    report
+                })
+                .collect()
+        }
+    };
+    for (report, patch) in reports.iter_mut().zip(patches) {
+        (report.patch, report.sample) = (Some(patch.at), patch.sample);
+    }
+    Ok(Report { regions: reports, check: None, unpredicted })
+}
+
+/// Sampling laws of the places of patches, at any level; none where the weights hang on the level.
+struct Laws(Vec<(Place, SamplingBasis)>);
+
+impl Laws {
+    fn of(frame: &FrameHeader, regions: &[Region]) -> Self {
+        let record = frame.metadata.demosaic.as_ref().filter(|_| is_rendered(frame));
+        let method = record.and_then(|record| Some((Method::named(&record.method)?, record.cfa)));
+        let table = method.map(|(method, cfa)| WeightTable::of(method, cfa)).filter(|table| !table.depends_on_hue());
+        let Some(table) = table else { return Self(Vec::new()) };
+        let mut places: Vec<Place> = Vec::new();
+        for place in regions.iter().map(|region| region.place(frame)) {
+            if !places.contains(&place) {
+                places.push(place);
+            }
+        }
+        let weights = table.about([1.0; 2]);
+        Self(places.into_par_iter().map(|place| (place, SamplingBasis::of(&weights, &place))).collect())
+    }
+
+    fn sampling(&self, mixture: &PixelMoments, place: Place) -> Sampling {
+        let known = self.0.iter().find(|(of, _)| *of == place);
+        let mut sampling = match known {
+            Some((_, basis)) => basis.sampling(&mixture.sites).through(&mixture.from_camera),
+            None => Sampling::of(&mixture.weights, &mixture.sites, &place),
+        };
+        sampling.covariance += beyond_weights(mixture);
+        sampling
+    }
+}
+
+/// Whether the frame was rendered and nothing was done to it that leaves a patch without a level of its own.
+fn is_rendered(frame: &FrameHeader) -> bool {
+    let transferred = frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
+    frame.metadata.scene.is_some() && !transferred
+}
+
+impl Tally {
+    /// What is predicted of a uniform scene whose means are those of the tally.
+    fn prediction(&self, frame: &FrameHeader, equations: Equations) -> Option<FramePrediction> {
+        if !is_rendered(frame) {
+            return None;
+        }
+        let expected = expected_electrons(frame, self.means(frame)?)?;
+        let mut uniform = frame.clone();
+        let scene = frame.metadata.scene.clone()?;
+        uniform.metadata.scene = Some(Scene { uniform: true, expected_electrons: Some(expected), ..scene });
+        propagation::of_frame(&uniform, equations).ok()
+    }
+
+    /// Means of the three planes, or of the classes of one; NaN for a class of which there is none.
+    fn means(&self, frame: &FrameHeader) -> Option<[f64; 3]> {
+        match (self.channels.channels(), frame.metadata.cfa) {
+            _ if self.channels.count == 0 => None,
+            (1, Some(_)) => Some(Class::ALL.map(|class| {
+                let moments = &self.classes[class as usize];
+                if moments.count > 0 { moments.mean[0] } else { f64::NAN }
+            })),
+            (1 | 2, _) => None,
+            _ => Some([0, 1, 2].map(|channel| self.channels.mean[channel])),
+        }
+    }
+}
+
+/// Expected signal electrons of R, G and B in a patch whose samples have these means; 0 for a class of which the means
+/// do not tell, or tell less than nothing. None where the metadata do not say enough.
+///
+/// Noise moves the means of L\*a\*b\* and xyY to second order, σ²/μ², and full well and the largest code hold them back:
+/// the first is far below the sampling error of a spread, the second leaves no level to work back to.
+pub fn expected_electrons(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 3]> {
+    let metadata = &frame.metadata;
+    let camera_signals = |xyz: [f64; 3]| -> Option<[f64; 3]> {
+        let record = metadata.color.as_ref()?;
+        let camera_from_xyz =
+            color::matrix(&record.xyz_from_camera).try_inverse()? * metadata.exposure?.exposure_s_sr();
+        Some((camera_from_xyz * Vector3::from(xyz) / metadata.adc?.adu_per_e).into())
+    };
+    let [first, second, third] = means;
+    let electrons = match metadata.quantity {
+        QuantityKind::ExpectedElectrons => means,
+        QuantityKind::Electrons => means.map(|mean| mean - metadata.dark_signal_e.unwrap_or(0.0)),
+        QuantityKind::Adu => {
+            let adc = metadata.adc?;
+            means.map(|mean| (mean - metadata.black_level_adu.unwrap_or(0.0)) / adc.adu_per_e)
+        }
+        QuantityKind::Xyz => camera_signals(means)?,
+        QuantityKind::Xyy => camera_signals(color::xyz_of_chromaticity([first, second], third))?,
+        QuantityKind::Lab => camera_signals(color::xyz_from_lab(means, metadata.color.as_ref()?.white?))?,
+        _ => return None,
+    };
+    Some(electrons.map(|e| if e.is_finite() { e.max(0.0) } else { 0.0 }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::optics::Exposure;
+    use crate::cfa::CfaPattern;
+    use crate::color::{lab_from_xyz, xyy_from_xyz};
+    use crate::frame::Geometry;
+    use crate::metadata::{AdcRecord, ColorRecord, DemosaicRecord, Metadata};
+    use crate::stream::MemoryFrame;
+
+    /// A chart of 5 columns in patches of 8x6.
+    fn chart(width: usize, height: usize, origin: [i32; 2]) -> FrameHeader {
+        let mut metadata = Metadata::new(QuantityKind::Electrons);
+        metadata.scene = Some(Scene {
+            source: "chart".into(),
+            uniform: false,
+            expected_electrons: None,
+            vignetting_focal_length_mm: None,
+            patch: Some([8, 6]),
+            source_width: Some(5),
+            brightest_e: None,
+        });
+        let geometry = Geometry { origin, ..Geometry::new(width, height, &["R", "G", "B"]) };
+        FrameHeader { name: "chart.exr".into(), geometry, metadata }
+    }
+
+    fn with_demosaic(mut frame: FrameHeader, method: &str) -> FrameHeader {
+        frame.metadata.demosaic = Some(DemosaicRecord { method: method.into(), cfa: CfaPattern::Rggb, black: 0.0 });
+        frame
+    }
+
+    #[test]
+    fn patches_are_laid_out_from_the_sensors_corner() {
+        let patches = of_frame(&chart(40, 18, [0, 0]), None).unwrap();
+        assert_eq!(patches.len(), 15);
+        let second_row = Patch { at: [1, 1], sample: Some(6), interior: Region { x: 8, y: 6, width: 8, height: 6 } };
+        assert_eq!(patches[6], second_row);
+        // A rim of the method's reach is left out.
+        let patches = of_frame(&with_demosaic(chart(40, 18, [0, 0]), "shti"), None).unwrap();
+        assert_eq!(patches[6].interior, Region { x: 10, y: 8, width: 4, height: 2 });
+        // The last column and row are cut.
+        let patches = of_frame(&chart(39, 17, [0, 0]), None).unwrap();
+        assert_eq!(patches.iter().map(|patch| patch.sample).collect::<Vec<_>>(), [0, 1, 2, 3, 5, 6, 7, 8].map(Some));
+    }
+
+    #[test]
+    fn a_crop_keeps_the_numbers_of_its_whole_patches() {
+        // Sensor columns 3 to 27 and rows 6 to 16: the patches of columns 1 and 2, row 1.
+        let patches = of_frame(&chart(25, 11, [3, 6]), None).unwrap();
+        let region = |x| Region { x, y: 0, width: 8, height: 6 };
+        assert_eq!(
+            patches,
+            [(1, 6, 5), (2, 7, 13)].map(|(column, sample, x)| Patch {
+                at: [column, 1],
+                sample: Some(sample),
+                interior: region(x)
+            })
+        );
+        // Of another chart the width is known only where the frame shows it whole.
+        let samples = |width, origin| {
+            let patches = of_frame(&chart(width, 6, origin), Some([4, 3])).unwrap();
+            patches.iter().map(|patch| patch.sample).collect::<Vec<_>>()
+        };
+        assert_eq!(samples(8, [0, 0]), [0, 1, 2, 3].map(Some));
+        assert_eq!(samples(9, [0, 0]), [None; 4]);
+        assert_eq!(samples(8, [4, 0]), [None; 4]);
+        // What lies before the sensor's corner is no chart.
+        let patches = of_frame(&chart(24, 6, [-8, 0]), None).unwrap();
+        assert_eq!(
+            patches.iter().map(|patch| (patch.at, patch.interior.x)).collect::<Vec<_>>(),
+            [([0, 0], 8), ([1, 0], 16)]
+        );
+    }
+
+    #[test]
+    fn what_has_no_patches_is_refused() {
+        let complaint = |frame: &FrameHeader, size| of_frame(frame, size).unwrap_err().to_string();
+        let mut plain = chart(40, 18, [0, 0]);
+        for patch in [Some([1, 1]), None] {
+            plain.metadata.scene.as_mut().unwrap().patch = patch;
+            assert!(complaint(&plain, None).contains("give --patches=WxH"));
+        }
+        assert!(complaint(&chart(10, 5, [4, 3]), None).contains("no patch of 8x6 lies whole within the frame of 10x5"));
+        let camera = with_demosaic(chart(40, 18, [0, 0]), "eci");
+        assert!(complaint(&camera, None).contains("patches of 8x6 have no interior"));
+        assert!(complaint(&camera, None).ends_with("they must be 7x7 at least"));
+        assert!(complaint(&camera, Some([41, 7])).contains("lies whole"));
+    }
+
+    /// Every stage leads back to the electrons that it came from; doubles carry the condition of the matrix, about 10.
+    #[test]
+    fn means_of_every_stage_lead_back_to_electrons() {
+        let electrons = [700.0, 1500.0, 2900.0];
+        let mut frame = chart(8, 6, [0, 0]);
+        let check = |frame: &FrameHeader, means: [f64; 3]| {
+            let found = expected_electrons(frame, means).unwrap();
+            for (found, expected) in found.into_iter().zip(electrons) {
+                assert!((found / expected - 1.0).abs() < 1e-12, "{:?}: {found} {expected}", frame.metadata.quantity);
+            }
+        };
+        frame.metadata.dark_signal_e = Some(30.0);
+        check(&frame, electrons.map(|e| e + 30.0));
+        assert_eq!(expected_electrons(&frame, [10.0, f64::NAN, 31.0]), Some([0.0, 0.0, 1.0]));
+        frame.metadata.quantity = QuantityKind::Adu;
+        assert_eq!(expected_electrons(&frame, electrons), None);
+        frame.metadata.adc = Some(AdcRecord { bits: 14, bias_adu: 100.0, adu_per_e: 0.25 });
+        frame.metadata.black_level_adu = Some(107.5);
+        check(&frame, electrons.map(|e| 0.25 * e + 107.5));
+
+        let exposure = Exposure { exposure_s: 0.02, f_number: 5.6, lens_transmittance: 1.0 };
+        let xyz_from_camera = [[0.4, 0.3, 0.2], [0.2, 0.7, 0.1], [0.01, 0.1, 0.9]];
+        let white = [950.0, 1000.0, 1080.0];
+        frame.metadata.exposure = Some(exposure);
+        frame.metadata.color = Some(ColorRecord { xyz_from_camera, method: None, black_adu: 7.0, white: Some(white) });
+        let camera = Vector3::from(electrons.map(|e| 0.25 * e));
+        let xyz: [f64; 3] = (color::matrix(&xyz_from_camera) / exposure.exposure_s_sr() * camera).into();
+        for (quantity, means) in [
+            (QuantityKind::Xyz, xyz),
+            (QuantityKind::Xyy, xyy_from_xyz(xyz, [0.3, 0.3])),
+            (QuantityKind::Lab, lab_from_xyz(xyz, white)),
+        ] {
+            frame.metadata.quantity = quantity;
+            check(&frame, means);
+        }
+        frame.metadata.quantity = QuantityKind::Srgb;
+        assert_eq!(expected_electrons(&frame, electrons), None);
+    }
+
+    /// The same numbers as of the same rectangles; predictions only where the frame was rendered.
+    #[test]
+    fn patches_are_measured_as_regions_are() {
+        let header = chart(37, 18, [2, 0]);
+        let samples: Vec<f32> = (0..37 * 3 * 18).map(|i| ((i * 7919) % 1013) as f32).collect();
+        let frame = || MemoryFrame::new(header.clone(), samples.clone());
+        let patches = measure(&mut frame(), None, Equations::Exact).unwrap();
+        let regions: Vec<Region> = patches.regions.iter().map(|report| report.region).collect();
+        assert_eq!(regions.len(), 9);
+        let plain = super::super::measure(&mut frame(), &regions, Equations::Exact, None).unwrap();
+        for (patch, region) in patches.regions.iter().zip(&plain.regions) {
+            assert!(patch.patch.is_some() && patch.sample.is_some() && region.patch.is_none());
+            assert_eq!(patch.covariance, region.covariance);
+            for (a, b) in patch.channels.iter().zip(&region.channels) {
+                assert_eq!((a.count, a.mean, a.std, a.min, a.max), (b.count, b.mean, b.std, b.min, b.max));
+            }
+        }
+        let mut other = frame();
+        other.header.metadata.scene = None;
+        let unknown = measure(&mut other, Some([8, 6]), Equations::Exact).unwrap();
+        assert!(
+            unknown.regions.iter().flat_map(|region| &region.channels).all(|channel| channel.predicted_std.is_none())
+        );
+    }
+}

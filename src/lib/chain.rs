@@ -1,0 +1,447 @@
+//! The whole noise budget of a uniform scene, stage by stage, by formula alone.
+//!
+//! The heads of the frames that the programs would pass on are made by the stages themselves; only no sample is. So what
+//! is predicted here is what `measure` compares such frames with.
+
+use crate::camera::optics::Exposure;
+use crate::camera::sensor::Sensor;
+use crate::cfa::CfaPattern;
+use crate::color::Space;
+use crate::color::difference::DELTA_E_PER_JND;
+use crate::error::{Error, Result};
+use crate::frame::Geometry;
+use crate::metadata::{CorrectionRecord, FrameHeader, Metadata, Scene};
+use crate::numerics::normal;
+use crate::propagation::budget::{Budget, Cause};
+use crate::propagation::frame::{Sites, quantity_of_sites};
+use crate::propagation::gains;
+use crate::propagation::smooth_hue::FirstOrder;
+use crate::propagation::{Equations, FramePrediction, PixelMoments};
+use crate::stages::adc::{AdcSettings, Digitize};
+use crate::stages::black::Black;
+use crate::stages::correct::{CorrectFrame, CorrectionSettings};
+use crate::stages::demosaic::stencil::PHASES;
+use crate::stages::demosaic::{Demosaic, Method};
+use crate::stages::mosaic::Mosaic;
+use crate::stages::noise::{AddNoise, NoiseSettings};
+use crate::stages::to_xyz::{ColorSettings, ToXyz};
+use crate::stream::Stage;
+use crate::units::QuantityKind;
+use nalgebra::{Matrix3, Vector3};
+use serde::Serialize;
+
+/// What a prediction follows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChainSettings {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// Exposure time and lens.
+    pub exposure: Exposure,
+    /// Noise sources, temperature.
+    pub noise: NoiseSettings,
+    /// Demosaicking method.
+    pub method: Method,
+    /// Pattern of the filter array; the sensor's own where none is given.
+    pub pattern: Option<CfaPattern>,
+    /// Matrix and white; XYZ and L*a*b* are predicted where there is one.
+    pub color: Option<ColorSettings>,
+    /// Dark frames whose mean is subtracted; none where the black level is subtracted as a constant.
+    pub dark_frames: u32,
+    /// Equations to predict by.
+    pub equations: Equations,
+    /// Patch whose mean is predicted, columns and rows.
+    pub patch: Option<[usize; 2]>,
+    /// Column and row of the patch's corner on the sensor; any where none is given.
+    pub patch_at: Option<[i64; 2]>,
+    /// The uncertainty that a mean shall have.
+    pub wanted: Option<Uncertainty>,
+}
+
+/// A wanted uncertainty of a mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Uncertainty {
+    /// Standard deviation over mean signal.
+    Relative(f64),
+    /// Expected colour difference, in just noticeable differences of 2.3 ΔE*ab.
+    Jnd(f64),
+}
+
+/// The stages of the chain, ready to predict one scene after another.
+#[derive(Debug, Clone)]
+pub struct Chain {
+    settings: ChainSettings,
+    heads: Vec<(&'static str, FrameHeader)>,
+}
+
+/// What is predicted of one scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChainPrediction {
+    /// Expected signal electrons of R, G and B.
+    pub electrons: [f64; 3],
+    /// One entry per stage.
+    pub stages: Vec<StagePrediction>,
+    /// Colour difference that noise makes at a pixel, where there is a matrix.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_delta_e: Option<NoiseDeltaE>,
+    /// How far to trust the linearisation of smooth hue transition, where that is the method.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_order: Option<FirstOrder>,
+}
+
+/// Moments of one stage.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StagePrediction {
+    /// `electrons`, `adu`, `dark_subtracted` (where dark frames are), `demosaicked`, `xyz` or `lab`.
+    pub stage: &'static str,
+    /// Unit of the samples.
+    pub unit: String,
+    /// Names of the channels.
+    pub channels: Vec<String>,
+    /// Mean of each.
+    pub mean: [f64; 3],
+    /// The part of the mean that noise brings about because the stage is curved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bias: Option<[f64; 3]>,
+    /// Standard deviation over the pixels of a frame, fixed patterns included.
+    pub std: [f64; 3],
+    /// The part that differs from exposure to exposure; none where it is not known apart.
+    pub temporal_std: Option<[f64; 3]>,
+    /// The part that is the same in every exposure of one sensor.
+    pub fixed_pattern_std: Option<[f64; 3]>,
+    /// 20 log₁₀ of the mean above black over the standard deviation; none where the mean is no signal.
+    pub snr_db: [Option<f64>; 3],
+    /// Covariance of the channels of a pixel, over the phases of the filter array.
+    pub covariance: [[f64; 3]; 3],
+    /// The same to second order, of smooth hue transition; `covariance` and `std` are its first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_order_covariance: Option<[[f64; 3]; 3]>,
+    /// The covariance for each of the four phases, of a demosaicked frame.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub phases: Vec<PhaseCovariance>,
+    /// Variance by cause; the causes add up to the variance.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub causes: Vec<CauseVariance>,
+    /// Standard deviation of the mean of the patch.
+    pub patch_mean_std: Option<[f64; 3]>,
+    /// Covariance of the mean of the patch.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch_mean_covariance: Option<[[f64; 3]; 3]>,
+    /// Pixels of the smallest square patch whose mean is as certain as wanted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pixels_needed: Option<[Option<u64>; 3]>,
+}
+
+/// Variance that one cause gives to the channels.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CauseVariance {
+    /// The cause.
+    pub cause: Cause,
+    /// Variance of each channel.
+    pub variance: [f64; 3],
+}
+
+/// Covariance of the pixels of one phase.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PhaseCovariance {
+    /// Parity of the sensor's column.
+    pub column: isize,
+    /// Parity of the sensor's row.
+    pub row: isize,
+    /// Class of the photosite there.
+    pub class: &'static str,
+    /// Covariance of the channels.
+    pub covariance: [[f64; 3]; 3],
+}
+
+/// Colour difference that noise makes: the distance in L*a*b* between a pixel and the colour without noise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NoiseDeltaE {
+    /// Expected ΔE*ab.
+    pub mean: f64,
+    /// Its standard deviation.
+    pub std: f64,
+    /// Expected difference in just noticeable ones.
+    pub jnd: f64,
+    /// Expected ΔE*ab of the mean of the patch.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch_mean: Option<f64>,
+    /// Pixels of the smallest square patch whose mean differs by no more than wanted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pixels_needed: Option<u64>,
+}
+
+/// What photosites are: their quantity, and how they were corrected.
+type Plane = (QuantityKind, Option<CorrectionRecord>);
+
+fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)]))
+}
+
+fn diagonal_std(covariance: &Matrix3<f64>) -> [f64; 3] {
+    [0, 1, 2].map(|i| covariance[(i, i)].max(0.0).sqrt())
+}
+
+impl Chain {
+    /// Sets the chain up.
+    ///
+    /// # Errors
+    ///
+    /// Those of the stages.
+    pub fn new(settings: ChainSettings) -> Result<Self> {
+        let sensor = &settings.sensor;
+        if settings.equations == Equations::Paper && settings.method == Method::Malvar {
+            return Err(Error::Usage("the paper has no equations for the method mhc; choose bi, shti or eci".into()));
+        }
+        let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+        metadata.sensor = Some(sensor.clone());
+        metadata.exposure = Some(settings.exposure);
+        metadata.scene = Some(Scene {
+            source: "formula".into(),
+            uniform: true,
+            expected_electrons: Some([0.0; 3]),
+            vignetting_focal_length_mm: None,
+            patch: None,
+            source_width: None,
+            brightest_e: None,
+        });
+        let geometry = Geometry::new(sensor.width as usize, sensor.height as usize, &["R", "G", "B"]);
+        let expected = FrameHeader { name: "the prediction".into(), geometry, metadata };
+        let electrons = AddNoise::new(&expected, &settings.noise)?.header().clone();
+        let adu = Digitize::new(&electrons, &AdcSettings::default())?.header().clone();
+        let mut heads = vec![("electrons", electrons), ("adu", adu.clone())];
+        let codes = if settings.dark_frames > 0 {
+            let darks = vec![&adu; settings.dark_frames as usize];
+            let nothing_else = CorrectionSettings { black: Black::None, cte: None };
+            let corrected = CorrectFrame::new(&adu, &nothing_else, &darks)?.header().clone();
+            heads.push(("dark_subtracted", corrected.clone()));
+            corrected
+        } else {
+            adu
+        };
+        let plane = Mosaic::new(&codes, settings.pattern)?.header().clone();
+        let camera = Demosaic::new(&plane, settings.method, Black::Auto, None)?.header().clone();
+        if let Some(color) = &settings.color {
+            let made = |space| ToXyz::new(&camera, &ColorSettings { space, ..color.clone() });
+            let (xyz, lab) = (made(Space::Xyz)?.header().clone(), made(Space::Lab)?.header().clone());
+            heads.extend([("demosaicked", camera), ("xyz", xyz), ("lab", lab)]);
+        } else {
+            heads.push(("demosaicked", camera));
+        }
+        Ok(Self { settings, heads })
+    }
+
+    /// The sensor.
+    pub fn sensor(&self) -> &Sensor {
+        &self.settings.sensor
+    }
+
+    /// The heads of the frames of each stage.
+    pub fn heads(&self) -> impl Iterator<Item = (&'static str, &FrameHeader)> {
+        self.heads.iter().map(|(stage, head)| (*stage, head))
+    }
+
+    /// Predicts the scene that expects so many signal electrons of R, G and B.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Data`] for electrons that no chain can have.
+    pub fn predict(&mut self, electrons: [f64; 3]) -> Result<ChainPrediction> {
+        let mut stages = Vec::new();
+        let mut noise_delta_e = None;
+        let mut first_order = None;
+        // Photosites are the same from the converter, or the subtraction of dark frames, on.
+        let mut known: Option<(Plane, Sites, [Budget; 3])> = None;
+        for (stage, head) in &mut self.heads {
+            if let Some(scene) = &mut head.metadata.scene {
+                scene.expected_electrons = Some(electrons);
+            }
+            let none =
+                |why| Error::Data(format!("nothing can be predicted of {stage} at {electrons:?} electrons: {why}"));
+            let plane = (quantity_of_sites(head), head.metadata.correction);
+            let (sites, causes) = match known.take().filter(|(of, ..)| *of == plane) {
+                Some((_, sites, causes)) => (sites, causes),
+                None => {
+                    let sites = Sites::of(head, self.settings.equations).map_err(none)?;
+                    let causes = electrons.map(|e| sites.photosite.budget(e));
+                    (sites, causes)
+                }
+            };
+            let prediction = sites.frame(head).map_err(none)?;
+            match &prediction {
+                FramePrediction::Pixels(mixture) if *stage == "lab" => {
+                    noise_delta_e = Some(self.settings.delta_e(mixture));
+                }
+                FramePrediction::Pixels(mixture) if *stage == "demosaicked" => {
+                    let variances = mixture.sites.map(|site| site.moments.variance);
+                    first_order =
+                        (self.settings.method == Method::SmoothHue).then(|| FirstOrder::of(mixture.mean, variances));
+                }
+                _ => {}
+            }
+            stages.push(self.settings.stage(stage, head, &prediction, &causes));
+            known = Some((plane, sites, causes));
+        }
+        Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order })
+    }
+}
+
+impl ChainSettings {
+    fn stage(
+        &self,
+        stage: &'static str,
+        head: &FrameHeader,
+        prediction: &FramePrediction,
+        causes: &[Budget; 3],
+    ) -> StagePrediction {
+        let metadata = &head.metadata;
+        let (mean, covariance) = match prediction {
+            FramePrediction::Planes(classes) => {
+                let variances = classes.map(|class| class.moments.variance);
+                (classes.map(|class| class.moments.mean), Matrix3::from_diagonal(&variances.into()))
+            }
+            FramePrediction::Pixels(mixture) if self.equations == Equations::Paper => {
+                (mixture.mean, mixture.covariance)
+            }
+            FramePrediction::Pixels(mixture) => {
+                let variances = mixture.sites.map(|site| site.moments.variance);
+                (mixture.mean, gains::mean_pixel(&mixture.weights).covariance(variances))
+            }
+        };
+        let second_order = match prediction {
+            FramePrediction::Pixels(mixture) if self.method == Method::SmoothHue => Some(rows(&mixture.covariance)),
+            _ => None,
+        };
+        let by_cause = self.by_cause(prediction, causes);
+        let part = |fixed: bool| {
+            (!by_cause.is_empty()).then(|| {
+                let chosen = by_cause.iter().filter(|entry| entry.cause.is_fixed_pattern() == fixed);
+                let sum = chosen.fold([0.0; 3], |sum, entry| [0, 1, 2].map(|i| sum[i] + entry.variance[i]));
+                sum.map(|variance| variance.max(0.0).sqrt())
+            })
+        };
+        let std = diagonal_std(&covariance);
+        let black = match metadata.quantity {
+            QuantityKind::Electrons => metadata.dark_signal_e.unwrap_or(0.0),
+            QuantityKind::Adu => metadata.black_level_adu.unwrap_or(0.0),
+            _ => 0.0,
+        };
+        let signal = mean.map(|mean| mean - black);
+        let is_signal = metadata.quantity != QuantityKind::Lab;
+        let snr_db = [0, 1, 2].map(|i| {
+            let ratio = signal[i] / std[i];
+            (is_signal && ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
+        });
+        let patch = self.patch.map(|size| self.patch_mean(prediction, &covariance, size));
+        let pixels_needed = match self.wanted {
+            Some(Uncertainty::Relative(wanted)) if is_signal => Some([0, 1, 2].map(|i| {
+                (signal[i] > 0.0).then_some(()).and_then(|()| {
+                    smallest_square(|side| {
+                        let variance = self.patch_mean(prediction, &covariance, [side; 2])[(i, i)];
+                        variance.max(0.0).sqrt() <= wanted * signal[i]
+                    })
+                })
+            })),
+            _ => None,
+        };
+        StagePrediction {
+            stage,
+            unit: metadata.unit.clone(),
+            channels: (0..3).map(|index| head.channel_name(index).to_owned()).collect(),
+            mean,
+            bias: match prediction {
+                FramePrediction::Pixels(mixture) if mixture.bias != [0.0; 3] => Some(mixture.bias),
+                _ => None,
+            },
+            std,
+            temporal_std: part(false),
+            fixed_pattern_std: part(true),
+            snr_db,
+            covariance: rows(&covariance),
+            second_order_covariance: second_order.filter(|_| self.equations == Equations::Exact),
+            phases: self.phases(prediction),
+            causes: by_cause,
+            patch_mean_std: patch.as_ref().map(diagonal_std),
+            patch_mean_covariance: patch.as_ref().map(rows),
+            pixels_needed,
+        }
+    }
+
+    /// Variance by cause; none for mixtures by the paper's equations, which do not keep causes apart.
+    fn by_cause(&self, prediction: &FramePrediction, causes: &[Budget; 3]) -> Vec<CauseVariance> {
+        let gains = match prediction {
+            FramePrediction::Planes(_) => None,
+            FramePrediction::Pixels(_) if self.equations == Equations::Paper => return Vec::new(),
+            FramePrediction::Pixels(mixture) => Some(gains::mean_pixel(&mixture.weights)),
+        };
+        let variance = |cause: Cause| {
+            let of_classes = [0, 1, 2].map(|class| causes[class][cause as usize]);
+            match &gains {
+                None => of_classes,
+                Some(gains) => gains.covariance(of_classes).diagonal().into(),
+            }
+        };
+        Cause::ALL.into_iter().map(|cause| CauseVariance { cause, variance: variance(cause) }).collect()
+    }
+
+    fn phases(&self, prediction: &FramePrediction) -> Vec<PhaseCovariance> {
+        let FramePrediction::Pixels(mixture) = prediction else { return Vec::new() };
+        if self.equations == Equations::Paper {
+            return Vec::new();
+        }
+        let variances = mixture.sites.map(|site| site.moments.variance);
+        let entry = |(phase, [column, row]): (usize, [isize; 2])| PhaseCovariance {
+            column,
+            row,
+            class: mixture.weights.class(phase, [0, 0]).letter(),
+            covariance: rows(&gains::pixel(&mixture.weights, phase).covariance(variances)),
+        };
+        PHASES.into_iter().enumerate().map(entry).collect()
+    }
+
+    /// Covariance of the mean of a patch. Before demosaicking, and by the paper, its pixels count as independent.
+    fn patch_mean(&self, prediction: &FramePrediction, covariance: &Matrix3<f64>, size: [usize; 2]) -> Matrix3<f64> {
+        match prediction {
+            FramePrediction::Pixels(mixture) if self.equations == Equations::Exact => {
+                let phase = self.patch_at.map(|[x, y]| crate::stages::demosaic::stencil::phase(x, y));
+                mixture.patch_mean_covariance(phase, size)
+            }
+            _ => covariance / (size[0] as f64 * size[1] as f64),
+        }
+    }
+
+    /// The colour difference that noise makes in L*a*b*.
+    fn delta_e(&self, mixture: &PixelMoments) -> NoiseDeltaE {
+        let found = match self.equations {
+            Equations::Exact => mixture.noise_length(mixture.bias, [1.0 / PHASES.len() as f64; PHASES.len()]),
+            Equations::Paper => normal::length(&Vector3::from(mixture.bias), &mixture.covariance),
+        };
+        // The mean of a patch is taken of XYZ, so that the curvature of L*a*b* does not bias it.
+        let of_patch = |size: [usize; 2]| {
+            let covariance =
+                self.patch_mean(&FramePrediction::Pixels(Box::new(mixture.clone())), &mixture.covariance, size);
+            normal::length(&Vector3::zeros(), &covariance).mean
+        };
+        let pixels_needed = match self.wanted {
+            Some(Uncertainty::Jnd(wanted)) => smallest_square(|side| of_patch([side; 2]) <= wanted * DELTA_E_PER_JND),
+            _ => None,
+        };
+        NoiseDeltaE {
+            mean: found.mean,
+            std: found.std(),
+            jnd: found.mean / DELTA_E_PER_JND,
+            patch_mean: self.patch.map(of_patch),
+            pixels_needed,
+        }
+    }
+}
+
+/// Pixels of the smallest square that is large enough; none up to 2²⁰ on a side.
+fn smallest_square(enough: impl Fn(usize) -> bool) -> Option<u64> {
+    let above = (0..=20).map(|power| 1_usize << power).find(|&side| enough(side))?;
+    let (mut too_small, mut fits) = (above / 2, above);
+    while fits - too_small > 1 {
+        let middle = usize::midpoint(too_small, fits);
+        if enough(middle) { fits = middle } else { too_small = middle }
+    }
+    Some((fits * fits) as u64)
+}

@@ -1,0 +1,236 @@
+//! Moments of a frame from its head alone.
+//!
+//! The way goes down once: from the head to the photosites that the frame was made of ([`Sites`]), from these to its
+//! pixels ([`PixelMoments`]).
+
+use super::moments::{Equations, Prediction};
+use super::photosite::Photosite;
+use super::pixel_moments::PixelMoments;
+use crate::cfa::Class;
+use crate::color;
+use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind, PredictedRecord};
+use crate::numerics::normal::MeanVariance;
+use crate::stages::demosaic::Method;
+use crate::stages::noise::NoiseModel;
+use crate::stages::transfer::{Transfer, uniform_share};
+use crate::units::QuantityKind;
+use nalgebra::Matrix3;
+
+/// Predicted moments of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FramePrediction {
+    /// Classes that are drawn apart: R, G and B before demosaicking.
+    Planes([Prediction; 3]),
+    /// Pixels that are weighted sums of photosites.
+    Pixels(Box<PixelMoments>),
+}
+
+/// Why nothing is predicted of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Unpredictable {
+    /// The metadata lack a key.
+    #[error("the metadata have no `{0}`")]
+    Missing(&'static str),
+    /// Photosites of a class expect different signals.
+    #[error("the scene is not uniform")]
+    NotUniform,
+    /// There is no formula for what was done.
+    #[error("{0}")]
+    Beyond(&'static str),
+}
+
+/// A prediction, or why there is none.
+pub type Predicted<T> = Result<T, Unpredictable>;
+
+/// Predicts a frame from its metadata alone.
+///
+/// # Errors
+///
+/// [`Unpredictable`] where the scene is not uniform, the stage is beyond what is predicted, or the metadata do not say
+/// enough.
+pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
+    Sites::of(frame, equations)?.frame(frame)
+}
+
+/// Writes the predicted moments of a frame into its metadata, where there are any.
+pub fn note(frame: &mut FrameHeader, equations: Equations) {
+    // A frame of which nothing can be predicted carries no prediction; `of_frame` tells why to whoever asks.
+    frame.metadata.predicted = of_frame(frame, equations).ok().map(|prediction| match prediction {
+        FramePrediction::Planes(classes) => PredictedRecord {
+            mean: classes.map(|class| class.moments.mean),
+            std: classes.map(|class| class.moments.std()),
+        },
+        FramePrediction::Pixels(pixels) => {
+            PredictedRecord { mean: pixels.mean, std: [0, 1, 2].map(|i| pixels.covariance[(i, i)].max(0.0).sqrt()) }
+        }
+    });
+}
+
+/// The quantity of the photosites that a frame was made of.
+pub(crate) fn quantity_of_sites(frame: &FrameHeader) -> QuantityKind {
+    match (frame.metadata.quantity, &frame.metadata.demosaic) {
+        (QuantityKind::Electrons | QuantityKind::ExpectedElectrons, _) | (_, None) => frame.metadata.quantity,
+        _ => QuantityKind::Adu,
+    }
+}
+
+/// The photosites of R, G and B that a frame was made of, in the unit that it was made in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sites {
+    /// What their samples follow from.
+    pub photosite: Photosite,
+    /// Signal electrons that they expect.
+    pub expected_e: [f64; 3],
+    /// Moments of their samples.
+    pub moments: [Prediction; 3],
+}
+
+impl Sites {
+    /// The photosites of a frame, or of the plane that it was made of.
+    ///
+    /// # Errors
+    ///
+    /// As [`of_frame`].
+    pub fn of(frame: &FrameHeader, equations: Equations) -> Predicted<Self> {
+        let metadata = &frame.metadata;
+        let scene = metadata.scene.as_ref().ok_or(Unpredictable::Missing("scene"))?;
+        if !scene.uniform {
+            return Err(Unpredictable::NotUniform);
+        }
+        let expected_e = scene.expected_electrons.ok_or(Unpredictable::Missing("scene.expected_electrons"))?;
+        let model = noise_model(frame)?;
+        let photosite = Photosite::of_electrons(model, equations);
+        let (photosite, moments) = match quantity_of_sites(frame) {
+            QuantityKind::ExpectedElectrons => {
+                let certain = |mean| Prediction { moments: MeanVariance { mean, variance: 0.0 }, excess_kurtosis: 0.0 };
+                (photosite, expected_e.map(certain))
+            }
+            QuantityKind::Electrons => {
+                let classes = expected_e.map(|mean| photosite.moments(mean));
+                (photosite, transferred(frame, &photosite, classes, 0.0)?)
+            }
+            QuantityKind::Adu => {
+                let codes = photosite.digitized(metadata.adc.ok_or(Unpredictable::Missing("adc"))?);
+                codes_of(frame, codes, expected_e)?
+            }
+            _ => return Err(Unpredictable::Beyond("only electrons, ADU and what is made of them are predicted")),
+        };
+        Ok(Self { photosite, expected_e, moments })
+    }
+
+    /// Predicts a frame that was made of these photosites.
+    ///
+    /// # Errors
+    ///
+    /// As [`of_frame`].
+    pub fn frame(&self, frame: &FrameHeader) -> Predicted<FramePrediction> {
+        let metadata = &frame.metadata;
+        let Some(record) = &metadata.demosaic else { return Ok(FramePrediction::Planes(self.moments)) };
+        let equations = self.photosite.equations;
+        let method = Method::named(&record.method)
+            .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
+        let third = self.photosite.third_cumulant(self.expected_e[Class::Green as usize]);
+        let size = [frame.geometry.width, frame.geometry.height];
+        let camera = PixelMoments::demosaicked(record, method, self.moments, third, size, equations)
+            .ok_or(Unpredictable::Beyond("the paper has no equations for its method of demosaicking"))?;
+        let Some(record) = &metadata.color else {
+            if metadata.quantity != quantity_of_sites(frame) {
+                return Err(Unpredictable::Missing("color"));
+            }
+            return Ok(FramePrediction::Pixels(Box::new(camera)));
+        };
+        let exposure = metadata.exposure.ok_or(Unpredictable::Missing("exposure"))?;
+        let xyz_from_adu = color::matrix(&record.xyz_from_camera) / exposure.exposure_s_sr();
+        let xyz = match equations {
+            Equations::Paper if method != Method::EffectiveColor => {
+                // Eq. 19 of [HP2005] takes the channels as independent; Eq. 20 keeps the correlations, for ECI.
+                let squares = xyz_from_adu.map(|element| element * element);
+                let independent = Matrix3::from_diagonal(&(squares * camera.covariance.diagonal()));
+                PixelMoments { covariance: independent, ..camera.through(&xyz_from_adu, record.black_adu) }
+            }
+            _ => camera.through(&xyz_from_adu, record.black_adu),
+        };
+        let pixels = match metadata.quantity {
+            QuantityKind::Xyz => xyz,
+            QuantityKind::Xyy => {
+                let local = color::xyy_about(xyz.mean).ok_or(Unpredictable::Beyond("its mean has no chromaticity"))?;
+                xyz.curved(&local)
+            }
+            QuantityKind::Lab => {
+                let white = record.white.ok_or(Unpredictable::Missing("color.white"))?;
+                xyz.curved(&color::lab_about(xyz.mean, white))
+            }
+            _ => return Err(Unpredictable::Beyond("of colors only XYZ, xyY and L*a*b* are predicted")),
+        };
+        Ok(FramePrediction::Pixels(Box::new(pixels)))
+    }
+}
+
+/// Codes as the converter gave them and charge transfer left them, or as they were corrected.
+fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Predicted<(Photosite, [Prediction; 3])> {
+    let metadata = &frame.metadata;
+    let shifted = |prediction: Prediction, by: f64| Prediction {
+        moments: MeanVariance { mean: prediction.moments.mean + by, ..prediction.moments },
+        ..prediction
+    };
+    let Some(correction) = &metadata.correction else {
+        let bias_adu = codes.adc.map_or(0.0, |adc| adc.bias_adu);
+        let above_bias = expected_e.map(|mean| shifted(codes.moments(mean), -bias_adu));
+        let left = transferred(frame, &codes, above_bias, 1.0 / 12.0)?;
+        return Ok((codes, left.map(|code| shifted(code, bias_adu))));
+    };
+    if correction.cte.is_some() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+        return Err(Unpredictable::Beyond(
+            "what charge transfer and its undoing do to noise differs from place to place",
+        ));
+    }
+    let corrected = codes.less_dark_frames(correction.dark_frames);
+    let black_adu = if correction.dark_frames > 0 { 0.0 } else { correction.black_adu };
+    Ok((corrected, expected_e.map(|mean| shifted(corrected.moments(mean), -black_adu))))
+}
+
+/// What charge transfer leaves of photosites whose mean is in proportion to charge: the same share of the mean everywhere,
+/// and of the variance, apart from read noise and from that of `rounding`, what it leaves on average over the frame.
+fn transferred(
+    frame: &FrameHeader,
+    photosite: &Photosite,
+    classes: [Prediction; 3],
+    rounding: f64,
+) -> Predicted<[Prediction; 3]> {
+    let Some(cte) = frame.metadata.noise.as_ref().and_then(|noise| noise.cte) else { return Ok(classes) };
+    // Behind a filter array charge moves between classes: where they differ, so do means from place to place.
+    let is_level = classes.iter().all(|class| class.moments.mean == classes[0].moments.mean);
+    if frame.metadata.demosaic.is_some() || (frame.metadata.cfa.is_some() && !is_level) {
+        return Err(Unpredictable::Beyond("charge transfer mixes classes of unequal signals"));
+    }
+    let transfer = Transfer::new(cte, &frame.geometry)
+        .map_err(|_| Unpredictable::Beyond("its charge transfer efficiency is impossible"))?;
+    let of_variance = transfer.mean_square_share();
+    let slope = photosite.slope();
+    let after = photosite.model.read_noise_e.powi(2) * slope * slope + rounding;
+    Ok(classes.map(|class| {
+        let mean = class.moments.mean * uniform_share(cte);
+        let variance = (class.moments.variance - after).max(0.0) * of_variance + after.min(class.moments.variance);
+        Prediction { moments: MeanVariance { mean, variance }, ..class }
+    }))
+}
+
+/// The noise model of a frame; one without noise record has no noise, and no dark signal.
+fn noise_model(frame: &FrameHeader) -> Predicted<NoiseModel> {
+    let silent = NoiseRecord {
+        sources: vec![],
+        seed: 0,
+        sensor_seed: 0,
+        frame: 0,
+        temperature_k: 0.0,
+        dark_e: 0.0,
+        poisson: PoissonKind::Exact,
+        cte: None,
+    };
+    let record = frame.metadata.noise.as_ref().unwrap_or(&silent);
+    let mut model = NoiseModel::of(frame, record).map_err(|_| Unpredictable::Missing("sensor"))?;
+    if frame.metadata.noise.is_none() {
+        model.full_well_e = f64::INFINITY;
+    }
+    Ok(model)
+}

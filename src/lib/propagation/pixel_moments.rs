@@ -1,0 +1,122 @@
+//! Moments of pixels that are weighted sums of photosites: demosaicked, and what is made of them.
+
+use super::gains;
+use super::moments::{Equations, Prediction};
+use super::paper;
+use super::smooth_hue::{self, hues};
+use crate::color;
+use crate::metadata::DemosaicRecord;
+use crate::numerics::normal::{self, MeanVariance};
+use crate::stages::demosaic::Method;
+use crate::stages::demosaic::stencil::PHASES;
+use crate::stages::demosaic::weights::{WeightTable, Weights};
+use nalgebra::{Matrix3, Vector3};
+
+/// Moments of pixels each of which is a weighted sum of photosites that are drawn apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PixelMoments {
+    /// Mean of the three channels, bias included.
+    pub mean: [f64; 3],
+    /// How far noise moves the mean where the channels are curved functions of the photosites, to second order.
+    pub bias: [f64; 3],
+    /// Covariance of the three channels of a pixel, over all pixels of a large frame; to second order for smooth hue
+    /// transition, whose first order, as everyone's covariance, follows from `weights` and `sites`.
+    pub covariance: Matrix3<f64>,
+    /// What each channel is made of, to first order.
+    pub weights: Weights,
+    /// Derivatives of these channels with respect to demosaicked R, G and B.
+    pub from_camera: Matrix3<f64>,
+    /// Moments of the photosites of R, G and B, in the unit that the weights act on.
+    pub sites: [Prediction; 3],
+}
+
+impl PixelMoments {
+    /// What demosaicking makes of photosites, by the exact weights or by the paper's equations; none where the paper has
+    /// none.
+    ///
+    /// `third` is the third cumulant of the green photosites, `size` that of the frame. The hues that smooth hue transition
+    /// divides by are those of the means above the black level that was subtracted.
+    pub(super) fn demosaicked(
+        record: &DemosaicRecord,
+        method: Method,
+        sites: [Prediction; 3],
+        third: f64,
+        size: [usize; 2],
+        equations: Equations,
+    ) -> Option<Self> {
+        let mean = sites.map(|site| site.moments.mean - record.black);
+        let weights = WeightTable::of(method, record.cfa).about(hues(mean));
+        let variances = sites.map(|site| site.moments.variance);
+        let mut bias = [0.0; 3];
+        let covariance = match equations {
+            Equations::Exact => match smooth_hue::second_order(method, record.cfa, mean, variances, third) {
+                Some(second) => {
+                    bias = second.bias;
+                    second.covariance
+                }
+                None => gains::mean_pixel(&weights).covariance(variances),
+            },
+            Equations::Paper => paper::demosaicked(method, variances, mean, Some(size))?,
+        };
+        Some(Self {
+            mean: [0, 1, 2].map(|i| mean[i] + bias[i]),
+            bias,
+            covariance,
+            weights,
+            from_camera: Matrix3::identity(),
+            sites,
+        })
+    }
+
+    /// The same pixels in the channels that are `matrix` times these, less `black`.
+    #[must_use]
+    pub fn through(&self, matrix: &Matrix3<f64>, black: f64) -> Self {
+        Self {
+            mean: (matrix * Vector3::from(self.mean.map(|mean| mean - black))).into(),
+            bias: (matrix * Vector3::from(self.bias)).into(),
+            covariance: matrix * self.covariance * matrix.transpose(),
+            weights: self.weights.through(matrix),
+            from_camera: matrix * self.from_camera,
+            sites: self.sites,
+        }
+    }
+
+    /// The same pixels in a space that is not linear in these channels: covariance to first order, through the Jacobian
+    /// at the mean; the mean with its bias of second order.
+    #[must_use]
+    pub(super) fn curved(&self, local: &color::Local) -> Self {
+        let straight = self.through(&local.jacobian, 0.0);
+        let bias = local.bias(&self.covariance);
+        Self { mean: [0, 1, 2].map(|i| local.value[i] + bias[i]), bias, ..straight }
+    }
+
+    /// Covariance of a pixel of each phase of the filter array; what the second order adds counts for all alike.
+    pub fn phase_covariances(&self) -> [Matrix3<f64>; PHASES.len()] {
+        let variances = self.sites.map(|site| site.moments.variance);
+        let further = self.covariance - gains::mean_pixel(&self.weights).covariance(variances);
+        std::array::from_fn(|phase| gains::pixel(&self.weights, phase).covariance(variances) + further)
+    }
+
+    /// Distance of a pixel from what lies `offset` before the mean, the phases of the filter array in these shares.
+    ///
+    /// Pixels of each phase are normal, those of all together are not: the mean length is the mean over the phases.
+    pub fn noise_length(&self, offset: [f64; 3], shares: [f64; PHASES.len()]) -> MeanVariance {
+        let offset = Vector3::from(offset);
+        let (mut mean, mut square) = (0.0, 0.0);
+        for (share, covariance) in shares.into_iter().zip(self.phase_covariances()) {
+            let length = normal::length(&offset, &covariance);
+            mean += share * length.mean;
+            square += share * (length.variance + length.mean.powi(2));
+        }
+        MeanVariance { mean, variance: (square - mean * mean).max(0.0) }
+    }
+
+    /// Gains of the covariance of the mean of a patch, its corner on `phase`, or on any.
+    pub fn patch_mean_covariance(&self, phase: Option<usize>, size: [usize; 2]) -> Matrix3<f64> {
+        let gains = match phase {
+            Some(phase) => gains::patch_mean(&self.weights, phase, size),
+            None => gains::mean_patch_mean(&self.weights, size),
+        };
+        gains.covariance(self.sites.map(|site| site.moments.variance))
+    }
+}

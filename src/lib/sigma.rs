@@ -1,0 +1,172 @@
+//! Standard deviations beside pixels: a stage that wraps demosaicking or conversion and adds their layers.
+//!
+//! The noise of each pixel follows from the sensor's noise model at the pixel's own level ([`PixelNoise`]), so that scenes
+//! need not be uniform.
+
+use crate::color::{Space, lab_about, xyy_about};
+use crate::error::{Error, Result};
+use crate::frame::{Rows, Window, to_sample};
+use crate::metadata::FrameHeader;
+use crate::propagation::covariance::{stds, through};
+use crate::propagation::pixels::PixelNoise;
+use crate::stages::demosaic::Demosaic;
+use crate::stages::to_xyz::ToXyz;
+use crate::stream::{Counts, Stage};
+
+/// Channels of the layer of covariances of XYZ.
+pub const COVARIANCE_LAYER: [&str; 6] =
+    ["covariance.XX", "covariance.XY", "covariance.XZ", "covariance.YY", "covariance.YZ", "covariance.ZZ"];
+
+/// A stage that makes three planes of pixels whose noise can be told from the noise of demosaicked R, G and B.
+pub trait Propagating: Stage {
+    /// Names of the layers, in the order in which files have them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where what the stage makes has no uncertainty to tell.
+    fn layers(&self) -> Result<Vec<&'static str>>;
+
+    /// Fills the layers of row `y`, one plane after another, from the rows that the stage saw and the three planes that it
+    /// made; gives the number of pixels where propagation is void.
+    fn fill_layers(
+        &self,
+        noise: &PixelNoise,
+        input: &Window<'_, Self::Input>,
+        y: usize,
+        made: [&[f32]; 3],
+        layers: &mut [f32],
+    ) -> u64;
+}
+
+/// A stage and, beside each pixel that it makes, how uncertain the pixel is.
+#[derive(Debug, Clone)]
+pub struct WithSigma<S> {
+    stage: S,
+    header: FrameHeader,
+    noise: PixelNoise,
+}
+
+impl WithSigma<Demosaic> {
+    /// Demosaicking with a layer of standard deviations.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`PixelNoise::of`].
+    pub fn of_demosaicking(stage: Demosaic) -> Result<Self> {
+        let noise = PixelNoise::of(stage.header())?;
+        Self::new(stage, noise)
+    }
+}
+
+impl WithSigma<ToXyz> {
+    /// The conversion of `input` with a layer of standard deviations and, for XYZ, one of the six covariances. xyY and
+    /// L\*a\*b\* are taken to first order.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`PixelNoise::of`]; [`Error::Usage`] for sRGB, a picture.
+    pub fn of_conversion(stage: ToXyz, input: &FrameHeader) -> Result<Self> {
+        stage.layers()?;
+        Self::new(stage, PixelNoise::of(input)?)
+    }
+}
+
+impl<S: Propagating> WithSigma<S> {
+    fn new(stage: S, noise: PixelNoise) -> Result<Self> {
+        let mut header = stage.header().clone();
+        header.geometry.channels.extend(stage.layers()?.into_iter().map(str::to_owned));
+        Ok(Self { stage, header, noise })
+    }
+
+    /// The head of the frame that comes out, to add to.
+    pub fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.header
+    }
+}
+
+impl<S: Propagating> Stage for WithSigma<S> {
+    type Input = S::Input;
+    type Output = S::Output;
+
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn reach(&self) -> usize {
+        self.stage.reach()
+    }
+
+    fn apply(&self, input: Window<'_, S::Input>, mut output: Rows<'_, S::Output>) -> Counts {
+        let mut counts = self.stage.apply(input, output.reborrow());
+        for y in output.range() {
+            let (made, layers) = output.three_and_rest(y);
+            counts.propagation_void +=
+                self.stage.fill_layers(&self.noise, &input, y, made.map(|plane| &*plane), layers);
+        }
+        counts
+    }
+}
+
+impl Propagating for Demosaic {
+    fn layers(&self) -> Result<Vec<&'static str>> {
+        Ok(vec!["sigma.R", "sigma.G", "sigma.B"])
+    }
+
+    fn fill_layers(&self, noise: &PixelNoise, _: &Window<'_>, y: usize, made: [&[f32]; 3], layers: &mut [f32]) -> u64 {
+        fill(made[0].len(), layers, |x| {
+            let (covariance, holds) = noise.covariance([x, y], made.map(|plane| f64::from(plane[x])));
+            (stds(&covariance).into_iter(), holds)
+        })
+    }
+}
+
+impl Propagating for ToXyz {
+    fn layers(&self) -> Result<Vec<&'static str>> {
+        match self.space() {
+            Space::Xyz => Ok(COVARIANCE_LAYER.into_iter().chain(["sigma.R", "sigma.G", "sigma.B"]).collect()),
+            Space::Xyy => Ok(vec!["sigma.x", "sigma.y", "sigma.Y"]),
+            Space::Lab => Ok(vec!["sigma.L", "sigma.a", "sigma.b"]),
+            Space::Srgb => Err(Error::Usage(
+                "--sigma gives the uncertainty of xyz, xyy or lab; srgb is a picture to look at".into(),
+            )),
+        }
+    }
+
+    fn fill_layers(
+        &self,
+        noise: &PixelNoise,
+        input: &Window<'_, Self::Input>,
+        y: usize,
+        _: [&[f32]; 3],
+        layers: &mut [f32],
+    ) -> u64 {
+        let planes = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
+        fill(input.width(), layers, |x| {
+            let rgb = planes.map(|plane| f64::from(plane[x]));
+            let (camera, holds) = noise.covariance([x, y], rgb);
+            let of_xyz = through(&camera, self.xyz_from_adu());
+            let xyz = self.xyz(rgb).into();
+            let covariance = match self.space() {
+                Space::Lab => through(&of_xyz, &lab_about(xyz, self.white()).jacobian),
+                Space::Xyy => xyy_about(xyz).map_or([0.0; 6], |local| through(&of_xyz, &local.jacobian)),
+                Space::Xyz | Space::Srgb => of_xyz,
+            };
+            let shown = if self.space() == Space::Xyz { covariance.len() } else { 0 };
+            (covariance.into_iter().take(shown).chain(stds(&covariance)), holds)
+        })
+    }
+}
+
+/// Fills planes of `width` samples, one after another, with the values of each pixel; gives the number of pixels whose
+/// values do not hold.
+fn fill<V: Iterator<Item = f64>>(width: usize, planes: &mut [f32], values: impl Fn(usize) -> (V, bool)) -> u64 {
+    let mut void = 0;
+    for x in 0..width {
+        let (values, holds) = values(x);
+        void += u64::from(!holds);
+        for (plane, value) in values.enumerate() {
+            planes[plane * width + x] = to_sample(value);
+        }
+    }
+    void
+}

@@ -1,0 +1,18 @@
+//! The stages, in the order in which light meets them. Each is a [`crate::stream::Stage`] that refuses a frame which comes
+//! at the wrong time.
+
+pub mod black;
+pub mod render;
+
+pub mod noise;
+pub mod transfer;
+
+pub mod adc;
+
+pub mod correct;
+
+pub mod mosaic;
+
+pub mod demosaic;
+
+pub mod to_xyz;

@@ -1,0 +1,102 @@
+//! The colour filter array: of three planes, each photosite keeps the one that its filter lets through.
+
+use crate::cfa::CfaPattern;
+use crate::error::Result;
+use crate::frame::{Rows, Window};
+use crate::metadata::FrameHeader;
+use crate::numerics::vectors::{self, Instructions, Kernel};
+use crate::stream::{Counts, Stage};
+use crate::units::{Any, QuantityKind};
+
+/// Keeps of each pixel the sample of its photosite's class (the **M**_Bayer of [HP2005, Sec. 3.5]).
+#[derive(Debug, Clone)]
+pub struct Mosaic {
+    header: FrameHeader,
+    pattern: CfaPattern,
+}
+
+impl Mosaic {
+    /// The mosaic of `input`; without a pattern, that of its sensor, or R G / G B.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`](crate::error::Error::Format) unless the frame has the three planes R, G and B of photosites.
+    pub fn new(input: &FrameHeader, pattern: Option<CfaPattern>) -> Result<Self> {
+        if let (1, Some(cfa)) = (input.geometry.channels.len(), input.metadata.cfa) {
+            return Err(input.refuse(format!("it is a CFA plane already, {cfa}")));
+        }
+        let is_light = !matches!(
+            input.metadata.quantity,
+            QuantityKind::Xyz
+                | QuantityKind::Xyy
+                | QuantityKind::Lab
+                | QuantityKind::Srgb
+                | QuantityKind::SpectralRadiance
+                | QuantityKind::ColorDifference
+        );
+        if !input.has_three_planes() || !is_light {
+            return Err(input.refuse(format!(
+                "it holds {}; a mosaic is made of the three planes R, G and B of a sensor",
+                input.holds()
+            )));
+        }
+        let of_sensor = input.metadata.sensor.as_ref().map(|sensor| sensor.cfa);
+        let pattern = pattern.or(of_sensor).unwrap_or(CfaPattern::Rggb);
+        let mut metadata = input.metadata.becoming(input.metadata.quantity);
+        metadata.predicted.clone_from(&input.metadata.predicted);
+        metadata.cfa = Some(pattern);
+        metadata.demosaic = None;
+        let header = FrameHeader { geometry: input.geometry.with_channels(&["Y"]), metadata, name: input.name.clone() };
+        Ok(Self { header, pattern })
+    }
+
+    /// The head of the mosaicked frame, to add to.
+    pub fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.header
+    }
+
+    /// What [`Stage::apply`] does, on one set of instructions; the bits are the same on all of them.
+    pub fn apply_on(&self, instructions: Instructions, input: Window<'_>, mut output: Rows<'_>) -> Counts {
+        for y in output.range() {
+            let classes = self.pattern.row_classes(self.header.geometry.origin, y);
+            let [even, odd] = classes.map(|class| input.row(y.cast_signed(), class as usize));
+            vectors::run_on(instructions, Alternate { even, odd, to: output.row(y, 0) });
+        }
+        Counts::default()
+    }
+}
+
+impl Stage for Mosaic {
+    type Input = Any;
+    type Output = Any;
+
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn apply(&self, input: Window<'_>, output: Rows<'_>) -> Counts {
+        self.apply_on(Instructions::widest(), input, output)
+    }
+}
+
+/// Columns by columns from two rows: the even ones of the first, the odd ones of the second.
+struct Alternate<'a> {
+    even: &'a [f32],
+    odd: &'a [f32],
+    to: &'a mut [f32],
+}
+
+impl Kernel for Alternate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (pairs, last) = self.to.as_chunks_mut::<2>();
+        for ((to, even), odd) in pairs.iter_mut().zip(self.even.as_chunks::<2>().0).zip(self.odd.as_chunks::<2>().0) {
+            *to = [even[0], odd[1]];
+        }
+        if let ([last], [.., sample]) = (last, self.even) {
+            *last = *sample;
+        }
+    }
+}

@@ -1,0 +1,527 @@
+//! The noise module: from expected electrons to those of one exposure.
+//!
+//! M = DCSN ∘ DCNU + SSN ∘ PRNU + RON        [HP2005, Eq. 10]
+//!
+//! DCNU and PRNU are fixed patterns: they hang on the sensor's seed alone. DCSN, SSN and RON are temporal: they hang on
+//! seed and frame. Where charge transfer is simulated, it takes light and dark charge to the output before RON is added.
+
+use crate::cfa::Class;
+use crate::error::{Error, Result};
+use crate::frame::{Rows, Window, to_sample};
+use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
+use crate::numerics::vectors::{self, Instructions, Kernel};
+use crate::random::philox::{BLOCK, LANES};
+use crate::random::poisson::Table;
+use crate::random::{Run, RunWords, Source, spans};
+use crate::stages::transfer::{Transfer, uniform_share};
+use crate::stream::{Counts, Stage};
+use crate::units::{Electrons, ExpectedElectrons, QuantityKind};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The numbers that the noise of a photosite follows from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseModel {
+    /// Mean dark signal Q_DC before non-uniformity, e⁻ [HP2005, Eq. 7].
+    pub dark_e: f64,
+    /// Relative rms of the dark current over photosites; 0 when left out.
+    pub dcnu: f64,
+    /// Relative rms of the response over photosites; 0 when left out.
+    pub prnu: f64,
+    /// Read noise, rms e⁻; 0 when left out.
+    pub read_noise_e: f64,
+    /// Full well, e⁻.
+    pub full_well_e: f64,
+    /// Whether the dark signal has shot noise.
+    pub dark_shot: bool,
+    /// Whether the light signal has shot noise.
+    pub signal_shot: bool,
+    /// How Poisson numbers are drawn.
+    pub poisson: PoissonKind,
+}
+
+impl NoiseModel {
+    /// The model of a noise record.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingKey`] when the frame has no sensor.
+    pub fn of(frame: &FrameHeader, record: &NoiseRecord) -> Result<Self> {
+        let sensor = frame.sensor()?;
+        let drawn = |source| record.sources.contains(&source);
+        let if_drawn = |source, value| if drawn(source) { value } else { 0.0 };
+        Ok(Self {
+            dark_e: record.dark_e,
+            dcnu: if_drawn(Source::Dcnu, sensor.dcnu),
+            prnu: if_drawn(Source::Prnu, sensor.prnu),
+            read_noise_e: if_drawn(Source::Ron, sensor.read_noise_e),
+            full_well_e: sensor.full_well_e,
+            dark_shot: drawn(Source::Dcsn),
+            signal_shot: drawn(Source::Ssn),
+            poisson: record.poisson,
+        })
+    }
+}
+
+/// What a user may set of the noise.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct NoiseSettings {
+    /// Seed of the temporal noise.
+    pub seed: u64,
+    /// Seed of the fixed patterns.
+    pub sensor_seed: u64,
+    /// Number of the exposure.
+    pub frame: u32,
+    /// Sources to leave out; their means stay.
+    pub without: Vec<Source>,
+    /// Temperature in K, the sensor's own where none is given.
+    pub temperature_k: Option<f64>,
+    /// How to draw Poisson numbers.
+    pub poisson: PoissonKind,
+    /// Share of a packet that each move to the output takes along; none leaves transfer out.
+    pub cte: Option<f64>,
+}
+
+/// Draws one noisy exposure.
+#[derive(Debug, Clone)]
+pub struct AddNoise {
+    header: FrameHeader,
+    model: NoiseModel,
+    record: NoiseRecord,
+    transfer: Option<Transfer>,
+    tables: Tables,
+    instructions: Instructions,
+}
+
+/// Counts at rates that are known beforehand: those of the dark signal, and of light where the scene is uniform.
+#[derive(Debug, Clone, Default)]
+struct Tables {
+    dark: Option<Arc<Table>>,
+    light: [Option<Arc<Table>>; 3],
+}
+
+impl Tables {
+    /// The tables that a frame is large enough for.
+    fn of(frame: &FrameHeader, model: &NoiseModel, instructions: Instructions) -> Self {
+        /// Photosites from which on a table saves more than it costs.
+        const WORTHWHILE: usize = 1 << 17;
+        /// Rates from which on the widest vectors work counts out faster than they are looked up.
+        const FEW: f64 = 10.0;
+        let geometry = &frame.geometry;
+        if model.poisson != PoissonKind::Exact || geometry.width * geometry.height < WORTHWHILE {
+            return Self::default();
+        }
+        let table = |rate: f64| Table::new(to_sample(rate)).map(Arc::new);
+        let scene = frame.metadata.scene.as_ref().filter(|scene| scene.uniform && model.signal_shot);
+        let rates = scene.and_then(|scene| scene.expected_electrons);
+        let is_slow = |rates: &[f64; 3]| instructions == Instructions::Avx512 && rates.iter().all(|&rate| rate >= FEW);
+        let light = rates.filter(|rates| !is_slow(rates)).map(|rates| rates.map(table));
+        let dark = if model.dark_shot { table(model.dark_e) } else { None };
+        Self { dark, light: light.unwrap_or_default() }
+    }
+}
+
+/// The dark signal is left out where its variance is below this share of that of the read noise: the total standard
+/// deviation changes by less than half of it.
+const NEGLIGIBLE_DARK: f64 = 1e-9;
+
+impl AddNoise {
+    /// The noise of `input`, whose metadata gives sensor and exposure.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Order`] unless the frame holds expected electrons of photosites; [`Error::MissingKey`] without sensor
+    /// or exposure; [`Error::Usage`] for an impossible temperature or charge transfer efficiency; [`Error::Format`]
+    /// where charge of a crop would be transferred.
+    pub fn new(input: &FrameHeader, settings: &NoiseSettings) -> Result<Self> {
+        let holds = input.holds();
+        match input.metadata.quantity {
+            QuantityKind::ExpectedElectrons if input.metadata.demosaic.is_none() => {}
+            QuantityKind::Electrons => {
+                return Err(
+                    input.refuse(format!("it holds {holds} that have their noise already; noise is added once"))
+                );
+            }
+            _ => {
+                let problem = format!("it holds {holds}, not expected electrons of photosites");
+                return Err(input.out_of_order(problem, "render-radiance"));
+            }
+        }
+        plane_classes(input)?;
+        let sensor = input.sensor()?;
+        let temperature_k = settings.temperature_k.unwrap_or(sensor.temperature_k);
+        if !(1.0..=1000.0).contains(&temperature_k) {
+            return Err(Error::Usage(format!(
+                "a temperature of {temperature_k} K is impossible for a sensor; give 1 to 1000"
+            )));
+        }
+        let transfer = match settings.cte {
+            Some(cte) => {
+                input.check_corner()?;
+                Some(Transfer::new(cte, &input.geometry)?)
+            }
+            None => None,
+        };
+        // Eq. 7: Q_DC = I_DC Δt.
+        let mut dark_e = sensor.dark_current_e_per_s(temperature_k) * input.exposure()?.exposure_s;
+        let mut metadata = input.metadata.becoming(QuantityKind::Electrons);
+        let mut sources: Vec<Source> =
+            Source::ALL.into_iter().filter(|source| !settings.without.contains(source)).collect();
+        let read_variance = if sources.contains(&Source::Ron) { sensor.read_noise_e.powi(2) } else { 0.0 };
+        if dark_e > 0.0 && dark_e * (1.0 + sensor.dcnu.powi(2)) < NEGLIGIBLE_DARK * read_variance {
+            metadata.leave_out(
+                "add-noise",
+                format!("dark signal of {dark_e:.1e} e-"),
+                format!("its variance is below {NEGLIGIBLE_DARK:e} of that of the read noise"),
+            );
+            dark_e = 0.0;
+        }
+        if dark_e == 0.0 {
+            sources.retain(|source| !matches!(source, Source::Dcsn | Source::Dcnu));
+        }
+        sources.retain(|source| match source {
+            Source::Dcnu => sensor.dcnu > 0.0,
+            Source::Prnu => sensor.prnu > 0.0,
+            Source::Ron => sensor.read_noise_e > 0.0,
+            Source::Dcsn | Source::Ssn => true,
+        });
+        let record = NoiseRecord {
+            sources,
+            seed: settings.seed,
+            sensor_seed: settings.sensor_seed,
+            frame: settings.frame,
+            temperature_k,
+            dark_e,
+            poisson: settings.poisson,
+            cte: settings.cte,
+        };
+        let model = NoiseModel::of(input, &record)?;
+        metadata.dark_signal_e = Some(dark_e * rectified_mean(model.dcnu) * settings.cte.map_or(1.0, uniform_share));
+        metadata.noise = Some(record.clone());
+        let instructions = Instructions::widest();
+        let tables = Tables::of(input, &model, instructions);
+        let header = FrameHeader { metadata, ..input.clone() };
+        Ok(Self { header, model, record, transfer, tables, instructions })
+    }
+
+    /// Draws on a narrower set of instructions than the widest there is; the noise is the same.
+    pub fn on(mut self, instructions: Instructions) -> Self {
+        self.instructions = instructions;
+        self.tables = Tables::of(&self.header, &self.model, instructions);
+        self
+    }
+
+    /// The head of the noisy frame, to add to.
+    pub fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.header
+    }
+
+    /// What a user should hear before the frame is made.
+    pub fn warning(&self) -> Option<String> {
+        let apart = self.transfer.is_some() && self.header.metadata.cfa.is_none();
+        apart.then(|| {
+            "each of the three planes is transferred by itself, as if its class were at every photosite; for what a \
+             sensor does run `mosaic` first"
+                .into()
+        })
+    }
+}
+
+/// The sensor classes of the frame's planes: three planes, or none for a CFA plane whose classes alternate.
+///
+/// # Errors
+///
+/// [`Error::Format`] when the frame has neither three planes nor a CFA pattern.
+fn plane_classes(frame: &FrameHeader) -> Result<()> {
+    match (frame.geometry.channels.len(), frame.metadata.cfa) {
+        (3, None) if frame.has_three_planes() => Ok(()),
+        (1, Some(_)) => Ok(()),
+        _ => Err(frame.refuse(format!(
+            "it holds {}; noise needs the three planes R, G, B, or one CFA plane whose pattern the metadata names",
+            frame.holds()
+        ))),
+    }
+}
+
+/// Mean of max(0, N) for N normal with mean 1: a photosite has no negative sensitivity, so draws below zero count as
+/// zero, which lifts the mean by σ φ(1/σ) − Φ(−1/σ) (10⁻⁸ at σ = 0.2).
+pub fn rectified_mean(sigma: f64) -> f64 {
+    use crate::numerics::normal::{cumulative, density};
+    if sigma <= 0.0 { 1.0 } else { cumulative(1.0 / sigma) + sigma * density(1.0 / sigma) }
+}
+
+/// Mean square of max(0, N) for N normal with mean 1.
+pub fn rectified_mean_square(sigma: f64) -> f64 {
+    use crate::numerics::normal::{cumulative, density};
+    if sigma <= 0.0 { 1.0 } else { (1.0 + sigma * sigma) * cumulative(1.0 / sigma) + sigma * density(1.0 / sigma) }
+}
+
+impl Stage for AddNoise {
+    type Input = ExpectedElectrons;
+    type Output = Electrons;
+
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn reach(&self) -> usize {
+        self.transfer.as_ref().map_or(0, Transfer::reach)
+    }
+
+    fn apply(&self, input: Window<'_, ExpectedElectrons>, mut output: Rows<'_, Electrons>) -> Counts {
+        let rows = output.range();
+        let Some(transfer) = &self.transfer else {
+            let draw = Expose { noise: self, input, output };
+            return vectors::run_on(self.instructions, draw);
+        };
+        let mut counts = Counts::default();
+        let (mut words, mut charge, mut noise) = (RunWords::default(), vec![0.0; input.width()], [0.0; BLOCK]);
+        for channel in 0..input.channels() {
+            let mut passage = transfer.passage();
+            // The rows above are drawn again, and counted in the band that they belong to.
+            for y in rows.start.saturating_sub(transfer.reach())..rows.end {
+                let line = self.line(y, channel);
+                let expected = input.row(y.cast_signed(), channel);
+                let charges = Charges { line: &line, expected, charge: &mut charge };
+                let of_row = vectors::run_on(self.instructions, charges);
+                for (entering, &charge) in passage.entering(y).iter_mut().zip(&charge) {
+                    *entering = f64::from(charge);
+                }
+                if y >= rows.start {
+                    counts = counts.plus(of_row);
+                    let noisy = output.row(y, channel);
+                    for (noisy, &charge) in noisy.iter_mut().zip(passage.leaving(y)) {
+                        *noisy = to_sample(charge);
+                    }
+                    for span in spans(line.first_column, noisy.len()) {
+                        let run = line.run(&span);
+                        run.make_temporal(&mut words);
+                        counts.not_finite += line.read(&run, &words, &mut noise, &mut noisy[span]);
+                    }
+                }
+            }
+        }
+        counts
+    }
+}
+
+/// One row of one plane.
+struct Line<'a> {
+    model: &'a NoiseModel,
+    record: &'a NoiseRecord,
+    tables: &'a Tables,
+    /// Row of the sensor, and column of the frame's first.
+    row: i32,
+    first_column: i32,
+    /// Classes of the frame's even and odd columns.
+    classes: [Class; 2],
+}
+
+impl AddNoise {
+    fn line(&self, y: usize, channel: usize) -> Line<'_> {
+        let geometry = &self.header.geometry;
+        let classes = match self.header.metadata.cfa {
+            Some(pattern) => pattern.row_classes(geometry.origin, y),
+            None => [Class::ALL[channel]; 2],
+        };
+        let [first_column, y0] = geometry.origin;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
+        let row = y0.wrapping_add(y as i32);
+        let Self { model, record, tables, .. } = self;
+        Line { model, record, tables, row, first_column, classes }
+    }
+}
+
+/// Makes rows of a noisy exposure without charge transfer.
+struct Expose<'a> {
+    noise: &'a AddNoise,
+    input: Window<'a, ExpectedElectrons>,
+    output: Rows<'a, Electrons>,
+}
+
+impl Kernel for Expose<'_> {
+    type Output = Counts;
+
+    #[inline(always)]
+    fn run(self) -> Counts {
+        let Self { noise, input, mut output } = self;
+        let mut counts = Counts::default();
+        let mut scratch = Scratch::default();
+        for y in output.range() {
+            for channel in 0..input.channels() {
+                let line = noise.line(y, channel);
+                let expected = input.row(y.cast_signed(), channel);
+                let noisy = output.row(y, channel);
+                for span in spans(line.first_column, expected.len()) {
+                    let run = line.run(&span);
+                    let (expected, noisy) = (&expected[span.clone()], &mut noisy[span]);
+                    run.make_temporal(&mut scratch.words);
+                    line.charges(&run, &mut scratch, expected, noisy, &mut counts);
+                    counts.not_finite += line.read(&run, &scratch.words, &mut scratch.normals, noisy);
+                }
+            }
+        }
+        counts
+    }
+}
+
+/// Makes the charge of one row, before it is transferred.
+struct Charges<'a> {
+    line: &'a Line<'a>,
+    expected: &'a [f32],
+    charge: &'a mut [f32],
+}
+
+impl Kernel for Charges<'_> {
+    type Output = Counts;
+
+    #[inline(always)]
+    fn run(self) -> Counts {
+        let mut counts = Counts::default();
+        let mut scratch = Scratch::default();
+        for span in spans(self.line.first_column, self.expected.len()) {
+            let run = self.line.run(&span);
+            let (expected, charge) = (&self.expected[span.clone()], &mut self.charge[span]);
+            run.make_temporal(&mut scratch.words);
+            self.line.charges(&run, &mut scratch, expected, charge, &mut counts);
+        }
+        counts
+    }
+}
+
+/// Memory for the numbers of a run.
+struct Scratch {
+    words: RunWords,
+    rates: [f32; BLOCK],
+    light: [f32; BLOCK],
+    dark: [f32; BLOCK],
+    normals: [f32; BLOCK],
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        let empty = [0.0; BLOCK];
+        Self { words: RunWords::default(), rates: empty, light: empty, dark: empty, normals: empty }
+    }
+}
+
+impl Line<'_> {
+    /// The draws of the photosites in a span of the frame's columns.
+    fn run(&self, span: &Range<usize>) -> Run {
+        let record = self.record;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
+        let column = self.first_column.wrapping_add(span.start as i32);
+        Run {
+            seed: record.seed,
+            sensor_seed: record.sensor_seed,
+            frame: record.frame,
+            place: [column, self.row],
+            classes: [span.start, span.start + 1].map(|x| self.classes[x % 2] as u8),
+            length: span.len().next_multiple_of(LANES),
+        }
+    }
+
+    /// Draws the charge of each photosite, light and dark, clipped at full well. The run's temporal words are made.
+    #[inline(always)]
+    fn charges(&self, run: &Run, scratch: &mut Scratch, expected: &[f32], charge: &mut [f32], counts: &mut Counts) {
+        let model = self.model;
+        let Scratch { words, rates, light, dark, normals } = scratch;
+        let [rates, light, dark, normals] = [rates, light, dark, normals].map(|numbers| &mut numbers[..run.length]);
+        let mut negative = 0_u32;
+        for (rate, &expected) in rates.iter_mut().zip(expected) {
+            negative += u32::from(expected < 0.0);
+            *rate = if expected < 0.0 { 0.0 } else { expected };
+        }
+        // What fills the run up looks like the rest, so that it takes no path of its own.
+        for index in expected.len()..run.length {
+            rates[index] = rates[index.saturating_sub(2)];
+        }
+        counts.negative += u64::from(negative);
+
+        self.shot(model.signal_shot, Source::Ssn, run, words, rates, light);
+        // No count stands for a rate that is no number.
+        for (light, &rate) in light.iter_mut().zip(&*rates) {
+            *light = if rate.is_nan() { rate } else { *light };
+        }
+        if model.prnu > 0.0 || model.dcnu > 0.0 {
+            run.make_pattern(words);
+        }
+        if model.prnu > 0.0 {
+            run.normals(words, Source::Prnu, normals);
+            scale(light, to_sample(model.prnu), normals);
+        }
+        if model.dark_e > 0.0 {
+            rates.fill(to_sample(model.dark_e));
+            self.shot(model.dark_shot, Source::Dcsn, run, words, rates, dark);
+            if model.dcnu > 0.0 {
+                run.normals(words, Source::Dcnu, normals);
+                scale(dark, to_sample(model.dcnu), normals);
+            }
+            for (light, &dark) in light.iter_mut().zip(&*dark) {
+                *light += dark;
+            }
+        }
+        let full_well = to_sample(model.full_well_e);
+        let mut full = 0_u32;
+        for (charge, &light) in charge.iter_mut().zip(&*light) {
+            full += u32::from(light > full_well);
+            *charge = if light > full_well { full_well } else { light };
+        }
+        counts.full_well += u64::from(full);
+    }
+
+    /// Fills `numbers` with counts at `rates`, or with the rates themselves where there is no shot noise.
+    #[inline(always)]
+    fn shot(&self, is_drawn: bool, source: Source, run: &Run, words: &RunWords, rates: &[f32], numbers: &mut [f32]) {
+        if !is_drawn {
+            numbers.copy_from_slice(rates);
+        } else if self.model.poisson == PoissonKind::Gaussian {
+            run.normals(words, source, numbers);
+            for (number, &rate) in numbers.iter_mut().zip(rates) {
+                *number = rate + rate.sqrt() * *number;
+            }
+        } else if let Some(tables) = self.tables_at(source, run, rates) {
+            run.counts_of(words, source, tables, numbers);
+        } else {
+            run.counts(words, source, rates, numbers);
+        }
+    }
+
+    /// The tables of the run's rates, where all its photosites have those.
+    #[inline(always)]
+    fn tables_at(&self, source: Source, run: &Run, rates: &[f32]) -> Option<[&Table; 2]> {
+        let tables = match source {
+            Source::Dcsn => [self.tables.dark.as_deref(); 2],
+            _ => run.classes.map(|class| self.tables.light[usize::from(class)].as_deref()),
+        };
+        let [Some(even), Some(odd)] = tables else { return None };
+        let known = [even.rate(), odd.rate()];
+        let differs = |pair: &[f32; 2]| (pair[0] != known[0]) | (pair[1] != known[1]);
+        let any = rates.as_chunks::<2>().0.iter().fold(false, |any, pair| any | differs(pair));
+        (!any).then_some([even, odd])
+    }
+
+    /// Reads packets of charge out; gives the number of samples that are not finite.
+    #[inline(always)]
+    fn read(&self, run: &Run, words: &RunWords, normals: &mut [f32; BLOCK], charge: &mut [f32]) -> u64 {
+        if self.model.read_noise_e > 0.0 {
+            let normals = &mut normals[..run.length];
+            run.normals(words, Source::Ron, normals);
+            let rms = to_sample(self.model.read_noise_e);
+            for (charge, &normal) in charge.iter_mut().zip(&*normals) {
+                *charge += rms * normal;
+            }
+        }
+        let not_finite = charge.iter().fold(0_u32, |count, charge| count + u32::from(!charge.is_finite()));
+        u64::from(not_finite)
+    }
+}
+
+/// Multiplies each number by max(0, 1 + σ n).
+#[inline(always)]
+fn scale(numbers: &mut [f32], sigma: f32, normals: &[f32]) {
+    for (number, &normal) in numbers.iter_mut().zip(normals) {
+        let sensitivity = 1.0 + sigma * normal;
+        *number *= if sensitivity > 0.0 { sensitivity } else { 0.0 };
+    }
+}

@@ -1,0 +1,266 @@
+//! From demosaicked ADU to CIE XYZ and on to xyY, L*a*b* and a viewable sRGB.
+
+use crate::color::{
+    D65_XY, Space, White, lab_from_xyz, linear_srgb_from_xyz, matrix, rows_of, srgb_encode, xyy_from_xyz,
+    xyz_of_chromaticity,
+};
+use crate::error::{Error, Result};
+use crate::frame::{Rows, Window, to_sample};
+use crate::metadata::{ColorRecord, FrameHeader};
+use crate::numerics::vectors::{self, Instructions, Kernel};
+use crate::stream::{Counts, Stage};
+use crate::units::{Adu, QuantityKind, Tristimulus};
+use nalgebra::{Matrix3, Vector3};
+
+/// What a user may set of the conversion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColorSettings {
+    /// The matrix, XYZ from black-free ADU per s sr.
+    pub xyz_from_camera: [[f64; 3]; 3],
+    /// How it was fitted, for the record.
+    pub method: Option<String>,
+    /// The space.
+    pub space: Space,
+    /// The white of L*a*b* and sRGB.
+    pub white: White,
+    /// Luminance of a white that is given by its chromaticity, cd m⁻²; that at which the camera saturates where none is
+    /// given.
+    pub white_luminance: Option<f64>,
+}
+
+/// Turns demosaicked ADU into colours.
+///
+/// x = M ρ / H        ρ: ADU above black; H = t π T / (4N² + 1)        [HP2005, Eq. 18, per exposure]
+#[derive(Debug, Clone)]
+pub struct ToXyz {
+    header: FrameHeader,
+    space: Space,
+    /// XYZ from ADU above black, exposure included.
+    xyz_from_adu: Matrix3<f64>,
+    black: f64,
+    white: [f64; 3],
+    srgb_from_xyz: Matrix3<f64>,
+}
+
+impl ToXyz {
+    /// The conversion of `input`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Order`] unless the frame holds three planes of ADU; [`Error::MissingKey`] without exposure;
+    /// [`Error::Usage`] for an impossible white.
+    pub fn new(input: &FrameHeader, settings: &ColorSettings) -> Result<Self> {
+        let holds = input.holds();
+        match input.metadata.quantity {
+            QuantityKind::Adu | QuantityKind::Unspecified => {}
+            QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
+                return Err(input.out_of_order(format!("it holds {holds}, not ADU"), "digitize"));
+            }
+            _ => return Err(input.refuse(format!("it holds {holds}: it is converted already"))),
+        }
+        if input.metadata.cfa.is_some() || input.geometry.channels.len() == 1 {
+            return Err(input.out_of_order(format!("it holds {holds}, not three classes at each pixel"), "demosaic"));
+        }
+        if !input.has_three_planes() {
+            return Err(input.refuse(format!("it holds {holds}; a camera has the three planes R, G and B")));
+        }
+        let exposure = input.exposure()?;
+        let black = input.metadata.black_level_adu.unwrap_or(0.0);
+        let xyz_from_adu = matrix(&settings.xyz_from_camera) / exposure.exposure_s_sr();
+        let needs_white = matches!(settings.space, Space::Lab | Space::Srgb);
+        let mut known_white = true;
+        let white = match settings.white {
+            White::Absolute(white) => white,
+            White::D65 | White::EqualEnergy => {
+                let xy = if settings.white == White::D65 { D65_XY } else { [1.0 / 3.0, 1.0 / 3.0] };
+                let at_saturation = || -> Option<f64> {
+                    let range = input.metadata.white_level_adu? - black;
+                    Some((xyz_from_adu * Vector3::repeat(range)).y)
+                };
+                let luminance = match settings.white_luminance.or_else(at_saturation) {
+                    Some(luminance) => luminance,
+                    None if needs_white => {
+                        return Err(input.missing("white_level_adu", "--white-luminance CD_PER_M2"));
+                    }
+                    None => {
+                        known_white = false;
+                        1.0
+                    }
+                };
+                xyz_of_chromaticity(xy, luminance)
+            }
+        };
+        if needs_white && !white.iter().all(|&value| value > 0.0 && value.is_finite()) {
+            return Err(Error::Usage(format!(
+                "a white of XYZ {:.6} {:.6} {:.6} is impossible; all three must be above 0",
+                white[0], white[1], white[2]
+            )));
+        }
+        let (quantity, channels) = match settings.space {
+            Space::Xyz => (QuantityKind::Xyz, ["R", "G", "B"]),
+            Space::Xyy => (QuantityKind::Xyy, ["x", "y", "Y"]),
+            Space::Lab => (QuantityKind::Lab, ["L", "a", "b"]),
+            Space::Srgb => (QuantityKind::Srgb, ["R", "G", "B"]),
+        };
+        let mut metadata = input.metadata.becoming(quantity);
+        metadata.black_level_adu = None;
+        metadata.white_level_adu = None;
+        metadata.color = Some(ColorRecord {
+            xyz_from_camera: settings.xyz_from_camera,
+            method: settings.method.clone(),
+            black_adu: black,
+            white: known_white.then_some(white),
+        });
+        let geometry = input.geometry.with_channels(&channels);
+        let srgb_from_xyz = if needs_white { linear_srgb_from_xyz(white) } else { Matrix3::identity() };
+        let header = FrameHeader { name: input.name.clone(), geometry, metadata };
+        Ok(Self { header, space: settings.space, xyz_from_adu, black, white, srgb_from_xyz })
+    }
+
+    /// The space of the converted frame.
+    pub fn space(&self) -> Space {
+        self.space
+    }
+
+    /// XYZ of the white that L*a*b* and sRGB refer to.
+    pub fn white(&self) -> [f64; 3] {
+        self.white
+    }
+
+    /// XYZ from ADU above black, the exposure included.
+    pub fn xyz_from_adu(&self) -> &Matrix3<f64> {
+        &self.xyz_from_adu
+    }
+
+    /// XYZ of a pixel of the input.
+    pub fn xyz(&self, rgb: [f64; 3]) -> Vector3<f64> {
+        self.xyz_from_adu * Vector3::from(rgb.map(|sample| sample - self.black))
+    }
+
+    /// The head of the converted frame, to add to.
+    pub fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.header
+    }
+
+    /// What [`Stage::apply`] does, on one set of instructions; the bits are the same on all of them.
+    pub fn apply_on(
+        &self,
+        instructions: Instructions,
+        input: Window<'_, Adu>,
+        mut output: Rows<'_, Tristimulus>,
+    ) -> Counts {
+        let mut counts = Counts::default();
+        if self.space == Space::Xyz {
+            let xyz_from_adu = rows_of(&self.xyz_from_adu);
+            for y in output.range() {
+                let rgb = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
+                let (black, xyz) = (self.black, output.three(y));
+                counts.not_finite += vectors::run_on(instructions, XyzRow { xyz_from_adu, black, rgb, xyz });
+            }
+            return counts;
+        }
+        let white_sum: f64 = self.white.iter().sum();
+        let white_xy = [self.white[0] / white_sum, self.white[1] / white_sum];
+        for y in output.range() {
+            let planes = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
+            let [first, second, third] = output.three(y);
+            for x in 0..input.width() {
+                let xyz = self.xyz(planes.map(|plane| f64::from(plane[x])));
+                let color = match self.space {
+                    Space::Xyz => xyz.into(),
+                    Space::Xyy => xyy_from_xyz(xyz.into(), white_xy),
+                    Space::Lab => lab_from_xyz(xyz.into(), self.white),
+                    Space::Srgb => {
+                        let linear = self.srgb_from_xyz * xyz;
+                        counts.out_of_gamut += u64::from(linear.iter().any(|v| !(-1e-6..=1.0 + 1e-6).contains(v)));
+                        <[f64; 3]>::from(linear).map(|v| srgb_encode(v.clamp(0.0, 1.0)))
+                    }
+                };
+                counts.not_finite += u64::from(color.iter().any(|value| !value.is_finite()));
+                (first[x], second[x], third[x]) = (to_sample(color[0]), to_sample(color[1]), to_sample(color[2]));
+            }
+        }
+        counts
+    }
+}
+
+impl Stage for ToXyz {
+    type Input = Adu;
+    type Output = Tristimulus;
+
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn apply(&self, input: Window<'_, Adu>, output: Rows<'_, Tristimulus>) -> Counts {
+        self.apply_on(Instructions::widest(), input, output)
+    }
+}
+
+/// XYZ of a row, in doubles; gives the pixels that are not finite.
+struct XyzRow<'a> {
+    xyz_from_adu: [[f64; 3]; 3],
+    black: f64,
+    rgb: [&'a [f32]; 3],
+    xyz: [&'a mut [f32]; 3],
+}
+
+impl Kernel for XyzRow<'_> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn run(self) -> u64 {
+        let Self { xyz_from_adu: m, black, rgb: [red, green, blue], xyz: [to_x, to_y, to_z] } = self;
+        let width = to_x.len();
+        let (red, green, blue) = (&red[..width], &green[..width], &blue[..width]);
+        let (to_y, to_z) = (&mut to_y[..width], &mut to_z[..width]);
+        let [[rx, gx, bx], [ry, gy, by], [rz, gz, bz]] = m;
+        let mut not_finite = 0;
+        for index in 0..width {
+            let r = f64::from(red[index]) - black;
+            let g = f64::from(green[index]) - black;
+            let b = f64::from(blue[index]) - black;
+            let x = rx * r + gx * g + bx * b;
+            let y = ry * r + gy * g + by * b;
+            let z = rz * r + gz * g + bz * b;
+            not_finite += u64::from(!(x.is_finite() & y.is_finite() & z.is_finite()));
+            to_x[index] = to_sample(x);
+            to_y[index] = to_sample(y);
+            to_z[index] = to_sample(z);
+        }
+        not_finite
+    }
+}
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Also where one colour of a pixel is no number, at every place of a vector.
+    #[test]
+    fn rows_of_xyz_are_the_products_of_the_matrix_on_every_set_of_instructions() {
+        let matrix = Matrix3::new(8.7e-4, 4.5e-5, 4.4e-5, 3.7e-4, 3.1e-4, -2.6e-5, 1.0e-4, -1.6e-4, 5.3e-4);
+        let plane = |seed: usize| -> Vec<f32> {
+            let strange = [f32::NAN, f32::INFINITY, f32::MAX];
+            let sample = |x: usize| if x % 37 == seed { strange[x % 3] } else { (x * 7919 % 4096 * seed) as f32 };
+            (0..331).map(sample).collect()
+        };
+        let planes = [1, 2, 3].map(plane);
+        for set in Instructions::ALL {
+            let mut made = [(); 3].map(|()| vec![0.0; 331]);
+            let rgb = planes.each_ref().map(|plane| &plane[..]);
+            let xyz = made.each_mut().map(|plane| &mut plane[..]);
+            let row = XyzRow { xyz_from_adu: rows_of(&matrix), black: 102.3, rgb, xyz };
+            let not_finite = vectors::run_on(set, row);
+            let mut expected = 0;
+            for x in 0..331 {
+                let value = matrix * Vector3::from(planes.each_ref().map(|plane| f64::from(plane[x]) - 102.3));
+                expected += u64::from(value.iter().any(|value| !value.is_finite()));
+                for (made, value) in made.iter().zip(&value) {
+                    let sample = to_sample(*value);
+                    assert!(made[x].to_bits() == sample.to_bits() || made[x].is_nan() && sample.is_nan());
+                }
+            }
+            assert_eq!(not_finite, expected);
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! What is counted while samples pass.
+
+use crate::metadata::SamplesRecord;
+
+/// What a stage counts while samples pass.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Photosites whose charge was clipped at full well.
+    pub full_well: u64,
+    /// Samples clipped to the smallest code.
+    pub clipped_low: u64,
+    /// Samples clipped to the largest code.
+    pub clipped_high: u64,
+    /// Samples that are NaN or infinite.
+    pub not_finite: u64,
+    /// Expected electrons below zero.
+    pub negative: u64,
+    /// Demosaicked values without a green to divide by, or beyond the range of samples.
+    pub undefined_hue: u64,
+    /// Colours outside sRGB.
+    pub out_of_gamut: u64,
+    /// Pixels whose noise cannot be propagated.
+    pub propagation_void: u64,
+}
+
+impl Counts {
+    /// The sums of two counts.
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            full_well: self.full_well + other.full_well,
+            clipped_low: self.clipped_low + other.clipped_low,
+            clipped_high: self.clipped_high + other.clipped_high,
+            not_finite: self.not_finite + other.not_finite,
+            negative: self.negative + other.negative,
+            undefined_hue: self.undefined_hue + other.undefined_hue,
+            out_of_gamut: self.out_of_gamut + other.out_of_gamut,
+            propagation_void: self.propagation_void + other.propagation_void,
+        }
+    }
+
+    /// The record for a sidecar: what did not happen is left out.
+    pub fn record(self, digest: String) -> SamplesRecord {
+        let some = |count: u64| (count > 0).then_some(count);
+        SamplesRecord {
+            digest,
+            full_well: some(self.full_well),
+            clipped_low: some(self.clipped_low),
+            clipped_high: some(self.clipped_high),
+            not_finite: some(self.not_finite),
+            negative: some(self.negative),
+            undefined_hue: some(self.undefined_hue),
+            out_of_gamut: some(self.out_of_gamut),
+            propagation_void: some(self.propagation_void),
+        }
+    }
+
+    /// What a user should hear about, one sentence each.
+    pub fn warnings(self) -> Vec<String> {
+        [
+            (self.full_well, "photosites were clipped at full well"),
+            (self.clipped_low, "samples were clipped to the smallest code"),
+            (self.clipped_high, "samples were clipped to the largest code"),
+            (self.not_finite, "samples are NaN or infinite"),
+            (self.negative, "expected signals below zero were taken as zero"),
+            (
+                self.undefined_hue,
+                "values had no green to divide by, or lay beyond the range of samples; bilinear ones stand in",
+            ),
+            (self.out_of_gamut, "colours lie outside sRGB and were clipped"),
+            (
+                self.propagation_void,
+                "pixels have a green too near its noise to divide by; their standard deviations say only that they are large",
+            ),
+        ]
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect()
+    }
+}

@@ -1,0 +1,56 @@
+//! What a stream is made of: sources of rows, stages, sinks of rows.
+
+use super::counts::Counts;
+use crate::error::Result;
+use crate::frame::{Rows, Window};
+use crate::metadata::FrameHeader;
+use crate::units::Quantity;
+
+/// Rows of a frame, top to bottom.
+pub trait RowSource: Send {
+    /// Geometry and metadata.
+    fn header(&self) -> &FrameHeader;
+    /// The number of rows that the source makes together; asking for multiples of it saves work.
+    fn natural_rows(&self) -> usize;
+    /// Whether the rows come from another program, which may take any time to give them.
+    fn may_wait(&self) -> bool {
+        false
+    }
+    /// Appends the next `rows` rows, laid out as `[row][channel][column]`.
+    ///
+    /// # Errors
+    ///
+    /// What the file's reader complains of. Rows beyond the last must not be asked for.
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()>;
+}
+
+/// Takes rows, top to bottom.
+pub trait RowSink: Send {
+    /// Takes whole rows, laid out as `[row][channel][column]`.
+    ///
+    /// # Errors
+    ///
+    /// What the file's writer complains of.
+    fn write(&mut self, samples: &[f32]) -> Result<()>;
+}
+
+/// A step of the chain: a value with a method from band to band.
+pub trait Stage: Sync {
+    /// What the samples were.
+    type Input: Quantity;
+    /// What they become.
+    type Output: Quantity;
+
+    /// The head of the frame that comes out.
+    fn header(&self) -> &FrameHeader;
+
+    /// Rows above and below that a row of the output depends on.
+    fn reach(&self) -> usize {
+        0
+    }
+
+    /// Fills `output` from `input`, which holds the same rows and [`Self::reach`] more on either side.
+    ///
+    /// What a row becomes must not depend on how the frame is cut into bands.
+    fn apply(&self, input: Window<'_, Self::Input>, output: Rows<'_, Self::Output>) -> Counts;
+}
