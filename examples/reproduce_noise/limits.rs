@@ -5,7 +5,7 @@ use crate::prediction::{Equation, Sites, effective_share, independent, of_frame,
 use cyanometer::error::Result;
 use cyanometer::numerics::moments::Moments;
 use cyanometer::propagation::gains;
-use cyanometer::propagation::{Equations, Photosite};
+use cyanometer::propagation::{self, Equations, Photosite};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::Method;
 use nalgebra::Matrix3;

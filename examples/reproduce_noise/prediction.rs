@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::frame::mirror;
 use cyanometer::propagation::gains::{self, Gains};
-use cyanometer::propagation::{Equations, Photosite, paper};
+use cyanometer::propagation::{self, Equations, Photosite, paper};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::demosaic::stencil::{PHASES, REACH, phase};
 use cyanometer::stages::demosaic::weights::{WeightTable, Weights};
