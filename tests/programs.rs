@@ -497,7 +497,7 @@ fn noise_is_predicted_checked_and_carried_along() {
         (
             "to-xyz rgb.exr --matrix m.yaml --space srgb --sigma",
             2,
-            "--sigma gives the uncertainty of xyz, xyy or lab; srgb is a picture to look at",
+            "standard deviations are those of xyz, xyy or lab; srgb is a picture to look at",
         ),
         ("predict-noise", 2, "give a spectrum, --electrons R,G,B, --dark or --sweep"),
         ("predict-noise --dark --sweep 1:10:3lin", 2, "a sweep scales the signal of a scene, but this one is dark"),
@@ -1071,7 +1071,7 @@ const MISTAKES: [(&str, i32, &str); 74] = [
     (
         "color-difference 1,2,3 4,5,6 --map map.exr",
         BAD_USAGE,
-        "--map needs an image; two colors have no map of differences",
+        "a map needs an image; two colors have no map of differences",
     ),
     (
         "color-difference xyz.exr 4,5,6 --map map.tiff",
@@ -1091,7 +1091,7 @@ const MISTAKES: [(&str, i32, &str); 74] = [
     (
         "color-difference 1,2,3 4,5,6 --white 1,1,1 --white-luminance 2",
         BAD_USAGE,
-        "--white X,Y,Z has its luminance already; leave out --white-luminance",
+        "a white of X,Y,Z has its luminance already; leave out --white-luminance",
     ),
     (
         "color-difference xyz.exr 4,5,6 --map -",

@@ -1,5 +1,6 @@
 //! One error type; its variants are named for whoever must act.
 
+use std::fmt;
 use std::io;
 
 /// What went wrong, and whose move it is.
@@ -42,24 +43,63 @@ pub enum Error {
         first: &'static str,
     },
 
-    /// The metadata lacks a key that the program needs.
-    #[error("{file}: the metadata has no `{key}`; give {option}")]
+    /// The metadata lacks a key that is needed. The command line adds the option that supplies it.
+    #[error("{file}: the metadata has no `{key}`")]
     MissingKey {
         /// The file as the user named it.
         file: String,
         /// The key that is missing.
         key: &'static str,
-        /// The option that supplies it.
-        option: &'static str,
     },
 
     /// The data are too few, undetermined or out of range.
     #[error("{0}")]
     Data(String),
 
+    /// An error that other settings would mend. The command line calls them by its options.
+    #[error("{error}; {advice}")]
+    Advised {
+        /// What is wrong.
+        error: Box<Self>,
+        /// What to do about it.
+        advice: Advice,
+    },
+
     /// Whoever read our output has closed the pipe: no error, the program ends quietly.
     #[error("the output pipe was closed")]
     ClosedPipe,
+}
+
+/// What a user should do with settings, each called by its name in the library, such as `white_luminance`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Advice {
+    /// Give one of these.
+    Give(&'static [&'static str]),
+    /// Leave out all of these.
+    LeaveOut(&'static [&'static str]),
+    /// Choose another value of one of these.
+    Change(&'static [&'static str]),
+}
+
+impl Advice {
+    /// The advice in words, each setting as `shown` has it.
+    pub fn in_words(self, shown: impl Fn(&str) -> String) -> String {
+        let (act, settings, joined) = match self {
+            Self::Give(settings) => ("give", settings, "or"),
+            Self::LeaveOut(settings) => ("leave out", settings, "and"),
+            Self::Change(settings) => ("give another", settings, "or"),
+        };
+        let (last, others) = settings.split_last().unwrap_or((&"", &[]));
+        let others: Vec<String> = others.iter().map(|setting| shown(setting)).collect();
+        let joined = if others.is_empty() { String::new() } else { format!("{} {joined} ", others.join(", ")) };
+        format!("{act} {joined}{}", shown(last))
+    }
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.in_words(|setting| format!("`{setting}`")))
+    }
 }
 
 /// A result with the project's [`Error`].
@@ -82,10 +122,29 @@ impl Error {
         Self::Disk { file: file.into(), action, source }
     }
 
+    /// The same error with advice to give one of some settings.
+    #[must_use]
+    pub fn give(self, settings: &'static [&'static str]) -> Self {
+        Self::Advised { error: Box::new(self), advice: Advice::Give(settings) }
+    }
+
+    /// The same error with advice to leave some settings out.
+    #[must_use]
+    pub fn leave_out(self, settings: &'static [&'static str]) -> Self {
+        Self::Advised { error: Box::new(self), advice: Advice::LeaveOut(settings) }
+    }
+
+    /// The same error with advice to choose another value of one of some settings.
+    #[must_use]
+    pub fn change(self, settings: &'static [&'static str]) -> Self {
+        Self::Advised { error: Box::new(self), advice: Advice::Change(settings) }
+    }
+
     /// The exit status that a program ends with.
     pub fn exit_status(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
+            Self::Advised { error, .. } => error.exit_status(),
             Self::ClosedPipe => 0,
             _ => 1,
         }

@@ -343,22 +343,22 @@ impl FrameHeader {
         self.geometry.channels.iter().map(|name| bare_name(name)).take(3).eq(["R", "G", "B"])
     }
 
-    /// The sensor, or the error that names the option to give.
+    /// The sensor, or the error that names the key.
     ///
     /// # Errors
     ///
     /// [`Error::MissingKey`].
     pub fn sensor(&self) -> Result<&Sensor> {
-        self.metadata.sensor.as_ref().ok_or_else(|| self.missing("sensor", "--sensor NAME|FILE"))
+        self.metadata.sensor.as_ref().ok_or_else(|| self.missing("sensor"))
     }
 
-    /// The exposure, or the error that names the options to give.
+    /// The exposure, or the error that names the key.
     ///
     /// # Errors
     ///
     /// [`Error::MissingKey`].
     pub fn exposure(&self) -> Result<Exposure> {
-        self.metadata.exposure.ok_or_else(|| self.missing("exposure", "--exposure S and --f-number N"))
+        self.metadata.exposure.ok_or_else(|| self.missing("exposure"))
     }
 
     /// Makes sure that the frame starts at the sensor's corner, from where moves of charge are counted.
@@ -378,8 +378,8 @@ impl FrameHeader {
     }
 
     /// An [`Error::MissingKey`] about this frame.
-    pub fn missing(&self, key: &'static str, option: &'static str) -> Error {
-        Error::MissingKey { file: self.name.clone(), key, option }
+    pub fn missing(&self, key: &'static str) -> Error {
+        Error::MissingKey { file: self.name.clone(), key }
     }
 
     /// An [`Error::Format`] about this frame.

@@ -127,7 +127,7 @@ impl Propagating for ToXyz {
             Space::Xyy => Ok(vec!["sigma.x", "sigma.y", "sigma.Y"]),
             Space::Lab => Ok(vec!["sigma.L", "sigma.a", "sigma.b"]),
             Space::Srgb => Err(Error::Usage(
-                "--sigma gives the uncertainty of xyz, xyy or lab; srgb is a picture to look at".into(),
+                "standard deviations are those of xyz, xyy or lab; srgb is a picture to look at".into(),
             )),
         }
     }

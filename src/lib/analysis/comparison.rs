@@ -131,7 +131,7 @@ impl<S: RowSource> Comparison<S> {
     /// [`Error::Usage`] for two colors, which have no map.
     pub fn map_header(&self) -> Result<FrameHeader> {
         let Some(header) = self.frames().next().map(S::header) else {
-            return Err(Error::Usage("--map needs an image; two colors have no map of differences".into()));
+            return Err(Error::Usage("a map needs an image; two colors have no map of differences".into()));
         };
         let mut metadata = header.metadata.becoming(QuantityKind::ColorDifference);
         if let Some(record) = &mut metadata.color {
@@ -350,13 +350,15 @@ fn white(
         let unknown = (0..2).find_map(|i| headers[i].filter(|_| !is_lab[i]));
         match (settings.white_luminance.or(known.map(|white| white[1])), unknown) {
             (Some(luminance), _) => Ok(luminance),
-            (None, Some(frame)) => Err(frame.missing("color.white", "--white-luminance CD_PER_M2")),
+            (None, Some(frame)) => Err(frame.missing("color.white")),
             (None, None) => Ok(NUMBERS_WHITE_LUMINANCE),
         }
     };
     let white = match (settings.white, known) {
         (Some(White::Absolute(_)), _) if settings.white_luminance.is_some() => {
-            return Err(Error::Usage("--white X,Y,Z has its luminance already; leave out --white-luminance".into()));
+            return Err(
+                Error::Usage("a white of X,Y,Z has its luminance already".into()).leave_out(&["white_luminance"])
+            );
         }
         (Some(White::Absolute(white)), _) => white,
         (Some(White::EqualEnergy), _) => xyz_of_chromaticity([1.0 / 3.0, 1.0 / 3.0], luminance()?),
@@ -370,11 +372,10 @@ fn white(
         return Err(Error::Usage(format!("a white of {} is impossible; all three must be above 0", in_words(white))));
     }
     match of_lab {
-        Some((frame, other)) if !agree(other, white) => Err(frame.refuse(format!(
-            "its L*a*b* refer to the white {}, not to {}; leave out --white and --white-luminance",
-            in_words(other),
-            in_words(white)
-        ))),
+        Some((frame, other)) if !agree(other, white) => {
+            let problem = format!("its L*a*b* refer to the white {}, not to {}", in_words(other), in_words(white));
+            Err(frame.refuse(problem).leave_out(&["white", "white_luminance"]))
+        }
         _ => Ok(Some(white)),
     }
 }

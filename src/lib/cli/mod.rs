@@ -1,5 +1,6 @@
 //! The command line: start, fail, exit, and the options that programs share.
 
+mod advice;
 pub mod characterization;
 mod history;
 pub mod options;
@@ -68,7 +69,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     match Instructions::allowed().and_then(|_| body(&arguments, &session)) {
         Ok(()) | Err(Error::ClosedPipe) => ExitCode::SUCCESS,
         Err(error) => {
-            complain(program, &error.to_string());
+            complain(program, &advice::advised(&error, &A::command()));
             ExitCode::from(error.exit_status())
         }
     }

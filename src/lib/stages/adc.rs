@@ -56,7 +56,7 @@ impl Digitize {
             }
         }
         let sensor = input.metadata.sensor.as_ref();
-        let needed = |key| input.missing(key, "--sensor NAME|FILE, or all of --bits, --bias and --slope");
+        let needed = |key| input.missing(key);
         let adc = AdcRecord {
             bits: settings.bits.or(sensor.map(|s| s.bits)).ok_or_else(|| needed("sensor.bits"))?,
             bias_adu: settings.bias_adu.or(sensor.map(|s| s.bias_adu)).ok_or_else(|| needed("sensor.bias_adu"))?,

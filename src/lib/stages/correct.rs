@@ -53,13 +53,13 @@ impl CorrectFrame {
         let known_black = input.metadata.black_level_adu;
         let black_adu = match black {
             Black::None if darks.is_empty() && cte.is_none() => {
-                return Err(Error::Usage("there is nothing to correct; give --black, --dark or --cte".into()));
+                return Err(Error::Usage("there is nothing to correct".into()).give(&["black", "dark", "cte"]));
             }
             Black::None => 0.0,
             _ if !darks.is_empty() => {
-                return Err(Error::Usage("dark frames hold the black level already; leave out --black".into()));
+                return Err(Error::Usage("dark frames hold the black level already".into()).leave_out(&["black"]));
             }
-            Black::Auto => known_black.ok_or_else(|| input.missing("black_level_adu", "--black N"))?,
+            Black::Auto => known_black.ok_or_else(|| input.missing("black_level_adu"))?,
             Black::Level(level) => level,
         };
         let is_subtracted = black != Black::None || !darks.is_empty();
@@ -69,7 +69,7 @@ impl CorrectFrame {
             input.check_corner()?;
             transfer = Some(Transfer::undoing(cte, &input.geometry)?);
             if !is_subtracted {
-                bias_adu = input.metadata.adc.ok_or_else(|| input.missing("adc", "--black N"))?.bias_adu;
+                bias_adu = input.metadata.adc.ok_or_else(|| input.missing("adc"))?.bias_adu;
             }
         }
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);

@@ -80,7 +80,7 @@ impl ToXyz {
                 let luminance = match settings.white_luminance.or_else(at_saturation) {
                     Some(luminance) => luminance,
                     None if needs_white => {
-                        return Err(input.missing("white_level_adu", "--white-luminance CD_PER_M2"));
+                        return Err(input.missing("white_level_adu"));
                     }
                     None => {
                         known_white = false;

@@ -83,9 +83,10 @@ impl SampleExposure {
                 let squared = (base.exposure_s * PI * base.lens_transmittance / wanted - 1.0) / 4.0;
                 if squared.is_nan() || squared <= 0.0 {
                     return Err(Error::Data(format!(
-                        "no aperture fills {fraction} of full well in {} s; give a longer --exposure",
+                        "no aperture fills {fraction} of full well in {} s, which is too short",
                         base.exposure_s
-                    )));
+                    ))
+                    .change(&["exposure"]));
                 }
                 Exposure { f_number: squared.sqrt(), ..base }.checked()
             }

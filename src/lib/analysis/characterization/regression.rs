@@ -135,7 +135,7 @@ pub fn fit(
     if let Some(sample) =
         settings.training.iter().filter(|_| trained).find(|&&sample| signals.camera.row(sample).min() < 0.0)
     {
-        return Err(Error::Data(format!("sample {sample} gives a negative signal; leave it out of --train")));
+        return Err(Error::Data(format!("sample {sample} gives a negative signal; it cannot be trained on")));
     }
     for (row, weight) in weights.iter().enumerate() {
         camera.row_mut(row).scale_mut(weight.sqrt());

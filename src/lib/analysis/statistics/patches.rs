@@ -42,7 +42,7 @@ pub fn of_frame(frame: &FrameHeader, size: Option<[usize; 2]>) -> Result<Vec<Pat
     let scene = frame.metadata.scene.as_ref();
     let recorded = scene.and_then(|scene| scene.patch).filter(|patch| *patch != [1, 1]);
     let Some(size) = size.or(recorded) else {
-        return Err(usage("its metadata tell of no patches of several photosites; give --patches=WxH".into()));
+        return Err(usage("its metadata tell of no patches of several photosites".into()).give(&["patches"]));
     };
     let [width, height] = size;
     let method = frame.metadata.demosaic.as_ref().map(|record| record.method.as_str());
@@ -307,7 +307,7 @@ mod tests {
         let mut plain = chart(40, 18, [0, 0]);
         for patch in [Some([1, 1]), None] {
             plain.metadata.scene.as_mut().unwrap().patch = patch;
-            assert!(complaint(&plain, None).contains("give --patches=WxH"));
+            assert!(complaint(&plain, None).contains("give `patches`"));
         }
         assert!(complaint(&chart(10, 5, [4, 3]), None).contains("no patch of 8x6 lies whole within the frame of 10x5"));
         let camera = with_demosaic(chart(40, 18, [0, 0]), "eci");

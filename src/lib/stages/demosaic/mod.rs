@@ -58,7 +58,7 @@ impl Demosaic {
                 "a CFA plane of {width}x{height} lacks whole classes; demosaicking needs at least 2x2"
             )));
         }
-        let cfa = pattern.or(metadata.cfa).ok_or_else(|| input.missing("cfa", "--pattern rggb|bggr|grbg|gbrg"))?;
+        let cfa = pattern.or(metadata.cfa).ok_or_else(|| input.missing("cfa"))?;
         let level = black.level(input);
         let quantity = match metadata.quantity {
             QuantityKind::Unspecified => QuantityKind::Adu,

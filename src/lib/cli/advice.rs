@@ -1,0 +1,103 @@
+//! What to do about an error, in the options of the program that met it.
+
+use crate::error::Error;
+use clap::Command;
+
+/// What supplies a key that metadata lack, the better choice first; it counts where the program has all its options.
+const SUPPLIES: [(&str, &str); 10] = [
+    ("sensor", "--sensor NAME|FILE, or all of --bits, --bias and --slope"),
+    ("sensor", "--sensor NAME|FILE"),
+    ("exposure", "--exposure S and --f-number N"),
+    ("white_level_adu", "--white-luminance CD_PER_M2"),
+    ("white_level_adu", "--white N"),
+    ("black_level_adu", "--black N"),
+    ("adc", "--black N"),
+    ("cfa", "--pattern rggb|bggr|grbg|gbrg"),
+    ("cfa", "--cfa PATTERN"),
+    ("color.white", "--white-luminance CD_PER_M2"),
+];
+
+/// An error in words, with what to do about it in options that `command` has.
+pub(super) fn advised(error: &Error, command: &Command) -> String {
+    match error {
+        Error::MissingKey { key, .. } => match supply(key, command) {
+            Some(supply) => format!("{error}; give {supply}"),
+            None => error.to_string(),
+        },
+        Error::Advised { error, advice } => {
+            format!("{}; {}", advised(error, command), advice.in_words(|setting| option(setting, command)))
+        }
+        _ => error.to_string(),
+    }
+}
+
+/// The options that supply a key, or metadata that hold it.
+fn supply(key: &str, command: &Command) -> Option<String> {
+    let of_key = |known: &str| key.strip_prefix(known).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+    let known = SUPPLIES.into_iter().filter(|(known, _)| of_key(known)).map(|(_, supply)| supply);
+    let mut usable = known.filter(|supply| options_of(supply).all(|option| has(option, command)));
+    let in_metadata = || has("metadata", command).then(|| "--metadata FILE with it".to_owned());
+    usable.next().map(str::to_owned).or_else(in_metadata)
+}
+
+/// The names of the options that a text mentions.
+fn options_of(text: &str) -> impl Iterator<Item = &str> {
+    let words = text.split([' ', ',']);
+    words.filter_map(|word| word.strip_prefix("--"))
+}
+
+fn has(option: &str, command: &Command) -> bool {
+    command.get_arguments().any(|argument| argument.get_long() == Some(option))
+}
+
+/// A setting as the command line calls it: `white_luminance` is `--white-luminance`; an option whose value must follow an
+/// equals sign is shown with it.
+fn option(setting: &str, command: &Command) -> String {
+    let long = setting.replace('_', "-");
+    let argument = command.get_arguments().find(|argument| argument.get_long() == Some(&long));
+    match argument.filter(|argument| argument.is_require_equals_set()).and_then(|argument| argument.get_value_names()) {
+        Some([value, ..]) => format!("--{long}={value}"),
+        _ => format!("--{long}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Arg;
+
+    fn program(options: &[&'static str]) -> Command {
+        options.iter().fold(Command::new("test"), |command, option| command.arg(Arg::new(*option).long(*option)))
+    }
+
+    #[test]
+    fn a_missing_key_is_supplied_by_options_that_the_program_has() {
+        let said = |key, options: &[&'static str]| {
+            advised(&Error::MissingKey { file: "a.exr".into(), key }, &program(options))
+        };
+        let missing = "a.exr: the metadata has no `sensor.bits`";
+        let all = "; give --sensor NAME|FILE, or all of --bits, --bias and --slope";
+        assert_eq!(said("sensor.bits", &["sensor", "bits", "bias", "slope"]), format!("{missing}{all}"));
+        assert_eq!(said("sensor.bits", &["sensor"]), format!("{missing}; give --sensor NAME|FILE"));
+        assert_eq!(said("sensor.bits", &["metadata"]), format!("{missing}; give --metadata FILE with it"));
+        assert_eq!(said("sensor.bits", &[]), missing);
+        assert_eq!(said("sensors", &["sensor"]), "a.exr: the metadata has no `sensors`");
+        let exposure = "a.exr: the metadata has no `exposure`";
+        assert_eq!(said("exposure", &["exposure", "metadata"]), format!("{exposure}; give --metadata FILE with it"));
+    }
+
+    #[test]
+    fn settings_are_called_by_their_options() {
+        let command = program(&["black", "white-luminance"])
+            .arg(Arg::new("patches").long("patches").require_equals(true).num_args(0..=1).value_name("WxH"));
+        let wrong = || Error::Usage("it is wrong".into());
+        let said = |error: Error| advised(&error, &command);
+        assert_eq!(said(wrong().give(&["black", "dark", "cte"])), "it is wrong; give --black, --dark or --cte");
+        assert_eq!(said(wrong().give(&["patches"])), "it is wrong; give --patches=WxH");
+        let both = wrong().leave_out(&["black", "white_luminance"]);
+        assert_eq!(both.to_string(), "it is wrong; leave out `black` and `white_luminance`");
+        assert_eq!(both.exit_status(), 2);
+        assert_eq!(said(both), "it is wrong; leave out --black and --white-luminance");
+        assert_eq!(said(wrong().change(&["exposure"])), "it is wrong; give another --exposure");
+    }
+}
