@@ -13,7 +13,7 @@ use cyanometer::camera::sensor::Sensor;
 use cyanometer::color::difference::DifferenceReport;
 use cyanometer::color::{Space, White};
 use cyanometer::error::{Error, Result};
-use cyanometer::formats::{csv, data, spectral};
+use cyanometer::formats::{csv, data, files, spectral};
 use cyanometer::spectrum::{Observer, SpectralLibrary, WavelengthGrid};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::noise::NoiseSettings;
@@ -69,7 +69,7 @@ impl Studio {
         let (computed, measured) = (see("sky912.exr")?, see("kider2014.exr")?);
         let labels = |column| {
             let path = skies.join("sky912_meta.csv");
-            csv::text_column(&path.display().to_string(), &data::read_file(&path)?, column)
+            csv::text_column(&path.display().to_string(), &files::read_file(&path)?, column)
         };
         // Rural skies come in two visibilities.
         let aerosols = labels("aerosol")?.into_iter().zip(labels("vis_km")?);

@@ -117,7 +117,7 @@ impl Error {
             return Self::ClosedPipe;
         }
         if action == "read" && source.kind() == io::ErrorKind::UnexpectedEof {
-            return Self::format(file, "the file ends before its last row; it was cut short");
+            return Self::cut_short(file);
         }
         Self::Disk { file: file.into(), action, source }
     }
@@ -140,6 +140,11 @@ impl Error {
         Self::Advised { error: Box::new(self), advice: Advice::Change(settings) }
     }
 
+    /// An [`Error::Format`] about `file`, which ends too soon.
+    pub fn cut_short(file: &str) -> Self {
+        Self::format(file, "the file ends before its last row; it was cut short")
+    }
+
     /// The exit status that a program ends with.
     pub fn exit_status(&self) -> u8 {
         match self {
@@ -157,5 +162,18 @@ fn reason(source: &io::Error) -> String {
     match text.find(" (os error") {
         Some(end) => text[..end].to_lowercase(),
         None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reason_is_the_systems_alone() {
+        let source = std::fs::File::open("there is no such file").unwrap_err();
+        assert!(source.to_string().contains("(os error"), "the words that are cut off have changed: {source}");
+        assert_eq!(reason(&source), "no such file or directory");
+        assert_eq!(reason(&io::Error::other("Lights went out")), "Lights went out");
     }
 }

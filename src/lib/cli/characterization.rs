@@ -14,7 +14,7 @@ use crate::camera::sensor::Sensor;
 use crate::color::difference::DELTA_E_PER_JND;
 use crate::color::{Space, White};
 use crate::error::{Error, Result};
-use crate::formats::{csv, data, output, spectral};
+use crate::formats::{csv, data, files, output, spectral};
 use crate::report::characterization::{
     About, Characterization, DifferenceSummaries, Evaluation, Group, NoiseReport, characterization, matrix,
 };
@@ -229,7 +229,7 @@ impl Request {
     }
 
     fn write(&self, found: &Characterization) -> Result<()> {
-        let to_file = self.output.as_deref().filter(|path| *path != Path::new("-"));
+        let to_file = files::named(self.output.as_deref());
         if let Some(path) = to_file {
             output::write_text(Some(path), &matrix(&found.matrix)?, None)?;
         }
@@ -245,7 +245,7 @@ impl Request {
 
     fn read_labels(&self) -> Result<Vec<String>> {
         match &self.labels {
-            Some((file, column)) => csv::text_column(&file.display().to_string(), &data::read_file(file)?, column),
+            Some((file, column)) => csv::text_column(&file.display().to_string(), &files::read_file(file)?, column),
             None if self.hold_out.is_empty() => Ok(Vec::new()),
             None => Err(Error::Usage("--hold-out names labels; give them with --labels FILE:COLUMN".into())),
         }

@@ -10,7 +10,7 @@ use crate::cfa::{CfaPattern, Class};
 use crate::chain::{Chain, ChainPrediction, ChainSettings, Uncertainty};
 use crate::color::{Space, White};
 use crate::error::{Error, Result};
-use crate::formats::input::regular_file;
+use crate::formats::files::regular_file;
 use crate::formats::{data, output, spectral};
 use crate::propagation::Equations;
 use crate::report::plot::{Plot, PlotFormat};

@@ -3,7 +3,7 @@
 //! A named file is written beside its target and renamed when complete; on an error or an interrupt nothing is left.
 //! Devices, named pipes and the standard output are written as they are.
 
-use super::input::{FileId, file_id};
+use super::files::{FileId, STDOUT_NAME, file_id, same_file};
 use super::pipe;
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions, Permissions};
@@ -13,9 +13,6 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use tempfile::{NamedTempFile, TempPath};
-
-/// How messages call the standard output.
-pub const STDOUT_NAME: &str = "standard output";
 
 /// Temporary files to remove when the program is interrupted.
 static PENDING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -103,11 +100,6 @@ impl Write for AtomicFile {
 /// The system's error without the temporary file's name, which means nothing to the user.
 fn plain(error: &io::Error) -> io::Error {
     error.raw_os_error().map_or_else(|| io::Error::from(error.kind()), io::Error::from_raw_os_error)
-}
-
-/// The complaint about an output that would be written over its input.
-pub fn same_file(output: &str, input: &str) -> Error {
-    Error::Usage(format!("{output}: it is the same file as the input {input}; name another output"))
 }
 
 /// Where the bytes of a frame go.

@@ -3,12 +3,14 @@
 //! Lines that start with `#` are comments. Two layouts are read: a column of wavelengths in nm and one column per curve,
 //! or one row per spectrum under a header of wavelengths.
 
+use super::foreign::csv_complaint;
 use crate::error::{Error, Result};
 use crate::spectrum::{Curve, check_wavelengths};
 use crate::units::RadianceUnit;
 use csv::StringRecord;
 use flate2::read::GzDecoder;
 use ndarray::Array2;
+use std::borrow::Cow;
 use std::io::Read;
 
 /// A table may unpack to this much.
@@ -22,11 +24,8 @@ const MAX_CELLS: usize = 1 << 25;
 ///
 /// [`Error::Format`] for what is no CSV table, or has no such column, naming those that there are.
 pub fn text_column(name: &str, bytes: &[u8], column: &str) -> Result<Vec<String>> {
-    let not_csv = |error: csv::Error| Error::format(name, format!("it is not a CSV table: {error}"));
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
+    let not_csv = |error: csv::Error| csv_complaint(name, &error);
+    let mut reader = reader(bytes, true);
     let headers = reader.headers().map_err(not_csv)?;
     let place = headers.iter().position(|header| header == column).ok_or_else(|| {
         let known: Vec<&str> = headers.iter().collect();
@@ -54,78 +53,34 @@ impl SpectralTable {
     ///
     /// [`Error::Format`] naming line and column of what is no number, or what the table lacks.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self> {
-        let mut unpacked = Vec::new();
-        let bytes = if bytes.starts_with(&[0x1F, 0x8B]) {
-            let unpack = GzDecoder::new(bytes).take(MAX_BYTES + 1).read_to_end(&mut unpacked);
-            unpack.map_err(|_| Error::format(name, "it is gzipped, but damaged"))?;
-            if unpacked.len() as u64 > MAX_BYTES {
-                return Err(Error::format(name, "it unpacks to more than 256 MiB; no table does"));
-            }
-            &unpacked
-        } else {
-            bytes
-        };
-        let refuse = |problem: String| Error::format(name, problem);
+        let refuse = |problem: &str| Err(Error::format(name, problem));
+        let bytes = unpacked(name, bytes)?;
         if bytes.contains(&0) {
-            return Err(refuse("it is not a CSV table but a binary file".into()));
+            return refuse("it is not a CSV table but a binary file");
         }
-        let mut reader = csv::ReaderBuilder::new()
-            .comment(Some(b'#'))
-            .has_headers(false)
-            .trim(csv::Trim::All)
-            .from_reader(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
-        let not_csv = |error: csv::Error| refuse(format!("it is not a CSV table: {error}"));
-        let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite());
+        let mut reader = reader(&bytes, false);
         let mut first = StringRecord::new();
-        if !reader.read_record(&mut first).map_err(not_csv)? {
-            return Err(refuse("it holds no rows".into()));
+        if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, &e))? {
+            return refuse("it holds no rows");
         }
-        let by_rows =
-            first.len() > 2 && number(&first[0]).is_none() && first.iter().skip(1).all(|c| number(c).is_some());
-        let header: Option<Vec<String>> =
-            number(&first[0]).is_none().then(|| first.iter().map(ToOwned::to_owned).collect());
-        let width = first.len();
-        let (mut cells, mut labels, mut rows) = (Vec::new(), Vec::new(), 0);
-        let mut record = if header.is_none() { first.clone() } else { StringRecord::new() };
-        // One row at a time: as text a table takes many times the memory of its numbers.
-        while header.is_none() && rows == 0 || reader.read_record(&mut record).map_err(not_csv)? {
-            let line = record.position().map_or(0, csv::Position::line);
-            rows += 1;
-            if cells.len() + width > MAX_CELLS {
-                return Err(refuse(format!("it has more than {MAX_CELLS} numbers; no table has")));
-            }
-            if by_rows {
-                labels.push(record[0].to_owned());
-            }
-            for (column, text) in record.iter().enumerate() {
-                let value = match number(text) {
-                    Some(value) => value,
-                    // The label of a row need not be a number.
-                    None if by_rows && column == 0 => 0.0,
-                    None => {
-                        let shown: String = text.chars().take(20).collect();
-                        return Err(refuse(format!("line {line}, column {}: `{shown}` is no number", column + 1)));
-                    }
-                };
-                cells.push(value);
-            }
-        }
-        let cells =
-            Array2::from_shape_vec((rows, width), cells).map_err(|_| refuse("its rows differ in length".into()))?;
+        let has_header = number(&first[0]).is_none();
+        let by_rows = has_header && first.len() > 2 && first.iter().skip(1).all(|cell| number(cell).is_some());
+        let Cells { numbers, labels } = Cells::read(name, &mut reader, (!has_header).then_some(&first), by_rows)?;
+        let (rows, width) = numbers.dim();
         if width < 2 || rows == 0 {
-            return Err(refuse("it needs a column of wavelengths in nm and at least one of values".into()));
+            return refuse("it needs a column of wavelengths in nm and at least one of values");
         }
+        let values = numbers.slice(ndarray::s![.., 1..]);
         let (wavelength_nm, columns, values) = if by_rows {
-            let wavelengths = first.iter().skip(1).filter_map(number).collect();
-            (wavelengths, labels, cells.slice(ndarray::s![.., 1..]).to_owned())
+            (first.iter().skip(1).filter_map(number).collect(), labels, values.to_owned())
         } else {
-            let columns = match &header {
-                Some(header) => header[1..].to_vec(),
-                None => (1..width).map(|column| format!("column{column}")).collect(),
+            let columns = match has_header {
+                true => first.iter().skip(1).map(ToOwned::to_owned).collect(),
+                false => (1..width).map(|column| format!("column{column}")).collect(),
             };
-            (cells.column(0).to_vec(), columns, cells.slice(ndarray::s![.., 1..]).t().to_owned())
+            (numbers.column(0).to_vec(), columns, values.t().to_owned())
         };
-        check_wavelengths(&wavelength_nm).map_err(refuse)?;
+        check_wavelengths(&wavelength_nm).map_err(|problem| Error::format(name, problem))?;
         Ok(Self { name: name.into(), wavelength_nm, columns, values })
     }
 
@@ -171,6 +126,77 @@ impl SpectralTable {
         .into_iter()
         .find_map(|(suffix, unit)| lower.ends_with(suffix).then_some(unit))
     }
+}
+
+/// A table's rows below its header.
+struct Cells {
+    /// Shape rows × columns; 0 where a row's label is no number.
+    numbers: Array2<f64>,
+    /// What the rows begin with, where they have labels.
+    labels: Vec<String>,
+}
+
+impl Cells {
+    /// Reads the rows, after `first` where that is one; each begins with a label where the table goes `by_rows`.
+    fn read(name: &str, reader: &mut csv::Reader<&[u8]>, first: Option<&StringRecord>, by_rows: bool) -> Result<Self> {
+        let refuse = |problem: String| Error::format(name, problem);
+        let (mut numbers, mut labels, mut rows, mut width) = (Vec::new(), Vec::new(), 0, 0);
+        let mut record = first.cloned().unwrap_or_default();
+        let mut at_hand = first.is_some();
+        // One row at a time: as text a table takes many times the memory of its numbers.
+        while std::mem::take(&mut at_hand) || reader.read_record(&mut record).map_err(|e| csv_complaint(name, &e))? {
+            let line = record.position().map_or(0, csv::Position::line);
+            (rows, width) = (rows + 1, record.len());
+            if numbers.len() + width > MAX_CELLS {
+                return Err(refuse(format!("it has more than {MAX_CELLS} numbers; no table has")));
+            }
+            if by_rows {
+                labels.push(record[0].to_owned());
+            }
+            for (column, text) in record.iter().enumerate() {
+                numbers.push(match number(text) {
+                    Some(value) => value,
+                    // The label of a row need not be a number.
+                    None if by_rows && column == 0 => 0.0,
+                    None => {
+                        let shown: String = text.chars().take(20).collect();
+                        return Err(refuse(format!("line {line}, column {}: `{shown}` is no number", column + 1)));
+                    }
+                });
+            }
+        }
+        let numbers =
+            Array2::from_shape_vec((rows, width), numbers).map_err(|_| refuse("its rows differ in length".into()))?;
+        Ok(Self { numbers, labels })
+    }
+}
+
+/// A reader of CSV that knows our comments; a byte order mark is passed over.
+fn reader(bytes: &[u8], has_headers: bool) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .has_headers(has_headers)
+        .trim(csv::Trim::All)
+        .from_reader(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes))
+}
+
+/// A finite number, if it is one.
+fn number(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+/// The bytes of a table that may be gzipped.
+fn unpacked<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>> {
+    if !bytes.starts_with(&[0x1F, 0x8B]) {
+        return Ok(bytes.into());
+    }
+    let mut unpacked = Vec::new();
+    let unpack = GzDecoder::new(bytes).take(MAX_BYTES + 1).read_to_end(&mut unpacked);
+    unpack.map_err(|error| Error::format(name, format!("it is gzipped, but damaged: {error}")))?;
+    if unpacked.len() as u64 > MAX_BYTES {
+        return Err(Error::format(name, "it unpacks to more than 256 MiB; no table does"));
+    }
+    Ok(unpacked.into())
 }
 
 #[cfg(test)]

@@ -1,14 +1,13 @@
 //! Data files: sensors, the observer, curves; where they are found, and what is built in.
 
 use super::csv::SpectralTable;
+use super::digest::sha256;
+use super::files::read_file;
 use super::yaml;
 use crate::analysis::characterization::CameraMatrix;
 use crate::camera::sensor::{CurveFile, Sensor, SpectralResponse};
 use crate::error::{Error, Result};
 use crate::spectrum::{Curve, Observer};
-use sha2::{Digest, Sha256};
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The environment variable that names directories with data files, like `sample_data`.
@@ -72,7 +71,7 @@ pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
     sensor.check().map_err(|problem| Error::format(&shown, problem))?;
     let table = |curve: &mut CurveFile| -> Result<SpectralTable> {
         let (name, bytes) = read_beside(&place, &shown, &curve.file)?;
-        curve.sha256 = Some(hex(&Sha256::digest(&bytes)));
+        curve.sha256 = Some(sha256(&bytes));
         SpectralTable::parse(&name, &bytes)
     };
     let efficiencies = table(&mut sensor.quantum_efficiency)?;
@@ -120,36 +119,6 @@ pub fn load_observer() -> Result<Observer> {
     let name = "observers/cie1931_2deg_1nm.csv";
     let table = SpectralTable::parse(name, built_in(name).unwrap_or_default())?;
     Ok(Observer { matching: [table.curve(Some("xbar"))?, table.curve(Some("ybar"))?, table.curve(Some("zbar"))?] })
-}
-
-/// Reads a whole small file.
-///
-/// # Errors
-///
-/// [`Error::Disk`], and as [`read_table`].
-pub fn read_file(path: &Path) -> Result<Vec<u8>> {
-    let name = path.display().to_string();
-    let file = File::open(path).map_err(|e| Error::disk(&name, "open", e))?;
-    if file.metadata().is_ok_and(|m| m.is_dir()) {
-        return Err(Error::format(&name, "it is a directory"));
-    }
-    read_table(file, &name)
-}
-
-/// Reads what is small to its end, but no more than a table can be: a device may never end.
-///
-/// # Errors
-///
-/// [`Error::Disk`]; [`Error::Format`] when there is more.
-pub fn read_table(input: impl Read, name: &str) -> Result<Vec<u8>> {
-    /// A table may be this long.
-    const MAX_BYTES: u64 = 256 << 20;
-    let mut bytes = Vec::new();
-    input.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::disk(name, "read", e))?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(Error::format(name, "it is longer than 256 MiB; no table is"));
-    }
-    Ok(bytes)
 }
 
 /// An efficiency or a transmittance is a fraction.
@@ -219,11 +188,6 @@ fn known_sensors() -> Vec<String> {
     names
 }
 
-/// Bytes as hexadecimal digits.
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -252,12 +216,6 @@ mod tests {
         // Equal energy has x = y = ⅓ to the rounding of the tables (CIE 015, Table T.4: 0.33333 to 0.33334).
         let total: f64 = sums.iter().sum();
         assert!(sums.iter().all(|sum| (sum / total - 1.0 / 3.0).abs() < 1e-4), "{sums:?}");
-    }
-
-    #[test]
-    fn what_never_ends_is_not_read_for_ever() {
-        let complaint = read_file(Path::new("/dev/zero")).unwrap_err().to_string();
-        assert!(complaint.contains("longer than 256 MiB"), "{complaint}");
     }
 
     #[test]

@@ -1,6 +1,5 @@
-//! Digests of a frame's samples, by which a sidecar knows its frame.
+//! Digests: of a frame's samples, by which a sidecar knows its frame, and of data files.
 
-use super::data::hex;
 use sha2::{Digest, Sha256};
 
 /// Digest of samples as little-endian 32-bit floats.
@@ -49,6 +48,15 @@ impl SamplesDigest {
     }
 }
 
+/// SHA-256 of a file's bytes, in hexadecimal digits: by which a sensor names its curves.
+pub fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 impl Default for SamplesDigest {
     fn default() -> Self {
         Self::new()
@@ -69,6 +77,9 @@ mod tests {
             "blake3:42214739f095a406f3fc83deb889744ac00df831c10daa55189b5d121c855af7",
             "sha256:2bce1ba628720664be4b9fdd77aae0678e5f0f3f02fc6ff641ec879094f6a404",
         ] {
+            if let Some(digits) = expected.strip_prefix("sha256:") {
+                assert_eq!(sha256(&bytes), digits);
+            }
             let mut digest = SamplesDigest::like(expected);
             digest.update(&samples[..100]);
             digest.update(&samples[100..]);

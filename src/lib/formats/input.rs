@@ -1,28 +1,17 @@
-//! Opens frames: EXR and TIFF, files and pipes, with the metadata that belongs to them.
+//! Opens frames of any format, from files and pipes, with the metadata that belongs to them.
 
-use super::data::read_file;
 use super::digest::SamplesDigest;
-use super::exr::{ExrReader, Primaries, is_streamable};
-use super::pipe;
-use super::tiff::TiffReader;
-use super::yaml;
-use crate::camera::optics::Exposure;
+use super::files::{FileId, STDIN_NAME, file_id, named, open_named, read_file, sidecar_path, spool};
+use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, U16_FULL_SCALE};
+use super::{pipe, table, tiff, yaml};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
-use crate::spectrum::channel_wavelength_nm;
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use std::fs::File;
-use std::io::{self, IsTerminal, Read, Seek, SeekFrom};
-use std::os::fd::AsFd;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-
-/// How messages call the standard input.
-pub const STDIN_NAME: &str = "standard input";
-
-/// Chromaticities that mark XYZ stored as R, G, B: an OpenEXR convention.
-pub const XYZ_PRIMARIES: Primaries = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0 / 3.0, 1.0 / 3.0]];
 
 /// What to open.
 #[derive(Debug, Clone, Default)]
@@ -37,19 +26,10 @@ pub struct InputOptions {
     pub all_channels: bool,
 }
 
-/// What full-scale sRGB is in 16 bits.
-pub const U16_FULL_SCALE: f32 = 65535.0;
-
-/// Identity of an opened file: device and inode.
-pub type FileId = (u64, u64);
-
 /// A frame that is being read.
 pub struct FrameReader {
-    file: Rows,
+    reader: Box<dyn SampleReader>,
     header: FrameHeader,
-    /// Channels of the file; the first of them are those of the header.
-    stored: Geometry,
-    stored_as: &'static str,
     id: Option<FileId>,
     rows_read: usize,
     check: Option<DigestCheck>,
@@ -57,11 +37,6 @@ pub struct FrameReader {
     /// What stored samples are divided by: sRGB in 16 bits runs to 65535.
     divisor: Option<f32>,
     notes: Vec<String>,
-}
-
-enum Rows {
-    Exr(Box<ExrReader>),
-    Tiff(Box<TiffReader>),
 }
 
 /// A digest to compare with once all samples are in.
@@ -79,11 +54,8 @@ impl FrameReader {
     /// [`Error::Usage`] where a terminal would be waited on; [`Error::Disk`] and [`Error::Format`] for what cannot be
     /// opened or is no frame.
     pub fn open(options: &InputOptions) -> Result<Self> {
-        let path = options.path.as_deref().filter(|path| *path != Path::new("-"));
-        let (name, input) = match path {
-            Some(path) => (path.display().to_string(), open_path(path)?),
-            None => (STDIN_NAME.to_owned(), open_stdin()?),
-        };
+        let path = named(options.path.as_deref());
+        let (input, name) = open_named(path)?;
         Self::open_file(input, &name, path, options)
     }
 
@@ -93,15 +65,16 @@ impl FrameReader {
     ///
     /// As [`Self::open`].
     pub fn open_file(input: File, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
-        let id = input.metadata().ok().map(|m| file_id(&m));
-        let (file, id) = sort_out(input, name, options.part, id)?;
-        let (stored, stored_as) = match &file {
-            Rows::Exr(reader) => (reader.geometry().clone(), reader.stored_as()),
-            Rows::Tiff(reader) => (reader.geometry().clone(), reader.stored_as()),
+        let about = input.metadata().map_err(|e| Error::disk(name, "read", e))?;
+        let reader = if about.is_file() {
+            open_seekable(input, name, options.part)?
+        } else {
+            open_unseekable(input, name, options.part)?
         };
-        let mut notes = Vec::new();
-        let (metadata, sidecar) = find_metadata(&file, name, path, options)?;
-        let geometry = keep_planes(&stored, options.all_channels, metadata.quantity);
+        let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
+        let (metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
+        let stored = reader.geometry();
+        let geometry = keep_planes(stored, options.all_channels, metadata.quantity);
         if geometry.channels.len() < stored.channels.len() {
             let dropped = stored.channels[geometry.channels.len()..].join(", ");
             notes.push(format!("{name}: channels {dropped} are left out"));
@@ -111,10 +84,11 @@ impl FrameReader {
             expected: samples.digest.clone(),
             sidecar,
         });
-        let is_integer = stored_as.starts_with('u');
-        let divisor = (metadata.quantity == QuantityKind::Srgb && is_integer).then_some(U16_FULL_SCALE);
+        let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
+        let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
         let header = FrameHeader { name: name.into(), geometry, metadata };
-        Ok(Self { file, header, stored, stored_as, id, rows_read: 0, check, buffer: Vec::new(), divisor, notes })
+        let id = about.is_file().then(|| file_id(&about));
+        Ok(Self { reader, header, id, rows_read: 0, check, buffer: Vec::new(), divisor, notes })
     }
 
     /// Metadata to amend before a stage is built on them.
@@ -122,9 +96,9 @@ impl FrameReader {
         &mut self.header
     }
 
-    /// How the file stores its samples.
+    /// How the file stores its samples, in a word: `u16`, `f32` …; `mixed` where channels differ.
     pub fn stored_as(&self) -> &'static str {
-        self.stored_as
+        self.reader.stored_as().map_or("mixed", SampleType::name)
     }
 
     /// The file that is read, so that it is not written over; none for pipes.
@@ -132,7 +106,7 @@ impl FrameReader {
         self.id.map(|id| (id, self.header.name.clone()))
     }
 
-    /// What a careful user should know: channels left out, a digest that does not match.
+    /// What a careful user should know: channels left out, tags passed over.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -158,31 +132,22 @@ impl RowSource for FrameReader {
     }
 
     fn natural_rows(&self) -> usize {
-        match &self.file {
-            Rows::Exr(reader) => reader.natural_rows(),
-            Rows::Tiff(reader) => reader.natural_rows(),
-        }
+        self.reader.natural_rows()
     }
 
     fn may_wait(&self) -> bool {
-        matches!(&self.file, Rows::Exr(reader) if reader.is_stream())
+        self.reader.may_wait()
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
-        let whole = self.stored.row_samples();
+        let whole = self.reader.geometry().row_samples();
         let kept = self.header.geometry.row_samples();
         let mut buffer = std::mem::take(&mut self.buffer);
         let direct = kept == whole;
         let start = if direct { samples.len() } else { 0 };
         let into: &mut Vec<f32> = if direct { samples } else { &mut buffer };
         into.truncate(start);
-        match &mut self.file {
-            Rows::Exr(reader) => reader.read(rows, into)?,
-            Rows::Tiff(reader) => {
-                into.resize(start + rows * whole, 0.0);
-                reader.read_rows(self.rows_read, rows, &mut into[start..])?;
-            }
-        }
+        self.reader.read(rows, into)?;
         if let Some(check) = &mut self.check {
             check.digest.update(&into[start..]);
         }
@@ -200,115 +165,71 @@ impl RowSource for FrameReader {
     }
 }
 
-/// Device and inode of a file.
-pub fn file_id(metadata: &std::fs::Metadata) -> FileId {
-    use std::os::unix::fs::MetadataExt;
-    (metadata.dev(), metadata.ino())
+/// Opens a file that can seek with the reader of its format.
+fn open_seekable(mut input: File, name: &str, part: usize) -> Opened {
+    let failed = |e| Error::disk(name, "read", e);
+    let start = input.stream_position().map_err(failed)?;
+    let head = head_of(&mut input, name)?;
+    let readers = readers_of(&head, name)?;
+    input.seek(SeekFrom::Start(start)).map_err(failed)?;
+    open_whole(readers, &head, input, name, part)
 }
 
-/// The file at a path, so that it is not written over; none for pipes and devices.
-pub fn regular_file(path: &Path) -> Option<(FileId, String)> {
-    let metadata = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
-    Some((file_id(&metadata), path.display().to_string()))
-}
-
-/// Opens a named file.
-///
-/// # Errors
-///
-/// [`Error::Disk`], and [`Error::Format`] for directories.
-fn open_path(path: &Path) -> Result<File> {
-    let name = path.display().to_string();
-    let file = File::open(path).map_err(|e| Error::disk(&name, "open", e))?;
-    if file.metadata().is_ok_and(|m| m.is_dir()) {
-        return Err(Error::format(&name, "it is a directory; name a file in it"));
-    }
-    Ok(file)
-}
-
-/// The standard input as a file.
-///
-/// # Errors
-///
-/// [`Error::Usage`] when it is a terminal.
-pub fn open_stdin() -> Result<File> {
-    let stdin = io::stdin();
-    if stdin.is_terminal() {
-        return Err(Error::Usage("no input: name a file, or pipe one in".into()));
-    }
-    let owned = stdin.as_fd().try_clone_to_owned().map_err(|e| Error::disk(STDIN_NAME, "open", e))?;
-    Ok(File::from(owned))
-}
-
-/// Opens a named file, or the standard input. Gives the name for messages too.
-///
-/// # Errors
-///
-/// [`Error::Disk`], [`Error::Format`] for directories, [`Error::Usage`] for a terminal.
-pub fn open_named(path: Option<&Path>) -> Result<(File, String)> {
-    Ok(match path {
-        Some(path) => (open_path(path)?, path.display().to_string()),
-        None => (open_stdin()?, STDIN_NAME.to_owned()),
-    })
-}
-
-/// Copies a stream to a temporary file and stands at its start.
-///
-/// # Errors
-///
-/// [`Error::Disk`].
-pub fn spool(stream: &mut impl Read, name: &str) -> Result<File> {
-    let mut copied = || -> io::Result<File> {
-        let mut copy = tempfile::tempfile()?;
-        io::copy(stream, &mut copy)?;
-        copy.rewind()?;
-        Ok(copy)
-    };
-    copied().map_err(|e| Error::disk(name, "copy to a temporary file", e))
-}
-
-/// Finds out what a file holds and opens it with the right reader. A stream that its format cannot read without seeking
-/// is first copied to a temporary file.
-fn sort_out(mut input: File, name: &str, part: usize, id: Option<FileId>) -> Result<(Rows, Option<FileId>)> {
-    let seekable = input.metadata().is_ok_and(|m| m.is_file());
-    let mut head = Vec::new();
-    let start = if seekable { input.stream_position().unwrap_or(0) } else { 0 };
-    (&mut input).take(8).read_to_end(&mut head).map_err(|e| Error::disk(name, "read", e))?;
-    if head.is_empty() {
-        let hint = if name == STDIN_NAME { "; the program before it wrote nothing" } else { "" };
-        return Err(Error::format(name, format!("it is empty{hint}")));
-    }
-    let is_exr = head.starts_with(&[0x76, 0x2F, 0x31, 0x01]);
-    let is_tiff = [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| head.starts_with(*magic));
-    if !is_exr && !is_tiff {
-        let is_text = head.iter().all(|&byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace());
-        let hint = if is_text { "; it looks like text (a spectrum goes into `render-radiance`)" } else { "" };
-        return Err(Error::format(name, format!("it is neither an EXR nor a TIFF file{hint}")));
-    }
-    if seekable {
-        input.seek(SeekFrom::Start(start)).map_err(|e| Error::disk(name, "read", e))?;
-    } else if is_streamable(&head) {
+/// Opens a stream with the reader of its format. One that cannot be read without seeking is first copied to a temporary
+/// file.
+fn open_unseekable(mut input: File, name: &str, part: usize) -> Opened {
+    let head = head_of(&mut input, name)?;
+    let readers = readers_of(&head, name)?;
+    if let Some(stream) = readers.stream.filter(|stream| (stream.is_streamable)(&head)) {
         if part != 0 {
             return Err(Error::Usage(format!("{name}: it has no part {part}; it has a single one")));
         }
         pipe::enlarge(&input);
-        let whole = io::Cursor::new(head).chain(input);
-        return Ok((Rows::Exr(Box::new(ExrReader::stream(Box::new(whole), name)?)), None));
-    } else {
-        input = spool(&mut io::Cursor::new(&head).chain(&mut input), name)?;
+        return (stream.open)(Box::new(io::Cursor::new(head).chain(input)), name);
     }
-    let id = id.filter(|_| seekable);
-    if is_exr {
-        Ok((Rows::Exr(Box::new(ExrReader::open(input, name, part)?)), id))
-    } else {
-        Ok((Rows::Tiff(Box::new(TiffReader::open(input, name, part)?)), id))
+    let spooled = spool(&mut io::Cursor::new(&head).chain(input), name)?;
+    open_whole(readers, &head, spooled, name, part)
+}
+
+/// Opens a file that begins with `head` with these readers, or, where its tags call for them, with others.
+fn open_whole(readers: Readers, head: &[u8], input: File, name: &str, part: usize) -> Opened {
+    let narrower = if tiff::begins_so(head) { table::by_tags(&input, name)? } else { None };
+    (narrower.unwrap_or(readers).open)(input, name, part)
+}
+
+/// The first bytes, by which most formats are known.
+fn head_of(input: &mut File, name: &str) -> Result<Vec<u8>> {
+    let mut head = Vec::new();
+    input.take(HEAD_BYTES as u64).read_to_end(&mut head).map_err(|e| Error::disk(name, "read", e))?;
+    if head.is_empty() {
+        let hint = if name == STDIN_NAME { "; the program before it wrote nothing" } else { "" };
+        return Err(Error::format(name, format!("it is empty{hint}")));
     }
+    Ok(head)
+}
+
+/// The readers of what a file begins as.
+fn readers_of(head: &[u8], name: &str) -> Result<Readers> {
+    table::by_head(head, name)?.ok_or_else(|| {
+        let hint = if is_text(head) { "; it looks like text (a spectrum goes into `render-radiance`)" } else { "" };
+        Error::format(name, format!("it is neither {} file{hint}", table::names_of_read()))
+    })
+}
+
+/// Whether bytes are the beginning of a text, the last character perhaps cut off.
+fn is_text(head: &[u8]) -> bool {
+    let whole = match std::str::from_utf8(head) {
+        Ok(text) => text,
+        Err(cut) if cut.error_len().is_none() => std::str::from_utf8(&head[..cut.valid_up_to()]).unwrap_or_default(),
+        Err(_) => return false,
+    };
+    whole.chars().all(|character| !character.is_control() || character.is_whitespace())
 }
 
 /// The metadata in order of trust: `--metadata`, sidecar, embedded, the format's own tags; and the sidecar's name where
 /// it is the one.
 fn find_metadata(
-    file: &Rows,
+    reader: &dyn SampleReader,
     name: &str,
     path: Option<&Path>,
     options: &InputOptions,
@@ -325,42 +246,10 @@ fn find_metadata(
     if let Some(sidecar) = path.map(sidecar_path).filter(|sidecar| sidecar.is_file()) {
         return Ok((from_file(&sidecar)?, Some(sidecar.display().to_string())));
     }
-    let embedded = match file {
-        Rows::Exr(reader) => reader.tags().metadata.clone(),
-        // Other programs put their own words into tag 270.
-        Rows::Tiff(reader) => reader.tags().description.clone().filter(|text| text.starts_with("schema: cyanometer/")),
-    };
-    if let Some(text) = embedded {
-        return Ok((yaml::parse_metadata(name, &text)?, None));
+    if let Some(text) = reader.embedded() {
+        return Ok((yaml::parse_metadata(name, text)?, None));
     }
-    let mut metadata = Metadata::new(QuantityKind::Unspecified);
-    if let Rows::Exr(reader) = file {
-        let tags = reader.tags();
-        let known = tags.exposure_s.zip(tags.f_number);
-        metadata.exposure = known
-            .map(|(exposure_s, f_number)| Exposure { exposure_s, f_number, lens_transmittance: 1.0 })
-            .and_then(|exposure| exposure.checked().ok());
-        let near = |found: Primaries| {
-            found.iter().flatten().zip(XYZ_PRIMARIES.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-6)
-        };
-        if tags.primaries.is_some_and(near) {
-            metadata.quantity = QuantityKind::Xyz;
-        }
-        if reader.geometry().channels.iter().any(|channel| channel_wavelength_nm(channel).is_some()) {
-            metadata.quantity = QuantityKind::SpectralRadiance;
-            metadata.unit = tags.emissive_units.clone().unwrap_or_default();
-        } else {
-            metadata.unit = metadata.quantity.unit().into();
-        }
-    }
-    Ok((metadata, None))
-}
-
-/// `frame.exr` → `frame.exr.yaml`.
-pub fn sidecar_path(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".yaml");
-    PathBuf::from(name)
+    Ok((reader.own_tags().clone(), None))
 }
 
 /// The channels that stages work on: the first three where they are R, G, B; Y alone; otherwise all.

@@ -1,10 +1,11 @@
 //! Writes frames: to named files, whole or not at all, and to pipes.
 
-use super::atomic::{AtomicFile, Target, same_file};
+use super::atomic::{AtomicFile, Target};
 use super::digest::SamplesDigest;
-use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter};
-use super::input::{FileId, U16_FULL_SCALE, XYZ_PRIMARIES, regular_file, sidecar_path};
-use super::tiff::{TiffCompression, TiffSamples, TiffTags, TiffWriter};
+use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMARIES};
+use super::files::{FileId, STDOUT_NAME, named, regular_file, same_file, sidecar_path};
+use super::format::U16_FULL_SCALE;
+use super::tiff::{TiffCompression, TiffSamples, TiffSettings, TiffTags, TiffWriter};
 use super::yaml;
 use crate::color;
 use crate::error::{Error, Result};
@@ -95,78 +96,84 @@ enum Encoding {
 
 impl OutputOptions {
     fn encoding(&self, header: &FrameHeader) -> Result<Encoding> {
-        let path = self.path.as_deref().filter(|path| *path != Path::new("-"));
-        let extension = path.and_then(Path::extension).map(|end| end.to_string_lossy().to_ascii_lowercase());
-        let format = match (self.format, extension.as_deref()) {
-            (Some(format), _) => format,
-            (None, Some("exr") | None) => Format::Exr,
-            (None, Some("tif" | "tiff")) => Format::Tiff,
-            (None, Some(end)) => {
-                return Err(Error::Usage(format!(
-                    "{}: `.{end}` names no format that is written here; end the name in .exr or .tiff, or give --format",
-                    path.unwrap_or(Path::new("-")).display()
-                )));
-            }
-        };
+        let format = self.format()?;
+        let quantity = header.metadata.quantity;
         if format == Format::Tiff && header.geometry.channels.iter().any(|name| name.contains('.')) {
             return Err(Error::Usage("a TIFF has no names for the layers of standard deviations; write an EXR".into()));
         }
-        let quantity = header.metadata.quantity;
         if format == Format::Tiff && quantity == QuantityKind::ColorDifference {
             return Err(Error::Usage(
                 "a TIFF has no names for the channels of a map of differences; write an EXR".into(),
             ));
         }
         let changed = header.metadata.demosaic.is_some() || header.metadata.correction.is_some();
-        let is_codes = quantity == QuantityKind::Adu && !changed;
-        let default = match format {
-            Format::Tiff if is_codes || quantity == QuantityKind::Srgb => SampleKind::U16,
-            _ => SampleKind::F32,
-        };
-        let samples = self.samples.unwrap_or(default);
+        let fits_u16 = quantity == QuantityKind::Adu && !changed || quantity == QuantityKind::Srgb;
         let compression = self.compression.unwrap_or(CompressionKind::None);
-        let refuse = |problem: &str| Err(Error::Usage(problem.into()));
         match format {
             Format::Exr => {
-                let samples = match samples {
-                    SampleKind::F32 => ExrSamples::F32,
-                    SampleKind::F16 => ExrSamples::F16,
-                    SampleKind::U16 => {
-                        return refuse("EXR stores f32 or f16; for u16 write a TIFF");
-                    }
-                };
-                let compression = match compression {
-                    CompressionKind::None => ExrCompression::None,
-                    CompressionKind::Rle => ExrCompression::Rle,
-                    CompressionKind::Zips => ExrCompression::Zips,
-                    CompressionKind::Zip => ExrCompression::Zip,
-                    CompressionKind::Piz => ExrCompression::Piz,
-                    CompressionKind::Lzw | CompressionKind::Deflate => {
-                        return Err(compression.refused("EXR", "none, rle, zips, zip or piz"));
-                    }
-                };
-                Ok(Encoding::Exr(samples, compression))
+                let samples = exr_samples(self.samples.unwrap_or(SampleKind::F32))?;
+                Ok(Encoding::Exr(samples, exr_compression(compression)?))
             }
             Format::Tiff => {
-                let samples = match samples {
-                    SampleKind::F32 => TiffSamples::F32,
-                    SampleKind::U16 if is_codes || quantity == QuantityKind::Srgb => TiffSamples::U16,
-                    SampleKind::U16 => {
-                        return Err(Error::Usage(format!("u16 would round or clip {quantity}; write f32")));
-                    }
-                    SampleKind::F16 => {
-                        return refuse("TIFF stores u16 or f32 here; for f16 write an EXR");
-                    }
-                };
-                let compression = match compression {
-                    CompressionKind::None => TiffCompression::None,
-                    CompressionKind::Lzw => TiffCompression::Lzw,
-                    CompressionKind::Deflate => TiffCompression::Deflate,
-                    _ => return Err(compression.refused("TIFF", "none, lzw or deflate")),
-                };
-                Ok(Encoding::Tiff(samples, compression))
+                let default = if fits_u16 { SampleKind::U16 } else { SampleKind::F32 };
+                let samples = tiff_samples(self.samples.unwrap_or(default), fits_u16, quantity)?;
+                Ok(Encoding::Tiff(samples, tiff_compression(compression)?))
             }
         }
+    }
+
+    /// The format, by the file's extension where none is given.
+    fn format(&self) -> Result<Format> {
+        let path = named(self.path.as_deref());
+        let extension = path.and_then(Path::extension).map(|end| end.to_string_lossy().to_ascii_lowercase());
+        match (self.format, extension.as_deref()) {
+            (Some(format), _) => Ok(format),
+            (None, Some("exr") | None) => Ok(Format::Exr),
+            (None, Some("tif" | "tiff")) => Ok(Format::Tiff),
+            (None, Some(end)) => Err(Error::Usage(format!(
+                "{}: `.{end}` names no format that is written here; end the name in .exr or .tiff, or give --format",
+                path.unwrap_or(Path::new("-")).display()
+            ))),
+        }
+    }
+}
+
+fn exr_samples(samples: SampleKind) -> Result<ExrSamples> {
+    match samples {
+        SampleKind::F32 => Ok(ExrSamples::F32),
+        SampleKind::F16 => Ok(ExrSamples::F16),
+        SampleKind::U16 => Err(Error::Usage("EXR stores f32 or f16; for u16 write a TIFF".into())),
+    }
+}
+
+fn exr_compression(compression: CompressionKind) -> Result<ExrCompression> {
+    match compression {
+        CompressionKind::None => Ok(ExrCompression::None),
+        CompressionKind::Rle => Ok(ExrCompression::Rle),
+        CompressionKind::Zips => Ok(ExrCompression::Zips),
+        CompressionKind::Zip => Ok(ExrCompression::Zip),
+        CompressionKind::Piz => Ok(ExrCompression::Piz),
+        CompressionKind::Lzw | CompressionKind::Deflate => {
+            Err(compression.refused("EXR", "none, rle, zips, zip or piz"))
+        }
+    }
+}
+
+fn tiff_samples(samples: SampleKind, fits_u16: bool, quantity: QuantityKind) -> Result<TiffSamples> {
+    match samples {
+        SampleKind::F32 => Ok(TiffSamples::F32),
+        SampleKind::U16 if fits_u16 => Ok(TiffSamples::U16),
+        SampleKind::U16 => Err(Error::Usage(format!("u16 would round or clip {quantity}; write f32"))),
+        SampleKind::F16 => Err(Error::Usage("TIFF stores u16 or f32 here; for f16 write an EXR".into())),
+    }
+}
+
+fn tiff_compression(compression: CompressionKind) -> Result<TiffCompression> {
+    match compression {
+        CompressionKind::None => Ok(TiffCompression::None),
+        CompressionKind::Lzw => Ok(TiffCompression::Lzw),
+        CompressionKind::Deflate => Ok(TiffCompression::Deflate),
+        _ => Err(compression.refused("TIFF", "none, lzw or deflate")),
     }
 }
 
@@ -194,51 +201,24 @@ impl FrameWriter {
     /// [`Error::Usage`] where options do not go together, the output is a terminal or an input; [`Error::Disk`].
     pub fn create(options: &OutputOptions, header: &FrameHeader, inputs: &[(FileId, String)]) -> Result<Self> {
         let encoding = options.encoding(header)?;
-        let path = options.path.as_deref().filter(|path| *path != Path::new("-"));
+        let path = named(options.path.as_deref());
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
         let target = Target::open(path, needs_seek, inputs)?;
         let name = target.name().to_owned();
         let record = target.named_file().map(|path| (SamplesDigest::new(), sidecar_path(path)));
-        let metadata = yaml::write_metadata(&header.metadata)?;
+        let description = Some(yaml::write_metadata(&header.metadata)?);
         let software = Some(format!("cyanometer {}", env!("CARGO_PKG_VERSION")));
         let geometry = &header.geometry;
         let encoder = match encoding {
             Encoding::Exr(samples, compression) => {
-                let exposure = header.metadata.exposure;
-                let primaries = match header.metadata.quantity {
-                    QuantityKind::Xyz => Some(XYZ_PRIMARIES),
-                    QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu
-                        if header.leads_with_three_planes() =>
-                    {
-                        let matrix = header.metadata.sensor.as_ref().and_then(|sensor| sensor.xyz_from_camera);
-                        matrix.and_then(|matrix| color::implied_primaries(&matrix))
-                    }
-                    _ => None,
-                };
-                let tags = ExrTags {
-                    metadata: Some(metadata),
-                    software,
-                    exposure_s: exposure.map(|e| e.exposure_s),
-                    f_number: exposure.map(|e| e.f_number),
-                    // Absolute XYZ: (1, 1, 1) has Y = 1 cd m⁻².
-                    white_luminance: (header.metadata.quantity == QuantityKind::Xyz).then_some(1.0),
-                    primaries,
-                    emissive_units: None,
-                };
+                let tags = ExrTags { metadata: description, software, ..native_tags(header) };
                 Encoder::Exr(Box::new(ExrWriter::create(target, &name, geometry, samples, compression, &tags)?))
             }
             Encoding::Tiff(samples, compression) => {
                 let scale = u16_scale(header.metadata.quantity, samples);
-                let tags = TiffTags { description: Some(metadata), software };
-                Encoder::Tiff(Box::new(TiffWriter::create(
-                    target,
-                    &name,
-                    geometry,
-                    samples,
-                    scale,
-                    compression,
-                    &tags,
-                )?))
+                let tags = TiffTags { description, software };
+                let settings = TiffSettings { samples, scale, compression, tags, extra: Vec::new() };
+                Encoder::Tiff(Box::new(TiffWriter::create(target, &name, geometry, settings)?))
             }
         };
         Ok(Self { encoder, header: header.clone(), name, record, encoding, stored: Vec::new() })
@@ -284,6 +264,29 @@ impl FrameWriter {
         target.commit()?;
         sidecar.map_or(Ok(()), AtomicFile::commit)?;
         Ok(did_not_fit)
+    }
+}
+
+/// What EXR attributes tell other software of a frame.
+fn native_tags(header: &FrameHeader) -> ExrTags {
+    let FrameHeader { metadata, .. } = header;
+    let primaries = match metadata.quantity {
+        QuantityKind::Xyz => Some(XYZ_PRIMARIES),
+        QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu
+            if header.leads_with_three_planes() =>
+        {
+            let matrix = metadata.sensor.as_ref().and_then(|sensor| sensor.xyz_from_camera);
+            matrix.and_then(|matrix| color::implied_primaries(&matrix))
+        }
+        _ => None,
+    };
+    ExrTags {
+        exposure_s: metadata.exposure.map(|e| e.exposure_s),
+        f_number: metadata.exposure.map(|e| e.f_number),
+        // Absolute XYZ: (1, 1, 1) has Y = 1 cd m⁻².
+        white_luminance: (metadata.quantity == QuantityKind::Xyz).then_some(1.0),
+        primaries,
+        ..ExrTags::default()
     }
 }
 
@@ -351,7 +354,7 @@ fn check_output(output: Option<&Path>, inputs: &[(FileId, String)]) -> Result<()
 /// Whether two outputs are one file, or both the standard output.
 pub fn same_place(a: Option<&Path>, b: Option<&Path>) -> bool {
     let place = |path: Option<&Path>| {
-        let path = path.filter(|path| *path != Path::new("-"))?;
+        let path = named(path)?;
         let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let beside = || Some(directory.canonicalize().ok()?.join(path.file_name()?));
         Some(path.canonicalize().ok().or_else(beside).unwrap_or_else(|| path.to_owned()))
@@ -367,7 +370,7 @@ pub fn same_place(a: Option<&Path>, b: Option<&Path>) -> bool {
 pub fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> {
     let guarded: Vec<(FileId, String)> =
         inputs.iter().flat_map(|path| [regular_file(path), regular_file(&sidecar_path(path))]).flatten().collect();
-    let named: Vec<&Path> = outputs.iter().copied().flatten().filter(|path| *path != Path::new("-")).collect();
+    let named: Vec<&Path> = outputs.iter().filter_map(|path| named(*path)).collect();
     for (index, output) in named.iter().enumerate() {
         check_output(Some(output), &guarded)?;
         if named[..index].iter().any(|other| same_place(Some(other), Some(output))) {
@@ -384,12 +387,12 @@ pub fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> 
 ///
 /// [`Error::Usage`] where the output is the input; [`Error::Disk`].
 pub fn write_text(path: Option<&Path>, text: &str, input: Option<&(FileId, String)>) -> Result<()> {
-    match path.filter(|path| *path != Path::new("-")) {
+    match named(path) {
         Some(path) => write_bytes(path, text.as_bytes(), input),
         None => {
             let mut output = io::stdout().lock();
             let written = output.write_all(text.as_bytes()).and_then(|()| output.flush());
-            written.map_err(|e| Error::disk(super::atomic::STDOUT_NAME, "write", e))
+            written.map_err(|e| Error::disk(STDOUT_NAME, "write", e))
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Pictures for people: 8-bit PNG of any frame.
 
 use super::atomic::Target;
-use super::input::FileId;
+use super::files::FileId;
+use super::foreign::png_complaint;
 use crate::analysis::statistics::Region;
 use crate::color::{linear_srgb_from_xyz, srgb_encode};
 use crate::error::{Error, Result};
@@ -109,10 +110,7 @@ pub fn write_png(
     let size = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
     PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Adaptive)
         .write_image(&bytes, size(width), size(height), color)
-        .map_err(|error| match error {
-            image::ImageError::IoError(source) => Error::disk(&name, "write", source),
-            other => Error::format(&name, format!("it cannot be written as PNG: {other}")),
-        })?;
+        .map_err(|error| png_complaint(&name, error))?;
     file.flush().map_err(|e| Error::disk(&name, "write", e))?;
     file.commit()
 }

@@ -1,5 +1,6 @@
 //! Pipes: which inputs and outputs are some, and how much they hold.
 
+use super::files::named;
 use std::fs::File;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
@@ -30,7 +31,7 @@ pub fn is_output(path: Option<&Path>) -> bool {
 }
 
 fn is_pipe(path: Option<&Path>, standard: BorrowedFd<'_>) -> bool {
-    let metadata = match path.filter(|path| *path != Path::new("-")) {
+    let metadata = match named(path) {
         Some(path) => std::fs::metadata(path),
         None => standard.try_clone_to_owned().and_then(|stream| File::from(stream).metadata()),
     };

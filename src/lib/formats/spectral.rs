@@ -1,8 +1,10 @@
 //! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` \[Fichet2021].
 
 use super::csv::SpectralTable;
-use super::data;
-use super::input::{FrameReader, InputOptions, open_named, spool};
+use super::files::{named, open_named, read_table, spool};
+use super::format::HEAD_BYTES;
+use super::input::{FrameReader, InputOptions};
+use super::table;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::spectrum::{SpectralLibrary, channel_wavelength_nm, chart_columns, check_wavelengths};
@@ -73,12 +75,12 @@ pub enum Radiances {
 ///
 /// Those of the readers, and [`Error::Disk`].
 pub fn open(options: &InputOptions) -> Result<Radiances> {
-    let path = options.path.as_deref().filter(|path| *path != Path::new("-"));
+    let path = named(options.path.as_deref());
     let (mut file, name) = open_named(path)?;
     let failed = |e| Error::disk(&name, "read", e);
     let mut head = Vec::new();
-    (&mut file).take(4).read_to_end(&mut head).map_err(failed)?;
-    if head == [0x76, 0x2F, 0x31, 0x01] {
+    (&mut file).take(HEAD_BYTES as u64).read_to_end(&mut head).map_err(failed)?;
+    if table::by_head(&head, &name)?.is_some() {
         if file.metadata().is_ok_and(|m| m.is_file()) {
             file.rewind().map_err(failed)?;
         } else {
@@ -87,7 +89,7 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
         let options = InputOptions { all_channels: true, ..options.clone() };
         return Ok(Radiances::Image(Box::new(FrameReader::open_file(file, &name, path, &options)?)));
     }
-    let bytes = data::read_table(io::Cursor::new(head).chain(file), &name)?;
+    let bytes = read_table(io::Cursor::new(head).chain(file), &name)?;
     Ok(Radiances::Table(SpectralTable::parse(&name, &bytes)?))
 }
 

@@ -1,5 +1,6 @@
 //! YAML, read with limits: metadata, sensors and matrices all come through here.
 
+use super::foreign::yaml_complaint;
 use crate::error::{Error, Result};
 use crate::metadata::{METADATA_SCHEMA, Metadata};
 use serde::Serialize;
@@ -17,7 +18,7 @@ const MAX_REFERENCES: usize = 8;
 
 /// Reads a document as what it is, before it is read as what it should be.
 fn parse_raw(name: &str, text: &str) -> Result<Mapping> {
-    let raw: Value = serde_yaml::from_str(text).map_err(|error| not_as_expected(name, &error))?;
+    let raw: Value = serde_yaml::from_str(text).map_err(|error| yaml_complaint(name, &error))?;
     if let Some(key) = not_finite(&raw) {
         return Err(Error::format(name, format!("`{key}` is not a finite number")));
     }
@@ -27,10 +28,6 @@ fn parse_raw(name: &str, text: &str) -> Result<Mapping> {
     }
 }
 
-fn not_as_expected(name: &str, error: &serde_yaml::Error) -> Error {
-    Error::format(name, format!("it is not as expected: {error}"))
-}
-
 /// Reads one document into a typed value and what of it the type does not know.
 ///
 /// # Errors
@@ -38,8 +35,8 @@ fn not_as_expected(name: &str, error: &serde_yaml::Error) -> Error {
 /// [`Error::Format`] when the text is no YAML of this kind, is larger or deeper than any of ours, or holds a number that
 /// is not finite. The place is named where the parser knows it.
 fn parse<T: DeserializeOwned + Serialize>(name: &str, raw: &Mapping, text: &str) -> Result<(T, Mapping)> {
-    let typed: T = serde_yaml::from_str(text).map_err(|error| not_as_expected(name, &error))?;
-    let known = serde_yaml::to_value(&typed).map_err(|error| not_as_expected(name, &error))?;
+    let typed: T = serde_yaml::from_str(text).map_err(|error| yaml_complaint(name, &error))?;
+    let known = serde_yaml::to_value(&typed).map_err(|error| yaml_complaint(name, &error))?;
     let unknown = known.as_mapping().map(|known| unknown_keys(raw, known)).unwrap_or_default();
     Ok((typed, unknown))
 }

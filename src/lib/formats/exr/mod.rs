@@ -3,13 +3,14 @@
 //! The crate `exr` parses headers and (de)compresses blocks; the order of reading and writing is ours, so that rows
 //! stream by and a pipe needs no seek. Uncompressed scanlines, which is what pipes carry, are moved without the crate.
 
+mod header;
 mod read;
 mod read_ahead;
 mod straight;
 mod write;
 mod write_behind;
 
-pub use read::{ExrReader, is_streamable};
+pub use read::{ExrReader, FORMAT};
 pub use write::{ExrWriter, TablePatch, patch_table};
 
 /// The string attribute that holds the metadata.
@@ -53,6 +54,9 @@ pub enum ExrCompression {
 
 /// Chromaticities (x, y) of the three primaries and of white.
 pub type Primaries = [[f64; 2]; 4];
+
+/// Chromaticities that mark XYZ stored as R, G, B: an OpenEXR convention.
+pub const XYZ_PRIMARIES: Primaries = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0 / 3.0, 1.0 / 3.0]];
 
 /// Attributes that other software understands, and ours.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -11,22 +11,27 @@ use tiff::tags::Tag;
 /// Longest text of one tag.
 const TEXT_BYTES: u64 = 16 << 20;
 
+/// Whether a file begins as a TIFF does: classic or BigTIFF, in either byte order.
+pub fn begins_so(head: &[u8]) -> bool {
+    [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| head.starts_with(*magic))
+}
+
 /// A TIFF file: its bytes, and how its numbers are written.
 #[derive(Debug)]
-pub(super) struct Source {
+pub struct TiffFile {
     file: File,
     /// The file as the user named it.
-    pub name: String,
+    name: String,
     /// Bytes in the file.
-    pub length: u64,
+    pub(super) length: u64,
     /// `MM` files; the others are little-endian.
-    pub big_endian: bool,
+    pub(super) big_endian: bool,
     /// BigTIFF: offsets and counts have eight bytes.
-    pub big_tiff: bool,
+    big_tiff: bool,
     first_directory: u64,
 }
 
-impl Source {
+impl TiffFile {
     /// Reads the header.
     ///
     /// # Errors
@@ -34,33 +39,33 @@ impl Source {
     /// When the file cannot be read or is no TIFF.
     pub fn open(mut file: File, name: &str) -> Result<Self> {
         let length = file.seek(SeekFrom::End(0)).map_err(|source| Error::disk(name, "read", source))?;
-        let mut source =
+        let mut opened =
             Self { file, name: name.to_owned(), length, big_endian: false, big_tiff: false, first_directory: 0 };
         if length == 0 {
-            return Err(source.problem("the file is empty"));
+            return Err(opened.problem("the file is empty"));
         }
         let no_tiff = "this is no TIFF file; its first bytes are not those of one";
         if length < 8 {
-            return Err(source.problem(no_tiff));
+            return Err(opened.problem(no_tiff));
         }
         let mut head = [0; 8];
-        source.read_at(0, &mut head)?;
-        source.big_endian = match &head[..2] {
+        opened.read_at(0, &mut head)?;
+        opened.big_endian = match &head[..2] {
             b"II" => false,
             b"MM" => true,
-            _ => return Err(source.problem(no_tiff)),
+            _ => return Err(opened.problem(no_tiff)),
         };
-        source.first_directory = match source.number(&head[2..4]) {
-            42 => source.number(&head[4..8]),
-            43 if source.number(&head[4..6]) == 8 && source.number(&head[6..8]) == 0 => {
-                source.big_tiff = true;
+        opened.first_directory = match opened.number(&head[2..4]) {
+            42 => opened.number(&head[4..8]),
+            43 if opened.number(&head[4..6]) == 8 && opened.number(&head[6..8]) == 0 => {
+                opened.big_tiff = true;
                 let mut offset = [0; 8];
-                source.read_at(8, &mut offset)?;
-                source.number(&offset)
+                opened.read_at(8, &mut offset)?;
+                opened.number(&offset)
             }
-            _ => return Err(source.problem(no_tiff)),
+            _ => return Err(opened.problem(no_tiff)),
         };
-        Ok(source)
+        Ok(opened)
     }
 
     /// An [`Error::Format`] about this file.
@@ -99,6 +104,12 @@ impl Source {
         if self.big_endian { bytes.iter().fold(0, append) } else { bytes.iter().rev().fold(0, append) }
     }
 
+    /// A signed number of up to eight bytes.
+    fn signed(&self, bytes: &[u8]) -> i64 {
+        let unused = 64 - 8 * bytes.len();
+        (self.number(bytes) << unused).cast_signed() >> unused
+    }
+
     /// Reads the directory of image number `page`, counted from 0.
     ///
     /// # Errors
@@ -132,7 +143,7 @@ impl Source {
     /// Reads the directory at `offset` (only its link to the next one unless `wanted`), and gives that link.
     fn directory_at(&mut self, offset: u64, wanted: bool) -> Result<(Directory, u64)> {
         let (count_bytes, entry_bytes, offset_bytes) = if self.big_tiff { (8, 20, 8) } else { (2, 12, 4) };
-        let beyond = |source: &Self| source.cut_short("the table of tags");
+        let beyond = |file: &Self| file.cut_short("the table of tags");
         if !self.holds(offset, count_bytes as u64) {
             return Err(beyond(self));
         }
@@ -184,7 +195,7 @@ impl Source {
             let kind = entry.kind;
             return Err(self.problem(format!("the file is damaged; tag {tag:?} has type {kind}")));
         }
-        let beyond = |source: &Self| source.cut_short(&format!("the value of tag {tag:?}"));
+        let beyond = |file: &Self| file.cut_short(&format!("the value of tag {tag:?}"));
         let total = entry.count.checked_mul(size as u64).filter(|&total| total <= self.length.max(8));
         let Some(total) = total else { return Err(beyond(self)) };
         let wanted = usize::try_from(total.min(at_most.saturating_mul(size as u64))).map_err(|_| beyond(self))?;
@@ -219,27 +230,49 @@ impl Source {
     ///
     /// # Errors
     ///
-    /// As [`Source::unsigned`].
+    /// As [`TiffFile::unsigned`].
     pub fn one(&mut self, directory: &Directory, tag: Tag) -> Result<Option<u64>> {
         Ok(self.unsigned(directory, tag, 1)?.and_then(|values| values.first().copied()))
     }
 
-    /// A tag that holds a ratio of unsigned numbers, or a float. None where it is missing, 0/0 or unreadable: such tags
-    /// are never needed to read an image.
-    pub fn ratio(&mut self, directory: &Directory, tag: Tag) -> Option<f64> {
-        let entry = directory.entries.get(&tag.to_u16())?;
-        let (kind, _, bytes) = self.value(entry, tag, 1).ok()?;
-        let number = |bytes: &[u8]| self.number(bytes);
-        let value = match kind {
-            5 => {
-                let (above, below) = (bytes.get(..4)?, bytes.get(4..)?);
-                u32::try_from(number(above)).ok().map(f64::from)? / u32::try_from(number(below)).ok().map(f64::from)?
-            }
-            11 => f32::from_bits(u32::try_from(number(&bytes)).ok()?).into(),
-            12 if bytes.len() == 8 => f64::from_bits(number(&bytes)),
-            _ => return None,
-        };
-        value.is_finite().then_some(value)
+    /// The first `at_most` values of a tag that holds numbers of any type, or bytes; none where the tag is missing. Ratios
+    /// of zeros are NaN.
+    ///
+    /// # Errors
+    ///
+    /// When the value lies outside the file or is text.
+    pub fn numbers(&mut self, directory: &Directory, tag: Tag, at_most: u64) -> Result<Option<Vec<f64>>> {
+        let Some(entry) = directory.entries.get(&tag.to_u16()) else { return Ok(None) };
+        let (kind, size, bytes) = self.value(entry, tag, at_most)?;
+        let mut numbers = Vec::with_capacity(bytes.len() / size);
+        for bytes in bytes.chunks_exact(size) {
+            let (above, below) = bytes.split_at(size / 2);
+            numbers.push(match kind {
+                5 => self.number(above) as f64 / self.number(below) as f64,
+                10 => self.signed(above) as f64 / self.signed(below) as f64,
+                6 | 8 | 9 | 17 => self.signed(bytes) as f64,
+                11 => f32::from_bits(low_half(self.number(bytes))).into(),
+                12 => f64::from_bits(self.number(bytes)),
+                2 | 129 => {
+                    return Err(
+                        self.problem(format!("the file is damaged; tag {tag:?} should be a number and is text"))
+                    );
+                }
+                _ => self.number(bytes) as f64,
+            });
+        }
+        Ok(Some(numbers))
+    }
+
+    /// The number that a tag of any such type holds, the first if there are several; none where it is missing or no
+    /// finite number.
+    ///
+    /// # Errors
+    ///
+    /// As [`TiffFile::numbers`].
+    pub fn ratio(&mut self, directory: &Directory, tag: Tag) -> Result<Option<f64>> {
+        let numbers = self.numbers(directory, tag, 1)?;
+        Ok(numbers.and_then(|numbers| numbers.first().copied()).filter(|number| number.is_finite()))
     }
 
     /// The text of a tag up to its first NUL; bytes that are not UTF-8 become U+FFFD.
@@ -264,7 +297,7 @@ impl Source {
 
 /// The tags of one image.
 #[derive(Debug)]
-pub(super) struct Directory {
+pub struct Directory {
     entries: BTreeMap<u16, Entry>,
 }
 
@@ -272,6 +305,11 @@ impl Directory {
     /// Whether the tag is there.
     pub fn has(&self, tag: Tag) -> bool {
         self.entries.contains_key(&tag.to_u16())
+    }
+
+    /// The numbers of all tags, in ascending order.
+    pub fn numbers(&self) -> impl Iterator<Item = u16> {
+        self.entries.keys().copied()
     }
 }
 
@@ -281,6 +319,12 @@ struct Entry {
     count: u64,
     inline: [u8; 8],
     offset: u64,
+}
+
+/// The four lower bytes.
+fn low_half(number: u64) -> u32 {
+    let [a, b, c, d, ..] = number.to_le_bytes();
+    u32::from_le_bytes([a, b, c, d])
 }
 
 /// Bytes of one value of a TIFF type; 0 for types that do not exist.

@@ -7,14 +7,18 @@
 
 mod chunk;
 mod directory;
+mod grid;
 mod layout;
 mod read;
+mod tags;
 #[cfg(test)]
 mod tests;
 mod write;
 
-pub use read::TiffReader;
-pub use write::TiffWriter;
+pub use directory::{Directory, TiffFile, begins_so};
+pub use read::{FORMAT, TiffReader};
+pub use tags::{ExtraTag, TagValue};
+pub use write::{TiffSettings, TiffWriter};
 
 /// What a TIFF's own tags say in words.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -32,6 +36,16 @@ pub enum TiffSamples {
     U16,
     /// 32-bit floats.
     F32,
+}
+
+impl TiffSamples {
+    /// Bytes of a sample.
+    fn bytes(self) -> usize {
+        match self {
+            Self::U16 => 2,
+            Self::F32 => 4,
+        }
+    }
 }
 
 /// How strips are compressed in a file that we write; without loss, all of them.

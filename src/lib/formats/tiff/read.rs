@@ -1,11 +1,15 @@
 //! Reading rows.
 
+#[cfg(test)]
 use super::TiffTags;
 use super::chunk::{Compression, Trouble};
-use super::directory::Source;
-use super::layout::{Layout, Stored};
+use super::directory::{TiffFile, begins_so};
+use super::layout::Layout;
 use crate::error::Result;
+use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
 use crate::frame::Geometry;
+use crate::metadata::Metadata;
+use crate::units::QuantityKind;
 use half::f16;
 use rayon::prelude::*;
 use std::fs::File;
@@ -20,6 +24,19 @@ const PIECE_BYTES: usize = 1 << 20;
 /// Rows that take more than this as `f32` are not worth having together.
 const NATURAL_BYTES: usize = 64 << 20;
 
+/// TIFF, classic and BigTIFF.
+pub const FORMAT: FrameFormat = FrameFormat {
+    name: "a TIFF",
+    sign: Sign::Bytes(begins_so),
+    reading: Reading::Rows(Readers {
+        open: |file, name, page| Ok(Box::new(TiffReader::open(file, name, page)?)),
+        stream: None,
+    }),
+};
+
+/// What our metadata begin with; other programs put their own words into tag 270.
+const METADATA_BEGIN: &str = "schema: cyanometer/";
+
 /// Reads rows of one image of a TIFF file.
 ///
 /// Reads strips and tiles, interleaved and planar; 8, 16 and 32-bit integers, half, single and double floats; no
@@ -30,8 +47,11 @@ const NATURAL_BYTES: usize = 64 << 20;
 /// Memory is the decoded bytes of one row of tiles or one strip, or about 8 MiB where these are smaller.
 #[derive(Debug)]
 pub struct TiffReader {
-    source: Source,
+    file: TiffFile,
     layout: Layout,
+    own_tags: Metadata,
+    /// The row that [`SampleReader::read`] gives next.
+    next_row: usize,
     /// Rows of a piece: a chunk's rows; or fewer where samples are not compressed, so that any rows can be had.
     piece_rows: usize,
     /// The pieces that are decoded, in the order of [`TiffReader::piece_range`].
@@ -46,42 +66,23 @@ impl TiffReader {
     ///
     /// When the file is no TIFF, is damaged or shorter than its tags say, or is of a kind that is not supported.
     pub fn open(file: File, name: &str, page: usize) -> Result<Self> {
-        let mut source = Source::open(file, name)?;
-        let directory = source.directory(page)?;
-        let layout = Layout::read(&mut source, &directory)?;
+        let mut file = TiffFile::open(file, name)?;
+        let directory = file.directory(page)?;
+        let layout = Layout::read(&mut file, &directory)?;
         let piece_rows = if layout.compression == Compression::None {
             let row_bytes = layout.chunk_row_bytes() * layout.across * layout.planes();
             layout.chunk_rows.min((PIECE_BYTES / row_bytes).max(1))
         } else {
             layout.chunk_rows
         };
-        Ok(Self { source, layout, piece_rows, decoded: Vec::new(), held: 0..0 })
-    }
-
-    /// Size, place and channels of the image. Channels are `Y`; `Y`, `A`; `R`, `G`, `B`; with `A`; `C`, `M`, `Y`, `K`;
-    /// or else `C0`, `C1` …
-    pub fn geometry(&self) -> &Geometry {
-        &self.layout.geometry
+        let own_tags = Metadata::new(QuantityKind::Unspecified);
+        Ok(Self { file, layout, own_tags, next_row: 0, piece_rows, decoded: Vec::new(), held: 0..0 })
     }
 
     /// The texts in the image's tags.
-    pub fn tags(&self) -> &TiffTags {
+    #[cfg(test)]
+    pub(super) fn tags(&self) -> &TiffTags {
         &self.layout.tags
-    }
-
-    /// How samples are stored: `u8`, `i8`, `u16`, `i16`, `u32`, `i32`, `f16`, `f32` or `f64`.
-    pub fn stored_as(&self) -> &'static str {
-        self.layout.stored.name()
-    }
-
-    /// Rows that decode together, where these are not too many; asking for multiples of it is fastest.
-    pub fn natural_rows(&self) -> usize {
-        let row_bytes = self.layout.geometry.row_samples() * size_of::<f32>();
-        if self.layout.chunk_rows.saturating_mul(row_bytes) <= NATURAL_BYTES {
-            self.layout.chunk_rows
-        } else {
-            self.piece_rows.min((PIECE_BYTES / row_bytes).max(1))
-        }
     }
 
     /// Reads rows `first_row..first_row + rows` into `samples`, laid out `[row][channel][column]`.
@@ -157,7 +158,7 @@ impl TiffReader {
         self.decoded.clear();
         if self.decoded.try_reserve_exact(one * fitting).is_err() {
             let mebibytes = one >> 20;
-            return Err(self.source.problem(format!(
+            return Err(self.file.problem(format!(
                 "its strips or tiles need {mebibytes} MiB of memory at a time, and there is not so much; rewrite it with smaller ones, for example with `tiffcp -r 64`"
             )));
         }
@@ -201,13 +202,13 @@ impl TiffReader {
         let decoded = &mut place[..rows * layout.chunk_row_bytes()];
         if layout.compression == Compression::None {
             let skip = part * self.piece_rows * layout.chunk_row_bytes();
-            self.source.read_at(offset + skip as u64, decoded)?;
+            self.file.read_at(offset + skip as u64, decoded)?;
             return Ok(Job { chunk, stored: Vec::new(), decoded });
         }
         // No compression makes data so much longer; what is beyond cannot be needed.
         let most = 2 * decoded.len() as u64 + 1024;
         let mut bytes = vec![0; usize::try_from(stored.min(most)).unwrap_or_default()];
-        self.source.read_at(offset, &mut bytes)?;
+        self.file.read_at(offset, &mut bytes)?;
         Ok(Job { chunk, stored: bytes, decoded })
     }
 
@@ -226,7 +227,7 @@ impl TiffReader {
                     layout.chunk_row_bytes(),
                     layout.chunk_channels(),
                     layout.stored.bytes(),
-                    self.source.big_endian,
+                    self.file.big_endian,
                 );
                 (chunk, result)
             })
@@ -234,7 +235,7 @@ impl TiffReader {
         for (chunk, result) in results {
             if let Err(trouble) = result {
                 let what = if layout.tiled { "tile" } else { "strip" };
-                return Err(self.source.problem(format!("{what} {chunk} {}", trouble.text())));
+                return Err(self.file.problem(format!("{what} {chunk} {}", trouble.text())));
             }
         }
         Ok(())
@@ -243,16 +244,16 @@ impl TiffReader {
     /// Converts one row of the held pieces.
     fn convert_row(&self, row: usize, samples: &mut [f32]) {
         match self.layout.stored {
-            Stored::U8 => self.convert(row, samples, |[byte]: [u8; 1]| f32::from(byte)),
-            Stored::I8 => self.convert(row, samples, |bytes| f32::from(i8::from_ne_bytes(bytes))),
-            Stored::U16 => self.convert(row, samples, |bytes| f32::from(u16::from_ne_bytes(bytes))),
-            Stored::I16 => self.convert(row, samples, |bytes| f32::from(i16::from_ne_bytes(bytes))),
-            Stored::U32 => self.convert(row, samples, |bytes| u32::from_ne_bytes(bytes) as f32),
-            Stored::I32 => self.convert(row, samples, |bytes| i32::from_ne_bytes(bytes) as f32),
-            Stored::F16 => self.convert(row, samples, |bytes| f16::from_ne_bytes(bytes).to_f32()),
-            Stored::F32 => self.convert(row, samples, f32::from_ne_bytes),
+            SampleType::U8 => self.convert(row, samples, |[byte]: [u8; 1]| f32::from(byte)),
+            SampleType::I8 => self.convert(row, samples, |bytes| f32::from(i8::from_ne_bytes(bytes))),
+            SampleType::U16 => self.convert(row, samples, |bytes| f32::from(u16::from_ne_bytes(bytes))),
+            SampleType::I16 => self.convert(row, samples, |bytes| f32::from(i16::from_ne_bytes(bytes))),
+            SampleType::U32 => self.convert(row, samples, |bytes| u32::from_ne_bytes(bytes) as f32),
+            SampleType::I32 => self.convert(row, samples, |bytes| i32::from_ne_bytes(bytes) as f32),
+            SampleType::F16 => self.convert(row, samples, |bytes| f16::from_ne_bytes(bytes).to_f32()),
+            SampleType::F32 => self.convert(row, samples, f32::from_ne_bytes),
             #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what is promised")]
-            Stored::F64 => self.convert(row, samples, |bytes| f64::from_ne_bytes(bytes) as f32),
+            SampleType::F64 => self.convert(row, samples, |bytes| f64::from_ne_bytes(bytes) as f32),
         }
         if self.layout.inverted {
             for sample in samples {
@@ -295,6 +296,47 @@ impl TiffReader {
                 }
             }
         }
+    }
+}
+
+impl SampleReader for TiffReader {
+    /// Channels are `Y`; `Y`, `A`; `R`, `G`, `B`; with `A`; `C`, `M`, `Y`, `K`; or else `C0`, `C1` …
+    fn geometry(&self) -> &Geometry {
+        &self.layout.geometry
+    }
+
+    fn stored_as(&self) -> Option<SampleType> {
+        Some(self.layout.stored)
+    }
+
+    /// Rows that decode together, where these are not too many.
+    fn natural_rows(&self) -> usize {
+        let row_bytes = self.layout.geometry.row_samples() * size_of::<f32>();
+        if self.layout.chunk_rows.saturating_mul(row_bytes) <= NATURAL_BYTES {
+            self.layout.chunk_rows
+        } else {
+            self.piece_rows.min((PIECE_BYTES / row_bytes).max(1))
+        }
+    }
+
+    fn embedded(&self) -> Option<&str> {
+        self.layout.tags.description.as_deref().filter(|text| text.starts_with(METADATA_BEGIN))
+    }
+
+    fn own_tags(&self) -> &Metadata {
+        &self.own_tags
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.layout.notes
+    }
+
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        let start = samples.len();
+        samples.resize(start + rows * self.layout.geometry.row_samples(), 0.0);
+        self.read_rows(self.next_row, rows, &mut samples[start..])?;
+        self.next_row += rows;
+        Ok(())
     }
 }
 

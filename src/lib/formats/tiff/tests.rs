@@ -2,9 +2,11 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "tests, with values chosen to fit")]
 
+use super::tags::{Field, OF_THE_WRITER, fields};
 use super::write::needs_big_tiff;
 use super::*;
 use crate::error::Result;
+use crate::formats::format::SampleReader;
 use crate::frame::Geometry;
 use std::fs::File;
 use std::io::{Cursor, Write};
@@ -37,6 +39,10 @@ fn frame(width: usize, height: usize, channels: usize) -> Geometry {
     Geometry { width, height, origin: [0, 0], channels: names }
 }
 
+fn settings(samples: TiffSamples, compression: TiffCompression, tags: &TiffTags) -> TiffSettings {
+    TiffSettings { samples, scale: 1.0, compression, tags: tags.clone(), extra: Vec::new() }
+}
+
 fn write(
     geometry: &Geometry,
     kind: TiffSamples,
@@ -46,7 +52,7 @@ fn write(
     rows_at_once: usize,
 ) -> (Vec<u8>, u64) {
     let output = Cursor::new(Vec::new());
-    let mut writer = TiffWriter::create(output, "out.tif", geometry, kind, 1.0, compression, tags).unwrap();
+    let mut writer = TiffWriter::create(output, "out.tif", geometry, settings(kind, compression, tags)).unwrap();
     for rows in samples.chunks(rows_at_once * geometry.row_samples()) {
         writer.write_rows(rows).unwrap();
     }
@@ -90,7 +96,7 @@ fn what_is_written_is_read() {
                     let mut reader = open(&bytes, 0).unwrap();
                     assert_eq!(*reader.geometry(), geometry, "{case}");
                     let stored = if kind == TiffSamples::U16 { "u16" } else { "f32" };
-                    assert_eq!(reader.stored_as(), stored);
+                    assert_eq!(reader.stored_as().unwrap().name(), stored);
                     assert!(read_all(&mut reader, height).unwrap() == samples, "{case}");
                     assert!(read_all(&mut reader, 11).unwrap() == samples, "{case}");
                 }
@@ -218,16 +224,9 @@ fn rounds_and_clamps_to_sixteen_bits_and_counts_what_did_not_fit() {
     let all: Vec<f32> = (0..=u16::MAX).map(f32::from).collect();
     let scaled: Vec<f32> = all.iter().map(|code| code / 65_535.0).collect();
     let geometry = frame(256, 256, 1);
-    let mut writer = TiffWriter::create(
-        Cursor::new(Vec::new()),
-        "out.tif",
-        &geometry,
-        TiffSamples::U16,
-        65_535.0,
-        TiffCompression::None,
-        &TiffTags::default(),
-    )
-    .unwrap();
+    let settings = settings(TiffSamples::U16, TiffCompression::None, &TiffTags::default());
+    let settings = TiffSettings { scale: 65_535.0, ..settings };
+    let mut writer = TiffWriter::create(Cursor::new(Vec::new()), "out.tif", &geometry, settings).unwrap();
     writer.write_rows(&scaled).unwrap();
     let (bytes, unfit) = writer.finish().unwrap();
     assert_eq!(unfit, 0);
@@ -237,7 +236,10 @@ fn rounds_and_clamps_to_sixteen_bits_and_counts_what_did_not_fit() {
 #[test]
 fn big_tiff_when_it_must_be() {
     let tags = TiffTags::default();
-    let big = |height, compression| needs_big_tiff(&frame(10_000, height, 1), TiffSamples::F32, compression, &tags);
+    let big = |height, compression| {
+        let settings = settings(TiffSamples::F32, compression, &tags);
+        needs_big_tiff(&frame(10_000, height, 1), &settings, &[])
+    };
     // 4 GiB are 107 374 rows of 40 kB.
     assert!(!big(107_000, TiffCompression::None) && big(107_374, TiffCompression::None));
     assert!(!big(97_000, TiffCompression::Deflate) && big(98_000, TiffCompression::Deflate));
@@ -246,17 +248,9 @@ fn big_tiff_when_it_must_be() {
     let geometry = Geometry { origin: [3, 4], ..frame(300, 200, 3) };
     for kind in [TiffSamples::U16, TiffSamples::F32] {
         let samples = samples(300 * 200 * 3, kind);
-        let mut writer = TiffWriter::begin(
-            Cursor::new(Vec::new()),
-            "out.tif",
-            &geometry,
-            kind,
-            1.0,
-            TiffCompression::Deflate,
-            &tags,
-            true,
-        )
-        .unwrap();
+        let settings = settings(kind, TiffCompression::Deflate, &tags);
+        let output = Cursor::new(Vec::new());
+        let mut writer = TiffWriter::begin(output, "out.tif", &geometry, settings, Vec::new(), true).unwrap();
         writer.write_rows(&samples).unwrap();
         let bytes = writer.finish().unwrap().0.into_inner();
         assert_eq!(bytes[2], 43);
@@ -267,19 +261,153 @@ fn big_tiff_when_it_must_be() {
     }
 }
 
+/// A tag of each type, one with a value that fits into its entry and one with a value that does not.
+fn extra_tags() -> Vec<ExtraTag> {
+    let values = [
+        TagValue::Bytes(vec![1, 4, 0, 255]),
+        TagValue::Bytes((0..9).collect()),
+        TagValue::Undefined(vec![7, 8]),
+        TagValue::Undefined((1..=20).collect()),
+        TagValue::Text("abc".into()),
+        TagValue::Text("a camera of ours".into()),
+        TagValue::Shorts(vec![2, 65_535]),
+        TagValue::Shorts(vec![1, 2, 3, 4, 5]),
+        TagValue::Longs(vec![u32::MAX]),
+        TagValue::Longs(vec![1, 2, 3]),
+        TagValue::SignedShorts(vec![-2, 5]),
+        TagValue::SignedShorts(vec![i16::MIN, i16::MAX, 0, -1, 1]),
+        TagValue::SignedLongs(vec![-7]),
+        TagValue::SignedLongs(vec![i32::MIN, i32::MAX, -1]),
+        TagValue::Ratios(vec![[1, 30]]),
+        TagValue::Ratios(vec![[u32::MAX, 7], [0, 1]]),
+        TagValue::SignedRatios(vec![[-1, 3]]),
+        TagValue::SignedRatios(vec![[i32::MIN, 10_000], [5, -2]]),
+        TagValue::Floats(vec![-0.1]),
+        TagValue::Floats(vec![1e30, f32::MIN_POSITIVE, 3.0]),
+        TagValue::Doubles(vec![-0.1]),
+        TagValue::Doubles(vec![1e300, 2.0]),
+    ];
+    // From the highest number to the lowest: some before those of the writer, some between, some behind.
+    let numbers = [254, 271, 272, 306, 315, 316, 318].into_iter().chain(50_700..);
+    let mut tags: Vec<ExtraTag> = numbers.zip(values).map(|(number, value)| ExtraTag { number, value }).collect();
+    tags.reverse();
+    tags
+}
+
+/// Any value as numbers, or bytes.
+fn as_numbers(value: &TagValue) -> Vec<f64> {
+    match value {
+        TagValue::Bytes(bytes) | TagValue::Undefined(bytes) => bytes.iter().map(|&byte| byte.into()).collect(),
+        TagValue::Text(_) => Vec::new(),
+        TagValue::Shorts(numbers) => numbers.iter().map(|&number| number.into()).collect(),
+        TagValue::Longs(numbers) => numbers.iter().map(|&number| number.into()).collect(),
+        TagValue::SignedShorts(numbers) => numbers.iter().map(|&number| number.into()).collect(),
+        TagValue::SignedLongs(numbers) => numbers.iter().map(|&number| number.into()).collect(),
+        TagValue::Ratios(ratios) => ratios.iter().map(|[a, b]| f64::from(*a) / f64::from(*b)).collect(),
+        TagValue::SignedRatios(ratios) => ratios.iter().map(|[a, b]| f64::from(*a) / f64::from(*b)).collect(),
+        TagValue::Floats(numbers) => numbers.iter().map(|&number| number.into()).collect(),
+        TagValue::Doubles(numbers) => numbers.clone(),
+    }
+}
+
+#[test]
+fn tags_of_the_caller_come_back() {
+    let geometry = Geometry { origin: [3, 4], ..frame(30, 20, 3) };
+    let samples = samples(1800, TiffSamples::U16);
+    let texts = TiffTags { description: Some("a frame".into()), software: Some("a program".into()) };
+    for big in [false, true] {
+        let settings = settings(TiffSamples::U16, TiffCompression::Lzw, &texts);
+        let extra = fields(&extra_tags(), "out.tif").unwrap();
+        let output = Cursor::new(Vec::new());
+        let mut writer = TiffWriter::begin(output, "out.tif", &geometry, settings, extra, big).unwrap();
+        writer.write_rows(&samples).unwrap();
+        let bytes = writer.finish().unwrap().0.into_inner();
+        assert_eq!(bytes[2], if big { 43 } else { 42 });
+
+        let mut reader = open(&bytes, 0).unwrap();
+        assert_eq!((reader.tags(), reader.geometry()), (&texts, &geometry));
+        assert!(read_all(&mut reader, 20).unwrap() == samples);
+        let mut spooled = tempfile::tempfile().unwrap();
+        spooled.write_all(&bytes).unwrap();
+        let mut file = TiffFile::open(spooled, "out.tif").unwrap();
+        let directory = file.directory(0).unwrap();
+        let numbers: Vec<u16> = directory.numbers().collect();
+        assert!(numbers.is_sorted() && numbers.len() > extra_tags().len() + 15, "{numbers:?}");
+        let mut witness = tiff::decoder::Decoder::new(Cursor::new(&bytes)).unwrap();
+        for ExtraTag { number, value } in extra_tags() {
+            let tag = tiff::tags::Tag::from_u16_exhaustive(number);
+            if let TagValue::Text(text) = &value {
+                assert_eq!(file.text(&directory, tag).unwrap().as_ref(), Some(text));
+                assert_eq!(witness.get_tag_ascii_string(tag).unwrap(), *text);
+            } else {
+                let wanted = as_numbers(&value);
+                assert_eq!(file.numbers(&directory, tag, u64::MAX).unwrap().unwrap(), wanted, "{value:?}");
+                assert_eq!(as_the_crate_reads(&witness.get_tag(tag).unwrap()), wanted, "{value:?}");
+            }
+        }
+        assert!(witness.read_image().is_ok());
+    }
+}
+
+fn as_the_crate_reads(value: &tiff::decoder::ifd::Value) -> Vec<f64> {
+    use tiff::decoder::ifd::Value as V;
+    match value {
+        V::List(values) => values.iter().flat_map(as_the_crate_reads).collect(),
+        V::Byte(number) => vec![(*number).into()],
+        V::Short(number) => vec![(*number).into()],
+        V::Unsigned(number) => vec![(*number).into()],
+        V::SignedShort(number) => vec![(*number).into()],
+        V::Signed(number) => vec![(*number).into()],
+        V::Rational(a, b) => vec![f64::from(*a) / f64::from(*b)],
+        V::SRational(a, b) => vec![f64::from(*a) / f64::from(*b)],
+        V::Float(number) => vec![(*number).into()],
+        V::Double(number) => vec![*number],
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn tags_that_would_stand_twice_are_refused() {
+    let tag = |number| ExtraTag { number, value: TagValue::Shorts(vec![1]) };
+    let complaint = |tags: &[ExtraTag]| fields(tags, "out.tif").unwrap_err().to_string();
+    for number in OF_THE_WRITER {
+        let wanted = format!("out.tif: the tag {number} is set by the writer of the file; it cannot be added");
+        assert_eq!(complaint(&[tag(271), tag(number)]), wanted);
+    }
+    assert_eq!(complaint(&[tag(271), tag(50_706), tag(271)]), "out.tif: the tag 271 is given twice");
+    let empty = ExtraTag { number: 271, value: TagValue::Shorts(Vec::new()) };
+    assert_eq!(complaint(&[empty]), "out.tif: the tag 271 has no value");
+
+    // And no tag that the writer sets is missing from its list.
+    for channels in [1, 5] {
+        for kind in [TiffSamples::U16, TiffSamples::F32] {
+            let geometry = Geometry { origin: [3, 4], ..frame(30, 20, channels) };
+            let tags = TiffTags { description: Some("a frame".into()), software: Some("a program".into()) };
+            let samples = samples(600 * channels, kind);
+            let mut file = tempfile::tempfile().unwrap();
+            file.write_all(&write(&geometry, kind, TiffCompression::Lzw, &tags, &samples, 20).0).unwrap();
+            let directory = TiffFile::open(file, "out.tif").unwrap().directory(0).unwrap();
+            assert!(directory.numbers().count() >= 19);
+            assert!(directory.numbers().all(|number| OF_THE_WRITER.contains(&number)));
+        }
+    }
+}
+
+#[test]
+fn long_tags_may_call_for_a_big_tiff() {
+    let settings = settings(TiffSamples::F32, TiffCompression::None, &TiffTags::default());
+    let geometry = frame(10_000, 107_000, 1);
+    let field = |bytes| Field::new(tiff::tags::Tag::Unknown(51_009), tiff::tags::Type::UNDEFINED, vec![0; bytes]);
+    // 4 GiB less 107 000 rows of 40 kB leave 15 MB.
+    assert!(!needs_big_tiff(&geometry, &settings, &[field(10 << 20)]));
+    assert!(needs_big_tiff(&geometry, &settings, &[field(16 << 20)]));
+}
+
 #[test]
 fn an_incomplete_frame_is_not_finished() {
     let geometry = frame(5, 4, 1);
-    let mut writer = TiffWriter::create(
-        Cursor::new(Vec::new()),
-        "out.tif",
-        &geometry,
-        TiffSamples::F32,
-        1.0,
-        TiffCompression::None,
-        &TiffTags::default(),
-    )
-    .unwrap();
+    let settings = settings(TiffSamples::F32, TiffCompression::None, &TiffTags::default());
+    let mut writer = TiffWriter::create(Cursor::new(Vec::new()), "out.tif", &geometry, settings).unwrap();
     writer.write_rows(&[0.0; 15]).unwrap();
     let text = writer.finish().map(|_| ()).unwrap_err().to_string();
     assert_eq!(text, "out.tif: only 3 of 4 rows were written; the file is not complete");
@@ -405,7 +533,7 @@ fn every_kind_of_sample_is_read_in_both_byte_orders() {
                     made.chunks[0].extend(sample);
                 }
                 let mut reader = open(&made.bytes(), 0).unwrap();
-                assert_eq!(reader.stored_as(), name);
+                assert_eq!(reader.stored_as().unwrap().name(), name);
                 assert_eq!(read_all(&mut reader, 1).unwrap(), values, "{name} {big_endian}");
             }
         }
@@ -463,6 +591,25 @@ fn tiles_and_planes_are_put_together() {
             }
         }
     }
+}
+
+#[test]
+fn a_damaged_place_is_passed_over_and_said() {
+    let place = |made: Made| {
+        let reader = open(&made.bytes(), 0).unwrap();
+        (reader.geometry().origin, reader.notes().to_vec())
+    };
+    assert_eq!(place(Made::gray(4, 2).with(286, &[3]).with(287, &[5])), ([3, 5], Vec::new()));
+    assert_eq!(place(Made::gray(4, 2).with(286, &[3])), ([0, 0], Vec::new()));
+    let (origin, notes) = place(Made::gray(4, 2).with(286, &[3_000_000_000]).with(287, &[5]));
+    assert_eq!(origin, [0, 0]);
+    assert_eq!(notes, ["its place on the sensor is passed over: it is 3000000000, no whole number of pixels"]);
+    let mut bytes = Made::gray(4, 2).with(286, &[3]).with(287, &[5]).bytes();
+    let entry = bytes.windows(4).position(|four| four == [30, 1, 4, 0]).unwrap();
+    bytes[entry + 2] = 99;
+    let reader = open(&bytes, 0).unwrap();
+    assert_eq!(reader.geometry().origin, [0, 0]);
+    assert!(reader.notes()[0].contains("has type 99"), "{:?}", reader.notes());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Writing rows.
 
 use super::chunk::{self, Predictor};
-use super::directory::type_bytes;
+use super::tags::{self, ExtraTag, Field};
 use super::{TiffCompression, TiffSamples, TiffTags};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
@@ -15,6 +15,22 @@ const STRIP_BYTES: usize = 128 << 10;
 /// if that is more.
 const COLLECTED_BYTES: usize = 4 << 20;
 
+/// How a file is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TiffSettings {
+    /// How samples are stored.
+    pub samples: TiffSamples,
+    /// What each sample is multiplied with before it is rounded to an integer: 1 for ADU, 65535 for sRGB. Floats are
+    /// written as they are.
+    pub scale: f32,
+    /// How strips are compressed.
+    pub compression: TiffCompression,
+    /// What the file says in words.
+    pub tags: TiffTags,
+    /// Tags besides those that the writer sets.
+    pub extra: Vec<ExtraTag>,
+}
+
 /// Writes rows as a TIFF file: little-endian, interleaved strips, the directory at the end.
 ///
 /// The bytes depend on what is written only, not on the number of rows per call or of threads. Memory is about 8 MiB.
@@ -23,10 +39,9 @@ pub struct TiffWriter<W: Write + Seek> {
     output: W,
     name: String,
     geometry: Geometry,
-    samples: TiffSamples,
-    scale: f32,
-    compression: TiffCompression,
-    tags: TiffTags,
+    settings: TiffSettings,
+    /// The entries of the settings' extra tags.
+    extra: Vec<Field>,
     big: bool,
     rows_per_strip: usize,
     rows: usize,
@@ -40,37 +55,27 @@ pub struct TiffWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> TiffWriter<W> {
-    /// Starts a file that the user calls `name`. For [`TiffSamples::U16`], each sample is multiplied with `scale`
-    /// before it is rounded: 1 for ADU, 65535 for sRGB; floats are written as they are.
+    /// Starts a file that the user calls `name`.
     ///
     /// `output` must be empty and at its start. The file is a BigTIFF if it might not fit into 4 GiB.
     ///
     /// # Errors
     ///
-    /// When the frame is larger than TIFF can say, or the disk refuses.
-    pub fn create(
-        output: W,
-        name: &str,
-        geometry: &Geometry,
-        samples: TiffSamples,
-        scale: f32,
-        compression: TiffCompression,
-        tags: &TiffTags,
-    ) -> Result<Self> {
-        let big = needs_big_tiff(geometry, samples, compression, tags);
-        Self::begin(output, name, geometry, samples, scale, compression, tags, big)
+    /// When the frame is larger than TIFF can say, an extra tag is one of the writer's own or given twice, or the disk
+    /// refuses.
+    pub fn create(output: W, name: &str, geometry: &Geometry, settings: TiffSettings) -> Result<Self> {
+        let extra = tags::fields(&settings.extra, name)?;
+        let big = needs_big_tiff(geometry, &settings, &extra);
+        Self::begin(output, name, geometry, settings, extra, big)
     }
 
     /// [`TiffWriter::create`], told whether it is to be a BigTIFF.
-    #[expect(clippy::too_many_arguments, reason = "those of `create` and one for the tests")]
     pub(super) fn begin(
         output: W,
         name: &str,
         geometry: &Geometry,
-        samples: TiffSamples,
-        scale: f32,
-        compression: TiffCompression,
-        tags: &TiffTags,
+        settings: TiffSettings,
+        extra: Vec<Field>,
         big: bool,
     ) -> Result<Self> {
         let fits = u32::try_from(geometry.width).is_ok()
@@ -87,15 +92,13 @@ impl<W: Write + Seek> TiffWriter<W> {
                 ),
             ));
         }
-        let rows_per_strip = rows_per_strip(geometry, samples);
+        let rows_per_strip = rows_per_strip(geometry, settings.samples);
         let mut writer = Self {
             output,
             name: name.to_owned(),
             geometry: geometry.clone(),
-            samples,
-            scale,
-            compression,
-            tags: tags.clone(),
+            settings,
+            extra,
             big,
             rows_per_strip,
             rows: 0,
@@ -164,11 +167,11 @@ impl<W: Write + Seek> TiffWriter<W> {
     }
 
     fn row_bytes(&self) -> usize {
-        self.geometry.row_samples() * sample_bytes(self.samples)
+        self.geometry.row_samples() * self.settings.samples.bytes()
     }
 
     fn predictor(&self) -> Predictor {
-        match (self.compression, self.samples) {
+        match (self.settings.compression, self.settings.samples) {
             (TiffCompression::None, _) => Predictor::None,
             (_, TiffSamples::U16) => Predictor::Horizontal,
             (_, TiffSamples::F32) => Predictor::FloatingPoint,
@@ -178,10 +181,10 @@ impl<W: Write + Seek> TiffWriter<W> {
     /// Appends rows, interleaved and little-endian, to those collected.
     fn collect(&mut self, samples: &[f32]) {
         let start = self.collected.len();
-        self.collected.resize(start + samples.len() * sample_bytes(self.samples), 0);
-        let rows = self.collected[start..].par_chunks_mut(self.geometry.row_samples() * sample_bytes(self.samples));
+        self.collected.resize(start + samples.len() * self.settings.samples.bytes(), 0);
+        let rows = self.collected[start..].par_chunks_mut(self.geometry.row_samples() * self.settings.samples.bytes());
         let lines = samples.par_chunks(self.geometry.row_samples());
-        let (channels, scale, kind) = (self.geometry.channels.len(), self.scale, self.samples);
+        let (channels, scale, kind) = (self.geometry.channels.len(), self.settings.scale, self.settings.samples);
         self.unfit += rows
             .zip(lines)
             .with_min_len(16)
@@ -198,7 +201,7 @@ impl<W: Write + Seek> TiffWriter<W> {
     /// Compresses and writes the rows collected; whole strips, but for the frame's last.
     fn write_strips(&mut self) -> Result<()> {
         let (row_bytes, channels) = (self.row_bytes(), self.geometry.channels.len());
-        let (predictor, compression) = (self.predictor(), self.compression);
+        let (predictor, compression) = (self.predictor(), self.settings.compression);
         let mut collected = std::mem::take(&mut self.collected);
         if compression == TiffCompression::None {
             for strip in collected.chunks(self.rows_per_strip * row_bytes) {
@@ -290,126 +293,109 @@ impl<W: Write + Seek> TiffWriter<W> {
 
     /// All fields of the directory, in the order of their tags.
     fn fields(&self) -> Vec<Field> {
+        let mut fields = self.sample_fields();
+        fields.extend(self.place_fields());
+        let texts = &self.settings.tags;
+        fields.extend(texts.description.as_ref().map(|text| Field::text(Tag::ImageDescription, text)));
+        fields.extend(texts.software.as_ref().map(|text| Field::text(Tag::Software, text)));
+        fields.extend(self.extra.iter().cloned());
+        fields.sort_by_key(|field| field.tag.to_u16());
+        fields
+    }
+
+    /// How samples are stored, and where.
+    fn sample_fields(&self) -> Vec<Field> {
         let channels = self.geometry.channels.len();
-        let (bits, format) = match self.samples {
+        let (bits, format) = match self.settings.samples {
             TiffSamples::U16 => (16, 1),
             TiffSamples::F32 => (32, 3),
         };
-        let compression = match self.compression {
+        let compression = match self.settings.compression {
             TiffCompression::None => CompressionMethod::None,
             TiffCompression::Lzw => CompressionMethod::LZW,
             TiffCompression::Deflate => CompressionMethod::Deflate,
         };
         let (photometric, colors) = if channels < 3 { (1, 1) } else { (2, 3) };
-        let predictor = match self.predictor() {
-            Predictor::None => 1,
-            Predictor::Horizontal => 2,
-            Predictor::FloatingPoint => 3,
-        };
-        let [offsets, counts] = [|strip: &(u64, u64)| strip.0, |strip: &(u64, u64)| strip.1]
-            .map(|part| self.offsets(self.strips.iter().map(part)));
-        let long = |tag, value: usize| Field::new(tag, Type::LONG, value.to_le_bytes()[..4].to_vec());
-        let short = |tag, value: u16| Field::new(tag, Type::SHORT, value.to_le_bytes().to_vec());
-        let shorts = |tag, value: u16, count: usize| Field::new(tag, Type::SHORT, value.to_le_bytes().repeat(count));
-        let ratio = |tag, value: u32| {
-            let bytes = [value, 1].iter().flat_map(|part| part.to_le_bytes()).collect();
-            Field::new(tag, Type::RATIONAL, bytes)
-        };
-        let text = |tag, text: &Option<String>| {
-            text.as_ref().map(|text| {
-                let mut bytes: Vec<u8> = text.bytes().filter(|&byte| byte != 0).collect();
-                bytes.push(0);
-                Field::new(tag, Type::ASCII, bytes)
-            })
-        };
         let mut fields = vec![
             long(Tag::ImageWidth, self.geometry.width),
             long(Tag::ImageLength, self.geometry.height),
             shorts(Tag::BitsPerSample, bits, channels),
-            short(Tag::Compression, compression.to_u16()),
-            short(Tag::PhotometricInterpretation, photometric),
-        ];
-        fields.extend(text(Tag::ImageDescription, &self.tags.description));
-        fields.extend([
-            Field { tag: Tag::StripOffsets, ..offsets },
-            short(Tag::SamplesPerPixel, u16::try_from(channels).unwrap_or(u16::MAX)),
+            shorts(Tag::Compression, compression.to_u16(), 1),
+            shorts(Tag::PhotometricInterpretation, photometric, 1),
+            self.offsets(Tag::StripOffsets, self.strips.iter().map(|strip| strip.0)),
+            shorts(Tag::SamplesPerPixel, u16::try_from(channels).unwrap_or(u16::MAX), 1),
             long(Tag::RowsPerStrip, self.rows_per_strip),
-            Field { tag: Tag::StripByteCounts, ..counts },
-            ratio(Tag::XResolution, 1),
-            ratio(Tag::YResolution, 1),
-            short(Tag::PlanarConfiguration, 1),
-        ]);
+            self.offsets(Tag::StripByteCounts, self.strips.iter().map(|strip| strip.1)),
+            shorts(Tag::PlanarConfiguration, 1, 1),
+            shorts(Tag::SampleFormat, format, channels),
+        ];
+        match self.predictor() {
+            Predictor::None => {}
+            Predictor::Horizontal => fields.push(shorts(Tag::Predictor, 2, 1)),
+            Predictor::FloatingPoint => fields.push(shorts(Tag::Predictor, 3, 1)),
+        }
+        if channels > colors {
+            fields.push(shorts(Tag::ExtraSamples, 0, channels - colors));
+        }
+        fields
+    }
+
+    /// The frame's place on the sensor, in pixels.
+    fn place_fields(&self) -> Vec<Field> {
+        let mut fields =
+            vec![ratio(Tag::XResolution, 1), ratio(Tag::YResolution, 1), shorts(Tag::ResolutionUnit, 1, 1)];
         if let [Ok(x), Ok(y)] = self.geometry.origin.map(u32::try_from)
             && [x, y] != [0, 0]
         {
             fields.extend([ratio(Tag::Unknown(286), x), ratio(Tag::Unknown(287), y)]);
         }
-        fields.push(short(Tag::ResolutionUnit, 1));
-        fields.extend(text(Tag::Software, &self.tags.software));
-        if predictor != 1 {
-            fields.push(short(Tag::Predictor, predictor));
-        }
-        if channels > colors {
-            fields.push(shorts(Tag::ExtraSamples, 0, channels - colors));
-        }
-        fields.push(shorts(Tag::SampleFormat, format, channels));
         fields
     }
 
     /// A field of offsets or byte counts.
-    fn offsets(&self, values: impl Iterator<Item = u64>) -> Field {
+    fn offsets(&self, tag: Tag, values: impl Iterator<Item = u64>) -> Field {
         let mut bytes = Vec::new();
         values.for_each(|value| self.append_offset(&mut bytes, value));
-        Field::new(Tag::StripOffsets, if self.big { Type::LONG8 } else { Type::LONG }, bytes)
+        Field::new(tag, if self.big { Type::LONG8 } else { Type::LONG }, bytes)
     }
 }
 
-/// One entry of the directory.
-struct Field {
-    tag: Tag,
-    kind: Type,
-    count: u64,
-    bytes: Vec<u8>,
+fn long(tag: Tag, value: usize) -> Field {
+    Field::new(tag, Type::LONG, value.to_le_bytes()[..4].to_vec())
 }
 
-impl Field {
-    fn new(tag: Tag, kind: Type, bytes: Vec<u8>) -> Self {
-        Self { tag, kind, count: (bytes.len() / type_bytes(kind.to_u16())) as u64, bytes }
-    }
+/// The same number, so many times.
+fn shorts(tag: Tag, value: u16, count: usize) -> Field {
+    Field::new(tag, Type::SHORT, value.to_le_bytes().repeat(count))
 }
 
-fn sample_bytes(samples: TiffSamples) -> usize {
-    match samples {
-        TiffSamples::U16 => 2,
-        TiffSamples::F32 => 4,
-    }
+/// A whole number as a ratio.
+fn ratio(tag: Tag, value: u32) -> Field {
+    Field::new(tag, Type::RATIONAL, [value, 1].iter().flat_map(|part| part.to_le_bytes()).collect())
 }
 
 /// Rows of all strips but the last.
 fn rows_per_strip(geometry: &Geometry, samples: TiffSamples) -> usize {
-    let row_bytes = geometry.row_samples() * sample_bytes(samples);
+    let row_bytes = geometry.row_samples() * samples.bytes();
     (STRIP_BYTES / row_bytes.max(1)).clamp(1, geometry.height.max(1))
 }
 
 /// Whether the file might not fit into the 4 GiB of a classic TIFF.
-pub(super) fn needs_big_tiff(
-    geometry: &Geometry,
-    samples: TiffSamples,
-    compression: TiffCompression,
-    tags: &TiffTags,
-) -> bool {
-    let row_bytes = geometry.row_samples() * sample_bytes(samples);
+pub(super) fn needs_big_tiff(geometry: &Geometry, settings: &TiffSettings, extra: &[Field]) -> bool {
+    let row_bytes = geometry.row_samples() * settings.samples.bytes();
     let data = geometry.height as u128 * row_bytes as u128;
-    let worst = match compression {
+    let worst = match settings.compression {
         TiffCompression::None => data,
         TiffCompression::Deflate => data + data / 10,
         // Codes of up to 12 bits, each for one byte where nothing repeats.
         TiffCompression::Lzw => data + data / 2,
     };
-    let strips = geometry.height.div_ceil(rows_per_strip(geometry, samples)) as u128;
-    let texts = [&tags.description, &tags.software];
+    let strips = geometry.height.div_ceil(rows_per_strip(geometry, settings.samples)) as u128;
+    let texts = [&settings.tags.description, &settings.tags.software];
     let text_bytes: usize = texts.into_iter().flatten().map(String::len).sum();
-    let directory = 4096 + 16 * strips + 6 * geometry.channels.len() as u128 + text_bytes as u128;
+    // Twelve bytes for each entry of a classic directory, and one to be even.
+    let extra_bytes: usize = extra.iter().map(|field| field.bytes.len() + 13).sum();
+    let directory = 4096 + 16 * strips + 6 * geometry.channels.len() as u128 + text_bytes as u128 + extra_bytes as u128;
     worst + directory > u128::from(u32::MAX)
 }
 

@@ -9,7 +9,7 @@ mod font;
 mod layout;
 
 use crate::error::{Error, Result};
-use crate::formats::input::FileId;
+use crate::formats::files::FileId;
 use crate::formats::output::write_bytes;
 pub use axis::{Axis, Scale, power_of_ten};
 use std::path::Path;

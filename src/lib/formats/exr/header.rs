@@ -1,0 +1,191 @@
+//! What the headers of an EXR file say about its parts, or why a part cannot be read.
+
+use super::{ExrTags, METADATA_ATTRIBUTE, Primaries, XYZ_PRIMARIES};
+use crate::camera::optics::Exposure;
+use crate::error::{Error, Result};
+use crate::formats::foreign::{self, STORE_WITHOUT_LOSS, SUBSAMPLED};
+use crate::formats::format::SampleType;
+use crate::frame::{Geometry, bare_name};
+use crate::metadata::Metadata;
+use crate::spectrum::channel_wavelength_nm;
+use crate::units::QuantityKind;
+use exr::compression::Compression;
+use exr::math::Vec2;
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, SampleType as ExrSampleType, Text};
+use exr::meta::header::Header;
+use std::io::Read;
+
+/// A block (a tile, or the scanlines that are compressed together) may take this much memory, not more.
+const MAX_BLOCK_BYTES: usize = 1 << 30;
+/// All headers of a file may take this much.
+const MAX_HEADER_BYTES: u64 = 64 << 20;
+
+/// What a part holds.
+pub(super) struct Contents {
+    /// Size, place and channels; the data window's corner is the origin.
+    pub geometry: Geometry,
+    /// For each channel of the geometry, its place in the file's list.
+    pub order: Vec<usize>,
+    /// Attributes.
+    pub tags: ExrTags,
+    /// How samples are stored; none where channels differ in it.
+    pub stored_as: Option<SampleType>,
+    /// What the attributes, those of our metadata apart, say in the project's terms.
+    pub own_tags: Metadata,
+    /// Attributes that were passed over, and why.
+    pub notes: Vec<String>,
+}
+
+/// Reads the headers of all parts.
+pub(super) fn read_meta(input: &mut impl Read, name: &str) -> Result<MetaData> {
+    let complaint = |error| foreign::exr_complaint(name, &error);
+    let meta = MetaData::read_from_buffered(input.take(MAX_HEADER_BYTES), false).map_err(complaint)?;
+    // The strict check of the whole, as the crate makes it before it writes.
+    for header in &meta.headers {
+        let mut long_names = false;
+        header.validate(meta.requirements.has_multiple_layers, &mut long_names, false).map_err(complaint)?;
+    }
+    Ok(meta)
+}
+
+impl Contents {
+    /// What part `part` holds.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where there is no such part, [`Error::Format`] where it is not supported.
+    pub fn of(meta: &MetaData, part: usize, name: &str) -> Result<Self> {
+        let Some(header) = meta.headers.get(part) else {
+            let last = meta.headers.len().saturating_sub(1);
+            return Err(Error::Usage(format!("{name}: there is no part {part}; its parts are 0 to {last}")));
+        };
+        check_kind(header, name)?;
+        let (width, height) = (header.layer_size.width(), header.layer_size.height());
+        if width == 0 || height == 0 || header.channels.list.is_empty() {
+            return Err(Error::format(name, "it has no samples"));
+        }
+        let channels = &header.channels;
+        let names: Vec<String> =
+            channels.list.iter().map(|channel| String::from_utf8_lossy(channel.name.as_slice()).into()).collect();
+        let order = canonical_order(&names);
+        let origin = header.own_attributes.layer_position;
+        let geometry = Geometry {
+            width,
+            height,
+            origin: [origin.x(), origin.y()],
+            channels: order.iter().map(|&place| names[place].clone()).collect(),
+        };
+        let stored_as = channels.uniform_sample_type.map(|kind| match kind {
+            ExrSampleType::F32 => SampleType::F32,
+            ExrSampleType::F16 => SampleType::F16,
+            ExrSampleType::U32 => SampleType::U32,
+        });
+        let tags = read_tags(header);
+        let mut notes = Vec::new();
+        let own_tags = own_tags(&tags, &geometry, &mut notes);
+        Ok(Self { geometry, order, tags, stored_as, own_tags, notes })
+    }
+}
+
+/// The attributes in the project's terms.
+fn own_tags(tags: &ExrTags, geometry: &Geometry, notes: &mut Vec<String>) -> Metadata {
+    let near = |found: &Primaries| {
+        found.iter().flatten().zip(XYZ_PRIMARIES.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-6)
+    };
+    let is_spectral = geometry.channels.iter().any(|channel| channel_wavelength_nm(channel).is_some());
+    let mut metadata = Metadata::new(match tags.primaries {
+        _ if is_spectral => QuantityKind::SpectralRadiance,
+        Some(primaries) if near(&primaries) => QuantityKind::Xyz,
+        _ => QuantityKind::Unspecified,
+    });
+    if is_spectral {
+        metadata.unit = tags.emissive_units.clone().unwrap_or_default();
+    }
+    if let Some((exposure_s, f_number)) = tags.exposure_s.zip(tags.f_number) {
+        match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
+            Ok(exposure) => metadata.exposure = Some(exposure),
+            Err(error) => notes.push(format!("its attributes expTime and aperture are passed over: {error}")),
+        }
+    }
+    metadata
+}
+
+/// Refuses parts that are of a kind that is not read, naming it.
+fn check_kind(header: &Header, name: &str) -> Result<()> {
+    let refuse = |problem: &str| Err(Error::format(name, problem));
+    if header.deep {
+        return refuse("deep data are not supported; flatten them first, for example with `oiiotool --flatten`");
+    }
+    if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
+        return refuse(SUBSAMPLED);
+    }
+    let is_read = match header.compression {
+        Compression::Uncompressed | Compression::RLE | Compression::ZIP1 | Compression::ZIP16 | Compression::PIZ => {
+            true
+        }
+        // It cuts 32-bit floats to 24 bits, and loses nothing of the other types.
+        Compression::PXR24 => header.channels.list.iter().all(|channel| channel.sample_type != ExrSampleType::F32),
+        _ => false,
+    };
+    if !is_read {
+        return Err(Error::format(name, format!("its {} is not read here; {STORE_WITHOUT_LOSS}", header.compression)));
+    }
+    if header.max_block_byte_size() > MAX_BLOCK_BYTES {
+        return refuse("its blocks are larger than 1 GiB; store it in smaller ones");
+    }
+    Ok(())
+}
+
+fn read_tags(header: &Header) -> ExrTags {
+    let text = |text: &Text| String::from_utf8_lossy(text.as_slice()).into_owned();
+    let own = &header.own_attributes;
+    let other = |name: &str| match own.other.get(&Text::new_or_none(name)?)? {
+        AttributeValue::Text(value) => Some(text(value)),
+        _ => None,
+    };
+    let point = |Vec2(x, y): Vec2<f32>| [f64::from(x), f64::from(y)];
+    ExrTags {
+        metadata: other(METADATA_ATTRIBUTE),
+        software: own.software_name.as_ref().map(text),
+        exposure_s: own.exposure.map(f64::from),
+        f_number: own.aperture.map(f64::from),
+        white_luminance: own.white_luminance.map(f64::from),
+        primaries: header
+            .shared_attributes
+            .chromaticities
+            .map(|c| [point(c.red), point(c.green), point(c.blue), point(c.white)]),
+        emissive_units: other("emissiveUnits"),
+    }
+}
+
+/// The order in which channels are worked on: R, G, B (or Y; x, y, Y; L, a, b) first, the rest layer by layer as the file
+/// has them, each again R, G, B (or the like) first. Where all belong to layers, as in `left.R`, what stands behind the
+/// last dot counts.
+fn canonical_order(names: &[String]) -> Vec<usize> {
+    let place = |wanted: &str| {
+        let exact = names.iter().position(|name| name == wanted);
+        exact.or_else(|| names.iter().position(|name| bare_name(name) == wanted))
+    };
+    let leading: Vec<usize> = [&["R", "G", "B"][..], &["x", "y", "Y"], &["L", "a", "b"], &["X", "Y", "Z"], &["Y"]]
+        .into_iter()
+        .find_map(|set| set.iter().map(|name| place(name)).collect())
+        .unwrap_or_default();
+    let mut order: Vec<usize> = (0..names.len()).collect();
+    let layer = |place: usize| names[place].len() - bare_name(&names[place]).len();
+    let first_of_layer = |place: usize| {
+        let prefix = &names[place].as_bytes()[..layer(place)];
+        names.iter().position(|name| name.as_bytes().starts_with(prefix))
+    };
+    let rank = |place: usize| {
+        ["R", "G", "B", "x", "y", "Y", "L", "a", "b"]
+            .iter()
+            .position(|name| *name == bare_name(&names[place]))
+            .unwrap_or(9)
+    };
+    order.sort_by_key(|&place| {
+        let leads = leading.iter().position(|leader| *leader == place);
+        (leads.unwrap_or(leading.len()), if leads.is_none() { first_of_layer(place) } else { None }, rank(place))
+    });
+    order
+}

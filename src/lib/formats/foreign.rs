@@ -1,0 +1,158 @@
+//! Complaints of other crates, in our words.
+//!
+//! What these crates say is no interface: an update may change it. So it is looked at here only, and the tests provoke
+//! each of their complaints in earnest.
+
+use crate::error::Error;
+use exr::error::Error as ExrError;
+use image::ImageError;
+use std::io;
+
+/// What is said of EXR channels that are stored at fewer points than the others.
+pub const SUBSAMPLED: &str = "subsampled channels (luminance/chroma images) are not supported; convert it to RGB first";
+/// What to do about an EXR whose compression is not read.
+pub const STORE_WITHOUT_LOSS: &str = "store it without loss as none, rle, zips, zip or piz";
+
+/// What the crate `exr` complains of while it reads.
+pub fn exr_complaint(name: &str, error: &ExrError) -> Error {
+    match error {
+        ExrError::Io(source) => Error::disk(name, "read", io::Error::new(source.kind(), source.to_string())),
+        // Before any header is given out, the crate refuses what is named better here.
+        ExrError::NotSupported(what) if what.contains("subsampling") => Error::format(name, SUBSAMPLED),
+        ExrError::Invalid(what) if what.contains("compression attribute") => {
+            Error::format(name, format!("its compression is missing or of an unknown kind; {STORE_WITHOUT_LOSS}"))
+        }
+        ExrError::NotSupported(what) => Error::format(name, format!("this kind of EXR is not supported: {what}")),
+        // So the crate reports the end of the file.
+        ExrError::Invalid(what) if what.contains("missing bytes") => Error::cut_short(name),
+        ExrError::Invalid(what) => Error::format(name, format!("it is no valid EXR file: {what}")),
+        ExrError::Aborted => Error::format(name, "reading was given up"),
+    }
+}
+
+/// What the crate `csv` complains of: rows of different lengths, bytes that are no text.
+pub fn csv_complaint(name: &str, error: &csv::Error) -> Error {
+    Error::format(name, format!("it is not a CSV table: {error}"))
+}
+
+/// What the crate `serde_yaml` complains of while it reads: what is no YAML, or not that of the type.
+pub fn yaml_complaint(name: &str, error: &serde_yaml::Error) -> Error {
+    Error::format(name, format!("it is not as expected: {error}"))
+}
+
+/// What the crate `image` complains of while it writes a PNG.
+pub fn png_complaint(name: &str, error: ImageError) -> Error {
+    match error {
+        ImageError::IoError(source) => Error::disk(name, "write", source),
+        other => Error::format(name, format!("it cannot be written as PNG: {other}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::csv::SpectralTable;
+    use crate::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter};
+    use crate::formats::format::SampleReader;
+    use crate::formats::yaml::parse_strict;
+    use crate::frame::Geometry;
+    use image::codecs::png::PngEncoder;
+    use image::{ExtendedColorType, ImageEncoder};
+    use serde::{Deserialize, Serialize};
+
+    /// An EXR of 6x4 pixels with a channel `Y`.
+    fn exr() -> Vec<u8> {
+        let geometry = Geometry::new(6, 4, &["Y"]);
+        let (samples, compression) = (ExrSamples::F32, ExrCompression::Zips);
+        let tags = ExrTags::default();
+        let mut writer = ExrWriter::create(Vec::new(), "a.exr", &geometry, samples, compression, &tags).unwrap();
+        writer.write(&[0.5; 24]).unwrap();
+        writer.finish().unwrap().0
+    }
+
+    /// Where in the file the value of an attribute begins.
+    fn value_of(bytes: &[u8], attribute: &str) -> usize {
+        let begin = format!("{attribute}\0");
+        let name = bytes.windows(begin.len()).position(|bytes| bytes == begin.as_bytes()).unwrap() + begin.len();
+        name + bytes[name..].iter().position(|byte| *byte == 0).unwrap() + 1 + 4
+    }
+
+    fn exr_refused(bytes: Vec<u8>) -> String {
+        let read = ExrReader::stream(Box::new(io::Cursor::new(bytes)), "a.exr")
+            .and_then(|mut reader| reader.read(3, &mut Vec::new()));
+        read.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn exr_says_what_is_expected_of_it() {
+        let whole = exr();
+        let value = |attribute| value_of(&whole, attribute);
+        let with = |place: usize, bytes: &[u8]| {
+            let mut changed = whole.clone();
+            changed[place..place + bytes.len()].copy_from_slice(bytes);
+            exr_refused(changed)
+        };
+        // A channel: its name and a NUL, its type, four bytes, and every how many columns and rows it has samples.
+        let sampling = value("channels") + 2 + 8;
+        assert_eq!(with(sampling, &[2, 0, 0, 0, 2]), format!("a.exr: {SUBSAMPLED}"));
+        let unknown = format!("a.exr: its compression is missing or of an unknown kind; {STORE_WITHOUT_LOSS}");
+        assert_eq!(with(value("compression"), &[99]), unknown);
+        // The name of the attribute, its type, which is called the same, and a length in four bytes stand before the value.
+        assert_eq!(with(value("compression") - 4 - 12 - 12, b"K"), unknown);
+        for length in [8, 40, 300, whole.len() - 1] {
+            let cut_short = "a.exr: the file ends before its last row; it was cut short";
+            assert_eq!(exr_refused(whole[..length].to_vec()), cut_short);
+        }
+        assert_eq!(
+            with(4, &[3]),
+            "a.exr: this kind of EXR is not supported: file versions other than 2.0 are not supported"
+        );
+        let malformed =
+            "a.exr: it is no valid EXR file: compressed ZIP1 data (invalid: zlib-compressed data malformed)";
+        assert_eq!(with(whole.len() - 8, &[0xFF; 8]), malformed);
+    }
+
+    #[test]
+    fn csv_says_where_a_table_is_none() {
+        let refused = |bytes: &[u8]| SpectralTable::parse("t.csv", bytes).unwrap_err().to_string();
+        assert_eq!(
+            refused(b"nm,L\n400,1\n410\n"),
+            "t.csv: it is not a CSV table: CSV error: record 2 (line: 3, byte: 11): found record with 1 fields, but the \
+             previous record has 2 fields"
+        );
+        assert_eq!(
+            refused(b"nm,L\n400,\xFF\n"),
+            "t.csv: it is not a CSV table: CSV parse error: record 1 (line 2, field: 1, byte: 5): invalid utf-8: invalid \
+             UTF-8 in field 1 near byte index 0"
+        );
+    }
+
+    #[derive(Debug, Serialize, Deserialize)]
+    struct Sensor {
+        bits: u32,
+    }
+
+    #[test]
+    fn yaml_says_where_a_document_is_none() {
+        let refused = |text: &str| parse_strict::<Sensor>("s.yaml", text.as_bytes()).unwrap_err().to_string();
+        for (text, wanted) in [
+            ("bits: many\n", "bits: invalid type: string \"many\", expected u32 at line 1 column 7"),
+            ("bits: 12\n---\nbits: 14\n", "deserializing from YAML containing more than one document is not supported"),
+            ("{}\n", "missing field `bits`"),
+            ("bits: [\n", "did not find expected node content at line 2 column 1, while parsing a flow node"),
+        ] {
+            assert_eq!(refused(text), format!("s.yaml: it is not as expected: {wanted}"));
+        }
+    }
+
+    #[test]
+    fn png_says_whether_it_was_the_disk() {
+        let write = |output: &mut dyn io::Write, width: u32| {
+            let pixels = vec![0; width as usize];
+            let written = PngEncoder::new(output).write_image(&pixels, width, 1, ExtendedColorType::L8);
+            png_complaint("a.png", written.unwrap_err()).to_string()
+        };
+        assert_eq!(write(&mut [0; 4].as_mut_slice(), 9), "a.png: cannot write: failed to write whole buffer");
+        assert!(write(&mut Vec::new(), 0).starts_with("a.png: it cannot be written as PNG: "));
+    }
+}

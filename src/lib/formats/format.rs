@@ -1,0 +1,157 @@
+//! What a format of frames is to the rest of the library: how its files are known, and a reader of their samples.
+//!
+//! A new format is a file that ends in a [`FrameFormat`], and a line in [`super::table`].
+
+use super::tiff::{Directory, TiffFile};
+use crate::error::Result;
+use crate::frame::Geometry;
+use crate::metadata::Metadata;
+use std::fs::File;
+use std::io::Read;
+
+/// Reads the samples of one frame, top to bottom, and says what its file tells about it.
+pub trait SampleReader: Send {
+    /// Size, place and channels.
+    fn geometry(&self) -> &Geometry;
+
+    /// How samples are stored; none where channels differ in it.
+    fn stored_as(&self) -> Option<SampleType>;
+
+    /// The number of rows that decode together; asking for multiples of it saves work.
+    fn natural_rows(&self) -> usize;
+
+    /// Whether the rows come from another program, which may take any time to give them.
+    fn may_wait(&self) -> bool {
+        false
+    }
+
+    /// The project's metadata that the file carries, YAML.
+    fn embedded(&self) -> Option<&str>;
+
+    /// What the format's own tags say, in the project's terms, the rest as in [`Metadata::new`]: where no metadata of ours
+    /// are found, they stand in.
+    fn own_tags(&self) -> &Metadata;
+
+    /// What of the file was passed over, and why.
+    fn notes(&self) -> &[String];
+
+    /// Appends the next `rows` rows, laid out as `[row][channel][column]`; the values are those stored, integers not
+    /// scaled. Rows beyond the last must not be asked for.
+    ///
+    /// # Errors
+    ///
+    /// [`crate::error::Error::Format`] where the file is damaged or cut short, [`crate::error::Error::Disk`] where
+    /// reading fails.
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()>;
+}
+
+/// How a sample is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SampleType {
+    /// 8-bit unsigned integer.
+    U8,
+    /// 8-bit signed integer.
+    I8,
+    /// 16-bit unsigned integer.
+    U16,
+    /// 16-bit signed integer.
+    I16,
+    /// 32-bit unsigned integer.
+    U32,
+    /// 32-bit signed integer.
+    I32,
+    /// Half-precision float.
+    F16,
+    /// Single-precision float.
+    F32,
+    /// Double-precision float.
+    F64,
+}
+
+impl SampleType {
+    /// Its short name: `u8`, `f32` …
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::U8 => "u8",
+            Self::I8 => "i8",
+            Self::U16 => "u16",
+            Self::I16 => "i16",
+            Self::U32 => "u32",
+            Self::I32 => "i32",
+            Self::F16 => "f16",
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        }
+    }
+
+    /// Its bytes.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 | Self::F16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// Whether it is an integer without sign.
+    pub fn is_unsigned(self) -> bool {
+        matches!(self, Self::U8 | Self::U16 | Self::U32)
+    }
+}
+
+/// What full-scale sRGB is in 16 bits.
+pub const U16_FULL_SCALE: f32 = 65535.0;
+
+/// A format of frames: how its files are known, and what is done with them.
+#[derive(Debug, Clone, Copy)]
+pub struct FrameFormat {
+    /// What messages call a file of it, with the article: `an EXR`.
+    pub name: &'static str,
+    /// How its files are known.
+    pub sign: Sign,
+    /// What is done with them.
+    pub reading: Reading,
+}
+
+/// How the files of a format are known.
+#[derive(Debug, Clone, Copy)]
+pub enum Sign {
+    /// By their first bytes, of which up to [`HEAD_BYTES`] are given.
+    Bytes(fn(&[u8]) -> bool),
+    /// They begin as a TIFF does: by the tags of their first image.
+    Tags(fn(&mut TiffFile, &Directory) -> Result<bool>),
+}
+
+/// What is done with the files of a format.
+#[derive(Debug, Clone, Copy)]
+pub enum Reading {
+    /// Their samples are read.
+    Rows(Readers),
+    /// They are not read yet: what a user can do instead.
+    NotYet(&'static str),
+}
+
+/// A reader of any format, or why there is none.
+pub type Opened = Result<Box<dyn SampleReader>>;
+
+/// How the files of a format are read.
+#[derive(Debug, Clone, Copy)]
+pub struct Readers {
+    /// Opens a part (or page) of a file that can seek and stands at its start; the name is for messages.
+    pub open: fn(File, &str, usize) -> Opened,
+    /// How to read some of them without a seek.
+    pub stream: Option<Streaming>,
+}
+
+/// How a file is read that comes down a pipe.
+#[derive(Debug, Clone, Copy)]
+pub struct Streaming {
+    /// Whether a file that begins so is one that needs no seek; it has a single part then.
+    pub is_streamable: fn(&[u8]) -> bool,
+    /// Opens it; the name is for messages.
+    pub open: fn(Box<dyn Read + Send>, &str) -> Opened,
+}
+
+/// First bytes that tell most formats apart.
+pub const HEAD_BYTES: usize = 16;

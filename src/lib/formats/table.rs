@@ -1,0 +1,207 @@
+//! The table of formats: what a file is, told before any of it is decoded.
+
+use super::format::{FrameFormat, Readers, Reading, Sign};
+use super::tiff::{self, TiffFile};
+use super::{exr, unread};
+use crate::error::{Error, Result};
+use std::fs::File;
+
+/// All formats that are known. Of those that share their first bytes the narrower comes first, TIFF last.
+pub const FORMATS: &[FrameFormat] = &[
+    exr::FORMAT,
+    unread::DNG,
+    unread::NEF,
+    unread::ARW,
+    unread::PEF,
+    unread::CR2,
+    unread::CR3,
+    unread::CRW,
+    unread::ORF,
+    unread::RW2,
+    unread::RAF,
+    unread::PNG,
+    unread::JPEG,
+    unread::FITS,
+    tiff::FORMAT,
+];
+
+/// The readers of a file that begins with the bytes `head`; none where no format does. Those of a TIFF may have to give
+/// way to others, see [`by_tags`].
+///
+/// # Errors
+///
+/// [`Error::Format`] for a format that is not read.
+pub fn by_head(head: &[u8], name: &str) -> Result<Option<Readers>> {
+    let found = FORMATS.iter().find(|format| matches!(format.sign, Sign::Bytes(is_one) if is_one(head)));
+    found.map(|format| readers(format, name)).transpose()
+}
+
+/// The readers of a file that begins as a TIFF does and is something narrower; none where it is just a TIFF.
+///
+/// # Errors
+///
+/// [`Error::Format`] for a format that is not read, [`Error::Disk`] where the file cannot be looked at.
+pub fn by_tags(file: &File, name: &str) -> Result<Option<Readers>> {
+    match narrower(file, name) {
+        Ok(found) => found.map(|format| readers(format, name)).transpose(),
+        // A damaged file: the reader of TIFF meets the damage again, and tells it if it matters.
+        Err(Error::Format { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+fn narrower(file: &File, name: &str) -> Result<Option<&'static FrameFormat>> {
+    let copy = file.try_clone().map_err(|e| Error::disk(name, "read", e))?;
+    let mut file = TiffFile::open(copy, name)?;
+    let directory = file.directory(0)?;
+    for format in FORMATS {
+        if let Sign::Tags(is_one) = format.sign
+            && is_one(&mut file, &directory)?
+        {
+            return Ok(Some(format));
+        }
+    }
+    Ok(None)
+}
+
+fn readers(format: &FrameFormat, name: &str) -> Result<Readers> {
+    match format.reading {
+        Reading::Rows(readers) => Ok(readers),
+        Reading::NotYet(instead) => {
+            Err(Error::format(name, format!("it is {}, which is not read yet; {instead}", format.name)))
+        }
+    }
+}
+
+/// The names of the formats that are read: `an EXR nor a TIFF`.
+pub fn names_of_read() -> String {
+    let is_read = |format: &&FrameFormat| matches!(format.reading, Reading::Rows(_));
+    FORMATS.iter().filter(is_read).map(|format| format.name).collect::<Vec<_>>().join(" nor ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::input::{FrameReader, InputOptions};
+    use crate::formats::tiff::{ExtraTag, TagValue, TiffCompression, TiffSamples, TiffSettings, TiffTags, TiffWriter};
+    use crate::frame::Geometry;
+    use crate::stream::RowSource;
+    use std::io::{Cursor, Write};
+    use std::os::fd::OwnedFd;
+
+    const RAW: &str = "which is not read yet; write its codes as a TIFF first, for example with `unprocessed_raw -T` of \
+                       LibRaw, and name that file";
+
+    /// Opens bytes as a file or as what comes down a pipe, which holds them.
+    fn open(bytes: &[u8], piped: bool) -> Result<FrameReader> {
+        let input = if piped {
+            let (output, mut input) = std::io::pipe().unwrap();
+            input.write_all(bytes).unwrap();
+            File::from(OwnedFd::from(output))
+        } else {
+            let mut file = tempfile::tempfile().unwrap();
+            file.write_all(bytes).unwrap();
+            std::io::Seek::rewind(&mut file).unwrap();
+            file
+        };
+        FrameReader::open_file(input, "in", None, &InputOptions::default())
+    }
+
+    fn complaint(bytes: &[u8]) -> String {
+        let [file, pipe] = [false, true].map(|piped| open(bytes, piped).err().unwrap().to_string());
+        assert_eq!(file, pipe);
+        file
+    }
+
+    /// A TIFF of 4x2 pixels with tags of its own.
+    fn tiff(extra: &[(u16, TagValue)]) -> Vec<u8> {
+        let extra = extra.iter().map(|(number, value)| ExtraTag { number: *number, value: value.clone() }).collect();
+        let settings = TiffSettings {
+            samples: TiffSamples::U16,
+            scale: 1.0,
+            compression: TiffCompression::None,
+            tags: TiffTags::default(),
+            extra,
+        };
+        let geometry = Geometry::new(4, 2, &["Y"]);
+        let mut writer = TiffWriter::create(Cursor::new(Vec::new()), "out.tif", &geometry, settings).unwrap();
+        writer.write_rows(&[7.0; 8]).unwrap();
+        writer.finish().unwrap().0.into_inner()
+    }
+
+    #[test]
+    fn formats_that_are_not_read_are_refused_by_name() {
+        for (begin, name) in [
+            (&b"II*\0\x10\0\0\0CR\x02\0"[..], "a Canon CR2"),
+            (b"\0\0\0\x18ftypcrx \0\0\0\x01", "a Canon CR3"),
+            (b"II\x1A\0\0\0HEAPCCDR", "a Canon CRW"),
+            (b"IIRO\x08\0\0\0", "an Olympus ORF"),
+            (b"IIU\0\x18\0\0\0", "a Panasonic RW2"),
+            (b"FUJIFILMCCD-RAW 0201", "a Fujifilm RAF"),
+        ] {
+            let bytes = [begin, &[0; 64]].concat();
+            assert_eq!(complaint(&bytes), format!("in: it is {name}, {RAW}"));
+        }
+        let png = complaint(b"\x89PNG\r\n\x1A\n\0\0\0\rIHDR");
+        assert_eq!(
+            png,
+            "in: it is a PNG, which is not read yet; convert it first, for example with `oiiotool in.png -o out.tif`"
+        );
+        assert!(complaint(&[0xFF, 0xD8, 0xFF, 0xE0]).starts_with("in: it is a JPEG, which is not read yet; "));
+        assert!(complaint(b"SIMPLE  =                    T").starts_with("in: it is a FITS file, which is not read"));
+    }
+
+    #[test]
+    fn raws_that_begin_as_a_tiff_are_told_from_one() {
+        let (make, reduced) = (|make: &str| (271, TagValue::Text(make.into())), (254, TagValue::Longs(vec![1])));
+        let below = (330, TagValue::Longs(vec![8]));
+        let dng = (50_706, TagValue::Bytes(vec![1, 4, 0, 0]));
+        for (tags, name) in [
+            (vec![dng.clone()], "a DNG"),
+            (vec![make("NIKON CORPORATION"), dng], "a DNG"),
+            (vec![make("NIKON CORPORATION"), reduced.clone(), below.clone()], "a Nikon NEF"),
+            (vec![make("SONY"), reduced.clone(), below.clone()], "a Sony ARW"),
+        ] {
+            assert_eq!(complaint(&tiff(&tags)), format!("in: it is {name}, {RAW}"));
+        }
+        let mut pef = tiff(&[make("PENTAX Corporation")]);
+        let compression = pef.windows(8).position(|entry| entry == [3, 1, 3, 0, 1, 0, 0, 0]).unwrap() + 8;
+        pef[compression..compression + 2].copy_from_slice(&[0xFF, 0xFF]);
+        assert_eq!(complaint(&pef), format!("in: it is a Pentax PEF, {RAW}"));
+
+        // Such a maker's programs write plain TIFF too, and so do those that make small pictures beside large ones.
+        for tags in [vec![make("NIKON CORPORATION")], vec![make("SONY"), reduced.clone()], vec![reduced, below]] {
+            for piped in [false, true] {
+                let mut reader = open(&tiff(&tags), piped).unwrap();
+                let mut samples = Vec::new();
+                reader.read(2, &mut samples).unwrap();
+                assert_eq!((reader.stored_as(), samples), ("u16", vec![7.0; 8]));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_frame_is_told_so() {
+        let refused = "in: it is neither an EXR nor a TIFF file";
+        let text = "; it looks like text (a spectrum goes into `render-radiance`)";
+        assert_eq!(complaint(&[0; 64]), refused);
+        assert_eq!(complaint("# Größen\n".as_bytes()), format!("{refused}{text}"));
+        // The sixteenth byte is the first of two.
+        assert_eq!(complaint("# 1 characters ö".as_bytes()), format!("{refused}{text}"));
+        assert_eq!(complaint(b"# 1 ch\x01racters"), refused);
+        assert_eq!(complaint(b""), "in: it is empty");
+        // A TIFF that is damaged where others are told from it is still one.
+        let mut damaged = tiff(&[]);
+        let end = damaged.len() - 30;
+        damaged.truncate(end);
+        assert!(complaint(&damaged).contains("cut short"));
+    }
+
+    #[test]
+    fn no_line_hides_another() {
+        for (index, format) in FORMATS.iter().enumerate() {
+            assert!(FORMATS[..index].iter().all(|other| other.name != format.name), "{}", format.name);
+        }
+        assert_eq!(FORMATS.last().map(|format| format.name), Some("a TIFF"));
+    }
+}

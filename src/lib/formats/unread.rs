@@ -1,0 +1,81 @@
+//! Formats that are known, so that none is taken for what it is not, but not read yet.
+//!
+//! Camera raws mostly begin as a TIFF does, and their first image is a small picture of what was taken: it must not pass
+//! for the frame.
+
+use super::format::{FrameFormat, Reading, Sign};
+use super::tiff::{Directory, TiffFile};
+use crate::error::Result;
+use tiff::tags::Tag;
+
+/// LibRaw's program of this name writes the codes of the whole sensor, as they are, to NAME.tiff.
+const RAW: Reading = Reading::NotYet(
+    "write its codes as a TIFF first, for example with `unprocessed_raw -T` of LibRaw, and name that file",
+);
+
+/// Adobe's raw format, which also cameras write.
+pub const DNG: FrameFormat =
+    FrameFormat { name: "a DNG", sign: Sign::Tags(|_, directory| Ok(directory.has(DNG_VERSION))), reading: RAW };
+/// Nikon's raw format.
+pub const NEF: FrameFormat = tagged("a Nikon NEF", |file, directory| is_raw_of(file, directory, &["NIKON"]));
+/// Sony's raw format.
+pub const ARW: FrameFormat = tagged("a Sony ARW", |file, directory| is_raw_of(file, directory, &["SONY"]));
+/// Pentax's raw format.
+pub const PEF: FrameFormat = tagged("a Pentax PEF", |file, directory| is_raw_of(file, directory, &["PENTAX", "RICOH"]));
+/// Canon's raw format of 2004 to 2018.
+pub const CR2: FrameFormat = raw("a Canon CR2", |head| {
+    head.starts_with(b"II*\0") && head.get(8..).is_some_and(|at| at.starts_with(b"CR\x02\0"))
+});
+/// Canon's raw format since 2018.
+pub const CR3: FrameFormat = raw("a Canon CR3", |head| head.get(4..).is_some_and(|at| at.starts_with(b"ftypcrx ")));
+/// Canon's raw format before 2004.
+pub const CRW: FrameFormat = raw("a Canon CRW", |head| head.get(6..).is_some_and(|at| at.starts_with(b"HEAPCCDR")));
+/// Olympus's raw format.
+pub const ORF: FrameFormat =
+    raw("an Olympus ORF", |head| [b"IIRO", b"IIRS", b"MMOR"].iter().any(|magic| head.starts_with(*magic)));
+/// Panasonic's raw format, which Leica uses too.
+pub const RW2: FrameFormat = raw("a Panasonic RW2", |head| head.starts_with(b"IIU\0"));
+/// Fujifilm's raw format.
+pub const RAF: FrameFormat = raw("a Fujifilm RAF", |head| head.starts_with(b"FUJIFILMCCD-RAW"));
+/// Portable Network Graphics.
+pub const PNG: FrameFormat = FrameFormat {
+    name: "a PNG",
+    sign: Sign::Bytes(|head| head.starts_with(b"\x89PNG\r\n\x1A\n")),
+    reading: Reading::NotYet("convert it first, for example with `oiiotool in.png -o out.tif`"),
+};
+/// JPEG pictures.
+pub const JPEG: FrameFormat = FrameFormat {
+    name: "a JPEG",
+    sign: Sign::Bytes(|head| head.starts_with(&[0xFF, 0xD8, 0xFF])),
+    reading: Reading::NotYet("convert it first, for example with `oiiotool in.jpg -o out.tif`"),
+};
+/// The Flexible Image Transport System of astronomy.
+pub const FITS: FrameFormat = FrameFormat {
+    name: "a FITS file",
+    sign: Sign::Bytes(|head| head.starts_with(b"SIMPLE  =")),
+    reading: Reading::NotYet("store its samples as a TIFF of 16-bit integers or of floats first"),
+};
+
+const DNG_VERSION: Tag = Tag::Unknown(50706);
+/// Compressions of their own: Sony's, Nikon's and Pentax's.
+const OWN_COMPRESSIONS: [u64; 3] = [32_767, 34_713, 65_535];
+
+const fn raw(name: &'static str, is_one: fn(&[u8]) -> bool) -> FrameFormat {
+    FrameFormat { name, sign: Sign::Bytes(is_one), reading: RAW }
+}
+
+const fn tagged(name: &'static str, is_one: fn(&mut TiffFile, &Directory) -> Result<bool>) -> FrameFormat {
+    FrameFormat { name, sign: Sign::Tags(is_one), reading: RAW }
+}
+
+/// Whether a file is a raw of one of these makers, and not a TIFF of theirs: its first image is a reduced one that has
+/// others below it, or is compressed as only raws are.
+fn is_raw_of(file: &mut TiffFile, directory: &Directory, makers: &[&str]) -> Result<bool> {
+    let make = file.text(directory, Tag::Make)?.unwrap_or_default().to_ascii_uppercase();
+    if !makers.iter().any(|maker| make.starts_with(maker)) {
+        return Ok(false);
+    }
+    let is_reduced = file.one(directory, Tag::NewSubfileType)?.is_some_and(|kind| kind & 1 == 1);
+    let compression = file.one(directory, Tag::Compression)?;
+    Ok(is_reduced && directory.has(Tag::SubIfd) || compression.is_some_and(|number| OWN_COMPRESSIONS.contains(&number)))
+}
