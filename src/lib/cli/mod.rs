@@ -6,6 +6,7 @@ mod history;
 pub mod options;
 pub mod prediction;
 pub mod rendering;
+mod usage;
 
 pub use history::history_entry;
 
@@ -17,7 +18,6 @@ use crate::metadata::FrameHeader;
 use crate::numerics::vectors::Instructions;
 use crate::stages::correct::LessDarks;
 use crate::stream::{Counts, RowSource, Stage, run};
-use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use options::{General, Output, ProgressWhen};
@@ -59,7 +59,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
             return ExitCode::SUCCESS;
         }
         Err(error) => {
-            complain(program, &one_line(program, &error));
+            complain(program, &usage::one_line(program, &error));
             return ExitCode::from(2);
         }
     };
@@ -88,48 +88,6 @@ fn complain(program: &str, text: &str) {
         .collect();
     // Where the standard error is closed there is nobody to tell.
     drop(writeln!(std::io::stderr(), "{program}: {shown}"));
-}
-
-/// clap's complaint in one line.
-fn one_line(program: &str, error: &clap::Error) -> String {
-    let context = |kind| match error.get(kind) {
-        Some(ContextValue::String(text)) => Some(text.clone()),
-        Some(ContextValue::Strings(texts)) => Some(texts.join(", ")),
-        _ => None,
-    };
-    let argument = context(ContextKind::InvalidArg).unwrap_or_default();
-    let value = context(ContextKind::InvalidValue).unwrap_or_default();
-    let suggestion = context(ContextKind::SuggestedArg).or_else(|| context(ContextKind::SuggestedValue));
-    let hint = suggestion.map_or(String::new(), |s| format!("; did you mean `{s}`?"));
-    let problem = match error.kind() {
-        ErrorKind::UnknownArgument => {
-            format!("unknown option or extra argument `{argument}`{hint}")
-        }
-        ErrorKind::InvalidValue if value.is_empty() => format!("{argument} needs a value"),
-        ErrorKind::InvalidValue => {
-            let choices = context(ContextKind::ValidValue);
-            let choices = choices.map_or(String::new(), |list| format!("; it is one of {list}"));
-            format!("`{value}` is no value for {argument}{choices}{hint}")
-        }
-        ErrorKind::ValueValidation => {
-            let reason = std::error::Error::source(error).map_or(String::new(), |source| format!(": {source}"));
-            format!("`{value}` is no value for {argument}{reason}")
-        }
-        ErrorKind::MissingRequiredArgument => format!("{argument} is missing"),
-        ErrorKind::ArgumentConflict => {
-            let other = context(ContextKind::PriorArg).unwrap_or_default();
-            if argument == other || other.is_empty() {
-                format!("{argument} is given twice")
-            } else {
-                format!("{argument} and {other} exclude each other")
-            }
-        }
-        _ => {
-            let text = error.to_string();
-            text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned()
-        }
-    };
-    format!("{problem}; see `{program} --help`")
 }
 
 impl Session {

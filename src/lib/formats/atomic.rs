@@ -143,6 +143,7 @@ impl Target {
                 File::from(stdout.as_fd().try_clone_to_owned().map_err(|e| Error::disk(&name, "open", e))?)
             }
             Some(path) => {
+                // What cannot be looked at cannot be written either, which is told when that is tried.
                 let existing = std::fs::metadata(path).ok();
                 existing.as_ref().map_or(Ok(()), check)?;
                 if existing.is_none_or(|metadata| metadata.is_file() || metadata.is_dir()) {
@@ -152,8 +153,9 @@ impl Target {
                 OpenOptions::new().write(true).open(path).map_err(|e| Error::disk(&name, "open", e))?
             }
         };
-        if let Some(metadata) = output.metadata().ok().filter(std::fs::Metadata::is_file) {
-            check(&metadata)?;
+        let about = output.metadata().map_err(|e| Error::disk(&name, "open", e))?;
+        if about.is_file() {
+            check(&about)?;
         }
         let kind = if needs_seek {
             let spool = tempfile::tempfile().map_err(|e| Error::disk(&name, "write", e))?;

@@ -43,13 +43,13 @@ pub struct PictureSettings {
 
 /// Reads a frame and writes it as a PNG.
 ///
-/// Electrons and ADU are shown plane by plane, R as red and so on, with the sRGB curve; XYZ in its colours under the
+/// Electrons and ADU are shown plane by plane, R as red and so on, with the sRGB curve; XYZ in its colors under the
 /// white that its metadata name; sRGB as it is.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for a region outside the frame, a picture too large or the file `input` as the output; [`Error::Format`] for quantities that are no
-/// picture; those of the reader; [`Error::Disk`].
+/// [`Error::Usage`] for a region outside the frame, a picture too large or the file `input` as the output;
+/// [`Error::Format`] for quantities that are no picture; those of the reader; [`Error::Disk`].
 pub fn write_png(
     source: &mut dyn RowSource,
     settings: &PictureSettings,
@@ -90,20 +90,7 @@ pub fn write_png(
         }
     }
     let shade = Shade::new(&frame, settings.range, &moments)?;
-    let mut bytes = Vec::with_capacity(width * height * planes);
-    for row in kept.chunks_exact(region.width * planes) {
-        let start = bytes.len();
-        for x in 0..region.width {
-            let pixel: Vec<f64> = (0..planes).map(|plane| f64::from(row[plane * region.width + x])).collect();
-            let shown = shade.apply(&pixel);
-            for _ in 0..settings.zoom {
-                bytes.extend_from_slice(&shown);
-            }
-        }
-        for _ in 1..settings.zoom {
-            bytes.extend_from_within(start..start + width * planes);
-        }
-    }
+    let bytes = shown(&kept, planes, region.width, settings.zoom, &shade);
     let name = path.display().to_string();
     let mut file = Target::open(Some(path), false, input.map_or(&[], std::slice::from_ref))?;
     let color = if planes == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
@@ -113,6 +100,25 @@ pub fn write_png(
         .map_err(|error| png_complaint(&name, error))?;
     file.flush().map_err(|e| Error::disk(&name, "write", e))?;
     file.commit()
+}
+
+/// The picture's bytes, of rows `[channel][column]`; each pixel becomes a square of `zoom` by `zoom`.
+fn shown(rows: &[f32], planes: usize, columns: usize, zoom: usize, shade: &Shade) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(rows.len() * zoom * zoom);
+    for row in rows.chunks_exact(columns * planes) {
+        let start = bytes.len();
+        for x in 0..columns {
+            let pixel: Vec<f64> = (0..planes).map(|plane| f64::from(row[plane * columns + x])).collect();
+            let shown = shade.apply(&pixel);
+            for _ in 0..zoom {
+                bytes.extend_from_slice(&shown);
+            }
+        }
+        for _ in 1..zoom {
+            bytes.extend_from_within(start..start + columns * zoom * planes);
+        }
+    }
+    bytes
 }
 
 /// From samples to display values.

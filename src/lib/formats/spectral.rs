@@ -64,7 +64,7 @@ impl SpectralChannels {
 pub enum Radiances {
     /// Spectra as CSV.
     Table(SpectralTable),
-    /// A spectral EXR.
+    /// A frame, which should be a spectral EXR.
     Image(Box<FrameReader>),
 }
 

@@ -17,6 +17,10 @@ const MAX_INDENT: usize = 128;
 const MAX_REFERENCES: usize = 8;
 
 /// Reads a document as what it is, before it is read as what it should be.
+///
+/// # Errors
+///
+/// [`Error::Format`] when the text is no YAML, holds a number that is not finite, or is no list of keys and values.
 fn parse_raw(name: &str, text: &str) -> Result<Mapping> {
     let raw: Value = serde_yaml::from_str(text).map_err(|error| yaml_complaint(name, &error))?;
     if let Some(key) = not_finite(&raw) {
@@ -28,12 +32,11 @@ fn parse_raw(name: &str, text: &str) -> Result<Mapping> {
     }
 }
 
-/// Reads one document into a typed value and what of it the type does not know.
+/// Reads one document, of which `raw` is the raw form, into a typed value and what of it the type does not know.
 ///
 /// # Errors
 ///
-/// [`Error::Format`] when the text is no YAML of this kind, is larger or deeper than any of ours, or holds a number that
-/// is not finite. The place is named where the parser knows it.
+/// [`Error::Format`] when the text is not of this type. The place is named where the parser knows it.
 fn parse<T: DeserializeOwned + Serialize>(name: &str, raw: &Mapping, text: &str) -> Result<(T, Mapping)> {
     let typed: T = serde_yaml::from_str(text).map_err(|error| yaml_complaint(name, &error))?;
     let known = serde_yaml::to_value(&typed).map_err(|error| yaml_complaint(name, &error))?;
@@ -45,7 +48,7 @@ fn parse<T: DeserializeOwned + Serialize>(name: &str, raw: &Mapping, text: &str)
 ///
 /// # Errors
 ///
-/// [`Error::Format`] when the text is no YAML of this kind or too large or deep, for a number that is not finite, and for
+/// [`Error::Format`] when the text is no YAML of this kind, larger or deeper than any of ours, for a number that is not finite, and for
 /// unknown keys.
 pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -> Result<T> {
     let text = checked_text(name, bytes)?;

@@ -1,7 +1,8 @@
 //! OpenEXR: scanline files written, scanline and tiled files read, in bands, from files and from pipes.
 //!
 //! The crate `exr` parses headers and (de)compresses blocks; the order of reading and writing is ours, so that rows
-//! stream by and a pipe needs no seek. Uncompressed scanlines, which is what pipes carry, are moved without the crate.
+//! stream by and a pipe needs no seek. Uncompressed scanlines of one type of float, which is what pipes carry, are moved
+//! without the crate.
 
 mod header;
 mod read;
@@ -15,7 +16,8 @@ pub use write::{ExrWriter, TablePatch, patch_table};
 
 /// The string attribute that holds the metadata.
 const METADATA_ATTRIBUTE: &str = "cyanometer";
-/// Blocks are worked on in parallel while they fit this together; larger ones one or two at a time, to save memory.
+/// Blocks smaller than this are read 32 at a time, larger ones two, to save memory; blocks to be written are gathered up to
+/// this, or one that is larger.
 const PARALLEL_BLOCK_BYTES: usize = 4 << 20;
 
 /// How samples are stored.

@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Bytes that are held: four rows of three planes of a large sensor, few enough to stay in a level-2 cache.
+/// Bytes that are held: four rows of three planes of f32, 2700 columns wide; few enough to stay in a level-2 cache.
 const CAPACITY: usize = 1 << 17;
 
 /// A block that takes more is held all the same, up to this: a row of 471 bands of a wide spectral image.
@@ -23,10 +23,11 @@ impl<R: Read> ReadAhead<R> {
         Self { inner, bytes: vec![0; CAPACITY], start: 0, end: 0 }
     }
 
-    /// The next bytes, whole blocks of `block` bytes: at least one, at most `blocks`, as many as there are at hand or one
-    /// read gives; none where the stream ends before, where reading fails, or where a block is larger than 16 MiB.
+    /// The next bytes, whole blocks of `block` bytes, at most `blocks`: those that are at hand; where none is, those that come
+    /// with it, in as many reads as the first needs. None where the stream ends before, where reading fails, or where a block
+    /// is larger than 16 MiB.
     ///
-    /// They stay to be taken, by [`Self::skip`] or as a [`Read`]er, which then also tells what failed.
+    /// They stay to be taken, by [`Self::skip`] or by reading them, which meets again, and then tells, what failed.
     pub fn peek(&mut self, block: usize, blocks: usize) -> &[u8] {
         if self.end - self.start < block {
             if self.bytes.len() < block && block <= LARGEST {
@@ -55,7 +56,7 @@ impl<R: Read> ReadAhead<R> {
 }
 
 impl<R: Read + Seek> ReadAhead<R> {
-    /// Goes forth or back by `delta` bytes; within what is held that costs nothing.
+    /// Goes forth or back by `delta` bytes. Forth within what is held costs nothing; all else drops what is held.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Uncompressed scanlines: their bytes straight to rows, and where files keep them.
+//! Uncompressed scanlines: their bytes straight to rows and back, and where files keep them.
 
 use super::ExrSamples;
 use exr::compression::Compression;

@@ -239,7 +239,6 @@ fn file_header(
     if geometry.width > limit || geometry.height > limit || geometry.row_samples() * samples.bytes() * 32 > limit {
         return Err(too_large());
     }
-    let text = |string: &String| Text::from_slice_unchecked(string.as_bytes());
     let sample_type = if samples == ExrSamples::F32 { SampleType::F32 } else { SampleType::F16 };
     let channels = order
         .iter()
@@ -259,6 +258,27 @@ fn file_header(
         ExrCompression::Zip => Compression::ZIP16,
         ExrCompression::Piz => Compression::PIZ,
     };
+    let (own, shared) = attributes(tags, origin, size);
+    let blocks = BlockDescription::ScanLines;
+    let mut header = Header {
+        channels: ChannelList::new(channels),
+        compression,
+        blocks,
+        line_order: LineOrder::Increasing,
+        layer_size: size,
+        deep: false,
+        deep_data_version: None,
+        chunk_count: 0,
+        max_samples_per_pixel: None,
+        shared_attributes: shared,
+        own_attributes: own,
+    };
+    header.chunk_count = exr::meta::compute_chunk_count(compression, size, blocks);
+    Ok(header)
+}
+
+/// The attributes of a part, and those of the whole file.
+fn attributes(tags: &ExrTags, origin: Vec2<i32>, size: Vec2<usize>) -> (LayerAttributes, ImageAttributes) {
     let mut own = LayerAttributes { layer_position: origin, ..LayerAttributes::default() };
     own.software_name = tags.software.as_ref().map(text);
     own.exposure = tags.exposure_s.map(to_sample);
@@ -276,20 +296,10 @@ fn file_header(
         blue: point(blue),
         white: point(white),
     });
-    let blocks = BlockDescription::ScanLines;
-    let mut header = Header {
-        channels: ChannelList::new(channels),
-        compression,
-        blocks,
-        line_order: LineOrder::Increasing,
-        layer_size: size,
-        deep: false,
-        deep_data_version: None,
-        chunk_count: 0,
-        max_samples_per_pixel: None,
-        shared_attributes: shared,
-        own_attributes: own,
-    };
-    header.chunk_count = exr::meta::compute_chunk_count(compression, size, blocks);
-    Ok(header)
+    (own, shared)
+}
+
+/// A text as the crate holds it.
+fn text(string: &String) -> Text {
+    Text::from_slice_unchecked(string.as_bytes())
 }

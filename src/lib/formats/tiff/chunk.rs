@@ -97,7 +97,7 @@ fn decode_deflate(stored: &[u8], decoded: &mut [u8]) -> Result<usize, Trouble> {
         let status = decoder.decompress(&stored[read..], &mut decoded[filled..], FlushDecompress::Finish);
         let now = usize::try_from(decoder.total_out()).unwrap_or(usize::MAX);
         match status {
-            // Full: a wrong checksum behind it would be told as damage, with the data already there.
+            // Full. What is found wrong on the way there, as a checksum, is damage.
             _ if now == decoded.len() => return status.map(|_| now).map_err(|_| Trouble::Damaged),
             Ok(Status::StreamEnd) => return Ok(now),
             Ok(_) if now == filled && decoder.total_in() == read as u64 => return Ok(now),

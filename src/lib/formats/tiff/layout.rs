@@ -207,38 +207,29 @@ fn stored(file: &mut TiffFile, directory: &Directory, channels: u64) -> Result<S
         (3, 16) => SampleType::F16,
         (3, 32) => SampleType::F32,
         (3, 64) => SampleType::F64,
-        (1 | 2 | 4, 1) => {
-            return Err(file.problem(
-                "black and white images of 1 bit are not supported; give an image with 8 bits or more per sample",
-            ));
-        }
-        (1 | 2 | 4, 2..=31) => {
-            return Err(file.problem(format!(
-                "{bits}-bit packed samples are not supported; unpack them to 16 bit or float (`oiiotool in.tif -d uint16 -o out.tif` does, but scales {} to 65535)",
-                (1u64 << bits) - 1
-            )));
-        }
-        (1 | 2 | 4, 33..=64) => {
-            return Err(file.problem(format!(
-                "{bits}-bit integers are not supported; convert it to float, for example with `oiiotool in.tif -d float -o out.tif`"
-            )));
-        }
-        (3, 24) => {
-            return Err(file.problem(
-                "24-bit floats are not supported; convert it, for example with `oiiotool in.tif -d float -o out.tif`",
-            ));
-        }
-        (5 | 6, _) => {
-            return Err(
-                file.problem("complex samples are not supported; write real and imaginary part as two channels")
-            );
-        }
-        _ => {
-            return Err(
-                file.problem(format!("the file is damaged; sample format {format} with {bits} bits does not exist"))
-            );
-        }
+        _ => return Err(file.problem(no_sample_type(format, bits))),
     })
+}
+
+/// Why samples of this format and so many bits are not read.
+fn no_sample_type(format: u64, bits: u64) -> String {
+    match (format, bits) {
+        (1 | 2 | 4, 1) => {
+            "black and white images of 1 bit are not supported; give an image with 8 bits or more per sample".into()
+        }
+        (1 | 2 | 4, 2..=31) => format!(
+            "{bits}-bit packed samples are not supported; unpack them to 16 bit or float (`oiiotool in.tif -d uint16 -o out.tif` does, but scales {} to 65535)",
+            (1u64 << bits) - 1
+        ),
+        (1 | 2 | 4, 33..=64) => format!(
+            "{bits}-bit integers are not supported; convert it to float, for example with `oiiotool in.tif -d float -o out.tif`"
+        ),
+        (3, 24) => {
+            "24-bit floats are not supported; convert it, for example with `oiiotool in.tif -d float -o out.tif`".into()
+        }
+        (5 | 6, _) => "complex samples are not supported; write real and imaginary part as two channels".into(),
+        _ => format!("the file is damaged; sample format {format} with {bits} bits does not exist"),
+    }
 }
 
 /// The number of the photometric interpretation, if it is one whose samples mean themselves.

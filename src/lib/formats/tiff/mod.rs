@@ -1,9 +1,9 @@
 //! TIFF: rows of samples in and out, without ever holding a whole image.
 //!
 //! The crate `tiff` supplies the vocabulary (numbers of tags, types, compressions) and, in the tests, an independent
-//! witness. Directories and samples are read and written here, because its decoder inverts MinIsWhite, reads the first
-//! plane only of planar files, takes short strips for whole ones, and does not open photometric 32803 (CFA); its
-//! encoder has neither the floating-point predictor nor strips that arrive row by row.
+//! witness. Directories and samples are read and written here, because its decoder inverts MinIsWhite of any
+//! depth, does not open photometric 32803 (CFA), and decodes a strip whole, be it a gigabyte that is not even compressed; and
+//! its encoder has no floating-point predictor. Both work on one thread.
 
 mod chunk;
 mod directory;

@@ -40,11 +40,12 @@ const METADATA_BEGIN: &str = "schema: cyanometer/";
 /// Reads rows of one image of a TIFF file.
 ///
 /// Reads strips and tiles, interleaved and planar; 8, 16 and 32-bit integers, half, single and double floats; no
-/// compression, LZW, Deflate and PackBits with any predictor; both byte orders; classic TIFF and BigTIFF. Gray, RGB,
-/// CMYK, and planes behind a color filter array (photometric 32803). Extra samples are channels like the others.
-/// What it does not read, it refuses by name.
+/// compression, PackBits, LZW and Deflate, these two with any predictor; both byte orders; classic TIFF and BigTIFF. Gray,
+/// RGB, CMYK, planes behind a color filter array (photometric 32803) and demosaicked raws (34892). Extra samples are channels
+/// like the others. What it does not read, it refuses by name.
 ///
-/// Memory is the decoded bytes of one row of tiles or one strip, or about 8 MiB where these are smaller.
+/// Memory is the decoded bytes of one row of tiles or one strip, or about 8 MiB where these are smaller, and up to 16 MiB of
+/// them as stored, or one strip or tile if that is more.
 #[derive(Debug)]
 pub struct TiffReader {
     file: TiffFile,

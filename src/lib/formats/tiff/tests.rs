@@ -167,6 +167,18 @@ fn what_the_crate_writes_is_read() {
 }
 
 #[test]
+fn the_crate_still_cannot_read_for_us() {
+    use tiff::decoder::{Decoder, DecodingResult};
+    let read = |photometric: u32| {
+        let bytes = Made::gray(4, 1).with(262, &[photometric]).bytes();
+        Decoder::new(Cursor::new(bytes)).and_then(|mut decoder| decoder.read_image())
+    };
+    assert!(matches!(read(1), Ok(DecodingResult::U16(plain)) if plain == [0, 1, 2, 3]));
+    assert!(matches!(read(0), Ok(DecodingResult::U16(inverted)) if inverted == [65_535, 65_534, 65_533, 65_532]));
+    assert!(read(32_803).is_err());
+}
+
+#[test]
 fn bytes_depend_on_the_samples_only() {
     let geometry = frame(300, 1500, 3);
     for kind in [TiffSamples::U16, TiffSamples::F32] {

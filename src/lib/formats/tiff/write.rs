@@ -33,7 +33,8 @@ pub struct TiffSettings {
 
 /// Writes rows as a TIFF file: little-endian, interleaved strips, the directory at the end.
 ///
-/// The bytes depend on what is written only, not on the number of rows per call or of threads. Memory is about 8 MiB.
+/// The bytes depend on what is written only, not on the number of rows per call or of threads. Memory is about 8 MiB, and
+/// 16 bytes for each strip.
 #[derive(Debug)]
 pub struct TiffWriter<W: Write + Seek> {
     output: W,

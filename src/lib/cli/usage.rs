@@ -1,0 +1,88 @@
+//! Complaints of the crate `clap` about the command line, in our words.
+//!
+//! It tells what is wrong by kind and context; of its text only the first line of what has no kind here is taken.
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+
+/// clap's complaint in one line.
+pub(super) fn one_line(program: &str, error: &clap::Error) -> String {
+    let context = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        Some(ContextValue::Strings(texts)) => Some(texts.join(", ")),
+        _ => None,
+    };
+    let argument = context(ContextKind::InvalidArg).unwrap_or_default();
+    let value = context(ContextKind::InvalidValue).unwrap_or_default();
+    let suggestion = context(ContextKind::SuggestedArg).or_else(|| context(ContextKind::SuggestedValue));
+    let hint = suggestion.map_or(String::new(), |s| format!("; did you mean `{s}`?"));
+    let problem = match error.kind() {
+        ErrorKind::UnknownArgument => {
+            format!("unknown option or extra argument `{argument}`{hint}")
+        }
+        ErrorKind::InvalidValue if value.is_empty() => format!("{argument} needs a value"),
+        ErrorKind::InvalidValue => {
+            let choices = context(ContextKind::ValidValue);
+            let choices = choices.map_or(String::new(), |list| format!("; it is one of {list}"));
+            format!("`{value}` is no value for {argument}{choices}{hint}")
+        }
+        ErrorKind::ValueValidation => {
+            let reason = std::error::Error::source(error).map_or(String::new(), |source| format!(": {source}"));
+            format!("`{value}` is no value for {argument}{reason}")
+        }
+        ErrorKind::MissingRequiredArgument => format!("{argument} is missing"),
+        ErrorKind::ArgumentConflict => {
+            let other = context(ContextKind::PriorArg).unwrap_or_default();
+            if argument == other || other.is_empty() {
+                format!("{argument} is given twice")
+            } else {
+                format!("{argument} and {other} exclude each other")
+            }
+        }
+        _ => {
+            let text = error.to_string();
+            text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned()
+        }
+    };
+    format!("{problem}; see `{program} --help`")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::{Arg, ArgAction, Command};
+
+    fn command() -> Command {
+        Command::new("measure")
+            .arg(Arg::new("input"))
+            .arg(Arg::new("seed").long("seed").value_parser(clap::value_parser!(u8)))
+            .arg(Arg::new("method").long("method").value_parser(["bi", "eci"]))
+            .arg(Arg::new("size").long("size").num_args(2))
+            .arg(Arg::new("dark").long("dark").action(ArgAction::SetTrue).conflicts_with("seed"))
+            .arg(Arg::new("level").long("level").num_args(1).require_equals(true))
+            .arg(Arg::new("output").long("output").required(true))
+    }
+
+    #[test]
+    fn clap_says_what_is_expected_of_it() {
+        for (line, wanted) in [
+            ("--outptu a", "unknown option or extra argument `--outptu`; did you mean `--output`?"),
+            ("a b --output c", "unknown option or extra argument `b`"),
+            ("--output", "--output <output> needs a value"),
+            (
+                "--output a --method ecii",
+                "`ecii` is no value for --method <method>; it is one of bi, eci; did you mean `eci`?",
+            ),
+            ("--output a --seed x", "`x` is no value for --seed <seed>: invalid digit found in string"),
+            ("--output a --seed 256", "`256` is no value for --seed <seed>: 256 is not in 0..=255"),
+            ("a", "--output <output> is missing"),
+            ("--output a --output b", "--output <output> is given twice"),
+            ("--output a --dark --seed 1", "--dark and --seed <seed> exclude each other"),
+            ("--output a --size 1", "2 values required for '--size <size> <size>' but 1 was provided"),
+            ("--output a --level 1", "equal sign is needed when assigning values to '--level=<level>'"),
+        ] {
+            let words = std::iter::once("measure").chain(line.split(' '));
+            let error = command().try_get_matches_from(words).unwrap_err();
+            assert_eq!(one_line("measure", &error), format!("{wanted}; see `measure --help`"), "{line}");
+        }
+    }
+}
