@@ -16,7 +16,7 @@ NOISE_GOALS = {"baseline": 4.0, "avx2": 7.0, "avx512": 9.0}
 
 
 def instruction_sets():
-    command = [measuring.BIN / "examples" / "bench_kernels", "--instructions"]
+    command = [measuring.BIN / "bench-kernels", "--instructions"]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
 
 

@@ -94,8 +94,8 @@ class Worker:
 
 
 def ours(kernel, size, vectors=None):
-    """A kernel of examples/bench_kernels.rs."""
-    return [BIN / "examples" / "bench_kernels", kernel, size, 999], environment(True, vectors)
+    """A kernel of studies/src/bin/bench-kernels.rs."""
+    return [BIN / "bench-kernels", kernel, size, 999], environment(True, vectors)
 
 
 def peer(script, workload, size):
@@ -144,7 +144,7 @@ def pipeline(commands, folder, count=None, variables=None, output=None):
         variables = environment(True)
     reports = [folder / f"report-{index}" for index in range(len(commands))]
     processes = []
-    launcher = BIN / "examples" / "bench_process"
+    launcher = BIN / "bench-process"
     with contextlib.ExitStack() as stack:
         sink = stack.enter_context(open(output or os.devnull, "wb"))
         errors = stack.enter_context(open(folder / "errors", "w+", encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Runs a peer's kernel in turns, as examples/bench_kernels.rs runs ours: WORKLOAD WIDTHxHEIGHT REPEATS [--step]."""
+"""Runs a peer's kernel in turns, as studies/src/bin/bench-kernels.rs runs ours: WORKLOAD WIDTHxHEIGHT REPEATS [--step]."""
 
 import sys
 import time
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def ramp(width, height):
-    """Expected electrons from 10 to 30000, rising from photosite to photosite as in bench_kernels, 32-bit."""
+    """Expected electrons from 10 to 30000, rising from photosite to photosite as in bench-kernels, 32-bit."""
     return np.linspace(10.0, 30_000.0, width * height).reshape(height, width).astype(np.float32)
 
 

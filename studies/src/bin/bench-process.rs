@@ -1,6 +1,6 @@
 //! Runs a program and tells what it took, for `scripts/bench`.
 //!
-//!     bench_process REPORT PROGRAM [ARGUMENT]...
+//!     bench-process REPORT PROGRAM [ARGUMENT]...
 //!
 //! Writes one line to the file REPORT: clock seconds, user and system CPU seconds, and peak resident memory in KiB; exits
 //! as the program does. Linux counts the memory of the process that starts a program into the peak of the program, so
@@ -30,11 +30,11 @@ fn run(_: &OsString, _: &OsString, _: &[OsString]) -> Result<ExitCode, Box<dyn s
 fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
     let [report, program, arguments @ ..] = &arguments[..] else {
-        eprintln!("usage: bench_process REPORT PROGRAM [ARGUMENT]...");
+        eprintln!("usage: bench-process REPORT PROGRAM [ARGUMENT]...");
         return ExitCode::from(2);
     };
     run(report, program, arguments).unwrap_or_else(|error| {
-        eprintln!("bench_process: {}: {error}", program.display());
+        eprintln!("bench-process: {}: {error}", program.display());
         ExitCode::FAILURE
     })
 }

@@ -4,7 +4,6 @@ use crate::Study;
 use crate::bench::{Work, median, quantile, timed};
 use crate::camera::{Camera, EXPOSURE, sample_data};
 use crate::labels::Shape;
-use crate::markdown::Table;
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::analysis::characterization::evaluation::{
@@ -23,6 +22,7 @@ use cyanometer::spectrum::WavelengthGrid;
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::noise::NoiseSettings;
 use cyanometer::stages::to_xyz::ColorSettings;
+use cyanometer_studies::markdown::Table;
 use std::hint::black_box;
 
 const COUNTS: [usize; 11] = [3, 4, 5, 7, 10, 20, 40, 80, 160, 320, 912];

@@ -4,7 +4,6 @@ use crate::Study;
 use crate::bench::{Work, quantile};
 use crate::camera::{Camera, EXPOSURE, sample_data};
 use crate::labels::Shape;
-use crate::markdown::Table;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::error::Result;
@@ -12,6 +11,7 @@ use cyanometer::formats::spectral;
 use cyanometer::numerics::quadrature::Rule;
 use cyanometer::report::plot::Plot;
 use cyanometer::spectrum::WavelengthGrid;
+use cyanometer_studies::markdown::Table;
 use std::hint::black_box;
 
 /// Steps in nm. All divide the range an even number of times, as Simpson's rule needs.

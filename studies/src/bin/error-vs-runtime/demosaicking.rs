@@ -4,7 +4,6 @@ use crate::Study;
 use crate::bench::Work;
 use crate::camera::{METHODS, SKY, demosaicked, mosaicked};
 use crate::labels::Shape;
-use crate::markdown::{Table, number};
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::cfa::CfaPattern;
@@ -18,6 +17,7 @@ use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::Demosaic;
 use cyanometer::stages::demosaic::weights::WeightTable;
 use cyanometer::stream::{MemoryFrame, RowSource};
+use cyanometer_studies::markdown::{Table, number};
 use std::hint::black_box;
 use std::path::Path;
 

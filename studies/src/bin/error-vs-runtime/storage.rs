@@ -4,7 +4,6 @@ use crate::Study;
 use crate::bench::Work;
 use crate::camera::{Camera, codes, demosaicked, exposed, mosaicked};
 use crate::labels::Shape;
-use crate::markdown::{Table, number};
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::color::difference::delta_e_76;
@@ -16,6 +15,7 @@ use cyanometer::frame::to_sample;
 use cyanometer::report::plot::Plot;
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stream::{Counts, MemoryFrame, RowSink, RowSource};
+use cyanometer_studies::markdown::{Table, number};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 

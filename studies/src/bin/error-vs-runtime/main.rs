@@ -10,8 +10,6 @@ mod camera;
 mod demosaicking;
 mod equations;
 mod labels;
-#[path = "../support/markdown.rs"]
-mod markdown;
 mod page;
 mod pareto;
 mod precision;
@@ -62,7 +60,7 @@ const PARTS: [(&str, Part); 9] = [
     ("averaging", averaging::study),
 ];
 
-const USAGE: &str = "error_vs_runtime DIRECTORY [--quick] [--only PART] [--scene FILE]";
+const USAGE: &str = "error-vs-runtime DIRECTORY [--quick] [--only PART] [--scene FILE]";
 
 fn main() -> ExitCode {
     let mut directory = None;
@@ -81,13 +79,13 @@ fn main() -> ExitCode {
         }
     }
     let Some(directory) = directory else {
-        eprintln!("error_vs_runtime: name the directory to write to; usage: {USAGE}");
+        eprintln!("error-vs-runtime: name the directory to write to; usage: {USAGE}");
         return ExitCode::from(2);
     };
     match run(Path::new(&directory), quick, only.as_deref(), scene) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error_vs_runtime: {error}");
+            eprintln!("error-vs-runtime: {error}");
             ExitCode::FAILURE
         }
     }

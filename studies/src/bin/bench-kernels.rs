@@ -1,7 +1,7 @@
 //! Times one kernel in memory on one thread, for `scripts/bench`.
 //!
-//!     bench_kernels KERNEL WIDTHxHEIGHT REPEATS [--step]
-//!     bench_kernels --instructions
+//!     bench-kernels KERNEL WIDTHxHEIGHT REPEATS [--step]
+//!     bench-kernels --instructions
 //!
 //! After a run that is not counted it prints `ready`, then a line for each repeat: CPU seconds of the process, and clock
 //! seconds. With `--step` each repeat waits for a line on standard input, so that several programs can take turns.
@@ -10,6 +10,7 @@
 //! A stage goes over a frame in bands, as programs do, from one buffer to another that are made once. The light is a ramp
 //! from 10 to 30 000 e⁻ over the whole frame, so that no two photosites that are neighbours expect the same.
 
+use cpu_time::ProcessTime;
 use cyanometer::camera::optics::Exposure;
 use cyanometer::cfa::{CfaPattern, Class};
 use cyanometer::color::{Space, White};
@@ -289,18 +290,6 @@ impl TryRng for Draws {
     }
 }
 
-#[cfg(unix)]
-fn cpu_s() -> f64 {
-    use nix::time::{ClockId, clock_gettime};
-    clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID)
-        .map_or(f64::NAN, |time| time.tv_sec() as f64 + 1e-9 * time.tv_nsec() as f64)
-}
-
-#[cfg(not(unix))]
-fn cpu_s() -> f64 {
-    f64::NAN
-}
-
 fn repeat(mut kernel: Kernel, repeats: usize, step: bool) -> std::io::Result<()> {
     let mut output = std::io::stdout().lock();
     let mut turns = std::io::stdin().lock().lines();
@@ -311,9 +300,9 @@ fn repeat(mut kernel: Kernel, repeats: usize, step: bool) -> std::io::Result<()>
         if step && turns.next().transpose()?.is_none() {
             break;
         }
-        let (cpu_before_s, start) = (cpu_s(), Instant::now());
+        let (cpu, clock) = (ProcessTime::now(), Instant::now());
         kernel();
-        writeln!(output, "{:.6} {:.6}", cpu_s() - cpu_before_s, start.elapsed().as_secs_f64())?;
+        writeln!(output, "{:.6} {:.6}", cpu.elapsed().as_secs_f64(), clock.elapsed().as_secs_f64())?;
         output.flush()?;
     }
     Ok(())
@@ -342,18 +331,18 @@ fn main() -> ExitCode {
     };
     let Some((((_, make), (width, height)), repeats)) = parsed else {
         let names: Vec<&str> = KERNELS.iter().map(|(name, _)| *name).collect();
-        eprintln!("usage: bench_kernels KERNEL WIDTHxHEIGHT REPEATS [--step]; kernels: {}", names.join(", "));
+        eprintln!("usage: bench-kernels KERNEL WIDTHxHEIGHT REPEATS [--step]; kernels: {}", names.join(", "));
         return ExitCode::from(2);
     };
     let done = make(width, height).map(|kernel| repeat(kernel, repeats, step));
     match done {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
-            eprintln!("bench_kernels: {error}");
+            eprintln!("bench-kernels: {error}");
             ExitCode::FAILURE
         }
         Err(error) => {
-            eprintln!("bench_kernels: {error}");
+            eprintln!("bench-kernels: {error}");
             ExitCode::FAILURE
         }
     }

@@ -3,8 +3,6 @@
 //!
 //! Writes Markdown and figures into the directory that is named, always the same to the byte: `scripts/reproduce colour`.
 
-#[path = "../support/markdown.rs"]
-mod markdown;
 mod report;
 mod studio;
 
@@ -72,13 +70,13 @@ struct Results {
 
 fn main() -> ExitCode {
     let Some(directory) = std::env::args().nth(1) else {
-        eprintln!("reproduce_color: name the directory to write to");
+        eprintln!("reproduce-color: name the directory to write to");
         return ExitCode::from(2);
     };
     match run(Path::new(&directory)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("reproduce_color: {error}");
+            eprintln!("reproduce-color: {error}");
             ExitCode::FAILURE
         }
     }

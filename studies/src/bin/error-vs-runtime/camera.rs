@@ -46,7 +46,7 @@ pub struct Camera {
 
 /// A file of the tree.
 pub fn sample_data(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_data").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join("sample_data").join(name)
 }
 
 impl Camera {

@@ -4,7 +4,6 @@ use crate::Study;
 use crate::bench::Work;
 use crate::camera::{Camera, mosaicked};
 use crate::labels::Shape;
-use crate::markdown::{Table, number};
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::error::Result;
@@ -16,6 +15,7 @@ use cyanometer::random::{Source, poisson::tails};
 use cyanometer::report::plot::Plot;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::MemoryFrame;
+use cyanometer_studies::markdown::{Table, number};
 use std::hint::black_box;
 
 const RATES: [f64; 6] = [0.5, 5.0, 50.0, 500.0, 5000.0, 30_000.0];

@@ -4,7 +4,6 @@ use crate::Study;
 use crate::bench::{Work, median, timed};
 use crate::camera::{SKY, codes, exposed};
 use crate::labels::Shape;
-use crate::markdown::{Table, number};
 use crate::page::{Section, count, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::error::{Error, Result};
@@ -15,6 +14,7 @@ use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::noise::NoiseModel;
 use cyanometer::stream::MemoryFrame;
+use cyanometer_studies::markdown::{Table, number};
 use std::hint::black_box;
 
 /// Signal electrons; those of green of the clear sky.

@@ -52,7 +52,7 @@ pub struct Camera {
 impl Camera {
     /// The KAF-5101CE, and SkyRadLS fitted to the 912 skies.
     pub fn new() -> Result<Self> {
-        let tree = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let tree = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let loaded = data::load_sensor(&tree.join("sample_data/sensors/kaf-5101ce.yaml").display().to_string())?;
         let library = spectral::read_library(&tree.join("sample_data/skies/sky912.exr"), None)?;
         let grid = WavelengthGrid::default();

@@ -1,12 +1,12 @@
 //! The page: docs/reproduction/colour.md.
 
-use crate::markdown::{Table, number};
 use crate::studio::{EXPOSURE_S, FILLING, PATCH, TRAINING};
 use crate::{Case, Results};
 use cyanometer::analysis::characterization::evaluation::{SampleEvaluation, noise_free, noisy};
 use cyanometer::color::difference::{Difference, DifferenceReport, DifferenceSummary};
 use cyanometer::error::{Error, Result};
 use cyanometer::numerics::distribution::Distribution;
+use cyanometer_studies::markdown::{Table, number};
 use std::fmt::Write;
 
 /// A row of parts (a) of Tables 3 to 6: shares below 1/10, 1/4, 1/2 in per cent, minimum, maximum, mean, median.

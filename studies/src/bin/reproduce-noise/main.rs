@@ -7,8 +7,6 @@ mod camera;
 mod correlation;
 mod figures;
 mod limits;
-#[path = "../support/markdown.rs"]
-mod markdown;
 mod prediction;
 mod report;
 mod sweep;
@@ -65,13 +63,13 @@ struct Results {
 
 fn main() -> ExitCode {
     let Some(directory) = std::env::args().nth(1) else {
-        eprintln!("reproduce_noise: name the directory to write to");
+        eprintln!("reproduce-noise: name the directory to write to");
         return ExitCode::from(2);
     };
     match run(Path::new(&directory)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("reproduce_noise: {error}");
+            eprintln!("reproduce-noise: {error}");
             ExitCode::FAILURE
         }
     }

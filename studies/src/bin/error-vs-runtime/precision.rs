@@ -4,7 +4,6 @@ use crate::Study;
 use crate::bench::Work;
 use crate::camera::{Camera, EXPOSURE, codes, demosaicked, exposed, mosaicked};
 use crate::labels::Shape;
-use crate::markdown::Table;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::color::difference::delta_e_76;
@@ -15,6 +14,7 @@ use cyanometer::report::plot::Plot;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stream::MemoryFrame;
+use cyanometer_studies::markdown::Table;
 use std::hint::black_box;
 use std::ops::{Add, Mul, Sub};
 

@@ -4,7 +4,6 @@ use crate::Study;
 use crate::bench::timed;
 use crate::camera::{SKY, codes, demosaicked, exposed, std};
 use crate::labels::Shape;
-use crate::markdown::{Table, number};
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::chain::StagePrediction;
@@ -15,6 +14,7 @@ use cyanometer::propagation::{Equations, FramePrediction, of_frame};
 use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stream::MemoryFrame;
+use cyanometer_studies::markdown::{Table, number};
 
 /// The channel that is judged, red: a quarter of the photosites measure it.
 const CHANNEL: usize = 0;

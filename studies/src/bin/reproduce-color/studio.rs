@@ -57,7 +57,7 @@ pub struct Studio {
 
 impl Studio {
     pub fn new() -> Result<Self> {
-        let skies = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_data/skies");
+        let skies = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join("sample_data/skies");
         let loaded = data::load_sensor(data::DEFAULT_SENSOR)?;
         let observer = data::load_observer()?;
         let grid = WavelengthGrid::default();

@@ -4,7 +4,6 @@ use crate::Study;
 use crate::bench::{Work, median, timed};
 use crate::camera::{METHODS, codes, demosaicked, exposed, moments, std};
 use crate::labels::Shape;
-use crate::markdown::Table;
 use crate::page::{Section, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::chain::{Chain, ChainPrediction};
@@ -12,6 +11,7 @@ use cyanometer::error::Result;
 use cyanometer::propagation::Equations;
 use cyanometer::report::plot::Plot;
 use cyanometer::stages::demosaic::Method;
+use cyanometer_studies::markdown::Table;
 use std::hint::black_box;
 
 /// Scenes: names, and e⁻ of R, G and B.

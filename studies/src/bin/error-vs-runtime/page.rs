@@ -1,8 +1,8 @@
 //! The page: sections of text, plots, tables and advice.
 
-use crate::markdown::{Table, number};
 use cyanometer::error::Result;
 use cyanometer::report::plot::{Plot, power_of_ten};
+use cyanometer_studies::markdown::{Table, number};
 use std::fmt::Write;
 use std::path::Path;
 

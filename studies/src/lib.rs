@@ -1,0 +1,3 @@
+//! What the studies share.
+
+pub mod markdown;
