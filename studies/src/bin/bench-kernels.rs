@@ -11,13 +11,10 @@
 //! from 10 to 30 000 e⁻ over the whole frame, so that no two photosites that are neighbours expect the same.
 
 use cpu_time::ProcessTime;
-use cyanometer::camera::optics::Exposure;
 use cyanometer::cfa::{CfaPattern, Class};
-use cyanometer::color::{Space, White};
+use cyanometer::color::Space;
 use cyanometer::error::{Error, Result};
-use cyanometer::formats::data;
-use cyanometer::frame::{Geometry, Rows, Window, to_sample};
-use cyanometer::metadata::{FrameHeader, Metadata};
+use cyanometer::frame::{Rows, Window, to_sample};
 use cyanometer::numerics::moments::Moments;
 use cyanometer::numerics::planes::weighted_sums;
 use cyanometer::numerics::vectors::{self, Instructions};
@@ -27,11 +24,11 @@ use cyanometer::spectrum::WavelengthGrid;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
-use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
-use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stages::to_xyz::ToXyz;
 use cyanometer::stream::{MemoryFrame, Stage};
-use cyanometer::units::QuantityKind;
+use cyanometer_studies::camera::{EXPOSURE, color_settings, sensor};
+use cyanometer_studies::frames;
 use rand_core::TryRng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 use std::convert::Infallible;
@@ -71,14 +68,8 @@ const KERNELS: [(&str, Maker); 15] = [
     ("spectral-read", spectral_read),
 ];
 
-/// The default exposure of `render-radiance`.
-const EXPOSURE: Exposure = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
-
 /// Three planes of the ramp.
 fn expected(width: usize, height: usize) -> Result<MemoryFrame> {
-    let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-    metadata.sensor = Some(data::load_sensor(data::DEFAULT_SENSOR)?.sensor);
-    metadata.exposure = Some(EXPOSURE);
     let step = (RAMP_E[1] - RAMP_E[0]) / ((width * height).max(2) - 1) as f64;
     let mut samples = Vec::with_capacity(3 * width * height);
     for y in 0..height {
@@ -86,23 +77,19 @@ fn expected(width: usize, height: usize) -> Result<MemoryFrame> {
             samples.extend((0..width).map(|x| to_sample(RAMP_E[0] + step * (y * width + x) as f64)));
         }
     }
-    let geometry = Geometry::new(width, height, &["R", "G", "B"]);
-    Ok(MemoryFrame::new(FrameHeader { name: "ramp".into(), geometry, metadata }, samples))
+    Ok(MemoryFrame::new(frames::head(&sensor()?.sensor, [width, height], None), samples))
 }
 
 fn cfa_plane(width: usize, height: usize) -> Result<MemoryFrame> {
-    let three = expected(width, height)?;
-    Ok(three.through(&Mosaic::new(&three.header, Some(CfaPattern::Rggb))?)?.0)
+    frames::mosaicked(&expected(width, height)?)
 }
 
 fn codes(width: usize, height: usize) -> Result<MemoryFrame> {
-    let plane = cfa_plane(width, height)?;
-    Ok(plane.through(&Digitize::new(&plane.header, &AdcSettings::default())?)?.0)
+    frames::codes(&cfa_plane(width, height)?)
 }
 
 fn demosaicked(width: usize, height: usize) -> Result<MemoryFrame> {
-    let plane = codes(width, height)?;
-    Ok(plane.through(&Demosaic::new(&plane.header, Method::Bilinear, Black::Auto, None)?)?.0)
+    frames::demosaicked(&codes(width, height)?, Method::Bilinear)
 }
 
 /// A stage on a frame, band by band, into a buffer that the next band uses again, as programs do.
@@ -140,13 +127,8 @@ fn interpolation(method: Method, width: usize, height: usize) -> Result<Kernel> 
 
 fn matrix(width: usize, height: usize) -> Result<Kernel> {
     let rgb = demosaicked(width, height)?;
-    let settings = ColorSettings {
-        xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
-        method: None,
-        space: Space::Xyz,
-        white: White::D65,
-        white_luminance: None,
-    };
+    let xyz_from_camera = [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]];
+    let settings = color_settings(xyz_from_camera, Space::Xyz);
     Ok(over(ToXyz::new(&rgb.header, &settings)?, rgb))
 }
 
@@ -169,7 +151,7 @@ fn moments_of(frame: MemoryFrame) -> Kernel {
 
 /// Spectral radiances at 471 wavelengths to the electrons of three classes, from rows as an EXR holds them.
 fn spectral(width: usize, height: usize) -> Result<Kernel> {
-    let loaded = data::load_sensor(data::DEFAULT_SENSOR)?;
+    let loaded = sensor()?;
     let (wavelengths_nm, _) = WavelengthGrid::default().points()?;
     let weights = loaded.response.weights_on(&loaded.sensor, &EXPOSURE, &WavelengthGrid::default())?;
     let (camera, _) = weights.camera(&wavelengths_nm);
@@ -218,7 +200,7 @@ impl vectors::Kernel for Reading<'_> {
 /// The noise of a CFA plane as one writes it down with rand_distr, on the same generator with the same keys.
 fn noise_by_rand_distr(width: usize, height: usize) -> Result<Kernel> {
     let plane = cfa_plane(width, height)?;
-    let sensor = data::load_sensor(data::DEFAULT_SENSOR)?.sensor;
+    let sensor = sensor()?.sensor;
     let dark_e = sensor.dark_current_e_per_s(sensor.temperature_k) * EXPOSURE.exposure_s;
     let refused = |_| Error::Data("rand_distr refuses a rate".into());
     let dark_shot = Poisson::new(dark_e).map_err(refused)?;

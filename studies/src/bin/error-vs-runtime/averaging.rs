@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::timed;
-use crate::camera::{SKY, codes, demosaicked, exposed, std};
 use crate::labels::Shape;
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
@@ -14,7 +13,9 @@ use cyanometer::propagation::{Equations, FramePrediction, of_frame};
 use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stream::MemoryFrame;
-use cyanometer_studies::markdown::{Table, number};
+use cyanometer_studies::camera::SKY;
+use cyanometer_studies::frames::{codes, demosaicked, exposed, std};
+use cyanometer_studies::pages::{Table, number};
 
 /// The channel that is judged, red: a quarter of the photosites measure it.
 const CHANNEL: usize = 0;
@@ -34,14 +35,13 @@ struct Mean {
 }
 
 pub fn study(study: &Study) -> Result<Section> {
-    let camera = &study.camera;
     let (size, frames) = if study.quick { ([96, 64], 8_usize) } else { ([384, 256], 64) };
     let pixels = size[0] * size[1];
-    let mut chain = camera.chain(METHOD, Equations::Exact, false)?;
+    let mut chain = study.chain(METHOD, Equations::Exact, false)?;
     let prediction = chain.predict(SKY)?;
     let missing = || Error::Data("the chain has no such stage".into());
     let stage = prediction.stages.iter().find(|stage| stage.stage == "demosaicked").ok_or_else(missing)?;
-    let expected = camera.plane(size, SKY)?;
+    let expected = study.plane(size, SKY)?;
     let shot = |seed: u64, sensor: u64| demosaicked(&codes(&exposed(&expected, seed, sensor)?)?, METHOD);
 
     // Frames of one sensor: the same patterns, new temporal noise.

@@ -2,6 +2,7 @@
 
 use cpu_time::ThreadTime;
 use cyanometer::error::Result;
+use cyanometer_studies::frames::median;
 
 /// Something whose run is timed.
 pub type Work<'a> = Box<dyn FnMut() -> Result<()> + 'a>;
@@ -77,12 +78,6 @@ pub fn timed<T>(work: impl FnOnce() -> Result<T>) -> Result<(T, f64)> {
     let start = ThreadTime::now();
     let made = work()?;
     Ok((made, start.elapsed().as_secs_f64()))
-}
-
-/// The middle value; NaN of none.
-pub fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// The value that a share of all values do not exceed; NaN of none.

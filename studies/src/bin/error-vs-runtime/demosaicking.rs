@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::Work;
-use crate::camera::{METHODS, SKY, demosaicked, mosaicked};
 use crate::labels::Shape;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
@@ -17,7 +16,9 @@ use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::Demosaic;
 use cyanometer::stages::demosaic::weights::WeightTable;
 use cyanometer::stream::{MemoryFrame, RowSource};
-use cyanometer_studies::markdown::{Table, number};
+use cyanometer_studies::camera::{METHODS, SKY};
+use cyanometer_studies::frames::{demosaicked, mosaicked};
+use cyanometer_studies::pages::{Table, number};
 use std::hint::black_box;
 use std::path::Path;
 
@@ -59,7 +60,7 @@ pub fn study(study: &Study) -> Result<Section> {
         let weights = WeightTable::new(method, CfaPattern::Rggb).about([1.0; 2]);
         let covariance = gains::mean_pixel(&weights).covariance([1.0; 3]);
         gains.push([0, 1, 2].map(|i| covariance[(i, i)].sqrt()));
-        let prediction = study.camera.chain(method, Equations::Exact, true)?.predict(SKY)?;
+        let prediction = study.chain(method, Equations::Exact, true)?.predict(SKY)?;
         noise.push(prediction.noise_delta_e.map_or(f64::NAN, |delta| delta.mean));
     }
     let timed_frame = mosaicked(&scenes[3].truth)?;
@@ -171,7 +172,7 @@ fn scene(study: &Study, [width, height]: [usize; 2], name: &str, at: impl Fn(f64
         let row: Vec<[f64; 3]> = (0..width).map(|x| at(x as f64 / width as f64, y as f64 / width as f64)).collect();
         (0..3).for_each(|class| samples.extend(row.iter().map(|pixel| to_sample(FULL_E * pixel[class]))));
     }
-    Scene { name: name.into(), truth: MemoryFrame::new(study.camera.head([width, height], None), samples) }
+    Scene { name: name.into(), truth: MemoryFrame::new(study.head([width, height], None), samples) }
 }
 
 fn stripes(x: f64, y: f64, period: f64) -> [f64; 3] {
@@ -187,7 +188,7 @@ fn picture(study: &Study, path: &Path) -> Result<Scene> {
     reader.read(geometry.height, &mut samples)?;
     let largest = samples.iter().fold(0.0, |a: f32, b| a.max(*b));
     samples.iter_mut().for_each(|sample| *sample *= 36_000.0 / largest);
-    let truth = MemoryFrame::new(study.camera.head([geometry.width, geometry.height], None), samples);
+    let truth = MemoryFrame::new(study.head([geometry.width, geometry.height], None), samples);
     let name = path.file_stem().map_or("picture".into(), |name| name.to_string_lossy().into_owned());
     Ok(Scene { name, truth })
 }

@@ -1,8 +1,7 @@
 //! The paper's equations, exact ones, and simulations.
 
 use crate::Study;
-use crate::bench::{Work, median, timed};
-use crate::camera::{METHODS, codes, demosaicked, exposed, moments, std};
+use crate::bench::{Work, timed};
 use crate::labels::Shape;
 use crate::page::{Section, percent, time};
 use crate::pareto::{self, Choice, Group};
@@ -11,12 +10,14 @@ use cyanometer::error::Result;
 use cyanometer::propagation::Equations;
 use cyanometer::report::plot::Plot;
 use cyanometer::stages::demosaic::Method;
-use cyanometer_studies::markdown::Table;
+use cyanometer_studies::camera::{METHODS, SKY};
+use cyanometer_studies::frames::{codes, demosaicked, exposed, median, moments, stds};
+use cyanometer_studies::pages::Table;
 use std::hint::black_box;
 
 /// Scenes: names, and e⁻ of R, G and B.
 const LEVELS: [(&str, [f64; 3]); 3] =
-    [("dark room, 20 e⁻", [20.0; 3]), ("gray, 10 000 e⁻", [10_000.0; 3]), ("clear sky", crate::camera::SKY)];
+    [("dark room, 20 e⁻", [20.0; 3]), ("gray, 10 000 e⁻", [10_000.0; 3]), ("clear sky", SKY)];
 /// Photosites of the simulation that a user may run instead.
 const SMALL: [usize; 2] = [100, 100];
 
@@ -30,7 +31,6 @@ struct Way {
 }
 
 pub fn study(study: &Study) -> Result<Section> {
-    let camera = &study.camera;
     let size = if study.quick { [400, 300] } else { [2400, 1600] };
     // The huge simulation: one exposure of each level, through every method.
     let mut reference = [[[0.0; 3]; 3]; METHODS.len()];
@@ -38,17 +38,16 @@ pub fn study(study: &Study) -> Result<Section> {
     let mut small_times = vec![Vec::new(); METHODS.len()];
     for (level, (_, electrons)) in LEVELS.into_iter().enumerate() {
         let seed = study.seed(4) + 10 * level as u64;
-        let plane = codes(&exposed(&camera.plane(size, electrons)?, seed, seed)?)?;
-        let scene = camera.plane(SMALL, electrons)?;
+        let plane = codes(&exposed(&study.plane(size, electrons)?, seed, seed)?)?;
+        let scene = study.plane(SMALL, electrons)?;
         for (index, (_, method)) in METHODS.into_iter().enumerate() {
-            let all = moments(&demosaicked(&plane, method)?);
-            reference[index][level] = [0, 1, 2].map(|channel| std(&all, channel));
+            reference[index][level] = stds(&moments(&demosaicked(&plane, method)?));
             for repeat in 0..study.bench.rounds() as u64 {
                 let seed = seed + 1000 * (repeat + 1);
                 let (found, taken) =
                     timed(|| Ok(moments(&demosaicked(&codes(&exposed(&scene, seed, seed)?)?, method)?)))?;
                 small_times[index].push(taken);
-                small_sigma[index][level].push([0, 1, 2].map(|channel| std(&found, channel)));
+                small_sigma[index][level].push(stds(&found));
             }
         }
     }
@@ -56,9 +55,9 @@ pub fn study(study: &Study) -> Result<Section> {
     let mut chains: Vec<(usize, &'static str, Chain)> = Vec::new();
     for (index, (_, method)) in METHODS.into_iter().enumerate() {
         if method != Method::Malvar {
-            chains.push((index, "paper", camera.chain(method, Equations::Paper, false)?));
+            chains.push((index, "paper", study.chain(method, Equations::Paper, false)?));
         }
-        chains.push((index, "exact", camera.chain(method, Equations::Exact, false)?));
+        chains.push((index, "exact", study.chain(method, Equations::Exact, false)?));
     }
     let mut predictions = Vec::new();
     for (index, name, chain) in &mut chains {

@@ -6,7 +6,6 @@
 
 mod averaging;
 mod bench;
-mod camera;
 mod demosaicking;
 mod equations;
 mod labels;
@@ -20,10 +19,21 @@ mod training;
 mod wavelength;
 
 use bench::Bench;
-use camera::Camera;
+use cyanometer::analysis::characterization::regression::Weights;
+use cyanometer::chain::{Chain, ChainSettings};
+use cyanometer::color::Space;
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::output::write_text;
+use cyanometer::frame::to_sample;
+use cyanometer::metadata::FrameHeader;
 use cyanometer::numerics::vectors::Instructions;
+use cyanometer::propagation::Equations;
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::noise::NoiseSettings;
+use cyanometer::stages::to_xyz::ColorSettings;
+use cyanometer::stream::MemoryFrame;
+use cyanometer_studies::camera::{Camera, EXPOSURE, color_settings};
+use cyanometer_studies::{frames, pages};
 use page::Section;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -33,6 +43,8 @@ use std::time::Instant;
 /// What all studies share.
 pub struct Study {
     camera: Camera,
+    /// XYZ by SkyRadLS on all 912 skies, errors relative to luminance.
+    color: ColorSettings,
     bench: Bench,
     quick: bool,
     /// A picture to demosaic.
@@ -43,6 +55,45 @@ impl Study {
     /// The first seed of a study; no two studies use the same.
     fn seed(&self, study: u64) -> u64 {
         1_000_000 * study
+    }
+
+    /// The head of a frame of expected electrons; `uniform` are those of a uniform scene.
+    fn head(&self, size: [usize; 2], uniform: Option<[f64; 3]>) -> FrameHeader {
+        frames::head(&self.camera.sensor, size, uniform)
+    }
+
+    /// A uniform scene behind the filter array.
+    fn plane(&self, size: [usize; 2], electrons: [f64; 3]) -> Result<MemoryFrame> {
+        frames::mosaicked(&frames::uniform(&self.camera.sensor, size, electrons))
+    }
+
+    /// A sky that becomes brighter and whiter downwards, three planes of expected electrons.
+    fn sky_with_gradient(&self, [width, height]: [usize; 2]) -> MemoryFrame {
+        let mut samples = Vec::with_capacity(3 * width * height);
+        for y in 0..height {
+            let down = y as f64 / height as f64;
+            for (low, high) in [(3000.0, 20_000.0), (9000.0, 25_000.0), (16_000.0, 28_000.0)] {
+                samples.extend(std::iter::repeat_n(to_sample(low + down * (high - low)), width));
+            }
+        }
+        MemoryFrame::new(self.head([width, height], None), samples)
+    }
+
+    /// The noise budget by formula, ready to predict.
+    fn chain(&self, method: Method, equations: Equations, with_color: bool) -> Result<Chain> {
+        Chain::new(ChainSettings {
+            sensor: self.camera.sensor.clone(),
+            exposure: EXPOSURE,
+            noise: NoiseSettings::default(),
+            method,
+            pattern: None,
+            color: with_color.then(|| self.color.clone()),
+            dark_frames: 0,
+            equations,
+            patch: None,
+            patch_at: None,
+            wanted: None,
+        })
     }
 }
 
@@ -82,13 +133,7 @@ fn main() -> ExitCode {
         eprintln!("error-vs-runtime: name the directory to write to; usage: {USAGE}");
         return ExitCode::from(2);
     };
-    match run(Path::new(&directory), quick, only.as_deref(), scene) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error-vs-runtime: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    pages::finish("error-vs-runtime", run(Path::new(&directory), quick, only.as_deref(), scene))
 }
 
 fn run(directory: &Path, quick: bool, only: Option<&str>, scene: Option<PathBuf>) -> Result<()> {
@@ -96,8 +141,10 @@ fn run(directory: &Path, quick: bool, only: Option<&str>, scene: Option<PathBuf>
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
     one.map_err(|error| Error::Data(format!("threads cannot be set: {error}")))?;
     let plots = directory.join("error-vs-runtime");
-    std::fs::create_dir_all(&plots).map_err(|e| Error::disk(&plots.display().to_string(), "make", e))?;
-    let study = Study { camera: Camera::new()?, bench: Bench::new(quick), quick, scene };
+    pages::make_directory(&plots)?;
+    let camera = Camera::new()?;
+    let color = color_settings(camera.fit_to_skies(Weights::Relative)?, Space::Xyz);
+    let study = Study { camera, color, bench: Bench::new(quick), quick, scene };
     let mut sections = Vec::new();
     for (name, part) in PARTS.into_iter().filter(|(name, _)| only.is_none_or(|only| only == *name)) {
         let start = Instant::now();

@@ -2,7 +2,7 @@
 
 use cyanometer::error::Result;
 use cyanometer::report::plot::{Plot, power_of_ten};
-use cyanometer_studies::markdown::{Table, number};
+use cyanometer_studies::pages::{Table, number};
 use std::fmt::Write;
 use std::path::Path;
 

@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::Work;
-use crate::camera::{Camera, EXPOSURE, codes, demosaicked, exposed, mosaicked};
 use crate::labels::Shape;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
@@ -14,7 +13,9 @@ use cyanometer::report::plot::Plot;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stream::MemoryFrame;
-use cyanometer_studies::markdown::Table;
+use cyanometer_studies::camera::EXPOSURE;
+use cyanometer_studies::frames::{codes, colors, demosaicked, exposed, mosaicked};
+use cyanometer_studies::pages::Table;
 use std::hint::black_box;
 use std::ops::{Add, Mul, Sub};
 
@@ -110,13 +111,12 @@ fn plain<T: Real>(electrons: &[f32], [width, height]: [usize; 2], constants: &Co
 }
 
 pub fn study(study: &Study) -> Result<Section> {
-    let camera = &study.camera;
     let size = if study.quick { [128, 96] } else { [640, 480] };
-    let electrons = noisy(camera, size, study.seed(6))?;
+    let electrons = exposed(&study.sky_with_gradient(size), study.seed(6), study.seed(6))?;
     let digitized = Digitize::new(&electrons.header, &AdcSettings::default())?;
     let head = cyanometer::stream::Stage::header(&digitized);
     let adc = head.metadata.adc.ok_or_else(|| Error::Data("the converter left no record".into()))?;
-    let matrix = color::matrix(&camera.color.xyz_from_camera) / EXPOSURE.exposure_s_sr();
+    let matrix = color::matrix(&study.color.xyz_from_camera) / EXPOSURE.exposure_s_sr();
     let constants = Constants {
         bias_adu: adc.bias_adu,
         adu_per_e: adc.adu_per_e,
@@ -124,8 +124,9 @@ pub fn study(study: &Study) -> Result<Section> {
         black_adu: head.metadata.black_level_adu.unwrap_or(0.0),
         xyz_from_adu: [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)])),
     };
-    let programs =
-        || -> Result<MemoryFrame> { camera.xyz(&demosaicked(&codes(&mosaicked(&electrons)?)?, Method::Bilinear)?) };
+    let programs = || -> Result<MemoryFrame> {
+        colors(&demosaicked(&codes(&mosaicked(&electrons)?)?, Method::Bilinear)?, &study.color)
+    };
     let mut works: Vec<Work<'_>> = vec![
         Box::new(|| {
             black_box(plain::<f64>(black_box(&electrons.samples), size, &constants));
@@ -213,18 +214,6 @@ pub fn study(study: &Study) -> Result<Section> {
             time(times[1] / pixels),
         ),
     })
-}
-
-/// A noisy exposure of a sky that becomes brighter and whiter downwards, three planes of electrons.
-fn noisy(camera: &Camera, [width, height]: [usize; 2], seed: u64) -> Result<MemoryFrame> {
-    let mut samples = Vec::new();
-    for y in 0..height {
-        let down = y as f64 / height as f64;
-        for (low, high) in [(3000.0, 20_000.0), (9000.0, 25_000.0), (16_000.0, 28_000.0)] {
-            samples.extend(std::iter::repeat_n(to_sample(low + down * (high - low)), width));
-        }
-    }
-    exposed(&MemoryFrame::new(camera.head([width, height], None), samples), seed, seed)
 }
 
 /// How far colors are from the reference.

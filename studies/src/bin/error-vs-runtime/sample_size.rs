@@ -1,8 +1,7 @@
 //! Simulated standard deviations as the number of photosites grows, beside the formula.
 
 use crate::Study;
-use crate::bench::{Work, median, timed};
-use crate::camera::{SKY, codes, exposed};
+use crate::bench::{Work, timed};
 use crate::labels::Shape;
 use crate::page::{Section, count, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
@@ -14,7 +13,9 @@ use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::noise::NoiseModel;
 use cyanometer::stream::MemoryFrame;
-use cyanometer_studies::markdown::{Table, number};
+use cyanometer_studies::camera::SKY;
+use cyanometer_studies::frames::{codes, exposed, median};
+use cyanometer_studies::pages::{Table, number};
 use std::hint::black_box;
 
 /// Signal electrons; those of green of the clear sky.
@@ -32,13 +33,12 @@ struct Size {
 }
 
 pub fn study(study: &Study) -> Result<Section> {
-    let camera = &study.camera;
     let sizes: &[(usize, usize)] = if study.quick {
         &[(100, 20), (1000, 20), (10_000, 10), (100_000, 3)]
     } else {
         &[(100, 400), (1000, 400), (10_000, 200), (100_000, 60), (1_000_000, 12), (10_000_000, 3)]
     };
-    let head = camera.plane([2, 2], [LEVEL_E; 3])?.header;
+    let head = study.plane([2, 2], [LEVEL_E; 3])?.header;
     let noisy = exposed(&MemoryFrame::new(head, vec![to_sample(LEVEL_E); 4]), 0, 0)?;
     let adc = codes(&noisy)?.header.metadata.adc;
     let (record, adc) =
@@ -46,7 +46,7 @@ pub fn study(study: &Study) -> Result<Section> {
     let model = NoiseModel::of(&noisy.header, record)?;
     let predicted = Photosite::of_electrons(model, Equations::Exact).digitized(adc).moments(LEVEL_E);
     let sigma = predicted.moments.std();
-    let mut chain = camera.chain(Method::Bilinear, Equations::Exact, true)?;
+    let mut chain = study.chain(Method::Bilinear, Equations::Exact, true)?;
     let mut works: Vec<Work<'_>> = vec![
         Box::new(|| {
             black_box(Photosite::of_electrons(model, Equations::Exact).digitized(adc).moments(black_box(LEVEL_E)));
@@ -67,7 +67,7 @@ pub fn study(study: &Study) -> Result<Section> {
         // Rows at once, so that ten million photosites need no more memory than a million.
         let height = (photosites / width).min(1000);
         let pieces = photosites / (width * height);
-        let expected = camera.plane([width, height], [LEVEL_E; 3])?;
+        let expected = study.plane([width, height], [LEVEL_E; 3])?;
         let (mut squares, mut times) = (0.0, Vec::new());
         for _ in 0..frames {
             let (moments, taken) = timed(|| {

@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::Work;
-use crate::camera::{Camera, mosaicked};
 use crate::labels::Shape;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
@@ -15,7 +14,8 @@ use cyanometer::random::{Source, poisson::tails};
 use cyanometer::report::plot::Plot;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::MemoryFrame;
-use cyanometer_studies::markdown::{Table, number};
+use cyanometer_studies::frames::mosaicked;
+use cyanometer_studies::pages::{Table, number};
 use std::hint::black_box;
 
 const RATES: [f64; 6] = [0.5, 5.0, 50.0, 500.0, 5000.0, 30_000.0];
@@ -171,8 +171,8 @@ fn signed_percent(fraction: f64) -> String {
     format!("{} %", number(100.0 * fraction, 3))
 }
 
-fn head(camera: &Camera, size: [usize; 2], rate: f64, uniform: bool) -> FrameHeader {
-    let mut head = camera.head(size, Some([rate; 3]));
+fn head(study: &Study, size: [usize; 2], rate: f64, uniform: bool) -> FrameHeader {
+    let mut head = study.head(size, Some([rate; 3]));
     if let Some(scene) = &mut head.metadata.scene {
         *scene = Scene { uniform, ..scene.clone() };
     }
@@ -180,10 +180,9 @@ fn head(camera: &Camera, size: [usize; 2], rate: f64, uniform: bool) -> FrameHea
 }
 
 fn at_rate(study: &Study, rate: f64, size: [usize; 2], seed: u64) -> Result<Vec<Case>> {
-    let camera = &study.camera;
     let plane = |uniform: bool| -> Result<MemoryFrame> {
         let samples = vec![to_sample(rate); 3 * size[0] * size[1]];
-        mosaicked(&MemoryFrame::new(head(camera, size, rate, uniform), samples))
+        mosaicked(&MemoryFrame::new(head(study, size, rate, uniform), samples))
     };
     let (any, uniform) = (plane(false)?, plane(true)?);
     // At 1 K there is no dark signal.

@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::Work;
-use crate::camera::{Camera, codes, demosaicked, exposed, mosaicked};
 use crate::labels::Shape;
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
@@ -11,11 +10,11 @@ use cyanometer::color::{D65_XY, lab_from_xyz, xyz_of_chromaticity};
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::output::{CompressionKind, FrameWriter, OutputOptions, SampleKind};
-use cyanometer::frame::to_sample;
 use cyanometer::report::plot::Plot;
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stream::{Counts, MemoryFrame, RowSink, RowSource};
-use cyanometer_studies::markdown::{Table, number};
+use cyanometer_studies::frames::{codes, colors, demosaicked, exposed, mosaicked};
+use cyanometer_studies::pages::{Table, number};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
@@ -48,8 +47,8 @@ fn compression_name(kind: CompressionKind) -> &'static str {
 pub fn study(study: &Study) -> Result<Section> {
     let size = if study.quick { [160, 120] } else { [640, 480] };
     let directory = tempfile::tempdir().map_err(|e| Error::disk("a temporary directory", "make", e))?;
-    let plane = sky(&study.camera, size, study.seed(7))?;
-    let xyz = study.camera.xyz(&demosaicked(&plane, Method::EffectiveColor)?)?;
+    let plane = codes(&exposed(&mosaicked(&study.sky_with_gradient(size))?, study.seed(7), study.seed(7))?)?;
+    let xyz = colors(&demosaicked(&plane, Method::EffectiveColor)?, &study.color)?;
     let of_codes = |stored: &MemoryFrame| {
         let difference = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
         plane.samples.iter().zip(&stored.samples).map(difference).fold(0.0, f64::max)
@@ -143,18 +142,6 @@ pub fn study(study: &Study) -> Result<Section> {
         tables,
         advice: advice(&of_codes_ways, &of_xyz_ways),
     })
-}
-
-fn sky(camera: &Camera, [width, height]: [usize; 2], seed: u64) -> Result<MemoryFrame> {
-    let mut samples = Vec::new();
-    for y in 0..height {
-        let down = y as f64 / height as f64;
-        for (low, high) in [(3000.0, 20_000.0), (9000.0, 25_000.0), (16_000.0, 28_000.0)] {
-            samples.extend(std::iter::repeat_n(to_sample(low + down * (high - low)), width));
-        }
-    }
-    let expected = mosaicked(&MemoryFrame::new(camera.head([width, height], None), samples))?;
-    codes(&exposed(&expected, seed, seed)?)
 }
 
 fn largest_delta_e(truth: &MemoryFrame, stored: &MemoryFrame) -> f64 {

@@ -1,28 +1,26 @@
 //! How many spectra a matrix is fitted on.
 
 use crate::Study;
-use crate::bench::{Work, median, quantile, timed};
-use crate::camera::{Camera, EXPOSURE, sample_data};
+use crate::bench::{Work, quantile, timed};
 use crate::labels::Shape;
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
+use cyanometer::analysis::characterization::Signals;
 use cyanometer::analysis::characterization::evaluation::{
     EvaluationSettings, Filling, SampleExposure, evaluate, noise_free,
 };
 use cyanometer::analysis::characterization::regression::{FitSettings, Weights, fit};
 use cyanometer::analysis::characterization::training::spanning_subset;
-use cyanometer::analysis::characterization::{Signals, signals};
 use cyanometer::color::Space;
 use cyanometer::color::difference::DELTA_E_PER_JND;
 use cyanometer::error::{Error, Result};
-use cyanometer::formats::{data, spectral};
 use cyanometer::random::philox::philox4x32_10;
 use cyanometer::report::plot::Plot;
-use cyanometer::spectrum::WavelengthGrid;
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::noise::NoiseSettings;
-use cyanometer::stages::to_xyz::ColorSettings;
-use cyanometer_studies::markdown::Table;
+use cyanometer_studies::camera::{Camera, EXPOSURE, Matrix, color_settings};
+use cyanometer_studies::frames::median;
+use cyanometer_studies::pages::Table;
 use std::hint::black_box;
 
 const COUNTS: [usize; 11] = [3, 4, 5, 7, 10, 20, 40, 80, 160, 320, 912];
@@ -44,29 +42,30 @@ struct Training {
 
 pub fn study(study: &Study) -> Result<Section> {
     let camera = &study.camera;
-    let total = camera.skies.radiance.nrows();
+    let total = camera.skies.library.radiance.nrows();
     let all: Vec<usize> = (0..total).collect();
     let (counts, draws) = if study.quick { (&COUNTS[..5], 3) } else { (&COUNTS[..], 40) };
-    let library = spectral::read_library(&sample_data("skies/kider2014.exr"), None)?;
-    let observer = data::load_observer()?;
-    let measured = signals(&library, &camera.sensor, &camera.response, &observer, &WavelengthGrid::default())?;
+    let measured = camera.measured_skies()?;
     let mut found = Vec::new();
     let mut subsets = Vec::new();
     for &count in counts {
-        let (chosen, choose) =
-            if count >= total { (all.clone(), 0.0) } else { timed(|| spanning_subset(&camera.skies, &all, count))? };
+        let (chosen, choose) = if count >= total {
+            (all.clone(), 0.0)
+        } else {
+            timed(|| spanning_subset(&camera.skies.library, &all, count))?
+        };
         let mut drawn = Vec::new();
         if count < total {
             for draw in 0..draws {
-                drawn.push(judge(camera, &camera.signals, &lot(total, count, study.seed(8) + draw))?);
+                drawn.push(judge(camera, &camera.skies.signals, &lot(total, count, study.seed(8) + draw))?);
             }
         }
         let refused = drawn.iter().filter(|error| error.is_nan()).count() as f64 / drawn.len().max(1) as f64;
         let valid: Vec<f64> = drawn.into_iter().filter(|error| error.is_finite()).collect();
         found.push(Training {
             count,
-            chosen: judge(camera, &camera.signals, &chosen)?,
-            measured: judge(camera, &measured, &chosen)?,
+            chosen: judge(camera, &camera.skies.signals, &chosen)?,
+            measured: judge(camera, &measured.signals, &chosen)?,
             drawn: [median(valid.clone()), quantile(valid, 0.9)],
             refused,
             choose,
@@ -149,7 +148,7 @@ pub fn study(study: &Study) -> Result<Section> {
              lot {draws} times. Choosing is timed once. The time to fit includes the jackknife uncertainty that the matrix file states. Sets \
              whose signals are too much alike determine no matrix and are refused. The {} measured \
              skies are judged by the same matrices.",
-            library.radiance.nrows()
+            measured.library.radiance.nrows()
         ),
         figures: vec![("training".into(), "Color error against time, by number of training spectra".into(), plot)],
         tables: vec![(String::new(), table)],
@@ -185,9 +184,9 @@ fn lot(total: usize, count: usize, seed: u64) -> Vec<usize> {
     all.into_iter().take(count).map(|(_, index)| index).collect()
 }
 
-fn matrix(camera: &Camera, training: &[usize]) -> Result<[[f64; 3]; 3]> {
+fn matrix(camera: &Camera, training: &[usize]) -> Result<Matrix> {
     let settings = FitSettings { training: training.to_vec(), weights: Weights::Relative, ..FitSettings::default() };
-    Ok(fit(&camera.signals, &camera.responses, &settings, None)?.xyz_from_camera)
+    Ok(fit(&camera.skies.signals, &camera.responses, &settings, None)?.xyz_from_camera)
 }
 
 /// Mean ΔE*ab of skies; NaN where the training spectra determine no matrix.
@@ -202,9 +201,9 @@ fn judge(camera: &Camera, skies: &Signals, training: &[usize]) -> Result<f64> {
         noise: NoiseSettings::default(),
         method: Method::EffectiveColor,
         pattern: None,
-        color: ColorSettings { xyz_from_camera, space: Space::Lab, ..camera.color.clone() },
+        color: color_settings(xyz_from_camera, Space::Lab),
         patch: None,
-        columns: camera.skies.columns,
+        columns: camera.skies.library.columns,
         dark_frames: 1,
     };
     let skies = evaluate(&camera.sensor, skies, &settings)?;

@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::{Work, quantile};
-use crate::camera::{Camera, EXPOSURE, sample_data};
 use crate::labels::Shape;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
@@ -11,7 +10,8 @@ use cyanometer::formats::spectral;
 use cyanometer::numerics::quadrature::Rule;
 use cyanometer::report::plot::Plot;
 use cyanometer::spectrum::WavelengthGrid;
-use cyanometer_studies::markdown::Table;
+use cyanometer_studies::camera::{Camera, EXPOSURE, sample_data};
+use cyanometer_studies::pages::Table;
 use std::hint::black_box;
 
 /// Steps in nm. All divide the range an even number of times, as Simpson's rule needs.

@@ -10,11 +10,13 @@ use cyanometer::analysis::characterization::evaluation::SampleEvaluation;
 use cyanometer::analysis::characterization::noise_aware::TradeOff;
 use cyanometer::analysis::characterization::regression::{Regression, Weights};
 use cyanometer::color::difference::DifferenceReport;
-use cyanometer::error::{Error, Result};
+use cyanometer::error::Result;
 use cyanometer::formats::output::write_text;
 use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot};
 use cyanometer::report::{SkyColor, chromaticity, trade_off};
 use cyanometer::stages::demosaic::Method;
+use cyanometer_studies::camera::METHODS;
+use cyanometer_studies::pages::{write_figure, write_into_directory};
 use std::path::Path;
 use std::process::ExitCode;
 use studio::Studio;
@@ -26,10 +28,6 @@ const REGRESSIONS: [(&str, Regression); 4] = [
     ("SkyRadSPPLS", Regression::SkyRadSppls),
     ("MaxIgnSPPLS, positive", Regression::MaxIgnPositiveSppls),
 ];
-
-/// The methods in the order of Tables 5 and 6, and one more.
-const METHODS: [(&str, Method); 4] =
-    [("BI", Method::Bilinear), ("SHTI", Method::SmoothHue), ("ECI", Method::EffectiveColor), ("MHC", Method::Malvar)];
 
 /// A named evaluation of all skies.
 struct Case {
@@ -69,24 +67,14 @@ struct Results {
 }
 
 fn main() -> ExitCode {
-    let Some(directory) = std::env::args().nth(1) else {
-        eprintln!("reproduce-color: name the directory to write to");
-        return ExitCode::from(2);
-    };
-    match run(Path::new(&directory)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("reproduce-color: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    write_into_directory("reproduce-color", run)
 }
 
 fn run(directory: &Path) -> Result<()> {
     let studio = Studio::new()?;
     let case = |name, regression, method| -> Result<Case> {
         let matrix = studio.fit(regression, &studio.training, &Weights::Relative)?;
-        Ok(Case { name, skies: studio.evaluate(&studio.skies, &matrix, method, true)? })
+        Ok(Case { name, skies: studio.evaluate(&studio.camera.skies, &matrix, method, true)? })
     };
     let regressions: Vec<Case> =
         REGRESSIONS.into_iter().map(|(name, r)| case(name, r, Method::EffectiveColor)).collect::<Result<_>>()?;
@@ -94,10 +82,7 @@ fn run(directory: &Path) -> Result<()> {
         METHODS.into_iter().map(|(name, method)| case(name, Regression::SkyRadSppls, method)).collect::<Result<_>>()?;
     let (measured, measured_own) = studio.measured_skies()?;
 
-    std::fs::create_dir_all(directory).map_err(|e| Error::disk(&directory.display().to_string(), "make", e))?;
-    let figure = |name: &str, plot: &Plot| -> Result<()> {
-        ["svg", "png"].iter().try_for_each(|end| plot.write(&directory.join(format!("{name}.{end}")), None))
-    };
+    let figure = |name: &str, plot: &Plot| write_figure(directory, name, plot);
     let preserved = &regressions[2];
     figure("fig3", &colors(&studio, preserved))?;
     figure("fig8", &noise(preserved))?;
@@ -124,7 +109,7 @@ fn colors(studio: &Studio, case: &Case) -> Plot {
         .iter()
         .map(|sky| SkyColor { xy: xy(sky.xyz), fitted_xy: xy(sky.camera_xyz), delta_e_94: sky.noise_free.delta_e_94 })
         .collect();
-    chromaticity(&skies, Some(studio.kept), &studio.observer, "Fig. 3: 912 skies and the errors of SkyRadSPPLS")
+    chromaticity(&skies, Some(studio.kept), &studio.camera.observer, "Fig. 3: 912 skies and the errors of SkyRadSPPLS")
 }
 
 /// Fig. 8: observed against predicted noise of X, Y, Z.

@@ -1,12 +1,13 @@
 //! The page: docs/reproduction/colour.md.
 
-use crate::studio::{EXPOSURE_S, FILLING, PATCH, TRAINING};
+use crate::studio::{FILLING, PATCH, TRAINING};
 use crate::{Case, Results};
 use cyanometer::analysis::characterization::evaluation::{SampleEvaluation, noise_free, noisy};
 use cyanometer::color::difference::{Difference, DifferenceReport, DifferenceSummary};
 use cyanometer::error::{Error, Result};
 use cyanometer::numerics::distribution::Distribution;
-use cyanometer_studies::markdown::{Table, number};
+use cyanometer_studies::camera::EXPOSURE;
+use cyanometer_studies::pages::{Table, number};
 use std::fmt::Write;
 
 /// A row of parts (a) of Tables 3 to 6: shares below 1/10, 1/4, 1/2 in per cent, minimum, maximum, mean, median.
@@ -180,10 +181,10 @@ pub fn markdown(results: &Results) -> Result<String> {
         "# The color figures and tables of the paper, beside ours\n\n\
          Made by `scripts/reproduce colour`; every number of ours is computed there, from fixed seeds. “The paper” is\n\
          [HP2005](../references.md), Sec. 4.1.\n\n\
-         Set-up, as the paper has it: each sky exposed so that its brightest class is at {FILLING} of full well, 33 ms ({EXPOSURE_S} s; the\n\
+         Set-up, as the paper has it: each sky exposed so that its brightest class is at {FILLING} of full well, 33 ms ({} s; the\n\
          aperture is chosen), {}×{} pixels (columns × rows), no vignetting, one dark frame subtracted, ECI for the regressions,\n\
          SkyRadSPPLS for the demosaicking methods; {TRAINING} training skies.\n",
-        PATCH[0], PATCH[1]
+        EXPOSURE.exposure_s, PATCH[0], PATCH[1]
     );
     out.push_str("## What can agree and what cannot\n\n");
     let _ = writeln!(

@@ -7,45 +7,27 @@ use cyanometer::analysis::characterization::evaluation::{
 use cyanometer::analysis::characterization::noise_aware::{NoiseTerms, NoisySample, TradeOff};
 use cyanometer::analysis::characterization::regression::{FitSettings, Regression, Weights, fit};
 use cyanometer::analysis::characterization::training::{average_sample, spanning_subset};
-use cyanometer::analysis::characterization::{Signals, responses, signals};
-use cyanometer::camera::optics::Exposure;
-use cyanometer::camera::sensor::Sensor;
+use cyanometer::color::Space;
 use cyanometer::color::difference::DifferenceReport;
-use cyanometer::color::{Space, White};
 use cyanometer::error::{Error, Result};
-use cyanometer::formats::{csv, data, files, spectral};
-use cyanometer::spectrum::{Observer, SpectralLibrary, WavelengthGrid};
+use cyanometer::formats::{csv, files};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::noise::NoiseSettings;
-use cyanometer::stages::to_xyz::ColorSettings;
-use std::path::Path;
+use cyanometer_studies::camera::{Camera, EXPOSURE, Matrix, Seen, color_settings, sample_data};
 
 /// Pixels of each sky, columns and rows: the paper's 15 × 20.
 pub const PATCH: [usize; 2] = [20, 15];
-/// Exposure time in s, and share of full well: the aperture follows.
-pub const EXPOSURE_S: f64 = 0.033;
-/// Share of full well that the brightest class fills.
+/// Share of full well that the brightest class fills: the aperture follows.
 pub const FILLING: f64 = 0.75;
 /// Training samples.
 pub const TRAINING: usize = 20;
 /// Seed of the noise.
 pub const SEED: u64 = 3;
 
-type Matrix = [[f64; 3]; 3];
-
-/// A library as camera and observer see it.
-pub struct Seen {
-    pub library: SpectralLibrary,
-    pub signals: Signals,
-}
-
 /// Camera, observer and skies.
 pub struct Studio {
-    pub sensor: Sensor,
-    pub observer: Observer,
-    responses: Signals,
-    /// The 912 computed skies.
-    pub skies: Seen,
+    /// The camera and the 912 computed skies.
+    pub camera: Camera,
     /// The measured skies.
     pub measured: Seen,
     aerosols: Vec<String>,
@@ -57,18 +39,9 @@ pub struct Studio {
 
 impl Studio {
     pub fn new() -> Result<Self> {
-        let skies = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join("sample_data/skies");
-        let loaded = data::load_sensor(data::DEFAULT_SENSOR)?;
-        let observer = data::load_observer()?;
-        let grid = WavelengthGrid::default();
-        let see = |name: &str| -> Result<Seen> {
-            let library = spectral::read_library(&skies.join(name), None)?;
-            let signals = signals(&library, &loaded.sensor, &loaded.response, &observer, &grid)?;
-            Ok(Seen { library, signals })
-        };
-        let (computed, measured) = (see("sky912.exr")?, see("kider2014.exr")?);
+        let camera = Camera::new()?;
         let labels = |column| {
-            let path = skies.join("sky912_meta.csv");
+            let path = sample_data("skies/sky912_meta.csv");
             csv::text_column(&path.display().to_string(), &files::read_file(&path)?, column)
         };
         // Rural skies come in two visibilities.
@@ -77,16 +50,13 @@ impl Studio {
             Ok(0.0_f64) | Err(_) => name,
             Ok(km) => format!("{} {km} km", name.trim_end_matches(|c: char| c.is_ascii_digit())),
         });
-        let all: Vec<usize> = (0..computed.library.radiance.nrows()).collect();
+        let all: Vec<usize> = (0..camera.skies.library.radiance.nrows()).collect();
         Ok(Self {
-            responses: responses(&loaded.sensor, &loaded.response, &observer, &grid)?,
-            training: spanning_subset(&computed.library, &all, TRAINING)?,
-            kept: average_sample(&computed.signals, &all)?,
+            training: spanning_subset(&camera.skies.library, &all, TRAINING)?,
+            kept: average_sample(&camera.skies.signals, &all)?,
             aerosols: aerosols.collect(),
-            sensor: loaded.sensor,
-            observer,
-            skies: computed,
-            measured,
+            measured: camera.measured_skies()?,
+            camera,
         })
     }
 
@@ -104,26 +74,16 @@ impl Studio {
             weights: if trained { weights.clone() } else { Weights::Equal },
             ridge: 0.0,
         };
-        Ok(fit(&self.skies.signals, &self.responses, &settings, None)?.xyz_from_camera)
+        Ok(fit(&self.camera.skies.signals, &self.camera.responses, &settings, None)?.xyz_from_camera)
     }
 
     fn settings(&self, seen: &Seen, xyz_from_camera: Matrix, method: Method, with_noise: bool) -> EvaluationSettings {
         EvaluationSettings {
-            exposure: SampleExposure::Filled {
-                base: Exposure { exposure_s: EXPOSURE_S, f_number: 8.0, lens_transmittance: 1.0 },
-                fraction: FILLING,
-                by: Filling::Aperture,
-            },
+            exposure: SampleExposure::Filled { base: EXPOSURE, fraction: FILLING, by: Filling::Aperture },
             noise: NoiseSettings { seed: SEED, ..NoiseSettings::default() },
             method,
             pattern: None,
-            color: ColorSettings {
-                xyz_from_camera,
-                method: None,
-                space: Space::Lab,
-                white: White::D65,
-                white_luminance: None,
-            },
+            color: color_settings(xyz_from_camera, Space::Lab),
             patch: with_noise.then_some(PATCH),
             columns: seen.library.columns,
             dark_frames: 1,
@@ -137,7 +97,7 @@ impl Studio {
         method: Method,
         with_noise: bool,
     ) -> Result<Vec<SampleEvaluation>> {
-        evaluate(&self.sensor, &seen.signals, &self.settings(seen, *matrix, method, with_noise))
+        evaluate(&self.camera.sensor, &seen.signals, &self.settings(seen, *matrix, method, with_noise))
     }
 
     /// Differences without noise of the skies that `chosen` names, or all.
@@ -153,7 +113,7 @@ impl Studio {
         weights: &Weights,
         chosen: impl Fn(usize) -> bool + Copy,
     ) -> Result<[DifferenceReport; 2]> {
-        let one = |regression| self.report(&self.skies, &self.fit(regression, training, weights)?, chosen);
+        let one = |regression| self.report(&self.camera.skies, &self.fit(regression, training, weights)?, chosen);
         Ok([one(Regression::SkyRadLs)?, one(Regression::SkyRadSppls)?])
     }
 
@@ -162,8 +122,11 @@ impl Studio {
         let all: Vec<usize> = (0..self.aerosols.len()).collect();
         let mut choices = Vec::new();
         for count in [3, 5, 10, 20, 40, 80, all.len()] {
-            let training =
-                if count == all.len() { all.clone() } else { spanning_subset(&self.skies.library, &all, count)? };
+            let training = if count == all.len() {
+                all.clone()
+            } else {
+                spanning_subset(&self.camera.skies.library, &all, count)?
+            };
             for (name, weights) in [("relative", Weights::Relative), ("equal", Weights::Equal)] {
                 choices.push(Choice {
                     training: count.to_string(),
@@ -185,7 +148,7 @@ impl Studio {
             .map(|aerosol| {
                 let is_one = |sky: usize| self.aerosols[sky] == aerosol;
                 let others: Vec<usize> = (0..self.aerosols.len()).filter(|&sky| !is_one(sky)).collect();
-                let without = spanning_subset(&self.skies.library, &others, TRAINING)?;
+                let without = spanning_subset(&self.camera.skies.library, &others, TRAINING)?;
                 Ok(HeldOut {
                     count: self.aerosols.len() - others.len(),
                     with: self.trained(&self.training, &Weights::Relative, is_one)?,
@@ -207,16 +170,16 @@ impl Studio {
             .collect::<Result<_>>()?;
         let all = (0..self.measured.library.radiance.nrows()).collect();
         let settings = FitSettings { training: all, weights: Weights::Relative, ..FitSettings::default() };
-        let own = fit(&self.measured.signals, &self.responses, &settings, None)?.xyz_from_camera;
+        let own = fit(&self.measured.signals, &self.camera.responses, &settings, None)?.xyz_from_camera;
         Ok((never, self.report(&self.measured, &own, |_| true)?))
     }
 
     /// What errors of color cost in noise: SkyRadLS on the training samples.
     pub fn trade_off(&self) -> Result<Vec<TradeOff>> {
         let first = self.fit(Regression::SkyRadLs, &self.training, &Weights::Equal)?;
-        let signals = &self.skies.signals;
-        let settings = self.settings(&self.skies, first, Method::EffectiveColor, false);
-        let noise = pixel_covariances(&self.sensor, signals, &settings, &self.training)?;
+        let signals = &self.camera.skies.signals;
+        let settings = self.settings(&self.camera.skies, first, Method::EffectiveColor, false);
+        let noise = pixel_covariances(&self.camera.sensor, signals, &settings, &self.training)?;
         let samples = self.training.iter().zip(noise).map(|(&sky, (covariance, white))| NoisySample {
             camera: [0, 1, 2].map(|j| signals.camera[(sky, j)]),
             xyz: [0, 1, 2].map(|j| signals.xyz[(sky, j)]),
@@ -229,7 +192,7 @@ impl Studio {
         weights
             .map(|weight| {
                 terms.weight = weight;
-                let fitted = fit(signals, &self.responses, &fit_settings, Some(&terms))?;
+                let fitted = fit(signals, &self.camera.responses, &fit_settings, Some(&terms))?;
                 Ok(terms.trade_off(&fitted.xyz_from_camera))
             })
             .collect()

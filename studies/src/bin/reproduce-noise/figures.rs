@@ -8,8 +8,9 @@ use cyanometer::error::Result;
 use cyanometer::propagation::smooth_hue::{FirstOrder, VOID_BELOW};
 use cyanometer::propagation::{Equations, gains};
 use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot, ReferenceLine, Region};
-use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::Method;
+use cyanometer::stream::MemoryFrame;
+use cyanometer_studies::frames::{self, median, std};
 
 /// What X, Y and Z are drawn in.
 const COLORS: [Color; 3] = [Color::Vermillion, Color::Green, Color::Blue];
@@ -176,13 +177,10 @@ pub fn hue_levels(camera: &Camera, first_seed: u64) -> Result<Vec<HueLevel>> {
         let (mut before, mut dark_free, mut biased) = (0.0, Vec::new(), Vec::new());
         for frame in 0..HUE_FRAMES {
             let plane = camera.plane(SMALL, electrons, first_seed + HUE_FRAMES * index as u64 + frame)?;
-            before += camera::class_moments(&plane)[blue].std(0).unwrap_or(f64::NAN).powi(2) / HUE_FRAMES as f64;
-            let after = |black| -> Result<f64> {
-                let rgb = camera::demosaicked(&plane, Method::SmoothHue, black)?;
-                Ok(camera::moments(&rgb).std(blue).unwrap_or(f64::NAN) / slope)
-            };
-            dark_free.push(after(Black::Auto)?);
-            biased.push(after(Black::Level(camera.adc.bias_adu))?);
+            before += std(&camera::class_moments(&plane)[blue], 0).powi(2) / HUE_FRAMES as f64;
+            let after = |rgb: MemoryFrame| std(&frames::moments(&rgb), blue) / slope;
+            dark_free.push(after(frames::demosaicked(&plane, Method::SmoothHue)?));
+            biased.push(after(camera::demosaicked_above(camera.adc.bias_adu, &plane, Method::SmoothHue)?));
         }
         let sites = Sites::of(camera, electrons, Equations::Exact);
         let mut with_dark = sites;
@@ -196,8 +194,8 @@ pub fn hue_levels(camera: &Camera, first_seed: u64) -> Result<Vec<HueLevel>> {
             blue: level,
             before: before.sqrt() / slope,
             small: dark_free[0],
-            median: median(&mut dark_free),
-            biased: median(&mut biased),
+            median: median(dark_free),
+            biased: median(biased),
             paper: by_paper(&sites),
             paper_biased: by_paper(&with_dark),
             exact: exact(&sites),
@@ -206,11 +204,6 @@ pub fn hue_levels(camera: &Camera, first_seed: u64) -> Result<Vec<HueLevel>> {
         });
     }
     Ok(found)
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// The level whose measured noise is `std` e⁻, by exact moments.

@@ -6,8 +6,8 @@ use cyanometer::error::Result;
 use cyanometer::numerics::moments::Moments;
 use cyanometer::propagation::gains;
 use cyanometer::propagation::{self, Equations, Photosite};
-use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::Method;
+use cyanometer_studies::frames;
 use nalgebra::Matrix3;
 
 /// Levels at which approximations are looked at, e⁻.
@@ -34,15 +34,15 @@ impl Pool {
             Self { electrons: Moments::new(3), codes: Moments::new(3), rgb: empty(), xyz: empty(), patches: empty() };
         for seed in first_seed..first_seed + FRAMES {
             let electrons = camera.electrons(SIZE, [level; 3], seed)?;
-            let codes = camera::codes(&electrons)?;
-            pool.electrons.merge(&camera::moments(&electrons));
-            pool.codes.merge(&camera::moments(&codes));
-            let plane = camera::mosaicked(&codes)?;
+            let codes = frames::codes(&electrons)?;
+            pool.electrons.merge(&frames::moments(&electrons));
+            pool.codes.merge(&frames::moments(&codes));
+            let plane = frames::mosaicked(&codes)?;
             for (index, method) in METHODS.into_iter().enumerate() {
-                let rgb = camera::demosaicked(&plane, method, Black::Auto)?;
-                pool.rgb[index].merge(&camera::moments(&rgb));
+                let rgb = frames::demosaicked(&plane, method)?;
+                pool.rgb[index].merge(&frames::moments(&rgb));
                 pool.patches[index].merge(&camera::patch_moments(&rgb, SMALL));
-                pool.xyz[index].merge(&camera::moments(&camera.xyz(&rgb)?));
+                pool.xyz[index].merge(&frames::moments(&camera.xyz(&rgb)?));
             }
         }
         Ok(pool)
@@ -248,7 +248,7 @@ pub fn edges(camera: &Camera, first_seed: u64) -> Result<Vec<Edge>> {
     for seed in first_seed..first_seed + EDGE_FRAMES {
         let plane = camera.plane(SMALL, electrons, seed)?;
         for (sums, method) in sums.iter_mut().zip(METHODS) {
-            let moments = camera::moments(&camera::demosaicked(&plane, method, Black::Auto)?);
+            let moments = frames::moments(&frames::demosaicked(&plane, method)?);
             for (channel, sum) in sums.iter_mut().enumerate() {
                 *sum += variance(&moments, channel) / EDGE_FRAMES as f64;
             }

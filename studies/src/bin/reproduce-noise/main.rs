@@ -14,12 +14,14 @@ mod sweep;
 use agreement::{Row, SkyRow};
 use camera::{Camera, SMALL};
 use correlation::Covariances;
-use cyanometer::error::{Error, Result};
+use cyanometer::error::Result;
 use cyanometer::formats::output::write_text;
 use cyanometer::propagation::Equations;
 use cyanometer::propagation::paper::Coefficients;
-use cyanometer::stages::black::Black;
+use cyanometer::report::plot::Plot;
 use cyanometer::stages::demosaic::Method;
+use cyanometer_studies::frames;
+use cyanometer_studies::pages::{write_figure, write_into_directory};
 use figures::HueLevel;
 use limits::{Edge, Limit};
 use prediction::{Equation, Sites};
@@ -62,17 +64,7 @@ struct Results {
 }
 
 fn main() -> ExitCode {
-    let Some(directory) = std::env::args().nth(1) else {
-        eprintln!("reproduce-noise: name the directory to write to");
-        return ExitCode::from(2);
-    };
-    match run(Path::new(&directory)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("reproduce-noise: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    write_into_directory("reproduce-noise", run)
 }
 
 fn run(directory: &Path) -> Result<()> {
@@ -87,10 +79,7 @@ fn run(directory: &Path) -> Result<()> {
     let rows = agreement::rows(&camera, &levels);
     let factor_rows = agreement::rows(&camera, &plotted);
 
-    std::fs::create_dir_all(directory).map_err(|e| Error::disk(&directory.display().to_string(), "make", e))?;
-    let figure = |name: &str, plot: &cyanometer::report::plot::Plot| -> Result<()> {
-        ["svg", "png"].iter().try_for_each(|end| plot.write(&directory.join(format!("{name}.{end}")), None))
-    };
+    let figure = |name: &str, plot: &Plot| write_figure(directory, name, plot);
     let xyz = |title: &str, equation, gray, ratios| figures::xyz(&camera, &plotted, title, equation, gray, ratios);
     figure("fig4", &xyz("Fig. 4: noise of XYZ after BI", Equation::Bi14, None, (0.96, 1.04)))?;
     figure("fig5", &xyz("Fig. 5: noise of XYZ after SHTI", Equation::Shti15, Some(Equation::Shti48), (0.6, 1.8)))?;
@@ -108,8 +97,8 @@ fn skies(camera: &Camera, levels: &[Level], first_seed: u64) -> Result<(Vec<SkyR
         let mut std = [[0.0; 3]; 2];
         for (which, size) in [SMALL, SKY].into_iter().enumerate() {
             let seed = first_seed + 2 * index as u64 + which as u64;
-            let rgb = camera::demosaicked(&camera.plane(size, sky, seed)?, Method::EffectiveColor, Black::Auto)?;
-            std[which] = camera::std(&camera::moments(&camera.xyz(&rgb)?));
+            let rgb = frames::demosaicked(&camera.plane(size, sky, seed)?, Method::EffectiveColor)?;
+            std[which] = frames::stds(&frames::moments(&camera.xyz(&rgb)?));
             measured[which].push(Covariances::of(&camera::class_moments(&rgb)).table());
         }
         observed.push(std);

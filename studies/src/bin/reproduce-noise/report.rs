@@ -1,7 +1,7 @@
 //! The page: docs/reproduction/noise.md.
 
 use crate::agreement::{Agreement, Row, UNCLIPPED_E};
-use crate::camera::{EXPOSURE, LARGE, METHODS, SMALL};
+use crate::camera::{LARGE, METHODS, SMALL};
 use crate::correlation::{NAMES, READINGS, list};
 use crate::figures::{HUE_FRAMES, HueLevel, exact_snr_db, level_with_noise};
 use crate::limits::{EDGE_FRAMES, FRAMES, LEVELS, Limit, SIZE};
@@ -13,7 +13,8 @@ use cyanometer::propagation::Equations;
 use cyanometer::propagation::paper::Coefficients;
 use cyanometer::propagation::smooth_hue::FirstOrder;
 use cyanometer::stages::demosaic::Method;
-use cyanometer_studies::markdown::{Table, number};
+use cyanometer_studies::camera::EXPOSURE;
+use cyanometer_studies::pages::{Table, number};
 use std::fmt::Write;
 
 /// The maximum signal-to-noise ratios of the paper's X, Y, Z with BI, SHTI, ECI, in dB [HP2005, Secs. 4.2.1–4.2.3].

@@ -3,7 +3,7 @@
 use crate::camera::{self, Camera, LARGE, METHODS, SMALL};
 use cyanometer::error::Result;
 use cyanometer::numerics::moments::Moments;
-use cyanometer::stages::black::Black;
+use cyanometer_studies::frames;
 
 /// What one frame showed: standard deviations of three channels at every stage.
 pub struct Shot {
@@ -22,15 +22,15 @@ pub struct Shot {
 impl Shot {
     /// Draws a frame and takes it through every method.
     pub fn of(camera: &Camera, size: [usize; 2], electrons: [f64; 3], seed: u64) -> Result<Self> {
-        let codes = camera::codes(&camera.electrons(size, electrons, seed)?)?;
-        let planes = camera::std(&camera::moments(&codes));
-        let plane = camera::mosaicked(&codes)?;
+        let codes = frames::codes(&camera.electrons(size, electrons, seed)?)?;
+        let planes = frames::stds(&frames::moments(&codes));
+        let plane = frames::mosaicked(&codes)?;
         let mut shot = Self { planes, rgb: [[0.0; 3]; 3], xyz: [[0.0; 3]; 3], snr_db: [[0.0; 3]; 3], classes: empty() };
         for (index, method) in METHODS.into_iter().enumerate() {
-            let rgb = camera::demosaicked(&plane, method, Black::Auto)?;
-            let xyz = camera::moments(&camera.xyz(&rgb)?);
-            shot.rgb[index] = camera::std(&camera::moments(&rgb));
-            shot.xyz[index] = camera::std(&xyz);
+            let rgb = frames::demosaicked(&plane, method)?;
+            let xyz = frames::moments(&camera.xyz(&rgb)?);
+            shot.rgb[index] = frames::stds(&frames::moments(&rgb));
+            shot.xyz[index] = frames::stds(&xyz);
             shot.snr_db[index] = [0, 1, 2].map(|i| 20.0 * (xyz.mean[i] / shot.xyz[index][i]).log10());
             if index == 2 {
                 shot.classes = camera::class_moments(&rgb);
