@@ -5,16 +5,16 @@
 
 #![allow(clippy::print_stdout, reason = "an example talks")]
 
+use cyanometer::camera::optics::Exposure;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::error::Result;
 use cyanometer::formats::data::load_sensor;
 use cyanometer::frame::{Geometry, Rows, Window, mirror};
 use cyanometer::metadata::{FrameHeader, Metadata};
-use cyanometer::noise::{AddNoise, NoiseSettings};
 use cyanometer::numerics::moments::Moments;
-use cyanometer::optics::Exposure;
 use cyanometer::random::Source;
-use cyanometer::stage::{Counts, MemoryFrame, Stage};
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stream::{Counts, MemoryFrame, Stage};
 use cyanometer::units::{Electrons, QuantityKind};
 
 /// Each photosite shows this share of its charge at each of its four neighbors.

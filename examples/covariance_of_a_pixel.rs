@@ -4,14 +4,15 @@
 
 #![allow(clippy::print_stdout, reason = "an example talks")]
 
-use cyanometer::color::{ColorSettings, Space, White};
-use cyanometer::demosaic::Method;
+use cyanometer::camera::optics::Exposure;
+use cyanometer::chain::{Chain, ChainPrediction, ChainSettings};
+use cyanometer::color::{Space, White};
 use cyanometer::error::Result;
 use cyanometer::formats::data::load_sensor;
-use cyanometer::noise::NoiseSettings;
-use cyanometer::optics::Exposure;
 use cyanometer::propagation::Equations;
-use cyanometer::propagation::chain::{Chain, ChainPrediction, ChainSettings};
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::noise::NoiseSettings;
+use cyanometer::stages::to_xyz::ColorSettings;
 
 /// XYZ from camera signals, rounded from what `fit-matrix sample_data/skies/sky912.exr` finds.
 const XYZ_FROM_CAMERA: [[f64; 3]; 3] = [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]];

@@ -4,15 +4,15 @@
 
 #![allow(clippy::print_stdout, reason = "an example talks")]
 
+use cyanometer::camera::optics::Exposure;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::error::Result;
 use cyanometer::formats::data::load_sensor;
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata};
-use cyanometer::noise::{AddNoise, NoiseModel, NoiseSettings};
-use cyanometer::optics::Exposure;
-use cyanometer::propagation::{Equations, electrons};
-use cyanometer::stage::{MemoryFrame, Stage};
+use cyanometer::propagation::{Equations, Photosite};
+use cyanometer::stages::noise::{AddNoise, NoiseModel, NoiseSettings};
+use cyanometer::stream::{MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
 use ndarray::{Array2, s};
 
@@ -48,12 +48,12 @@ pub fn wedge() -> Result<Vec<Row>> {
     // The head of what came out holds all that the noise follows from.
     let head = stage.header();
     let record = head.metadata.noise.as_ref().ok_or_else(|| head.missing("noise", "add-noise"))?;
-    let model = NoiseModel::of(head, record)?;
+    let photosite = Photosite::of_electrons(NoiseModel::of(head, record)?, Equations::Exact);
 
     let noisy = Array2::from_shape_fn((ROWS, COLUMNS), |(y, x)| f64::from(noisy.samples[y * COLUMNS + x]));
     let rows = LEVELS_E.iter().enumerate().map(|(i, &level)| {
         let drawn = noisy.slice(s![.., WIDTH * i..WIDTH * (i + 1)]);
-        let predicted = electrons(&model, level.into(), Equations::Exact).moments;
+        let predicted = photosite.moments(level.into()).moments;
         [drawn.mean().unwrap_or(f64::NAN), drawn.std(1.0), predicted.mean, predicted.std()]
     });
     Ok(rows.collect())

@@ -10,7 +10,7 @@ mod covariance_of_a_pixel;
 #[path = "../examples/noise_on_an_array.rs"]
 mod noise_on_an_array;
 
-use cyanometer::demosaic::Method;
+use cyanometer::stages::demosaic::Method;
 
 /// Each level has 2¹⁶ photosites; five standard errors of a mean are 5 σ/2⁸, of a σ near enough 5 σ/√2¹⁷.
 #[test]
