@@ -27,7 +27,7 @@ def libraw(width, height):
     """LibRaw's linear interpolation of a DNG, by rawpy; opening and unpacking the file is not counted.
 
     LibRaw interpolates within its whole processing: black subtraction, scaling to 16 bits, and output (of the camera's own
-    colours, without gamma and brightening) are in the time.
+    colors, without gamma and brightening) are in the time.
     """
     import dng
     import rawpy

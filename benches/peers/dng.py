@@ -8,7 +8,7 @@ LETTERS = {ASCII: "s", BYTE: "B", SHORT: "H", LONG: "I"}
 
 def write(path, codes, black, white):
     height, width = codes.shape
-    # The identity as color matrix: XYZ of D65 to the camera's own colours. Nothing here depends on it.
+    # The identity as color matrix: XYZ of D65 to the camera's own colors. Nothing here depends on it.
     identity = [number for i in range(3) for j in range(3) for number in (int(i == j), 1)]
     entries = [
         (254, LONG, [0]),  # a full-resolution image
@@ -16,7 +16,7 @@ def write(path, codes, black, white):
         (257, LONG, [height]),
         (258, SHORT, [16]),
         (259, SHORT, [1]),  # not compressed
-        (262, SHORT, [32803]),  # a colour filter array
+        (262, SHORT, [32803]),  # a color filter array
         (271, ASCII, b"none\0"),
         (272, ASCII, b"plane\0"),
         (273, LONG, [0]),  # where the strip is, filled in below

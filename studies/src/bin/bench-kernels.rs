@@ -8,7 +8,7 @@
 //! `--instructions` prints the sets of vector instructions that can be chosen here.
 //!
 //! A stage goes over a frame in bands, as programs do, from one buffer to another that are made once. The light is a ramp
-//! from 10 to 30 000 e⁻ over the whole frame, so that no two photosites that are neighbours expect the same.
+//! from 10 to 30 000 e⁻ over the whole frame, so that no two photosites that are neighbors expect the same.
 
 use cpu_time::ProcessTime;
 use cyanometer::cfa::{CfaPattern, Class};

@@ -194,7 +194,7 @@ pub fn study(study: &Study) -> Result<Section> {
         title: "Single and double precision".into(),
         method: format!(
             "One noisy exposure of {}×{} of a sky with a gradient, from electrons to XYZ: converter, mosaic, bilinear \
-             interpolation, matrix. The reference is a plain version in double precision, written in the example; beside it \
+             interpolation, matrix. The reference is a plain version in double precision, written in the study; beside it \
              the same source in single precision, and the stages of the programs (samples in 32 bits, `mosaic | digitize | demosaic \
              --method bi | to-xyz`). Relative errors are those of X, Y and Z, over the largest of each. Pixels whose ΔE\\*ab is \
              above 0.001 count as off by a code: a level too near a tie was rounded the other way. Double precision \

@@ -131,7 +131,7 @@ pub fn study(study: &Study) -> Result<Section> {
         title: "Sample type and compression of files".into(),
         method: format!(
             "A noisy sky with a gradient, {}×{}: codes behind the filter array, and XYZ after ECI, written to a file and read back \
-             (`--samples`, `--compression`). Times are CPU time of one thread with the SHA-256 digest that each named file gets, \
+             (`--sample-type`, `--compression`). Times are CPU time of one thread with the BLAKE3 digest that each named file gets, \
              both ways, and what the system does for the file, but no waiting for a disk. Bits are those of the whole file.",
             size[0], size[1]
         ),

@@ -1,7 +1,7 @@
 //! Reproduces the color figures and tables of [HP2005]: Figs. 3 and 8, Tables 3 to 6; and goes on to skies that were not
 //! trained on.
 //!
-//! Writes Markdown and figures into the directory that is named, always the same to the byte: `scripts/reproduce colour`.
+//! Writes Markdown and figures into the directory that is named, always the same to the byte: `scripts/reproduce color`.
 
 mod report;
 mod studio;
@@ -98,7 +98,7 @@ fn run(directory: &Path) -> Result<()> {
         methods,
         studio,
     };
-    write_text(Some(&directory.join("colour.md")), &report::markdown(&results)?, None)
+    write_text(Some(&directory.join("color.md")), &report::markdown(&results)?, None)
 }
 
 /// Fig. 3.

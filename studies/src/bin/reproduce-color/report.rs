@@ -1,4 +1,4 @@
-//! The page: docs/reproduction/colour.md.
+//! The page: docs/reproduction/color.md.
 
 use crate::studio::{FILLING, PATCH, TRAINING};
 use crate::{Case, Results};
@@ -179,7 +179,7 @@ pub fn markdown(results: &Results) -> Result<String> {
     let _ = writeln!(
         out,
         "# The color figures and tables of the paper, beside ours\n\n\
-         Made by `scripts/reproduce colour`; every number of ours is computed there, from fixed seeds. “The paper” is\n\
+         Made by `scripts/reproduce color`; every number of ours is computed there, from fixed seeds. “The paper” is\n\
          [HP2005](../references.md), Sec. 4.1.\n\n\
          Set-up, as the paper has it: each sky exposed so that its brightest class is at {FILLING} of full well, 33 ms ({} s; the\n\
          aperture is chosen), {}×{} pixels (columns × rows), no vignetting, one dark frame subtracted, ECI for the regressions,\n\

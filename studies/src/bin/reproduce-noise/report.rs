@@ -261,7 +261,7 @@ fn verdicts(results: &Results) -> Result<String> {
     row(
         "the mean of a patch suppresses noise (no law given; σ/√n is what one would write)",
         format!(
-            "demosaicked neighbours are correlated: the mean of 1200 pixels is {} times less sure for red and blue after \
+            "demosaicked neighbors are correlated: the mean of 1200 pixels is {} times less sure for red and blue after \
              BI, {} after ECI, {} for green after ECI",
             number(bi?, 1),
             number(eci?, 1),
@@ -291,7 +291,7 @@ fn figures(results: &Results) -> Result<String> {
     figure(
         5,
         format!(
-            "Dashes are Eqs. 11, 15, 19; grey ones Eq. 48 for Eq. 15. Eq. 15 takes values as independent that share the \
+            "Dashes are Eqs. 11, 15, 19; gray ones Eq. 48 for Eq. 15. Eq. 15 takes values as independent that share the \
              same green: its red and blue are {} too noisy. X, Y and Z come out on either side of the simulation because \
              Eq. 19 leaves out the covariances that SHTI makes, which the matrix weighs with either sign. Below {void} e⁻ \
              green is within 10 σ of zero, and ratios have no first order.",
@@ -518,8 +518,8 @@ fn table_8(results: &Results) -> String {
          By the weights: correlations as Eq. 50 defines them, exact for large frames. What the equations need: the coefficients \
          that make Eqs. 16 and 17 exact, which also have to make up for the K of one mean being correlated with each other \
          (each takes part in the same measured value), where the paper takes them as not (above Eq. 53).\n\n{}\n\
-         The paper's r₃, r_rg, r_rb and r_gb are those of frames of its size: edges, where neighbours count twice, lower them.\n\n\
-         The means over the skies depend on the sensor's colours, which are estimates; {} of 11 lie within 0.05 of the \
+         The paper's r₃, r_rg, r_rb and r_gb are those of frames of its size: edges, where neighbors count twice, lower them.\n\n\
+         The means over the skies depend on the sensor's colors, which are estimates; {} of 11 lie within 0.05 of the \
          paper's.\n\n{}\n\
          ### r′₂\n\n\
          Eq. 57 takes it as the correlation of the green interpolated at blue with the mean of the four K_R about it. That is \
@@ -577,7 +577,7 @@ fn limits(results: &Results) -> Result<String> {
          simulates {frames} frames of {large} where the error is largest; z is the deviation in standard errors. The paper's \
          frames have 1200 pixels, enough for Eqs. 15 and 48 and for missing covariances in Y; the rounding of codes takes {nil} \
          pixels of darkness.\n\n{table}\n\
-         Edges are another matter. Eq. 14 has no edges; mirroring at them, as we do, counts some neighbours twice. That touches \
+         Edges are another matter. Eq. 14 has no edges; mirroring at them, as we do, counts some neighbors twice. That touches \
          a share of pixels that falls as one over the side of the frame, as the sampling error does: it shows at no size of a \
          single frame, and in the mean over many.\n\n{edges}",
         frames = FRAMES,
