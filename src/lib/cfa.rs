@@ -30,6 +30,18 @@ impl Class {
 ///
 /// The corner is the sensor's photosite (0, 0). A crop that starts elsewhere keeps the pattern and says where it
 /// starts, so the class of each photosite stays true.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::cfa::{CfaPattern, Class};
+///
+/// let pattern: CfaPattern = "rggb".parse()?;
+/// assert_eq!(pattern.class(0, 0), Class::Red);
+/// // A crop that starts at column 3, row 1 of the sensor starts with blue.
+/// assert_eq!(pattern.row_classes([3, 1], 0), [Class::Blue, Class::Green]);
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CfaPattern {

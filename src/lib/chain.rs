@@ -67,6 +67,38 @@ pub enum Uncertainty {
 }
 
 /// The stages of the chain, ready to predict one scene after another.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::camera::optics::Exposure;
+/// use cyanometer::chain::{Chain, ChainSettings};
+/// use cyanometer::formats::data::load_sensor;
+/// use cyanometer::propagation::Equations;
+/// use cyanometer::stages::demosaic::Method;
+/// use cyanometer::stages::noise::NoiseSettings;
+///
+/// let mut chain = Chain::new(ChainSettings {
+///     sensor: load_sensor("kaf-5101ce")?.sensor,
+///     exposure: Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 },
+///     noise: NoiseSettings::default(),
+///     method: Method::Bilinear,
+///     pattern: None,
+///     color: None,
+///     dark_frames: 0,
+///     equations: Equations::Exact,
+///     patch: None,
+///     patch_at: None,
+///     wanted: None,
+/// })?;
+/// let stages = chain.predict([10_000.0; 3])?.stages;
+/// let variance = |name: &str| stages.iter().find(|stage| stage.stage == name).map(|stage| stage.covariance[0][0]);
+/// // Red is measured at a quarter of the pixels and else the mean of two neighbors, of two, and of four:
+/// // (1 + ½ + ½ + ¼)/4 of the variance of a photosite.
+/// let ratio = variance("demosaicked").zip(variance("adu")).map(|(pixel, photosite)| pixel / photosite);
+/// assert!((ratio.unwrap() - 9.0 / 16.0).abs() < 1e-12);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Chain {
     settings: ChainSettings,

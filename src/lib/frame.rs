@@ -69,6 +69,18 @@ const WIDE_BYTES: usize = 4 << 20;
 const STEP_BYTES: usize = 4 << 20;
 
 /// The rows of a frame that a stage can see: those it makes, and a halo above and below.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::frame::Window;
+///
+/// // Rows 1 and 2 of a frame of three rows: two columns, one channel.
+/// let window: Window<'_> = Window::new(3, 1, 2, 1, &[3.0, 4.0, 5.0, 6.0]);
+/// assert_eq!(window.row(2, 0), [5.0, 6.0]);
+/// // Row 3 lies beyond the frame. Edges are mirrored, and the row at the edge does not come twice.
+/// assert_eq!(window.row(3, 0), window.row(1, 0));
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Window<'a, Q = Any> {
     frame_height: usize,
@@ -110,6 +122,20 @@ impl<'a, Q: Quantity> Window<'a, Q> {
 }
 
 /// The rows that a stage fills in.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::frame::Rows;
+///
+/// // Rows 5 and 6 of a frame: two columns, one channel.
+/// let mut samples = [0.0; 4];
+/// let mut rows: Rows<'_> = Rows::new(5, 2, 1, &mut samples);
+/// for y in rows.range() {
+///     rows.row(y, 0).fill(y as f32);
+/// }
+/// assert_eq!(samples, [5.0, 5.0, 6.0, 6.0]);
+/// ```
 #[derive(Debug)]
 pub struct Rows<'a, Q = Any> {
     /// The frame's row that comes first.

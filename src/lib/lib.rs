@@ -25,6 +25,8 @@
 //! height of the frame. Each sees the frame's head, [`metadata::FrameHeader`], and refuses a frame that comes at the wrong
 //! time. Rendering starts a chain, so that it is no stage but fills a sink; statistics end one.
 //!
+//! `examples/` has three short programs: noise on an array, the covariance of a pixel by formula, a stage of one's own.
+//!
 //! # Units
 //!
 //! Wavelengths in nm, spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, charge in electrons, codes in ADU, luminance in cd m⁻².

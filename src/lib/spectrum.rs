@@ -174,6 +174,29 @@ pub fn chart_columns(samples: usize) -> usize {
 }
 
 /// Radiances on one grid of wavelengths.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::formats::data::{load_observer, load_sensor};
+/// use cyanometer::analysis::characterization::signals;
+/// use cyanometer::spectrum::{SpectralLibrary, WavelengthGrid};
+/// use ndarray::Array2;
+///
+/// // A library of one spectrum that is the same at all wavelengths, and of twice that.
+/// let wavelength_nm: Vec<f64> = (360..=830).map(f64::from).collect();
+/// let radiance = Array2::from_shape_fn((2, wavelength_nm.len()), |(sample, _)| 1e-6 * (sample + 1) as f64);
+/// let library = SpectralLibrary { wavelength_nm, radiance, columns: 2 };
+/// assert_eq!(library.sample(1)?[100], 2e-6);
+///
+/// // Equal energy lies at (⅓, ⅓), and twice the light is twice the signal.
+/// let camera = load_sensor("kaf-5101ce")?;
+/// let seen = signals(&library, &camera.sensor, &camera.response, &load_observer()?, &WavelengthGrid::default())?;
+/// let [x, y, z] = [0, 1, 2].map(|i| seen.xyz[(0, i)]);
+/// assert!((x / (x + y + z) - 1.0 / 3.0).abs() < 1e-4);
+/// assert!((seen.camera[(1, 0)] / seen.camera[(0, 0)] - 2.0).abs() < 1e-12);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectralLibrary {
     /// Wavelengths in nm, ascending.

@@ -237,6 +237,30 @@ pub struct Camera {
 
 impl Camera {
     /// Signal electrons of R, G and B from a radiance in W cm⁻² sr⁻¹ nm⁻¹.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use cyanometer::camera::optics::Exposure;
+    /// use cyanometer::camera::sensor::SpectralResponse;
+    /// use cyanometer::formats::data::load_sensor;
+    /// use cyanometer::numerics::quadrature::Rule;
+    /// use cyanometer::spectrum::{Curve, WavelengthGrid};
+    ///
+    /// // A photosite of 6.8 µm that turns half of all photons into electrons.
+    /// let mut sensor = load_sensor("kaf-5101ce")?.sensor;
+    /// sensor.pixel_pitch_um = 6.8;
+    /// let half = || Curve::new(vec![400.0, 700.0], vec![0.5, 0.5]).unwrap();
+    /// let response = SpectralResponse { quantum_efficiency: [half(), half(), half()], cover_glass: None };
+    /// let exposure = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
+    /// let grid = WavelengthGrid { start_nm: 550.0, end_nm: 550.0, step_nm: 1.0, quadrature: Rule::Rectangle };
+    /// let (camera, _) = response.weights_on(&sensor, &exposure, &grid)?.camera(&[549.0, 550.0, 551.0]);
+    ///
+    /// // 10⁻⁶ W cm⁻² sr⁻¹ nm⁻¹ over 1 nm, 4.624·10⁻⁷ cm², π/257 sr, 33 ms: 1.865·10⁻¹⁶ J, photons of 3.612·10⁻¹⁹ J.
+    /// let [red, ..] = camera.electrons(&[1e-6; 3]);
+    /// assert!((red / (0.5 * 516.5) - 1.0).abs() < 1e-4, "{red}");
+    /// # Ok::<(), cyanometer::error::Error>(())
+    /// ```
     pub fn electrons(&self, radiance: &[f64]) -> [f64; 3] {
         self.weights.each_ref().map(|weights| weights.iter().zip(radiance).map(|(w, l)| w * l).sum())
     }

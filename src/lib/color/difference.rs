@@ -57,6 +57,16 @@ pub fn delta_e_94(reference: [f64; 3], color: [f64; 3]) -> f64 {
 }
 
 /// CIEDE2000 difference, k_L = k_C = k_H = 1, as \[Sharma2005, Eqs. 2–22] works it out.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::color::difference::delta_e_2000;
+///
+/// // The first of the pairs that Sharma, Wu and Dalal published.
+/// let difference = delta_e_2000([50.0, 2.6772, -79.7751], [50.0, 0.0, -82.7485]);
+/// assert!((difference - 2.0425).abs() < 5e-5);
+/// ```
 pub fn delta_e_2000(reference: [f64; 3], color: [f64; 3]) -> f64 {
     const POW25_7: f64 = 6_103_515_625.0;
     let [l1, a1, b1] = reference;

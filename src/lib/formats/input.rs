@@ -27,6 +27,34 @@ pub struct InputOptions {
 }
 
 /// A frame that is being read.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::formats::input::{FrameReader, InputOptions};
+/// use cyanometer::formats::output::{FrameWriter, OutputOptions};
+/// use cyanometer::stream::{Counts, RowSink, RowSource};
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let metadata = Metadata::new(QuantityKind::Adu);
+/// # let geometry = Geometry::new(2, 2, &["Y"]);
+/// # let header = FrameHeader { name: "example".into(), geometry, metadata };
+///
+/// let directory = tempfile::tempdir().unwrap();
+/// let path = directory.path().join("codes.exr");
+/// let mut writer = FrameWriter::create(&OutputOptions { path: Some(path.clone()), ..Default::default() }, &header, &[])?;
+/// writer.write(&[1.0, 2.0, 3.0, 4.0])?;
+/// writer.finish(Counts::default())?;
+///
+/// let mut reader = FrameReader::open(&InputOptions { path: Some(path), ..InputOptions::default() })?;
+/// assert_eq!(reader.header().geometry, header.geometry);
+/// assert_eq!(reader.header().metadata.quantity, QuantityKind::Adu);
+/// let mut samples = Vec::new();
+/// reader.read(2, &mut samples)?;
+/// assert_eq!(samples, [1.0, 2.0, 3.0, 4.0]);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 pub struct FrameReader {
     reader: Box<dyn SampleReader>,
     header: FrameHeader,

@@ -178,6 +178,31 @@ fn tiff_compression(compression: CompressionKind) -> Result<TiffCompression> {
 }
 
 /// A frame that is being written.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::formats::output::{FrameWriter, OutputOptions};
+/// use cyanometer::stream::{Counts, RowSink};
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let metadata = Metadata::new(QuantityKind::Adu);
+/// # let geometry = Geometry::new(2, 2, &["Y"]);
+/// # let header = FrameHeader { name: "example".into(), geometry, metadata };
+///
+/// let directory = tempfile::tempdir().unwrap();
+/// let path = directory.path().join("codes.tiff");
+/// let options = OutputOptions { path: Some(path.clone()), ..OutputOptions::default() };
+///
+/// let mut writer = FrameWriter::create(&options, &header, &[])?;
+/// writer.write(&[1.0, 2.0, 3.0, 4.0])?;
+/// // The file has its name once it is complete, and its sidecar beside it.
+/// assert!(!path.exists());
+/// writer.finish(Counts::default())?;
+/// assert!(path.exists() && directory.path().join("codes.tiff.yaml").exists());
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 pub struct FrameWriter {
     encoder: Encoder,
     header: FrameHeader,

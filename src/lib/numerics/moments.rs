@@ -11,6 +11,25 @@ pub const BLOCK: usize = 4096;
 /// first turns out to lie far from it, so that nothing cancels; blocks are merged by the pairwise update of Chan, Golub
 /// and LeVeque \[Chan1983], means as offsets from the first center, so that they lose nothing beside a large level. What
 /// comes out has the same bits on every set of instructions, and is within 10⁻¹² of what two passes in doubles give.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::numerics::moments::Moments;
+///
+/// // Two variables, observed together.
+/// let mut moments = Moments::new(2);
+/// moments.add(&[&[1.0, 2.0, 3.0], &[30.0, 20.0, 10.0]]);
+/// let mut rest = Moments::new(2);
+/// rest.add(&[&[4.0, f32::NAN], &[0.0, 5.0]]);
+/// moments.merge(&rest);
+///
+/// assert_eq!((moments.count, moments.not_finite), (4, 1));
+/// assert_eq!(moments.mean, [2.5, 15.0]);
+/// // Σ (x − x̄)(y − ȳ) / (n − 1)
+/// assert_eq!(moments.covariance(0, 0), Some(5.0 / 3.0));
+/// assert_eq!(moments.covariance(0, 1), Some(-50.0 / 3.0));
+/// ```
 #[derive(Debug, Clone)]
 pub struct Moments {
     /// Observations in which every channel was finite.

@@ -21,6 +21,17 @@ pub enum Rule {
 /// # Errors
 ///
 /// [`Error::Usage`] when Simpson's rule is asked for an even number of points: it needs pairs of intervals.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::numerics::quadrature::{Rule, weights};
+///
+/// // Simpson's rule is exact for cubics: ∫₀² x³ dx = 4.
+/// let sum: f64 = weights(Rule::Simpson, 5, 0.5)?.iter().zip(0..).map(|(w, i)| w * (0.5 * f64::from(i)).powi(3)).sum();
+/// assert!((sum - 4.0).abs() < 1e-15);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 pub fn weights(rule: Rule, points: usize, step: f64) -> Result<Vec<f64>> {
     let mut weights = vec![step; points];
     match rule {

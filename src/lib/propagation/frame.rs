@@ -48,6 +48,47 @@ pub type Predicted<T> = Result<T, Unpredictable>;
 ///
 /// [`Unpredictable`] where the scene is not uniform, the stage is beyond what is predicted, or the metadata do not say
 /// enough.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::metadata::Scene;
+/// use cyanometer::propagation::{Equations, FramePrediction, Unpredictable, of_frame};
+/// use cyanometer::random::Source;
+/// use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+/// use cyanometer::stream::Stage;
+/// # use cyanometer::camera::optics::Exposure;
+/// # use cyanometer::formats::data::load_sensor;
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+/// # metadata.sensor = Some(load_sensor("kaf-5101ce")?.sensor);
+/// # metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
+/// # metadata.scene = Some(Scene {
+/// #     source: "example".into(),
+/// #     uniform: true,
+/// #     expected_electrons: Some([1000.0, 4000.0, 9000.0]),
+/// #     vignetting_focal_length_mm: None,
+/// #     patch: None,
+/// #     source_width: None,
+/// #     brightest_e: None,
+/// # });
+/// # let geometry = Geometry::new(640, 480, &["R", "G", "B"]);
+/// # let header = FrameHeader { name: "example".into(), geometry, metadata };
+///
+/// // A uniform scene of 1000, 4000 and 9000 e⁻, of whose noise only the shot noise of light is drawn.
+/// let without = vec![Source::Dcsn, Source::Dcnu, Source::Prnu, Source::Ron];
+/// let noisy = AddNoise::new(&header, &NoiseSettings { without, ..NoiseSettings::default() })?.header().clone();
+/// let Ok(FramePrediction::Planes(planes)) = of_frame(&noisy, Equations::Exact) else { panic!("nothing predicted") };
+/// assert_eq!(planes.map(|plane| plane.moments.variance.round()), [1000.0, 4000.0, 9000.0]);
+///
+/// // Of a scene that is not known to be uniform nothing is predicted.
+/// let mut unknown = noisy;
+/// unknown.metadata.scene = None;
+/// assert!(matches!(of_frame(&unknown, Equations::Exact), Err(Unpredictable::Missing(_))));
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
     Sites::of(frame, equations)?.frame(frame)
 }

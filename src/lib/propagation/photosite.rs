@@ -8,6 +8,30 @@ use crate::numerics::normal::{self, MeanVariance};
 use crate::stages::noise::NoiseModel;
 
 /// What a photosite's samples follow from, but for the light that reaches it.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::metadata::PoissonKind;
+/// use cyanometer::propagation::{Equations, Photosite};
+/// use cyanometer::stages::noise::NoiseModel;
+///
+/// let model = NoiseModel {
+///     dark_e: 0.0,
+///     dcnu: 0.0,
+///     prnu: 0.01,
+///     read_noise_e: 10.0,
+///     full_well_e: 40_000.0,
+///     dark_shot: true,
+///     signal_shot: true,
+///     poisson: PoissonKind::Exact,
+/// };
+/// let variance = |equations| Photosite::of_electrons(model, equations).moments(10_000.0).moments.variance;
+/// // Shot noise 10⁴, non-uniformity (10⁴ · 0.01)², read noise 10².
+/// assert!((variance(Equations::Paper) - 20_100.0).abs() < 1e-6);
+/// // Brighter photosites have more shot noise too: 10⁴ · 0.01² more, which the paper's Eq. 11 leaves out.
+/// assert!((variance(Equations::Exact) - 20_101.0).abs() < 1e-6);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Photosite {
     /// The noise of its charge.

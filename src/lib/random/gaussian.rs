@@ -114,6 +114,16 @@ pub(super) fn share(word: u64) -> (f64, bool) {
 }
 
 /// Quantile of the standard normal distribution at a word, in double precision.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::random::gaussian::quantile;
+///
+/// // A word is a place among 2⁶⁴; Φ(1.959964) = 0.975.
+/// let word = (0.975 * 2f64.powi(64)) as u64;
+/// assert!((quantile(word) - 1.959964).abs() < 1e-6);
+/// ```
 pub fn quantile(word: u64) -> f64 {
     let (share, is_lower) = share(word);
     let size = upper_quantile(share);

@@ -57,6 +57,27 @@ impl Source {
 ///
 /// The second word of the counter is the row; column and row are those on the sensor. Each draw has a 64-bit word of its
 /// own; low words that have a block of their own are made only where the high ones do not settle a number.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::random::{Run, RunWords, Source};
+///
+/// /// The read noise of photosites from `column` on, as normal numbers.
+/// fn read_noise(column: i32, numbers: &mut [f32]) {
+///     let (seed, sensor_seed, frame, place) = (7, 1, 0, [column, 40]);
+///     let run = Run { seed, sensor_seed, frame, place, classes: [0, 1], length: numbers.len() };
+///     let mut words = RunWords::default();
+///     run.make_temporal(&mut words);
+///     run.normals(&words, Source::Ron, numbers);
+/// }
+///
+/// // A photosite has the same draw wherever a run begins.
+/// let (mut whole, mut part) = ([0.0; 64], [0.0; 32]);
+/// read_noise(0, &mut whole);
+/// read_noise(32, &mut part);
+/// assert_eq!(whole[32..], part);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Run {
     /// Seed of the temporal noise.

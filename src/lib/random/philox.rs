@@ -15,6 +15,15 @@ const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 /// The Philox 4x32 bijection with 10 rounds: 128 random bits from a 128-bit counter and a 64-bit key.
 ///
 /// Multipliers and Weyl constants of [Salmon2011, Table 2 and Sec. 4].
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::random::philox::philox4x32_10;
+///
+/// // One of the known answers that are published with Random123.
+/// assert_eq!(philox4x32_10([0; 4], [0; 2]), [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]);
+/// ```
 #[inline(always)]
 pub fn philox4x32_10(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     for round in 0..10 {

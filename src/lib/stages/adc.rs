@@ -24,6 +24,26 @@ pub struct AdcSettings {
 ///
 /// Rounding *is* the quantisation noise (variance 1/12 ADU² while σ ≥ ½ ADU); nothing else is added for it. Ties go
 /// away from zero. NaN stays NaN.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::stages::adc::{AdcSettings, Digitize};
+/// use cyanometer::stream::MemoryFrame;
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let metadata = Metadata::new(QuantityKind::Electrons);
+/// # let geometry = Geometry::new(4, 1, &["Y"]);
+/// # let header = FrameHeader { name: "example".into(), geometry, metadata };
+///
+/// let electrons = MemoryFrame::new(header, vec![-10.0, 2.4, 2.6, 300.0]);
+/// let settings = AdcSettings { bits: Some(8), bias_adu: Some(4.0), adu_per_e: Some(1.0) };
+/// let (codes, counts) = electrons.through(&Digitize::new(&electrons.header, &settings)?)?;
+/// assert_eq!(codes.samples, [0.0, 6.0, 7.0, 255.0]);
+/// assert_eq!((counts.clipped_low, counts.clipped_high), (1, 1));
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Digitize {
     header: FrameHeader,

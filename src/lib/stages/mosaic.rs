@@ -9,6 +9,26 @@ use crate::stream::{Counts, Stage};
 use crate::units::{Any, QuantityKind};
 
 /// Keeps of each pixel the sample of its photosite's class (the **M**_Bayer of [HP2005, Sec. 3.5]).
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::cfa::CfaPattern;
+/// use cyanometer::stages::mosaic::Mosaic;
+/// use cyanometer::stream::MemoryFrame;
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let metadata = Metadata::new(QuantityKind::Adu);
+/// # let geometry = Geometry::new(2, 2, &["R", "G", "B"]);
+/// # let header = FrameHeader { name: "example".into(), geometry, metadata };
+///
+/// // Two rows, each of R, G and B.
+/// let planes = MemoryFrame::new(header, vec![1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
+/// let plane = planes.through(&Mosaic::new(&planes.header, Some(CfaPattern::Rggb))?)?.0;
+/// assert_eq!(plane.samples, [1.0, 2.0, 2.0, 3.0]);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Mosaic {
     header: FrameHeader,

@@ -83,6 +83,36 @@ pub struct NoiseSettings {
 }
 
 /// Draws one noisy exposure.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::stages::mosaic::Mosaic;
+/// use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+/// use cyanometer::stream::MemoryFrame;
+/// # use cyanometer::camera::optics::Exposure;
+/// # use cyanometer::formats::data::load_sensor;
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+/// # metadata.sensor = Some(load_sensor("kaf-5101ce")?.sensor);
+/// # metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
+/// # let geometry = Geometry::new(40, 30, &["R", "G", "B"]);
+/// # let header = FrameHeader { name: "example".into(), geometry, metadata };
+///
+/// let light = MemoryFrame::new(header, vec![5000.0; 40 * 30 * 3]);
+/// let exposed = |frame: &MemoryFrame| {
+///     let settings = NoiseSettings { seed: 7, ..NoiseSettings::default() };
+///     Ok(frame.through(&AddNoise::new(&frame.header, &settings)?)?.0)
+/// };
+/// let mosaicked = |frame: &MemoryFrame| Ok(frame.through(&Mosaic::new(&frame.header, None)?)?.0);
+///
+/// // A draw hangs on its photosite and class, not on the order of work: mosaicking first gives the same noise, and draws a
+/// // third of it.
+/// assert_eq!(mosaicked(&exposed(&light)?)?.samples, exposed(&mosaicked(&light)?)?.samples);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct AddNoise {
     header: FrameHeader,

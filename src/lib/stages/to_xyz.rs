@@ -31,6 +31,38 @@ pub struct ColorSettings {
 /// Turns demosaicked ADU into colours.
 ///
 /// x = M ρ / H        ρ: ADU above black; H = t π T / (4N² + 1)        [HP2005, Eq. 18, per exposure]
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::color::{Space, White};
+/// use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+/// use cyanometer::stream::MemoryFrame;
+/// # use cyanometer::camera::optics::Exposure;
+/// # use cyanometer::formats::data::load_sensor;
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let mut metadata = Metadata::new(QuantityKind::Adu);
+/// # metadata.sensor = Some(load_sensor("kaf-5101ce")?.sensor);
+/// # metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
+/// # let geometry = Geometry::new(1, 1, &["R", "G", "B"]);
+/// # let header = FrameHeader { name: "example".into(), geometry, metadata };
+///
+/// let settings = ColorSettings {
+///     xyz_from_camera: [[2e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 4e-3]],
+///     method: None,
+///     space: Space::Xyz,
+///     white: White::D65,
+///     white_luminance: None,
+/// };
+/// let rgb = MemoryFrame::new(header, vec![100.0, 200.0, 300.0]);
+/// let xyz = rgb.through(&ToXyz::new(&rgb.header, &settings)?)?.0;
+/// // 33 ms at f/8: H = 0.033 π / (4·8² + 1) s sr, and 0.2 / H cd m⁻².
+/// let luminance = 0.2 * 257.0 / (0.033 * std::f32::consts::PI);
+/// assert!((xyz.samples[1] / luminance - 1.0).abs() < 1e-6);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct ToXyz {
     header: FrameHeader,

@@ -20,6 +20,29 @@ const UNDER_WAY: usize = 2;
 /// # Errors
 ///
 /// Those of the source and the sink, whichever meets the first band that goes wrong.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::stages::mosaic::Mosaic;
+/// use cyanometer::stream::{MemoryFrame, Stage, run};
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let metadata = Metadata::new(QuantityKind::Adu);
+/// # let geometry = Geometry::new(4, 100, &["R", "G", "B"]);
+/// # let header = FrameHeader { name: "example".into(), geometry, metadata };
+///
+/// // Any reader of frames is a source, any writer a sink; so is a frame in memory.
+/// let mut source = MemoryFrame::new(header.clone(), vec![7.0; 4 * 3 * 100]);
+/// let stage = Mosaic::new(&header, None)?;
+/// let mut sink = MemoryFrame::new(stage.header().clone(), Vec::new());
+/// let mut rows_done = 0;
+/// run(&stage, &mut source, &mut sink, &mut |rows| rows_done = rows)?;
+/// assert_eq!(rows_done, 100);
+/// assert_eq!(sink.samples, vec![7.0; 4 * 100]);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 pub fn run<S: Stage>(
     stage: &S,
     source: &mut dyn RowSource,

@@ -7,6 +7,26 @@ use crate::error::Result;
 use crate::metadata::FrameHeader;
 
 /// A whole frame in memory: source and sink for tests and small work.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::frame::Geometry;
+/// use cyanometer::metadata::{FrameHeader, Metadata};
+/// use cyanometer::stages::adc::{AdcSettings, Digitize};
+/// use cyanometer::stream::MemoryFrame;
+/// use cyanometer::units::QuantityKind;
+///
+/// let (geometry, metadata) = (Geometry::new(2, 1, &["R", "G", "B"]), Metadata::new(QuantityKind::Electrons));
+/// let header = FrameHeader { name: "two pixels".into(), geometry, metadata };
+/// let electrons = MemoryFrame::new(header, vec![0.0, 10.0, 100.0, 1000.0, 10_000.0, 100_000.0]);
+///
+/// let settings = AdcSettings { bits: Some(12), bias_adu: Some(100.0), adu_per_e: Some(0.1) };
+/// let (codes, counts) = electrons.through(&Digitize::new(&electrons.header, &settings)?)?;
+/// assert_eq!(codes.samples, [100.0, 101.0, 110.0, 200.0, 1100.0, 4095.0]);
+/// assert_eq!(counts.clipped_high, 1);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct MemoryFrame {
     /// Its head.

@@ -35,6 +35,45 @@ pub trait RowSink: Send {
 }
 
 /// A step of the chain: a value with a method from band to band.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::frame::{Geometry, Rows, Window};
+/// use cyanometer::metadata::{FrameHeader, Metadata};
+/// use cyanometer::stream::{Counts, MemoryFrame, Stage};
+/// use cyanometer::units::{Any, QuantityKind};
+///
+/// /// Exchanges left and right, whatever the samples are.
+/// struct Flip(FrameHeader);
+///
+/// impl Stage for Flip {
+///     type Input = Any;
+///     type Output = Any;
+///
+///     fn header(&self) -> &FrameHeader {
+///         &self.0
+///     }
+///
+///     fn apply(&self, input: Window<'_>, mut output: Rows<'_>) -> Counts {
+///         for y in output.range() {
+///             for channel in 0..input.channels() {
+///                 output.row(y, channel).copy_from_slice(input.row(y.cast_signed(), channel));
+///                 output.row(y, channel).reverse();
+///             }
+///         }
+///         Counts::default()
+///     }
+/// }
+///
+/// let (geometry, metadata) = (Geometry::new(2, 2, &["Y"]), Metadata::new(QuantityKind::Adu));
+/// let header = FrameHeader { name: "example".into(), geometry, metadata };
+/// let frame = MemoryFrame::new(header.clone(), vec![1.0, 2.0, 3.0, 4.0]);
+/// let flipped = frame.through(&Flip(header.clone()))?.0;
+/// assert_eq!(flipped.samples, [2.0, 1.0, 4.0, 3.0]);
+/// assert_eq!(flipped.through(&Flip(header))?.0, frame);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 pub trait Stage: Sync {
     /// What the samples were.
     type Input: Quantity;

@@ -108,6 +108,28 @@ fn check_samples(signals: &Signals, samples: impl IntoIterator<Item = usize>) ->
 ///
 /// [`Error::Data`] where the samples do not determine the matrix; [`Error::Usage`] for samples that there are not, and
 /// weights that do not fit.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::analysis::characterization::Signals;
+/// use cyanometer::analysis::characterization::regression::{FitSettings, fit};
+/// use nalgebra::DMatrix;
+///
+/// // Five colors that a matrix explains exactly; it is found again.
+/// let xyz_from_camera = DMatrix::from_row_slice(3, 3, &[0.9, 0.1, 0.2, 0.3, 0.7, -0.1, 0.0, -0.2, 1.1]);
+/// let camera = DMatrix::from_row_slice(5, 3, &[1., 2., 3., 2., 1., 1., 4., 1., 0., 3., 3., 5., 1., 0., 2.]);
+/// let signals = Signals { xyz: &camera * xyz_from_camera.transpose(), camera };
+/// let settings = FitSettings { training: vec![0, 1, 2, 3, 4], ..FitSettings::default() };
+/// let found = fit(&signals, &signals, &settings, None)?;
+/// assert_eq!(found.rank, 3);
+/// for (i, row) in found.xyz_from_camera.iter().enumerate() {
+///     for (j, element) in row.iter().enumerate() {
+///         assert!((element - xyz_from_camera[(i, j)]).abs() < 1e-12);
+///     }
+/// }
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 pub fn fit(
     signals: &Signals,
     responses: &Signals,

@@ -28,6 +28,29 @@ use crate::units::{Any, QuantityKind};
 use rows::{Planes, Ring, masks, mend, strips};
 
 /// Interpolates the classes that each photosite of a CFA plane did not measure; values stay signed.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::cfa::CfaPattern;
+/// use cyanometer::stages::black::Black;
+/// use cyanometer::stages::demosaic::{Demosaic, Method};
+/// use cyanometer::stream::MemoryFrame;
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let metadata = Metadata::new(QuantityKind::Adu);
+/// # let geometry = Geometry::new(6, 4, &["Y"]);
+/// # let header = FrameHeader { name: "example".into(), geometry, metadata };
+///
+/// // What is flat stays flat, less the black level, whatever the method.
+/// let plane = MemoryFrame::new(header, vec![300.0; 6 * 4]);
+/// for method in Method::ALL {
+///     let stage = Demosaic::new(&plane.header, method, Black::Level(100.0), Some(CfaPattern::Grbg))?;
+///     assert_eq!(plane.through(&stage)?.0.samples, vec![200.0; 6 * 4 * 3]);
+/// }
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Demosaic {
     header: FrameHeader,

@@ -88,6 +88,21 @@ pub fn greens_of_hue(pattern: CfaPattern, phase: usize, wanted: Class) -> (Stenc
 type Stencils = [[Stencil; 3]; 4];
 
 /// The weights of a method for one filter array; those of smooth hue transition hang on the hue of the scene.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::cfa::{CfaPattern, Class};
+/// use cyanometer::stages::demosaic::Method;
+/// use cyanometer::stages::demosaic::weights::WeightTable;
+///
+/// let weights = WeightTable::of(Method::Bilinear, CfaPattern::Rggb).about([1.0, 1.0]);
+/// // The phase whose photosites are blue: there red is the mean of the four at the corners.
+/// let blue = (0..4).find(|&phase| weights.class(phase, [0, 0]) == Class::Blue).unwrap();
+/// let red = weights.kernel(blue, Class::Red as usize);
+/// assert_eq!([[-1, -1], [1, -1], [-1, 1], [1, 1]].map(|corner| red.at(corner)), [0.25; 4]);
+/// assert_eq!(red.at([0, 0]), 0.0);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightTable {
     pattern: CfaPattern,
