@@ -7,7 +7,7 @@
 //! | floor | modules | what they know |
 //! |---|---|---|
 //! | 0 words | [`error`], [`units`], [`cfa`], [`frame`] | no files, no chance |
-//! | 1 mathematics | [`numerics`], [`random`] | no camera |
+//! | 1 mathematics | [`numerics`], [`random`], [`plot`] | no camera, no file |
 //! | 2 light and camera | [`spectrum`], [`color`], [`camera`] | curves, color spaces, lens and sensor in numbers; no frame |
 //! | 3 frames in motion | [`metadata`], [`stream`] | what is known of a frame, and how its rows move |
 //! | 4 stages | [`stages`] | what each step does to rows, in the order in which light meets them |
@@ -42,6 +42,7 @@ pub mod frame;
 pub mod units;
 
 pub mod numerics;
+pub mod plot;
 pub mod random;
 
 pub mod camera;

@@ -1,7 +1,8 @@
 //! Pages of Markdown with figures, and programs that write them into a directory.
 
 use cyanometer::error::{Error, Result};
-use cyanometer::report::plot::Plot;
+use cyanometer::formats::plots::write_plot;
+use cyanometer::plot::Plot;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -38,9 +39,9 @@ pub fn make_directory(directory: &Path) -> Result<()> {
 ///
 /// # Errors
 ///
-/// Those of [`Plot::write`].
+/// Those of [`write_plot`].
 pub fn write_figure(directory: &Path, name: &str, plot: &Plot) -> Result<()> {
-    ["svg", "png"].iter().try_for_each(|end| plot.write(&directory.join(format!("{name}.{end}")), None))
+    ["svg", "png"].iter().try_for_each(|end| write_plot(&directory.join(format!("{name}.{end}")), plot, None))
 }
 
 /// A table of Markdown.

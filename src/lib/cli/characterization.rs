@@ -14,11 +14,11 @@ use crate::camera::sensor::Sensor;
 use crate::color::difference::DELTA_E_PER_JND;
 use crate::color::{Space, White};
 use crate::error::{Error, Result};
+use crate::formats::plots::{PlotFormat, write_plot};
 use crate::formats::{csv, data, files, output, spectral};
 use crate::report::characterization::{
     About, Characterization, DifferenceSummaries, Evaluation, Group, NoiseReport, characterization, matrix,
 };
-use crate::report::plot::PlotFormat;
 use crate::report::{self, ReportFormat};
 use crate::spectrum::{SpectralLibrary, WavelengthGrid};
 use crate::stages::demosaic::Method;
@@ -234,7 +234,7 @@ impl Request {
             output::write_text(Some(path), &matrix(&found.matrix)?, None)?;
         }
         if let Some(plot) = &self.plot {
-            report::trade_off(&found.trade_off).write(plot, None)?;
+            write_plot(plot, &report::trade_off(&found.trade_off), None)?;
         }
         let format = self.format.unwrap_or(if self.has_report() { ReportFormat::Text } else { ReportFormat::Yaml });
         if to_file.is_none() || self.has_report() || format != ReportFormat::Yaml {

@@ -11,9 +11,10 @@ use crate::chain::{Chain, ChainPrediction, ChainSettings, Uncertainty};
 use crate::color::{Space, White};
 use crate::error::{Error, Result};
 use crate::formats::files::regular_file;
+use crate::formats::plots::{PlotFormat, write_plot};
 use crate::formats::{data, output, spectral};
+use crate::plot::Plot;
 use crate::propagation::Equations;
-use crate::report::plot::{Plot, PlotFormat};
 use crate::report::{self, ReportFormat, SamplePrediction};
 use crate::spectrum::WavelengthGrid;
 use crate::stages::demosaic::Method;
@@ -171,7 +172,7 @@ impl Request {
             }
         };
         if let Some(plot) = &self.plot {
-            self.curve(&mut chain, electrons)?.write(plot, input.as_ref())?;
+            write_plot(plot, &self.curve(&mut chain, electrons)?, input.as_ref())?;
         }
         output::write_text(path, &text, input.as_ref())
     }

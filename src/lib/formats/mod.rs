@@ -12,6 +12,7 @@ pub mod input;
 pub mod output;
 pub mod picture;
 pub mod pipe;
+pub mod plots;
 pub mod spectral;
 pub mod table;
 pub mod tiff;

@@ -1,15 +1,12 @@
-//! Reports: statistics and matrices as text, JSON, YAML and CSV; plots.
+//! Reports: statistics and matrices as text, JSON, YAML and CSV, and as plots.
 
 pub mod characterization;
-pub mod plot;
 
-mod chromaticity;
 mod difference;
 mod photon_transfer;
 mod prediction;
 mod trade_off;
 
-pub use chromaticity::{SkyColor, chromaticity};
 pub use difference::difference;
 pub use photon_transfer::photon_transfer;
 pub use prediction::{SamplePrediction, prediction, samples, sweep};

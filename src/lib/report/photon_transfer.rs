@@ -1,7 +1,7 @@
 //! The photon transfer curve: noise against signal, and which cause rules where.
 
-use super::plot::{Axis, Color, Marks, Panel, Plot, ReferenceLine, Region};
 use crate::chain::ChainPrediction;
+use crate::plot::{Axis, Color, Marks, Panel, Plot, ReferenceLine, Region};
 use crate::propagation::budget::Cause;
 
 /// Draws the noise of one class in electrons against its signal, from predictions of one level after another, with the

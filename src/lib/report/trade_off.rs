@@ -1,7 +1,7 @@
 //! The plot of what a matrix leaves of errors of color and of noise.
 
-use super::plot::{Axis, Color, Marks, Panel, Plot};
 use crate::analysis::characterization::noise_aware::TradeOff;
+use crate::plot::{Axis, Color, Marks, Panel, Plot};
 
 /// Noise of a pixel against error of the matrix, one point for each noise weight, along the curve.
 pub fn trade_off(curve: &[TradeOff]) -> Plot {

@@ -9,9 +9,9 @@ use cyanometer::cfa::CfaPattern;
 use cyanometer::error::Result;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::frame::to_sample;
+use cyanometer::plot::{Anchor, Arrangement, Axis, Color, Marks, Note, Panel, Plot};
 use cyanometer::propagation::{Equations, gains};
 use cyanometer::random::philox::philox4x32_10;
-use cyanometer::report::plot::{Arrangement, Arrow, Axis, Color, Marks, Panel, Plot};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::Demosaic;
 use cyanometer::stages::demosaic::weights::WeightTable;
@@ -157,9 +157,14 @@ fn trade(errors: &[Vec<f64>], judged: usize, noise: &[f64]) -> Panel {
     let front: Vec<[f64; 2]> = pareto::front(points.iter()).into_iter().map(place).collect();
     panel.add("beaten by none in both", Color::Gray, Marks::Line(front));
     panel.add("", Color::Blue, Marks::Points(points.iter().map(place).collect()));
+    let ends = noise.iter().fold([f64::INFINITY, 0.0], |[low, high], &value| [value.min(low), value.max(high)]);
     for choice in &points {
-        let at = place(choice);
-        panel.arrows.push(Arrow { from: at, to: at, label: choice.label.clone(), color: Color::Blue });
+        let [x, y] = place(choice);
+        // Beside the point, towards the middle.
+        let aside = 0.015 * (ends[1] - ends[0]);
+        let is_left = x < 0.5 * (ends[0] + ends[1]);
+        let (x, anchor) = if is_left { (x + aside, Anchor::Start) } else { (x - aside, Anchor::End) };
+        panel.notes.push(Note::Text { at: [x, y], anchor, text: choice.label.clone() });
     }
     panel
 }

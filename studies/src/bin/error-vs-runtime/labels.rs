@@ -1,6 +1,6 @@
 //! Names beside points, where they cover neither points nor each other.
 
-use cyanometer::report::plot::{Arrow, Color, Marks, Panel, Series};
+use cyanometer::plot::{Anchor, Color, Note, Panel};
 
 /// How large a panel is drawn; the layout does not say, so these are near enough.
 #[derive(Clone, Copy)]
@@ -68,8 +68,6 @@ impl Rect {
 /// A line's end stays so far from its label.
 const SHORT: f64 = 7.0;
 const HALF_LINE: f64 = 6.5;
-/// From where an arrow begins to its label.
-const BESIDE: f64 = 5.0;
 /// Points with the same name share it within so many pixels.
 const NEAR: f64 = 26.0;
 
@@ -122,18 +120,13 @@ pub fn write(panel: &mut Panel, canvas: Canvas, named: &[([f64; 2], &str)], poin
         written.push((rect, name));
         reached.push((name, at));
     }
-    let segments = leaders.iter().map(|leader| {
-        let (from, to) = (canvas.value([leader[0], leader[1]]), canvas.value([leader[2], leader[3]]));
-        [from[0], from[1], to[0], to[1]]
-    });
-    // Below the points, which are drawn later.
-    let marks = Marks::Segments(segments.collect());
-    let leaders = Series { name: String::new(), color: Color::Gray, marks };
-    panel.series.insert(0, leaders);
+    panel.notes.extend(leaders.iter().map(|leader| {
+        let ends = [[leader[0], leader[1]], [leader[2], leader[3]]];
+        Note::Line { points: ends.map(|end| canvas.value(end)).to_vec(), color: Color::Gray }
+    }));
     for (rect, name) in written {
-        // An arrow of no length is a text to the right of its place.
-        let place = canvas.value([rect.center[0] - rect.half[0] - BESIDE, rect.center[1]]);
-        panel.arrows.push(Arrow { from: place, to: place, label: name.to_owned(), color: Color::Black });
+        let at = canvas.value(rect.center);
+        panel.notes.push(Note::Text { at, anchor: Anchor::Middle, text: name.to_owned() });
     }
 }
 

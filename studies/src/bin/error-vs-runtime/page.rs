@@ -1,7 +1,8 @@
 //! The page: sections of text, plots, tables and advice.
 
 use cyanometer::error::Result;
-use cyanometer::report::plot::{Plot, power_of_ten};
+use cyanometer::formats::plots::write_plot;
+use cyanometer::plot::{Plot, power_of_ten};
 use cyanometer_studies::pages::{Table, number};
 use std::fmt::Write;
 use std::path::Path;
@@ -26,7 +27,7 @@ impl Section {
         let mut text = format!("## {place}. {}\n\n{}\n\n", self.title, self.method);
         let _ = writeln!(text, "**Advice.** {}\n", self.advice);
         for (name, alt, plot) in &self.figures {
-            plot.write(&directory.join(format!("{name}.svg")), None)?;
+            write_plot(&directory.join(format!("{name}.svg")), plot, None)?;
             let _ = writeln!(text, "![{alt}](error-vs-runtime/{name}.svg)\n");
         }
         for (head, table) in &self.tables {

@@ -1,7 +1,7 @@
 //! Choices on a plane of run time and error, and the front of those that no other beats.
 
 use crate::labels::{self, Canvas, Shape};
-use cyanometer::report::plot::{Axis, Color, Marks, Panel, Series};
+use cyanometer::plot::{Axis, Color, Marks, Panel, Series};
 
 /// A setting that a user may choose.
 #[derive(Clone)]

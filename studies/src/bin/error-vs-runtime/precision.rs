@@ -9,7 +9,7 @@ use cyanometer::color::difference::delta_e_76;
 use cyanometer::color::{self, D65_XY, lab_from_xyz, xyz_of_chromaticity};
 use cyanometer::error::{Error, Result};
 use cyanometer::frame::{mirror, to_sample};
-use cyanometer::report::plot::Plot;
+use cyanometer::plot::Plot;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stream::MemoryFrame;

@@ -10,7 +10,7 @@ use cyanometer::color::{D65_XY, lab_from_xyz, xyz_of_chromaticity};
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::output::{CompressionKind, FrameWriter, OutputOptions, SampleKind};
-use cyanometer::report::plot::Plot;
+use cyanometer::plot::Plot;
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stream::{Counts, MemoryFrame, RowSink, RowSource};
 use cyanometer_studies::frames::{codes, colors, demosaicked, exposed, mosaicked};

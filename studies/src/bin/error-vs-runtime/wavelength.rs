@@ -8,7 +8,7 @@ use crate::pareto::{self, Choice, Group};
 use cyanometer::error::Result;
 use cyanometer::formats::spectral;
 use cyanometer::numerics::quadrature::Rule;
-use cyanometer::report::plot::Plot;
+use cyanometer::plot::Plot;
 use cyanometer::spectrum::WavelengthGrid;
 use cyanometer_studies::camera::{Camera, EXPOSURE, sample_data};
 use cyanometer_studies::pages::Table;

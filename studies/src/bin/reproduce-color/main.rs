@@ -3,17 +3,19 @@
 //!
 //! Writes Markdown and figures into the directory that is named, always the same to the byte: `scripts/reproduce color`.
 
+mod chromaticity;
 mod report;
 mod studio;
 
+use chromaticity::{SkyColor, chromaticity};
 use cyanometer::analysis::characterization::evaluation::SampleEvaluation;
 use cyanometer::analysis::characterization::noise_aware::TradeOff;
 use cyanometer::analysis::characterization::regression::{Regression, Weights};
 use cyanometer::color::difference::DifferenceReport;
 use cyanometer::error::Result;
 use cyanometer::formats::output::write_text;
-use cyanometer::report::plot::{Axis, Color, Marks, Panel, Plot};
-use cyanometer::report::{SkyColor, chromaticity, trade_off};
+use cyanometer::plot::{Axis, Color, Marks, Panel, Plot};
+use cyanometer::report::trade_off;
 use cyanometer::stages::demosaic::Method;
 use cyanometer_studies::camera::METHODS;
 use cyanometer_studies::pages::{write_figure, write_into_directory};

@@ -5,7 +5,7 @@ use tiny_skia::PathBuilder;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 static FACE: LazyLock<Face<'static>> = LazyLock::new(|| {
-    let bytes = include_bytes!("../../../../assets/fonts/DejaVuSans-subset.ttf");
+    let bytes = include_bytes!("../../../assets/fonts/DejaVuSans-subset.ttf");
     Face::parse(bytes, 0).expect("the embedded font is a font")
 });
 

@@ -1,41 +1,6 @@
-//! Axes: from values to places, and the ticks between.
+//! Rulers: from values to places along an axis, and the ticks between.
 
-/// How values are spread along an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scale {
-    /// Equal steps are equally long.
-    Linear,
-    /// Equal factors are equally long.
-    Log10,
-}
-
-/// What one direction of a panel means.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Axis {
-    /// The quantity and its unit.
-    pub label: String,
-    /// How values are spread.
-    pub scale: Scale,
-    /// The lowest and the highest value; from what is shown where there is none (or none that makes sense).
-    pub range: Option<(f64, f64)>,
-}
-
-impl Axis {
-    /// A linear axis as long as what is shown.
-    pub fn linear(label: &str) -> Self {
-        Self { label: label.into(), scale: Scale::Linear, range: None }
-    }
-
-    /// A logarithmic axis as long as what is shown.
-    pub fn log10(label: &str) -> Self {
-        Self { label: label.into(), scale: Scale::Log10, range: None }
-    }
-
-    /// The same axis from one value to another.
-    pub fn range(self, low: f64, high: f64) -> Self {
-        Self { range: Some((low, high)), ..self }
-    }
-}
+use super::figure::{Axis, Scale};
 
 /// Values of a larger magnitude are not shown, and differences smaller than its inverse are none: arithmetic with them
 /// would overflow.
@@ -60,9 +25,8 @@ pub(super) struct Tick {
 }
 
 impl Ruler {
-    /// Settles the range: as given, or from `values` with some room. An end at the value zero gets no room where
-    /// `grounded`, so that bars stand on the axis.
-    pub fn new(axis: &Axis, values: impl Iterator<Item = f64>, grounded: bool) -> Self {
+    /// Settles the range: as given, or from `values` with some room.
+    pub fn new(axis: &Axis, values: impl Iterator<Item = f64>) -> Self {
         let scale = axis.scale;
         let given = axis.range.and_then(|(low, high)| Some((position(scale, low)?, position(scale, high)?)));
         if let Some((low, high)) = given.filter(|(low, high)| is_wide(*low, *high)) {
@@ -75,8 +39,7 @@ impl Ruler {
             (0.0, 1.0)
         } else if is_wide(low, high) {
             let room = 0.05 * (high - low);
-            let on_ground = |end: f64| grounded && scale == Scale::Linear && end == 0.0;
-            (if on_ground(low) { low } else { low - room }, if on_ground(high) { high } else { high + room })
+            (low - room, high + room)
         } else {
             let room = match scale {
                 Scale::Log10 => 0.5,
@@ -246,7 +209,7 @@ mod tests {
     use super::*;
 
     fn labels(axis: &Axis, count: f64) -> Vec<String> {
-        Ruler::new(axis, std::iter::empty(), false).ticks(count).into_iter().filter_map(|tick| tick.label).collect()
+        Ruler::new(axis, std::iter::empty()).ticks(count).into_iter().filter_map(|tick| tick.label).collect()
     }
 
     #[test]
@@ -267,7 +230,7 @@ mod tests {
         assert_eq!(labels(&axis(3.0, 30.0), 8.0), ["5", "10", "20"]);
         assert_eq!(labels(&axis(1e4, 6e4), 8.0), ["10⁴", "2·10⁴", "5·10⁴"]);
         assert_eq!(labels(&axis(100.0, 300.0), 5.0), ["100", "150", "200", "250", "300"]);
-        let ticks = Ruler::new(&axis(1.0, 1000.0), std::iter::empty(), false).ticks(8.0);
+        let ticks = Ruler::new(&axis(1.0, 1000.0), std::iter::empty()).ticks(8.0);
         // 1…9 in each of three decades, and the end.
         assert_eq!(ticks.len(), 28);
         assert!((ticks[1].place - 2_f64.log10() / 3.0).abs() < 1e-12);
@@ -275,12 +238,12 @@ mod tests {
 
     #[test]
     fn places_are_proportional_to_values_or_their_logarithms() {
-        let linear = Ruler::new(&Axis::linear("").range(-1.0, 3.0), std::iter::empty(), false);
+        let linear = Ruler::new(&Axis::linear("").range(-1.0, 3.0), std::iter::empty());
         assert_eq!(linear.place(0.0), Some(0.25));
         assert_eq!(linear.place(f64::NAN), None);
         assert_eq!(linear.place(f64::INFINITY), None);
         assert_eq!(linear.place_within(f64::INFINITY), Some(1.0));
-        let log = Ruler::new(&Axis::log10("").range(1.0, 1e4), std::iter::empty(), false);
+        let log = Ruler::new(&Axis::log10("").range(1.0, 1e4), std::iter::empty());
         assert_eq!(log.place(100.0), Some(0.5));
         assert_eq!(log.place(0.0), None);
         assert_eq!(log.place(-1.0), None);
@@ -289,19 +252,18 @@ mod tests {
 
     #[test]
     fn ranges_come_from_what_is_shown() {
-        let ends = |axis: Axis, values: &[f64], grounded| {
-            let ruler = Ruler::new(&axis, values.iter().copied(), grounded);
+        let ends = |axis: Axis, values: &[f64]| {
+            let ruler = Ruler::new(&axis, values.iter().copied());
             (ruler.low, ruler.high)
         };
-        assert_eq!(ends(Axis::linear(""), &[0.0, f64::NAN, 100.0], true), (0.0, 105.0));
-        assert_eq!(ends(Axis::linear(""), &[0.0, 100.0], false), (-5.0, 105.0));
-        assert_eq!(ends(Axis::linear(""), &[7.0], false), (6.3, 7.7));
-        assert_eq!(ends(Axis::log10(""), &[-1.0, 0.0, 10.0], false), (0.5, 1.5));
-        assert_eq!(ends(Axis::linear(""), &[], false), (0.0, 1.0));
+        assert_eq!(ends(Axis::linear(""), &[0.0, f64::NAN, 100.0]), (-5.0, 105.0));
+        assert_eq!(ends(Axis::linear(""), &[7.0]), (6.3, 7.7));
+        assert_eq!(ends(Axis::log10(""), &[-1.0, 0.0, 10.0]), (0.5, 1.5));
+        assert_eq!(ends(Axis::linear(""), &[]), (0.0, 1.0));
         // Ranges that make no sense are as none.
-        assert_eq!(ends(Axis::log10("").range(0.0, 5.0), &[], false), (0.0, 1.0));
-        assert_eq!(ends(Axis::linear("").range(5.0, 1.0), &[], false), (0.0, 1.0));
-        assert_eq!(ends(Axis::linear("").range(f64::NAN, 1.0), &[], false), (0.0, 1.0));
+        assert_eq!(ends(Axis::log10("").range(0.0, 5.0), &[]), (0.0, 1.0));
+        assert_eq!(ends(Axis::linear("").range(5.0, 1.0), &[]), (0.0, 1.0));
+        assert_eq!(ends(Axis::linear("").range(f64::NAN, 1.0), &[]), (0.0, 1.0));
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Colors of skies in the CIE 1931 diagram, and how far from them a camera's colors are.
 
-use super::plot::{Arrangement, Arrow, Axis, CircleSize, Color, Corner, Inset, Marks, Panel, Plot};
-use crate::color::locus;
-use crate::spectrum::Observer;
+use cyanometer::color::locus;
+use cyanometer::plot::{Anchor, Arrangement, Axis, Color, Marks, Note, Panel, Plot};
+use cyanometer::spectrum::Observer;
 
 /// The color of a sky, and what a camera makes of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,50 +22,88 @@ const SPAN: [f64; 2] = [0.20, 0.42];
 const LARGEST_CIRCLE: f64 = 32.0;
 
 /// Draws chromaticities of skies: with lines to those that a camera gives, between the loci of black bodies, daylight
-/// and clear skies, in the entire diagram (inset); and beside it with circles in proportion to the differences.
+/// and clear skies, and in the entire diagram (small, in a corner); and beside it with circles in proportion to the
+/// differences.
 ///
 /// An arrow points at the sky `kept`, whose color the camera's matrix keeps exactly.
 pub fn chromaticity(skies: &[SkyColor], kept: Option<usize>, observer: &Observer, title: &str) -> Plot {
+    let span = span(skies);
+    let panels = vec![errors(skies, kept, observer, span), differences(skies, span)];
+    Plot { title: title.into(), panels, arrangement: Arrangement::SideBySide }
+}
+
+fn errors(skies: &[SkyColor], kept: Option<usize>, observer: &Observer, span: [f64; 2]) -> Panel {
+    let mut panel = panel(span, "colors and errors");
     let black_bodies = black_bodies(observer);
-    let mut lines = panel(skies, "colors and errors");
-    let errors = skies.iter().map(|sky| [sky.xy[0], sky.xy[1], sky.fitted_xy[0], sky.fitted_xy[1]]);
-    let places: Vec<[f64; 2]> = skies.iter().map(|sky| sky.xy).collect();
-    lines.add("black bodies", Color::Black, Marks::Line(black_bodies.clone()));
-    lines.add("daylight (CIE)", Color::Orange, Marks::Line(curve(locus::DAYLIGHT_X, locus::daylight)));
-    lines.add("measured clear skies", Color::Vermillion, Marks::Dashed(curve(locus::CLEAR_SKY_X, locus::clear_sky)));
-    lines.add("error of the camera", Color::Gray, Marks::Segments(errors.collect()));
-    lines.add("skies", Color::Blue, Marks::Points(places.clone()));
+    let error = |sky: &SkyColor| Note::Line { points: vec![sky.xy, sky.fitted_xy], color: Color::Gray };
+    panel.notes = skies.iter().map(error).collect();
+    panel.notes.extend(diagram(skies, &black_bodies, observer, span));
+    panel.add("black bodies", Color::Black, Marks::Line(black_bodies));
+    panel.add("daylight (CIE)", Color::Orange, Marks::Line(curve(locus::DAYLIGHT_X, locus::daylight)));
+    panel.add("measured clear skies", Color::Vermillion, Marks::Dashed(curve(locus::CLEAR_SKY_X, locus::clear_sky)));
+    // For the legend: the errors are notes.
+    panel.add("error of the camera", Color::Gray, Marks::Line(Vec::new()));
+    panel.add("skies", Color::Blue, Marks::Points(places(skies)));
     if let Some(sky) = kept.and_then(|index| skies.get(index)) {
-        lines.add("", Color::Black, Marks::Points(vec![sky.xy]));
-        lines.arrows.push(arrow(sky.xy));
+        panel.add("", Color::Black, Marks::Points(vec![sky.xy]));
+        panel.notes.extend(arrow(sky.xy, "kept exactly"));
     }
+    panel
+}
 
-    let axis = |label| Axis::linear(label).range(0.0, 0.9);
-    let mut entire = Panel::new(axis("x"), axis("y"));
-    entire.equal_scale = true;
-    entire.add("", Color::Gray, Marks::Line(locus::boundary(observer)));
-    entire.add("", Color::Black, Marks::Line(black_bodies));
-    entire.add("", Color::Blue, Marks::Points(places.clone()));
-    lines.inset = Some(Box::new(Inset { panel: entire, corner: Corner::TopLeft, share: 0.46 }));
-
-    let mut circles = panel(skies, "differences ΔE₉₄");
+fn differences(skies: &[SkyColor], span: [f64; 2]) -> Panel {
+    let mut panel = panel(span, "differences ΔE₉₄");
+    let color = Color::Vermillion;
     let largest = skies.iter().map(|sky| sky.delta_e_94).filter(|value| value.is_finite()).fold(0.0, f64::max);
     if largest > 0.0 {
         let scale = LARGEST_CIRCLE / largest;
-        let circle = |sky: &SkyColor| [sky.xy[0], sky.xy[1], scale * sky.delta_e_94];
-        circles.add("", Color::Vermillion, Marks::Circles(skies.iter().map(circle).collect()));
-        circles.circle_sizes = sample_differences(largest)
-            .into_iter()
-            .map(|(difference, label)| CircleSize { diameter: scale * difference, label, color: Color::Vermillion })
-            .collect();
+        let circle = |at, difference| Note::Circle { at, diameter: scale * difference, color };
+        panel.notes = skies.iter().map(|sky| circle(sky.xy, sky.delta_e_94)).collect();
+        for (row, (difference, label)) in sample_differences(largest).into_iter().enumerate() {
+            let along = |part: f64| span[0] + part * (span[1] - span[0]);
+            let y = along(0.24 - 0.08 * row as f64);
+            panel.notes.push(circle([along(0.7), y], difference));
+            panel.notes.push(Note::Text { at: [along(0.76), y], anchor: Anchor::Start, text: label });
+        }
     }
-    circles.add("skies", Color::Blue, Marks::Points(places));
-    Plot { title: title.into(), panels: vec![lines, circles], arrangement: Arrangement::SideBySide }
+    panel.add("skies", Color::Blue, Marks::Points(places(skies)));
+    panel
 }
 
-fn panel(skies: &[SkyColor], title: &str) -> Panel {
+/// The entire diagram, small, in the upper left corner of a panel.
+fn diagram(skies: &[SkyColor], black_bodies: &[[f64; 2]], observer: &Observer, span: [f64; 2]) -> Vec<Note> {
+    const END: f64 = 0.9;
+    let side = 0.3 * (span[1] - span[0]);
+    let corner = [span[0] + 0.4 * side, span[1] - 1.15 * side];
+    let at = |xy: [f64; 2]| [0, 1].map(|axis| corner[axis] + side * xy[axis] / END);
+    let line = |points: &[[f64; 2]], color| Note::Line { points: points.iter().map(|&xy| at(xy)).collect(), color };
+    let mut notes = vec![
+        line(&[[0.0, 0.0], [END, 0.0], [END, END], [0.0, END], [0.0, 0.0]], Color::Black),
+        line(&locus::boundary(observer), Color::Gray),
+        line(black_bodies, Color::Black),
+    ];
+    notes.extend(skies.iter().map(|sky| Note::Circle { at: at(sky.xy), diameter: 1.0, color: Color::Blue }));
+    for value in [0.0, 0.4, 0.8] {
+        notes.push(line(&[[value, 0.0], [value, 0.02]], Color::Black));
+        notes.push(line(&[[0.0, value], [0.02, value]], Color::Black));
+        let text = |at, anchor| Note::Text { at, anchor, text: value.to_string() };
+        notes.push(text(at([value, -0.1]), Anchor::Middle));
+        notes.push(text(at([-0.04, value]), Anchor::End));
+    }
+    notes
+}
+
+fn places(skies: &[SkyColor]) -> Vec<[f64; 2]> {
+    skies.iter().map(|sky| sky.xy).collect()
+}
+
+/// What both axes span, so that all skies are seen.
+fn span(skies: &[SkyColor]) -> [f64; 2] {
     let seen = skies.iter().flat_map(|sky| sky.xy.into_iter().chain(sky.fitted_xy)).filter(|value| value.is_finite());
-    let [low, high] = seen.fold(SPAN, |[low, high], value| [low.min(value - 0.01), high.max(value + 0.01)]);
+    seen.fold(SPAN, |[low, high], value| [low.min(value - 0.01), high.max(value + 0.01)])
+}
+
+fn panel([low, high]: [f64; 2], title: &str) -> Panel {
     let axis = |label| Axis::linear(label).range(low, high);
     Panel { title: title.into(), equal_scale: true, ..Panel::new(axis("x"), axis("y")) }
 }
@@ -82,9 +120,16 @@ fn curve([first, last]: [f64; 2], y: fn(f64) -> f64) -> Vec<[f64; 2]> {
     (0..=60).map(|step| first + (last - first) * f64::from(step) / 60.0).map(|x| [x, y(x)]).collect()
 }
 
-/// An arrow from below and the right, where no sky is.
-fn arrow(to: [f64; 2]) -> Arrow {
-    Arrow { from: [to[0] + 0.02, to[1] - 0.025], to, label: "kept exactly".into(), color: Color::Black }
+/// An arrow from below and the right, where no sky is, and what it points at.
+fn arrow(to: [f64; 2], label: &str) -> [Note; 3] {
+    let at = |before: f64, aside: f64| [to[0] + 0.6 * before + 0.8 * aside, to[1] - 0.8 * before + 0.6 * aside];
+    let line = |points| Note::Line { points, color: Color::Black };
+    let (tip, tail) = (at(0.004, 0.0), at(0.02, 0.0));
+    [
+        line(vec![tail, tip]),
+        line(vec![at(0.009, 0.002), tip, at(0.009, -0.002)]),
+        Note::Text { at: [tail[0], tail[1] - 0.006], anchor: Anchor::Middle, text: label.into() },
+    ]
 }
 
 /// Round differences up to the largest, with what the legend says: about all, half and a fifth of it.
@@ -105,11 +150,11 @@ fn sample_differences(largest: f64) -> Vec<(f64, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::data::load_observer;
+    use cyanometer::formats::data::load_observer;
 
     /// The skies of the library, and errors of a few thousandths that vanish at one of them.
     fn skies() -> Vec<SkyColor> {
-        let table = include_str!("../../../sample_data/skies/sky912_meta.csv");
+        let table = include_str!("../../sample_data/skies/sky912_meta.csv");
         let rows = table.lines().filter(|row| row.starts_with(|c: char| c.is_ascii_digit()));
         let sky = |row: &str| {
             let cells: Vec<f64> = row.split(',').skip(10).map(|cell| cell.parse().unwrap()).collect();
@@ -129,7 +174,12 @@ mod tests {
         let plot = chromaticity(&skies, kept, &load_observer().unwrap(), "Skies and a camera");
         if let Some(directory) = std::env::var_os("CYANOMETER_PLOTS") {
             for end in ["svg", "png"] {
-                plot.write(&std::path::Path::new(&directory).join(format!("chromaticity.{end}")), None).unwrap();
+                cyanometer::formats::plots::write_plot(
+                    &std::path::Path::new(&directory).join(format!("chromaticity.{end}")),
+                    &plot,
+                    None,
+                )
+                .unwrap();
             }
         }
         let svg = plot.svg();

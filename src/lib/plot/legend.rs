@@ -1,0 +1,103 @@
+//! Where the legend and names of lines go: where they cover least.
+
+use super::drawing::{Drawing, Ink, Point, Rect, Stroke};
+use super::figure::{Anchor, Panel, Series};
+use super::font;
+use super::marks::draw_swatch;
+use super::style::{LINE, MIDDLE, SWATCH, TEXT, write};
+
+/// Places on the canvas that are better not covered, a few pixels apart.
+#[derive(Debug, Default)]
+pub(super) struct Covered {
+    places: Vec<Point>,
+}
+
+impl Covered {
+    const STEP: f64 = 5.0;
+
+    /// Adds a straight line.
+    pub fn walk(&mut self, from: Point, to: Point) {
+        let steps = (f64::hypot(to[0] - from[0], to[1] - from[1]) / Self::STEP).ceil().clamp(1.0, 4000.0);
+        let mut along = 0.0;
+        while along <= steps {
+            let part = along / steps;
+            self.places.push([from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1])]);
+            along += 1.0;
+        }
+    }
+
+    /// Adds a rectangle.
+    pub fn add(&mut self, rect: Rect) {
+        let mut y = rect.top;
+        while y <= rect.bottom() {
+            self.walk([rect.left, y], [rect.right(), y]);
+            y += Self::STEP;
+        }
+    }
+
+    /// Forgets what lies outside.
+    pub fn keep_within(&mut self, area: Rect) {
+        self.places.retain(|at| area.contains(*at));
+    }
+
+    /// How much a rectangle with some room about it would cover.
+    fn cost(&self, rect: Rect) -> usize {
+        let room =
+            Rect { left: rect.left - 4.0, top: rect.top - 4.0, width: rect.width + 8.0, height: rect.height + 8.0 };
+        self.places.iter().filter(|at| room.contains(**at)).count()
+    }
+}
+
+/// Draws the legend where it covers least; of equal places, in a corner.
+pub(super) fn draw_legend(drawing: &mut Drawing, panel: &Panel, area: Rect, covered: &mut Covered) {
+    let named: Vec<&Series> = panel.series.iter().filter(|series| !series.name.is_empty()).collect();
+    if named.is_empty() {
+        return;
+    }
+    let longest = named.iter().map(|series| font::width(&series.name, TEXT)).fold(0.0, f64::max);
+    let (width, height) = (8.0 + SWATCH + 8.0 + longest + 10.0, LINE * named.len() as f64 + 8.0);
+    let (free_x, free_y) = (area.width - width - 20.0, area.height - height - 20.0);
+    // Corners first, then the other places of a grid; the first of the best is taken.
+    const STEPS: [f64; 9] = [1.0, 0.0, 0.875, 0.125, 0.75, 0.25, 0.625, 0.375, 0.5];
+    let places = STEPS.iter().flat_map(|along| STEPS.iter().map(move |up| (*along, *up)));
+    let at = |(along, up): (f64, f64)| Rect {
+        left: (area.left + 10.0 + along * free_x.max(0.0)).round() + 0.5,
+        top: (area.top + 10.0 + (1.0 - up) * free_y.max(0.0)).round() + 0.5,
+        width,
+        height,
+    };
+    let Some(rect) = places.map(at).min_by_key(|rect| covered.cost(*rect)) else { return };
+    drawing.shape(
+        rect.outline(),
+        Ink { rgb: [0xff; 3], opacity: 0.88 },
+        Stroke { ink: Ink { rgb: [0; 3], opacity: 0.25 }, width: 1.0, dashes: &[] },
+    );
+    for (index, series) in named.into_iter().enumerate() {
+        let middle = rect.top + 4.0 + (index as f64 + 0.5) * LINE;
+        let left = rect.left + 8.0;
+        draw_swatch(drawing, series, [left, middle]);
+        let baseline = [left + SWATCH + 8.0, middle + MIDDLE * TEXT];
+        write(drawing, &series.name, baseline, TEXT, Anchor::Start);
+    }
+    covered.add(rect);
+}
+
+/// Writes beside a horizontal line at `y` what it is, at the end where it covers least.
+pub(super) fn draw_line_label(drawing: &mut Drawing, label: &str, y: f64, area: Rect, covered: &mut Covered) {
+    if label.is_empty() {
+        return;
+    }
+    let width = font::width(label, TEXT);
+    let (left, right) = (area.left + 8.0, area.right() - 8.0 - width);
+    let center = 0.5 * (left + right);
+    let (above, below) = (y - 3.0 - TEXT, y + 3.0);
+    let places = [right, left, center].into_iter().flat_map(|left| [above, below].map(|top| (left, top)));
+    let rect = places
+        .map(|(left, top)| Rect { left, top, width, height: TEXT })
+        .filter(|rect| rect.top > area.top && rect.bottom() < area.bottom())
+        .min_by_key(|rect| covered.cost(Rect { height: TEXT - 4.0, top: rect.top + 2.0, ..*rect }));
+    if let Some(rect) = rect {
+        write(drawing, label, [rect.left, rect.top + TEXT * 0.85], TEXT, Anchor::Start);
+        covered.add(rect);
+    }
+}
