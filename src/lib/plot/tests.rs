@@ -179,6 +179,14 @@ fn a_circle_stands_exactly_where_the_axes_say() {
 }
 
 #[test]
+fn axes_end_at_the_corners_of_the_frame() {
+    let plot = Plot::new("", Panel::new(Axis::linear("x").range(-2.0, 6.0), Axis::log10("y").range(1e-3, 1e6)));
+    let [left, top, right, bottom] = frames(&plot)[0];
+    let [axes] = &axes(&plot)[..] else { panic!("one panel") };
+    assert!(is_at([left, bottom], axes, [-2.0, 1e-3]) && is_at([right, top], axes, [6.0, 1e6]));
+}
+
+#[test]
 fn regions_and_reference_lines_stand_at_their_values() {
     let plot = photon_transfer();
     let [left, top, right, bottom] = frames(&plot)[0];
@@ -264,7 +272,9 @@ fn what_lies_beyond_the_axes_is_not_seen_outside_the_frame() {
     let empty = Plot::new("", Panel::new(axis(), axis()));
     let mut plot = empty.clone();
     let panel = &mut plot.panels[0];
-    let wild = vec![[-5.0, -5.0], [5.0, 15.0], [30.0, 5.0], [5.0, -40.0]];
+    // Far away, and so near that it would stand on the margins.
+    let wild =
+        vec![[-5.0, -5.0], [5.0, 15.0], [30.0, 5.0], [5.0, -40.0], [-0.2, 5.0], [5.0, 10.2], [10.2, 5.0], [5.0, -0.2]];
     panel.add("", Color::Blue, Marks::LineAndPoints(wild.clone()));
     panel.add("", Color::Green, Marks::Dashed(wild.iter().map(|[x, y]| [*y, *x]).collect()));
     panel.add("", Color::Orange, Marks::ErrorBars(vec![[5.0, -5.0, 20.0], [-3.0, 2.0, 4.0]]));
@@ -292,7 +302,7 @@ fn words_lie_beside_each_other_on_the_canvas() {
     let mut narrow = diagrams();
     narrow.panels.iter_mut().for_each(|panel| panel.notes.clear());
     narrow.panels[0].y = Axis::linear("b / mm").range(0.0, 60.0);
-    narrow.panels[1].x = Axis::linear("a / mm").range(1.000_01, 1.000_02);
+    narrow.panels[1].x = Axis::linear("a / mm").range(1.0, 1.000_000_07);
     narrow.panels.push(two_panels().panels[0].clone());
     for (name, plot) in figures().into_iter().chain([("crowded", crowded), ("narrow", narrow)]) {
         keep(name, &plot);
