@@ -182,9 +182,9 @@ mod tests {
         for (sky, note) in skies.iter().zip(notes(errors, Color::Gray)) {
             assert_eq!(*note, Note::Line { points: vec![sky.xy, sky.fitted_xy], color: Color::Gray });
         }
-        // The arrow's tip is the point of its shaft that is nearest to the sky.
-        let shaft = notes(errors, Color::Black).nth_back(1);
-        let Some(Note::Line { points, .. }) = shaft else { panic!("no shaft") };
+        // Of the arrow, the last notes in black, the shaft ends beside the sky.
+        let black: Vec<&Note> = notes(errors, Color::Black).collect();
+        let [.., Note::Line { points, .. }, _] = &black[..] else { panic!("no shaft") };
         let [far, near] = [0, 1].map(|end: usize| {
             let [x, y] = points[end];
             f64::hypot(x - skies[7].xy[0], y - skies[7].xy[1])
