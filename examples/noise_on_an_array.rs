@@ -47,7 +47,7 @@ pub fn wedge() -> Result<Vec<Row>> {
 
     // The head of what came out holds all that the noise follows from.
     let head = stage.header();
-    let record = head.metadata.noise.as_ref().ok_or_else(|| head.missing("noise", "add-noise"))?;
+    let record = head.metadata.noise.as_ref().ok_or_else(|| head.missing("noise"))?;
     let photosite = Photosite::of_electrons(NoiseModel::of(head, record)?, Equations::Exact);
 
     let noisy = Array2::from_shape_fn((ROWS, COLUMNS), |(y, x)| f64::from(noisy.samples[y * COLUMNS + x]));

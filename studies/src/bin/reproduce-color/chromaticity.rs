@@ -154,7 +154,7 @@ mod tests {
 
     /// The skies of the library, and errors of a few thousandths that vanish at one of them.
     fn skies() -> Vec<SkyColor> {
-        let table = include_str!("../../sample_data/skies/sky912_meta.csv");
+        let table = include_str!("../../../../sample_data/skies/sky912_meta.csv");
         let rows = table.lines().filter(|row| row.starts_with(|c: char| c.is_ascii_digit()));
         let sky = |row: &str| {
             let cells: Vec<f64> = row.split(',').skip(10).map(|cell| cell.parse().unwrap()).collect();

@@ -6,7 +6,6 @@ use crate::prediction::{Equation, Sites, effective_share, of_frame, roots, weigh
 use crate::sweep::Level;
 use cyanometer::error::Result;
 use cyanometer::plot::{Axis, Color, Marks, Panel, Plot, ReferenceLine, Region};
-use cyanometer::plot::{Axis, Color, Marks, Panel, Plot, ReferenceLine, Region};
 use cyanometer::propagation::smooth_hue::{FirstOrder, VOID_BELOW};
 use cyanometer::propagation::{Equations, gains};
 use cyanometer::stages::demosaic::Method;
