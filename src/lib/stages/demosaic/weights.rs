@@ -198,7 +198,7 @@ impl Weights {
         &self.kernels[phase][channel]
     }
 
-    /// The farthest row or column that has weight; at most [`REACH`].
+    /// The farthest row or column that has weight; at most [`REACH`](super::stencil::REACH).
     pub fn reach(&self) -> isize {
         let sites = self.kernels.iter().flatten().flat_map(Stencil::sites);
         sites.map(|([x, y], _)| x.abs().max(y.abs())).max().unwrap_or_default()

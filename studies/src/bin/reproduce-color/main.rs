@@ -1,4 +1,4 @@
-//! Reproduces the color figures and tables of [HP2005]: Figs. 3 and 8, Tables 3 to 6; and goes on to skies that were not
+//! Reproduces the color figures and tables of \[HP2005]: Figs. 3 and 8, Tables 3 to 6; and goes on to skies that were not
 //! trained on.
 //!
 //! Writes Markdown and figures into the directory that is named, always the same to the byte: `scripts/reproduce color`.

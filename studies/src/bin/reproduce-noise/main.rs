@@ -1,4 +1,4 @@
-//! Reproduces the noise figures and tables of [HP2005]: Figs. 4 to 7, Tables 7 and 8.
+//! Reproduces the noise figures and tables of \[HP2005]: Figs. 4 to 7, Tables 7 and 8.
 //!
 //! Writes Markdown and figures into the directory that is named, always the same to the byte: `scripts/reproduce noise`.
 
