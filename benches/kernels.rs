@@ -75,7 +75,7 @@ impl RowSink for Sink {
 
 /// Rows in a band of a frame from `input` to `output` channels.
 fn band_rows(input: &FrameHeader, output: &FrameHeader) -> usize {
-    input.geometry.band_rows(1, 1).min(output.geometry.band_rows(1, 1))
+    input.geometry.cached_rows().min(output.geometry.cached_rows())
 }
 
 type Apply<'a, S> = &'a dyn Fn(Instructions, Window<'_, <S as Stage>::Input>, Rows<'_, <S as Stage>::Output>) -> Counts;

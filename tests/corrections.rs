@@ -176,7 +176,7 @@ fn the_term_of_correlation_has_a_variance() {
 fn differences_about_one_site_are_correlated() {
     let weights = WeightTable::new(Method::EffectiveColor, CfaPattern::Rggb).about([1.0, 1.0]);
     let red = (0..PHASES.len()).find(|&phase| weights.class(phase, [0, 0]) == Class::Red).unwrap();
-    let mean_k = weights.kernel(red, Class::Green as usize).clone().plus(-1.0, &Stencil::site([0, 0]));
+    let mean_k = weights.stencil(red, Class::Green as usize).clone().plus(-1.0, &Stencil::site([0, 0]));
     let variance: f64 = mean_k.sites().map(|(_, weight)| weight * weight).sum();
     assert!((variance - 9.0 / 16.0).abs() < 1e-15);
     says("9/16 σ², not the 3/8 σ² of Eq. 53");

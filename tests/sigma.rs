@@ -187,7 +187,7 @@ fn gains_agree_with_weights_site_by_site() {
                         let mut on_sites = vec![[0.0; 2]; width * height];
                         let place = phase(x as i64 + 1, y as i64 + 2);
                         for channel in [Class::Red, Class::Green] {
-                            for ([dx, dy], weight) in weights.kernel(place, channel as usize).sites() {
+                            for ([dx, dy], weight) in weights.stencil(place, channel as usize).sites() {
                                 let column = mirror(x.cast_signed() + dx, width);
                                 let row = mirror(y.cast_signed() + dy, height);
                                 on_sites[row * width + column][channel as usize] += weight;

@@ -48,6 +48,11 @@ impl Geometry {
         if natural * self.row_bytes() <= STEP_BYTES { natural } else { 1 }
     }
 
+    /// Rows of a band for one thread that may begin at any row: as many as fit a cache.
+    pub fn cached_rows(&self) -> usize {
+        self.band_rows(1, 1)
+    }
+
     /// Rows of a band for so many threads, a multiple of `step`, at least one step.
     pub fn band_rows(&self, step: usize, threads: usize) -> usize {
         let row_bytes = self.row_bytes();

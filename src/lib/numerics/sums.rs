@@ -250,7 +250,7 @@ pub fn together<const VARIABLES: usize, const PAIRS: usize>(
 ) -> ([Sums; VARIABLES], [f64; PAIRS]) {
     const { assert!(PAIRS == VARIABLES * (VARIABLES - 1) / 2) };
     assert!(samples.iter().all(|line| line.len() == samples[0].len()));
-    let widest = if VARIABLES == 1 { narrow() } else { Instructions::widest() };
+    let widest = if VARIABLES == 1 { Instructions::up_to_256_bits() } else { Instructions::widest() };
     vectors::run_on(widest, Together { samples, centers })
 }
 
@@ -261,13 +261,7 @@ pub fn product(samples: [&[f32]; 2], centers: [f64; 2]) -> f64 {
 
 /// Sums over the samples at even and at odd places.
 pub fn alternating(samples: &[f32], centers: [f64; 2]) -> [Sums; 2] {
-    vectors::run_on(narrow(), Alternating { samples, centers })
-}
-
-/// What sums of one variable run on: at 512 bits the compiler packs smallest and largest samples into one vector and takes
-/// them out again, which costs more than the width brings.
-fn narrow() -> Instructions {
-    Instructions::widest().min(Instructions::Avx2)
+    vectors::run_on(Instructions::up_to_256_bits(), Alternating { samples, centers })
 }
 
 #[cfg(test)]

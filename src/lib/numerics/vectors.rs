@@ -73,6 +73,13 @@ impl Instructions {
             Self::ALL.into_iter().rev().find(fits).unwrap_or(Self::Baseline)
         })
     }
+
+    /// The widest of them but for 512-bit vectors, for loops that were measured to be slower on those: demosaicking by up
+    /// to a third, whatever the method; sums of one variable, whose smallest and largest samples the compiler packs into
+    /// one such vector and takes out again.
+    pub fn up_to_256_bits() -> Self {
+        Self::widest().min(Self::Avx2)
+    }
 }
 
 /// A loop worth compiling for every set of instructions.

@@ -52,8 +52,8 @@ pub fn autocovariance(weights: &Weights, phase: usize, lag: [isize; 2]) -> Gains
     let other = phase_at(PHASES[phase], lag);
     for y in (-REACH).max(lag[1] - REACH)..=REACH.min(lag[1] + REACH) {
         for x in (-REACH).max(lag[0] - REACH)..=REACH.min(lag[0] + REACH) {
-            let first = [0, 1, 2].map(|channel| weights.kernel(phase, channel).at([x, y]));
-            let second = [0, 1, 2].map(|channel| weights.kernel(other, channel).at([x - lag[0], y - lag[1]]));
+            let first = [0, 1, 2].map(|channel| weights.stencil(phase, channel).at([x, y]));
+            let second = [0, 1, 2].map(|channel| weights.stencil(other, channel).at([x - lag[0], y - lag[1]]));
             gains.add(weights.class(phase, [x, y]), first, second, 1.0);
         }
     }
@@ -78,7 +78,7 @@ pub fn patch_mean(weights: &Weights, phase: usize, size: [usize; 2]) -> Gains {
                 for dx in (x - width + 1).max(-REACH)..=x.min(REACH) {
                     let pixel = phase_at(corner, [x - dx, y - dy]);
                     for (channel, weight) in weight.iter_mut().enumerate() {
-                        *weight += weights.kernel(pixel, channel).at([dx, dy]);
+                        *weight += weights.stencil(pixel, channel).at([dx, dy]);
                     }
                 }
             }

@@ -164,7 +164,7 @@ impl Coefficients {
     pub fn simulated(variances: [f64; 3]) -> Self {
         let exact = Exact::new(variances);
         let here = Stencil::site([0, 0]);
-        let channel = |at: Class, of: Class| exact.kernel(at, of);
+        let channel = |at: Class, of: Class| exact.stencil(at, of);
         let mean_of_k = |at: Class, own: Class| match at {
             // Green = X + mean of K where X is measured; X = green − mean of K elsewhere.
             _ if at == own => channel(at, Class::Green).plus(-1.0, &here),
@@ -199,7 +199,7 @@ impl Coefficients {
             quotient(interpolated(class) - own - k, 2.0 * (own * k).sqrt())
         });
         let here = Stencil::site([0, 0]);
-        let r3 = both.map(|(class, _, _)| exact.correlation(class, &exact.kernel(class, Class::Green), &here));
+        let r3 = both.map(|(class, _, _)| exact.correlation(class, &exact.stencil(class, Class::Green), &here));
         let k = [0, 1].map(|i| difference(interpolated(both[i].0), both[i].2, r3[i]));
         let r1_prime = [0, 1].map(|i| {
             // Red at green: σ² = σ_g² + σ_K²/2 − √2 r σ_g σ_K.
@@ -254,8 +254,8 @@ impl Exact {
     }
 
     /// The weights of channel `of` at the sites of class `at`.
-    fn kernel(&self, at: Class, of: Class) -> Stencil {
-        self.weights.kernel(self.phase(at), of as usize).clone()
+    fn stencil(&self, at: Class, of: Class) -> Stencil {
+        self.weights.stencil(self.phase(at), of as usize).clone()
     }
 
     /// The covariance of two sums of sites about a site of class `at`.
@@ -271,8 +271,8 @@ impl Exact {
 
     /// The variance of channel `of` at the sites of class `at`.
     fn variance(&self, at: Class, of: Class) -> f64 {
-        let kernel = self.kernel(at, of);
-        self.covariance(at, &kernel, &kernel)
+        let stencil = self.stencil(at, of);
+        self.covariance(at, &stencil, &stencil)
     }
 }
 

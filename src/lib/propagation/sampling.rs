@@ -260,8 +260,8 @@ impl Sums {
                 let at = [place.corner[0] + column, place.corner[1] + row];
                 let [x, y] = on_sensor(at);
                 let phase = phase(x, y);
-                let kernels = [0, 1, 2].map(|channel| weights.kernel(phase, channel).folded(at, place.frame));
-                pixels.push(Pixel::new(&kernels, |offset| weights.class(phase, offset)));
+                let stencils = [0, 1, 2].map(|channel| weights.stencil(phase, channel).folded(at, place.frame));
+                pixels.push(Pixel::new(&stencils, |offset| weights.class(phase, offset)));
             }
         }
         let mut sums = Self::zero();
@@ -370,17 +370,17 @@ fn add_products(table: &mut [[f64; 6]; 6], c: &Matrix3<f64>) {
 /// One pixel: the sites it is made of, with the weights of the three channels, and the same by offset.
 struct Pixel {
     sites: Vec<([isize; 2], Class, [f64; 3])>,
-    kernels: [Stencil; 3],
+    stencils: [Stencil; 3],
 }
 
 impl Pixel {
-    fn new(kernels: &[Stencil; 3], class: impl Fn([isize; 2]) -> Class) -> Self {
+    fn new(stencils: &[Stencil; 3], class: impl Fn([isize; 2]) -> Class) -> Self {
         let all = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| [x, y]));
         let sites = all
-            .map(|offset| (offset, class(offset), kernels.each_ref().map(|kernel| kernel.at(offset))))
+            .map(|offset| (offset, class(offset), stencils.each_ref().map(|stencil| stencil.at(offset))))
             .filter(|(_, _, weights)| *weights != [0.0; 3])
             .collect();
-        Self { sites, kernels: kernels.clone() }
+        Self { sites, stencils: stencils.clone() }
     }
 
     /// The covariance of this pixel's channels (rows) with those of the pixel `lag` away.
@@ -391,7 +391,7 @@ impl Pixel {
             if there[0].abs() > REACH || there[1].abs() > REACH {
                 continue;
             }
-            let theirs = other.kernels.each_ref().map(|kernel| kernel.at(there));
+            let theirs = other.stencils.each_ref().map(|stencil| stencil.at(there));
             let variance = variances[*class as usize];
             for j in 0..3 {
                 for i in 0..3 {
@@ -474,7 +474,7 @@ mod tests {
                 let mut w = DMatrix::<f64>::zeros(n, 72);
                 for a in 0..n {
                     let [x, y] = [a % 7, a / 7 + 2];
-                    for ([dx, dy], weight) in weights.kernel(phase(x as i64, y as i64), channel).sites() {
+                    for ([dx, dy], weight) in weights.stencil(phase(x as i64, y as i64), channel).sites() {
                         let site = mirror(y.cast_signed() + dy, 8) * 9 + mirror(x.cast_signed() + dx, 9);
                         w[(a, site)] += weight;
                     }

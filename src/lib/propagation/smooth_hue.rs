@@ -103,7 +103,7 @@ fn of_phase(
     let (mut means, mut covariance) = (Vector3::from(mean), linear);
     // Mean over the neighbours of E (1 + a)ᵖ/(1 + uᵢ) − 1. All expectations are kept less 1, so that nothing cancels.
     let average = |power: u32, here: &Stencil, around: &[Stencil]| {
-        around.iter().map(|kernel| noise.quotient(power, here, kernel, None)).sum::<f64>() / around.len() as f64
+        around.iter().map(|stencil| noise.quotient(power, here, stencil, None)).sum::<f64>() / around.len() as f64
     };
     for (class, (here, around)) in chrominances.iter().filter(|(_, (_, around))| !around.is_empty()) {
         let channel = *class as usize;

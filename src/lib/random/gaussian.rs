@@ -9,7 +9,7 @@
 
 #![expect(clippy::excessive_precision, reason = "coefficients have the digits that they were published or found with")]
 
-use super::philox::LANES;
+use super::philox::VECTOR;
 
 /// Upper halves of words whose tail is at least this many 2⁻³² belong to the body: 1.38·10⁻⁴, |z| ≤ 3.63.
 const BODY: u32 = 593_960;
@@ -215,16 +215,16 @@ const FAR: Rational = (
 );
 
 /// Fills a run with normal numbers; `low` gives the lower half of the word of a photosite. Lengths are multiples of
-/// [`LANES`].
+/// [`VECTOR`].
 #[inline(always)]
 pub(super) fn fill(normals: &mut [f32], high: &[u32], low: impl Fn(usize) -> u32) {
     bodies(normals, high);
-    let (normals, high) = (normals.as_chunks_mut::<LANES>().0, high.as_chunks::<LANES>().0);
+    let (normals, high) = (normals.as_chunks_mut::<VECTOR>().0, high.as_chunks::<VECTOR>().0);
     for (first, (normals, high)) in normals.iter_mut().zip(high).enumerate() {
         if high.iter().fold(false, |any, &high| any | is_in_tail(high)) {
             for (lane, (normal, &high)) in normals.iter_mut().zip(high).enumerate() {
                 if is_in_tail(high) {
-                    *normal = of_tail(high, low(first * LANES + lane));
+                    *normal = of_tail(high, low(first * VECTOR + lane));
                 }
             }
         }

@@ -7,7 +7,7 @@ pub mod gaussian;
 pub mod philox;
 pub mod poisson;
 
-use philox::{BLOCK, Words, halves, philox4x32_10};
+use philox::{LONGEST_RUN, Words, halves, philox4x32_10};
 use poisson::Table;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -44,7 +44,7 @@ impl Source {
     }
 }
 
-/// A run of photosites of one row, at most [`BLOCK`], whose draws are made together.
+/// A run of photosites of one row, at most [`LONGEST_RUN`], whose draws are made together.
 ///
 /// One and a half Philox blocks a photosite hold all words that its five draws need but in one case of a thousand:
 ///
@@ -90,25 +90,25 @@ pub struct Run {
     pub place: [i32; 2],
     /// Sensor classes of the first photosite and of the second; they alternate.
     pub classes: [u8; 2],
-    /// Photosites, a multiple of [`LANES`](philox::LANES). Those that follow the last of [`spans`] get any words.
+    /// Photosites, a multiple of [`VECTOR`](philox::VECTOR). Those that follow the last of [`spans`] get any words.
     pub length: usize,
 }
 
-/// Cuts the columns of a row, the first of which is `column` on the sensor, into runs: each within [`BLOCK`] columns of
+/// Cuts the columns of a row, the first of which is `column` on the sensor, into runs: each within [`LONGEST_RUN`] columns of
 /// the sensor that share their patterns' words.
 pub fn spans(column: i32, width: usize) -> impl Iterator<Item = Range<usize>> {
     let offset = column.rem_euclid(COLUMNS) as usize;
-    let ends = (1..).map(move |block| (block * BLOCK).saturating_sub(offset).min(width));
+    let ends = (1..).map(move |block| (block * LONGEST_RUN).saturating_sub(offset).min(width));
     let starts = std::iter::once(0).chain(ends.clone());
     starts.zip(ends).take_while(|(start, end)| start < end).map(|(start, end)| start..end)
 }
 
-/// [`BLOCK`] as a number of columns.
+/// [`LONGEST_RUN`] as a number of columns.
 #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "256")]
-const COLUMNS: i32 = BLOCK as i32;
+const COLUMNS: i32 = LONGEST_RUN as i32;
 
 /// Columns between two photosites that share a block of their patterns.
-const HALF: usize = BLOCK / 2;
+const HALF: usize = LONGEST_RUN / 2;
 
 /// The bit of a column in which two such photosites differ.
 #[expect(clippy::cast_possible_truncation, reason = "128")]
@@ -121,12 +121,12 @@ pub struct RunWords {
     /// What two photosites share.
     shared: Words,
     /// High words of DCNU and PRNU.
-    pattern: [[u32; BLOCK]; 2],
+    pattern: [[u32; LONGEST_RUN]; 2],
 }
 
 impl Default for RunWords {
     fn default() -> Self {
-        Self { temporal: [[0; BLOCK]; 4], shared: [[0; BLOCK]; 4], pattern: [[0; BLOCK]; 2] }
+        Self { temporal: [[0; LONGEST_RUN]; 4], shared: [[0; LONGEST_RUN]; 4], pattern: [[0; LONGEST_RUN]; 2] }
     }
 }
 
@@ -155,13 +155,13 @@ impl Run {
     #[inline(always)]
     pub fn make_pattern(&self, words: &mut RunWords) {
         let first = self.place[0].rem_euclid(COLUMNS) as usize;
-        let end = (first + self.length).min(BLOCK);
+        let end = (first + self.length).min(LONGEST_RUN);
         let is_in_one_half = first / HALF == (end - 1) / HALF;
         let made = if is_in_one_half { first % HALF..(end - 1) % HALF + 1 } else { 0..HALF };
         let [even, odd] = self.fourth().map(|class| class | PATTERN);
         let fourth = if (first - made.start).is_multiple_of(2) { [even, odd] } else { [odd, even] };
         #[expect(clippy::cast_possible_truncation, reason = "below 256")]
-        let x = (self.place[0].cast_unsigned() & !(BLOCK as u32 - 1)) + made.start as u32;
+        let x = (self.place[0].cast_unsigned() & !(LONGEST_RUN as u32 - 1)) + made.start as u32;
         let y = self.place[1].cast_unsigned();
         philox::fill(&mut words.shared, made.len(), halves(self.sensor_seed), [x, y, 0], fourth);
         for half in first / HALF..=(end - 1) / HALF {
@@ -220,7 +220,7 @@ impl Run {
 
 #[cfg(test)]
 mod tests {
-    use super::philox::LANES;
+    use super::philox::VECTOR;
     use super::*;
 
     /// Every photosite has the same high words wherever the run begins that they are made in, those of the documented
@@ -234,7 +234,7 @@ mod tests {
                 assert_eq!(span.start, covered);
                 covered = span.end;
                 let place = [column.wrapping_add(i32::try_from(span.start).unwrap()), -7];
-                let length = span.len().next_multiple_of(LANES);
+                let length = span.len().next_multiple_of(VECTOR);
                 let run = Run { seed: 3, sensor_seed: 1 << 40, frame: 9, place, classes: [2, 1], length };
                 let mut words = RunWords::default();
                 run.make_temporal(&mut words);
@@ -267,7 +267,7 @@ mod tests {
             run.make_pattern(&mut words);
             (words.temporal.map(|word| word[0]), words.pattern.map(|word| word[0]))
         };
-        let base = Run { seed: 1, sensor_seed: 5, frame: 2, place: [3, 4], classes: [0, 1], length: LANES };
+        let base = Run { seed: 1, sensor_seed: 5, frame: 2, place: [3, 4], classes: [0, 1], length: VECTOR };
         let (temporal, pattern) = words_of(base);
         assert_eq!(words_of(base), (temporal, pattern));
         for other in [Run { seed: 1 << 32, ..base }, Run { frame: 3, ..base }] {

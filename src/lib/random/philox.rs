@@ -1,13 +1,13 @@
 //! The Philox 4x32 bijection with 10 rounds [Salmon2011, Sec. 3.3]: 128 random bits from a counter and a key.
 
-/// Photosites whose numbers are made together, at most: few enough for the first-level cache.
-pub const BLOCK: usize = 256;
+/// Photosites of a run, whose numbers are made together, at most: few enough for the first-level cache.
+pub const LONGEST_RUN: usize = 256;
 
-/// Photosites that fill the widest vectors; a run is made in multiples of them.
-pub const LANES: usize = 16;
+/// Photosites that fill the widest vector; runs are made in multiples of it.
+pub const VECTOR: usize = 16;
 
 /// The words of a run of photosites, `[word][photosite]`.
-pub type Words = [[u32; BLOCK]; 4];
+pub type Words = [[u32; LONGEST_RUN]; 4];
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
@@ -86,10 +86,10 @@ mod tests {
 
     #[test]
     fn a_block_is_its_photosites_one_by_one() {
-        let mut words = [[0; BLOCK]; 4];
+        let mut words = [[0; LONGEST_RUN]; 4];
         let (key, start, fourth) = ([7, 8], [u32::MAX - 3, 5, 6], [1 << 16, 2 << 16]);
-        fill(&mut words, BLOCK, key, start, fourth);
-        for index in 0..BLOCK as u32 {
+        fill(&mut words, LONGEST_RUN, key, start, fourth);
+        for index in 0..LONGEST_RUN as u32 {
             let counter = [start[0].wrapping_add(index), 5, 6, fourth[index as usize % 2]];
             assert_eq!(words.map(|word| word[index as usize]), philox4x32_10(counter, key));
         }

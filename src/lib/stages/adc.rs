@@ -114,11 +114,11 @@ impl Digitize {
         mut output: Rows<'_, Adu>,
     ) -> Counts {
         let mut counts = Counts::default();
-        let limits = Limits::of(&self.adc);
+        let clipping = Clipping::of(&self.adc);
         for y in output.range() {
             for channel in 0..input.channels() {
                 let (charges, codes) = (input.row(y.cast_signed(), channel), output.row(y, channel));
-                let of_row = vectors::run_on(instructions, Row { adc: self.adc, limits, charges, codes });
+                let of_row = vectors::run_on(instructions, Row { adc: self.adc, clipping, charges, codes });
                 counts = counts.plus(of_row);
             }
         }
@@ -140,18 +140,21 @@ impl Stage for Digitize {
 }
 
 /// Added to a number from 0 to 2⁵¹ and taken away, it leaves the nearest whole number: doubles have no fractions there.
-const WHOLE: f64 = (1_u64 << 52) as f64;
+const WHOLE_DOUBLES: f64 = (1_u64 << 52) as f64;
+
+/// The same for numbers from 0 to 2²² in single precision.
+const WHOLE_SINGLES: f32 = (1_u32 << 23) as f32;
 
 /// The charges from which levels are clipped: levels rise with the charge, also as doubles.
 #[derive(Debug, Clone, Copy)]
-struct Limits {
+struct Clipping {
     /// The largest charge whose level rounds to less than 0.
     low: f32,
     /// The smallest charge whose level rounds to more than the largest code.
     high: f32,
 }
 
-impl Limits {
+impl Clipping {
     /// Those of a converter. Ties go away from zero, so that −½ rounds to less than 0.
     fn of(adc: &AdcRecord) -> Self {
         let top = f64::from(adc.top_code());
@@ -186,7 +189,7 @@ impl AdcRecord {
         let above = if 0.0 > level { 0.0 } else { level };
         let within = if top < above { top } else { above };
         // To even at ties, and 0 of −0; the difference is exact, and one half only where a tie went down.
-        let even = (within + WHOLE) - WHOLE;
+        let even = (within + WHOLE_DOUBLES) - WHOLE_DOUBLES;
         let tie = if within - even >= 0.5 { 1.0 } else { 0.0 };
         to_sample(even + tie)
     }
@@ -201,13 +204,13 @@ impl AdcRecord {
 /// Digitizes a row.
 struct Row<'a> {
     adc: AdcRecord,
-    limits: Limits,
+    clipping: Clipping,
     charges: &'a [f32],
     codes: &'a mut [f32],
 }
 
 /// Samples whose doubts are looked for together.
-const LANES: usize = 16;
+const SETTLED_TOGETHER: usize = 16;
 
 impl Row<'_> {
     /// How far a level in single precision may be off, in ADU, where it lies within the codes: bias and slope are rounded,
@@ -223,32 +226,30 @@ impl Kernel for Row<'_> {
 
     #[inline(always)]
     fn run(self) -> Counts {
-        /// Added to a number from 0 to 2²² and taken away, it leaves the nearest whole number.
-        const WHOLE: f32 = 8_388_608.0;
         let doubt = self.doubt();
-        let Self { adc, limits, charges, codes } = self;
+        let Self { adc, clipping, charges, codes } = self;
         let (mut low, mut high, mut nan) = (0_u32, 0_u32, 0_u32);
         for &charge in charges {
-            low += u32::from(charge <= limits.low);
-            high += u32::from(charge >= limits.high);
+            low += u32::from(charge <= clipping.low);
+            high += u32::from(charge >= clipping.high);
             nan += u32::from(charge.is_nan());
         }
         let counts =
             Counts { clipped_low: low.into(), clipped_high: high.into(), not_finite: nan.into(), ..Counts::default() };
-        let settled = charges.len() / LANES * LANES;
+        let settled = charges.len() / SETTLED_TOGETHER * SETTLED_TOGETHER;
         let (bias, slope, top) = (to_sample(adc.bias_adu), to_sample(adc.adu_per_e), to_sample(adc.top_code().into()));
         let is_worthwhile = doubt < 0.01 && slope.is_normal();
         let (charges, last) = charges.split_at(if is_worthwhile { settled } else { 0 });
         let (codes, last_codes) = codes.split_at_mut(charges.len());
         let sure = to_sample(0.5 - doubt);
-        let chunks = charges.as_chunks::<LANES>().0.iter().zip(codes.as_chunks_mut::<LANES>().0);
+        let chunks = charges.as_chunks::<SETTLED_TOGETHER>().0.iter().zip(codes.as_chunks_mut::<SETTLED_TOGETHER>().0);
         for (charges, codes) in chunks {
             let mut unsure = 0_u32;
             for (&charge, code) in charges.iter().zip(&mut *codes) {
                 let level = bias + slope * charge;
                 let above = if level > 0.0 { level } else { 0.0 };
                 let within = if above < top { above } else { top };
-                let nearest = (within + WHOLE) - WHOLE;
+                let nearest = (within + WHOLE_SINGLES) - WHOLE_SINGLES;
                 *code = nearest;
                 // A charge that is no number is in doubt too.
                 unsure |= u32::from(((within - nearest).abs() >= sure) | level.is_nan());
@@ -293,13 +294,13 @@ mod tests {
         {
             for bits in [1, 12, 16] {
                 let adc = AdcRecord { bits, bias_adu, adu_per_e };
-                let limits = Limits::of(&adc);
+                let clipping = Clipping::of(&adc);
                 let mut expected = Counts::default();
                 let plain: Vec<u32> =
                     charges.iter().map(|&charge| plain(&adc, charge, &mut expected).to_bits()).collect();
                 for set in Instructions::ALL {
                     let mut codes = vec![0.0; charges.len()];
-                    let counts = vectors::run_on(set, Row { adc, limits, charges: &charges, codes: &mut codes });
+                    let counts = vectors::run_on(set, Row { adc, clipping, charges: &charges, codes: &mut codes });
                     assert_eq!(counts, expected);
                     let differing = (0..plain.len()).find(|&i| codes[i].to_bits() != plain[i] && !codes[i].is_nan());
                     assert_eq!(differing.map(|i| (charges[i], codes[i])), None, "{set:?} {adc:?}");

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::numerics::vectors::{self, Instructions, Kernel};
-use crate::random::philox::{BLOCK, LANES};
+use crate::random::philox::{LONGEST_RUN, VECTOR};
 use crate::random::poisson::Table;
 use crate::random::{Run, RunWords, Source, spans};
 use crate::stages::transfer::{Transfer, uniform_share};
@@ -305,7 +305,7 @@ impl Stage for AddNoise {
             return vectors::run_on(self.instructions, draw);
         };
         let mut counts = Counts::default();
-        let (mut words, mut charge, mut noise) = (RunWords::default(), vec![0.0; input.width()], [0.0; BLOCK]);
+        let (mut words, mut charge, mut noise) = (RunWords::default(), vec![0.0; input.width()], [0.0; LONGEST_RUN]);
         for channel in 0..input.channels() {
             let mut passage = transfer.passage();
             // The rows above are drawn again, and counted in the band that they belong to.
@@ -422,15 +422,15 @@ impl Kernel for Charges<'_> {
 /// Memory for the numbers of a run.
 struct Scratch {
     words: RunWords,
-    rates: [f32; BLOCK],
-    light: [f32; BLOCK],
-    dark: [f32; BLOCK],
-    normals: [f32; BLOCK],
+    rates: [f32; LONGEST_RUN],
+    light: [f32; LONGEST_RUN],
+    dark: [f32; LONGEST_RUN],
+    normals: [f32; LONGEST_RUN],
 }
 
 impl Default for Scratch {
     fn default() -> Self {
-        let empty = [0.0; BLOCK];
+        let empty = [0.0; LONGEST_RUN];
         Self { words: RunWords::default(), rates: empty, light: empty, dark: empty, normals: empty }
     }
 }
@@ -447,7 +447,7 @@ impl Line<'_> {
             frame: record.frame,
             place: [column, self.row],
             classes: [span.start, span.start + 1].map(|x| self.classes[x % 2] as u8),
-            length: span.len().next_multiple_of(LANES),
+            length: span.len().next_multiple_of(VECTOR),
         }
     }
 
@@ -533,7 +533,7 @@ impl Line<'_> {
 
     /// Reads packets of charge out; gives the number of samples that are not finite.
     #[inline(always)]
-    fn read(&self, run: &Run, words: &RunWords, normals: &mut [f32; BLOCK], charge: &mut [f32]) -> u64 {
+    fn read(&self, run: &Run, words: &RunWords, normals: &mut [f32; LONGEST_RUN], charge: &mut [f32]) -> u64 {
         if self.model.read_noise_e > 0.0 {
             let normals = &mut normals[..run.length];
             run.normals(words, Source::Ron, normals);

@@ -38,7 +38,7 @@ impl Rendering {
     ) -> Result<()> {
         let geometry = &self.header.geometry;
         // An even number of rows, so that bands begin at the same phase of the filter array.
-        let band_rows = geometry.band_rows(1, 1).next_multiple_of(2);
+        let band_rows = geometry.cached_rows().next_multiple_of(2);
         let row_samples = geometry.row_samples();
         let patch_of = |y: usize| y / self.patch[1];
         let mut pixels = Vec::new();

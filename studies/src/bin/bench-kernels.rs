@@ -96,7 +96,7 @@ fn demosaicked(width: usize, height: usize) -> Result<MemoryFrame> {
 fn over<S: Stage + 'static>(stage: S, input: MemoryFrame) -> Kernel {
     let from = input.header.geometry.clone();
     let to = stage.header().geometry.clone();
-    let rows = from.band_rows(1, 1).min(to.band_rows(1, 1));
+    let rows = from.cached_rows().min(to.cached_rows());
     let mut output = vec![0.0; rows * to.row_samples()];
     Box::new(move || {
         for first in (0..to.height).step_by(rows) {

@@ -14,7 +14,7 @@ pub use table::Table;
 pub(super) use table::fill as fill_by_tables;
 
 use super::gaussian;
-use super::philox::{BLOCK, LANES};
+use super::philox::{LONGEST_RUN, VECTOR};
 
 /// The rate from which on the expansion is used.
 const EXPANSION_FROM: f32 = 10.0;
@@ -53,7 +53,7 @@ const LEFT_OUT: [f32; 2] = [0.05, 3.0e-3];
 /// single precision does not settle one.
 #[inline(always)]
 fn by_expansion(counts: &mut [f32], unsure: &mut [u32], rates: &[f32], high: &[u32]) {
-    let mut normals = [0.0; BLOCK];
+    let mut normals = [0.0; LONGEST_RUN];
     let normals = &mut normals[..high.len()];
     gaussian::bodies(normals, high);
     let lanes = counts.iter_mut().zip(unsure).zip(rates).zip(normals.iter().zip(high));
@@ -111,11 +111,11 @@ const RECIPROCALS: [f32; TERMS + 1] = {
 /// Counts of a run by adding up probabilities, for rates up to [`EXPANSION_FROM`].
 #[inline(always)]
 fn by_sum(counts: &mut [f32], unsure: &mut [u32], rates: &[f32], high: &[u32]) {
-    let counts = counts.as_chunks_mut::<LANES>().0.iter_mut();
-    let words = rates.as_chunks::<LANES>().0.iter().zip(high.as_chunks::<LANES>().0);
-    for ((counts, unsure), (rates, high)) in counts.zip(unsure.as_chunks_mut::<LANES>().0).zip(words) {
-        let (mut share, mut term, mut sum) = ([0.0_f32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
-        for lane in 0..LANES {
+    let counts = counts.as_chunks_mut::<VECTOR>().0.iter_mut();
+    let words = rates.as_chunks::<VECTOR>().0.iter().zip(high.as_chunks::<VECTOR>().0);
+    for ((counts, unsure), (rates, high)) in counts.zip(unsure.as_chunks_mut::<VECTOR>().0).zip(words) {
+        let (mut share, mut term, mut sum) = ([0.0_f32; VECTOR], [0.0_f32; VECTOR], [0.0_f32; VECTOR]);
+        for lane in 0..VECTOR {
             // Halved, so that it converts as a signed number.
             share[lane] = ((high[lane] >> 1).cast_signed() as f32 + 0.5) * (1.0 / 2_147_483_648.0);
             term[lane] = exponential(rates[lane]);
@@ -125,7 +125,7 @@ fn by_sum(counts: &mut [f32], unsure: &mut [u32], rates: &[f32], high: &[u32]) {
         for step in RECIPROCALS[1..].chunks_exact(4) {
             let mut open = 0;
             for reciprocal in step {
-                for lane in 0..LANES {
+                for lane in 0..VECTOR {
                     sum[lane] += term[lane];
                     let beyond = share[lane] - sum[lane];
                     counts[lane] += if beyond > 0.0 { 1.0 } else { 0.0 };
@@ -158,10 +158,10 @@ fn exponential(x: f32) -> f32 {
 }
 
 /// Fills a run with counts at `rates`; one of 0 or less, or NaN, gives 0. `low` gives the lower half of the word of a
-/// photosite. Lengths are multiples of [`LANES`], at most [`BLOCK`].
+/// photosite. Lengths are multiples of [`VECTOR`], at most [`LONGEST_RUN`].
 #[inline(always)]
 pub(super) fn fill(counts: &mut [f32], rates: &[f32], high: &[u32], low: impl Fn(usize) -> u32) {
-    let mut unsure = [0; BLOCK];
+    let mut unsure = [0; LONGEST_RUN];
     let unsure = &mut unsure[..rates.len()];
     let within = |rate: f32| (EXPANSION_FROM..=EXPANSION_TO).contains(&rate);
     if rates.iter().fold(true, |all, &rate| all & within(rate)) {
@@ -175,10 +175,10 @@ pub(super) fn fill(counts: &mut [f32], rates: &[f32], high: &[u32], low: impl Fn
 /// Calls `mend` with the place of every flag that is not 0, in order; few are.
 #[inline(always)]
 fn for_unsure(unsure: &[u32], mut mend: impl FnMut(usize)) {
-    for (first, flags) in unsure.as_chunks::<LANES>().0.iter().enumerate() {
+    for (first, flags) in unsure.as_chunks::<VECTOR>().0.iter().enumerate() {
         if flags.iter().fold(0, |any, flag| any | flag) != 0 {
             for (lane, _) in flags.iter().enumerate().filter(|(_, flag)| **flag != 0) {
-                mend(first * LANES + lane);
+                mend(first * VECTOR + lane);
             }
         }
     }
@@ -187,7 +187,7 @@ fn for_unsure(unsure: &[u32], mut mend: impl FnMut(usize)) {
 /// Counts of a run whose rates are not all the expansion's: each by its own method.
 #[inline(always)]
 fn of_all_rates(counts: &mut [f32], unsure: &mut [u32], rates: &[f32], high: &[u32]) {
-    let (mut held, mut few, mut few_unsure) = ([0.0; BLOCK], [0.0; BLOCK], [0; BLOCK]);
+    let (mut held, mut few, mut few_unsure) = ([0.0; LONGEST_RUN], [0.0; LONGEST_RUN], [0; LONGEST_RUN]);
     let (held, few, few_unsure) = (&mut held[..rates.len()], &mut few[..rates.len()], &mut few_unsure[..rates.len()]);
     if rates.iter().any(|&rate| rate >= EXPANSION_FROM) {
         for (held, &rate) in held.iter_mut().zip(rates) {
@@ -252,10 +252,10 @@ mod tests {
         assert!(worst < 0.5, "{worst}");
     }
 
-    fn block(rates: &[f32; BLOCK], seed: u32) -> ([f32; BLOCK], [u32; BLOCK], [u32; BLOCK]) {
-        let mut words = [[0; BLOCK]; 4];
-        super::super::philox::fill(&mut words, BLOCK, [seed, 0], [0, 0, 0], [0, 0]);
-        let mut counts = [0.0; BLOCK];
+    fn block(rates: &[f32; LONGEST_RUN], seed: u32) -> ([f32; LONGEST_RUN], [u32; LONGEST_RUN], [u32; LONGEST_RUN]) {
+        let mut words = [[0; LONGEST_RUN]; 4];
+        super::super::philox::fill(&mut words, LONGEST_RUN, [seed, 0], [0, 0, 0], [0, 0]);
+        let mut counts = [0.0; LONGEST_RUN];
         fill(&mut counts, rates, &words[0], |index| words[1][index]);
         (counts, words[0], words[1])
     }
@@ -268,13 +268,13 @@ mod tests {
         };
         for seed in 0..2000 {
             // Blocks of one rate, blocks about 10, and blocks of all rates.
-            let rates: [f32; BLOCK] = std::array::from_fn(|index| match seed % 3 {
+            let rates: [f32; LONGEST_RUN] = std::array::from_fn(|index| match seed % 3 {
                 0 => rate_at(seed),
                 1 => 8.0 + (index % 17) as f32 * 0.25,
                 _ => rate_at(seed * 256 + index as u32),
             });
             let (counts, high, low) = block(&rates, seed);
-            for index in 0..BLOCK {
+            for index in 0..LONGEST_RUN {
                 let word = u64::from(high[index]) << 32 | u64::from(low[index]);
                 let expected = crate::frame::to_sample(quantile(f64::from(rates[index]), word));
                 assert_eq!(counts[index], expected, "rate {} word {word:#x}", rates[index]);

@@ -1,7 +1,7 @@
 //! Counts at one rate, looked up.
 
 use super::exact::{quantile, tails};
-use super::{BLOCK, for_unsure, settle};
+use super::{LONGEST_RUN, for_unsure, settle};
 
 /// The counts of all words at one rate, by the upper halves of the words.
 ///
@@ -79,7 +79,7 @@ impl Table {
 /// Counts of a run at the rates of two tables, by turns. `low` gives the lower half of the word of a photosite.
 #[inline(always)]
 pub(in crate::random) fn fill(counts: &mut [f32], tables: [&Table; 2], high: &[u32], low: impl Fn(usize) -> u32) {
-    let mut unsure = [0; BLOCK];
+    let mut unsure = [0; LONGEST_RUN];
     let unsure = &mut unsure[..high.len()];
     look_up(counts, unsure, tables, high);
     for_unsure(unsure, |index| counts[index] = tables[index % 2].search(high[index], || low(index)));
@@ -115,8 +115,8 @@ mod tests {
         for (seed, rate) in (0..).zip([1e-3, 0.4, 3.0, 9.99, 10.0, 73.21, 199.9, 4321.5, 30_000.0, 1e5]) {
             let table = Table::new(rate).unwrap();
             for x in 0..40 {
-                let mut words = [[0; BLOCK]; 4];
-                fill_words(&mut words, BLOCK, [seed, 9], [x, 0, 0], [0, 0]);
+                let mut words = [[0; LONGEST_RUN]; 4];
+                fill_words(&mut words, LONGEST_RUN, [seed, 9], [x, 0, 0], [0, 0]);
                 // Some words at the steps, and some in the tails.
                 for (index, high) in words[0].iter_mut().enumerate().filter(|(index, _)| index % 3 == 0) {
                     let step = table.steps[(index * 31 + x as usize) % table.steps.len()];
@@ -125,9 +125,9 @@ mod tests {
                 for (index, high) in words[0].iter_mut().enumerate().filter(|(index, _)| index % 3 == 1) {
                     *high = if index % 2 == 0 { *high >> (index % 32) } else { !(*high >> (index % 32)) };
                 }
-                let mut counts = [0.0; BLOCK];
+                let mut counts = [0.0; LONGEST_RUN];
                 fill(&mut counts, [&table, &table], &words[0], |index| words[1][index]);
-                for index in 0..BLOCK {
+                for index in 0..LONGEST_RUN {
                     let word = u64::from(words[0][index]) << 32 | u64::from(words[1][index]);
                     let expected = crate::frame::to_sample(quantile(f64::from(rate), word));
                     assert_eq!(counts[index], expected, "rate {rate} word {word:#x}");

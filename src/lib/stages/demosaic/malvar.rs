@@ -51,7 +51,7 @@ impl Kernel for Row<'_> {
     }
 }
 
-/// Eighths of the 5×5 kernels of \[MHC2004, Fig. 2], top left quarter and centre lines: green at red or blue; red or
+/// Eighths of the 5×5 stencils of \[MHC2004, Fig. 2], top left quarter and centre lines: green at red or blue; red or
 /// blue at green with its neighbours of that class beside it; red at blue, blue at red.
 const GREEN: [[f64; 3]; 3] = [[0.0, 0.0, -1.0], [0.0, 0.0, 2.0], [-1.0, 2.0, 4.0]];
 const BESIDE: [[f64; 3]; 3] = [[0.0, 0.0, 0.5], [0.0, -1.0, 0.0], [-1.0, 4.0, 5.0]];

@@ -202,9 +202,6 @@ impl Demosaic {
     }
 }
 
-/// The widest vectors that are used: 512-bit ones were slower, by up to a third, for all methods.
-const WIDEST: Instructions = Instructions::Avx2;
-
 impl Stage for Demosaic {
     type Input = Any;
     type Output = Any;
@@ -218,7 +215,7 @@ impl Stage for Demosaic {
     }
 
     fn apply(&self, input: Window<'_>, output: Rows<'_>) -> Counts {
-        self.apply_on(WIDEST.min(Instructions::widest()), input, output)
+        self.apply_on(Instructions::up_to_256_bits(), input, output)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The table of weights: what each demosaicked value is made of, site by site.
 //!
-//! About a uniform scene every method is a linear filter whose kernels repeat with the 2×2 phases of the colour filter
+//! About a uniform scene every method is a linear filter whose stencils repeat with the 2×2 phases of the colour filter
 //! array. The table is built from the definition of each method in [HP2005, App. A] as a sum of sites, apart from the
 //! filters themselves; tests drive impulses through the filters and get it back. Propagation takes its covariances
 //! from it.
@@ -84,7 +84,7 @@ pub fn greens_of_hue(pattern: CfaPattern, phase: usize, wanted: Class) -> (Stenc
     (green([0, 0]), neighbors.into_iter().map(green).collect())
 }
 
-/// The kernels of R, G and B in each phase.
+/// The stencils of R, G and B in each phase.
 type Stencils = [[Stencil; 3]; 4];
 
 /// The weights of a method for one filter array; those of smooth hue transition hang on the hue of the scene.
@@ -150,12 +150,12 @@ impl WeightTable {
     /// depends on them.
     pub fn about(&self, hues: [f64; 2]) -> Weights {
         let ratio = [hues[0], 0.0, hues[1]];
-        let kernel = |phase: usize, channel: usize| {
+        let stencil = |phase: usize, channel: usize| {
             self.fixed[phase][channel].clone().plus(ratio[channel], &self.of_hue[phase][channel])
         };
         Weights {
             pattern: self.pattern,
-            kernels: [0, 1, 2, 3].map(|phase| [0, 1, 2].map(|channel| kernel(phase, channel))),
+            stencils: [0, 1, 2, 3].map(|phase| [0, 1, 2].map(|channel| stencil(phase, channel))),
         }
     }
 
@@ -176,7 +176,7 @@ impl WeightTable {
 
     /// Whether the weights hang on the hue of the scene.
     pub fn depends_on_hue(&self) -> bool {
-        self.of_hue.iter().flatten().any(|kernel| kernel.sites().next().is_some())
+        self.of_hue.iter().flatten().any(|stencil| stencil.sites().next().is_some())
     }
 }
 
@@ -184,7 +184,7 @@ impl WeightTable {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weights {
     pattern: CfaPattern,
-    kernels: Stencils,
+    stencils: Stencils,
 }
 
 impl Weights {
@@ -194,13 +194,13 @@ impl Weights {
     }
 
     /// The weights of a channel at the pixels of a phase, an index into [`PHASES`].
-    pub fn kernel(&self, phase: usize, channel: usize) -> &Stencil {
-        &self.kernels[phase][channel]
+    pub fn stencil(&self, phase: usize, channel: usize) -> &Stencil {
+        &self.stencils[phase][channel]
     }
 
     /// The farthest row or column that has weight; at most [`REACH`](super::stencil::REACH).
     pub fn reach(&self) -> isize {
-        let sites = self.kernels.iter().flatten().flat_map(Stencil::sites);
+        let sites = self.stencils.iter().flatten().flat_map(Stencil::sites);
         sites.map(|([x, y], _)| x.abs().max(y.abs())).max().unwrap_or_default()
     }
 
@@ -212,11 +212,11 @@ impl Weights {
     /// The weights of the channels that `matrix` makes of these.
     #[must_use]
     pub fn through(&self, matrix: &Matrix3<f64>) -> Self {
-        let mixture = |kernels: &[Stencil; 3], row: usize| {
-            (0..3).fold(Stencil::zero(), |sum, channel| sum.plus(matrix[(row, channel)], &kernels[channel]))
+        let mixture = |stencils: &[Stencil; 3], row: usize| {
+            (0..3).fold(Stencil::zero(), |sum, channel| sum.plus(matrix[(row, channel)], &stencils[channel]))
         };
-        let kernels = self.kernels.each_ref().map(|phase| [0, 1, 2].map(|row| mixture(phase, row)));
-        Self { pattern: self.pattern, kernels }
+        let stencils = self.stencils.each_ref().map(|phase| [0, 1, 2].map(|row| mixture(phase, row)));
+        Self { pattern: self.pattern, stencils }
     }
 }
 
@@ -245,10 +245,10 @@ mod tests {
 
     /// The weight that the table gives to a site of the frame in a channel of a pixel, edges mirrored.
     fn tabled(weights: &Weights, [x, y]: [usize; 2], channel: usize, site: [usize; 2]) -> f64 {
-        let kernel = weights.kernel(phase(x as i64, y as i64), channel);
+        let stencil = weights.stencil(phase(x as i64, y as i64), channel);
         let lands =
             |[dx, dy]: [isize; 2]| [mirror(x.cast_signed() + dx, WIDTH), mirror(y.cast_signed() + dy, HEIGHT)] == site;
-        kernel.sites().filter(|(offset, _)| lands(*offset)).map(|(_, weight)| weight).sum()
+        stencil.sites().filter(|(offset, _)| lands(*offset)).map(|(_, weight)| weight).sum()
     }
 
     /// Every site in turn is raised on a uniform scene and lowered by as much; half the difference of what the filter
@@ -303,7 +303,7 @@ mod tests {
             for phase in 0..4 {
                 for channel in 0..3 {
                     let value: f64 = weights
-                        .kernel(phase, channel)
+                        .stencil(phase, channel)
                         .sites()
                         .map(|(offset, weight)| weight * means[weights.class(phase, offset) as usize])
                         .sum();
@@ -326,9 +326,9 @@ mod tests {
         let weights = WeightTable::new(Method::EffectiveColor, CfaPattern::Grbg).about([1.0, 1.0]);
         let mixed = weights.through(&Matrix3::new(0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.0, -1.0, 0.0));
         for phase in 0..4 {
-            assert_eq!(mixed.kernel(phase, 0), weights.kernel(phase, 2));
-            let kernel = weights.kernel(phase, 0);
-            assert_eq!(mixed.kernel(phase, 1), &kernel.clone().plus(1.0, kernel));
+            assert_eq!(mixed.stencil(phase, 0), weights.stencil(phase, 2));
+            let stencil = weights.stencil(phase, 0);
+            assert_eq!(mixed.stencil(phase, 1), &stencil.clone().plus(1.0, stencil));
         }
         assert!(WeightTable::new(Method::SmoothHue, CfaPattern::Rggb).depends_on_hue());
         assert!(!WeightTable::new(Method::EffectiveColor, CfaPattern::Rggb).depends_on_hue());

@@ -124,7 +124,7 @@ fn frame_pixel(weights: &Weights, [width, height]: [usize; 2]) -> Gains {
             for dy in -REACH..=REACH {
                 for dx in -REACH..=REACH {
                     let site = [mirror(x.cast_signed() + dx, width), mirror(y.cast_signed() + dy, height)];
-                    let weight = [0, 1, 2].map(|channel| weights.kernel(pixel, channel).at([dx, dy]));
+                    let weight = [0, 1, 2].map(|channel| weights.stencil(pixel, channel).at([dx, dy]));
                     if let Some(found) = sites.iter_mut().find(|(at, _, _)| *at == site) {
                         found.2 = [0, 1, 2].map(|channel| found.2[channel] + weight[channel]);
                     } else {
