@@ -177,7 +177,7 @@ impl AddNoise {
                 return Err(input.out_of_order(problem, "render-radiance"));
             }
         }
-        plane_classes(input)?;
+        check_planes(input)?;
         let sensor = input.sensor()?;
         let temperature_k = settings.temperature_k.unwrap_or(sensor.temperature_k);
         if !(1.0..=1000.0).contains(&temperature_k) {
@@ -257,12 +257,12 @@ impl AddNoise {
     }
 }
 
-/// The sensor classes of the frame's planes: three planes, or none for a CFA plane whose classes alternate.
+/// Refuses a frame whose photosites are of no known class.
 ///
 /// # Errors
 ///
 /// [`Error::Format`] when the frame has neither three planes nor a CFA pattern.
-fn plane_classes(frame: &FrameHeader) -> Result<()> {
+fn check_planes(frame: &FrameHeader) -> Result<()> {
     match (frame.geometry.channels.len(), frame.metadata.cfa) {
         (3, None) if frame.has_three_planes() => Ok(()),
         (1, Some(_)) => Ok(()),
@@ -305,15 +305,18 @@ impl Stage for AddNoise {
             return vectors::run_on(self.instructions, draw);
         };
         let mut counts = Counts::default();
-        let (mut words, mut charge, mut noise) = (RunWords::default(), vec![0.0; input.width()], [0.0; LONGEST_RUN]);
+        let [mut charge, mut noise] = [(); 2].map(|()| vec![0.0; input.width()]);
+        let has_read_noise = self.model.read_noise_e > 0.0;
         for channel in 0..input.channels() {
             let mut passage = transfer.passage();
             // The rows above are drawn again, and counted in the band that they belong to.
             for y in rows.start.saturating_sub(transfer.reach())..rows.end {
                 let line = self.line(y, channel);
                 let expected = input.row(y.cast_signed(), channel);
-                let charges = Charges { line: &line, expected, charge: &mut charge };
-                let of_row = vectors::run_on(self.instructions, charges);
+                let is_read = y >= rows.start && has_read_noise;
+                let read_noise = is_read.then_some(&mut *noise);
+                let draw = Charges { line: &line, expected, charge: &mut charge, read_noise };
+                let of_row = vectors::run_on(self.instructions, draw);
                 for (entering, &charge) in passage.entering(y).iter_mut().zip(&charge) {
                     *entering = f64::from(charge);
                 }
@@ -323,11 +326,10 @@ impl Stage for AddNoise {
                     for (noisy, &charge) in noisy.iter_mut().zip(passage.leaving(y)) {
                         *noisy = to_sample(charge);
                     }
-                    for span in spans(line.first_column, noisy.len()) {
-                        let run = line.run(&span);
-                        run.make_temporal(&mut words);
-                        counts.not_finite += line.read(&run, &words, &mut noise, &mut noisy[span]);
+                    if is_read {
+                        add(noisy, &noise);
                     }
+                    counts.not_finite += not_finite(noisy);
                 }
             }
         }
@@ -387,7 +389,10 @@ impl Kernel for Expose<'_> {
                     let (expected, noisy) = (&expected[span.clone()], &mut noisy[span]);
                     run.make_temporal(&mut scratch.words);
                     line.charges(&run, &mut scratch, expected, noisy, &mut counts);
-                    counts.not_finite += line.read(&run, &scratch.words, &mut scratch.normals, noisy);
+                    if noise.model.read_noise_e > 0.0 {
+                        add(noisy, line.read_noise(&run, &mut scratch));
+                    }
+                    counts.not_finite += not_finite(noisy);
                 }
             }
         }
@@ -395,11 +400,12 @@ impl Kernel for Expose<'_> {
     }
 }
 
-/// Makes the charge of one row, before it is transferred.
+/// Makes the charge of one row, before it is transferred, and the read noise that it will meet where that is asked for.
 struct Charges<'a> {
     line: &'a Line<'a>,
     expected: &'a [f32],
     charge: &'a mut [f32],
+    read_noise: Option<&'a mut [f32]>,
 }
 
 impl Kernel for Charges<'_> {
@@ -407,13 +413,18 @@ impl Kernel for Charges<'_> {
 
     #[inline(always)]
     fn run(self) -> Counts {
+        let Self { line, expected, charge, mut read_noise } = self;
         let mut counts = Counts::default();
         let mut scratch = Scratch::default();
-        for span in spans(self.line.first_column, self.expected.len()) {
-            let run = self.line.run(&span);
-            let (expected, charge) = (&self.expected[span.clone()], &mut self.charge[span]);
+        for span in spans(line.first_column, expected.len()) {
+            let run = line.run(&span);
             run.make_temporal(&mut scratch.words);
-            self.line.charges(&run, &mut scratch, expected, charge, &mut counts);
+            line.charges(&run, &mut scratch, &expected[span.clone()], &mut charge[span.clone()], &mut counts);
+            if let Some(read_noise) = &mut read_noise {
+                let made = line.read_noise(&run, &mut scratch);
+                let of_span = &mut read_noise[span];
+                of_span.copy_from_slice(&made[..of_span.len()]);
+            }
         }
         counts
     }
@@ -531,20 +542,30 @@ impl Line<'_> {
         (!any).then_some([even, odd])
     }
 
-    /// Reads packets of charge out; gives the number of samples that are not finite.
+    /// Draws the read noise of each photosite. The run's temporal words are made.
     #[inline(always)]
-    fn read(&self, run: &Run, words: &RunWords, normals: &mut [f32; LONGEST_RUN], charge: &mut [f32]) -> u64 {
-        if self.model.read_noise_e > 0.0 {
-            let normals = &mut normals[..run.length];
-            run.normals(words, Source::Ron, normals);
-            let rms = to_sample(self.model.read_noise_e);
-            for (charge, &normal) in charge.iter_mut().zip(&*normals) {
-                *charge += rms * normal;
-            }
-        }
-        let not_finite = charge.iter().fold(0_u32, |count, charge| count + u32::from(!charge.is_finite()));
-        u64::from(not_finite)
+    fn read_noise<'a>(&self, run: &Run, scratch: &'a mut Scratch) -> &'a [f32] {
+        let noise = &mut scratch.normals[..run.length];
+        run.normals(&scratch.words, Source::Ron, noise);
+        let rms = to_sample(self.model.read_noise_e);
+        noise.iter_mut().for_each(|noise| *noise *= rms);
+        noise
     }
+}
+
+/// Adds numbers to samples.
+#[inline(always)]
+fn add(samples: &mut [f32], numbers: &[f32]) {
+    for (sample, number) in samples.iter_mut().zip(numbers) {
+        *sample += number;
+    }
+}
+
+/// How many samples are not finite.
+#[inline(always)]
+fn not_finite(samples: &[f32]) -> u64 {
+    let count = samples.iter().fold(0_u32, |count, sample| count + u32::from(!sample.is_finite()));
+    u64::from(count)
 }
 
 /// Multiplies each number by max(0, 1 + σ n).
