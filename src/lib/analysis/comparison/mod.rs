@@ -1,28 +1,22 @@
 //! Comparison of images and colors, pixel by pixel: which white they are seen under, what each pair differs by.
 
+mod white;
+
 use crate::color::difference::{Difference, DifferenceReport, Differences};
-use crate::color::{D65_XY, Space, White, lab_from_xyz, xyz_of_chromaticity};
+use crate::color::{Space, lab_from_xyz, xyz_of_chromaticity};
 use crate::error::{Error, Result};
-use crate::frame::{Geometry, bare_name, to_sample};
+use crate::frame::{Geometry, to_sample};
 use crate::metadata::FrameHeader;
-use crate::stream::{RowSink, RowSource};
-use crate::units::QuantityKind;
+use crate::stream::{Band, RowSink, RowSource, fold, fold_into};
+use crate::units::{Any, QuantityKind};
 use rayon::prelude::*;
 use serde::Serialize;
+use white::{space_of, white};
 
-/// Luminance of the white of colors that are given as numbers and name none: the 100 of CIE tables, cd m⁻².
-pub const NUMBERS_WHITE_LUMINANCE: f64 = 100.0;
+pub use white::{ComparisonSettings, NUMBERS_WHITE_LUMINANCE};
 
 /// Channels of a map of differences, in the order in which files have them.
 pub const MAP_CHANNELS: [&str; 4] = ["delta_e_2000", "delta_e_76", "delta_e_94", "jnd"];
-
-/// Names of the planes that a frame of colors can lead with; L\*a\*b\* and xyY name themselves.
-const PLANES: [([&str; 3], Option<Space>); 4] = [
-    (["R", "G", "B"], None),
-    (["X", "Y", "Z"], None),
-    (["x", "y", "Y"], Some(Space::Xyy)),
-    (["L", "a", "b"], Some(Space::Lab)),
-];
 
 /// One of the two that are compared.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,17 +25,6 @@ pub enum Side<S> {
     Frame(S),
     /// A color, the same against every pixel.
     Color([f64; 3]),
-}
-
-/// What a user may set of a comparison.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ComparisonSettings {
-    /// What frames without metadata hold, and colors given as numbers are; XYZ where none is given.
-    pub space: Option<Space>,
-    /// The white of XYZ and xyY.
-    pub white: Option<White>,
-    /// Luminance of the white in cd m⁻².
-    pub white_luminance: Option<f64>,
 }
 
 /// What is said of a comparison.
@@ -108,10 +91,7 @@ impl<S: RowSource> Comparison<S> {
 
     /// The same, to close them.
     pub fn frames_mut(&mut self) -> impl Iterator<Item = &mut S> {
-        self.sides.iter_mut().filter_map(|side| match side {
-            Side::Frame(frame) => Some(frame),
-            Side::Color(_) => None,
-        })
+        self.sides.iter_mut().filter_map(Side::frame_mut)
     }
 
     /// Rows to compare; 0 of two colors.
@@ -148,7 +128,7 @@ impl<S: RowSource> Comparison<S> {
     /// # Errors
     ///
     /// Those of the sources and of the sink.
-    pub fn run(&mut self, mut map: Option<&mut dyn RowSink>, progress: &mut dyn FnMut(usize)) -> Result<()> {
+    pub fn run(&mut self, map: Option<&mut dyn RowSink>, progress: &mut dyn FnMut(usize)) -> Result<()> {
         let Self { sides, spaces, white, geometry, differences } = self;
         let (spaces, white) = (*spaces, *white);
         let Some(geometry) = geometry else {
@@ -157,43 +137,36 @@ impl<S: RowSource> Comparison<S> {
             }
             return Ok(());
         };
-        let natural = sides.iter().filter_map(Side::frame).map(S::natural_rows).fold(1, usize::max);
-        let band_rows = geometry.band_rows(geometry.step_rows(natural), 1);
-        let mut bands = [Vec::new(), Vec::new()];
-        let mut made = Vec::new();
-        let mut first = 0;
-        while first < geometry.height {
-            let rows = band_rows.min(geometry.height - first);
-            for (side, band) in sides.iter_mut().zip(&mut bands) {
-                if let Side::Frame(frame) = side {
-                    band.clear();
-                    frame.read(rows, band)?;
-                }
-            }
-            let views = [0, 1].map(|i| View::of(&sides[i], &bands[i]));
-            let compared: Vec<Vec<Difference>> = (0..rows)
-                .into_par_iter()
-                .map(|row| {
-                    let at = |x: usize| difference(views.map(|view| view.at(row, x)), spaces, white);
-                    (0..geometry.width).map(at).collect()
-                })
-                .collect();
-            made.clear();
-            for row in &compared {
-                differences.add(row);
-                if map.is_some() {
-                    let planes: [fn(&Difference) -> f64; 4] =
-                        [|d| d.delta_e_2000, |d| d.delta_e_76, |d| d.delta_e_94, Difference::jnd];
-                    planes.iter().for_each(|plane| made.extend(row.iter().map(|pixel| to_sample(plane(pixel)))));
-                }
-            }
-            if let Some(map) = &mut map {
-                map.write(&made)?;
-            }
-            first += rows;
-            progress(first);
+        let colors = sides.each_ref().map(Side::color);
+        let compared = |band: &Band| -> Vec<Vec<Difference>> {
+            let of_row = |y: usize| {
+                let lines = Line::of_both(band, y, colors);
+                (0..geometry.width).map(|x| difference(lines.map(|line| line.at(x)), spaces, white)).collect()
+            };
+            band.rows().into_par_iter().map(of_row).collect()
+        };
+        let frames = sides.iter_mut().filter_map(Side::frame_mut).map(|frame| -> &mut dyn RowSource { frame });
+        let mut take_in = |band: &Band| {
+            let rows = compared(band);
+            rows.iter().for_each(|row| differences.add(row));
+            rows
+        };
+        match map {
+            None => fold(frames, geometry.height, |band| {
+                take_in(band);
+                progress(band.rows().end);
+                Ok(())
+            }),
+            Some(map) => fold_into(frames, geometry.height, map, |band, outlet| {
+                let rows = take_in(band);
+                let row_samples = MAP_CHANNELS.len() * geometry.width;
+                outlet.make(rows.len() * row_samples, |made| {
+                    made.chunks_exact_mut(row_samples).zip(&rows).for_each(|(made, row)| draw(row, made));
+                })?;
+                progress(band.rows().end);
+                Ok(())
+            }),
         }
-        Ok(())
     }
 
     /// What was found so far.
@@ -223,6 +196,20 @@ impl<S: RowSource> Side<S> {
         }
     }
 
+    fn frame_mut(&mut self) -> Option<&mut S> {
+        match self {
+            Self::Frame(frame) => Some(frame),
+            Self::Color(_) => None,
+        }
+    }
+
+    fn color(&self) -> Option<[f64; 3]> {
+        match self {
+            Self::Frame(_) => None,
+            Self::Color(color) => Some(*color),
+        }
+    }
+
     fn header(&self) -> Option<&FrameHeader> {
         self.frame().map(S::header)
     }
@@ -235,31 +222,39 @@ impl<S: RowSource> Side<S> {
     }
 }
 
-/// A band of a frame, or a color that stands for all its pixels.
+/// A row of a frame, or a color that stands for all its pixels.
 #[derive(Clone, Copy)]
-enum View<'a> {
-    Band { samples: &'a [f32], width: usize, row_samples: usize },
+enum Line<'a> {
+    Planes([&'a [f32]; 3]),
     Color([f64; 3]),
 }
 
-impl<'a> View<'a> {
-    fn of<S: RowSource>(side: &Side<S>, samples: &'a [f32]) -> Self {
-        match side {
-            Side::Frame(frame) => {
-                let geometry = &frame.header().geometry;
-                Self::Band { samples, width: geometry.width, row_samples: geometry.row_samples() }
+impl<'a> Line<'a> {
+    /// Row `y` of both sides; `colors` are those that are no frame.
+    fn of_both(band: &'a Band, y: usize, colors: [Option<[f64; 3]>; 2]) -> [Self; 2] {
+        let mut frames = 0..;
+        colors.map(|color| match color {
+            Some(color) => Self::Color(color),
+            None => {
+                let window = band.window::<Any>(frames.next().unwrap_or_default());
+                Self::Planes([0, 1, 2].map(|plane| window.row(y.cast_signed(), plane)))
             }
-            Side::Color(color) => Self::Color(*color),
-        }
+        })
     }
 
-    fn at(self, row: usize, x: usize) -> [f64; 3] {
+    fn at(self, x: usize) -> [f64; 3] {
         match self {
-            Self::Band { samples, width, row_samples } => {
-                [0, 1, 2].map(|plane| f64::from(samples[row * row_samples + plane * width + x]))
-            }
+            Self::Planes(planes) => planes.map(|plane| f64::from(plane[x])),
             Self::Color(color) => color,
         }
+    }
+}
+
+/// Draws a row of the map, [`MAP_CHANNELS`] one after another.
+fn draw(row: &[Difference], made: &mut [f32]) {
+    let planes: [fn(&Difference) -> f64; 4] = [|d| d.delta_e_2000, |d| d.delta_e_76, |d| d.delta_e_94, Difference::jnd];
+    for (plane, line) in planes.iter().zip(made.chunks_exact_mut(row.len())) {
+        line.iter_mut().zip(row).for_each(|(sample, pixel)| *sample = to_sample(plane(pixel)));
     }
 }
 
@@ -276,113 +271,10 @@ fn difference(colors: [[f64; 3]; 2], spaces: [Space; 2], white: Option<[f64; 3]>
     Difference::between(lab(0), lab(1))
 }
 
-/// The space of a frame's colors: as its metadata say; or as was stated; or as its channels are called; or XYZ.
-fn space_of(frame: &FrameHeader, stated: Option<Space>) -> Result<Space> {
-    let holds = frame.holds();
-    let channels = frame.geometry.channels.iter().map(|name| bare_name(name)).take(3);
-    let named = PLANES.iter().find(|(planes, _)| channels.clone().eq(*planes));
-    let space = match frame.metadata.quantity {
-        QuantityKind::Xyz => Space::Xyz,
-        QuantityKind::Xyy => Space::Xyy,
-        QuantityKind::Lab => Space::Lab,
-        QuantityKind::Unspecified => stated.or(named.and_then(|(_, space)| *space)).unwrap_or(Space::Xyz),
-        QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu => {
-            return Err(frame.out_of_order(format!("it holds {holds}, not colors"), "to-xyz"));
-        }
-        QuantityKind::Srgb => {
-            return Err(frame.refuse(format!(
-                "it holds {holds}, a picture whose colors may be clipped; run `to-xyz --space lab` instead"
-            )));
-        }
-        QuantityKind::SpectralRadiance => {
-            return Err(frame.out_of_order(format!("it holds {holds}, not colors"), "render-radiance"));
-        }
-        QuantityKind::ColorDifference => {
-            return Err(frame.refuse(format!("it holds {holds}; give the images that it was made of")));
-        }
-    };
-    match named {
-        Some(_) => Ok(space),
-        None => Err(frame.refuse(format!("it holds {holds}; a color is three planes, the first three channels"))),
-    }
-}
-
-/// Whether two whites are equal but for what a text with seven digits may have lost.
-fn agree(a: [f64; 3], b: [f64; 3]) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs())
-}
-
-fn in_words([x, y, z]: [f64; 3]) -> String {
-    format!("XYZ {x:.6} {y:.6} {z:.6}")
-}
-
-/// The white that XYZ and xyY are seen under; none where both are L\*a\*b\*.
-///
-/// It is the one asked for, else that of a frame of L\*a\*b\*, else that which the reference or the other records, else D65. Where
-/// only its luminance is asked for, it is scaled.
-fn white(
-    headers: [Option<&FrameHeader>; 2],
-    spaces: [Space; 2],
-    settings: &ComparisonSettings,
-) -> Result<Option<[f64; 3]>> {
-    let recorded = [0, 1].map(|i| {
-        let header: &FrameHeader = headers[i]?;
-        Some((header, header.metadata.color.as_ref()?.white?))
-    });
-    let is_lab = spaces.map(|space| space == Space::Lab);
-    let of_lab = [0, 1].map(|i| recorded[i].filter(|_| is_lab[i]));
-    if let [Some((first, a)), Some((second, b))] = of_lab
-        && !agree(a, b)
-    {
-        return Err(second.refuse(format!(
-            "its L*a*b* refer to the white {}, those of {} to {}; make both with the same `to-xyz --white`",
-            in_words(b),
-            first.name,
-            in_words(a)
-        )));
-    }
-    if is_lab == [true, true] {
-        return Ok(None);
-    }
-    let of_lab = of_lab[0].or(of_lab[1]);
-    let known = of_lab.or(recorded[0]).or(recorded[1]).map(|(_, white)| white);
-    let luminance = || {
-        let unknown = (0..2).find_map(|i| headers[i].filter(|_| !is_lab[i]));
-        match (settings.white_luminance.or(known.map(|white| white[1])), unknown) {
-            (Some(luminance), _) => Ok(luminance),
-            (None, Some(frame)) => Err(frame.missing("color.white")),
-            (None, None) => Ok(NUMBERS_WHITE_LUMINANCE),
-        }
-    };
-    let white = match (settings.white, known) {
-        (Some(White::Absolute(_)), _) if settings.white_luminance.is_some() => {
-            return Err(
-                Error::Usage("a white of X,Y,Z has its luminance already".into()).leave_out(&["white_luminance"])
-            );
-        }
-        (Some(White::Absolute(white)), _) => white,
-        (Some(White::EqualEnergy), _) => xyz_of_chromaticity([1.0 / 3.0, 1.0 / 3.0], luminance()?),
-        (None, Some(known)) => match settings.white_luminance {
-            Some(luminance) => known.map(|value| value * luminance / known[1]),
-            None => known,
-        },
-        (Some(White::D65) | None, _) => xyz_of_chromaticity(D65_XY, luminance()?),
-    };
-    if !white.iter().all(|&value| value > 0.0 && value.is_finite()) {
-        return Err(Error::Usage(format!("a white of {} is impossible; all three must be above 0", in_words(white))));
-    }
-    match of_lab {
-        Some((frame, other)) if !agree(other, white) => {
-            let problem = format!("its L*a*b* refer to the white {}, not to {}", in_words(other), in_words(white));
-            Err(frame.refuse(problem).leave_out(&["white", "white_luminance"]))
-        }
-        _ => Ok(Some(white)),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::color::{D65_XY, White};
     use crate::metadata::{ColorRecord, Metadata};
     use crate::stream::MemoryFrame;
 
@@ -458,27 +350,6 @@ mod tests {
         assert!(matches!(refused(GREY, GREY, absolute, Some(1.0)), Error::Usage(_)));
         let impossible = Some(White::Absolute([1.0, 0.0, 1.0]));
         assert!(matches!(refused(GREY, GREY, impossible, None), Error::Usage(_)));
-    }
-
-    #[test]
-    fn frames_say_what_they_hold_or_are_refused() {
-        let space = |quantity, channels: &[&str], stated| {
-            space_of(&frame(quantity, None, channels).header, stated).map_err(|error| error.to_string())
-        };
-        use QuantityKind::{Adu, ColorDifference, Lab, Srgb, Unspecified, Xyy, Xyz};
-        assert_eq!(space(Xyz, &["R", "G", "B", "sigma.R"], Some(Space::Lab)), Ok(Space::Xyz));
-        assert_eq!(space(Lab, &["R", "G", "B"], None), Ok(Space::Lab));
-        assert_eq!(space(Xyy, &["x", "y", "Y"], None), Ok(Space::Xyy));
-        assert_eq!(space(Unspecified, &["left.R", "left.G", "left.B"], None), Ok(Space::Xyz));
-        assert_eq!(space(Unspecified, &["R", "G", "B", "A"], Some(Space::Lab)), Ok(Space::Lab));
-        assert_eq!(space(Unspecified, &["L", "a", "b"], None), Ok(Space::Lab));
-        for (quantity, channels) in [(Unspecified, &["Y"][..]), (Xyz, &["Y"]), (Unspecified, &["C0", "C1", "C2"])] {
-            assert!(space(quantity, channels, None).is_err_and(|error| error.contains("three planes")));
-        }
-        let first = space(Adu, &["R", "G", "B"], None).unwrap_err();
-        assert_eq!(first, "frame: it holds three planes of ADU, not colors; run `to-xyz` first");
-        assert!(space(Srgb, &["R", "G", "B"], None).is_err_and(|error| error.contains("to-xyz --space lab")));
-        assert!(space(ColorDifference, &MAP_CHANNELS, None).is_err());
     }
 
     /// xyY and L\*a\*b\* are the same colors as the XYZ that they were made of.
