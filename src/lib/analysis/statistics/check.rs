@@ -113,15 +113,15 @@ pub(super) struct Measured<'a> {
 }
 
 /// What is expected of it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Expected<'a> {
+#[derive(Debug, Clone)]
+pub(super) struct Expected {
     /// Mean.
     pub mean: [f64; 3],
     /// Variance of a photosite in steps² of what it is counted in, e⁻ or ADU: where it is so small that nearly all
     /// samples are the same, sums of them are not normal.
     pub site_variances: [f64; 3],
     /// How samples scatter.
-    pub sampling: &'a Sampling,
+    pub sampling: Sampling,
     /// Whether the channels are the classes of the photosites themselves.
     pub is_plane: bool,
 }
@@ -130,8 +130,8 @@ pub(super) struct Expected<'a> {
 const RARE: f64 = 25.0;
 
 /// Tests the channels `0..count` and their correlations.
-pub(super) fn tests(measured: &Measured<'_>, expected: &Expected<'_>) -> Vec<Test> {
-    let sampling = expected.sampling;
+pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
+    let sampling = &expected.sampling;
     let channels = measured.names.len();
     let least = expected.site_variances.iter().copied().fold(f64::INFINITY, f64::min);
     let is_rare = |i: usize| sampling.count * if expected.is_plane { expected.site_variances[i] } else { least } < RARE;
@@ -160,7 +160,7 @@ pub(super) fn pair(channels: [usize; 2]) -> usize {
     PAIRS.iter().position(|known| *known == channels).unwrap_or_default()
 }
 
-fn mean(measured: &Measured<'_>, expected: &Expected<'_>, i: usize) -> Test {
+fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
     let error = expected.sampling.mean_covariance[(i, i)].sqrt();
     let z = (measured.mean[i] - expected.mean[i]) / error;
     Test {
@@ -224,7 +224,7 @@ fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Te
 
 /// Where hardly a sample should deviate: P(mean square deviation ≥ d²) ≤ E d²/d² by Markov's inequality. What single
 /// precision rounds off is no deviation.
-fn deviation(measured: &Measured<'_>, expected: &Expected<'_>, i: usize) -> Test {
+fn deviation(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
     let n = expected.sampling.count;
     let offset = measured.mean[i] - expected.mean[i];
     let spread = if n > 1.0 { measured.covariance[(i, i)] * (n - 1.0) / n } else { 0.0 };

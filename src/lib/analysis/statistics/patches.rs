@@ -3,11 +3,15 @@
 //! The scene is not uniform, but each patch is, and its means tell the level: the expected electrons are worked back from
 //! them, and spread and covariance are predicted at these. The means are used up by that, and are not tested.
 
-use super::{Region, RegionReport, Report, Samplings, Tally, beyond_weights, rails, tallies};
-use crate::cfa::Class;
+use super::assessment::Assessment;
+use super::laws::{Samplings, beyond_weights};
+use super::region::Region;
+use super::report::{RegionReport, Report};
+use super::tally::{Tally, rails, tallies};
 use crate::color;
 use crate::error::{Error, Result};
 use crate::metadata::{FrameHeader, Scene};
+use crate::numerics::moments::Moments;
 use crate::propagation::sampling::{Place, Sampling, SamplingBasis};
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments};
 use crate::stages::demosaic::Method;
@@ -99,7 +103,7 @@ pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: 
     let patches = of_frame(&frame, size)?;
     let regions: Vec<Region> = patches.iter().map(|patch| patch.interior).collect();
     let rails = rails(&frame);
-    let tallies = tallies(source, &frame, &regions, rails)?;
+    let tallies = tallies(source, &regions, rails)?;
     let mut unpredicted = None;
     let mut reports: Vec<RegionReport> = match propagation::of_frame(&frame, equations) {
         Ok(known) => {
@@ -108,7 +112,7 @@ pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: 
             tallies
                 .map(|(tally, region)| {
                     let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, region);
-                    tally.report(&frame, region, rails, Some(&known), sampling, false)
+                    Assessment::new(tally, &frame, Some(&known), sampling).report(&frame, region, rails)
                 })
                 .collect()
         }
@@ -118,9 +122,10 @@ pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: 
             let tallies = tallies.par_iter().zip(&regions);
             tallies
                 .map(|(tally, region)| {
-                    let prediction = tally.prediction(&frame, equations);
+                    let prediction = at_means(tally, &frame, equations);
                     let sampling = |mixture: &PixelMoments| laws.sampling(mixture, region.place(&frame));
-                    let mut report = tally.report(&frame, *region, rails, prediction.as_ref(), sampling, false);
+                    let assessment = Assessment::new(tally, &frame, prediction.as_ref(), sampling);
+                    let mut report = assessment.report(&frame, *region, rails);
                     for channel in report.channels.iter_mut().chain(&mut report.classes) {
                         (channel.predicted_mean, channel.z_mean) = (None, None);
                     }
@@ -171,31 +176,27 @@ fn is_rendered(frame: &FrameHeader) -> bool {
     frame.metadata.scene.is_some() && !transferred
 }
 
-impl Tally {
-    /// What is predicted of a uniform scene whose means are those of the tally.
-    fn prediction(&self, frame: &FrameHeader, equations: Equations) -> Option<FramePrediction> {
-        if !is_rendered(frame) {
-            return None;
-        }
-        let expected = expected_electrons(frame, self.means(frame)?)?;
-        let mut uniform = frame.clone();
-        let scene = frame.metadata.scene.clone()?;
-        uniform.metadata.scene = Some(Scene { uniform: true, expected_electrons: Some(expected), ..scene });
-        propagation::of_frame(&uniform, equations).ok()
+/// What is predicted of a uniform scene whose means are those of a tally.
+fn at_means(tally: &Tally, frame: &FrameHeader, equations: Equations) -> Option<FramePrediction> {
+    if !is_rendered(frame) {
+        return None;
     }
+    let expected = expected_electrons(frame, means(tally)?)?;
+    let mut uniform = frame.clone();
+    let scene = frame.metadata.scene.clone()?;
+    uniform.metadata.scene = Some(Scene { uniform: true, expected_electrons: Some(expected), ..scene });
+    propagation::of_frame(&uniform, equations).ok()
+}
 
-    /// Means of the three planes, or of the classes of one; NaN for a class of which there is none.
-    fn means(&self, frame: &FrameHeader) -> Option<[f64; 3]> {
-        match (self.channels.channels(), frame.metadata.cfa) {
-            _ if self.channels.count == 0 => None,
-            (1, Some(_)) => Some(Class::ALL.map(|class| {
-                let moments = &self.classes[class as usize];
-                if moments.count > 0 { moments.mean[0] } else { f64::NAN }
-            })),
-            (1 | 2, _) => None,
-            _ => Some([0, 1, 2].map(|channel| self.channels.mean[channel])),
-        }
+/// Means of the three planes, or of the classes of one; NaN for a class of which there is none.
+fn means(tally: &Tally) -> Option<[f64; 3]> {
+    let Tally { channels, classes } = tally;
+    if channels.count == 0 {
+        return None;
     }
+    let of_class = |class: &Moments| if class.count > 0 { class.mean[0] } else { f64::NAN };
+    let of_planes = || channels.mean.first_chunk().copied();
+    classes.as_ref().map_or_else(of_planes, |classes| Some(classes.each_ref().map(of_class)))
 }
 
 /// Expected signal electrons of R, G and B in a patch whose samples have these means; 0 for a class of which the means
@@ -364,7 +365,7 @@ mod tests {
         let patches = measure(&mut frame(), None, Equations::Exact).unwrap();
         let regions: Vec<Region> = patches.regions.iter().map(|report| report.region).collect();
         assert_eq!(regions.len(), 9);
-        let plain = super::super::measure(&mut frame(), &regions, Equations::Exact, None).unwrap();
+        let plain = super::super::measure::measure(&mut frame(), &regions, Equations::Exact, None).unwrap();
         for (patch, region) in patches.regions.iter().zip(&plain.regions) {
             assert!(patch.patch.is_some() && patch.sample.is_some() && region.patch.is_none());
             assert_eq!(patch.covariance, region.covariance);

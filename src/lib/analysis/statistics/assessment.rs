@@ -1,0 +1,182 @@
+//! What was seen of a region, beside what is predicted of it.
+
+use super::check::{self, Measured, Test};
+use super::expectation::{Expectation, Predicted};
+use super::region::Region;
+use super::report::{ChannelReport, RegionReport};
+use super::tally::Tally;
+use crate::cfa::Class;
+use crate::metadata::FrameHeader;
+use crate::numerics::moments::Moments;
+use crate::numerics::sums::Limits;
+use crate::propagation::sampling::Sampling;
+use crate::propagation::{FramePrediction, PixelMoments};
+use crate::units::QuantityKind;
+use nalgebra::Matrix3;
+
+/// The groups of channels that a region is measured in.
+pub(super) struct Assessment<'a> {
+    /// All channels of the frame.
+    channels: Group<'a>,
+    /// The classes of a CFA plane, each by itself; none of other frames.
+    classes: Vec<Group<'a>>,
+}
+
+/// Channels that were observed together.
+struct Group<'a> {
+    names: Vec<String>,
+    moments: &'a Moments,
+    predicted: Predicted,
+}
+
+impl<'a> Assessment<'a> {
+    /// Lays a tally beside a prediction; `sampling` tells how mixed pixels scatter there.
+    pub fn new(
+        tally: &'a Tally,
+        frame: &FrameHeader,
+        prediction: Option<&FramePrediction>,
+        sampling: impl FnOnce(&PixelMoments) -> Sampling,
+    ) -> Self {
+        let count = tally.channels.count;
+        // Layers of standard deviations may follow the three planes of a demosaicked frame.
+        let is_demosaicked = frame.metadata.demosaic.is_some();
+        let planes = tally.channels.channels();
+        let is_three = count > 0 && (planes == 3 || (planes > 3 && is_demosaicked));
+        let counts = tally.classes.as_ref().map(|classes| classes.each_ref().map(|class| class.count));
+        let mut of_classes: [Predicted; 3] = Default::default();
+        let of_channels = match (prediction, counts) {
+            (Some(FramePrediction::Planes(predictions)), Some(counts)) => {
+                of_classes = [0, 1, 2].map(|k| Predicted::of_class(&predictions[k], counts[k]));
+                Predicted::of_cfa_plane(predictions, counts)
+            }
+            (Some(FramePrediction::Planes(predictions)), None) if is_three => Predicted::of_planes(predictions, count),
+            (Some(FramePrediction::Pixels(mixture)), None) if is_three => {
+                Predicted::of_pixels(mixture, sampling(mixture))
+            }
+            _ => Predicted::default(),
+        };
+        let names = (0..planes).map(|index| frame.channel_name(index).to_owned()).collect();
+        let channels = Group { names, moments: &tally.channels, predicted: of_channels };
+        let classes = tally.classes.iter().flatten().zip(Class::ALL).zip(of_classes);
+        let classes = classes.map(|((moments, class), predicted)| Group {
+            names: vec![class.letter().to_owned()],
+            moments,
+            predicted,
+        });
+        Self { channels, classes: classes.collect() }
+    }
+
+    /// What is said of the region, without tests.
+    pub fn report(&self, frame: &FrameHeader, region: Region, rails: Limits) -> RegionReport {
+        let metadata = &frame.metadata;
+        let black = match metadata.quantity {
+            QuantityKind::Adu => metadata.black_level_adu.unwrap_or(0.0),
+            QuantityKind::Electrons => metadata.dark_signal_e.unwrap_or(0.0),
+            _ => 0.0,
+        };
+        let has_rails = !rails.high.is_nan();
+        let reports = |group: &Group<'_>| -> Vec<ChannelReport> {
+            (0..group.names.len()).map(|index| group.channel(index, black, has_rails)).collect()
+        };
+        let mut channels = reports(&self.channels);
+        if let ([plane], false) = (&mut channels[..], self.classes.is_empty()) {
+            (plane.mean_error, plane.std_error) = self.plane_errors();
+        }
+        let Group { moments, predicted, .. } = &self.channels;
+        let row = |i| (0..channels.len()).map(|j| moments.covariance(i, j)).collect::<Option<Vec<f64>>>();
+        RegionReport {
+            region,
+            patch: None,
+            sample: None,
+            count: moments.count,
+            not_finite: moments.not_finite,
+            quantity: metadata.quantity,
+            unit: metadata.unit.clone(),
+            classes: self.classes.iter().flat_map(reports).collect(),
+            covariance: (0..channels.len()).map(row).collect(),
+            channels,
+            predicted_covariance: predicted.covariance.clone(),
+            patch_mean_std: predicted.mean_std.clone(),
+            tests: Vec::new(),
+        }
+    }
+
+    /// Tests of everything that is predicted.
+    pub fn tests(&self) -> Vec<Test> {
+        std::iter::once(&self.channels).chain(&self.classes).flat_map(Group::tests).collect()
+    }
+
+    /// Standard errors of mean and standard deviation of a CFA plane, whose classes have shares w that are not drawn.
+    ///
+    /// x̄ = Σ w x̄ₖ,  s² ≈ Σ w (sₖ² + (x̄ₖ − x̄)²),  so that to first order
+    /// var x̄ = Σ w² sₖ²/nₖ,  var s² = Σ w² (2 sₖ⁴/(nₖ − 1) + 4 (x̄ₖ − x̄)² sₖ²/nₖ)
+    fn plane_errors(&self) -> (Option<f64>, Option<f64>) {
+        let plane = self.channels.moments;
+        let total = plane.count as f64;
+        let (mut of_mean, mut of_variance) = (0.0, 0.0);
+        for class in self.classes.iter().map(|class| class.moments).filter(|class| class.count > 0) {
+            let Some(variance) = class.covariance(0, 0) else { return (None, None) };
+            let (n, offset) = (class.count as f64, class.mean[0] - plane.mean[0]);
+            let share = (n / total).powi(2);
+            of_mean += share * variance / n;
+            of_variance += share * (2.0 * variance * variance / (n - 1.0) + 4.0 * offset * offset * variance / n);
+        }
+        let std = plane.std(0);
+        let of_std = std.map(|std| if std > 0.0 { of_variance.sqrt() / (2.0 * std) } else { 0.0 });
+        (std.map(|_| of_mean.sqrt()), of_std)
+    }
+}
+
+impl Group<'_> {
+    /// What is said of a channel.
+    fn channel(&self, index: usize, black: f64, has_rails: bool) -> ChannelReport {
+        let moments = self.moments;
+        let expectation = self.predicted.channels.get(index);
+        let count = moments.count;
+        let seen = |value: f64| (count > 0).then_some(value);
+        let mean = seen(moments.mean[index]);
+        let std = moments.std(index);
+        let ratio_db = |mean: f64, std: f64| {
+            let ratio = (mean - black) / std;
+            (ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
+        };
+        let spread = expectation.filter(|expected| expected.std > 0.0);
+        let n = count as f64;
+        // Errors of independent normal samples, relative to their standard deviation.
+        let independent = (1.0 / n.sqrt(), (2.0 * (n - 1.0)).sqrt().recip());
+        let known = |expected: &Expectation| (expected.mean_error / expected.sample_std, expected.std_error);
+        let is_known = |errors: &(f64, f64)| errors.0.is_finite() && errors.1.is_finite();
+        let (mean_error, std_error) = expectation.map(known).filter(is_known).unwrap_or(independent);
+        ChannelReport {
+            name: self.names[index].clone(),
+            count,
+            mean,
+            std,
+            min: seen(moments.min[index]),
+            max: seen(moments.max[index]),
+            snr_db: mean.zip(std).and_then(|(mean, std)| ratio_db(mean, std)),
+            clipped: has_rails.then_some(moments.beyond[index]),
+            predicted_mean: expectation.map(|expected| expected.mean),
+            predicted_std: expectation.map(|expected| expected.std),
+            z_mean: mean.zip(spread).map(|(mean, expected)| (mean - expected.mean) / expected.mean_error),
+            z_std: std.zip(spread).map(|(std, expected)| (std / expected.sample_std - 1.0) / expected.std_error),
+            mean_error: std.map(|std| std * mean_error),
+            std_error: std.map(|std| std * std_error),
+        }
+    }
+
+    /// Tests of what is predicted of the channels.
+    fn tests(&self) -> Vec<Test> {
+        let Some(expected) = &self.predicted.tested else { return Vec::new() };
+        let tested = self.predicted.channels.len();
+        // The one channel of a class stands for all three.
+        let place = |i: usize| i.min(tested - 1);
+        let covariance = |i, j| self.moments.covariance(place(i), place(j)).unwrap_or(0.0);
+        let measured = Measured {
+            names: &self.names[..tested],
+            mean: [0, 1, 2].map(|i| self.moments.mean[place(i)]),
+            covariance: Matrix3::from_fn(covariance),
+        };
+        check::tests(&measured, expected)
+    }
+}

@@ -1,0 +1,135 @@
+//! What is predicted of the samples of a region.
+
+use super::check::{Expected, pair};
+use crate::numerics::normal::MeanVariance;
+use crate::propagation::sampling::Sampling;
+use crate::propagation::{PixelMoments, Prediction};
+use nalgebra::Matrix3;
+
+/// What is predicted of channels that are observed together; nothing by default.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Predicted {
+    /// Of each of them; of the first three where layers follow.
+    pub channels: Vec<Expectation>,
+    /// Covariance over all pixels of a large frame.
+    pub covariance: Option<Vec<Vec<f64>>>,
+    /// Standard deviations of the means.
+    pub mean_std: Option<Vec<f64>>,
+    /// What can be tested.
+    pub tested: Option<Expected>,
+}
+
+/// What is expected of one channel of a sample.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Expectation {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation of the population.
+    pub std: f64,
+    /// Standard error of the sample mean.
+    pub mean_error: f64,
+    /// Root of the expected sample variance.
+    pub sample_std: f64,
+    /// Relative standard error of the sample standard deviation.
+    pub std_error: f64,
+}
+
+impl Predicted {
+    /// Of `count` pixels of three planes that are drawn apart.
+    pub fn of_planes(classes: &[Prediction; 3], count: u64) -> Self {
+        let sampling = Sampling::independent(classes, count as f64);
+        let expected = Expected {
+            mean: classes.map(|class| class.moments.mean),
+            site_variances: classes.map(|class| class.moments.variance),
+            sampling,
+            is_plane: true,
+        };
+        Self::of_three(&expected.sampling.covariance.clone(), expected)
+    }
+
+    /// Of mixed pixels that scatter as `sampling` says.
+    pub fn of_pixels(mixture: &PixelMoments, sampling: Sampling) -> Self {
+        let site_variances = mixture.sites.map(|site| site.moments.variance);
+        let expected = Expected { mean: mixture.mean, site_variances, sampling, is_plane: false };
+        Self::of_three(&mixture.covariance, expected)
+    }
+
+    fn of_three(covariance: &Matrix3<f64>, expected: Expected) -> Self {
+        let sampling = &expected.sampling;
+        let channel = |i: usize| {
+            let (index, sample_variance) = (pair([i, i]), sampling.covariance[(i, i)]);
+            Expectation {
+                mean: expected.mean[i],
+                std: covariance[(i, i)].max(0.0).sqrt(),
+                mean_error: sampling.mean_covariance[(i, i)].sqrt(),
+                sample_std: sample_variance.max(0.0).sqrt(),
+                std_error: sampling.spread[index][index].sqrt() / (2.0 * sample_variance),
+            }
+        };
+        Self {
+            channels: (0..3).map(channel).collect(),
+            covariance: Some((0..3).map(|i| (0..3).map(|j| covariance[(i, j)]).collect()).collect()),
+            mean_std: Some((0..3).map(|i| sampling.mean_covariance[(i, i)].sqrt()).collect()),
+            tested: Some(expected),
+        }
+    }
+
+    /// Of `count` independent samples of one class of a CFA plane.
+    pub fn of_class(prediction: &Prediction, count: u64) -> Self {
+        let expected = Expected {
+            mean: [prediction.moments.mean; 3],
+            site_variances: [prediction.moments.variance; 3],
+            sampling: Sampling::independent(&[*prediction; 3], count as f64),
+            is_plane: true,
+        };
+        Self { tested: (count > 0).then_some(expected), ..Self::of_one(prediction, count) }
+    }
+
+    /// Of a CFA plane that has so many samples of each class; nothing of none.
+    pub fn of_cfa_plane(classes: &[Prediction; 3], counts: [u64; 3]) -> Self {
+        let total = counts.iter().sum();
+        mixed(classes, counts).map_or_else(Self::default, |prediction| Self::of_one(&prediction, total))
+    }
+
+    fn of_one(prediction: &Prediction, count: u64) -> Self {
+        let expectation = Expectation::of(prediction, count);
+        let std = expectation.std;
+        Self {
+            channels: vec![expectation],
+            covariance: Some(vec![vec![std * std]]),
+            mean_std: (count > 0).then(|| vec![std / (count as f64).sqrt()]),
+            tested: None,
+        }
+    }
+}
+
+impl Expectation {
+    /// Of `count` independent samples.
+    fn of(prediction: &Prediction, count: u64) -> Self {
+        let n = count as f64;
+        let std = prediction.moments.std();
+        // Var(s²) = σ⁴ (2/(n−1) + κ/n); the standard deviation has a quarter of its relative variance.
+        let std_error = ((2.0 / (n - 1.0) + prediction.excess_kurtosis / n).max(0.0) / 4.0).sqrt();
+        Self { mean: prediction.moments.mean, std, mean_error: std / n.sqrt(), sample_std: std, std_error }
+    }
+}
+
+/// The prediction for samples of three classes, so many of each, taken as those of one variable; none of none.
+fn mixed(classes: &[Prediction; 3], counts: [u64; 3]) -> Option<Prediction> {
+    let total: u64 = counts.iter().sum();
+    if total == 0 {
+        return None;
+    }
+    let shares = counts.map(|count| count as f64 / total as f64);
+    let mean: f64 = shares.iter().zip(classes).map(|(w, p)| w * p.moments.mean).sum();
+    let offsets = classes.each_ref().map(|p| p.moments.mean - mean);
+    let variance: f64 = (0..3).map(|k| shares[k] * (classes[k].moments.variance + offsets[k].powi(2))).sum();
+    let fourth: f64 = (0..3)
+        .map(|k| {
+            let (v, d) = (classes[k].moments.variance, offsets[k]);
+            shares[k] * ((3.0 + classes[k].excess_kurtosis) * v * v + 6.0 * v * d * d + d.powi(4))
+        })
+        .sum();
+    let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) - 3.0 } else { 0.0 };
+    Some(Prediction { moments: MeanVariance { mean, variance }, excess_kurtosis })
+}

@@ -1,0 +1,32 @@
+//! How samples of mixed pixels scatter in the regions of a frame.
+
+use super::region::Region;
+use crate::metadata::FrameHeader;
+use crate::propagation::sampling::{Place, Sampling};
+use crate::propagation::{PixelMoments, gains};
+use nalgebra::Matrix3;
+
+/// Sampling laws by place: regions of one size and phase share one.
+#[derive(Default)]
+pub(super) struct Samplings(Vec<(Place, Sampling)>);
+
+impl Samplings {
+    /// The law of a region of a frame of mixed pixels.
+    pub fn of(&mut self, mixture: &PixelMoments, frame: &FrameHeader, region: Region) -> Sampling {
+        let place = region.place(frame);
+        if let Some((_, known)) = self.0.iter().find(|(of, _)| *of == place) {
+            return known.clone();
+        }
+        let mut made = Sampling::of(&mixture.weights, &mixture.sites, &place);
+        made.covariance += beyond_weights(mixture);
+        self.0.push((place, made.clone()));
+        made
+    }
+}
+
+/// What is predicted of the covariance beyond the weights: the second order of smooth hue transition, or the paper's
+/// equations.
+pub(super) fn beyond_weights(mixture: &PixelMoments) -> Matrix3<f64> {
+    let variances = mixture.sites.map(|site| site.moments.variance);
+    mixture.covariance - gains::mean_pixel(&mixture.weights).covariance(variances)
+}

@@ -1,0 +1,130 @@
+//! Reads a frame and measures its regions.
+
+use super::assessment::Assessment;
+use super::check::Verdict;
+use super::laws::Samplings;
+use super::region::Region;
+use super::report::{RegionReport, Report};
+use super::tally::{Tally, rails, tallies};
+use crate::error::{Error, Result};
+use crate::propagation::{self, Equations, FramePrediction, PixelMoments};
+use crate::stream::RowSource;
+
+/// Reads a whole frame and works out the statistics of its regions.
+///
+/// Rows are summed one by one and merged in order, so the result is the same at any number of threads. With a `level`,
+/// every prediction is tested.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for a region outside the frame, [`Error::Data`] where a test is wanted and nothing can be predicted,
+/// and those of the source.
+pub fn measure(
+    source: &mut dyn RowSource,
+    regions: &[Region],
+    equations: Equations,
+    level: Option<f64>,
+) -> Result<Report> {
+    let frame = source.header().clone();
+    let whole = [Region::whole(&frame)];
+    let regions = if regions.is_empty() { &whole } else { regions };
+    for region in regions {
+        region.check(&frame)?;
+    }
+    let rails = rails(&frame);
+    // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
+    let prediction = propagation::of_frame(&frame, equations);
+    let mut samplings = Samplings::default();
+    if let Ok(FramePrediction::Pixels(mixture)) = &prediction {
+        for region in regions {
+            samplings.of(mixture, &frame, *region);
+        }
+    }
+    let tallies = tallies(source, regions, rails)?;
+    if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+        return Err(Error::Data(format!(
+            "{}: nothing can be checked: charge transfer mixes neighbours, differently from place to place",
+            frame.name
+        )));
+    }
+    let report = |(region, tally): (&Region, &Tally)| {
+        let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, *region);
+        let assessment = Assessment::new(tally, &frame, prediction.as_ref().ok(), sampling);
+        let tests = if level.is_some() { assessment.tests() } else { Vec::new() };
+        RegionReport { tests, ..assessment.report(&frame, *region, rails) }
+    };
+    let regions = regions.iter().zip(&tallies).map(report).collect();
+    let mut report = Report { regions, check: None, unpredicted: prediction.err() };
+    if let Some(level) = level {
+        let regions = report.regions.iter().map(|region| (&region.tests[..], region.not_finite));
+        report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted)?);
+    }
+    Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cfa::CfaPattern;
+    use crate::frame::Geometry;
+    use crate::metadata::{FrameHeader, Metadata};
+    use crate::stream::MemoryFrame;
+    use crate::units::QuantityKind;
+
+    fn frame(channels: &[&str], width: usize, height: usize, f: impl Fn(usize) -> f32) -> MemoryFrame {
+        let geometry = Geometry::new(width, height, channels);
+        let samples = (0..geometry.row_samples() * height).map(f).collect();
+        let header = FrameHeader { name: "test".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+        MemoryFrame::new(header, samples)
+    }
+
+    #[test]
+    fn regions_see_their_own_samples() {
+        let mut ramp = frame(&["Y"], 10, 8, |i| i as f32);
+        let region = Region { x: 2, y: 3, width: 3, height: 2 };
+        let report = measure(&mut ramp, &[region], Equations::Exact, None).unwrap();
+        let channel = &report.regions[0].channels[0];
+        assert_eq!((channel.min, channel.max, channel.mean), (Some(32.0), Some(44.0), Some(38.0)));
+        let outside = Region { x: 8, ..region };
+        let again = measure(&mut frame(&["Y"], 10, 8, |i| i as f32), &[outside], Equations::Exact, None);
+        assert!(again.unwrap_err().to_string().contains("does not lie within"));
+    }
+
+    #[test]
+    fn classes_of_a_plane_are_told_apart_wherever_the_region_starts() {
+        let mut plane = frame(&["Y"], 8, 6, |i| [10.0, 20.0, 20.0, 30.0][(i / 8 % 2) * 2 + i % 2]);
+        plane.header.metadata.cfa = Some(CfaPattern::Rggb);
+        let region = Region { x: 1, y: 1, width: 5, height: 4 };
+        let report = measure(&mut plane, &[region], Equations::Exact, None).unwrap();
+        let means: Vec<_> = report.regions[0].classes.iter().map(|class| class.mean).collect();
+        assert_eq!(means, [Some(10.0), Some(20.0), Some(30.0)]);
+    }
+
+    /// Of independent normal samples 1/√n and 1/√(2(n − 1)) of the standard deviation; of a plane, those of its classes.
+    #[test]
+    fn errors_are_those_of_independent_samples() {
+        let noise = |i: usize| ((i * 7919 + i * i * 31) % 1009) as f32 / 1009.0;
+        let report = measure(&mut frame(&["Y"], 40, 30, noise), &[], Equations::Exact, None).unwrap();
+        let channel = &report.regions[0].channels[0];
+        let std = channel.std.unwrap();
+        assert!((channel.mean_error.unwrap() / std * 1200_f64.sqrt() - 1.0).abs() < 1e-12);
+        assert!((channel.std_error.unwrap() / std * 2398_f64.sqrt() - 1.0).abs() < 1e-12);
+        // Classes 100 apart: the error of the mean is that of their own scatter, not of their distance.
+        let mut plane = frame(&["Y"], 40, 30, |i| noise(i) + 100.0 * [1.0, 2.0, 2.0, 3.0][(i / 40 % 2) * 2 + i % 2]);
+        plane.header.metadata.cfa = Some(CfaPattern::Rggb);
+        let report = measure(&mut plane, &[], Equations::Exact, None).unwrap();
+        let (whole, classes) = (&report.regions[0].channels[0], &report.regions[0].classes);
+        let of_classes = |k: usize| classes[k].mean_error.unwrap() * [0.25, 0.5, 0.25][k];
+        let expected = (0..3).map(|k| of_classes(k).powi(2)).sum::<f64>().sqrt();
+        assert!((whole.mean_error.unwrap() / expected - 1.0).abs() < 1e-9);
+        assert!(whole.std.unwrap() > 70.0 && whole.std_error.unwrap() < 0.01);
+    }
+
+    #[test]
+    fn one_sample_has_a_mean_and_no_spread() {
+        let report = measure(&mut frame(&["Y"], 1, 1, |_| 7.0), &[], Equations::Exact, None).unwrap();
+        let channel = &report.regions[0].channels[0];
+        assert_eq!((channel.mean, channel.std, channel.snr_db), (Some(7.0), None, None));
+        assert_eq!(report.regions[0].covariance, None);
+    }
+}

@@ -1,0 +1,63 @@
+//! A rectangle of a frame.
+
+use crate::error::{Error, Result};
+use crate::metadata::FrameHeader;
+use crate::propagation::sampling::Place;
+use serde::Serialize;
+use std::ops::Range;
+
+/// A rectangle of a frame, counted from the frame's own corner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Region {
+    /// First column.
+    pub x: usize,
+    /// First row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Region {
+    /// All of a frame.
+    pub fn whole(frame: &FrameHeader) -> Self {
+        Self { x: 0, y: 0, width: frame.geometry.width, height: frame.geometry.height }
+    }
+
+    /// The rows of the frame that belong to the region, among some.
+    pub(super) fn rows_among(&self, rows: &Range<usize>) -> Range<usize> {
+        self.y.max(rows.start)..(self.y + self.height).min(rows.end)
+    }
+
+    /// A place of the same sampling law.
+    pub(super) fn place(&self, frame: &FrameHeader) -> Place {
+        let geometry = &frame.geometry;
+        let whole = Place {
+            frame: [geometry.width, geometry.height],
+            origin: geometry.origin,
+            corner: [self.x, self.y],
+            size: [self.width, self.height],
+        };
+        whole.canonical()
+    }
+
+    /// Checks that the region has pixels and lies within a frame.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] otherwise.
+    pub fn check(&self, frame: &FrameHeader) -> Result<()> {
+        let Self { x, y, width, height } = *self;
+        let geometry = &frame.geometry;
+        let inside = x.checked_add(width).is_some_and(|end| end <= geometry.width)
+            && y.checked_add(height).is_some_and(|end| end <= geometry.height);
+        if inside && width > 0 && height > 0 {
+            return Ok(());
+        }
+        Err(Error::Usage(format!(
+            "{}: region {x},{y},{width},{height} does not lie within the frame of {}x{}",
+            frame.name, geometry.width, geometry.height
+        )))
+    }
+}

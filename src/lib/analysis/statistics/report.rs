@@ -1,0 +1,91 @@
+//! What is said of a frame, its regions and their channels.
+
+use super::check::{Test, Verdict};
+use super::region::Region;
+use crate::propagation::Unpredictable;
+use crate::units::QuantityKind;
+use serde::Serialize;
+
+/// Everything that is said of a frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// One entry per region; the whole frame where none was named.
+    pub regions: Vec<RegionReport>,
+    /// Whether all predictions hold, where that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub check: Option<Verdict>,
+    /// Why nothing is predicted of the frame as a whole, where that is so.
+    #[serde(skip)]
+    pub unpredicted: Option<Unpredictable>,
+}
+
+/// What is said of a region.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegionReport {
+    /// The rectangle.
+    pub region: Region,
+    /// Column and row of the patch in its chart, where patches are measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch: Option<[usize; 2]>,
+    /// Number of the patch, row by row, from 0; where the width of the chart is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample: Option<usize>,
+    /// Pixels whose samples are all finite.
+    pub count: u64,
+    /// Pixels left out because a sample is NaN or infinite.
+    pub not_finite: u64,
+    /// Quantity and unit of the samples.
+    pub quantity: QuantityKind,
+    /// Unit.
+    pub unit: String,
+    /// Statistics of each channel.
+    pub channels: Vec<ChannelReport>,
+    /// Statistics of the classes of a CFA plane.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub classes: Vec<ChannelReport>,
+    /// Sample covariance of the channels (divisor n − 1).
+    pub covariance: Option<Vec<Vec<f64>>>,
+    /// The same by formula.
+    pub predicted_covariance: Option<Vec<Vec<f64>>>,
+    /// Predicted standard deviation of the mean of the region in each channel.
+    pub patch_mean_std: Option<Vec<f64>>,
+    /// Tests of the predictions, where they were asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tests: Vec<Test>,
+}
+
+/// Statistics of one channel, or of one class of a CFA plane.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelReport {
+    /// Name.
+    pub name: String,
+    /// Finite samples.
+    pub count: u64,
+    /// Mean.
+    pub mean: Option<f64>,
+    /// Sample standard deviation (divisor n − 1).
+    pub std: Option<f64>,
+    /// Smallest sample.
+    pub min: Option<f64>,
+    /// Largest sample.
+    pub max: Option<f64>,
+    /// 20 log₁₀ of the mean above black over the standard deviation.
+    pub snr_db: Option<f64>,
+    /// Samples at the ends of the range: codes 0 and 2^bits − 1, or electrons at full well or above.
+    pub clipped: Option<u64>,
+    /// Mean by formula.
+    pub predicted_mean: Option<f64>,
+    /// Standard deviation by formula.
+    pub predicted_std: Option<f64>,
+    /// (mean − predicted) over its sampling error, which knows that demosaicked neighbours are correlated.
+    pub z_mean: Option<f64>,
+    /// (std / expected − 1) over its sampling error, that of independent samples √((2 + κ n⁄(n−1)) / 4n), κ the excess
+    /// kurtosis.
+    pub z_std: Option<f64>,
+    /// Standard error of the mean: s/√n_eff. Where a prediction knows how demosaicked neighbours are correlated, n_eff is
+    /// its effective number; elsewhere samples count as independent, in a CFA plane within each class.
+    pub mean_error: Option<f64>,
+    /// Standard error of the standard deviation: with a prediction s times its relative one, elsewhere s/√(2(n − 1)), that
+    /// of independent normal samples; in a CFA plane from those of its classes.
+    pub std_error: Option<f64>,
+}
