@@ -14,7 +14,8 @@ use cyanometer::propagation::Equations;
 use cyanometer::random::Source;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
-use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings, LessDarks};
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::darks::{DarkFrames, LessDarks};
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
@@ -282,10 +283,9 @@ fn dark_frames_bring_their_noise_and_take_the_pattern() {
     let light = exposure(&scene(size, [200.0, 400.0, 300.0]), 0);
     let all: Vec<MemoryFrame> = (1..10).map(|frame| exposure(&scene(size, [0.0; 3]), frame)).collect();
     for count in [1, 2, 9] {
-        let mut darks = all[..count].to_vec();
-        let headers: Vec<_> = all[..count].iter().map(|dark| &dark.header).collect();
+        let mut darks = DarkFrames::of(all[..count].to_vec()).unwrap().unwrap();
         let settings = CorrectionSettings { black: Black::None, cte: None };
-        let stage = CorrectFrame::new(&light.header, &settings, &headers).unwrap();
+        let stage = CorrectFrame::new(&light.header, &settings, Some(darks.stack())).unwrap();
         let mut source = MemoryFrame::new(light.header.clone(), light.samples.clone());
         let mut corrected = MemoryFrame::new(stage.header().clone(), Vec::new());
         let mut less = LessDarks::new(&mut source, &mut darks);

@@ -13,7 +13,8 @@ use cyanometer::metadata::{FrameHeader, PoissonKind};
 use cyanometer::random::Source;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
-use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings, LessDarks};
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::darks::{DarkFrames, DarkStack, LessDarks};
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings, rectified_mean, rectified_mean_square};
@@ -59,7 +60,7 @@ fn digitizer(header: &FrameHeader) -> Digitize {
 }
 
 fn correction(header: &FrameHeader, black: Black, cte: Option<f64>) -> CorrectFrame {
-    CorrectFrame::new(header, &CorrectionSettings { black, cte }, &[]).unwrap()
+    CorrectFrame::new(header, &CorrectionSettings { black, cte }, None).unwrap()
 }
 
 fn color_settings(space: Space) -> ColorSettings {
@@ -875,13 +876,13 @@ fn darks_are_subtracted_in_step() {
     let codes =
         |seed: usize| plane([31, 17], [0, 0], CfaPattern::Rggb, |x, y, _| (4095.0 * scatter(x, y, seed)).round());
     let (frame, darks) = (codes(0), [1, 2, 3].map(codes));
-    let headers: Vec<&FrameHeader> = darks.iter().map(|dark| &dark.header).collect();
+    let stack = DarkStack::of(darks.iter().map(|dark| &dark.header)).unwrap();
     let settings = CorrectionSettings { black: Black::None, cte: None };
-    let stage = CorrectFrame::new(&frame.header, &settings, &headers).unwrap();
+    let stage = CorrectFrame::new(&frame.header, &settings, stack.as_ref()).unwrap();
     assert!(stage.warnings().is_empty());
     for step in [1, 2, 5, 17] {
-        let (mut source, mut darks) = (frame.clone(), darks.clone());
-        let mut less = LessDarks::new(&mut source, &mut darks);
+        let (mut source, mut stack) = (frame.clone(), DarkFrames::of(darks.to_vec()).unwrap().unwrap());
+        let mut less = LessDarks::new(&mut source, &mut stack);
         let mut samples = Vec::new();
         for first in (0..17).step_by(step) {
             less.read(step.min(17 - first), &mut samples).unwrap();

@@ -167,7 +167,7 @@ fn a_black_level_of_zero_is_nothing_to_subtract() {
     let codes = frame(header, |x, y, _| if x == 5 { f32::NAN } else { (4095.0 * scatter(x, y, 0)).floor() - 7.0 });
     let correct = |black| {
         let settings = CorrectionSettings { black: Black::Level(black), cte: None };
-        CorrectFrame::new(&codes.header, &settings, &[]).unwrap()
+        CorrectFrame::new(&codes.header, &settings, None).unwrap()
     };
     let stage = correct(0.0);
     let header = cyanometer::stream::Stage::header(&stage);

@@ -6,6 +6,7 @@ use cyanometer::error::Result;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::darks::DarkFrames;
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -42,10 +43,10 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let reader = FrameReader::open(&arguments.input.options())?;
     let open = |path: &PathBuf| FrameReader::open(&InputOptions { path: Some(path.clone()), ..Default::default() });
-    let darks = arguments.dark.iter().map(open).collect::<Result<Vec<_>>>()?;
-    let dark_headers: Vec<_> = darks.iter().map(RowSource::header).collect();
+    let darks = DarkFrames::of(arguments.dark.iter().map(open).collect::<Result<_>>()?)?;
     let settings = CorrectionSettings { black: arguments.black, cte: arguments.cte };
-    let mut stage = CorrectFrame::new(reader.header(), &settings, &dark_headers)?;
+    let stack = darks.as_ref().map(DarkFrames::stack);
+    let mut stage = CorrectFrame::new(reader.header(), &settings, stack)?;
     session.sign(stage.header_mut());
     for warning in stage.warnings() {
         session.warn(warning);

@@ -20,6 +20,7 @@ use crate::propagation::{Equations, FramePrediction, PixelMoments};
 use crate::stages::adc::{AdcSettings, Digitize};
 use crate::stages::black::Black;
 use crate::stages::correct::{CorrectFrame, CorrectionSettings};
+use crate::stages::darks::DarkStack;
 use crate::stages::demosaic::stencil::PHASES;
 use crate::stages::demosaic::{Demosaic, Method};
 use crate::stages::mosaic::Mosaic;
@@ -242,9 +243,9 @@ impl Chain {
         let adu = Digitize::new(&electrons, &AdcSettings::default())?.header().clone();
         let mut heads = vec![("electrons", electrons), ("adu", adu.clone())];
         let codes = if settings.dark_frames > 0 {
-            let darks = vec![&adu; settings.dark_frames as usize];
+            let darks = DarkStack::alike(adu.clone(), settings.dark_frames)?;
             let nothing_else = CorrectionSettings { black: Black::None, cte: None };
-            let corrected = CorrectFrame::new(&adu, &nothing_else, &darks)?.header().clone();
+            let corrected = CorrectFrame::new(&adu, &nothing_else, Some(&darks))?.header().clone();
             heads.push(("dark_subtracted", corrected.clone()));
             corrected
         } else {

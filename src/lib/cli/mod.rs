@@ -16,7 +16,7 @@ use crate::formats::input::FrameReader;
 use crate::formats::output::FrameWriter;
 use crate::metadata::FrameHeader;
 use crate::numerics::vectors::Instructions;
-use crate::stages::correct::LessDarks;
+use crate::stages::darks::{DarkFrames, LessDarks};
 use crate::stream::{Counts, RowSource, Stage, run};
 use clap::{CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -167,7 +167,7 @@ impl Session {
     ///
     /// Those of reader, stage and writer.
     pub fn drive<S: Stage>(&self, reader: FrameReader, stage: &S, output: &Output) -> Result<Counts> {
-        self.drive_less_darks(reader, Vec::new(), stage, output)
+        self.drive_less_darks(reader, None, stage, output)
     }
 
     /// Drives a frame less the mean of dark frames through a stage.
@@ -178,20 +178,23 @@ impl Session {
     pub fn drive_less_darks<S: Stage>(
         &self,
         mut reader: FrameReader,
-        mut darks: Vec<FrameReader>,
+        mut darks: Option<DarkFrames<FrameReader>>,
         stage: &S,
         output: &Output,
     ) -> Result<Counts> {
-        let readers = || std::iter::once(&reader).chain(&darks);
+        let readers = || std::iter::once(&reader).chain(darks.iter().flat_map(DarkFrames::frames));
         readers().for_each(|reader| self.report_reader(reader));
         let inputs: Vec<_> = readers().filter_map(FrameReader::file).collect();
         let mut writer = FrameWriter::create(&output.options(), stage.header(), &inputs)?;
         let bar = self.progress(stage.header().geometry.height);
-        let mut source = LessDarks::new(&mut reader, &mut darks);
-        let counts = run(stage, &mut source, &mut writer, &mut |rows| bar.set_position(rows as u64))?;
+        let mut progress = |rows| bar.set_position(rows as u64);
+        let counts = match &mut darks {
+            None => run(stage, &mut reader, &mut writer, &mut progress)?,
+            Some(darks) => run(stage, &mut LessDarks::new(&mut reader, darks), &mut writer, &mut progress)?,
+        };
         bar.finish_and_clear();
         self.finish(reader, writer, counts)?;
-        for warning in darks.iter_mut().filter_map(FrameReader::check_digest) {
+        for warning in darks.iter_mut().flat_map(DarkFrames::frames_mut).filter_map(FrameReader::check_digest) {
             self.warn(&warning);
         }
         Ok(counts)

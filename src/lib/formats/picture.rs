@@ -8,8 +8,8 @@ use crate::color::{linear_srgb_from_xyz, srgb_encode};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
-use crate::stream::RowSource;
-use crate::units::QuantityKind;
+use crate::stream::{RowSource, fold};
+use crate::units::{Any, QuantityKind};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use nalgebra::Vector3;
@@ -57,46 +57,54 @@ pub fn write_png(
     input: Option<&(FileId, String)>,
 ) -> Result<()> {
     let frame = source.header().clone();
-    let geometry = &frame.geometry;
-    let whole = Region { x: 0, y: 0, width: geometry.width, height: geometry.height };
-    let region = settings.region.unwrap_or(whole);
+    let region = settings.region.unwrap_or(Region::whole(&frame));
     region.check(&frame)?;
-    let (width, height) = (region.width * settings.zoom, region.height * settings.zoom);
-    if width.checked_mul(height).is_none_or(|pixels| pixels > MAX_PIXELS) {
+    let size = [region.width * settings.zoom, region.height * settings.zoom];
+    if size[0].checked_mul(size[1]).is_none_or(|pixels| pixels > MAX_PIXELS) {
         return Err(Error::Usage(format!(
-            "{}: a picture of {width}x{height} is too large; show a part of it with --region",
-            frame.name
+            "{}: a picture of {}x{} is too large; show a part of it with --region",
+            frame.name, size[0], size[1]
         )));
     }
-    let planes = match geometry.channels.len() {
+    let planes = match frame.geometry.channels.len() {
         1 => 1,
         3 if frame.has_three_planes() => 3,
         _ => {
             return Err(frame.refuse(format!("it holds {}, which makes no picture", frame.holds())));
         }
     };
-    let mut kept: Vec<f32> = Vec::new();
-    let mut moments = vec![Moments::new(1); planes];
-    let mut row = Vec::new();
-    for y in 0..region.y + region.height {
-        row.clear();
-        source.read(1, &mut row)?;
-        if y >= region.y {
-            for (plane, moments) in row.chunks_exact(geometry.width).zip(&mut moments) {
-                let shown = &plane[region.x..region.x + region.width];
-                moments.add(&[shown]);
-                kept.extend_from_slice(shown);
-            }
-        }
-    }
+    let (kept, moments) = read_region(source, region, planes)?;
     let shade = Shade::new(&frame, settings.range, &moments)?;
     let bytes = shown(&kept, planes, region.width, settings.zoom, &shade);
+    encode(&bytes, size, planes, path, input)
+}
+
+/// Samples of a region, laid out as a frame's, and their moments plane by plane.
+fn read_region(source: &mut dyn RowSource, region: Region, planes: usize) -> Result<(Vec<f32>, Vec<Moments>)> {
+    let mut kept = Vec::new();
+    let mut moments = vec![Moments::new(1); planes];
+    fold([source], region.y + region.height, |band| {
+        let window = band.window::<Any>(0);
+        for y in band.rows().filter(|y| *y >= region.y) {
+            for (plane, moments) in moments.iter_mut().enumerate() {
+                let line = &window.row(y.cast_signed(), plane)[region.x..][..region.width];
+                moments.add(&[line]);
+                kept.extend_from_slice(line);
+            }
+        }
+        Ok(())
+    })?;
+    Ok((kept, moments))
+}
+
+/// Writes the bytes of a picture as a PNG.
+fn encode(bytes: &[u8], size: [usize; 2], planes: usize, path: &Path, input: Option<&(FileId, String)>) -> Result<()> {
     let name = path.display().to_string();
     let mut file = Target::open(Some(path), false, input.map_or(&[], std::slice::from_ref))?;
     let color = if planes == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
-    let size = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+    let [width, height] = size.map(|length| u32::try_from(length).unwrap_or(u32::MAX));
     PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Adaptive)
-        .write_image(&bytes, size(width), size(height), color)
+        .write_image(bytes, width, height, color)
         .map_err(|error| png_complaint(&name, error))?;
     file.flush().map_err(|e| Error::disk(&name, "write", e))?;
     file.commit()

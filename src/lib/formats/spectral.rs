@@ -8,8 +8,8 @@ use super::table;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::spectrum::{SpectralLibrary, channel_wavelength_nm, chart_columns, check_wavelengths};
-use crate::stream::RowSource;
-use crate::units::RadianceUnit;
+use crate::stream::{RowSource, fold};
+use crate::units::{Any, RadianceUnit};
 use ndarray::Array2;
 use std::io::{self, Read, Seek};
 use std::path::Path;
@@ -107,17 +107,17 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralL
             let geometry = reader.header().geometry.clone();
             let factor = spectral.unit.in_w_per_cm2_sr_nm();
             let mut radiance = Array2::zeros((geometry.width * geometry.height, spectral.channels.len()));
-            let mut row = Vec::new();
-            for y in 0..geometry.height {
-                row.clear();
-                reader.read(1, &mut row)?;
-                for (index, channel) in spectral.channels.iter().enumerate() {
-                    let samples = &row[channel * geometry.width..(channel + 1) * geometry.width];
-                    for (x, &sample) in samples.iter().enumerate() {
-                        radiance[(y * geometry.width + x, index)] = f64::from(sample) * factor;
+            fold([&mut *reader as &mut dyn RowSource], geometry.height, |band| {
+                let window = band.window::<Any>(0);
+                for y in band.rows() {
+                    for (index, &channel) in spectral.channels.iter().enumerate() {
+                        for (x, &sample) in window.row(y.cast_signed(), channel).iter().enumerate() {
+                            radiance[(y * geometry.width + x, index)] = f64::from(sample) * factor;
+                        }
                     }
                 }
-            }
+                Ok(())
+            })?;
             SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance, columns: geometry.width }
         }
         Radiances::Table(table) => {

@@ -7,8 +7,9 @@ use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{CorrectionRecord, FrameHeader};
 use crate::stages::black::Black;
+use crate::stages::darks::{DarkStack, check_alike, check_codes, differences};
 use crate::stages::transfer::{Transfer, uniform_share};
-use crate::stream::{Counts, RowSource, Stage};
+use crate::stream::{Counts, Stage};
 use crate::units::{Adu, QuantityKind};
 
 /// What a user may ask to be corrected.
@@ -20,7 +21,8 @@ pub struct CorrectionSettings {
     pub cte: Option<f64>,
 }
 
-/// Subtracts a constant and undoes charge transfer; dark frames are subtracted while rows are read, by [`LessDarks`].
+/// Subtracts a constant and undoes charge transfer; dark frames are subtracted while rows are read, by
+/// [`LessDarks`](super::darks::LessDarks).
 ///
 /// y = b + A⁻¹(x − b)        A of [`Transfer`], b = bias where nothing was subtracted from x, else 0
 ///
@@ -39,30 +41,31 @@ impl CorrectFrame {
     ///
     /// # Errors
     ///
-    /// [`Error::Order`] unless the frames hold ADU; [`Error::Format`] for frames that are demosaicked or corrected
-    /// already, darks that do not fit, and crops whose transfer would be undone; [`Error::MissingKey`] where the metadata
-    /// know no black level or bias; [`Error::Usage`] where there is nothing to do, or too much.
-    pub fn new(input: &FrameHeader, settings: &CorrectionSettings, darks: &[&FrameHeader]) -> Result<Self> {
+    /// [`Error::Order`] unless the frame holds ADU; [`Error::Format`] for a frame that is demosaicked or corrected already,
+    /// darks that do not fit, and crops whose transfer would be undone; [`Error::MissingKey`] where the metadata know no
+    /// black level or bias; [`Error::Usage`] where there is nothing to do, or too much.
+    pub fn new(input: &FrameHeader, settings: &CorrectionSettings, darks: Option<&DarkStack>) -> Result<Self> {
         let CorrectionSettings { black, cte } = *settings;
         check_codes(input)?;
         let mut warnings = Vec::new();
-        for dark in darks {
-            check_dark(input, dark)?;
-            warnings.extend(differences(input, dark));
+        if let Some(darks) = darks {
+            check_alike(input, darks.head())?;
+            warnings = differences(input, darks.head());
+            warnings.extend_from_slice(darks.warnings());
         }
         let known_black = input.metadata.black_level_adu;
         let black_adu = match black {
-            Black::None if darks.is_empty() && cte.is_none() => {
+            Black::None if darks.is_none() && cte.is_none() => {
                 return Err(Error::Usage("there is nothing to correct".into()).give(&["black", "dark", "cte"]));
             }
             Black::None => 0.0,
-            _ if !darks.is_empty() => {
+            _ if darks.is_some() => {
                 return Err(Error::Usage("dark frames hold the black level already".into()).leave_out(&["black"]));
             }
             Black::Auto => known_black.ok_or_else(|| input.missing("black_level_adu"))?,
             Black::Level(level) => level,
         };
-        let is_subtracted = black != Black::None || !darks.is_empty();
+        let is_subtracted = black != Black::None || darks.is_some();
         let mut bias_adu = 0.0;
         let mut transfer = None;
         if let Some(cte) = cte {
@@ -75,15 +78,15 @@ impl CorrectFrame {
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
         // A frame of unknown black counts as black-free after a subtraction; how much a dark takes off its white is then
         // not known.
-        let less = |level: f64| if darks.is_empty() { Some(level - black_adu) } else { known_black.map(|b| level - b) };
+        let less = |level: f64| if darks.is_none() { Some(level - black_adu) } else { known_black.map(|b| level - b) };
         let restored = |level: f64| bias_adu + (level - bias_adu) / cte.map_or(1.0, uniform_share);
         let black_left = known_black.and_then(less).or(is_subtracted.then_some(0.0));
         metadata.black_level_adu = black_left.map(restored);
         metadata.white_level_adu = metadata.white_level_adu.and_then(less).map(restored);
-        if is_subtracted && darks.is_empty() && black_adu == 0.0 {
+        if is_subtracted && darks.is_none() && black_adu == 0.0 {
             metadata.leave_out("correct-frame", "subtraction of the black level", "it is zero");
         }
-        let dark_frames = u32::try_from(darks.len()).unwrap_or(u32::MAX);
+        let dark_frames = darks.map_or(0, DarkStack::frames);
         metadata.correction = Some(CorrectionRecord { black_adu, dark_frames, cte });
         let header = FrameHeader { metadata, ..input.clone() };
         Ok(Self { header, black_adu, bias_adu, transfer, warnings })
@@ -98,71 +101,6 @@ impl CorrectFrame {
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
-}
-
-/// Makes sure that a frame holds codes of photosites as the converter gave them, or another program's samples.
-fn check_codes(frame: &FrameHeader) -> Result<()> {
-    let (metadata, holds) = (&frame.metadata, frame.holds());
-    if metadata.demosaic.is_some() {
-        return Err(frame.refuse(format!("it holds {holds}; corrections come before demosaicking")));
-    }
-    if metadata.correction.is_some() {
-        return Err(frame.refuse(format!("it holds {holds} that is corrected already; correction is done once")));
-    }
-    match metadata.quantity {
-        QuantityKind::Adu | QuantityKind::Unspecified => Ok(()),
-        QuantityKind::ExpectedElectrons | QuantityKind::Electrons => {
-            Err(frame.out_of_order(format!("it holds {holds}, not ADU"), "digitize"))
-        }
-        _ => Err(frame.refuse(format!("it holds {holds}, not ADU of photosites"))),
-    }
-}
-
-/// Makes sure that a dark frame shows the photosites of `frame`.
-fn check_dark(frame: &FrameHeader, dark: &FrameHeader) -> Result<()> {
-    check_codes(dark)?;
-    let differs = |what: &str, its: String, theirs: String| {
-        Err(dark.refuse(format!("its {what} is {its}, but that of {} is {theirs}", frame.name)))
-    };
-    let (a, b) = (&frame.geometry, &dark.geometry);
-    if [a.width, a.height] != [b.width, b.height] {
-        return differs("size", format!("{}x{}", b.width, b.height), format!("{}x{}", a.width, a.height));
-    }
-    if a.origin != b.origin {
-        let place = |[column, row]: [i32; 2]| format!("{column},{row}");
-        return differs("place on the sensor", place(b.origin), place(a.origin));
-    }
-    if a.channels.len() != b.channels.len() {
-        return differs("number of planes", b.channels.len().to_string(), a.channels.len().to_string());
-    }
-    let (a, b) = (frame.metadata.cfa, dark.metadata.cfa);
-    if a != b {
-        let name = |cfa: Option<crate::cfa::CfaPattern>| cfa.map_or("none".to_owned(), |cfa| cfa.to_string());
-        return differs("pattern", name(b), name(a));
-    }
-    Ok(())
-}
-
-/// What makes the dark signal of two frames differ.
-fn differences(frame: &FrameHeader, dark: &FrameHeader) -> Vec<String> {
-    let exposure_s = |frame: &FrameHeader| frame.metadata.exposure.map(|exposure| exposure.exposure_s);
-    let temperature_k = |frame: &FrameHeader| {
-        let of_sensor = frame.metadata.sensor.as_ref().map(|sensor| sensor.temperature_k);
-        frame.metadata.noise.as_ref().map(|noise| noise.temperature_k).or(of_sensor)
-    };
-    let pairs = [
-        ("exposure", "s", exposure_s(dark).zip(exposure_s(frame))),
-        ("temperature", "K", temperature_k(dark).zip(temperature_k(frame))),
-    ];
-    let warn = |(what, unit, pair): (&str, &str, Option<(f64, f64)>)| {
-        // Equal but for what a text with seven digits may have lost.
-        let (its, theirs) = pair.filter(|(a, b)| (a - b).abs() > 1e-6 * b.abs())?;
-        Some(format!(
-            "{}: its {what} is {its} {unit}, but that of {} is {theirs} {unit}; their dark signals differ",
-            dark.name, frame.name
-        ))
-    };
-    pairs.into_iter().filter_map(warn).collect()
 }
 
 impl Stage for CorrectFrame {
@@ -215,57 +153,6 @@ impl Stage for CorrectFrame {
     }
 }
 
-/// The rows of a frame less the mean of those of dark frames, all read in step; memory is some rows of each.
-pub struct LessDarks<'a, S> {
-    frame: &'a mut S,
-    darks: &'a mut [S],
-    dark: Vec<f32>,
-    sums: Vec<f64>,
-}
-
-impl<'a, S: RowSource> LessDarks<'a, S> {
-    /// `frame` less the mean of `darks`, which fit it as [`CorrectFrame::new`] makes sure; without any, `frame` itself.
-    pub fn new(frame: &'a mut S, darks: &'a mut [S]) -> Self {
-        Self { frame, darks, dark: Vec::new(), sums: Vec::new() }
-    }
-}
-
-impl<S: RowSource> RowSource for LessDarks<'_, S> {
-    fn header(&self) -> &FrameHeader {
-        self.frame.header()
-    }
-
-    fn natural_rows(&self) -> usize {
-        self.darks.iter().map(S::natural_rows).fold(self.frame.natural_rows(), usize::max)
-    }
-
-    fn may_wait(&self) -> bool {
-        self.frame.may_wait() || self.darks.iter().any(S::may_wait)
-    }
-
-    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
-        let start = samples.len();
-        self.frame.read(rows, samples)?;
-        if self.darks.is_empty() {
-            return Ok(());
-        }
-        self.sums.clear();
-        self.sums.resize(samples.len() - start, 0.0);
-        for dark in &mut *self.darks {
-            self.dark.clear();
-            dark.read(rows, &mut self.dark)?;
-            for (sum, &sample) in self.sums.iter_mut().zip(&self.dark) {
-                *sum += f64::from(sample);
-            }
-        }
-        let count = self.darks.len() as f64;
-        for (sample, sum) in samples[start..].iter_mut().zip(&self.sums) {
-            *sample = to_sample(f64::from(*sample) - sum / count);
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -285,7 +172,8 @@ mod tests {
     }
 
     fn correct(frame: &FrameHeader, black: Black, cte: Option<f64>, darks: &[&FrameHeader]) -> Result<CorrectFrame> {
-        CorrectFrame::new(frame, &CorrectionSettings { black, cte }, darks)
+        let stack = DarkStack::of(darks.iter().copied())?;
+        CorrectFrame::new(frame, &CorrectionSettings { black, cte }, stack.as_ref())
     }
 
     #[test]
@@ -355,8 +243,11 @@ mod tests {
         let mut long = frame.clone();
         long.name = "long".into();
         long.metadata.exposure = Some(Exposure { exposure_s: 0.5, f_number: 8.0, lens_transmittance: 1.0 });
-        let stage = correct(&frame, Black::None, None, &[&frame, &long]).unwrap();
-        let said = "long: its exposure is 0.5 s, but that of codes is 0.1 s; their dark signals differ";
-        assert_eq!(stage.warnings(), [said]);
+        let said = |darks: &[&FrameHeader]| correct(&frame, Black::None, None, darks).unwrap().warnings().to_vec();
+        let differ = "its exposure is 0.5 s, but that of codes is 0.1 s; their dark signals differ";
+        assert_eq!(said(&[&long]), [format!("long: {differ}")]);
+        assert_eq!(said(&[&frame, &long]), [format!("long: {differ}")]);
+        assert_eq!(said(&[&long, &long]), [format!("the mean of long and 1 other: {differ}")]);
+        assert_eq!(said(&[&frame, &frame]), [""; 0]);
     }
 }

@@ -10,6 +10,7 @@ pub mod transfer;
 pub mod adc;
 
 pub mod correct;
+pub mod darks;
 
 pub mod mosaic;
 

@@ -14,7 +14,8 @@ use crate::propagation::frame::Predicted;
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
 use crate::stages::adc::{AdcSettings, Digitize};
 use crate::stages::black::Black;
-use crate::stages::correct::{CorrectFrame, CorrectionSettings, LessDarks};
+use crate::stages::correct::{CorrectFrame, CorrectionSettings};
+use crate::stages::darks::{DarkFrames, DarkStack, LessDarks};
 use crate::stages::demosaic::stencil::{PHASES, phase};
 use crate::stages::demosaic::{Demosaic, Method};
 use crate::stages::noise::{AddNoise, NoiseSettings};
@@ -299,9 +300,9 @@ impl Evaluator<'_> {
         let correct = match self.settings.dark_frames {
             0 => None,
             frames => {
-                let darks = vec![digitize.header(); frames as usize];
+                let darks = DarkStack::alike(digitize.header().clone(), frames)?;
                 let nothing_else = CorrectionSettings { black: Black::None, cte: None };
-                Some(CorrectFrame::new(digitize.header(), &nothing_else, &darks)?)
+                Some(CorrectFrame::new(digitize.header(), &nothing_else, Some(&darks))?)
             }
         };
         let codes = correct.as_ref().map_or(digitize.header(), Stage::header);
@@ -397,10 +398,9 @@ impl Evaluator<'_> {
     /// XYZ of the pixels within the margin.
     fn pixels(&self, chain: &Chain, patch: [usize; 2], margin: usize) -> Result<(Vec<[f64; 3]>, Counts)> {
         let (mut codes, mut counts) = self.codes(chain, chain.electrons, 0)?;
-        if let Some(correct) = &chain.correct {
-            let frames = 1..=self.settings.dark_frames;
-            let mut darks: Vec<MemoryFrame> =
-                frames.map(|frame| self.codes(chain, [0.0; 3], frame).map(|(dark, _)| dark)).collect::<Result<_>>()?;
+        let frames = 1..=self.settings.dark_frames;
+        let darks = frames.map(|frame| self.codes(chain, [0.0; 3], frame).map(|(dark, _)| dark));
+        if let Some((correct, mut darks)) = chain.correct.as_ref().zip(DarkFrames::of(darks.collect::<Result<_>>()?)?) {
             let mut corrected = MemoryFrame::new(correct.header().clone(), Vec::new());
             counts =
                 run(correct, &mut LessDarks::new(&mut codes, &mut darks), &mut corrected, &mut |_| ())?.plus(counts);
