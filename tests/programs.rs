@@ -1020,7 +1020,7 @@ const MISTAKES: [(&str, i32, &str); 74] = [
     (
         "measure --patches=4x3 rgb.exr",
         BAD_USAGE,
-        "rgb.exr: patches of 4x3 have no interior: eci mixes colours up to 3 pixels from their edges; they must be 7x7 at least",
+        "rgb.exr: patches of 4x3 have no interior: eci mixes colors up to 3 pixels from their edges; they must be 7x7 at least",
     ),
     (
         "measure --patches=4 noisy.exr",

@@ -43,7 +43,7 @@ pub fn measure(
     let tallies = tallies(source, regions, rails)?;
     if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
         return Err(Error::Data(format!(
-            "{}: nothing can be checked: charge transfer mixes neighbours, differently from place to place",
+            "{}: nothing can be checked: charge transfer mixes neighbors, differently from place to place",
             frame.name
         )));
     }

@@ -29,7 +29,7 @@ pub struct Patch {
     pub at: [usize; 2],
     /// Number, row by row, from 0; where the width of the chart is known.
     pub sample: Option<usize>,
-    /// What demosaicking has not mixed with the neighbours.
+    /// What demosaicking has not mixed with the neighbors.
     pub interior: Region,
 }
 
@@ -54,7 +54,7 @@ pub fn of_frame(frame: &FrameHeader, size: Option<[usize; 2]>) -> Result<Vec<Pat
     let least = 2 * margin + 1;
     if width.min(height) < least {
         return Err(usage(format!(
-            "patches of {width}x{height} have no interior: {} mixes colours up to {margin} pixels from their edges; they \
+            "patches of {width}x{height} have no interior: {} mixes colors up to {margin} pixels from their edges; they \
              must be {least}x{least} at least",
             method.unwrap_or_default()
         )));

@@ -77,12 +77,12 @@ pub struct ChannelReport {
     pub predicted_mean: Option<f64>,
     /// Standard deviation by formula.
     pub predicted_std: Option<f64>,
-    /// (mean − predicted) over its sampling error, which knows that demosaicked neighbours are correlated.
+    /// (mean − predicted) over its sampling error, which knows that demosaicked neighbors are correlated.
     pub z_mean: Option<f64>,
     /// (std / expected − 1) over its sampling error, that of independent samples √((2 + κ n⁄(n−1)) / 4n), κ the excess
     /// kurtosis.
     pub z_std: Option<f64>,
-    /// Standard error of the mean: s/√n_eff. Where a prediction knows how demosaicked neighbours are correlated, n_eff is
+    /// Standard error of the mean: s/√n_eff. Where a prediction knows how demosaicked neighbors are correlated, n_eff is
     /// its effective number; elsewhere samples count as independent, in a CFA plane within each class.
     pub mean_error: Option<f64>,
     /// Standard error of the standard deviation: with a prediction s times its relative one, elsewhere s/√(2(n − 1)), that
