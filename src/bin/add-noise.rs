@@ -1,12 +1,13 @@
 //! `add-noise`: one noisy exposure from expected electrons.
 
 use clap::Parser;
-use cyanometer::cli::{self, options};
+use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::metadata::PoissonKind;
+use cyanometer::names::Named;
 use cyanometer::propagation::{self, Equations};
-use cyanometer::random::Source;
+use cyanometer::requests::{options, values};
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
@@ -30,25 +31,21 @@ struct Arguments {
     /// Number of the exposure: another number, other temporal noise
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     frame: u32,
-    /// Sources to leave out, between commas; their means stay: dcsn, dcnu, ssn, prnu, ron
-    #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = options::choice(&options::SOURCES))]
-    without: Vec<Source>,
-    /// Temperature of the sensor in K; by default the sensor's own
-    #[arg(long, value_name = "K", value_parser = options::positive, allow_negative_numbers = true)]
-    temperature: Option<f64>,
+    #[command(flatten)]
+    noise: options::NoiseChoice,
     /// How Poisson numbers are drawn: exact, or gaussian to see what that approximation costs
-    #[arg(long, default_value = "exact", value_parser = options::choice(&[("exact", PoissonKind::Exact), ("gaussian", PoissonKind::Gaussian)]))]
+    #[arg(long, default_value = PoissonKind::default().name(), value_parser = values::choice::<PoissonKind>())]
     poisson: PoissonKind,
     /// Charge transfer efficiency: the share of a packet that each move to the output takes along, above 0 and at most 1;
     /// by default transfer is left out
-    #[arg(long, value_name = "X", value_parser = options::fraction, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", value_parser = values::fraction, allow_negative_numbers = true)]
     cte: Option<f64>,
     #[command(flatten)]
     sensor: options::SensorChoice,
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
-    general: options::General,
+    general: cli::General,
 }
 
 fn main() -> ExitCode {
@@ -63,10 +60,9 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         seed: arguments.seed,
         sensor_seed: arguments.sensor_seed,
         frame: arguments.frame,
-        without: arguments.without.clone(),
-        temperature_k: arguments.temperature,
         poisson: arguments.poisson,
         cte: arguments.cte,
+        ..arguments.noise.settings()
     };
     let mut stage = AddNoise::new(reader.header(), &settings)?;
     propagation::note(stage.header_mut(), Equations::Exact);

@@ -1,9 +1,10 @@
 //! `correct-frame`: codes without black, dark signal and the traces of charge transfer.
 
 use clap::Parser;
-use cyanometer::cli::{self, options};
+use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::requests::{options, values};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
 use cyanometer::stages::darks::DarkFrames;
@@ -21,18 +22,18 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Black level to remove: auto (from the metadata), none, or a number of ADU
-    #[arg(long, default_value = "none", value_name = "auto|none|N", value_parser = options::black, allow_negative_numbers = true)]
+    #[arg(long, default_value = "none", value_name = "auto|none|N", value_parser = values::black, allow_negative_numbers = true)]
     black: Black,
     /// Dark frame to subtract sample by sample; given more than once, the mean of all
     #[arg(long, value_name = "FILE", conflicts_with = "black")]
     dark: Vec<PathBuf>,
     /// Charge transfer efficiency to undo, above 0 and at most 1; the bias of the converter is left out of it
-    #[arg(long, value_name = "X", value_parser = options::fraction, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", value_parser = values::fraction, allow_negative_numbers = true)]
     cte: Option<f64>,
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
-    general: options::General,
+    general: cli::General,
 }
 
 fn main() -> ExitCode {

@@ -2,9 +2,11 @@
 
 use clap::Parser;
 use cyanometer::cfa::CfaPattern;
-use cyanometer::cli::{self, options};
+use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
+use cyanometer::names::Named;
+use cyanometer::requests::{options, values};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
@@ -21,13 +23,13 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
-    #[arg(long, default_value = "eci", value_parser = options::choice(&options::METHODS))]
+    #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>())]
     method: Method,
     /// Black level to remove: auto (from the metadata), none, or a number in the unit of the samples
-    #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = options::black, allow_negative_numbers = true)]
+    #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = values::black, allow_negative_numbers = true)]
     black: Black,
     /// Pattern of a plane that carries none, or another than it carries: rggb, bggr, grbg or gbrg
-    #[arg(long, value_parser = options::pattern)]
+    #[arg(long, value_parser = values::pattern)]
     pattern: Option<CfaPattern>,
     /// Add a layer with the standard deviation of each pixel, from the sensor's noise model at the pixel's own level
     #[arg(long)]
@@ -37,7 +39,7 @@ struct Arguments {
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
-    general: options::General,
+    general: cli::General,
 }
 
 fn main() -> ExitCode {

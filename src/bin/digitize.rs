@@ -1,10 +1,11 @@
 //! `digitize`: codes from electrons.
 
 use clap::Parser;
-use cyanometer::cli::{self, options};
+use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::propagation::{self, Equations};
+use cyanometer::requests::{options, values};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
@@ -22,17 +23,17 @@ struct Arguments {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     bits: Option<u32>,
     /// Bias in ADU; by default the sensor's
-    #[arg(long, value_name = "ADU", value_parser = options::number, allow_negative_numbers = true)]
+    #[arg(long, value_name = "ADU", value_parser = values::number, allow_negative_numbers = true)]
     bias: Option<f64>,
     /// Slope in ADU per electron; by default the sensor's
-    #[arg(long, value_name = "ADU_PER_E", value_parser = options::positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "ADU_PER_E", value_parser = values::positive, allow_negative_numbers = true)]
     slope: Option<f64>,
     #[command(flatten)]
     sensor: options::SensorChoice,
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
-    general: options::General,
+    general: cli::General,
 }
 
 fn main() -> ExitCode {

@@ -2,11 +2,13 @@
 
 use clap::Parser;
 use cyanometer::analysis::statistics::{Region, measure, patches};
-use cyanometer::cli::{self, options};
+use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::{input::FrameReader, input::InputOptions, output};
+use cyanometer::names::Named;
 use cyanometer::propagation::Equations;
 use cyanometer::report::{self, ReportFormat};
+use cyanometer::requests::{Note, options, values};
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,29 +25,29 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Rectangle X,Y,W,H in pixels; may be given more than once; by default the whole frame
-    #[arg(long, value_name = "X,Y,W,H", value_parser = options::region, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = values::region, allow_hyphen_values = true)]
     region: Vec<Region>,
     /// Measure each patch of a chart, as --patch of render-radiance draws them or as WxH says, less the rim that
     /// demosaicking mixes
-    #[arg(long, value_name = "WxH", num_args = 0..=1, require_equals = true, value_parser = options::size, conflicts_with_all = ["region", "check"])]
+    #[arg(long, value_name = "WxH", num_args = 0..=1, require_equals = true, value_parser = values::size, conflicts_with_all = ["region", "check"])]
     patches: Option<Option<[usize; 2]>>,
     /// Form of the report
-    #[arg(long, default_value = "text", value_parser = options::choice(&[("text", ReportFormat::Text), ("json", ReportFormat::Json), ("yaml", ReportFormat::Yaml), ("csv", ReportFormat::Csv)]))]
+    #[arg(long, default_value = "text", value_parser = values::choice::<ReportFormat>())]
     output_format: ReportFormat,
     /// Equations to predict by: exact, or those of the paper
-    #[arg(long, default_value = "exact", value_parser = options::choice(&[("exact", Equations::Exact), ("paper", Equations::Paper)]))]
+    #[arg(long, default_value = Equations::default().name(), value_parser = values::choice::<Equations>())]
     equations: Equations,
     /// Test every prediction, and exit with status 1 when one does not hold
     #[arg(long)]
     check: bool,
     /// Chance of a false alarm that --check accepts, all tests together
-    #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = options::fraction, allow_negative_numbers = true)]
+    #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = values::fraction, allow_negative_numbers = true)]
     level: f64,
     /// File for the report; by default standard output
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
-    general: options::General,
+    general: cli::General,
 }
 
 fn main() -> ExitCode {
@@ -55,10 +57,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let options = InputOptions { all_channels: true, ..arguments.input.options() };
-    output::check_outputs(
-        &[arguments.output.as_deref()],
-        &options.path.iter().map(PathBuf::as_path).collect::<Vec<_>>(),
-    )?;
+    output::check_outputs(&[arguments.output.as_deref()], options.path.as_deref().as_slice())?;
     let mut reader = FrameReader::open(&options)?;
     session.report_reader(&reader);
     let level = arguments.check.then_some(arguments.level);
@@ -66,17 +65,12 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         Some(size) => patches::measure(&mut reader, size, arguments.equations)?,
         None => measure(&mut reader, &arguments.region, arguments.equations, level)?,
     };
-    output::write_text(
-        arguments.output.as_deref(),
-        &report::render(&report, arguments.output_format)?,
-        reader.file().as_ref(),
-    )?;
+    let text = report::render(&report, arguments.output_format)?;
+    output::write_text(arguments.output.as_deref(), &text, reader.file().as_ref())?;
     if let Some(warning) = reader.check_digest() {
         session.warn(&warning);
     }
-    let not_finite: u64 = report.regions.iter().map(|region| region.not_finite).sum();
-    if not_finite > 0 {
-        session.warn(&format!("{not_finite} pixels are NaN or infinite; they are left out of the statistics"));
-    }
+    let not_finite = report.regions.iter().map(|region| region.not_finite).sum();
+    session.tell(Note::not_finite(not_finite).as_slice());
     report.check.map_or(Ok(()), |verdict| verdict.judge(&reader.header().name))
 }

@@ -2,9 +2,10 @@
 
 use clap::Parser;
 use cyanometer::cfa::CfaPattern;
-use cyanometer::cli::{self, options};
+use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
+use cyanometer::requests::{options, values};
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
@@ -19,12 +20,12 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Pattern at the sensor's corner: rggb, bggr, grbg or gbrg; by default the sensor's, or rggb
-    #[arg(long, value_parser = options::pattern)]
+    #[arg(long, value_parser = values::pattern)]
     pattern: Option<CfaPattern>,
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
-    general: options::General,
+    general: cli::General,
 }
 
 fn main() -> ExitCode {

@@ -2,10 +2,11 @@
 
 use clap::Parser;
 use cyanometer::analysis::statistics::Region;
-use cyanometer::cli::{self, options};
+use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::picture::{PictureSettings, Range, write_png};
+use cyanometer::requests::{options, values};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -22,7 +23,7 @@ struct Arguments {
     #[arg(short, long, value_name = "FILE.png")]
     output: PathBuf,
     /// Rectangle X,Y,W,H in pixels to show; by default the whole frame
-    #[arg(long, value_name = "X,Y,W,H", value_parser = options::region)]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = values::region)]
     region: Option<Region>,
     /// Show every pixel as a square of N x N
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=64))]
@@ -31,7 +32,7 @@ struct Arguments {
     #[arg(long, default_value = "full", value_name = "full|LOW,HIGH|Nsigma", value_parser = range, allow_negative_numbers = true)]
     range: Range,
     #[command(flatten)]
-    general: options::General,
+    general: cli::General,
 }
 
 fn range(text: &str) -> std::result::Result<Range, String> {
@@ -40,10 +41,10 @@ fn range(text: &str) -> std::result::Result<Range, String> {
         return Ok(Range::Full);
     }
     if let Some(count) = text.strip_suffix("sigma") {
-        return options::positive(count).map(Range::Deviations).map_err(|_| wrong());
+        return values::positive(count).map(Range::Deviations).map_err(|_| wrong());
     }
     let (low, high) = text.split_once(',').ok_or_else(wrong)?;
-    Ok(Range::Values(options::number(low).map_err(|_| wrong())?, options::number(high).map_err(|_| wrong())?))
+    Ok(Range::Values(values::number(low).map_err(|_| wrong())?, values::number(high).map_err(|_| wrong())?))
 }
 
 fn main() -> ExitCode {

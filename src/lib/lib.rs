@@ -6,7 +6,7 @@
 //!
 //! | floor | modules | what they know |
 //! |---|---|---|
-//! | 0 words | [`error`], [`units`], [`cfa`], [`frame`] | no files, no chance |
+//! | 0 words | [`error`], [`units`], [`names`], [`cfa`], [`frame`] | no files, no chance |
 //! | 1 mathematics | [`numerics`], [`random`], [`plot`] | no camera, no file |
 //! | 2 light and camera | [`spectrum`], [`color`], [`camera`] | curves, color spaces, lens and sensor in numbers; no frame |
 //! | 3 frames in motion | [`metadata`], [`stream`] | what is known of a frame, and how its rows move |
@@ -15,8 +15,9 @@
 //! | 6 the chain | [`chain`], [`sigma`] | stages and predictions together |
 //! | 7 analysis | [`analysis`] | statistics beside predictions, differences, matrices |
 //! | 8 files | [`formats`] | bytes to frames and back |
-//! | 9 reports | [`report`] | tables and figures |
-//! | 10 command line | [`cli`] | options, complaints, exit |
+//! | 9 requests | [`requests`] | what a program does, from its arguments to results and notes |
+//! | 10 reports | [`report`] | tables and figures |
+//! | 11 command line | [`cli`] | complaints, progress, exit |
 //!
 //! # The chain
 //!
@@ -39,6 +40,7 @@
 pub mod cfa;
 pub mod error;
 pub mod frame;
+pub mod names;
 pub mod units;
 
 pub mod numerics;
@@ -62,6 +64,8 @@ pub mod sigma;
 pub mod analysis;
 
 pub mod formats;
+
+pub mod requests;
 
 pub mod report;
 

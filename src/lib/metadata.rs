@@ -5,6 +5,7 @@ use crate::camera::sensor::Sensor;
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, bare_name};
+use crate::names::{Named, serde_by_name};
 use crate::random::Source;
 use crate::units::QuantityKind;
 use serde::{Deserialize, Serialize};
@@ -106,8 +107,7 @@ pub struct Scene {
 }
 
 /// How Poisson numbers are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PoissonKind {
     /// Exactly.
     #[default]
@@ -115,6 +115,19 @@ pub enum PoissonKind {
     /// As normal numbers of the same mean and variance, to see what that approximation costs.
     Gaussian,
 }
+
+impl Named for PoissonKind {
+    const ALL: &'static [Self] = &[Self::Exact, Self::Gaussian];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Gaussian => "gaussian",
+        }
+    }
+}
+
+serde_by_name!(PoissonKind);
 
 /// The noise that was drawn, enough to draw it again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

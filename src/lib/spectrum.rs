@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::numerics::quadrature::{self, Rule};
 use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// An even grid of wavelengths, and the rule that sums over it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -26,6 +27,13 @@ impl Default for WavelengthGrid {
     }
 }
 
+impl fmt::Display for WavelengthGrid {
+    /// As options have it: START:END:STEP.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.start_nm, self.end_nm, self.step_nm)
+    }
+}
+
 impl WavelengthGrid {
     /// The wavelengths in nm with the weight of each in nm.
     ///
@@ -39,13 +47,12 @@ impl WavelengthGrid {
         let steps = (end_nm - start_nm) / step_nm;
         if !in_range || !(0.0..1e6).contains(&steps) {
             return Err(Error::Usage(format!(
-                "{start_nm}:{end_nm}:{step_nm} nm make no grid; give START:END:STEP, such as 360:830:1"
+                "{self} nm make no grid; give START:END:STEP, such as {}",
+                Self::default()
             )));
         }
         if (steps - steps.round()).abs() > 1e-6 {
-            return Err(Error::Usage(format!(
-                "{start_nm}:{end_nm}:{step_nm} nm do not end on a step; change the end or the step"
-            )));
+            return Err(Error::Usage(format!("{self} nm do not end on a step; change the end or the step")));
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to lie in 0..10⁶")]
         let intervals = steps.round() as usize;

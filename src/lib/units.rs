@@ -3,6 +3,7 @@
 //! Wavelengths are in nm, spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, areas in cm², charge in electrons, luminance in
 //! cd m⁻². Every conversion stands here; a bare power of ten elsewhere is a defect.
 
+use crate::names::{Named, serde_by_name};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -28,23 +29,18 @@ pub const MM_PER_UM: f64 = 1e-3;
 pub const CM2_PER_M2: f64 = 1e4;
 
 /// The unit in which a file gives spectral radiance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RadianceUnit {
     /// W cm⁻² sr⁻¹ nm⁻¹, ours.
     #[default]
-    #[serde(rename = "W cm-2 sr-1 nm-1")]
     WPerCm2SrNm,
     /// W m⁻² sr⁻¹ nm⁻¹.
-    #[serde(rename = "W m-2 sr-1 nm-1")]
     WPerM2SrNm,
     /// mW m⁻² sr⁻¹ nm⁻¹.
-    #[serde(rename = "mW m-2 sr-1 nm-1")]
     MwPerM2SrNm,
     /// W m⁻² sr⁻¹ µm⁻¹.
-    #[serde(rename = "W m-2 sr-1 um-1")]
     WPerM2SrUm,
     /// µW cm⁻² sr⁻¹ nm⁻¹.
-    #[serde(rename = "uW cm-2 sr-1 nm-1")]
     UwPerCm2SrNm,
 }
 
@@ -60,17 +56,6 @@ impl RadianceUnit {
             Self::WPerM2SrNm => 1.0 / CM2_PER_M2,
             Self::MwPerM2SrNm | Self::WPerM2SrUm => 1e-3 / CM2_PER_M2,
             Self::UwPerCm2SrNm => 1e-6,
-        }
-    }
-
-    /// The name used in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::WPerCm2SrNm => "W cm-2 sr-1 nm-1",
-            Self::WPerM2SrNm => "W m-2 sr-1 nm-1",
-            Self::MwPerM2SrNm => "mW m-2 sr-1 nm-1",
-            Self::WPerM2SrUm => "W m-2 sr-1 um-1",
-            Self::UwPerCm2SrNm => "uW cm-2 sr-1 nm-1",
         }
     }
 
@@ -98,6 +83,22 @@ impl RadianceUnit {
         })
     }
 }
+
+impl Named for RadianceUnit {
+    const ALL: &'static [Self] = &Self::ALL;
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::WPerCm2SrNm => "W cm-2 sr-1 nm-1",
+            Self::WPerM2SrNm => "W m-2 sr-1 nm-1",
+            Self::MwPerM2SrNm => "mW m-2 sr-1 nm-1",
+            Self::WPerM2SrUm => "W m-2 sr-1 um-1",
+            Self::UwPerCm2SrNm => "uW cm-2 sr-1 nm-1",
+        }
+    }
+}
+
+serde_by_name!(RadianceUnit);
 
 /// What the samples of a frame are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]

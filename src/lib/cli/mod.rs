@@ -1,13 +1,11 @@
-//! The command line: start, fail, exit, and the options that programs share.
+//! The command line: start, complain, exit; what a program says beside its output.
 
 mod advice;
-pub mod characterization;
+mod general;
 mod history;
-pub mod options;
-pub mod prediction;
-pub mod rendering;
 mod usage;
 
+pub use general::{General, ProgressWhen};
 pub use history::history_entry;
 
 use crate::error::{Error, Result};
@@ -16,11 +14,12 @@ use crate::formats::input::FrameReader;
 use crate::formats::output::FrameWriter;
 use crate::metadata::FrameHeader;
 use crate::numerics::vectors::Instructions;
+use crate::requests::options::Output;
+use crate::requests::{self, Note};
 use crate::stages::darks::{DarkFrames, LessDarks};
-use crate::stream::{Counts, RowSource, Stage, run};
+use crate::stream::{Counts, Stage, run};
 use clap::{CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use options::{General, Output, ProgressWhen};
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 
@@ -105,6 +104,16 @@ impl Session {
         }
     }
 
+    /// Says what came up in a request.
+    pub fn tell(&self, notes: &[Note]) {
+        for note in notes {
+            match note {
+                Note::Warning(text) => self.warn(text),
+                Note::Remark(text) => self.note(text),
+            }
+        }
+    }
+
     /// Settles how many threads work: what was asked for; or one where frames come or go through a pipe, at whose other end
     /// another program has a processor of its own; or all.
     fn settle_threads(&self) {
@@ -130,17 +139,7 @@ impl Session {
 
     /// Says what a reader noticed.
     pub fn report_reader(&self, reader: &FrameReader) {
-        self.note(&format!(
-            "{}: {}x{}, {}, stored as {}",
-            reader.header().name,
-            reader.header().geometry.width,
-            reader.header().geometry.height,
-            reader.header().holds(),
-            reader.stored_as()
-        ));
-        for note in reader.notes() {
-            self.note(note);
-        }
+        self.tell(&requests::of_reader(reader));
     }
 
     /// A progress bar over rows, on terminals only.

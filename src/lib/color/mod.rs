@@ -3,6 +3,7 @@
 pub mod difference;
 pub mod locus;
 
+use crate::names::Named;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 
@@ -19,6 +20,19 @@ pub enum Space {
     Srgb,
 }
 
+impl Named for Space {
+    const ALL: &'static [Self] = &[Self::Xyz, Self::Xyy, Self::Lab, Self::Srgb];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Xyz => "xyz",
+            Self::Xyy => "xyy",
+            Self::Lab => "lab",
+            Self::Srgb => "srgb",
+        }
+    }
+}
+
 impl fmt::Display for Space {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -31,14 +45,26 @@ impl fmt::Display for Space {
 }
 
 /// The white that L*a*b* and sRGB refer to.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum White {
     /// Chromaticity of D65; the luminance is chosen apart.
+    #[default]
     D65,
     /// Chromaticity of equal energy, (⅓, ⅓).
     EqualEnergy,
     /// Absolute XYZ.
     Absolute([f64; 3]),
+}
+
+impl fmt::Display for White {
+    /// As options have it: `d65`, `e`, or X,Y,Z.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::D65 => f.write_str("d65"),
+            Self::EqualEnergy => f.write_str("e"),
+            Self::Absolute([x, y, z]) => write!(f, "{x},{y},{z}"),
+        }
+    }
 }
 
 /// Chromaticity of D65 for the 2° observer, as IEC 61966-2-1 has it.

@@ -11,6 +11,7 @@ use crate::color;
 use crate::error::{Error, Result};
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
+use crate::names::Named;
 use crate::stream::{Counts, RowSink};
 use crate::units::QuantityKind;
 use half::f16;
@@ -24,6 +25,17 @@ pub enum Format {
     Exr,
     /// TIFF.
     Tiff,
+}
+
+impl Named for Format {
+    const ALL: &'static [Self] = &[Self::Exr, Self::Tiff];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Exr => "exr",
+            Self::Tiff => "tiff",
+        }
+    }
 }
 
 /// How blocks are compressed.
@@ -45,21 +57,25 @@ pub enum CompressionKind {
     Deflate,
 }
 
-impl CompressionKind {
-    /// All kinds with the names used on the command line.
-    pub const NAMES: [(&str, Self); 7] = [
-        ("none", Self::None),
-        ("rle", Self::Rle),
-        ("zips", Self::Zips),
-        ("zip", Self::Zip),
-        ("piz", Self::Piz),
-        ("lzw", Self::Lzw),
-        ("deflate", Self::Deflate),
-    ];
+impl Named for CompressionKind {
+    const ALL: &'static [Self] = &[Self::None, Self::Rle, Self::Zips, Self::Zip, Self::Piz, Self::Lzw, Self::Deflate];
 
+    fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Rle => "rle",
+            Self::Zips => "zips",
+            Self::Zip => "zip",
+            Self::Piz => "piz",
+            Self::Lzw => "lzw",
+            Self::Deflate => "deflate",
+        }
+    }
+}
+
+impl CompressionKind {
     fn refused(self, format: &str, choices: &str) -> Error {
-        let name = Self::NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name);
-        Error::Usage(format!("{format} is not compressed by {name}; it is one of {choices}"))
+        Error::Usage(format!("{format} is not compressed by {}; it is one of {choices}", self.name()))
     }
 }
 
@@ -72,6 +88,18 @@ pub enum SampleKind {
     F16,
     /// 16-bit unsigned (TIFF).
     U16,
+}
+
+impl Named for SampleKind {
+    const ALL: &'static [Self] = &[Self::F32, Self::F16, Self::U16];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F16 => "f16",
+            Self::U16 => "u16",
+        }
+    }
 }
 
 /// Where and how a frame is written.

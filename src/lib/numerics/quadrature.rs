@@ -1,11 +1,10 @@
 //! Weights of a sum that stands for an integral over an even grid.
 
 use crate::error::{Error, Result};
-use serde::{Deserialize, Serialize};
+use crate::names::{Named, serde_by_name};
 
 /// How an integral is approximated by a sum.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rule {
     /// Every point counts alike: Eq. 5a of \[HP2005].
     #[default]
@@ -15,6 +14,20 @@ pub enum Rule {
     /// Composite Simpson rule, 1 4 2 4 … 2 4 1 thirds.
     Simpson,
 }
+
+impl Named for Rule {
+    const ALL: &'static [Self] = &[Self::Rectangle, Self::Trapezoid, Self::Simpson];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Rectangle => "rectangle",
+            Self::Trapezoid => "trapezoid",
+            Self::Simpson => "simpson",
+        }
+    }
+}
+
+serde_by_name!(Rule);
 
 /// The weights of `points` points a distance `step` apart.
 ///

@@ -9,6 +9,7 @@ use super::pixel_moments::PixelMoments;
 use crate::cfa::Class;
 use crate::color;
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind, PredictedRecord};
+use crate::names::Named;
 use crate::numerics::normal::MeanVariance;
 use crate::stages::demosaic::Method;
 use crate::stages::noise::NoiseModel;

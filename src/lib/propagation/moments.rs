@@ -1,11 +1,10 @@
 //! What is predicted of a sample, and by which equations.
 
+use crate::names::{Named, serde_by_name};
 use crate::numerics::normal::MeanVariance;
-use serde::{Deserialize, Serialize};
 
 /// Which equations to predict by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Equations {
     /// Exact moments.
     #[default]
@@ -13,6 +12,19 @@ pub enum Equations {
     /// Those of \[HP2005], misprints mended.
     Paper,
 }
+
+impl Named for Equations {
+    const ALL: &'static [Self] = &[Self::Exact, Self::Paper];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Paper => "paper",
+        }
+    }
+}
+
+serde_by_name!(Equations);
 
 /// Predicted moments of the samples of one class.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,6 +12,7 @@ use crate::cfa::Class;
 use crate::error::Result;
 use crate::frame::Geometry;
 use crate::metadata::{AdcRecord, FrameHeader, NoiseRecord};
+use crate::names::Named;
 use crate::random::Source;
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::{Stencil, phase};

@@ -7,14 +7,13 @@ pub mod gaussian;
 pub mod philox;
 pub mod poisson;
 
+use crate::names::{Named, serde_by_name};
 use philox::{LONGEST_RUN, Words, halves, philox4x32_10};
 use poisson::Table;
-use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// A source of noise, as the paper lists them (Sec. 3.3).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Source {
     /// Dark-current shot noise, temporal.
@@ -33,16 +32,21 @@ impl Source {
     /// All sources in the order of Eq. 9.
     pub const ALL: [Self; 5] = [Self::Dcsn, Self::Dcnu, Self::Ssn, Self::Prnu, Self::Ron];
 
-    /// The name used on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        ["dcsn", "dcnu", "ssn", "prnu", "ron"][self as usize]
-    }
-
     /// Whether the source repeats from frame to frame of one sensor.
     pub fn is_fixed_pattern(self) -> bool {
         matches!(self, Self::Dcnu | Self::Prnu)
     }
 }
+
+impl Named for Source {
+    const ALL: &'static [Self] = &Self::ALL;
+
+    fn name(self) -> &'static str {
+        ["dcsn", "dcnu", "ssn", "prnu", "ron"][self as usize]
+    }
+}
+
+serde_by_name!(Source);
 
 /// A run of photosites of one row, at most [`LONGEST_RUN`], whose draws are made together.
 ///

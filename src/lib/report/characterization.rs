@@ -1,106 +1,79 @@
 //! Reports of fitted matrices and of how well they do.
 
+use super::trade_off::trade_off;
 use super::{ReportFormat, shown, table, unwritable};
 use crate::analysis::characterization::CameraMatrix;
-use crate::analysis::characterization::evaluation::SampleEvaluation;
 use crate::analysis::characterization::noise_aware::TradeOff;
 use crate::color::difference::{Difference, DifferenceReport};
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::formats::plots::{PlotFormat, write_plot};
+use crate::formats::{files, output};
+use crate::requests::fit::{Characterization, Conditions, Evaluation, Fit, Group, NoiseReport};
+use crate::requests::values;
+use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
+use std::path::{Path, PathBuf};
 
-/// A fitted matrix with what was found out about it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Characterization {
-    /// The matrix.
-    pub matrix: CameraMatrix,
-    /// How it does on a library.
-    pub evaluation: Option<Evaluation>,
-    /// Matrices of other noise weights.
-    pub trade_off: Vec<TradeOff>,
+/// Where a matrix and its report go, in which form, and the plot.
+#[derive(Debug, Clone, Default, Args)]
+pub struct MatrixOutputs {
+    /// Form of what goes to standard output; by default yaml, and text with --evaluate or --noise-weight
+    #[arg(long, value_parser = values::one_of(&[ReportFormat::Yaml, ReportFormat::Json, ReportFormat::Text, ReportFormat::Csv]))]
+    pub output_format: Option<ReportFormat>,
+    /// Draw the trade-off of --noise-weight, as SVG or PNG
+    #[arg(long, value_name = "FILE.svg|png")]
+    pub plot: Option<PathBuf>,
+    /// Matrix file to write, as YAML; reports go to standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
 }
 
-/// How a matrix does on a library.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Evaluation {
-    /// What was evaluated, and under which conditions.
-    pub about: About,
-    /// Differences without noise.
-    pub noise_free: DifferenceReport,
-    /// What noise does.
-    pub noise: Option<NoiseReport>,
-    /// Parts of the library.
-    pub groups: Vec<Group>,
-    /// Each sample.
-    pub samples: Vec<SampleEvaluation>,
-    /// Label of each sample, where there are labels.
-    pub labels: Vec<String>,
-}
+impl MatrixOutputs {
+    /// Refuses, before any work, what the fit does not give or what cannot be written.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`]; those of [`Fit::inputs`], [`PlotFormat::of_path`] and [`output::check_outputs`].
+    pub fn check(&self, fit: &Fit) -> Result<()> {
+        if let Some(plot) = &self.plot {
+            PlotFormat::of_path(plot)?;
+            if fit.noise_weight.is_none() {
+                return Err(Error::Usage("--plot draws the trade-off of --noise-weight; give that too".into()));
+            }
+        }
+        if self.output_format == Some(ReportFormat::Csv) && fit.evaluate.is_none() && fit.noise_weight.is_none() {
+            return Err(Error::Usage(
+                "csv has one row for each sample of --evaluate LIBRARY, or for each weight of --noise-weight; give one of \
+                 them too"
+                    .into(),
+            ));
+        }
+        let inputs = fit.inputs()?;
+        let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+        output::check_outputs(&[self.output.as_deref(), self.plot.as_deref()], &inputs)
+    }
 
-/// What was evaluated, and under which conditions.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct About {
-    /// The library.
-    pub library: String,
-    /// Samples of it.
-    pub samples: usize,
-    /// How they were exposed.
-    pub exposure: String,
-    /// The white of L*a*b*.
-    pub white: String,
-    /// Demosaicking method.
-    pub demosaic: &'static str,
-    /// Pixels of each sample.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub patch: Option<[usize; 2]>,
-    /// Seed of the noise.
-    pub seed: u64,
-    /// Dark frames whose mean was subtracted.
-    pub dark_frames: u32,
-}
-
-/// What noise does to the samples of a library.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct NoiseReport {
-    /// Differences between the mean color of each sample's pixels and the true color.
-    pub patch_mean: DifferenceReport,
-    /// Mean difference of each sample's pixels from the true color.
-    pub pixel_mean: DifferenceReport,
-    /// Standard deviation of these differences over each sample's pixels.
-    pub pixel_std: DifferenceReport,
-    /// Largest of these differences.
-    pub pixel_max: DifferenceReport,
-    /// Mean distance of each sample's pixels from the color that the camera gives without noise.
-    pub noise: DifferenceSummaries,
-    /// Pixels clipped at full well or at the last code.
-    pub clipped: u64,
-}
-
-/// The distance that noise makes, simulated and by formula, ΔE*ab: mean over the samples.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct DifferenceSummaries {
-    /// Simulated.
-    pub simulated_delta_e: f64,
-    /// By formula; none where nothing is predicted.
-    pub predicted_delta_e: Option<f64>,
-    /// Simulated, in just noticeable differences.
-    pub simulated_jnd: f64,
-    /// By formula.
-    pub predicted_jnd: Option<f64>,
-}
-
-/// A part of the library.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Group {
-    /// Its label.
-    pub name: String,
-    /// Samples.
-    pub samples: usize,
-    /// Samples that the matrix was fitted on.
-    pub trained_on: usize,
-    /// Differences without noise.
-    #[serde(flatten)]
-    pub differences: DifferenceReport,
+    /// Writes matrix file, plot and report.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`characterization`] and of the disk.
+    pub fn write(&self, found: &Characterization) -> Result<()> {
+        let to_file = files::named(self.output.as_deref());
+        if let Some(path) = to_file {
+            output::write_text(Some(path), &matrix(&found.matrix)?, None)?;
+        }
+        if let Some(plot) = &self.plot {
+            write_plot(plot, &trade_off(&found.trade_off), None)?;
+        }
+        let has_report = found.evaluation.is_some() || !found.trade_off.is_empty();
+        let format = self.output_format.unwrap_or(if has_report { ReportFormat::Text } else { ReportFormat::Yaml });
+        if to_file.is_none() || has_report || format != ReportFormat::Yaml {
+            output::write_text(None, &characterization(found, format)?, None)?;
+        }
+        Ok(())
+    }
 }
 
 /// Writes what was found; YAML without evaluation is the matrix file itself.
@@ -147,7 +120,7 @@ struct Whole<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     evaluation: Option<&'a DifferenceReport>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    about: Option<&'a About>,
+    about: Option<&'a Conditions>,
     #[serde(skip_serializing_if = "Option::is_none")]
     noise: Option<&'a NoiseReport>,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
@@ -168,7 +141,7 @@ impl<'a> Whole<'a> {
             training: &found.matrix.training,
             uncertainty: &found.matrix.uncertainty,
             evaluation: evaluation.map(|evaluation| &evaluation.noise_free),
-            about: evaluation.map(|evaluation| &evaluation.about),
+            about: evaluation.map(|evaluation| &evaluation.conditions),
             noise: evaluation.and_then(|evaluation| evaluation.noise.as_ref()),
             groups: evaluation.map(|evaluation| evaluation.groups.as_slice()).unwrap_or_default(),
             trade_off: &found.trade_off,
@@ -330,7 +303,7 @@ fn differences_text(rows: &[(String, DifferenceReport)], out: &mut String) {
 }
 
 fn evaluation_text(evaluation: &Evaluation, out: &mut String) {
-    let about = &evaluation.about;
+    let about = &evaluation.conditions;
     let _ =
         writeln!(out, "\n{} samples of {}, {}; white {}", about.samples, about.library, about.exposure, about.white);
     out.push_str("without noise\n");

@@ -9,12 +9,13 @@ mod trade_off;
 
 pub use difference::difference;
 pub use photon_transfer::photon_transfer;
-pub use prediction::{SamplePrediction, prediction, samples, sweep};
+pub use prediction::{BudgetOutputs, prediction};
 pub use trade_off::trade_off;
 
 use crate::analysis::statistics::check::{Subject, Test};
 use crate::analysis::statistics::{ChannelReport, RegionReport, Report};
 use crate::error::{Error, Result};
+use crate::names::Named;
 use std::fmt::Write;
 
 /// The form of a report.
@@ -28,6 +29,19 @@ pub enum ReportFormat {
     Yaml,
     /// CSV, one row per region and channel; patches have their place after the predictions.
     Csv,
+}
+
+impl Named for ReportFormat {
+    const ALL: &'static [Self] = &[Self::Text, Self::Json, Self::Yaml, Self::Csv];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Text => "text",
+            Self::Json => "json",
+            Self::Yaml => "yaml",
+            Self::Csv => "csv",
+        }
+    }
 }
 
 fn unwritable(error: impl std::fmt::Display) -> Error {

@@ -3,10 +3,13 @@
 use crate::chain::ChainPrediction;
 use crate::plot::{Axis, Color, Marks, Panel, Plot, ReferenceLine, Region};
 use crate::propagation::budget::Cause;
+use crate::requests::prediction::TransferCurve;
 
-/// Draws the noise of one class in electrons against its signal, from predictions of one level after another, with the
-/// ranges where read-out and dark signal, shot noise, or the fixed pattern of the response is the largest.
-pub fn photon_transfer(levels: &[ChainPrediction], class: usize, full_well_e: f64, title: &str) -> Plot {
+/// Draws the noise of the brightest class in electrons against its signal, one level after another, with the ranges
+/// where read-out and dark signal, shot noise, or the fixed pattern of the response is the largest.
+pub fn photon_transfer(curve: &TransferCurve) -> Plot {
+    let TransferCurve { sensor, class: shown, full_well_e, levels } = curve;
+    let class = *shown as usize;
     let signal = |level: &ChainPrediction| level.electrons[class];
     let curve = |noise: &dyn Fn(&ChainPrediction) -> f64| -> Vec<[f64; 2]> {
         levels.iter().map(|level| [signal(level), noise(level)]).collect()
@@ -46,6 +49,6 @@ pub fn photon_transfer(levels: &[ChainPrediction], class: usize, full_well_e: f6
         });
         start = end;
     }
-    panel.vertical_lines.push(ReferenceLine { at: full_well_e, label: "full well".into() });
-    Plot::new(title, panel)
+    panel.vertical_lines.push(ReferenceLine { at: *full_well_e, label: "full well".into() });
+    Plot::new(&format!("Photon transfer of {sensor}, class {}", shown.letter()), panel)
 }

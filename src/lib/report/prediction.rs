@@ -1,95 +1,106 @@
 //! Reports of noise budgets.
 
+use super::photon_transfer::photon_transfer;
 use super::{ReportFormat, shown, table, unwritable};
 use crate::camera::optics::Exposure;
 use crate::chain::{ChainPrediction, StagePrediction};
 use crate::error::Result;
+use crate::formats::output;
+use crate::formats::plots::{PlotFormat, write_plot};
+use crate::requests::prediction::{Budgets, Conditions, PredictedNoise, SamplePrediction};
+use crate::requests::values;
+use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
+use std::path::{Path, PathBuf};
 
-/// Writes the budget of one scene; `about` says what it was predicted for. Text also shows the relative error of the sum
-/// over wavelengths, which the other forms have from `about`.
-///
-/// # Errors
-///
-/// [`crate::error::Error::Data`] when the form cannot hold it.
-pub fn prediction<A: Serialize>(
-    about: &A,
-    found: &ChainPrediction,
-    quadrature_error: Option<[f64; 3]>,
-    format: ReportFormat,
-) -> Result<String> {
-    #[derive(Serialize)]
-    struct Whole<'a, A> {
-        #[serde(flatten)]
-        about: &'a A,
-        #[serde(flatten)]
-        found: &'a ChainPrediction,
+/// Where a report of noise budgets goes, in which form, and its plot.
+#[derive(Debug, Clone, Default, Args)]
+pub struct BudgetOutputs {
+    /// Form of the report; by default text, and csv for a sweep or all samples
+    #[arg(long, value_parser = values::choice::<ReportFormat>())]
+    pub output_format: Option<ReportFormat>,
+    /// Draw the photon transfer curve, with its read, shot and fixed-pattern regimes, as SVG or PNG
+    #[arg(long, value_name = "FILE.svg|png", conflicts_with = "all_samples")]
+    pub plot: Option<PathBuf>,
+    /// File for the report; by default standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+impl BudgetOutputs {
+    /// Refuses, before any work, what cannot be written; `inputs` are the files that are read.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`PlotFormat::of_path`] and [`output::check_outputs`].
+    pub fn check(&self, inputs: &[PathBuf]) -> Result<()> {
+        if let Some(plot) = &self.plot {
+            PlotFormat::of_path(plot)?;
+        }
+        let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+        output::check_outputs(&[self.output.as_deref(), self.plot.as_deref()], &inputs)
     }
-    let whole = Whole { about, found };
-    match format {
-        ReportFormat::Json => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
-        ReportFormat::Yaml => serde_yaml::to_string(&whole).map_err(unwritable),
-        ReportFormat::Csv => stages_csv(found),
-        ReportFormat::Text => Ok(text(found, quadrature_error)),
+
+    /// Writes report and plot.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`prediction`], of the curve and of the disk.
+    pub fn write(&self, found: &mut PredictedNoise) -> Result<()> {
+        let text = prediction(found, self.output_format)?;
+        if let Some(plot) = &self.plot {
+            write_plot(plot, &photon_transfer(&found.transfer_curve()?), None)?;
+        }
+        output::write_text(self.output.as_deref(), &text, None)
     }
 }
 
-/// Writes budgets of one scene after another.
-///
-/// # Errors
-///
-/// [`crate::error::Error::Data`] when the form cannot hold it.
-pub fn sweep<A: Serialize>(about: &A, found: &[ChainPrediction], format: ReportFormat) -> Result<String> {
-    #[derive(Serialize)]
-    struct Whole<'a, A> {
-        #[serde(flatten)]
-        about: &'a A,
-        sweep: &'a [ChainPrediction],
-    }
-    let whole = Whole { about, sweep: found };
-    match format {
-        ReportFormat::Json => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
-        ReportFormat::Yaml => serde_yaml::to_string(&whole).map_err(unwritable),
-        ReportFormat::Csv | ReportFormat::Text => scenes_csv(&[], found.iter().map(|scene| (Vec::new(), scene))),
-    }
-}
-
-/// What is predicted of one sample of a library.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SamplePrediction {
-    /// Its number.
-    pub sample: usize,
-    /// Its exposure.
+/// What was predicted, with what it was predicted for.
+#[derive(Serialize)]
+struct Whole<'a> {
     #[serde(flatten)]
-    pub exposure: Exposure,
-    /// The prediction.
+    conditions: &'a Conditions,
     #[serde(flatten)]
-    pub prediction: ChainPrediction,
+    budgets: Document<'a>,
 }
 
-/// Writes budgets of one sample of a library after another.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Document<'a> {
+    Scene(&'a ChainPrediction),
+    Sweep { sweep: &'a [ChainPrediction] },
+    Samples { samples: &'a [SamplePrediction] },
+}
+
+/// Writes noise budgets; where no form is given, as text for one scene, as CSV for many. Text also shows the relative error
+/// of the sum over wavelengths, which the documents have among their conditions; that of many scenes is CSV too.
 ///
 /// # Errors
 ///
 /// [`crate::error::Error::Data`] when the form cannot hold it.
-pub fn samples<A: Serialize>(about: &A, found: &[SamplePrediction], format: ReportFormat) -> Result<String> {
-    #[derive(Serialize)]
-    struct Whole<'a, A> {
-        #[serde(flatten)]
-        about: &'a A,
-        samples: &'a [SamplePrediction],
-    }
-    let whole = Whole { about, samples: found };
-    match format {
-        ReportFormat::Json => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
-        ReportFormat::Yaml => serde_yaml::to_string(&whole).map_err(unwritable),
-        ReportFormat::Csv | ReportFormat::Text => {
+pub fn prediction(found: &PredictedNoise, format: Option<ReportFormat>) -> Result<String> {
+    let PredictedNoise { conditions, budgets, .. } = found;
+    let is_one = matches!(budgets, Budgets::Scene(_));
+    let format = format.unwrap_or(if is_one { ReportFormat::Text } else { ReportFormat::Csv });
+    let document = match budgets {
+        Budgets::Scene(scene) => Document::Scene(scene),
+        Budgets::Sweep(sweep) => Document::Sweep { sweep },
+        Budgets::Samples(samples) => Document::Samples { samples },
+    };
+    let whole = Whole { conditions, budgets: document };
+    match (format, budgets) {
+        (ReportFormat::Json, _) => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
+        (ReportFormat::Yaml, _) => serde_yaml::to_string(&whole).map_err(unwritable),
+        (ReportFormat::Text, Budgets::Scene(scene)) => Ok(text(scene, conditions.quadrature_error)),
+        (ReportFormat::Csv, Budgets::Scene(scene)) => stages_csv(scene),
+        (_, Budgets::Sweep(levels)) => scenes_csv(&[], levels.iter().map(|scene| (Vec::new(), scene))),
+        (_, Budgets::Samples(samples)) => {
             let lead = |one: &SamplePrediction| {
                 let Exposure { exposure_s, f_number, .. } = one.exposure;
                 vec![one.sample.to_string(), cell(Some(exposure_s)), cell(Some(f_number))]
             };
-            scenes_csv(&["sample", "exposure_s", "f_number"], found.iter().map(|one| (lead(one), &one.prediction)))
+            scenes_csv(&["sample", "exposure_s", "f_number"], samples.iter().map(|one| (lead(one), &one.prediction)))
         }
     }
 }

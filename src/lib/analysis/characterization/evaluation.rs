@@ -233,6 +233,7 @@ pub fn per_exposure(signals: &Signals, sample: usize, sensor: &Sensor) -> Result
 pub fn of_sample(sample: usize, error: Error) -> Error {
     match error {
         Error::Data(problem) => Error::Data(format!("sample {sample}: {problem}")),
+        Error::Advised { error, advice } => Error::Advised { error: Box::new(of_sample(sample, *error)), advice },
         other => other,
     }
 }

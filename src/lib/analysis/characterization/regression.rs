@@ -3,6 +3,7 @@
 use super::noise_aware::NoiseTerms;
 use super::{MatrixUncertainty, Signals};
 use crate::error::{Error, Result};
+use crate::names::Named;
 use crate::numerics::least_squares::{Fit, LARGEST_CONDITION, Problem, Undetermined, ridge_rows};
 use nalgebra::DMatrix;
 
@@ -24,16 +25,6 @@ impl Regression {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::SkyRadLs, Self::SkyRadSppls, Self::MaxIgnSppls, Self::MaxIgnPositiveSppls];
 
-    /// The name in options and files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::SkyRadLs => "sky-rad-ls",
-            Self::SkyRadSppls => "sky-rad-sppls",
-            Self::MaxIgnSppls => "max-ign-sppls",
-            Self::MaxIgnPositiveSppls => "max-ign-positive-sppls",
-        }
-    }
-
     /// Whether one sample is kept exact.
     pub fn keeps_a_sample(self) -> bool {
         self != Self::SkyRadLs
@@ -42,6 +33,19 @@ impl Regression {
     /// Whether it is fitted on training samples, rather than on the responses alone.
     pub fn is_trained(self) -> bool {
         matches!(self, Self::SkyRadLs | Self::SkyRadSppls)
+    }
+}
+
+impl Named for Regression {
+    const ALL: &'static [Self] = &Self::ALL;
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::SkyRadLs => "sky-rad-ls",
+            Self::SkyRadSppls => "sky-rad-sppls",
+            Self::MaxIgnSppls => "max-ign-sppls",
+            Self::MaxIgnPositiveSppls => "max-ign-positive-sppls",
+        }
     }
 }
 

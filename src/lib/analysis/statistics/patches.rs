@@ -11,6 +11,7 @@ use super::tally::{Tally, rails, tallies};
 use crate::color;
 use crate::error::{Error, Result};
 use crate::metadata::{FrameHeader, Scene};
+use crate::names::Named;
 use crate::numerics::moments::Moments;
 use crate::propagation::sampling::{Place, Sampling, SamplingBasis};
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments};

@@ -10,6 +10,7 @@ use cyanometer::color::{D65_XY, lab_from_xyz, xyz_of_chromaticity};
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::output::{CompressionKind, FrameWriter, OutputOptions, SampleKind};
+use cyanometer::names::Named;
 use cyanometer::plot::Plot;
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stream::{Counts, MemoryFrame, RowSink, RowSource};
@@ -40,10 +41,6 @@ struct Way {
 
 const GROUPS: [&str; 4] = ["EXR, f32", "EXR, f16", "TIFF, f32", "TIFF, u16"];
 
-fn compression_name(kind: CompressionKind) -> &'static str {
-    CompressionKind::NAMES.iter().find(|(_, other)| *other == kind).map_or("", |(name, _)| name)
-}
-
 pub fn study(study: &Study) -> Result<Section> {
     let size = if study.quick { [160, 120] } else { [640, 480] };
     let directory = tempfile::tempdir().map_err(|e| Error::disk("a temporary directory", "make", e))?;
@@ -60,8 +57,7 @@ pub fn study(study: &Study) -> Result<Section> {
     let groups = |ways: &[Way], of: &dyn Fn(&Way) -> f64| -> Vec<Group> {
         let group = |(index, name): (usize, &&str)| {
             let of_group = ways.iter().filter(|way| way.group == index);
-            let point =
-                |way: &Way| Choice::new(compression_name(way.compression), (way.write + way.read) * 1e9, of(way));
+            let point = |way: &Way| Choice::new(way.compression.name(), (way.write + way.read) * 1e9, of(way));
             Group::new(*name, of_group.map(point).collect())
         };
         GROUPS.iter().enumerate().map(group).filter(|group| !group.choices.is_empty()).collect()
@@ -114,7 +110,7 @@ pub fn study(study: &Study) -> Result<Section> {
         for way in ways {
             table.row(&[
                 GROUPS[way.group].into(),
-                compression_name(way.compression).into(),
+                way.compression.name().into(),
                 if way.error == 0.0 { "none".into() } else { digits(way.error, 2) },
                 number(way.bits, 1),
                 time(way.write),
@@ -191,7 +187,7 @@ fn judge(
     let mut ways = Vec::new();
     for (group, (kind, end)) in kinds.into_iter().enumerate().take(groups) {
         for &compression in if end == "exr" { EXR.as_slice() } else { &TIFF } {
-            let path = directory.join(format!("{groups}-{group}-{}.{end}", compression_name(compression)));
+            let path = directory.join(format!("{groups}-{group}-{}.{end}", compression.name()));
             let options = OutputOptions {
                 path: Some(path.clone()),
                 format: None,
@@ -231,7 +227,7 @@ fn judge(
 }
 
 fn advice(codes: &[Way], xyz: &[Way]) -> String {
-    let name = |way: &Way| format!("{} with `{}`", GROUPS[way.group], compression_name(way.compression));
+    let name = |way: &Way| format!("{} with `{}`", GROUPS[way.group], way.compression.name());
     let cost = |way: &Way| way.write + way.read;
     let least = |ways: &[Way], of: &dyn Fn(&Way) -> f64| -> String {
         let best = ways.iter().filter(|way| way.error == 0.0).min_by(|a, b| of(a).total_cmp(&of(b)));

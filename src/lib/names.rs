@@ -1,0 +1,98 @@
+//! Values of short fixed lists by their names: what options take and files hold.
+
+use serde::de::{Deserialize, Deserializer, Error};
+
+/// A value of a short fixed list, known by a name on the command line and in files.
+pub trait Named: Copy + Send + Sync + 'static {
+    /// All values, in the order in which help lists them.
+    const ALL: &'static [Self];
+
+    /// The name that is written.
+    fn name(self) -> &'static str;
+
+    /// Other names that are read as well.
+    fn other_names(self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// All names: the one that is written, then the others.
+    fn all_names(self) -> impl Iterator<Item = &'static str> {
+        std::iter::once(self.name()).chain(self.other_names().iter().copied())
+    }
+
+    /// The value of a name.
+    fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|value| value.all_names().any(|known| known == name))
+    }
+}
+
+/// Reads a value that a file holds by its name.
+///
+/// # Errors
+///
+/// The names that there are.
+pub(crate) fn deserialize<'de, T: Named, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
+    let name = String::deserialize(from)?;
+    T::named(&name).ok_or_else(|| {
+        let known: Vec<String> = T::ALL.iter().map(|value| format!("`{}`", value.name())).collect();
+        D::Error::custom(format_args!("unknown variant `{name}`, expected one of {}", known.join(", ")))
+    })
+}
+
+/// Makes files hold a value by its name.
+macro_rules! serde_by_name {
+    ($type:ty) => {
+        impl serde::Serialize for $type {
+            fn serialize<S: serde::Serializer>(&self, into: S) -> std::result::Result<S::Ok, S::Error> {
+                into.serialize_str($crate::names::Named::name(*self))
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $type {
+            fn deserialize<D: serde::Deserializer<'de>>(from: D) -> std::result::Result<Self, D::Error> {
+                $crate::names::deserialize(from)
+            }
+        }
+    };
+}
+pub(crate) use serde_by_name;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum Meal {
+        Breakfast,
+        Lunch,
+    }
+
+    impl Named for Meal {
+        const ALL: &'static [Self] = &[Self::Breakfast, Self::Lunch];
+
+        fn name(self) -> &'static str {
+            match self {
+                Self::Breakfast => "breakfast",
+                Self::Lunch => "lunch",
+            }
+        }
+
+        fn other_names(self) -> &'static [&'static str] {
+            match self {
+                Self::Breakfast => &[],
+                Self::Lunch => &["dinner"],
+            }
+        }
+    }
+
+    serde_by_name!(Meal);
+
+    #[test]
+    fn one_name_is_written_and_all_are_read() {
+        assert_eq!(serde_json::to_string(&[Meal::Breakfast, Meal::Lunch]).unwrap(), r#"["breakfast","lunch"]"#);
+        assert_eq!(Meal::named("dinner"), Some(Meal::Lunch));
+        assert_eq!(serde_yaml::from_str::<Vec<Meal>>("[dinner, breakfast]").unwrap(), [Meal::Lunch, Meal::Breakfast]);
+        let complaint = serde_yaml::from_str::<Meal>("supper").unwrap_err().to_string();
+        assert!(complaint.contains("unknown variant `supper`, expected one of `breakfast`, `lunch`"), "{complaint}");
+    }
+}

@@ -1,0 +1,158 @@
+//! Comparing colors: of images, or given as numbers.
+
+use super::notes::{self, Note};
+use super::values;
+use crate::analysis::comparison::{Comparison, ComparisonSettings, Side};
+use crate::color::{Space, White};
+use crate::error::{Error, Result};
+use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::pipe;
+use clap::Args;
+use clap::builder::{OsStringValueParser, TypedValueParser};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+/// A frame to read, or a color given as numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FrameOrColor {
+    /// A file, or `-`.
+    Frame(PathBuf),
+    /// Three numbers.
+    Color([f64; 3]),
+}
+
+impl FrameOrColor {
+    /// The file of a frame.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Frame(path) => Some(path),
+            Self::Color(_) => None,
+        }
+    }
+
+    /// Whether it is a frame that comes through a pipe.
+    pub fn is_pipe(&self) -> bool {
+        self.path().is_some_and(|path| pipe::is_input(Some(path)))
+    }
+
+    /// Whether the frame comes through the standard input.
+    pub fn is_standard_input(&self) -> bool {
+        *self == Self::Frame("-".into())
+    }
+
+    fn open(&self) -> Result<Side<FrameReader>> {
+        match self {
+            Self::Color(color) => Ok(Side::Color(*color)),
+            Self::Frame(path) => {
+                FrameReader::open(&InputOptions { path: Some(path.clone()), ..Default::default() }).map(Side::Frame)
+            }
+        }
+    }
+}
+
+/// A parser for a file or a color: what exists is a file.
+fn frame_or_color() -> impl TypedValueParser<Value = FrameOrColor> {
+    OsStringValueParser::new().try_map(|text: OsString| -> std::result::Result<FrameOrColor, String> {
+        let path = PathBuf::from(&text);
+        let text = text.to_string_lossy();
+        if text == "-" || path.exists() {
+            return Ok(FrameOrColor::Frame(path));
+        }
+        if let Ok(color) = values::three_numbers(&text) {
+            return Ok(FrameOrColor::Color(color));
+        }
+        let is_word = |part: &str| part.trim().parse::<f64>().is_err();
+        if text.starts_with('-') || !text.split(',').all(is_word) {
+            return Err("it is no option, no file, and no color, which is three numbers between commas".into());
+        }
+        Ok(FrameOrColor::Frame(path))
+    })
+}
+
+/// What is compared, and under which white.
+#[derive(Debug, Clone, Args)]
+pub struct ColorPair {
+    /// Reference: an image, or a color as X,Y,Z or L,a,b
+    #[arg(value_parser = frame_or_color(), allow_hyphen_values = true)]
+    pub a: FrameOrColor,
+    /// What is compared with it: an image, or a color as X,Y,Z or L,a,b
+    #[arg(value_parser = frame_or_color(), allow_hyphen_values = true)]
+    pub b: FrameOrColor,
+    /// What colors given as numbers are, and what images without metadata hold; by default xyz
+    #[arg(long, value_parser = values::one_of(&[Space::Xyz, Space::Lab]))]
+    pub space: Option<Space>,
+    /// White of XYZ and xyY: d65, e, or its absolute X,Y,Z; by default that in the metadata of an image, or d65
+    #[arg(long, value_name = "d65|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
+    pub white: Option<White>,
+    /// Luminance of the white in cd/m2; by default that in the metadata of an image, or 100 for colors given as numbers
+    #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive, allow_negative_numbers = true)]
+    pub white_luminance: Option<f64>,
+}
+
+impl ColorPair {
+    /// The files that are read, so that no output is written over one.
+    pub fn inputs(&self) -> Vec<&Path> {
+        [&self.a, &self.b].into_iter().filter_map(FrameOrColor::path).collect()
+    }
+
+    /// Whether one of the two comes through a pipe.
+    pub fn is_pipe(&self) -> bool {
+        self.a.is_pipe() || self.b.is_pipe()
+    }
+
+    /// Opens both, ready to be compared; with what came up.
+    ///
+    /// # Errors
+    ///
+    /// Those of readers, and of [`Comparison::new`].
+    pub fn open(&self) -> Result<(Comparison<FrameReader>, Vec<Note>)> {
+        if self.a.is_standard_input() && self.b.is_standard_input() {
+            let problem = "only one of A and B can be the standard input; name a file for the other";
+            return Err(Error::Usage(problem.into()));
+        }
+        let Self { space, white, white_luminance, .. } = *self;
+        let settings = ComparisonSettings { space, white, white_luminance };
+        let comparison = Comparison::new(self.a.open()?, self.b.open()?, &settings)?;
+        let mut notes = Vec::new();
+        if comparison.white().is_none() && (white.is_some() || white_luminance.is_some()) {
+            let text = "both are L*a*b* already; --white and --white-luminance have no effect";
+            notes.push(Note::Warning(text.into()));
+        }
+        notes.extend(comparison.frames().flat_map(notes::of_reader));
+        Ok((comparison, notes))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_side_is_a_file_or_a_color() {
+        let read = |text: &str| {
+            let command = clap::Command::new("test")
+                .arg(clap::Arg::new("side").value_parser(frame_or_color()).allow_hyphen_values(true));
+            let matches = command.try_get_matches_from(["test", text]).ok()?;
+            matches.get_one::<FrameOrColor>("side").cloned()
+        };
+        assert_eq!(read("-1.5, 2e1,-3"), Some(FrameOrColor::Color([-1.5, 20.0, -3.0])));
+        assert_eq!(read("-").map(|side| side.is_standard_input()), Some(true));
+        assert_eq!(read("Cargo.toml"), Some(FrameOrColor::Frame("Cargo.toml".into())));
+        // What looks like no color may be a file that is missing; its reader says so.
+        assert_eq!(read("sky,blue.exr"), Some(FrameOrColor::Frame("sky,blue.exr".into())));
+        for wrong in ["1,2", "1,2,3,4", "1,2,x", "inf,1,2", "--spac", "-x"] {
+            assert_eq!(read(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn colors_that_need_no_white_say_so() {
+        let color = |lightness: f64| FrameOrColor::Color([lightness, 0.0, 0.0]);
+        let white = Some(White::D65);
+        let pair = ColorPair { a: color(50.0), b: color(53.0), space: Some(Space::Lab), white, white_luminance: None };
+        let (mut comparison, notes) = pair.open().unwrap();
+        assert!(matches!(&notes[..], [Note::Warning(text)] if text.contains("have no effect")), "{notes:?}");
+        comparison.run(None, &mut |_| ()).unwrap();
+        assert_eq!(comparison.report().unwrap().differences.delta_e_76.summary.mean, 3.0);
+    }
+}

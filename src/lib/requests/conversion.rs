@@ -1,0 +1,73 @@
+//! Turning camera frames into colors, by a matrix file.
+
+use super::notes::Note;
+use super::options::WhiteChoice;
+use super::values;
+use crate::camera::optics::Exposure;
+use crate::color::Space;
+use crate::error::Result;
+use crate::formats::data;
+use crate::metadata::FrameHeader;
+use crate::names::Named;
+use crate::stages::to_xyz::{ColorSettings, ToXyz};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Which colors are made of a frame, and by which matrix.
+#[derive(Debug, Clone, Args)]
+#[command(mut_arg("white", |option| option.help("White of lab and srgb: d65, e, or its absolute X,Y,Z in cd/m2")))]
+pub struct Conversion {
+    /// Matrix file, as fit-matrix makes it
+    #[arg(long, value_name = "FILE")]
+    pub matrix: PathBuf,
+    /// Colour space
+    #[arg(long, default_value = Space::Xyz.name(), value_parser = values::choice::<Space>())]
+    pub space: Space,
+    /// The white of L\*a\*b\* and sRGB.
+    #[command(flatten)]
+    pub white: WhiteChoice,
+    /// Exposure time in s, for a frame whose metadata do not state it
+    #[arg(id = "exposure", long, value_name = "S", value_parser = values::positive, allow_negative_numbers = true)]
+    pub exposure_s: Option<f64>,
+    /// Relative aperture, for a frame whose metadata do not state it
+    #[arg(long, value_name = "N", value_parser = values::positive, allow_negative_numbers = true)]
+    pub f_number: Option<f64>,
+    /// Transmittance of the lens, 0 to 1, for a frame whose metadata do not state it
+    #[arg(long, value_name = "FRACTION", value_parser = values::fraction, allow_negative_numbers = true)]
+    pub lens_transmittance: Option<f64>,
+}
+
+impl Conversion {
+    /// The stage that converts a frame, into whose metadata the chosen exposure goes; with what came up.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`data::load_matrix`], [`Exposure::checked`] and [`ToXyz::new`].
+    pub fn stage(&self, frame: &mut FrameHeader) -> Result<(ToXyz, Vec<Note>)> {
+        let matrix = data::load_matrix(&self.matrix)?;
+        let metadata = &mut frame.metadata;
+        let known = metadata.exposure;
+        let exposure_s = self.exposure_s.or(known.map(|e| e.exposure_s));
+        let f_number = self.f_number.or(known.map(|e| e.f_number));
+        let lens_transmittance = self.lens_transmittance.or(known.map(|e| e.lens_transmittance)).unwrap_or(1.0);
+        if let Some((exposure_s, f_number)) = exposure_s.zip(f_number) {
+            metadata.exposure = Some(Exposure { exposure_s, f_number, lens_transmittance }.checked()?);
+        }
+        let mut notes = Vec::new();
+        if let (Some(of_matrix), Some(of_frame)) = (&matrix.sensor, metadata.sensor.as_ref().map(|sensor| &sensor.name))
+            && of_matrix != of_frame
+        {
+            let shown = self.matrix.display();
+            let text = format!("{shown} was fitted for the sensor {of_matrix}, but the frame comes from {of_frame}");
+            notes.push(Note::Warning(text));
+        }
+        let settings = ColorSettings {
+            xyz_from_camera: matrix.xyz_from_camera,
+            method: matrix.method,
+            space: self.space,
+            white: self.white.white,
+            white_luminance: self.white.white_luminance,
+        };
+        Ok((ToXyz::new(frame, &settings)?, notes))
+    }
+}

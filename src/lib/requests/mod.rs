@@ -1,0 +1,35 @@
+//! What a program does, from its arguments to results and notes; without a terminal, an exit, or a word to anyone.
+//!
+//! A request declares the options that it is made of, each once, with its help: a program takes it among its arguments, a
+//! library's user sets what differs from the defaults. It gives its result together with [`Note`]s, which the command line
+//! prints and others may read.
+//!
+//! ```
+//! use cyanometer::requests::{NoisePrediction, Scene, SignalLevel};
+//!
+//! let level = SignalLevel { electrons: Some([8000.0, 12_000.0, 20_000.0]), ..SignalLevel::default() };
+//! let (frame, _) = Scene { level, size: Some([64, 48]), ..Scene::default() }.render()?;
+//! assert_eq!(frame.samples.len(), 64 * 48 * 3);
+//!
+//! let predicted = NoisePrediction { level, ..NoisePrediction::default() }.run()?;
+//! assert_eq!(predicted.conditions.sensor, "kaf-5101ce");
+//! # Ok::<(), cyanometer::error::Error>(())
+//! ```
+
+pub mod comparison;
+pub mod conversion;
+pub mod fit;
+pub mod options;
+pub mod prediction;
+pub mod values;
+
+mod notes;
+mod scene;
+
+pub use comparison::ColorPair;
+pub use conversion::Conversion;
+pub use fit::Fit;
+pub use notes::{Note, of_reader};
+pub use options::SignalLevel;
+pub use prediction::NoisePrediction;
+pub use scene::{OpenScene, Scene, Uniform};

@@ -1,0 +1,42 @@
+//! What comes up on the way, for the user to hear.
+
+use crate::formats::input::FrameReader;
+use crate::stream::RowSource;
+
+/// Something that came up; whoever asked decides what to do with it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Note {
+    /// The result may not be what was wanted.
+    Warning(String),
+    /// For those who want to know how the result came about.
+    Remark(String),
+}
+
+impl Note {
+    /// What is said.
+    pub fn text(&self) -> &str {
+        match self {
+            Self::Warning(text) | Self::Remark(text) => text,
+        }
+    }
+
+    /// A warning of pixels that are left out of statistics; none where there are none.
+    pub fn not_finite(pixels: u64) -> Option<Self> {
+        let text = || format!("{pixels} pixels are NaN or infinite; they are left out of the statistics");
+        (pixels > 0).then(|| Self::Warning(text()))
+    }
+}
+
+/// What a reader found.
+pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
+    let header = reader.header();
+    let found = format!(
+        "{}: {}x{}, {}, stored as {}",
+        header.name,
+        header.geometry.width,
+        header.geometry.height,
+        header.holds(),
+        reader.stored_as()
+    );
+    std::iter::once(found).chain(reader.notes().iter().cloned()).map(Note::Remark).collect()
+}

@@ -1,0 +1,262 @@
+//! Groups of options that several programs share.
+
+use super::values;
+use crate::analysis::characterization::evaluation::{Filling, SampleExposure};
+use crate::camera::optics::Exposure;
+use crate::color::White;
+use crate::error::Result;
+use crate::formats::data;
+use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
+use crate::formats::pipe;
+use crate::random::Source;
+use crate::stages::noise::NoiseSettings;
+use crate::units::RadianceUnit;
+use clap::{Args, Command};
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// A request as its options have it where `words` alone are given: what is declared as default is the default everywhere.
+pub(super) fn defaults<R: Args>(words: &[OsString]) -> R {
+    let command = R::augment_args(Command::new("defaults").no_binary_name(true));
+    let parsed = command.try_get_matches_from(words).and_then(|matches| R::from_arg_matches(&matches));
+    parsed.unwrap_or_else(|error| panic!("the defaults of a request contradict each other: {error}"))
+}
+
+/// A frame to read.
+#[derive(Debug, Clone, Args)]
+pub struct Input {
+    /// Frame to read, EXR or TIFF; `-` or none for standard input
+    pub input: Option<PathBuf>,
+    /// Part of a multi-part EXR, or page of a TIFF, counted from 0
+    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
+    pub part: usize,
+    /// YAML file whose metadata replace those that come with the input
+    #[arg(long, value_name = "FILE")]
+    pub metadata: Option<PathBuf>,
+}
+
+impl Input {
+    /// Whether the frame comes through a pipe.
+    pub fn is_pipe(&self) -> bool {
+        pipe::is_input(self.input.as_deref())
+    }
+
+    /// What to open; channels besides R, G, B or Y are left out.
+    pub fn options(&self) -> InputOptions {
+        InputOptions { path: self.input.clone(), part: self.part, metadata: self.metadata.clone(), all_channels: false }
+    }
+}
+
+/// A sensor that counts instead of the one in the frame's metadata.
+#[derive(Debug, Clone, Default, Args)]
+pub struct SensorChoice {
+    /// Sensor, for a frame whose metadata names none, or another than it names
+    #[arg(long, value_name = "NAME|FILE")]
+    pub sensor: Option<String>,
+}
+
+impl SensorChoice {
+    /// Puts the sensor, if one was chosen, into the metadata of a frame.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`data::load_sensor`].
+    pub fn apply(&self, reader: &mut FrameReader) -> Result<()> {
+        if let Some(sensor) = &self.sensor {
+            reader.header_mut().metadata.sensor = Some(data::load_sensor(sensor)?.sensor);
+        }
+        Ok(())
+    }
+}
+
+/// A frame to write.
+#[derive(Debug, Clone, Default, Args)]
+pub struct Output {
+    /// File to write, with a sidecar FILE.yaml; `-` or none for standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Format; by default that of the file's extension, or EXR
+    #[arg(long, value_parser = values::choice::<Format>())]
+    pub format: Option<Format>,
+    /// Compression, without loss: rle, zips, zip, piz for EXR; lzw, deflate for TIFF; none by default
+    #[arg(long, value_parser = values::choice::<CompressionKind>())]
+    pub compression: Option<CompressionKind>,
+    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF; by default f32, and u16 for codes in TIFF
+    #[arg(long, value_name = "TYPE", value_parser = values::choice::<SampleKind>())]
+    pub sample_type: Option<SampleKind>,
+}
+
+impl Output {
+    /// Whether the frame goes through a pipe.
+    pub fn is_pipe(&self) -> bool {
+        pipe::is_output(self.output.as_deref())
+    }
+
+    /// Where and how to write.
+    pub fn options(&self) -> OutputOptions {
+        OutputOptions {
+            path: self.output.clone(),
+            format: self.format,
+            compression: self.compression,
+            samples: self.sample_type,
+        }
+    }
+}
+
+/// What light falls on which sensor.
+#[derive(Debug, Clone, Args)]
+pub struct Subject {
+    /// Spectrum or library as CSV, or spectral image as EXR; `-` or none for standard input
+    #[arg(conflicts_with_all = ["electrons", "dark"])]
+    pub input: Option<PathBuf>,
+    /// Sensor: a known name, or a file
+    #[arg(long, value_name = "NAME|FILE", default_value = data::DEFAULT_SENSOR)]
+    pub sensor: String,
+}
+
+/// A lens.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
+pub struct Lens {
+    /// Relative aperture
+    #[arg(long, value_name = "N", default_value_t = 8.0, value_parser = values::positive, allow_negative_numbers = true)]
+    pub f_number: f64,
+    /// Transmittance of the lens, 0 to 1
+    #[arg(long, value_name = "FRACTION", default_value_t = 1.0, value_parser = values::fraction, allow_negative_numbers = true)]
+    pub lens_transmittance: f64,
+}
+
+impl Lens {
+    /// An exposure through this lens.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Exposure::checked`].
+    pub fn exposed(&self, exposure_s: f64) -> Result<Exposure> {
+        let Self { f_number, lens_transmittance } = *self;
+        Exposure { exposure_s, f_number, lens_transmittance }.checked()
+    }
+}
+
+/// An exposure.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
+pub struct ExposureChoice {
+    /// Exposure time in s
+    #[arg(id = "exposure", long, value_name = "S", default_value_t = 0.033, value_parser = values::positive, allow_negative_numbers = true)]
+    pub exposure_s: f64,
+    /// The lens.
+    #[command(flatten)]
+    pub lens: Lens,
+}
+
+impl ExposureChoice {
+    /// What was chosen.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Exposure::checked`].
+    pub fn chosen(&self) -> Result<Exposure> {
+        self.lens.exposed(self.exposure_s)
+    }
+}
+
+/// How strong the signal of a scene is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
+pub struct SignalLevel {
+    /// Choose the exposure time that puts the brightest class, on the axis, at this fraction of full well
+    #[arg(long, value_name = "FRACTION", value_parser = values::positive, allow_negative_numbers = true, conflicts_with_all = ["electrons", "dark", "exposure"])]
+    pub expose_to: Option<f64>,
+    /// Expected electrons of R,G,B, given outright
+    #[arg(long, value_name = "R,G,B", value_parser = values::electrons, allow_hyphen_values = true)]
+    pub electrons: Option<[f64; 3]>,
+    /// No light at all
+    #[arg(long, conflicts_with = "electrons")]
+    pub dark: bool,
+}
+
+impl SignalLevel {
+    /// Electrons that are given outright; none of them in the dark.
+    pub fn given(&self) -> Option<[f64; 3]> {
+        if self.dark { Some([0.0; 3]) } else { self.electrons }
+    }
+}
+
+/// Which spectrum of a file, and in which unit.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
+pub struct SpectrumChoice {
+    /// Unit of the radiance, such as "W m-2 sr-1 nm-1"; by default what the file says, or W cm-2 sr-1 nm-1
+    #[arg(long, value_name = "UNIT", value_parser = values::radiance_unit)]
+    pub radiance_unit: Option<RadianceUnit>,
+    /// Column of the spectrum in a table
+    #[arg(long, value_name = "NAME", conflicts_with = "sample")]
+    pub column: Option<String>,
+    /// One spectrum of a library, counted from 0 (pixels row by row)
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub sample: Option<usize>,
+}
+
+/// How each sample of a library is exposed.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
+pub struct SampleExposureChoice {
+    /// Exposure time in s of every sample; with --expose-to, the aperture is chosen instead of the time
+    #[arg(id = "exposure", long, value_name = "S", value_parser = values::positive, allow_negative_numbers = true)]
+    pub exposure_s: Option<f64>,
+    /// The lens.
+    #[command(flatten)]
+    pub lens: Lens,
+    /// Expose each sample so that its brightest class fills this fraction of full well; 0.75 where no --exposure is given
+    #[arg(long, value_name = "FRACTION", value_parser = values::fraction, allow_negative_numbers = true)]
+    pub expose_to: Option<f64>,
+}
+
+impl SampleExposureChoice {
+    /// What was chosen.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Exposure::checked`].
+    pub fn chosen(&self) -> Result<SampleExposure> {
+        // A time that is chosen for each sample makes no odds.
+        let base = self.lens.exposed(self.exposure_s.unwrap_or(1.0))?;
+        Ok(match (self.exposure_s, self.expose_to) {
+            (Some(_), None) => SampleExposure::Fixed(base),
+            (Some(_), Some(fraction)) => SampleExposure::Filled { base, fraction, by: Filling::Aperture },
+            (None, fraction) => {
+                let fraction = fraction.unwrap_or(DEFAULT_FILLING);
+                SampleExposure::Filled { base, fraction, by: Filling::Time }
+            }
+        })
+    }
+}
+
+/// Share of full well that samples are exposed to where nothing else is said: that of the tests of [HP2005, Sec. 4.1].
+const DEFAULT_FILLING: f64 = 0.75;
+
+/// Which noise, at which temperature.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
+pub struct NoiseChoice {
+    /// Sources to leave out, between commas; their means stay: dcsn, dcnu, ssn, prnu, ron
+    #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = values::choice::<Source>())]
+    pub without: Vec<Source>,
+    /// Temperature of the sensor in K; by default the sensor's own
+    #[arg(id = "temperature", long, value_name = "K", value_parser = values::positive, allow_negative_numbers = true)]
+    pub temperature_k: Option<f64>,
+}
+
+impl NoiseChoice {
+    /// The noise of the seeds 0.
+    pub fn settings(&self) -> NoiseSettings {
+        NoiseSettings { without: self.without.clone(), temperature_k: self.temperature_k, ..NoiseSettings::default() }
+    }
+}
+
+/// The white that colors refer to.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
+pub struct WhiteChoice {
+    /// White of L*a*b*: d65, e, or its absolute X,Y,Z in cd/m2
+    #[arg(long, default_value_t, value_name = "d65|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
+    pub white: White,
+    /// Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates
+    #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive, allow_negative_numbers = true)]
+    pub white_luminance: Option<f64>,
+}

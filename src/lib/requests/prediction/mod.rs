@@ -1,0 +1,412 @@
+//! Predicting noise: from a scene, or a library of them, to noise budgets by formula.
+
+mod sweep;
+
+pub use sweep::Sweep;
+
+use super::notes::Note;
+use super::options::{ExposureChoice, NoiseChoice, SignalLevel, SpectrumChoice, Subject, WhiteChoice, defaults};
+use super::scene::{Scene, Uniform};
+use super::values;
+use crate::analysis::characterization::evaluation::{Filling, SampleExposure, of_sample, per_exposure};
+use crate::analysis::characterization::signals;
+use crate::camera::optics::Exposure;
+use crate::camera::sensor::Sensor;
+use crate::cfa::{CfaPattern, Class};
+use crate::chain::{Chain, ChainPrediction, ChainSettings, Uncertainty};
+use crate::color::Space;
+use crate::error::{Error, Result};
+use crate::formats::{data, spectral};
+use crate::names::Named;
+use crate::propagation::Equations;
+use crate::spectrum::WavelengthGrid;
+use crate::stages::demosaic::Method;
+use crate::stages::to_xyz::ColorSettings;
+use clap::Args;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::PathBuf;
+use sweep::uncertainty;
+
+/// What is to be predicted, and how.
+#[derive(Debug, Clone, Args)]
+#[command(mut_arg("input", |input| {
+    input.help("Spectrum or library as CSV, or spectral image as EXR; `-` for standard input")
+}))]
+#[command(mut_arg("expose_to", |option| {
+    option.help("Choose the exposure time that puts the brightest class at this fraction of full well")
+}))]
+#[command(mut_arg("electrons", |option| option.help("Expected electrons of R,G,B")))]
+#[command(mut_arg("sample", |option| option.help("One spectrum of a library, counted from 0")))]
+pub struct NoisePrediction {
+    /// Light and sensor.
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Exposure time and lens.
+    #[command(flatten)]
+    pub exposure: ExposureChoice,
+    /// How strong the signal is.
+    #[command(flatten)]
+    pub level: SignalLevel,
+    /// Which spectrum of a file.
+    #[command(flatten)]
+    pub spectrum: SpectrumChoice,
+    /// Noise sources and temperature.
+    #[command(flatten)]
+    pub noise: NoiseChoice,
+    /// Demosaicking method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
+    #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>())]
+    pub method: Method,
+    /// Pattern of the filter array; by default the sensor's own
+    #[arg(long, value_parser = values::pattern)]
+    pub pattern: Option<CfaPattern>,
+    /// Matrix file, as fit-matrix makes it, for XYZ and L*a*b*
+    #[arg(long, value_name = "FILE")]
+    pub matrix: Option<PathBuf>,
+    /// The white of L\*a\*b\*.
+    #[command(flatten)]
+    pub white: WhiteChoice,
+    /// Subtract the mean of so many dark frames rather than the black level
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100_000), allow_negative_numbers = true)]
+    pub dark_frames: u32,
+    /// Patch whose mean is predicted, in pixels
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    pub patch: Option<[usize; 2]>,
+    /// Column and row of the patch's corner on the sensor; by default any, on average
+    #[arg(long, value_name = "X,Y", value_parser = values::place, allow_hyphen_values = true, requires = "patch")]
+    pub patch_at: Option<[i64; 2]>,
+    /// Say how many pixels a square patch needs for this uncertainty of its mean, such as 0.5% or 0.1jnd
+    #[arg(long, value_name = "PERCENT%|JNDjnd", value_parser = uncertainty)]
+    pub uncertainty: Option<Uncertainty>,
+    /// Levels of the brightest class to go through, in electrons, as CSV; append log or lin
+    #[arg(long, value_name = "START:END:COUNT", value_parser = Sweep::parse)]
+    pub sweep: Option<Sweep>,
+    /// Predict every spectrum of a library, one row each as CSV; with --expose-to each at an exposure time of its own
+    #[arg(long, conflicts_with_all = ["electrons", "dark", "column", "sample", "sweep"])]
+    pub all_samples: bool,
+    /// Equations to predict by: exact, or those of the paper
+    #[arg(long, default_value = Equations::default().name(), value_parser = values::choice::<Equations>())]
+    pub equations: Equations,
+}
+
+impl Default for NoisePrediction {
+    /// The default sensor behind the paper's lens, at its exposure; the light is to be named.
+    fn default() -> Self {
+        defaults(&[])
+    }
+}
+
+/// What a prediction was made for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Conditions {
+    /// Name of the sensor.
+    pub sensor: String,
+    /// Exposure time and lens; of a library that of the samples which have none of their own.
+    pub exposure_s: f64,
+    /// Relative aperture.
+    pub f_number: f64,
+    /// Temperature of the sensor in K.
+    pub temperature_k: f64,
+    /// Demosaicking method.
+    pub method: &'static str,
+    /// Pattern of the filter array.
+    pub pattern: CfaPattern,
+    /// Equations.
+    pub equations: Equations,
+    /// Patch whose mean is predicted, in pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch: Option<[usize; 2]>,
+    /// Of the expected electrons of R, G and B, relative; where a spectrum was summed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quadrature_error: Option<[f64; 3]>,
+}
+
+/// What is predicted of one sample of a library.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SamplePrediction {
+    /// Its number.
+    pub sample: usize,
+    /// Its exposure.
+    #[serde(flatten)]
+    pub exposure: Exposure,
+    /// The prediction.
+    #[serde(flatten)]
+    pub prediction: ChainPrediction,
+}
+
+/// Noise budgets.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Budgets {
+    /// Of one scene.
+    Scene(ChainPrediction),
+    /// Of one scene at one level after another.
+    Sweep(Vec<ChainPrediction>),
+    /// Of the samples of a library.
+    Samples(Vec<SamplePrediction>),
+}
+
+impl Budgets {
+    fn scenes(&self) -> Vec<&ChainPrediction> {
+        match self {
+            Self::Scene(scene) => vec![scene],
+            Self::Sweep(levels) => levels.iter().collect(),
+            Self::Samples(samples) => samples.iter().map(|one| &one.prediction).collect(),
+        }
+    }
+}
+
+/// What was predicted.
+#[derive(Debug)]
+pub struct PredictedNoise {
+    /// What for.
+    pub conditions: Conditions,
+    /// The budgets.
+    pub budgets: Budgets,
+    /// What came up.
+    pub notes: Vec<Note>,
+    /// The chain and the electrons of the scene; none of a library.
+    scene: Option<(Chain, [f64; 3])>,
+    sweep: Option<Sweep>,
+}
+
+/// Predictions of one level after another, to draw noise against signal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TransferCurve {
+    /// Name of the sensor.
+    pub sensor: String,
+    /// The brightest class, which the levels are those of.
+    pub class: Class,
+    /// Full well of the sensor.
+    pub full_well_e: f64,
+    /// The predictions.
+    pub levels: Vec<ChainPrediction>,
+}
+
+impl NoisePrediction {
+    /// The files that are read, so that no output is written over one.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`data::load_sensor`].
+    pub fn inputs(&self) -> Result<Vec<PathBuf>> {
+        let Subject { input, sensor } = &self.subject;
+        let own = data::sensor_files(sensor, &data::load_sensor(sensor)?.sensor);
+        Ok(input.iter().chain(&self.matrix).cloned().chain(own).collect())
+    }
+
+    /// Predicts.
+    ///
+    /// # Errors
+    ///
+    /// Those of readers, sensor and matrix files and of the chain; [`Error::Usage`] where the request makes no sense.
+    pub fn run(&self) -> Result<PredictedNoise> {
+        let mut found = if self.all_samples { self.of_library()? } else { self.of_scene()? };
+        let first_order = found.budgets.scenes().into_iter().filter_map(|scene| scene.first_order);
+        if let Some(void) = first_order.into_iter().find(|first_order| !first_order.holds) {
+            found.notes.push(Note::Warning(format!(
+                "green is {:.1} times its noise: smooth hue transition divides by it, and its noise cannot be propagated \
+                 to first order",
+                void.green_over_noise
+            )));
+        }
+        Ok(found)
+    }
+
+    /// One scene, or one after another level of it.
+    fn of_scene(&self) -> Result<PredictedNoise> {
+        let Uniform { sensor, exposure, electrons, quadrature_error, mut notes } = self.scene()?.uniform()?;
+        if self.sweep.is_some() && electrons == [0.0; 3] {
+            return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
+        }
+        let color = self.color(&sensor, &mut notes)?;
+        let conditions = Conditions { quadrature_error, ..self.conditions(&sensor, exposure) };
+        let mut chain = self.chain(&sensor, exposure, color)?;
+        let budgets = match self.sweep {
+            Some(sweep) => Budgets::Sweep(sweep_levels(&mut chain, sweep, electrons)?),
+            None => Budgets::Scene(chain.predict(electrons)?),
+        };
+        Ok(PredictedNoise { conditions, budgets, notes, scene: Some((chain, electrons)), sweep: self.sweep })
+    }
+
+    /// The scene as it would be rendered; for a sweep any that is not dark.
+    fn scene(&self) -> Result<Scene> {
+        let Self { subject, exposure, mut level, spectrum, .. } = self.clone();
+        if subject.input.is_none() && level.given().is_none() {
+            if self.sweep.is_none() {
+                return Err(Error::Usage("give a spectrum, --electrons R,G,B, --dark or --sweep".into()));
+            }
+            level.electrons = Some([1.0; 3]);
+        }
+        Ok(Scene { subject, exposure, level, spectrum, ..Scene::default() })
+    }
+
+    /// Every sample of a library, each at its own exposure where one is to be chosen.
+    fn of_library(&self) -> Result<PredictedNoise> {
+        let Some(input) = &self.subject.input else {
+            return Err(Error::Usage("--all-samples is for a library of spectra; name one".into()));
+        };
+        let loaded = data::load_sensor(&self.subject.sensor)?;
+        let library = spectral::read_library(input, self.spectrum.radiance_unit)?;
+        let observer = data::load_observer()?;
+        let signals = signals(&library, &loaded.sensor, &loaded.response, &observer, &WavelengthGrid::default())?;
+        let base = self.exposure.chosen()?;
+        let exposing = match self.level.expose_to {
+            Some(fraction) => SampleExposure::Filled { base, fraction, by: Filling::Time },
+            None => SampleExposure::Fixed(base),
+        };
+        let mut notes = Vec::new();
+        let color = self.color(&loaded.sensor, &mut notes)?;
+        let one = |sample: usize| -> Result<SamplePrediction> {
+            let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;
+            let exposure = exposing.of(per_exposure, loaded.sensor.full_well_e)?;
+            let mut chain = self.chain(&loaded.sensor, exposure, color.clone())?;
+            let prediction = chain.predict(per_exposure.map(|e| e * exposure.exposure_s_sr()))?;
+            Ok(SamplePrediction { sample, exposure, prediction })
+        };
+        let found = (0..library.radiance.nrows())
+            .into_par_iter()
+            .map(|sample| one(sample).map_err(|error| of_sample(sample, error)));
+        let budgets = Budgets::Samples(found.collect::<Result<_>>()?);
+        Ok(PredictedNoise {
+            conditions: self.conditions(&loaded.sensor, base),
+            budgets,
+            notes,
+            scene: None,
+            sweep: None,
+        })
+    }
+
+    fn conditions(&self, sensor: &Sensor, exposure: Exposure) -> Conditions {
+        Conditions {
+            sensor: sensor.name.clone(),
+            exposure_s: exposure.exposure_s,
+            f_number: exposure.f_number,
+            temperature_k: self.noise.temperature_k.unwrap_or(sensor.temperature_k),
+            method: self.method.name(),
+            pattern: self.pattern.unwrap_or(sensor.cfa),
+            equations: self.equations,
+            patch: self.patch,
+            quadrature_error: None,
+        }
+    }
+
+    fn chain(&self, sensor: &Sensor, exposure: Exposure, color: Option<ColorSettings>) -> Result<Chain> {
+        Chain::new(ChainSettings {
+            sensor: sensor.clone(),
+            exposure,
+            noise: self.noise.settings(),
+            method: self.method,
+            pattern: self.pattern,
+            color,
+            dark_frames: self.dark_frames,
+            equations: self.equations,
+            patch: self.patch,
+            patch_at: self.patch_at,
+            wanted: self.uncertainty,
+        })
+    }
+
+    fn color(&self, sensor: &Sensor, notes: &mut Vec<Note>) -> Result<Option<ColorSettings>> {
+        let Some(path) = &self.matrix else {
+            return match self.uncertainty {
+                Some(Uncertainty::Jnd(_)) => {
+                    Err(Error::Usage("an uncertainty in jnd needs colours; give --matrix FILE".into()))
+                }
+                _ => Ok(None),
+            };
+        };
+        let matrix = data::load_matrix(path)?;
+        if let Some(of_matrix) = matrix.sensor.as_ref().filter(|name| **name != sensor.name) {
+            let text = format!("{} was fitted for the sensor {of_matrix}, not {}", path.display(), sensor.name);
+            notes.push(Note::Warning(text));
+        }
+        Ok(Some(ColorSettings {
+            xyz_from_camera: matrix.xyz_from_camera,
+            method: matrix.method,
+            space: Space::Xyz,
+            white: self.white.white,
+            white_luminance: self.white.white_luminance,
+        }))
+    }
+}
+
+impl PredictedNoise {
+    /// The photon transfer curve of the brightest class, over the levels of the sweep, or up to full well.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for a library, whose samples are no levels of one scene; those of the chain.
+    pub fn transfer_curve(&mut self) -> Result<TransferCurve> {
+        let Some((chain, electrons)) = &mut self.scene else {
+            return Err(Error::Usage("a library has no photon transfer curve; choose one sample".into()));
+        };
+        let (full_well_e, sensor) = (chain.sensor().full_well_e, chain.sensor().name.clone());
+        let all = Sweep { start_e: 1.0, end_e: full_well_e, count: 200, is_logarithmic: true };
+        let electrons = if *electrons == [0.0; 3] { [1.0; 3] } else { *electrons };
+        let levels = sweep_levels(chain, self.sweep.unwrap_or(all), electrons)?;
+        let brightest = (0..3).max_by(|&a, &b| electrons[a].total_cmp(&electrons[b])).unwrap_or_default();
+        Ok(TransferCurve { sensor, class: Class::ALL[brightest], full_well_e, levels })
+    }
+}
+
+/// Predicts the scene at one level of its brightest class after another.
+fn sweep_levels(chain: &mut Chain, sweep: Sweep, electrons: [f64; 3]) -> Result<Vec<ChainPrediction>> {
+    let brightest = electrons.iter().copied().fold(0.0, f64::max);
+    sweep.levels().map(|level| chain.predict(electrons.map(|e| e / brightest * level))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn given(electrons: [f64; 3]) -> NoisePrediction {
+        let level = SignalLevel { electrons: Some(electrons), ..SignalLevel::default() };
+        NoisePrediction { level, ..NoisePrediction::default() }
+    }
+
+    #[test]
+    fn a_scene_is_predicted_stage_by_stage() {
+        let found = given([1000.0, 2000.0, 3000.0]).run().unwrap();
+        let Budgets::Scene(scene) = &found.budgets else { panic!("{:?}", found.budgets) };
+        let stages: Vec<&str> = scene.stages.iter().map(|stage| stage.stage).collect();
+        assert_eq!(stages, ["electrons", "adu", "demosaicked"]);
+        let conditions = &found.conditions;
+        assert_eq!((conditions.method, conditions.exposure_s, conditions.quadrature_error), ("eci", 0.033, None));
+        assert_eq!(found.notes, []);
+    }
+
+    #[test]
+    fn levels_scale_the_brightest_class() {
+        let sweep = Some(Sweep { start_e: 10.0, end_e: 1000.0, count: 3, is_logarithmic: true });
+        let mut found = NoisePrediction { sweep, ..given([1.0, 4.0, 2.0]) }.run().unwrap();
+        let Budgets::Sweep(levels) = &found.budgets else { panic!("{:?}", found.budgets) };
+        let electrons: Vec<[f64; 3]> = levels.iter().map(|level| level.electrons).collect();
+        assert_eq!((electrons[0], electrons[2]), ([2.5, 10.0, 5.0], [250.0, 1000.0, 500.0]));
+        let levels = levels.clone();
+        let curve = found.transfer_curve().unwrap();
+        assert_eq!((curve.class, curve.levels), (Class::Green, levels));
+    }
+
+    #[test]
+    fn each_sample_of_a_library_has_an_exposure_of_its_own() {
+        let library = concat!(env!("CARGO_MANIFEST_DIR"), "/sample_data/skies/kider2014.exr");
+        let mut wanted = NoisePrediction { all_samples: true, ..NoisePrediction::default() };
+        wanted.subject.input = Some(library.into());
+        wanted.level.expose_to = Some(0.5);
+        let mut found = wanted.run().unwrap();
+        let Budgets::Samples(samples) = &found.budgets else { panic!("{:?}", found.budgets) };
+        for (number, one) in samples.iter().enumerate() {
+            let brightest = one.prediction.electrons.into_iter().fold(0.0, f64::max);
+            assert_eq!(one.sample, number);
+            assert!((brightest / 20_000.0 - 1.0).abs() < 1e-12, "{number}: {brightest}");
+        }
+        assert!(found.transfer_curve().is_err());
+    }
+
+    #[test]
+    fn a_void_first_order_is_noted() {
+        let found = NoisePrediction { method: Method::SmoothHue, ..given([1.0; 3]) }.run().unwrap();
+        assert!(found.notes[0].text().starts_with("green is "), "{:?}", found.notes);
+        assert!(NoisePrediction::default().run().is_err());
+    }
+}

@@ -1,0 +1,90 @@
+//! The frame that shows a scene: its size, its patches, and what its metadata say.
+
+use super::Scene;
+use super::light::Light;
+use super::open::Prepared;
+use crate::camera::optics::Vignetting;
+use crate::camera::sensor::Sensor;
+use crate::error::{Error, Result};
+use crate::frame::Geometry;
+use crate::metadata::{self, FrameHeader};
+use crate::stages::render::Rendering;
+
+/// How much of the frame a pixel of the source takes, and how much there is of both.
+struct Extent {
+    size: [usize; 2],
+    patch: [usize; 2],
+    /// Pixels of a row of the source; none of a uniform scene.
+    source_width: Option<usize>,
+}
+
+impl Scene {
+    /// Settles size, metadata and layout of the frame.
+    pub(super) fn rendering(&self, prepared: &Prepared) -> Result<Rendering> {
+        let Prepared { sensor, exposure, light, brightest_e, found } = prepared;
+        let Extent { size, patch, source_width } = self.extent(light, sensor)?;
+        let (source, uniform) = match light {
+            Light::Uniform { electrons, source } => (source, Some(*electrons)),
+            Light::Image { source, .. } => (source, None),
+        };
+        let wanted = self.vignetting_focal_length_mm();
+        let vignetting =
+            wanted.map(|focal_length| Vignetting::new(size[0], size[1], sensor.pixel_pitch_um, focal_length));
+        let is_negligible = vignetting.as_ref().is_some_and(Vignetting::is_negligible);
+        let vignetting = vignetting.filter(|_| !is_negligible);
+        let mut metadata = found.metadata.clone();
+        let mut leave_out = |what: &str, why: &str| metadata.leave_out("render-radiance", what, why);
+        if is_negligible {
+            leave_out("vignetting", "it changes no sample by half a unit in the last place");
+        }
+        if self.cfa.is_some() {
+            leave_out("two of the three planes at each photosite", "the mosaic drops them");
+        }
+        if vignetting.is_none() && patch[0] * patch[1] > 1 {
+            let what = "all photosites of a patch but one of each class";
+            leave_out(what, "without vignetting they expect the same");
+        }
+        let is_uniform = uniform.is_some() && vignetting.is_none();
+        metadata.cfa = self.cfa;
+        metadata.sensor = Some(sensor.clone());
+        metadata.exposure = Some(*exposure);
+        metadata.scene = Some(metadata::Scene {
+            source: source.clone(),
+            uniform: is_uniform,
+            expected_electrons: uniform.filter(|_| is_uniform),
+            vignetting_focal_length_mm: wanted.filter(|_| !is_negligible),
+            patch: uniform.is_none().then_some(patch),
+            source_width,
+            brightest_e: *brightest_e,
+        });
+        let channels: &[&str] = if self.cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
+        let geometry = Geometry::new(size[0], size[1], channels);
+        let header = FrameHeader { name: "the frame".into(), geometry, metadata };
+        Ok(Rendering { header, patch, vignetting, cfa: self.cfa })
+    }
+
+    fn extent(&self, light: &Light, sensor: &Sensor) -> Result<Extent> {
+        match light {
+            Light::Uniform { .. } if self.patch.is_some() => {
+                Err(Error::Usage("--patch is for the pixels of a spectral image, but the scene is uniform".into()))
+            }
+            Light::Uniform { .. } => {
+                let size = self.size.unwrap_or([sensor.width as usize, sensor.height as usize]);
+                Ok(Extent { size, patch: size, source_width: None })
+            }
+            Light::Image { width, height, source, .. } => {
+                let patch = self.patch.unwrap_or([1, 1]);
+                let whole = [*width * patch[0], *height * patch[1]];
+                let size = self.size.unwrap_or(whole);
+                if size[0] > whole[0] || size[1] > whole[1] {
+                    return Err(Error::Usage(format!(
+                        "{source}: its {width}x{height} pixels in patches of {}x{} make {}x{} photosites, fewer than \
+                         --size {}x{}",
+                        patch[0], patch[1], whole[0], whole[1], size[0], size[1]
+                    )));
+                }
+                Ok(Extent { size, patch, source_width: Some(*width) })
+            }
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! Rendering a scene: from spectra, or electrons given outright, to the frame that a camera expects to collect.
+
+mod layout;
+mod light;
+mod open;
+
+use super::notes::Note;
+use super::options::{ExposureChoice, SignalLevel, SpectrumChoice, Subject, defaults};
+use super::values;
+use crate::camera::optics::Exposure;
+use crate::camera::sensor::Sensor;
+use crate::cfa::CfaPattern;
+use crate::error::{Error, Result};
+use crate::formats::files::FileId;
+use crate::metadata::FrameHeader;
+use crate::names::Named;
+use crate::numerics::quadrature::Rule;
+use crate::spectrum::WavelengthGrid;
+use crate::stages::render::Rendering;
+use crate::stream::{MemoryFrame, RowSink};
+use clap::Args;
+use light::Light;
+use open::Prepared;
+
+/// What is to be rendered, and how.
+#[derive(Debug, Clone, Args)]
+pub struct Scene {
+    /// Light and sensor.
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Size of the frame in photosites; by default the sensor's, or that of the patches of a spectral image
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = values::size)]
+    pub size: Option<[usize; 2]>,
+    /// Exposure time and lens.
+    #[command(flatten)]
+    pub exposure: ExposureChoice,
+    /// Focal length in mm, for --vignetting
+    #[arg(id = "focal-length", long, value_name = "MM", default_value_t = 50.0, value_parser = values::positive, allow_negative_numbers = true)]
+    pub focal_length_mm: f64,
+    /// Darken the frame away from its centre by the fourth power of the cosine
+    #[arg(long)]
+    pub vignetting: bool,
+    /// How strong the signal is.
+    #[command(flatten)]
+    pub level: SignalLevel,
+    /// Wavelengths to sum over, in nm
+    #[arg(long, value_name = "START:END:STEP", default_value_t, value_parser = values::wavelengths)]
+    pub wavelengths: WavelengthGrid,
+    /// Rule of summation
+    #[arg(long, default_value = Rule::default().name(), value_parser = values::choice::<Rule>())]
+    pub quadrature: Rule,
+    /// Which spectrum of a file.
+    #[command(flatten)]
+    pub spectrum: SpectrumChoice,
+    /// Photosites that show one pixel of a spectral image, by default 1x1; or one spectrum of a table, to show them all
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    pub patch: Option<[usize; 2]>,
+    /// Render only the plane that the mosaic of this pattern keeps: rggb, bggr, grbg or gbrg
+    #[arg(long, value_name = "PATTERN", value_parser = values::pattern)]
+    pub cfa: Option<CfaPattern>,
+    /// Part of a multi-part EXR, counted from 0
+    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
+    pub part: usize,
+}
+
+impl Default for Scene {
+    /// The radiance that comes through the standard input, on the default sensor behind the paper's lens, at its exposure,
+    /// and over its wavelengths.
+    fn default() -> Self {
+        defaults(&[])
+    }
+}
+
+/// A scene that is ready to be drawn.
+pub struct OpenScene {
+    rendering: Rendering,
+    light: Light,
+    input: Option<(FileId, String)>,
+    /// What came up.
+    pub notes: Vec<Note>,
+}
+
+/// A uniform scene behind a camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Uniform {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// The exposure.
+    pub exposure: Exposure,
+    /// Signal electrons of R, G and B.
+    pub electrons: [f64; 3],
+    /// Estimated relative error of them by the sum over wavelengths; none where no spectrum was summed or none is possible.
+    pub quadrature_error: Option<[f64; 3]>,
+    /// What came up.
+    pub notes: Vec<Note>,
+}
+
+impl Scene {
+    /// Loads the sensor, opens the light, settles the exposure and lays the frame out.
+    ///
+    /// # Errors
+    ///
+    /// Those of readers and sensor files; [`Error::Usage`] where the request makes no sense; [`Error::Data`] where it asks
+    /// for a fraction of full well in the dark.
+    pub fn open(&self) -> Result<OpenScene> {
+        let prepared = self.prepare()?;
+        let rendering = self.rendering(&prepared)?;
+        let Prepared { light, found, .. } = prepared;
+        Ok(OpenScene { rendering, light, input: found.input, notes: found.notes })
+    }
+
+    /// Renders the frame into memory.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`], and those of the reader.
+    pub fn render(&self) -> Result<(MemoryFrame, Vec<Note>)> {
+        let mut open = self.open()?;
+        let notes = std::mem::take(&mut open.notes);
+        let mut frame = MemoryFrame::new(open.header().clone(), Vec::new());
+        open.draw(&mut frame, &mut |_| ())?;
+        Ok((frame, notes))
+    }
+
+    /// Sensor, exposure and signal electrons of a uniform scene, without a frame.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`]; [`Error::Usage`] for a spectral image of which no sample was chosen.
+    pub fn uniform(&self) -> Result<Uniform> {
+        let Prepared { sensor, exposure, light, found, .. } = self.prepare()?;
+        match light {
+            Light::Uniform { electrons, .. } => {
+                let (quadrature_error, notes) = (found.metadata.quadrature_error, found.notes);
+                Ok(Uniform { sensor, exposure, electrons, quadrature_error, notes })
+            }
+            Light::Image { source, .. } => {
+                Err(Error::Usage(format!("{source}: it holds many spectra; choose one with --sample N")))
+            }
+        }
+    }
+
+    fn vignetting_focal_length_mm(&self) -> Option<f64> {
+        self.vignetting.then_some(self.focal_length_mm)
+    }
+}
+
+impl OpenScene {
+    /// The head of the frame.
+    pub fn header(&self) -> &FrameHeader {
+        &self.rendering.header
+    }
+
+    /// The same, to add to.
+    pub fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.rendering.header
+    }
+
+    /// The file that is read, so that it is not written over; none for pipes.
+    pub fn inputs(&self) -> &[(FileId, String)] {
+        self.input.as_slice()
+    }
+
+    /// Draws the whole frame into a sink; `progress` hears the number of rows that are done.
+    ///
+    /// # Errors
+    ///
+    /// Those of reader and sink.
+    pub fn draw(self, sink: &mut dyn RowSink, progress: &mut dyn FnMut(usize)) -> Result<()> {
+        let Self { rendering, mut light, .. } = self;
+        rendering.run(|| light.next_row(), sink, progress)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::data::DEFAULT_SENSOR;
+
+    const TREE: &str = env!("CARGO_MANIFEST_DIR");
+
+    fn given(electrons: [f64; 3]) -> Scene {
+        let level = SignalLevel { electrons: Some(electrons), ..SignalLevel::default() };
+        Scene { level, size: Some([5, 4]), ..Scene::default() }
+    }
+
+    fn spectrum(file: &str) -> Scene {
+        let input = Some(format!("{TREE}/sample_data/{file}").into());
+        Scene { subject: Subject { input, sensor: DEFAULT_SENSOR.into() }, ..Scene::default() }
+    }
+
+    #[test]
+    fn the_defaults_are_those_of_the_paper() {
+        let scene = Scene::default();
+        assert_eq!((scene.subject.sensor.as_str(), &scene.subject.input), (DEFAULT_SENSOR, &None));
+        let exposure = scene.exposure.chosen().unwrap();
+        assert_eq!(exposure, Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
+        assert_eq!((scene.wavelengths, scene.quadrature), (WavelengthGrid::default(), Rule::Rectangle));
+        assert_eq!((scene.vignetting_focal_length_mm(), scene.focal_length_mm), (None, 50.0));
+    }
+
+    #[test]
+    fn a_uniform_scene_is_rendered_into_memory() {
+        let (frame, notes) = given([100.0, 200.0, 300.0]).render().unwrap();
+        assert_eq!((frame.header.geometry.width, frame.header.geometry.height), (5, 4));
+        let row = [100.0, 200.0, 300.0].map(|e| [e; 5]).concat();
+        assert_eq!(frame.samples, [row.clone(), row.clone(), row.clone(), row].concat());
+        assert_eq!(notes, []);
+        let scene = frame.header.metadata.scene.unwrap();
+        assert_eq!((scene.uniform, scene.expected_electrons), (true, Some([100.0, 200.0, 300.0])));
+
+        let (plane, _) = Scene { cfa: Some(CfaPattern::Rggb), ..given([1.0, 2.0, 3.0]) }.render().unwrap();
+        assert_eq!(plane.samples[..10], [1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 3.0, 2.0, 3.0, 2.0]);
+    }
+
+    #[test]
+    fn a_frame_and_the_formula_expect_the_same_of_a_spectrum() {
+        let scene = Scene { size: Some([2, 2]), ..spectrum("skies/clear_zenith.csv") };
+        let (frame, _) = scene.render().unwrap();
+        let uniform = scene.uniform().unwrap();
+        assert_eq!(frame.header.metadata.scene.unwrap().expected_electrons, Some(uniform.electrons));
+        assert_eq!(frame.header.metadata.quadrature_error, uniform.quadrature_error);
+        let filled = Scene { level: SignalLevel { expose_to: Some(0.5), ..SignalLevel::default() }, ..scene };
+        let filled = filled.uniform().unwrap();
+        let brightest = filled.electrons.into_iter().fold(0.0, f64::max);
+        assert!((brightest / (0.5 * filled.sensor.full_well_e) - 1.0).abs() < 1e-12, "{brightest}");
+        assert!(matches!(&filled.notes[0], Note::Remark(text) if text.starts_with("exposure ")), "{:?}", filled.notes);
+    }
+
+    #[test]
+    fn what_makes_no_scene_is_refused() {
+        let complaint = |scene: Scene| scene.render().unwrap_err().to_string();
+        assert!(complaint(Scene { patch: Some([2, 2]), ..given([1.0; 3]) }).contains("the scene is uniform"));
+        let dark = SignalLevel { dark: true, expose_to: Some(0.5), ..SignalLevel::default() };
+        assert!(complaint(Scene { level: dark, ..Scene::default() }).contains("the scene is dark"));
+        let library = spectrum("skies/kider2014.exr").uniform().unwrap_err().to_string();
+        assert!(library.contains("choose one with --sample N"), "{library}");
+    }
+}

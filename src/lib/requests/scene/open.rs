@@ -1,0 +1,216 @@
+//! Opens the light of a scene, and settles its exposure.
+
+use super::Scene;
+use super::light::{ImageRows, Light, Seen, SpectralRows, brightest, checked};
+use crate::camera::optics::Exposure;
+use crate::camera::sensor::{GridWeights, Sensor};
+use crate::error::{Error, Result};
+use crate::formats::csv::SpectralTable;
+use crate::formats::data::{self, LoadedSensor};
+use crate::formats::files::{FileId, regular_file};
+use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::spectral::{self, Radiances, SpectralChannels};
+use crate::frame::Geometry;
+use crate::metadata::Metadata;
+use crate::numerics::quadrature::Rule;
+use crate::requests::notes::{self, Note};
+use crate::spectrum::{WavelengthGrid, chart_columns};
+use crate::stream::RowSource;
+use crate::units::QuantityKind;
+
+/// A scene whose light is open and whose exposure is settled.
+pub(super) struct Prepared {
+    pub(super) sensor: Sensor,
+    pub(super) exposure: Exposure,
+    pub(super) light: Light,
+    /// Electrons of the brightest class, where the exposure was chosen by them.
+    pub(super) brightest_e: Option<f64>,
+    pub(super) found: Found,
+}
+
+/// What comes up while a scene is opened.
+pub(super) struct Found {
+    /// What is left out, and the error of the sum over wavelengths.
+    pub(super) metadata: Metadata,
+    /// The file that is read, where it is one.
+    pub(super) input: Option<(FileId, String)>,
+    pub(super) notes: Vec<Note>,
+}
+
+/// The sums over wavelengths that turn radiance into electrons.
+struct Sums {
+    weights: GridWeights,
+    /// Those at twice the step, where the rule fits them.
+    coarse: Option<GridWeights>,
+    rule: Rule,
+}
+
+impl Sums {
+    fn on(
+        grid: &WavelengthGrid,
+        LoadedSensor { sensor, response }: &LoadedSensor,
+        exposure: &Exposure,
+    ) -> Result<Self> {
+        let weights = response.weights_on(sensor, exposure, grid)?;
+        let coarse = grid.doubled().and_then(|grid| response.weights_on(sensor, exposure, &grid).ok());
+        Ok(Self { weights, coarse, rule: grid.quadrature })
+    }
+
+    /// The camera for radiances at these wavelengths, those of `name`.
+    fn camera(&self, sampled_nm: &[f64], name: &str, notes: &mut Vec<Note>) -> Seen {
+        let (camera, uncovered) = self.weights.camera(sampled_nm);
+        if uncovered > 1e-6 {
+            notes.push(Note::Warning(format!(
+                "{name}: it covers {} to {} nm; {:.2} % of the sensor's response lies beyond, where its radiance is \
+                 taken as zero",
+                sampled_nm[0],
+                sampled_nm[sampled_nm.len() - 1],
+                100.0 * uncovered
+            )));
+        }
+        let coarse = self.coarse.as_ref().map(|weights| weights.camera(sampled_nm).0);
+        Seen { camera, coarse, rule: self.rule }
+    }
+}
+
+impl Scene {
+    /// Loads the sensor, opens the light and settles the exposure.
+    pub(super) fn prepare(&self) -> Result<Prepared> {
+        let loaded = data::load_sensor(&self.subject.sensor)?;
+        let mut exposure = self.exposure.chosen()?;
+        if self.level.expose_to.is_some() {
+            // The signal is proportional to time: work it out for 1 s, then choose.
+            exposure.exposure_s = 1.0;
+        }
+        let mut found = Found {
+            metadata: Metadata::new(QuantityKind::ExpectedElectrons),
+            input: self.subject.input.as_deref().and_then(regular_file),
+            notes: Vec::new(),
+        };
+        let mut light = match self.level.given() {
+            Some(electrons) => {
+                let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
+                Light::Uniform { electrons, source: source.into() }
+            }
+            None => self.open_light(&loaded, &exposure, &mut found)?,
+        };
+        let mut brightest_e = None;
+        if let Some(fraction) = self.level.expose_to {
+            let (kept, brightest) = light.keep_and_find_brightest()?;
+            light = kept;
+            if brightest <= 0.0 {
+                return Err(Error::Data("the scene is dark: no exposure reaches a fraction of full well".into()));
+            }
+            exposure.exposure_s = fraction * loaded.sensor.full_well_e / brightest;
+            exposure = exposure.checked()?;
+            light.scale(exposure.exposure_s);
+            brightest_e = Some(fraction * loaded.sensor.full_well_e);
+            found.notes.push(Note::Remark(format!("exposure {} s", exposure.exposure_s)));
+        }
+        if let Some([red, green, blue]) = found.metadata.quadrature_error {
+            found.notes.push(Note::Remark(format!(
+                "the sum over wavelengths is off by about {red:.1e} of R, {green:.1e} of G, {blue:.1e} of B, as twice the \
+                 step tells"
+            )));
+        }
+        Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, found })
+    }
+
+    /// Opens the radiance at an exposure.
+    fn open_light(&self, loaded: &LoadedSensor, exposure: &Exposure, found: &mut Found) -> Result<Light> {
+        let grid = WavelengthGrid { quadrature: self.quadrature, ..self.wavelengths };
+        let sums = Sums::on(&grid, loaded, exposure)?;
+        let GridWeights { left_out, wavelengths_nm, .. } = &sums.weights;
+        if *left_out > 0 {
+            let all = left_out + wavelengths_nm.len();
+            let what = format!("{left_out} of {all} wavelengths");
+            found.metadata.leave_out("render-radiance", what, "no class responds there");
+        }
+        let path = self.subject.input.clone();
+        let options = InputOptions { path, part: self.part, metadata: None, all_channels: true };
+        match spectral::open(&options)? {
+            Radiances::Table(table) => self.light_of_table(&table, &sums, found),
+            Radiances::Image(reader) => self.light_of_image(*reader, &sums, found),
+        }
+    }
+
+    /// The chosen spectrum of a table, or all of them as a chart.
+    fn light_of_table(&self, table: &SpectralTable, sums: &Sums, found: &mut Found) -> Result<Light> {
+        let name = table.name().to_owned();
+        let seen = sums.camera(&table.wavelength_nm, &name, &mut found.notes);
+        let radiance_of = |index: usize| -> Vec<f64> {
+            let unit = self.spectrum.radiance_unit.or_else(|| table.unit_of(index)).unwrap_or_default();
+            table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect()
+        };
+        let electrons_of = |index: usize| checked(seen.camera.electrons(&radiance_of(index)), &name);
+        let count = table.columns.len();
+        let is_chosen = self.spectrum.column.is_some() || self.spectrum.sample.is_some();
+        if self.patch.is_some() && count > 1 && !is_chosen {
+            let all: Vec<[f64; 3]> = (0..count).map(electrons_of).collect::<Result<_>>()?;
+            let width = chart_columns(count);
+            found.metadata.quadrature_error = seen.quadrature_error(&radiance_of(brightest(&all[..width])));
+            let rows: Vec<Vec<[f64; 3]>> = all.chunks(width).map(<[_]>::to_vec).collect();
+            let rows = ImageRows::Kept(rows.into_iter());
+            return Ok(Light::Image { rows, factor: 1.0, width, height: count / width, source: name });
+        }
+        let index = self.choose(table)?;
+        let electrons = electrons_of(index)?;
+        found.metadata.quadrature_error = seen.quadrature_error(&radiance_of(index));
+        let source = if count > 1 { format!("{name}: {}", table.columns[index]) } else { name };
+        Ok(Light::Uniform { electrons, source })
+    }
+
+    /// The chosen pixel of a spectral image, or all of them.
+    fn light_of_image(&self, reader: FrameReader, sums: &Sums, found: &mut Found) -> Result<Light> {
+        if self.spectrum.column.is_some() {
+            return Err(Error::Usage("a spectral image has no columns; choose a pixel with --sample N".into()));
+        }
+        found.notes.extend(notes::of_reader(&reader));
+        found.input = reader.file();
+        let header = reader.header().clone();
+        let spectral = SpectralChannels::of(&header, self.spectrum.radiance_unit)?;
+        let seen = sums.camera(&spectral.wavelength_nm, &header.name, &mut found.notes);
+        let planes = seen.camera.planes(&spectral.channels, spectral.unit.in_w_per_cm2_sr_nm());
+        let all = spectral.channels.len();
+        if planes.len() < all {
+            let what = format!("{} of {all} spectral planes", all - planes.len());
+            found.metadata.leave_out("render-radiance", what, "no class responds to them");
+        }
+        let Geometry { width, height, .. } = header.geometry;
+        let mut rows = SpectralRows::new(reader, planes);
+        let Some(sample) = self.spectrum.sample else {
+            found.metadata.quadrature_error = seen.quadrature_error(&rows.brightest_ahead(&spectral)?);
+            let rows = ImageRows::Streamed(Box::new(rows));
+            return Ok(Light::Image { rows, factor: 1.0, width, height, source: header.name });
+        };
+        if sample >= width * height {
+            return Err(no_sample(&header.name, sample, width * height));
+        }
+        for _ in 0..sample / width {
+            rows.next()?;
+        }
+        let electrons = rows.next()?[sample % width];
+        let radiance = rows.radiance(&spectral, sample % width);
+        found.metadata.quadrature_error = seen.quadrature_error(&radiance);
+        Ok(Light::Uniform { electrons, source: format!("{}: sample {sample}", header.name) })
+    }
+
+    /// The row of a table that is wanted.
+    fn choose(&self, table: &SpectralTable) -> Result<usize> {
+        let count = table.columns.len();
+        match (&self.spectrum.column, self.spectrum.sample) {
+            (Some(column), _) => table.column_index(Some(column)),
+            (None, Some(sample)) if sample < count => Ok(sample),
+            (None, Some(sample)) => Err(no_sample(table.name(), sample, count)),
+            (None, None) if count == 1 => Ok(0),
+            (None, None) => Err(Error::Usage(format!(
+                "{}: it holds {count} spectra; choose one with --column NAME or --sample N",
+                table.name()
+            ))),
+        }
+    }
+}
+
+fn no_sample(name: &str, sample: usize, count: usize) -> Error {
+    Error::Usage(format!("{name}: there is no sample {sample}; it has samples 0 to {}", count - 1))
+}

@@ -1,0 +1,241 @@
+//! How values of options are read.
+
+use crate::analysis::statistics::Region;
+use crate::cfa::CfaPattern;
+use crate::color::White;
+use crate::names::Named;
+use crate::spectrum::WavelengthGrid;
+use crate::stages::black::Black;
+use crate::units::RadianceUnit;
+use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
+use std::path::PathBuf;
+
+/// A parser for a value by one of its names.
+pub fn choice<T: Named>() -> impl TypedValueParser<Value = T> {
+    one_of(T::ALL)
+}
+
+/// A parser for one of these values by its names.
+pub fn one_of<T: Named>(values: &'static [T]) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(values.iter().flat_map(|value| value.all_names()))
+        .try_map(|name| T::named(&name).ok_or("no value has this name"))
+}
+
+/// A parser for the name of an EXR file to write; other names without an extension may be devices.
+pub fn exr_file() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path: PathBuf| match path.extension() {
+        Some(end) if !end.eq_ignore_ascii_case("exr") => Err("end the name in .exr"),
+        _ => Ok(path),
+    })
+}
+
+/// Reads `WIDTHxHEIGHT`, both at least 1.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn size(text: &str) -> Result<[usize; 2], String> {
+    let parse = |part: &str| part.parse::<usize>().ok().filter(|n| (1..=i32::MAX as usize).contains(n));
+    text.split_once(['x', 'X'])
+        .and_then(|(width, height)| Some([parse(width)?, parse(height)?]))
+        .ok_or_else(|| "a size is WIDTHxHEIGHT in photosites, such as 1332x1000".into())
+}
+
+/// Reads finite numbers between commas.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn three_numbers(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    match (numbers.as_slice(), text.split(',').count()) {
+        ([a, b, c], 3) => Ok([*a, *b, *c]),
+        _ => Err("give three numbers between commas".into()),
+    }
+}
+
+/// Reads expected electrons `R,G,B`, none below zero.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn electrons(text: &str) -> Result<[f64; 3], String> {
+    let wrong = || "give the electrons of R,G,B between commas, none below 0".to_owned();
+    let found = three_numbers(text).map_err(|_| wrong())?;
+    if found.iter().all(|e| *e >= 0.0) { Ok(found) } else { Err(wrong()) }
+}
+
+/// Reads a finite number.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn number(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "give a number".into())
+}
+
+/// Reads a number above zero.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn positive(text: &str) -> Result<f64, String> {
+    number(text).ok().filter(|x| *x > 0.0).ok_or_else(|| "give a number above 0".into())
+}
+
+/// Reads a number that is not below zero.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).ok().filter(|x| *x >= 0.0).ok_or_else(|| "give a number that is not below 0".into())
+}
+
+/// Reads the size of a patch, `WIDTHxHEIGHT`, at least 2 pixels and at most 1024 on a side.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn patch(text: &str) -> Result<[usize; 2], String> {
+    let wrong = || "a patch is WIDTHxHEIGHT in pixels, from 2x2 to 1024x1024".to_owned();
+    size(text).ok().filter(|size| size.iter().all(|side| (2..=1024).contains(side))).ok_or_else(wrong)
+}
+
+/// Reads a fraction above 0 and at most 1.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn fraction(text: &str) -> Result<f64, String> {
+    positive(text).ok().filter(|x| *x <= 1.0).ok_or_else(|| "give a fraction above 0 and at most 1".into())
+}
+
+/// Reads a black level: `auto`, `none`, or a number.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn black(text: &str) -> Result<Black, String> {
+    match text {
+        "auto" => Ok(Black::Auto),
+        "none" => Ok(Black::None),
+        level => number(level).map(Black::Level).map_err(|_| "give auto, none or a number".into()),
+    }
+}
+
+/// Reads a region `X,Y,W,H`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn region(text: &str) -> Result<Region, String> {
+    let numbers: Option<Vec<usize>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([x, y, width, height]) => Ok(Region { x: *x, y: *y, width: *width, height: *height }),
+        _ => Err("a region is X,Y,W,H in pixels, counted from the frame's corner".into()),
+    }
+}
+
+/// Reads a white: `d65`, `e`, or absolute X,Y,Z.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn white(text: &str) -> Result<White, String> {
+    match text {
+        "d65" => Ok(White::D65),
+        "e" => Ok(White::EqualEnergy),
+        numbers => three_numbers(numbers)
+            .map(White::Absolute)
+            .map_err(|_| "give d65, e, or the white's X,Y,Z between commas".into()),
+    }
+}
+
+/// Reads a column and row of the sensor, `X,Y`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn place(text: &str) -> Result<[i64; 2], String> {
+    let numbers: Option<Vec<i64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([x, y]) => Ok([*x, *y]),
+        _ => Err("give the column and row X,Y of the sensor".into()),
+    }
+}
+
+/// Reads a colour filter array's pattern.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn pattern(text: &str) -> Result<CfaPattern, String> {
+    text.parse()
+}
+
+/// Reads a unit of spectral radiance.
+///
+/// # Errors
+///
+/// The units that there are.
+pub fn radiance_unit(text: &str) -> Result<RadianceUnit, String> {
+    RadianceUnit::parse(text).ok_or_else(|| {
+        let names: Vec<&str> = RadianceUnit::ALL.into_iter().map(RadianceUnit::name).collect();
+        format!("known units are {}", names.join("; "))
+    })
+}
+
+/// Reads wavelengths `START:END:STEP`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn wavelengths(text: &str) -> Result<WavelengthGrid, String> {
+    let numbers: Option<Vec<f64>> = text.split(':').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([start_nm, end_nm, step_nm]) => {
+            let (start_nm, end_nm, step_nm) = (*start_nm, *end_nm, *step_nm);
+            let grid = WavelengthGrid { start_nm, end_nm, step_nm, ..WavelengthGrid::default() };
+            grid.points().map(|_| grid).map_err(|error| error.to_string())
+        }
+        _ => Err(format!("give START:END:STEP in nm, such as {}", WavelengthGrid::default())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::Space;
+    use crate::stages::demosaic::Method;
+
+    fn read<P: TypedValueParser>(parser: P, text: &str) -> Option<P::Value>
+    where
+        P::Value: Clone + Send + Sync + 'static,
+    {
+        let command = clap::Command::new("test")
+            .arg(clap::Arg::new("value").value_parser(clap::builder::ValueParser::new(parser)));
+        command.try_get_matches_from(["test", text]).ok()?.remove_one("value")
+    }
+
+    #[test]
+    fn values_are_read_by_all_their_names_and_no_others() {
+        for method in Method::ALL {
+            for name in method.names() {
+                assert_eq!(read(choice::<Method>(), name), Some(method));
+            }
+        }
+        assert_eq!(read(choice::<Method>(), "nearest"), None);
+        let some = || one_of(&[Space::Xyz, Space::Lab]);
+        assert_eq!((read(some(), "lab"), read(some(), "srgb")), (Some(Space::Lab), None));
+    }
+
+    #[test]
+    fn what_help_shows_is_read_again() {
+        assert_eq!(wavelengths(&WavelengthGrid::default().to_string()), Ok(WavelengthGrid::default()));
+        for chosen in [White::D65, White::EqualEnergy, White::Absolute([95.047, 1e2, 108.883])] {
+            assert_eq!(white(&chosen.to_string()), Ok(chosen));
+        }
+    }
+}
