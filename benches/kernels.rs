@@ -27,9 +27,9 @@ const HEIGHT: usize = 1996;
 
 fn header(quantity: QuantityKind, channels: &[&str], cfa: Option<CfaPattern>) -> FrameHeader {
     let mut metadata = Metadata::new(quantity);
-    metadata.cfa = cfa;
-    metadata.black_level_adu = Some(102.3);
-    metadata.white_level_adu = Some(4095.0);
+    metadata.cfa = cfa.map(Into::into);
+    metadata.black_level_adu = Some(102.3.into());
+    metadata.white_level_adu = Some(4095.0.into());
     metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
     FrameHeader { name: "bench".into(), geometry: Geometry::new(WIDTH, HEIGHT, channels), metadata }
 }

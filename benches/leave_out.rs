@@ -24,7 +24,7 @@ fn header(quantity: QuantityKind, channels: &[&str]) -> FrameHeader {
     let mut metadata = Metadata::new(quantity);
     metadata.sensor = data::load_sensor(data::DEFAULT_SENSOR).ok().map(|loaded| loaded.sensor);
     metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
-    metadata.cfa = (channels.len() == 1).then_some(CfaPattern::Rggb);
+    metadata.cfa = (channels.len() == 1).then_some(CfaPattern::Rggb.into());
     FrameHeader { name: "bench".into(), geometry: Geometry::new(SIZE[0], SIZE[1], channels), metadata }
 }
 

@@ -127,7 +127,8 @@ fn evaluations(criterion: &mut Criterion) {
         return;
     };
     let grid = WavelengthGrid::default();
-    let Ok(signals) = signals(&library, &loaded.sensor, &loaded.response, &observer, &grid) else { return };
+    let Ok(response) = loaded.response() else { return };
+    let Ok(signals) = signals(&library, &loaded.sensor, response, &observer, &grid) else { return };
     let mut group = criterion.benchmark_group("evaluations");
     group.throughput(Throughput::Elements(signals.camera.nrows() as u64)).sample_size(10);
     for method in Method::ALL {

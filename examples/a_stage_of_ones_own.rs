@@ -58,7 +58,7 @@ pub fn variance_over_mean(share: f32) -> Result<[f64; 2]> {
     let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
     metadata.sensor = Some(load_sensor("kaf-5101ce")?.sensor);
     metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
-    metadata.cfa = Some(CfaPattern::Rggb);
+    metadata.cfa = Some(CfaPattern::Rggb.into());
     let geometry = Geometry::new(1000, 1000, &["Y"]);
     let light = MemoryFrame::new(FrameHeader { name: "gray".into(), geometry, metadata }, vec![20_000.0; 1_000_000]);
 

@@ -35,7 +35,7 @@ pub fn wedge() -> Result<Vec<Row>> {
     let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
     metadata.sensor = Some(load_sensor("kaf-5101ce")?.sensor);
     metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
-    metadata.cfa = Some(CfaPattern::Rggb);
+    metadata.cfa = Some(CfaPattern::Rggb.into());
     let header = FrameHeader { name: "wedge".into(), geometry: Geometry::new(COLUMNS, ROWS, &["Y"]), metadata };
     let frame = MemoryFrame::new(header, expected.into_iter().collect());
 

@@ -8,7 +8,8 @@ use cyanometer::analysis::characterization::regression::{FitSettings, FittedMatr
 use cyanometer::analysis::characterization::training::{average_sample, spanning_subset};
 use cyanometer::analysis::characterization::{Signals, responses, signals};
 use cyanometer::camera::optics::Exposure;
-use cyanometer::camera::sensor::{Sensor, SpectralResponse};
+use cyanometer::camera::response::SpectralResponse;
+use cyanometer::camera::sensor::Sensor;
 use cyanometer::color::difference::Difference;
 use cyanometer::color::{Space, White, lab_about, lab_from_xyz, matrix};
 use cyanometer::error::Result;
@@ -45,7 +46,7 @@ fn the_default_sensors_matrix_is_the_fit_to_the_sky_library() {
     let library = sky_library();
     let observer = data::load_observer().unwrap();
     let grid = WavelengthGrid::default();
-    let found = signals(&library, &loaded.sensor, &loaded.response, &observer, &grid).unwrap();
+    let found = signals(&library, &loaded.sensor, loaded.response().unwrap(), &observer, &grid).unwrap();
     let all: Vec<usize> = (0..912).collect();
     let fitted = sky_rad_ls(&found, &all).unwrap();
     let stated = loaded.sensor.xyz_from_camera.unwrap();
@@ -87,7 +88,8 @@ fn skies_that_do_not_determine_a_matrix_are_refused() {
     let loaded = data::load_sensor(data::DEFAULT_SENSOR).unwrap();
     let observer = data::load_observer().unwrap();
     let found =
-        signals(&sky_library(), &loaded.sensor, &loaded.response, &observer, &WavelengthGrid::default()).unwrap();
+        signals(&sky_library(), &loaded.sensor, loaded.response().unwrap(), &observer, &WavelengthGrid::default())
+            .unwrap();
     for (samples, complaint) in
         [(&[0, 1][..], "only 2 of the 3"), (&[5, 5, 5, 5], "only 1 of the 3"), (&[0, 1, 912], "no sample 912")]
     {
@@ -143,8 +145,8 @@ fn tristimulus_values_of_skies_are_those_of_colour_science() {
 fn sky_signals() -> (Sensor, Signals, Signals) {
     let loaded = data::load_sensor(data::DEFAULT_SENSOR).unwrap();
     let (observer, grid) = (data::load_observer().unwrap(), WavelengthGrid::default());
-    let found = signals(&sky_library(), &loaded.sensor, &loaded.response, &observer, &grid).unwrap();
-    let alone = responses(&loaded.sensor, &loaded.response, &observer, &grid).unwrap();
+    let found = signals(&sky_library(), &loaded.sensor, loaded.response().unwrap(), &observer, &grid).unwrap();
+    let alone = responses(&loaded.sensor, loaded.response().unwrap(), &observer, &grid).unwrap();
     (loaded.sensor, found, alone)
 }
 
@@ -275,7 +277,7 @@ fn the_noise_of_every_sky_is_as_predicted() {
         // The size of a patch is even, so that all have the same phases.
         let place = Place { frame, origin: [0, 0], corner: [reach; 2], size };
         // Only the weights of smooth hue transition depend on the sky.
-        let weights_of = |hues| WeightTable::of(method, sensor.cfa).about(hues);
+        let weights_of = |hues| WeightTable::of(method, sensor.bayer().unwrap()).about(hues);
         let common = SamplingBasis::of(&weights_of([1.0; 2]), &place);
         let mut ps = Vec::new();
         for sky in &skies {

@@ -6,7 +6,7 @@
 mod support;
 
 use cyanometer::camera::optics::Vignetting;
-use cyanometer::camera::sensor::silicon_band_gap_ev;
+use cyanometer::camera::readout::silicon_band_gap_ev;
 use cyanometer::cfa::{CfaPattern, Class};
 use cyanometer::color::matrix;
 use cyanometer::frame::{Geometry, mirror};
@@ -19,7 +19,7 @@ use cyanometer::stages::demosaic::weights::WeightTable;
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::units::QuantityKind;
 use nalgebra::Matrix3;
-use support::{TREE, frame, header, sensor, through};
+use support::{TREE, frame, header, readout, sensor, through};
 
 /// Fails unless the page states something.
 #[track_caller]
@@ -68,8 +68,8 @@ fn the_format_is_not_that_of_the_pixels() {
 
 #[test]
 fn the_band_gap_varies() {
-    let sensor = sensor();
-    let signal = sensor.dark_current_e_per_s(333.0) * MV_PER_E;
+    let readout = readout();
+    let signal = readout.dark_current_e_per_s(333.0) * MV_PER_E;
     assert!((signal - 40.0).abs() < 0.1, "{signal}");
     let thermal = 2.0 * 8.617_333e-5 * 333.0;
     let constant = signal * ((silicon_band_gap_ev(333.0) - 1.12) / thermal).exp();
@@ -78,7 +78,7 @@ fn the_band_gap_varies() {
 
 #[test]
 fn the_cross_terms_are_missing() {
-    let dark = sensor().dark_current_e_per_s(333.0) * 0.033;
+    let dark = readout().dark_current_e_per_s(333.0) * 0.033;
     let paper = (dark + (0.2 * dark).powi(2)).sqrt();
     let exact = (dark + (0.2 * dark).powi(2) + 0.04 * dark).sqrt();
     says(&format!("{paper:.2} e⁻ instead of {exact:.2} e⁻"));
@@ -119,7 +119,7 @@ fn full_well_lies_above_the_top_code() {
 #[test]
 fn the_difference_domain_takes_the_mean_of_its_neighbours() {
     let mut head = header(QuantityKind::Adu, Geometry::new(8, 8, &["Y"]));
-    head.metadata.cfa = Some(CfaPattern::Rggb);
+    head.metadata.cfa = Some(CfaPattern::Rggb.into());
     let flat = frame(head, |_, _, _| 100.0);
     let stage = Demosaic::new(&flat.header, Method::EffectiveColor, Black::None, None).unwrap();
     assert!(through(&flat, &stage).samples.iter().all(|&sample| sample == 100.0));

@@ -82,7 +82,7 @@ fn plane(
 ) -> MemoryFrame {
     let mut header = header(QuantityKind::Adu, Geometry::new(width, height, &["Y"]));
     header.geometry.origin = origin;
-    header.metadata.cfa = Some(cfa);
+    header.metadata.cfa = Some(cfa.into());
     frame(header, |x, y, _| f(x, y, cfa.row_classes(origin, y)[x % 2]))
 }
 
@@ -322,7 +322,7 @@ fn a_plane_rendered_behind_a_pattern_is_the_mosaic_of_three() {
             let channels: &[&str] = if cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
             let mut header = header(QuantityKind::ExpectedElectrons, Geometry::new(size[0], size[1], channels));
             header.geometry.origin = [x0, y0];
-            header.metadata.cfa = cfa;
+            header.metadata.cfa = cfa.map(Into::into);
             let rendering =
                 Rendering { header: header.clone(), patch: [patch_x, patch_y], vignetting: vignetting.clone(), cfa };
             let mut sink = MemoryFrame::new(header, Vec::new());
@@ -440,7 +440,7 @@ fn averaged_frames_converge_to_the_fixed_pattern() {
     const FRAMES: u32 = 64;
     let level = 2000.0;
     let light = expected(30, 24, |_, _, _| level);
-    let model = &sensor();
+    let model = &readout();
     for sensor_seed in [0, 77] {
         let settings = NoiseSettings { seed: 4, sensor_seed, ..Default::default() };
         let pattern = noisy(&light, &NoiseSettings { without: TEMPORAL.into(), ..settings.clone() });
@@ -484,9 +484,9 @@ fn maps_of_sensitivity_have_mean_one_and_the_stated_rms() {
         {
             let (level, temperature_k) = if source == Source::Prnu { (10_000.0, 1.0) } else { (0.0, 333.0) };
             let mut scene = expected(200, 150, |_, _, _| level);
-            let sensor = scene.header.metadata.sensor.as_mut().unwrap();
-            (sensor.prnu, sensor.dcnu) = (sigma, sigma);
-            let dark_e = sensor.dark_current_e_per_s(temperature_k) * EXPOSURE.exposure_s;
+            let readout = scene.header.metadata.sensor.as_mut().and_then(|sensor| sensor.readout.as_mut()).unwrap();
+            (readout.prnu, readout.dcnu) = (sigma, sigma);
+            let dark_e = readout.dark_current_e_per_s(temperature_k) * EXPOSURE.exposure_s;
             let unit = if source == Source::Prnu { f64::from(level) } else { dark_e };
             let without = all_but(&[source]);
             let settings =
@@ -825,7 +825,7 @@ fn transfer_is_undone_to_the_rounding_of_the_converter() {
             Black::None => (record.bias_adu, record.bias_adu + dark_adu),
             _ => (-dark_adu, 0.0),
         };
-        let found = restored.header.metadata.black_level_adu.unwrap();
+        let found = restored.header.uniform_black_adu().unwrap();
         assert!((found - level).abs() < 1e-9, "{cte}: black {found}, not {level}");
         for (charge, code) in still.samples.iter().zip(&restored.samples) {
             let wanted = offset + record.adu_per_e * f64::from(*charge);

@@ -31,7 +31,7 @@ fn rendered(
 ) -> MemoryFrame {
     let channels: &[&str] = if cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
     let mut header = header(QuantityKind::ExpectedElectrons, Geometry::new(size[0], size[1], channels));
-    header.metadata.cfa = cfa;
+    header.metadata.cfa = cfa.map(Into::into);
     let mut sink = MemoryFrame::new(header.clone(), Vec::new());
     let rendering = Rendering { header, patch, vignetting, cfa };
     let row = vec![SIGNAL; size[0].div_ceil(patch[0])];
@@ -76,10 +76,10 @@ fn vignetting_of_no_field_is_nothing() {
 fn wavelengths_that_no_class_responds_to_add_nothing() {
     let loaded = load_sensor(&format!("{TREE}/sample_data/sensors/kaf-5101ce.yaml")).unwrap();
     let grid = WavelengthGrid { start_nm: 300.0, end_nm: 1100.0, ..WavelengthGrid::default() };
-    let kept = loaded.response.weights_on(&loaded.sensor, &EXPOSURE, &grid).unwrap();
+    let kept = loaded.response().unwrap().weights_on(&loaded.sensor, &EXPOSURE, &grid).unwrap();
     let (all_nm, widths) = grid.points().unwrap();
     assert!(kept.left_out > 0 && kept.left_out + kept.wavelengths_nm.len() == all_nm.len());
-    let all = loaded.response.electron_weights(&loaded.sensor, &EXPOSURE, &all_nm, &widths);
+    let all = loaded.response().unwrap().electron_weights(&loaded.sensor, &EXPOSURE, &all_nm, &widths).unwrap();
     let radiance = |nm: f64| 1e-6 * (1.5 + (nm / 37.0).sin());
     for (all, kept_weights) in all.iter().zip(&kept.weights) {
         let sum =
@@ -134,8 +134,8 @@ fn dark_signal_far_below_the_read_noise_is_nothing() {
     let stage = AddNoise::new(&light.header, &settings).unwrap();
     let header = cyanometer::stream::Stage::header(&stage);
     assert!(header.metadata.left_out.iter().any(|entry| entry.what.starts_with("dark signal")));
-    let dark_e = sensor().dark_current_e_per_s(150.0) * EXPOSURE.exposure_s;
-    assert!(dark_e > 0.0 && dark_e < 1e-9 * sensor().read_noise_e.powi(2));
+    let dark_e = readout().dark_current_e_per_s(150.0) * EXPOSURE.exposure_s;
+    assert!(dark_e > 0.0 && dark_e < 1e-9 * readout().read_noise_e.powi(2));
     let mut without = header.clone();
     without.metadata.scene = Some(cyanometer::metadata::Scene {
         source: "test".into(),
@@ -155,7 +155,7 @@ fn dark_signal_far_below_the_read_noise_is_nothing() {
         _ => panic!("planes of photosites are predicted"),
     };
     for (with, without) in classes(&with).iter().zip(&classes(&without)) {
-        let read = sensor().read_noise_e;
+        let read = readout().read_noise_e;
         assert!((with.moments.mean - without.moments.mean).abs() < 1.1e-9 * read * read);
         assert!((with.moments.std() / without.moments.std() - 1.0).abs() < 5e-10);
     }
@@ -176,5 +176,5 @@ fn a_black_level_of_zero_is_nothing_to_subtract() {
     assert_eq!(counts.not_finite, 12);
     let plain = MemoryFrame::new(header.clone(), codes.samples.iter().map(|code| code - 0.0).collect());
     assert_same(&corrected, &plain, "a black level of zero");
-    assert_eq!(corrected.header.metadata.black_level_adu, Some(0.0));
+    assert_eq!(corrected.header.metadata.black_level_adu, Some(0.0.into()));
 }

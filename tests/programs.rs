@@ -426,16 +426,16 @@ fn darks_and_transfer_are_taken_back() {
     let (samples, metadata) = shop.read("corrected.tiff");
     // Thirds of codes, some below zero, are not what 16 bits hold.
     assert!(samples.iter().any(|sample| sample.fract() != 0.0));
-    assert_eq!(metadata.black_level_adu, Some(0.0));
-    let white = (4095.0 - shop.read("light.tiff").1.black_level_adu.unwrap()) / 0.9995_f64.powi(2);
-    assert!((metadata.white_level_adu.unwrap() - white).abs() < 1e-9);
+    assert_eq!(metadata.black_level_adu, Some(0.0.into()));
+    let white = (4095.0 - shop.read("light.tiff").1.uniform_black_adu().unwrap()) / 0.9995_f64.powi(2);
+    assert!((metadata.white_level_adu.unwrap().uniform().unwrap() - white).abs() < 1e-9);
     let record = metadata.correction.unwrap();
-    assert_eq!((record.black_adu, record.dark_frames, record.cte), (0.0, 3, Some(0.9995)));
+    assert_eq!((record.black_adu, record.dark_frames, record.cte), (0.0.into(), 3, Some(0.9995)));
     assert_eq!(metadata.noise.unwrap().cte, Some(0.9995));
     // On through the chain: black is off already.
     shop.run("demosaic corrected.tiff -o rgb.exr", &[]);
     let (rgb, metadata) = shop.read("rgb.exr");
-    assert_eq!(metadata.demosaic.unwrap().black, 0.0);
+    assert_eq!(metadata.demosaic.unwrap().black, 0.0.into());
     for (class, electrons) in [900.0, 9000.0, 19_000.0].into_iter().enumerate() {
         let rows = rgb.chunks(60).skip(class).step_by(3).flatten();
         let mean = rows.map(|sample| f64::from(*sample)).sum::<f64>() / 3000.0;

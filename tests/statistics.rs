@@ -14,7 +14,7 @@ use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::MemoryFrame;
-use support::{expected, sensor, through_blocks};
+use support::{expected, readout, through_blocks};
 
 /// The frame of a uniform scene.
 fn scene(width: usize, height: usize, electrons: [f64; 3]) -> MemoryFrame {
@@ -268,5 +268,5 @@ fn the_papers_equations_fail_where_they_should() {
     }
     // Where the paper's equations hold they are as good: 10⁴ e⁻, whose cross term is 0.6 % of 10⁻².
     assert!(z(10_000.0, &[], Equations::Paper) < 5.0);
-    assert!((sensor().read_noise_e - 15.7).abs() < 1e-12);
+    assert!((readout().read_noise_e - 15.7).abs() < 1e-12);
 }

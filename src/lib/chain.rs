@@ -237,7 +237,8 @@ impl Chain {
             source_width: None,
             brightest_e: None,
         });
-        let geometry = Geometry::new(sensor.width as usize, sensor.height as usize, &["R", "G", "B"]);
+        let readout = sensor.readout()?;
+        let geometry = Geometry::new(readout.width as usize, readout.height as usize, &["R", "G", "B"]);
         let expected = FrameHeader { name: "the prediction".into(), geometry, metadata };
         let electrons = AddNoise::new(&expected, &settings.noise)?.header().clone();
         let adu = Digitize::new(&electrons, &AdcSettings::default())?.header().clone();
@@ -355,7 +356,8 @@ impl ChainSettings {
         let std = diagonal_std(&covariance);
         let black = match metadata.quantity {
             QuantityKind::Electrons => metadata.dark_signal_e.unwrap_or(0.0),
-            QuantityKind::Adu => metadata.black_level_adu.unwrap_or(0.0),
+            // The converter gives all photosites the same.
+            QuantityKind::Adu => metadata.uniform_black_adu().unwrap_or(0.0),
             _ => 0.0,
         };
         let signal = mean.map(|mean| mean - black);

@@ -1,8 +1,10 @@
 //! What is known about a frame: its quantity, its camera, and everything that was done to it.
 
+use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
 use crate::camera::optics::Exposure;
+use crate::camera::readout::ReadOut;
 use crate::camera::sensor::Sensor;
-use crate::cfa::CfaPattern;
+use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, bare_name};
 use crate::names::{Named, serde_by_name};
@@ -25,18 +27,25 @@ pub struct Metadata {
     /// Unit of the samples, for people.
     #[serde(default)]
     pub unit: String,
-    /// Pattern of a single plane behind a colour filter array; absent for planes that are complete.
+    /// What stood before the photosites of a single plane; absent for planes that are complete.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cfa: Option<CfaPattern>,
+    pub cfa: Option<FilterArray>,
     /// What no light reads in a frame of electrons: the mean dark signal, e⁻.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dark_signal_e: Option<f64>,
     /// What no light reads in a frame of ADU.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub black_level_adu: Option<f64>,
-    /// The largest code, on the scale of the samples.
+    pub black_level_adu: Option<BlackLevel>,
+    /// What each row of the sensor, from its corner on, adds to the black level.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub black_by_row: Vec<f64>,
+    /// What each column of the sensor adds to the black level.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub black_by_column: Vec<f64>,
+    /// The largest code, on the scale of the samples. Where the black level differed among photosites of a class, that
+    /// which the first of them reaches.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub white_level_adu: Option<f64>,
+    pub white_level_adu: Option<WhiteLevel>,
     /// The sensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<Sensor>,
@@ -163,17 +172,20 @@ pub struct AdcRecord {
 }
 
 impl AdcRecord {
-    /// The converter of a sensor as the sensor's description has it.
-    pub fn of_sensor(sensor: &Sensor) -> Self {
-        Self { bits: sensor.bits, bias_adu: sensor.bias_adu, adu_per_e: sensor.adu_per_e }
+    /// The converter of a sensor as the description of its read-out has it.
+    pub fn of_readout(readout: &ReadOut) -> Self {
+        Self { bits: readout.bits, bias_adu: readout.bias_adu, adu_per_e: readout.adu_per_e }
     }
 }
 
 /// What was taken back of a frame of codes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CorrectionRecord {
-    /// What was subtracted as a constant, ADU.
-    pub black_adu: f64,
+    /// What was subtracted as a constant, or by site, ADU.
+    pub black_adu: BlackLevel,
+    /// Whether what rows and columns add came off with it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub black_deltas: bool,
     /// How many dark frames the mean was of that was subtracted sample by sample.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub dark_frames: u32,
@@ -187,6 +199,11 @@ fn is_zero(count: &u32) -> bool {
     *count == 0
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_false(flag: &bool) -> bool {
+    !*flag
+}
+
 /// How the missing classes were interpolated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DemosaicRecord {
@@ -195,7 +212,10 @@ pub struct DemosaicRecord {
     /// Pattern of the plane.
     pub cfa: CfaPattern,
     /// What was subtracted first, in the unit of the samples.
-    pub black: f64,
+    pub black: BlackLevel,
+    /// Whether what rows and columns add came off with it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub black_deltas: bool,
 }
 
 /// How colours were computed.
@@ -287,6 +307,8 @@ impl Metadata {
             cfa: None,
             dark_signal_e: None,
             black_level_adu: None,
+            black_by_row: Vec::new(),
+            black_by_column: Vec::new(),
             white_level_adu: None,
             sensor: None,
             exposure: None,
@@ -308,6 +330,20 @@ impl Metadata {
     /// The same record about samples of another quantity: what held for the old samples alone is dropped.
     pub fn becoming(&self, quantity: QuantityKind) -> Self {
         Self { quantity, unit: quantity.unit().into(), predicted: None, samples: None, ..self.clone() }
+    }
+
+    /// The black level in ADU, 0 where none is known; none where it differs among photosites.
+    pub fn uniform_black_adu(&self) -> Option<f64> {
+        let is_level = |deltas: &[f64]| deltas.iter().all(|delta| *delta == 0.0);
+        let level = self.black_level_adu.map_or(Some(0.0), BlackLevel::uniform);
+        level.filter(|_| is_level(&self.black_by_row) && is_level(&self.black_by_column))
+    }
+
+    /// Sets a black level that no row or column adds to.
+    pub fn set_black_adu(&mut self, level: Option<BlackLevel>) {
+        self.black_level_adu = level;
+        self.black_by_row.clear();
+        self.black_by_column.clear();
     }
 
     /// Notes that something was left out.
@@ -365,6 +401,62 @@ impl FrameHeader {
         self.metadata.sensor.as_ref().ok_or_else(|| self.missing("sensor"))
     }
 
+    /// The read-out of the sensor, or the error that names the key.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingKey`].
+    pub fn readout(&self) -> Result<&ReadOut> {
+        let readout = self.sensor()?.readout.as_ref();
+        readout.ok_or_else(|| self.missing("sensor.readout"))
+    }
+
+    /// The pattern of a plane behind a Bayer array; none where the metadata name no array. `done` says what is done to
+    /// Bayer arrays alone.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] naming another array.
+    pub fn bayer(&self, done: &str) -> Result<Option<CfaPattern>> {
+        match self.metadata.cfa.map(|array| (array, array.bayer())) {
+            None => Ok(None),
+            Some((_, Some(pattern))) => Ok(Some(pattern)),
+            Some((array, None)) => {
+                Err(self.refuse(format!("its sensor has {}; only Bayer arrays are {done}", array.in_words())))
+            }
+        }
+    }
+
+    /// The black level in ADU of each photosite; none where none is known.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] where what rows or columns add is not known for all of the frame.
+    pub fn black_levels(&self) -> Result<Option<BlackLevels>> {
+        let Metadata { black_level_adu, black_by_row, black_by_column, .. } = &self.metadata;
+        let geometry = &self.geometry;
+        let Some(level) = *black_level_adu else {
+            if black_by_row.is_empty() && black_by_column.is_empty() {
+                return Ok(None);
+            }
+            return Err(self.missing("black_level_adu"));
+        };
+        let size = [geometry.width, geometry.height];
+        let levels = BlackLevels::new(level, black_by_row, black_by_column, geometry.origin, size);
+        levels.map(Some).map_err(|problem| self.refuse(problem))
+    }
+
+    /// The black level in ADU, 0 where none is known.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] where it differs among photosites.
+    pub fn uniform_black_adu(&self) -> Result<f64> {
+        self.metadata.uniform_black_adu().ok_or_else(|| {
+            self.refuse("its black level differs among photosites; subtract it with `correct-frame --black auto` first")
+        })
+    }
+
     /// The exposure, or the error that names the key.
     ///
     /// # Errors
@@ -416,6 +508,7 @@ impl FrameHeader {
     pub fn holds(&self) -> String {
         let quantity = self.metadata.quantity;
         match (self.geometry.channels.len(), self.metadata.cfa) {
+            (1, Some(FilterArray::Monochrome)) => format!("a monochrome plane of {quantity}"),
             (1, Some(_)) => format!("a CFA plane of {quantity}"),
             (1, None) => format!("one plane of {quantity}"),
             (3, _) if !self.has_three_planes() => {

@@ -3,7 +3,8 @@
 use cyanometer::analysis::characterization::regression::{FitSettings, Weights, fit};
 use cyanometer::analysis::characterization::{Signals, responses, signals};
 use cyanometer::camera::optics::Exposure;
-use cyanometer::camera::sensor::{Sensor, SpectralResponse};
+use cyanometer::camera::response::SpectralResponse;
+use cyanometer::camera::sensor::Sensor;
 use cyanometer::color::{Space, White};
 use cyanometer::error::Result;
 use cyanometer::formats::data::LoadedSensor;
@@ -74,7 +75,8 @@ impl Camera {
     ///
     /// None unless the tree is damaged.
     pub fn new() -> Result<Self> {
-        let LoadedSensor { sensor, response } = sensor()?;
+        let loaded = sensor()?;
+        let (response, sensor) = (loaded.response()?.clone(), loaded.sensor);
         let observer = data::load_observer()?;
         let responses = responses(&sensor, &response, &observer, &WavelengthGrid::default())?;
         let skies = see(&sensor, &response, &observer, "skies/sky912.exr")?;

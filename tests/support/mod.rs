@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 use cyanometer::camera::optics::Exposure;
+use cyanometer::camera::readout::ReadOut;
 use cyanometer::camera::sensor::Sensor;
 use cyanometer::cfa::Class;
 use cyanometer::error::Result;
@@ -24,6 +25,11 @@ pub const EXPOSURE: Exposure = Exposure { exposure_s: 0.033, f_number: 8.0, lens
 /// The sensor of the paper, from the tree, whatever the environment says.
 pub fn sensor() -> Sensor {
     load_sensor(&format!("{TREE}/sample_data/sensors/kaf-5101ce.yaml")).unwrap().sensor
+}
+
+/// Its read-out.
+pub fn readout() -> ReadOut {
+    sensor().readout.unwrap()
 }
 
 /// The head of a frame that the paper's camera took.

@@ -5,7 +5,9 @@ use super::digest::sha256;
 use super::files::read_file;
 use super::yaml;
 use crate::analysis::characterization::CameraMatrix;
-use crate::camera::sensor::{CurveFile, Sensor, SpectralResponse};
+use crate::camera::response::SpectralResponse;
+use crate::camera::sensor::{CurveFile, ResponseFiles, Sensor};
+use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::spectrum::{Curve, Observer};
 use std::path::{Path, PathBuf};
@@ -28,8 +30,25 @@ const BUILT_IN: [(&str, &[u8]); 4] = [
 pub struct LoadedSensor {
     /// The description, digests of the curves filled in.
     pub sensor: Sensor,
-    /// The curves.
-    pub response: SpectralResponse,
+    /// The curves of R, G and B; none where the response is unknown, or that of other classes.
+    pub response: Option<SpectralResponse>,
+}
+
+impl LoadedSensor {
+    /// The curves of R, G and B.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingKey`] where the response is unknown; [`Error::Format`] where it is that of other classes.
+    pub fn response(&self) -> Result<&SpectralResponse> {
+        self.response.as_ref().ok_or_else(|| match (&self.sensor.response, &self.sensor.readout) {
+            (Some(_), Some(readout)) => {
+                let array = readout.cfa.in_words();
+                self.sensor.refuse(format!("it has {array}; only the response of the classes R, G and B is followed"))
+            }
+            _ => self.sensor.missing("sensor.response"),
+        })
+    }
 }
 
 /// Where a data file was found: in a directory, or built in.
@@ -38,7 +57,7 @@ enum Place {
     BuiltIn,
 }
 
-/// Finds and reads a sensor: a name among the installed, in-tree and built-in ones, or the path of a file.
+/// Finds and reads a sensor with the curves that it names: a name among the installed, in-tree and built-in ones, or the path of a file.
 ///
 /// Names are looked for in the directories of `CYANOMETER_DATA`, in `share/cyanometer` beside the program's directory,
 /// in the `sample_data` of the tree that the program was built in, and among what is built in.
@@ -67,24 +86,48 @@ pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
             }
         }
     };
-    let mut sensor: Sensor = yaml::parse_strict(&shown, &bytes)?;
+    let mut sensor = yaml::parse_sensor(&shown, &bytes)?;
     sensor.check().map_err(|problem| Error::format(&shown, problem))?;
+    let array = sensor.readout.as_ref().map(|readout| readout.cfa);
+    let response = sensor.response.as_mut().map(|files| load_curves(files, array, &place, &shown)).transpose()?;
+    Ok(LoadedSensor { sensor, response: response.flatten() })
+}
+
+/// Reads and checks the curves of a response, and notes the digests of their files; gives those of R, G and B, unless
+/// its classes are others.
+fn load_curves(
+    files: &mut ResponseFiles,
+    array: Option<FilterArray>,
+    place: &Place,
+    sensor: &str,
+) -> Result<Option<SpectralResponse>> {
     let table = |curve: &mut CurveFile| -> Result<SpectralTable> {
-        let (name, bytes) = read_beside(&place, &shown, &curve.file)?;
+        let (name, bytes) = read_beside(place, sensor, &curve.file)?;
         curve.sha256 = Some(sha256(&bytes));
         SpectralTable::parse(&name, &bytes)
     };
-    let efficiencies = table(&mut sensor.quantum_efficiency)?;
-    let class = |letter: &str| within_unit(&shown, "quantum_efficiency", efficiencies.curve(Some(letter))?);
-    let quantum_efficiency = [class("R")?, class("G")?, class("B")?];
-    let cover_glass = match &mut sensor.cover_glass {
+    let efficiencies = table(&mut files.quantum_efficiency)?;
+    let class = |column: Option<&str>| within_unit(sensor, "quantum_efficiency", efficiencies.curve(column)?);
+    let quantum_efficiency = if array.is_none_or(FilterArray::has_three_classes) {
+        Some([class(Some("R"))?, class(Some("G"))?, class(Some("B"))?])
+    } else {
+        let filters = array.map_or_else(Vec::new, FilterArray::filters);
+        if filters.is_empty() {
+            class(files.quantum_efficiency.column.as_deref())?;
+        }
+        for filter in filters {
+            class(Some(&filter.to_string()))?;
+        }
+        None
+    };
+    let cover_glass = match &mut files.cover_glass {
         Some(glass) => {
             let transmittance = table(glass)?.curve(glass.column.as_deref())?;
-            Some(within_unit(&shown, "cover_glass", transmittance)?)
+            Some(within_unit(sensor, "cover_glass", transmittance)?)
         }
         None => None,
     };
-    Ok(LoadedSensor { sensor, response: SpectralResponse { quantum_efficiency, cover_glass } })
+    Ok(quantum_efficiency.map(|quantum_efficiency| SpectralResponse { quantum_efficiency, cover_glass }))
 }
 
 /// Reads a matrix file.
@@ -105,9 +148,9 @@ pub fn sensor_files(name: &str, sensor: &Sensor) -> Vec<PathBuf> {
     if !path.is_file() {
         return Vec::new();
     }
-    let curves = [Some(&sensor.quantum_efficiency), sensor.cover_glass.as_ref()];
+    let curves = sensor.response.iter().flat_map(|files| [Some(&files.quantum_efficiency), files.cover_glass.as_ref()]);
     let beside = |file: &str| path.parent().unwrap_or(Path::new("")).join(file);
-    std::iter::once(path.to_owned()).chain(curves.into_iter().flatten().map(|curve| beside(&curve.file))).collect()
+    std::iter::once(path.to_owned()).chain(curves.flatten().map(|curve| beside(&curve.file))).collect()
 }
 
 /// The CIE 1931 2° observer, built in.
@@ -195,12 +238,12 @@ mod tests {
     #[test]
     fn the_default_sensor_is_built_in_and_complete() {
         let loaded = load_sensor(DEFAULT_SENSOR).unwrap();
-        assert_eq!(loaded.sensor.full_well_e, 40_000.0);
+        assert_eq!(loaded.sensor.readout().unwrap().full_well_e, 40_000.0);
         // Table 1 of the data file's source: Kodak publishes peak efficiencies of 0.31, 0.34 and 0.31.
-        for (curve, peak) in loaded.response.quantum_efficiency.iter().zip([0.31, 0.34, 0.31]) {
+        for (curve, peak) in loaded.response().unwrap().quantum_efficiency.iter().zip([0.31, 0.34, 0.31]) {
             assert!((curve.extremes().1 - peak).abs() < 0.005);
         }
-        assert!(loaded.sensor.quantum_efficiency.sha256.is_some());
+        assert!(loaded.sensor.response.unwrap().quantum_efficiency.sha256.is_some());
     }
 
     #[test]

@@ -163,12 +163,17 @@ impl Shade {
                     return Ok(Self::Xyz(linear_srgb_from_xyz(white)));
                 }
                 QuantityKind::ExpectedElectrons | QuantityKind::Electrons => {
-                    let full = metadata.sensor.as_ref().map_or(highest, |sensor| sensor.full_well_e);
+                    let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+                    let full = readout.map_or(highest, |readout| readout.full_well_e);
                     (metadata.dark_signal_e.unwrap_or(0.0), full)
                 }
                 QuantityKind::Adu => {
-                    let black = metadata.black_level_adu.unwrap_or(0.0);
-                    (black, metadata.white_level_adu.unwrap_or(highest))
+                    let black = frame.black_levels()?.map_or(0.0, |black| black.smallest());
+                    let white = metadata.white_level_adu.unwrap_or(highest.into());
+                    if moments.len() == 3 {
+                        return Self::planes(frame, white.classes().map(|white| (black, white)).to_vec());
+                    }
+                    (black, white.largest())
                 }
                 QuantityKind::Unspecified => (lowest.min(0.0), highest),
                 other => {

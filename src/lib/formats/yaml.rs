@@ -1,6 +1,8 @@
 //! YAML, read with limits: metadata, sensors and matrices all come through here.
 
 use super::foreign::yaml_complaint;
+use crate::camera::readout::ReadOut;
+use crate::camera::sensor::{FLAT_SENSOR_SCHEMA, FlatSensor, ResponseFiles, SENSOR_SCHEMA, Sensor};
 use crate::error::{Error, Result};
 use crate::metadata::{METADATA_SCHEMA, Metadata};
 use serde::Serialize;
@@ -51,19 +53,82 @@ fn parse<T: DeserializeOwned + Serialize>(name: &str, raw: &Mapping, text: &str)
 /// [`Error::Format`] when the text is no YAML of this kind, larger or deeper than any of ours, for a number that is not finite, and for
 /// unknown keys.
 pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -> Result<T> {
+    parse_parts(name, bytes, &[])
+}
+
+/// Reads a sensor file, with its parts or flat; unknown keys are errors as for [`parse_strict`], in the parts too.
+///
+/// # Errors
+///
+/// As [`parse_strict`].
+pub fn parse_sensor(name: &str, bytes: &[u8]) -> Result<Sensor> {
+    let raw = parse_raw(name, checked_text(name, bytes)?)?;
+    if !is_flat(&raw) {
+        return parse_parts(name, bytes, &sensor_parts());
+    }
+    if let Some((part, _)) = sensor_parts().iter().find(|(part, _)| raw.contains_key(*part)) {
+        return Err(Error::format(name, format!("`{part}` belongs to the schema `{SENSOR_SCHEMA}`; name that one")));
+    }
+    parse_strict::<FlatSensor>(name, bytes).map(Sensor::from)
+}
+
+/// The parts of a sensor and their keys.
+fn sensor_parts() -> [(&'static str, Keys); 2] {
+    [("readout", field_names::<ReadOut>()), ("response", field_names::<ResponseFiles>())]
+}
+
+/// Names of keys.
+type Keys = &'static [&'static str];
+
+/// Whether a sensor has all its keys side by side.
+fn is_flat(sensor: &Mapping) -> bool {
+    sensor.get("schema").and_then(Value::as_str) == Some(FLAT_SENSOR_SCHEMA)
+}
+
+/// A flat sensor in its parts, with what nobody knows of.
+fn regrouped(flat: &Mapping) -> std::result::Result<Mapping, serde_yaml::Error> {
+    let typed: FlatSensor = serde_yaml::from_value(Value::Mapping(flat.clone()))?;
+    let known = serde_yaml::to_value(&typed)?;
+    let unknown = known.as_mapping().map(|known| unknown_keys(flat, known)).unwrap_or_default();
+    match serde_yaml::to_value(Sensor::from(typed))? {
+        Value::Mapping(mut made) => {
+            merge(&mut made, &unknown);
+            Ok(made)
+        }
+        _ => Ok(Mapping::new()),
+    }
+}
+
+/// Refuses the first key that is neither among `fields` nor, within a part, among the part's, and suggests the nearest.
+fn check_keys(name: &str, raw: &Mapping, fields: Keys, parts: &[(&str, Keys)]) -> Result<()> {
+    let of_part = |(part, fields): &(&str, Keys)| fields.iter().map(|key| format!("{part}.{key}")).collect::<Vec<_>>();
+    let known: Vec<String> = fields.iter().map(|key| (*key).to_owned()).chain(parts.iter().flat_map(of_part)).collect();
+    let spelled = |key: &Value| key.as_str().unwrap_or("?").to_owned();
+    let inside = parts.iter().filter_map(|(part, _)| Some((part, raw.get(*part)?.as_mapping()?)));
+    let inside = inside.flat_map(|(part, keys)| keys.keys().map(move |key| format!("{part}.{}", spelled(key))));
+    let Some(key) = raw.keys().map(spelled).chain(inside).find(|key| !known.contains(key)) else { return Ok(()) };
+    let split =
+        |path: &str| path.rsplit_once('.').map_or((String::new(), path.to_owned()), |(a, b)| (a.into(), b.into()));
+    let (part, last) = split(&key);
+    let distance = |known: &String| {
+        let (known_part, known_last): (String, String) = split(known);
+        (strsim::damerau_levenshtein(&known_last, &last), known_part != part)
+    };
+    let nearest = known
+        .iter()
+        .map(|known| (distance(known), known))
+        .min()
+        .filter(|((distance, _), _)| *distance <= last.len().div_ceil(2))
+        .map_or(String::new(), |(_, known)| format!("; did you mean `{known}`?"));
+    Err(Error::format(name, format!("unknown key `{key}`{nearest}")))
+}
+
+/// [`parse_strict`] of a document with parts, each of which has keys of its own.
+fn parse_parts<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8], parts: &[(&str, Keys)]) -> Result<T> {
     let text = checked_text(name, bytes)?;
     let raw = parse_raw(name, text)?;
-    let fields = field_names::<T>();
     // A misspelt key first: that another is missing then follows from it.
-    if let Some(key) = raw.keys().map(|key| key.as_str().unwrap_or("?")).find(|key| !fields.contains(key)) {
-        let nearest = fields
-            .iter()
-            .map(|known| (strsim::damerau_levenshtein(known, key), known))
-            .min()
-            .filter(|(distance, _)| *distance <= key.len().div_ceil(2))
-            .map_or(String::new(), |(_, known)| format!("; did you mean `{known}`?"));
-        return Err(Error::format(name, format!("unknown key `{key}`{nearest}")));
-    }
+    check_keys(name, &raw, field_names::<T>(), parts)?;
     let (typed, unknown) = parse::<T>(name, &raw, text)?;
     match unknown.iter().next() {
         None => Ok(typed),
@@ -75,7 +140,7 @@ pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -
     }
 }
 
-/// Reads metadata; keys that this version does not know are kept.
+/// Reads metadata; keys that this version does not know are kept. A flat sensor gets its parts.
 ///
 /// # Errors
 ///
@@ -83,7 +148,15 @@ pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -
 /// impossible.
 pub fn parse_metadata(name: &str, text: &str) -> Result<Metadata> {
     let text = checked_text(name, text.as_bytes())?;
-    let (mut metadata, unknown) = parse::<Metadata>(name, &parse_raw(name, text)?, text)?;
+    let mut raw = parse_raw(name, text)?;
+    let mut text = std::borrow::Cow::from(text);
+    if let Some(sensor) = raw.get("sensor").and_then(Value::as_mapping).filter(|sensor| is_flat(sensor)) {
+        let wrong = |error| Error::format(name, format!("in `sensor`, it is not as expected: {error}"));
+        let sensor = regrouped(sensor).map_err(wrong)?;
+        raw.insert("sensor".into(), sensor.into());
+        text = serde_yaml::to_string(&raw).map_err(wrong)?.into();
+    }
+    let (mut metadata, unknown) = parse::<Metadata>(name, &raw, &text)?;
     if metadata.schema != METADATA_SCHEMA {
         return Err(Error::format(
             name,
@@ -213,7 +286,7 @@ fn merge(into: &mut Mapping, unknown: &Mapping) {
 }
 
 /// The names of a struct's fields, as its derived `Deserialize` asks for them.
-fn field_names<T: DeserializeOwned>() -> &'static [&'static str] {
+fn field_names<T: DeserializeOwned>() -> Keys {
     struct Ask<'a>(&'a mut &'static [&'static str]);
     impl<'de> Deserializer<'de> for Ask<'_> {
         type Error = value::Error;
@@ -282,7 +355,7 @@ mod tests {
     #[test]
     fn what_cannot_be_read_again_is_not_written() {
         let mut metadata = Metadata::new(QuantityKind::Adu);
-        metadata.black_level_adu = Some(f64::INFINITY);
+        metadata.black_level_adu = Some(f64::INFINITY.into());
         let complaint = write_metadata(&metadata).unwrap_err().to_string();
         assert!(complaint.contains("`black_level_adu` is not a finite number"), "{complaint}");
     }

@@ -6,8 +6,10 @@
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
+use crate::camera::levels::BlackLevel;
 use crate::cfa::Class;
 use crate::color;
+use crate::error::Error;
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind, PredictedRecord};
 use crate::names::Named;
 use crate::numerics::normal::MeanVariance;
@@ -171,9 +173,10 @@ impl Sites {
         let equations = self.photosite.equations;
         let method = Method::named(&record.method)
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
+        let black = subtracted(record.black, record.black_deltas)?;
         let third = self.photosite.third_cumulant(self.expected_e[Class::Green as usize]);
         let size = [frame.geometry.width, frame.geometry.height];
-        let camera = PixelMoments::demosaicked(record, method, self.moments, third, size, equations)
+        let camera = PixelMoments::demosaicked(record.cfa, black, method, self.moments, third, size, equations)
             .ok_or(Unpredictable::Beyond("the paper has no equations for its method of demosaicking"))?;
         let Some(record) = &metadata.color else {
             if metadata.quantity != quantity_of_sites(frame) {
@@ -208,6 +211,14 @@ impl Sites {
     }
 }
 
+/// What was subtracted, where it is the same at all photosites.
+fn subtracted(level: BlackLevel, with_deltas: bool) -> Predicted<f64> {
+    level
+        .uniform()
+        .filter(|_| !with_deltas)
+        .ok_or(Unpredictable::Beyond("the black level that was subtracted differs among photosites"))
+}
+
 /// Codes as the converter gave them and charge transfer left them, or as they were corrected.
 fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Predicted<(Photosite, [Prediction; 3])> {
     let metadata = &frame.metadata;
@@ -227,7 +238,10 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
         ));
     }
     let corrected = codes.less_dark_frames(correction.dark_frames);
-    let black_adu = if correction.dark_frames > 0 { 0.0 } else { correction.black_adu };
+    let black_adu = match correction.dark_frames {
+        0 => subtracted(correction.black_adu, correction.black_deltas)?,
+        _ => 0.0,
+    };
     Ok((corrected, expected_e.map(|mean| shifted(corrected.moments(mean), -black_adu))))
 }
 
@@ -270,7 +284,10 @@ fn noise_model(frame: &FrameHeader) -> Predicted<NoiseModel> {
         cte: None,
     };
     let record = frame.metadata.noise.as_ref().unwrap_or(&silent);
-    let mut model = NoiseModel::of(frame, record).map_err(|_| Unpredictable::Missing("sensor"))?;
+    let mut model = NoiseModel::of(frame, record).map_err(|error| match error {
+        Error::MissingKey { key, .. } => Unpredictable::Missing(key),
+        _ => Unpredictable::Missing("sensor"),
+    })?;
     if frame.metadata.noise.is_none() {
         model.full_well_e = f64::INFINITY;
     }

@@ -4,8 +4,8 @@ use super::gains;
 use super::moments::{Equations, Prediction};
 use super::paper;
 use super::smooth_hue::{self, hues};
+use crate::cfa::CfaPattern;
 use crate::color;
-use crate::metadata::DemosaicRecord;
 use crate::numerics::normal::{self, MeanVariance};
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::PHASES;
@@ -35,21 +35,22 @@ impl PixelMoments {
     /// none.
     ///
     /// `third` is the third cumulant of the green photosites, `size` that of the frame. The hues that smooth hue transition
-    /// divides by are those of the means above the black level that was subtracted.
+    /// divides by are those of the means above `black`, the level that was subtracted.
     pub(super) fn demosaicked(
-        record: &DemosaicRecord,
+        pattern: CfaPattern,
+        black: f64,
         method: Method,
         sites: [Prediction; 3],
         third: f64,
         size: [usize; 2],
         equations: Equations,
     ) -> Option<Self> {
-        let mean = sites.map(|site| site.moments.mean - record.black);
-        let weights = WeightTable::of(method, record.cfa).about(hues(mean));
+        let mean = sites.map(|site| site.moments.mean - black);
+        let weights = WeightTable::of(method, pattern).about(hues(mean));
         let variances = sites.map(|site| site.moments.variance);
         let mut bias = [0.0; 3];
         let covariance = match equations {
-            Equations::Exact => match smooth_hue::second_order(method, record.cfa, mean, variances, third) {
+            Equations::Exact => match smooth_hue::second_order(method, pattern, mean, variances, third) {
                 Some(second) => {
                     bias = second.bias;
                     second.covariance

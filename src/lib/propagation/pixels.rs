@@ -151,7 +151,7 @@ impl PixelNoise {
     ///
     /// # Errors
     ///
-    /// [`crate::error::Error::MissingKey`] where the metadata name no sensor, exposure or converter;
+    /// [`crate::error::Error::MissingKey`] where the metadata name no sensor, exposure or converter, or no read-out of the sensor;
     /// [`crate::error::Error::Order`] for a frame that is not demosaicked.
     pub fn of(frame: &FrameHeader) -> Result<Self> {
         let metadata = &frame.metadata;
@@ -163,7 +163,7 @@ impl PixelNoise {
         })?;
         let method = Method::named(&record.method)
             .ok_or_else(|| frame.refuse(format!("it was demosaicked by `{}`, a method unknown here", record.method)))?;
-        let sensor = frame.sensor()?;
+        let readout = frame.readout()?;
         let noise = match &metadata.noise {
             Some(noise) => noise.clone(),
             None => whole_noise(frame)?,
@@ -176,12 +176,12 @@ impl PixelNoise {
                 (photosite, metadata.dark_signal_e.unwrap_or(0.0))
             }
             _ => {
-                let adc = metadata.adc.unwrap_or_else(|| AdcRecord::of_sensor(sensor));
+                let adc = metadata.adc.unwrap_or_else(|| AdcRecord::of_readout(readout));
                 let codes = photosite.digitized(adc).less_dark_frames(dark_frames);
-                (codes, metadata.black_level_adu.unwrap_or(0.0))
+                (codes, frame.uniform_black_adu()?)
             }
         };
-        let largest = sensor.full_well_e * photosite.slope();
+        let largest = readout.full_well_e * photosite.slope();
         let table = WeightTable::of(method, record.cfa);
         let columns = Places::new(frame.geometry.width, method.reach());
         let rows = Places::new(frame.geometry.height, method.reach());
@@ -221,15 +221,15 @@ impl PixelNoise {
 
 /// Everything that the sensor's noise is made of, for a frame whose metadata do not say what was drawn.
 fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
-    let sensor = frame.sensor()?;
-    let temperature_k = sensor.temperature_k;
+    let readout = frame.readout()?;
+    let temperature_k = readout.temperature_k;
     Ok(NoiseRecord {
         sources: Source::ALL.to_vec(),
         seed: 0,
         sensor_seed: 0,
         frame: 0,
         temperature_k,
-        dark_e: sensor.dark_current_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
+        dark_e: readout.dark_current_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
         poisson: crate::metadata::PoissonKind::Exact,
         cte: None,
     })

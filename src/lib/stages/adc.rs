@@ -75,12 +75,18 @@ impl Digitize {
                 return Err(input.out_of_order(format!("it holds {holds}, not electrons of photosites"), "add-noise"));
             }
         }
-        let sensor = input.metadata.sensor.as_ref();
+        let readout = input.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
         let needed = |key| input.missing(key);
         let adc = AdcRecord {
-            bits: settings.bits.or(sensor.map(|s| s.bits)).ok_or_else(|| needed("sensor.bits"))?,
-            bias_adu: settings.bias_adu.or(sensor.map(|s| s.bias_adu)).ok_or_else(|| needed("sensor.bias_adu"))?,
-            adu_per_e: settings.adu_per_e.or(sensor.map(|s| s.adu_per_e)).ok_or_else(|| needed("sensor.adu_per_e"))?,
+            bits: settings.bits.or(readout.map(|r| r.bits)).ok_or_else(|| needed("sensor.readout.bits"))?,
+            bias_adu: settings
+                .bias_adu
+                .or(readout.map(|r| r.bias_adu))
+                .ok_or_else(|| needed("sensor.readout.bias_adu"))?,
+            adu_per_e: settings
+                .adu_per_e
+                .or(readout.map(|r| r.adu_per_e))
+                .ok_or_else(|| needed("sensor.readout.adu_per_e"))?,
         };
         if !(1..=16).contains(&adc.bits) {
             return Err(Error::Usage(format!("a converter of {} bits is impossible here; give 1 to 16", adc.bits)));
@@ -96,8 +102,9 @@ impl Digitize {
         }
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
         metadata.adc = Some(adc);
-        metadata.black_level_adu = Some(adc.bias_adu + adc.adu_per_e * metadata.dark_signal_e.take().unwrap_or(0.0));
-        metadata.white_level_adu = Some(f64::from(adc.top_code()));
+        let dark_signal_e = metadata.dark_signal_e.take().unwrap_or(0.0);
+        metadata.set_black_adu(Some((adc.bias_adu + adc.adu_per_e * dark_signal_e).into()));
+        metadata.white_level_adu = Some(f64::from(adc.top_code()).into());
         Ok(Self { header: FrameHeader { metadata, ..input.clone() }, adc })
     }
 

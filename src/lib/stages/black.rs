@@ -1,12 +1,16 @@
 //! The black level: what no light reads, and what is left of it once something was subtracted.
 
+use crate::camera::levels::{BlackLevels, WhiteLevel};
+use crate::cfa::CfaPattern;
+use crate::error::Result;
+use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
 use crate::units::QuantityKind;
 
 /// What is subtracted before interpolation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Black {
-    /// What the metadata says: bias plus mean dark signal.
+    /// What the metadata says: bias plus mean dark signal, or a level for each photosite.
     Auto,
     /// Nothing.
     None,
@@ -15,22 +19,45 @@ pub enum Black {
 }
 
 impl Black {
-    /// The level for a frame; zero where the metadata knows of none.
-    pub fn level(self, frame: &FrameHeader) -> f64 {
+    /// What comes off each photosite of a frame; zero where the metadata know of nothing.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`FrameHeader::black_levels`].
+    pub fn levels(self, frame: &FrameHeader) -> Result<BlackLevels> {
         let metadata = &frame.metadata;
-        match self {
+        let level = match self {
             Self::Level(level) => level,
             Self::None => 0.0,
             Self::Auto => match metadata.quantity {
                 QuantityKind::Electrons => metadata.dark_signal_e.unwrap_or(0.0),
                 QuantityKind::ExpectedElectrons => 0.0,
-                _ => metadata.black_level_adu.unwrap_or(0.0),
+                _ => return Ok(frame.black_levels()?.unwrap_or(BlackLevels::uniform_at(0.0))),
             },
-        }
+        };
+        Ok(BlackLevels::uniform_at(level))
     }
 }
 
-/// What no light reads once `subtracted` is off; a frame of unknown black counts as black-free after a subtraction.
-pub fn black_left(before: Option<f64>, subtracted: f64) -> f64 {
-    before.map_or(0.0, |black| black - subtracted)
+/// What no light reads once `subtracted` is off; a frame of unknown black counts as black-free after a subtraction. None
+/// where what is left differs among photosites.
+pub fn black_left(before: Option<&BlackLevels>, subtracted: &BlackLevels) -> Option<f64> {
+    match before {
+        None => Some(0.0),
+        Some(black) if black == subtracted => Some(0.0),
+        Some(black) => Some(black.uniform()? - subtracted.uniform()?),
+    }
+}
+
+/// The white level once `subtracted` is off; where that differs among photosites of a class, what the first of them reaches
+/// that is full. Photosites of unknown classes count for all.
+pub fn white_left(
+    before: WhiteLevel,
+    subtracted: &BlackLevels,
+    geometry: &Geometry,
+    pattern: Option<CfaPattern>,
+) -> WhiteLevel {
+    let [x0, y0] = geometry.origin.map(i64::from);
+    let class = |x: usize, y: usize| pattern.map(|pattern| pattern.class(x0 + x as i64, y0 + y as i64));
+    before.less(subtracted.largest([geometry.width, geometry.height], class))
 }

@@ -3,10 +3,12 @@
 //! First what no light reads is subtracted, as a constant or as the mean of dark frames, sample by sample; then the
 //! transfer of what is left is undone. Values become signed and fractional: clipping them at zero would bias means.
 
+use crate::camera::levels::{BlackLevels, RowBlack};
+use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
-use crate::metadata::{CorrectionRecord, FrameHeader};
-use crate::stages::black::Black;
+use crate::metadata::{CorrectionRecord, FrameHeader, Metadata};
+use crate::stages::black::{Black, white_left};
 use crate::stages::darks::{DarkStack, check_alike, check_codes, differences};
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
@@ -26,11 +28,12 @@ pub struct CorrectionSettings {
 ///
 /// y = b + A⁻¹(x − b)        A of [`Transfer`], b = bias where nothing was subtracted from x, else 0
 ///
-/// The converter adds its bias after transfer, so that it is no charge.
+/// The converter adds its bias after transfer, so that it is no charge. A black level of the metadata is subtracted
+/// photosite by photosite where it differs among them.
 #[derive(Debug, Clone)]
 pub struct CorrectFrame {
     header: FrameHeader,
-    black_adu: f64,
+    black: BlackLevels,
     bias_adu: f64,
     transfer: Option<Transfer>,
     warnings: Vec<String>,
@@ -53,17 +56,17 @@ impl CorrectFrame {
             warnings = differences(input, darks.head());
             warnings.extend_from_slice(darks.warnings());
         }
-        let known_black = input.metadata.black_level_adu;
-        let black_adu = match black {
+        let known_black = input.black_levels()?;
+        let levels = match black {
             Black::None if darks.is_none() && cte.is_none() => {
                 return Err(Error::Usage("there is nothing to correct".into()).give(&["black", "dark", "cte"]));
             }
-            Black::None => 0.0,
+            Black::None => BlackLevels::uniform_at(0.0),
             _ if darks.is_some() => {
                 return Err(Error::Usage("dark frames hold the black level already".into()).leave_out(&["black"]));
             }
-            Black::Auto => known_black.ok_or_else(|| input.missing("black_level_adu"))?,
-            Black::Level(level) => level,
+            Black::Auto => known_black.clone().ok_or_else(|| input.missing("black_level_adu"))?,
+            Black::Level(level) => BlackLevels::uniform_at(level),
         };
         let is_subtracted = black != Black::None || darks.is_some();
         let mut bias_adu = 0.0;
@@ -76,20 +79,28 @@ impl CorrectFrame {
             }
         }
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
-        // A frame of unknown black counts as black-free after a subtraction; how much a dark takes off its white is then
-        // not known.
-        let less = |level: f64| if darks.is_none() { Some(level - black_adu) } else { known_black.map(|b| level - b) };
-        let restored = |level: f64| bias_adu + (level - bias_adu) / cte.map_or(1.0, uniform_share);
-        let black_left = known_black.and_then(less).or(is_subtracted.then_some(0.0));
-        metadata.black_level_adu = black_left.map(restored);
-        metadata.white_level_adu = metadata.white_level_adu.and_then(less).map(restored);
-        if is_subtracted && darks.is_none() && black_adu == 0.0 {
+        // How much a dark takes off is known where the black level is.
+        let off = if darks.is_none() { Some(&levels) } else { known_black.as_ref() };
+        note_levels(&mut metadata, input, off, is_subtracted)?;
+        if let Some(cte) = cte {
+            let black_left = metadata.uniform_black_adu().ok_or_else(|| {
+                input.refuse(
+                    "what is left of its black level differs among photosites, so that it is no charge; subtract it with \
+                     --black auto as transfer is undone",
+                )
+            })?;
+            let restored = |level: f64| bias_adu + (level - bias_adu) / uniform_share(cte);
+            metadata.black_level_adu = metadata.black_level_adu.map(|_| restored(black_left).into());
+            metadata.white_level_adu = metadata.white_level_adu.map(|white| white.map(restored));
+        }
+        if is_subtracted && darks.is_none() && levels.uniform() == Some(0.0) {
             metadata.leave_out("correct-frame", "subtraction of the black level", "it is zero");
         }
         let dark_frames = darks.map_or(0, DarkStack::frames);
-        metadata.correction = Some(CorrectionRecord { black_adu, dark_frames, cte });
+        let (black_adu, black_deltas) = (levels.level(), levels.has_deltas());
+        metadata.correction = Some(CorrectionRecord { black_adu, black_deltas, dark_frames, cte });
         let header = FrameHeader { metadata, ..input.clone() };
-        Ok(Self { header, black_adu, bias_adu, transfer, warnings })
+        Ok(Self { header, black: levels, bias_adu, transfer, warnings })
     }
 
     /// The head of the corrected frame, to add to.
@@ -101,6 +112,29 @@ impl CorrectFrame {
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
+}
+
+/// Notes what is left of black and white once `off`, where that is known, is subtracted; a frame of unknown black counts
+/// as black-free after a subtraction.
+fn note_levels(
+    metadata: &mut Metadata,
+    input: &FrameHeader,
+    off: Option<&BlackLevels>,
+    is_subtracted: bool,
+) -> Result<()> {
+    let pattern = input.metadata.cfa.and_then(FilterArray::bayer);
+    let left = |white| off.map(|off| white_left(white, off, &input.geometry, pattern));
+    metadata.white_level_adu = metadata.white_level_adu.and_then(left);
+    match (input.black_levels()?, off) {
+        (Some(known), Some(off)) if known == *off => metadata.set_black_adu(Some(0.0.into())),
+        (Some(_), Some(off)) => {
+            // Only a number that a user gives is not the black level, and it is the same everywhere.
+            let number = off.uniform().unwrap_or_default();
+            metadata.black_level_adu = metadata.black_level_adu.map(|level| level.map(|black| black - number));
+        }
+        _ => metadata.set_black_adu(is_subtracted.then_some(0.0.into())),
+    }
+    Ok(())
 }
 
 impl Stage for CorrectFrame {
@@ -125,22 +159,33 @@ impl Stage for CorrectFrame {
             };
             let Some(transfer) = &self.transfer else {
                 for y in rows.clone() {
-                    if self.black_adu == 0.0 {
-                        let (codes, samples) = (input.row(y.cast_signed(), channel), output.row(y, channel));
-                        samples.copy_from_slice(codes);
-                        counts.not_finite += codes.iter().filter(|code| !code.is_finite()).count() as u64;
-                        continue;
-                    }
-                    for (&code, sample) in input.row(y.cast_signed(), channel).iter().zip(output.row(y, channel)) {
-                        store(f64::from(code) - self.black_adu, sample, &mut counts);
+                    let (codes, samples) = (input.row(y.cast_signed(), channel), output.row(y, channel));
+                    match self.black.row(y) {
+                        RowBlack::Uniform(0.0) => {
+                            samples.copy_from_slice(codes);
+                            counts.not_finite += codes.iter().filter(|code| !code.is_finite()).count() as u64;
+                        }
+                        RowBlack::Uniform(black) => {
+                            for (&code, sample) in codes.iter().zip(samples) {
+                                store(f64::from(code) - black, sample, &mut counts);
+                            }
+                        }
+                        black @ RowBlack::Varying(..) => {
+                            for (x, (&code, sample)) in codes.iter().zip(samples).enumerate() {
+                                store(f64::from(code) - black.at(x), sample, &mut counts);
+                            }
+                        }
                     }
                 }
                 continue;
             };
             let mut passage = transfer.passage();
             for y in rows.start.saturating_sub(transfer.reach())..rows.end {
-                for (&code, charge) in input.row(y.cast_signed(), channel).iter().zip(passage.entering(y)) {
-                    *charge = f64::from(code) - self.black_adu - self.bias_adu;
+                let black = self.black.row(y);
+                for (x, (&code, charge)) in
+                    input.row(y.cast_signed(), channel).iter().zip(passage.entering(y)).enumerate()
+                {
+                    *charge = f64::from(code) - black.at(x) - self.bias_adu;
                 }
                 if y >= rows.start {
                     for (&charge, sample) in passage.leaving(y).iter().zip(output.row(y, channel)) {
@@ -156,6 +201,7 @@ impl Stage for CorrectFrame {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::levels::WhiteLevel;
     use crate::camera::optics::Exposure;
     use crate::cfa::CfaPattern;
     use crate::frame::Geometry;
@@ -163,10 +209,10 @@ mod tests {
 
     fn codes() -> FrameHeader {
         let mut metadata = Metadata::new(QuantityKind::Adu);
-        metadata.cfa = Some(CfaPattern::Rggb);
+        metadata.cfa = Some(CfaPattern::Rggb.into());
         metadata.adc = Some(AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.05 });
-        metadata.black_level_adu = Some(104.0);
-        metadata.white_level_adu = Some(4095.0);
+        metadata.black_level_adu = Some(104.0.into());
+        metadata.white_level_adu = Some(4095.0.into());
         metadata.exposure = Some(Exposure { exposure_s: 0.1, f_number: 8.0, lens_transmittance: 1.0 });
         FrameHeader { name: "codes".into(), geometry: Geometry::new(4, 3, &["Y"]), metadata }
     }
@@ -181,7 +227,8 @@ mod tests {
         let frame = codes();
         let levels = |black, cte, darks: &[&FrameHeader]| {
             let metadata = &correct(&frame, black, cte, darks).unwrap().header.metadata;
-            [metadata.black_level_adu.unwrap(), metadata.white_level_adu.unwrap()]
+            let white = metadata.white_level_adu.and_then(WhiteLevel::uniform);
+            [metadata.uniform_black_adu().unwrap(), white.unwrap()]
         };
         assert_eq!(levels(Black::Auto, None, &[]), [0.0, 3991.0]);
         assert_eq!(levels(Black::Level(100.0), None, &[]), [4.0, 3995.0]);
@@ -193,9 +240,9 @@ mod tests {
         let mut unknown = frame.clone();
         unknown.metadata.black_level_adu = None;
         let found = correct(&unknown, Black::Level(9.0), None, &[]).unwrap().header.metadata;
-        assert_eq!((found.black_level_adu, found.white_level_adu), (Some(0.0), Some(4086.0)));
+        assert_eq!((found.black_level_adu, found.white_level_adu), (Some(0.0.into()), Some(4086.0.into())));
         let found = correct(&unknown, Black::None, None, &[&frame]).unwrap().header.metadata;
-        assert_eq!((found.black_level_adu, found.white_level_adu), (Some(0.0), None));
+        assert_eq!((found.black_level_adu, found.white_level_adu), (Some(0.0.into()), None));
         let found = correct(&unknown, Black::None, Some(0.5), &[]).unwrap().header.metadata;
         assert_eq!(found.black_level_adu, None);
     }
@@ -227,7 +274,7 @@ mod tests {
         let unlike = [
             with(&|f| f.geometry.width = 9),
             crop,
-            with(&|f| f.metadata.cfa = Some(CfaPattern::Bggr)),
+            with(&|f| f.metadata.cfa = Some(CfaPattern::Bggr.into())),
             with(&|f| f.geometry.channels = vec!["R".into(), "G".into(), "B".into()]),
             electrons,
             once,

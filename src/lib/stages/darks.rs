@@ -1,6 +1,6 @@
 //! Dark frames that count as one: their mean, taken off a frame while its rows are read.
 
-use crate::cfa::CfaPattern;
+use crate::cfa::FilterArray;
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
@@ -103,7 +103,7 @@ pub(super) fn check_alike(frame: &FrameHeader, dark: &FrameHeader) -> Result<()>
     }
     let (a, b) = (frame.metadata.cfa, dark.metadata.cfa);
     if a != b {
-        let name = |cfa: Option<CfaPattern>| cfa.map_or("none".to_owned(), |cfa| cfa.to_string());
+        let name = |cfa: Option<FilterArray>| cfa.map_or("none".to_owned(), |cfa| cfa.to_string());
         return differs("pattern", name(b), name(a));
     }
     Ok(())
@@ -113,7 +113,8 @@ pub(super) fn check_alike(frame: &FrameHeader, dark: &FrameHeader) -> Result<()>
 pub(super) fn differences(frame: &FrameHeader, dark: &FrameHeader) -> Vec<String> {
     let exposure_s = |frame: &FrameHeader| frame.metadata.exposure.map(|exposure| exposure.exposure_s);
     let temperature_k = |frame: &FrameHeader| {
-        let of_sensor = frame.metadata.sensor.as_ref().map(|sensor| sensor.temperature_k);
+        let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+        let of_sensor = readout.map(|readout| readout.temperature_k);
         frame.metadata.noise.as_ref().map(|noise| noise.temperature_k).or(of_sensor)
     };
     let pairs = [

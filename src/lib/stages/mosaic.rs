@@ -1,6 +1,6 @@
 //! The colour filter array: of three planes, each photosite keeps the one that its filter lets through.
 
-use crate::cfa::CfaPattern;
+use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::Result;
 use crate::frame::{Rows, Window};
 use crate::metadata::FrameHeader;
@@ -40,10 +40,15 @@ impl Mosaic {
     ///
     /// # Errors
     ///
-    /// [`Error::Format`](crate::error::Error::Format) unless the frame has the three planes R, G and B of photosites.
+    /// [`Error::Format`](crate::error::Error::Format) unless the frame has the three planes R, G and B of photosites, and
+    /// for sensors with another array than Bayer's.
     pub fn new(input: &FrameHeader, pattern: Option<CfaPattern>) -> Result<Self> {
-        if let (1, Some(cfa)) = (input.geometry.channels.len(), input.metadata.cfa) {
-            return Err(input.refuse(format!("it is a CFA plane already, {cfa}")));
+        match (input.geometry.channels.len(), input.metadata.cfa) {
+            (1, Some(FilterArray::Monochrome)) => {
+                return Err(input.refuse("it is the plane of a monochrome sensor, which has no filter array"));
+            }
+            (1, Some(cfa)) => return Err(input.refuse(format!("it is a CFA plane already, {cfa}"))),
+            _ => {}
         }
         let is_light = !matches!(
             input.metadata.quantity,
@@ -60,11 +65,18 @@ impl Mosaic {
                 input.holds()
             )));
         }
-        let of_sensor = input.metadata.sensor.as_ref().map(|sensor| sensor.cfa);
-        let pattern = pattern.or(of_sensor).unwrap_or(CfaPattern::Rggb);
+        let readout = input.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+        let pattern = match (pattern, readout.map(|readout| readout.cfa)) {
+            (Some(pattern), _) => pattern,
+            (None, None) => CfaPattern::Rggb,
+            (None, Some(array)) => array.bayer().ok_or_else(|| {
+                let problem = format!("its sensor has {}; mosaics are made of Bayer arrays alone", array.in_words());
+                input.refuse(format!("{problem}, such as --pattern rggb"))
+            })?,
+        };
         let mut metadata = input.metadata.becoming(input.metadata.quantity);
         metadata.predicted.clone_from(&input.metadata.predicted);
-        metadata.cfa = Some(pattern);
+        metadata.cfa = Some(pattern.into());
         metadata.demosaic = None;
         let header = FrameHeader { geometry: input.geometry.with_channels(&["Y"]), metadata, name: input.name.clone() };
         Ok(Self { header, pattern })

@@ -5,7 +5,7 @@
 //! DCNU and PRNU are fixed patterns: they hang on the sensor's seed alone. DCSN, SSN and RON are temporal: they hang on
 //! seed and frame. Where charge transfer is simulated, it takes light and dark charge to the output before RON is added.
 
-use crate::cfa::Class;
+use crate::cfa::{CfaPattern, Class};
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
@@ -45,17 +45,17 @@ impl NoiseModel {
     ///
     /// # Errors
     ///
-    /// [`Error::MissingKey`] when the frame has no sensor.
+    /// [`Error::MissingKey`] when the frame has no sensor, or that no read-out.
     pub fn of(frame: &FrameHeader, record: &NoiseRecord) -> Result<Self> {
-        let sensor = frame.sensor()?;
+        let readout = frame.readout()?;
         let drawn = |source| record.sources.contains(&source);
         let if_drawn = |source, value| if drawn(source) { value } else { 0.0 };
         Ok(Self {
             dark_e: record.dark_e,
-            dcnu: if_drawn(Source::Dcnu, sensor.dcnu),
-            prnu: if_drawn(Source::Prnu, sensor.prnu),
-            read_noise_e: if_drawn(Source::Ron, sensor.read_noise_e),
-            full_well_e: sensor.full_well_e,
+            dcnu: if_drawn(Source::Dcnu, readout.dcnu),
+            prnu: if_drawn(Source::Prnu, readout.prnu),
+            read_noise_e: if_drawn(Source::Ron, readout.read_noise_e),
+            full_well_e: readout.full_well_e,
             dark_shot: drawn(Source::Dcsn),
             signal_shot: drawn(Source::Ssn),
             poisson: record.poisson,
@@ -116,6 +116,7 @@ pub struct NoiseSettings {
 #[derive(Debug, Clone)]
 pub struct AddNoise {
     header: FrameHeader,
+    pattern: Option<CfaPattern>,
     model: NoiseModel,
     record: NoiseRecord,
     transfer: Option<Transfer>,
@@ -162,7 +163,7 @@ impl AddNoise {
     ///
     /// [`Error::Order`] unless the frame holds expected electrons of photosites; [`Error::MissingKey`] without sensor
     /// or exposure; [`Error::Usage`] for an impossible temperature or charge transfer efficiency; [`Error::Format`]
-    /// where charge of a crop would be transferred.
+    /// where charge of a crop would be transferred, and for planes behind another array than Bayer's.
     pub fn new(input: &FrameHeader, settings: &NoiseSettings) -> Result<Self> {
         let holds = input.holds();
         match input.metadata.quantity {
@@ -177,9 +178,10 @@ impl AddNoise {
                 return Err(input.out_of_order(problem, "render-radiance"));
             }
         }
+        let pattern = input.bayer("given noise")?;
         check_planes(input)?;
-        let sensor = input.sensor()?;
-        let temperature_k = settings.temperature_k.unwrap_or(sensor.temperature_k);
+        let readout = input.readout()?;
+        let temperature_k = settings.temperature_k.unwrap_or(readout.temperature_k);
         if !(1.0..=1000.0).contains(&temperature_k) {
             return Err(Error::Usage(format!(
                 "a temperature of {temperature_k} K is impossible for a sensor; give 1 to 1000"
@@ -193,12 +195,12 @@ impl AddNoise {
             None => None,
         };
         // Eq. 7: Q_DC = I_DC Δt.
-        let mut dark_e = sensor.dark_current_e_per_s(temperature_k) * input.exposure()?.exposure_s;
+        let mut dark_e = readout.dark_current_e_per_s(temperature_k) * input.exposure()?.exposure_s;
         let mut metadata = input.metadata.becoming(QuantityKind::Electrons);
         let mut sources: Vec<Source> =
             Source::ALL.into_iter().filter(|source| !settings.without.contains(source)).collect();
-        let read_variance = if sources.contains(&Source::Ron) { sensor.read_noise_e.powi(2) } else { 0.0 };
-        if dark_e > 0.0 && dark_e * (1.0 + sensor.dcnu.powi(2)) < NEGLIGIBLE_DARK * read_variance {
+        let read_variance = if sources.contains(&Source::Ron) { readout.read_noise_e.powi(2) } else { 0.0 };
+        if dark_e > 0.0 && dark_e * (1.0 + readout.dcnu.powi(2)) < NEGLIGIBLE_DARK * read_variance {
             metadata.leave_out(
                 "add-noise",
                 format!("dark signal of {dark_e:.1e} e-"),
@@ -210,9 +212,9 @@ impl AddNoise {
             sources.retain(|source| !matches!(source, Source::Dcsn | Source::Dcnu));
         }
         sources.retain(|source| match source {
-            Source::Dcnu => sensor.dcnu > 0.0,
-            Source::Prnu => sensor.prnu > 0.0,
-            Source::Ron => sensor.read_noise_e > 0.0,
+            Source::Dcnu => readout.dcnu > 0.0,
+            Source::Prnu => readout.prnu > 0.0,
+            Source::Ron => readout.read_noise_e > 0.0,
             Source::Dcsn | Source::Ssn => true,
         });
         let record = NoiseRecord {
@@ -231,7 +233,7 @@ impl AddNoise {
         let instructions = Instructions::widest();
         let tables = Tables::of(input, &model, instructions);
         let header = FrameHeader { metadata, ..input.clone() };
-        Ok(Self { header, model, record, transfer, tables, instructions })
+        Ok(Self { header, pattern, model, record, transfer, tables, instructions })
     }
 
     /// Draws on a narrower set of instructions than the widest there is; the noise is the same.
@@ -352,7 +354,7 @@ struct Line<'a> {
 impl AddNoise {
     fn line(&self, y: usize, channel: usize) -> Line<'_> {
         let geometry = &self.header.geometry;
-        let classes = match self.header.metadata.cfa {
+        let classes = match self.pattern {
             Some(pattern) => pattern.row_classes(geometry.origin, y),
             None => [Class::ALL[channel]; 2],
         };

@@ -80,7 +80,8 @@ impl ToXyz {
     /// # Errors
     ///
     /// [`Error::Order`] unless the frame holds three planes of ADU; [`Error::MissingKey`] without exposure;
-    /// [`Error::Usage`] for an impossible white.
+    /// [`Error::Usage`] for an impossible white; [`Error::Format`](crate::error::Error::Format) where the black level
+    /// differs among photosites.
     pub fn new(input: &FrameHeader, settings: &ColorSettings) -> Result<Self> {
         let holds = input.holds();
         match input.metadata.quantity {
@@ -97,7 +98,7 @@ impl ToXyz {
             return Err(input.refuse(format!("it holds {holds}; a camera has the three planes R, G and B")));
         }
         let exposure = input.exposure()?;
-        let black = input.metadata.black_level_adu.unwrap_or(0.0);
+        let black = input.uniform_black_adu()?;
         let xyz_from_adu = matrix(&settings.xyz_from_camera) / exposure.exposure_s_sr();
         let needs_white = matches!(settings.space, Space::Lab | Space::Srgb);
         let mut known_white = true;
@@ -106,8 +107,8 @@ impl ToXyz {
             White::D65 | White::EqualEnergy => {
                 let xy = if settings.white == White::D65 { D65_XY } else { [1.0 / 3.0, 1.0 / 3.0] };
                 let at_saturation = || -> Option<f64> {
-                    let range = input.metadata.white_level_adu? - black;
-                    Some((xyz_from_adu * Vector3::repeat(range)).y)
+                    let range = input.metadata.white_level_adu?.less([black; 3]).classes();
+                    Some((xyz_from_adu * Vector3::from(range)).y)
                 };
                 let luminance = match settings.white_luminance.or_else(at_saturation) {
                     Some(luminance) => luminance,
@@ -135,7 +136,7 @@ impl ToXyz {
             Space::Srgb => (QuantityKind::Srgb, ["R", "G", "B"]),
         };
         let mut metadata = input.metadata.becoming(quantity);
-        metadata.black_level_adu = None;
+        metadata.set_black_adu(None);
         metadata.white_level_adu = None;
         metadata.color = Some(ColorRecord {
             xyz_from_camera: settings.xyz_from_camera,

@@ -11,6 +11,7 @@
 //! from 10 to 30 000 e⁻ over the whole frame, so that no two photosites that are neighbors expect the same.
 
 use cpu_time::ProcessTime;
+use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::{CfaPattern, Class};
 use cyanometer::color::Space;
 use cyanometer::error::{Error, Result};
@@ -153,7 +154,7 @@ fn moments_of(frame: MemoryFrame) -> Kernel {
 fn spectral(width: usize, height: usize) -> Result<Kernel> {
     let loaded = sensor()?;
     let (wavelengths_nm, _) = WavelengthGrid::default().points()?;
-    let weights = loaded.response.weights_on(&loaded.sensor, &EXPOSURE, &WavelengthGrid::default())?;
+    let weights = loaded.response()?.weights_on(&loaded.sensor, &EXPOSURE, &WavelengthGrid::default())?;
     let (camera, _) = weights.camera(&wavelengths_nm);
     let bands = wavelengths_nm.len();
     let samples = spectral_samples(width, height, bands);
@@ -200,8 +201,8 @@ impl vectors::Kernel for Reading<'_> {
 /// The noise of a CFA plane as one writes it down with rand_distr, on the same generator with the same keys.
 fn noise_by_rand_distr(width: usize, height: usize) -> Result<Kernel> {
     let plane = cfa_plane(width, height)?;
-    let sensor = sensor()?.sensor;
-    let dark_e = sensor.dark_current_e_per_s(sensor.temperature_k) * EXPOSURE.exposure_s;
+    let readout = sensor()?.sensor.readout()?.clone();
+    let dark_e = readout.dark_current_e_per_s(readout.temperature_k) * EXPOSURE.exposure_s;
     let refused = |_| Error::Data("rand_distr refuses a rate".into());
     let dark_shot = Poisson::new(dark_e).map_err(refused)?;
     let mut output = vec![0.0; plane.samples.len()];
@@ -209,7 +210,7 @@ fn noise_by_rand_distr(width: usize, height: usize) -> Result<Kernel> {
         for (y, (rates, noisy)) in plane.samples.chunks(width).zip(output.chunks_mut(width)).enumerate() {
             let classes = CfaPattern::Rggb.row_classes([0, 0], y);
             for (x, (&rate, noisy)) in rates.iter().zip(noisy).enumerate() {
-                *noisy = photosite(f64::from(rate), classes[x % 2], [x, y], &dark_shot, &sensor);
+                *noisy = photosite(f64::from(rate), classes[x % 2], [x, y], &dark_shot, &readout);
             }
         }
         black_box(&output);
@@ -217,19 +218,13 @@ fn noise_by_rand_distr(width: usize, height: usize) -> Result<Kernel> {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "frames are narrower than 2³²")]
-fn photosite(
-    rate: f64,
-    class: Class,
-    [x, y]: [usize; 2],
-    dark_shot: &Poisson<f64>,
-    sensor: &cyanometer::camera::sensor::Sensor,
-) -> f32 {
+fn photosite(rate: f64, class: Class, [x, y]: [usize; 2], dark_shot: &Poisson<f64>, readout: &ReadOut) -> f32 {
     let draws = |source| Draws::new(source, class, x as u32, y as u32);
     let normal = |source| -> f64 { StandardNormal.sample(&mut draws(source)) };
     let light = Poisson::new(rate).map_or(rate, |shot| shot.sample(&mut draws(Source::Ssn)));
-    let light = light * (1.0 + sensor.prnu * normal(Source::Prnu)).max(0.0);
-    let dark = dark_shot.sample(&mut draws(Source::Dcsn)) * (1.0 + sensor.dcnu * normal(Source::Dcnu)).max(0.0);
-    to_sample((light + dark).min(sensor.full_well_e) + sensor.read_noise_e * normal(Source::Ron))
+    let light = light * (1.0 + readout.prnu * normal(Source::Prnu)).max(0.0);
+    let dark = dark_shot.sample(&mut draws(Source::Dcsn)) * (1.0 + readout.dcnu * normal(Source::Dcnu)).max(0.0);
+    to_sample((light + dark).min(readout.full_well_e) + readout.read_noise_e * normal(Source::Ron))
 }
 
 /// Words of one photosite and source for `rand_distr`, which takes as many as it needs: a stream of Philox blocks.

@@ -219,10 +219,11 @@ pub fn pixel_covariances(
 ///
 /// # Errors
 ///
-/// [`Error::Data`] where they are negative or not finite.
+/// [`Error::Data`] where they are negative or not finite; [`Error::MissingKey`] for a sensor of unknown read-out.
 pub fn per_exposure(signals: &Signals, sample: usize, sensor: &Sensor) -> Result<[f64; 3]> {
     let row = signals.camera.row(sample);
-    let electrons = [0, 1, 2].map(|class| row[class] / sensor.adu_per_e);
+    let adu_per_e = sensor.readout()?.adu_per_e;
+    let electrons = [0, 1, 2].map(|class| row[class] / adu_per_e);
     if electrons.iter().all(|e| (0.0..f64::INFINITY).contains(e)) {
         return Ok(electrons);
     }
@@ -266,10 +267,15 @@ impl Chain {
 }
 
 impl Evaluator<'_> {
+    /// The pattern of the filter array.
+    fn pattern(&self) -> Result<CfaPattern> {
+        self.settings.pattern.map_or_else(|| self.sensor.bayer(), Ok)
+    }
+
     /// Expected electrons of a sample, and what it is exposed to.
     fn exposed(&self, sample: usize) -> Result<(Exposure, [f64; 3])> {
         let per_exposure = per_exposure(self.signals, sample, self.sensor)?;
-        let exposure = self.settings.exposure.of(per_exposure, self.sensor.full_well_e)?;
+        let exposure = self.settings.exposure.of(per_exposure, self.sensor.readout()?.full_well_e)?;
         Ok((exposure, per_exposure.map(|e| e * exposure.exposure_s_sr())))
     }
 
@@ -279,7 +285,7 @@ impl Evaluator<'_> {
         let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
         metadata.sensor = Some(self.sensor.clone());
         metadata.exposure = Some(exposure);
-        metadata.cfa = Some(self.settings.pattern.unwrap_or(self.sensor.cfa));
+        metadata.cfa = Some(self.pattern()?.into());
         metadata.scene = Some(Scene {
             source: format!("sample {sample}"),
             uniform: true,
@@ -323,9 +329,9 @@ impl Evaluator<'_> {
             return None;
         }
         let metadata = &camera.metadata;
-        let range = metadata.white_level_adu? - metadata.black_level_adu.unwrap_or(0.0);
+        let range = metadata.white_level_adu?.less([metadata.uniform_black_adu()?; 3]).classes();
         let xyz_from_adu = matrix(&self.sensor.xyz_from_camera?) / metadata.exposure?.exposure_s_sr();
-        Some((xyz_from_adu * Vector3::repeat(range)).y)
+        Some((xyz_from_adu * Vector3::from(range)).y)
     }
 
     fn sample(&self, sample: usize) -> Result<SampleEvaluation> {
@@ -419,7 +425,7 @@ impl Evaluator<'_> {
     /// Codes of the patch's photosites in exposure number `frame` after the first.
     fn codes(&self, chain: &Chain, electrons: [f64; 3], frame: u32) -> Result<(MemoryFrame, Counts)> {
         let geometry = &chain.plane.geometry;
-        let pattern = chain.plane.metadata.cfa.unwrap_or(self.sensor.cfa);
+        let pattern = self.pattern()?;
         let samples = (0..geometry.height).flat_map(|y| {
             let classes = pattern.row_classes(geometry.origin, y).map(|class| to_sample(electrons[class as usize]));
             (0..geometry.width).map(move |x| classes[x % 2])

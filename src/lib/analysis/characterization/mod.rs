@@ -6,7 +6,8 @@ pub mod regression;
 pub mod training;
 
 use crate::camera::optics::Exposure;
-use crate::camera::sensor::{Sensor, SpectralResponse};
+use crate::camera::response::SpectralResponse;
+use crate::camera::sensor::Sensor;
 use crate::color::difference::DifferenceReport;
 use crate::error::{Error, Result};
 use crate::spectrum::{Observer, SpectralLibrary, WavelengthGrid, fold};
@@ -157,7 +158,7 @@ pub struct Signals {
 ///
 /// # Errors
 ///
-/// Those of the grid; [`Error::Data`] where the library leaves out more than 10⁻³ of what camera or observer respond to.
+/// Those of the grid; [`Error::MissingKey`] for a sensor of unknown read-out; [`Error::Data`] where the library leaves out more than 10⁻³ of what camera or observer respond to.
 pub fn signals(
     library: &SpectralLibrary,
     sensor: &Sensor,
@@ -195,7 +196,7 @@ pub fn signals(
 ///
 /// # Errors
 ///
-/// Those of the grid.
+/// Those of the grid; [`Error::MissingKey`] for a sensor of unknown read-out.
 pub fn responses(
     sensor: &Sensor,
     response: &SpectralResponse,
@@ -220,9 +221,9 @@ fn weights(
 ) -> Result<(Vec<f64>, Three, Three)> {
     let (wavelengths, widths) = grid.points()?;
     let unit = Exposure { exposure_s: 1.0, f_number: 1.0, lens_transmittance: 1.0 };
-    let per_exposure = sensor.adu_per_e / unit.exposure_s_sr();
+    let per_exposure = sensor.readout()?.adu_per_e / unit.exposure_s_sr();
     let camera = response
-        .electron_weights(sensor, &unit, &wavelengths, &widths)
+        .electron_weights(sensor, &unit, &wavelengths, &widths)?
         .map(|class| class.into_iter().map(|electrons| electrons * per_exposure).collect());
     let matching = observer.matching.each_ref().map(|curve| -> Vec<f64> {
         let weight = |(&nm, width): (&f64, &f64)| LUMINOUS_EFFICACY_LM_PER_W * CM2_PER_M2 * curve.at(nm) * width;

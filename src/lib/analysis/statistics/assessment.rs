@@ -2,16 +2,15 @@
 
 use super::check::{self, Measured, Test};
 use super::expectation::{Expectation, Predicted};
+use super::levels::Levels;
 use super::region::Region;
 use super::report::{ChannelReport, RegionReport};
 use super::tally::Tally;
 use crate::cfa::Class;
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
-use crate::numerics::sums::Limits;
 use crate::propagation::sampling::Sampling;
 use crate::propagation::{FramePrediction, PixelMoments};
-use crate::units::QuantityKind;
 use nalgebra::Matrix3;
 
 /// The groups of channels that a region is measured in.
@@ -67,18 +66,15 @@ impl<'a> Assessment<'a> {
     }
 
     /// What is said of the region, without tests.
-    pub fn report(&self, frame: &FrameHeader, region: Region, rails: Limits) -> RegionReport {
+    pub fn report(&self, frame: &FrameHeader, region: Region, levels: &Levels) -> RegionReport {
         let metadata = &frame.metadata;
-        let black = match metadata.quantity {
-            QuantityKind::Adu => metadata.black_level_adu.unwrap_or(0.0),
-            QuantityKind::Electrons => metadata.dark_signal_e.unwrap_or(0.0),
-            _ => 0.0,
-        };
-        let has_rails = !rails.high.is_nan();
-        let reports = |group: &Group<'_>| -> Vec<ChannelReport> {
+        let black = levels.mean_black(frame, region.x..region.x + region.width, region.y..region.y + region.height);
+        let has_rails = levels.has_rails();
+        let reports = |group: &Group<'_>, black: f64| -> Vec<ChannelReport> {
             (0..group.names.len()).map(|index| group.channel(index, black, has_rails)).collect()
         };
-        let mut channels = reports(&self.channels);
+        let of_classes = self.classes.iter().zip(black.classes);
+        let mut channels = reports(&self.channels, black.whole);
         if let ([plane], false) = (&mut channels[..], self.classes.is_empty()) {
             (plane.mean_error, plane.std_error) = self.plane_errors();
         }
@@ -92,7 +88,7 @@ impl<'a> Assessment<'a> {
             not_finite: moments.not_finite,
             quantity: metadata.quantity,
             unit: metadata.unit.clone(),
-            classes: self.classes.iter().flat_map(reports).collect(),
+            classes: of_classes.flat_map(|(group, black)| reports(group, black)).collect(),
             covariance: (0..channels.len()).map(row).collect(),
             channels,
             predicted_covariance: predicted.covariance.clone(),

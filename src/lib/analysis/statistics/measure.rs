@@ -3,9 +3,10 @@
 use super::assessment::Assessment;
 use super::check::Verdict;
 use super::laws::Samplings;
+use super::levels::Levels;
 use super::region::Region;
 use super::report::{RegionReport, Report};
-use super::tally::{Tally, rails, tallies};
+use super::tally::{Tally, tallies};
 use crate::error::{Error, Result};
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments};
 use crate::stream::RowSource;
@@ -31,7 +32,7 @@ pub fn measure(
     for region in regions {
         region.check(&frame)?;
     }
-    let rails = rails(&frame);
+    let levels = Levels::of(&frame)?;
     // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
     let prediction = propagation::of_frame(&frame, equations);
     let mut samplings = Samplings::default();
@@ -40,7 +41,7 @@ pub fn measure(
             samplings.of(mixture, &frame, *region);
         }
     }
-    let tallies = tallies(source, regions, rails)?;
+    let tallies = tallies(source, regions, &levels)?;
     if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
         return Err(Error::Data(format!(
             "{}: nothing can be checked: charge transfer mixes neighbors, differently from place to place",
@@ -51,7 +52,7 @@ pub fn measure(
         let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, *region);
         let assessment = Assessment::new(tally, &frame, prediction.as_ref().ok(), sampling);
         let tests = if level.is_some() { assessment.tests() } else { Vec::new() };
-        RegionReport { tests, ..assessment.report(&frame, *region, rails) }
+        RegionReport { tests, ..assessment.report(&frame, *region, &levels) }
     };
     let regions = regions.iter().zip(&tallies).map(report).collect();
     let mut report = Report { regions, check: None, unpredicted: prediction.err() };
@@ -93,7 +94,7 @@ mod tests {
     #[test]
     fn classes_of_a_plane_are_told_apart_wherever_the_region_starts() {
         let mut plane = frame(&["Y"], 8, 6, |i| [10.0, 20.0, 20.0, 30.0][(i / 8 % 2) * 2 + i % 2]);
-        plane.header.metadata.cfa = Some(CfaPattern::Rggb);
+        plane.header.metadata.cfa = Some(CfaPattern::Rggb.into());
         let region = Region { x: 1, y: 1, width: 5, height: 4 };
         let report = measure(&mut plane, &[region], Equations::Exact, None).unwrap();
         let means: Vec<_> = report.regions[0].classes.iter().map(|class| class.mean).collect();
@@ -111,7 +112,7 @@ mod tests {
         assert!((channel.std_error.unwrap() / std * 2398_f64.sqrt() - 1.0).abs() < 1e-12);
         // Classes 100 apart: the error of the mean is that of their own scatter, not of their distance.
         let mut plane = frame(&["Y"], 40, 30, |i| noise(i) + 100.0 * [1.0, 2.0, 2.0, 3.0][(i / 40 % 2) * 2 + i % 2]);
-        plane.header.metadata.cfa = Some(CfaPattern::Rggb);
+        plane.header.metadata.cfa = Some(CfaPattern::Rggb.into());
         let report = measure(&mut plane, &[], Equations::Exact, None).unwrap();
         let (whole, classes) = (&report.regions[0].channels[0], &report.regions[0].classes);
         let of_classes = |k: usize| classes[k].mean_error.unwrap() * [0.25, 0.5, 0.25][k];

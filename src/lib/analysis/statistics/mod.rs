@@ -7,6 +7,7 @@ mod assessment;
 pub mod check;
 mod expectation;
 mod laws;
+mod levels;
 mod measure;
 pub mod patches;
 mod region;

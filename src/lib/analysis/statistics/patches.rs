@@ -5,9 +5,10 @@
 
 use super::assessment::Assessment;
 use super::laws::{Samplings, beyond_weights};
+use super::levels::Levels;
 use super::region::Region;
 use super::report::{RegionReport, Report};
-use super::tally::{Tally, rails, tallies};
+use super::tally::{Tally, tallies};
 use crate::color;
 use crate::error::{Error, Result};
 use crate::metadata::{FrameHeader, Scene};
@@ -103,8 +104,8 @@ pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: 
     let frame = source.header().clone();
     let patches = of_frame(&frame, size)?;
     let regions: Vec<Region> = patches.iter().map(|patch| patch.interior).collect();
-    let rails = rails(&frame);
-    let tallies = tallies(source, &regions, rails)?;
+    let levels = Levels::of(&frame)?;
+    let tallies = tallies(source, &regions, &levels)?;
     let mut unpredicted = None;
     let mut reports: Vec<RegionReport> = match propagation::of_frame(&frame, equations) {
         Ok(known) => {
@@ -113,7 +114,7 @@ pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: 
             tallies
                 .map(|(tally, region)| {
                     let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, region);
-                    Assessment::new(tally, &frame, Some(&known), sampling).report(&frame, region, rails)
+                    Assessment::new(tally, &frame, Some(&known), sampling).report(&frame, region, &levels)
                 })
                 .collect()
         }
@@ -126,7 +127,7 @@ pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: 
                     let prediction = at_means(tally, &frame, equations);
                     let sampling = |mixture: &PixelMoments| laws.sampling(mixture, region.place(&frame));
                     let assessment = Assessment::new(tally, &frame, prediction.as_ref(), sampling);
-                    let mut report = assessment.report(&frame, *region, rails);
+                    let mut report = assessment.report(&frame, *region, &levels);
                     for channel in report.channels.iter_mut().chain(&mut report.classes) {
                         (channel.predicted_mean, channel.z_mean) = (None, None);
                     }
@@ -219,7 +220,8 @@ pub fn expected_electrons(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 
         QuantityKind::Electrons => means.map(|mean| mean - metadata.dark_signal_e.unwrap_or(0.0)),
         QuantityKind::Adu => {
             let adc = metadata.adc?;
-            means.map(|mean| (mean - metadata.black_level_adu.unwrap_or(0.0)) / adc.adu_per_e)
+            let black = metadata.uniform_black_adu()?;
+            means.map(|mean| (mean - black) / adc.adu_per_e)
         }
         QuantityKind::Xyz => camera_signals(means)?,
         QuantityKind::Xyy => camera_signals(color::xyz_of_chromaticity([first, second], third))?,
@@ -256,7 +258,8 @@ mod tests {
     }
 
     fn with_demosaic(mut frame: FrameHeader, method: &str) -> FrameHeader {
-        frame.metadata.demosaic = Some(DemosaicRecord { method: method.into(), cfa: CfaPattern::Rggb, black: 0.0 });
+        let (cfa, black) = (CfaPattern::Rggb, 0.0.into());
+        frame.metadata.demosaic = Some(DemosaicRecord { method: method.into(), cfa, black, black_deltas: false });
         frame
     }
 
@@ -335,7 +338,7 @@ mod tests {
         frame.metadata.quantity = QuantityKind::Adu;
         assert_eq!(expected_electrons(&frame, electrons), None);
         frame.metadata.adc = Some(AdcRecord { bits: 14, bias_adu: 100.0, adu_per_e: 0.25 });
-        frame.metadata.black_level_adu = Some(107.5);
+        frame.metadata.black_level_adu = Some(107.5.into());
         check(&frame, electrons.map(|e| 0.25 * e + 107.5));
 
         let exposure = Exposure { exposure_s: 0.02, f_number: 5.6, lens_transmittance: 1.0 };

@@ -71,7 +71,7 @@ pub struct ChannelReport {
     pub max: Option<f64>,
     /// 20 log₁₀ of the mean above black over the standard deviation.
     pub snr_db: Option<f64>,
-    /// Samples at the ends of the range: codes 0 and 2^bits − 1, or electrons at full well or above.
+    /// Samples at the ends of the range: code 0 and the white level of its class, or electrons at full well or above.
     pub clipped: Option<u64>,
     /// Mean by formula.
     pub predicted_mean: Option<f64>,

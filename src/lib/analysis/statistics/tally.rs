@@ -1,13 +1,14 @@
 //! What was seen of the samples of a region.
 
+use super::levels::Levels;
 use super::region::Region;
+use crate::cfa::Class;
 use crate::error::Result;
-use crate::frame::{Window, to_sample};
+use crate::frame::Window;
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::{self, Moments};
 use crate::numerics::sums::Limits;
 use crate::stream::{RowSource, fold};
-use crate::units::QuantityKind;
 use rayon::prelude::*;
 
 /// What one region has seen so far.
@@ -19,27 +20,6 @@ pub(super) struct Tally {
     pub classes: Option<[Moments; 3]>,
 }
 
-/// Which samples of a frame count as clipped: codes at or beyond either end, electrons at full well or above.
-pub(super) fn rails(frame: &FrameHeader) -> Limits {
-    let metadata = &frame.metadata;
-    // What transfer or its undoing has mixed lies at no rail any more; nor does a code less a dark frame's.
-    let transferred = metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
-    if metadata.correction.is_some() || (transferred && metadata.quantity == QuantityKind::Electrons) {
-        return Limits::NONE;
-    }
-    let limits = match metadata.quantity {
-        QuantityKind::Adu if metadata.demosaic.is_none() => {
-            metadata.white_level_adu.map(|white| Limits { low: 0.0, high: to_sample(white) })
-        }
-        QuantityKind::Electrons if metadata.demosaic.is_none() => {
-            let full_well_e = metadata.sensor.as_ref().map(|sensor| sensor.full_well_e);
-            full_well_e.map(|e| Limits { high: to_sample(e), ..Limits::NONE })
-        }
-        _ => None,
-    };
-    limits.unwrap_or(Limits::NONE)
-}
-
 /// Pixels of a region that are worth a task of their own.
 const SHARE: usize = 1 << 14;
 
@@ -47,9 +27,9 @@ const SHARE: usize = 1 << 14;
 ///
 /// Each row of a region is summed by itself and merged in order, whatever the threads: the rows of one region side by side
 /// where regions are few, or regions side by side.
-pub(super) fn tallies(source: &mut dyn RowSource, regions: &[Region], rails: Limits) -> Result<Vec<Tally>> {
+pub(super) fn tallies(source: &mut dyn RowSource, regions: &[Region], levels: &Levels) -> Result<Vec<Tally>> {
     let frame = source.header().clone();
-    let empty = || Tally::new(&frame);
+    let empty = || Tally::new(&frame, levels);
     let mut tallies: Vec<Tally> = regions.iter().map(|_| empty()).collect();
     let mut of_rows: Vec<Tally> = Vec::new();
     fold([source], frame.geometry.height, |band| {
@@ -63,7 +43,7 @@ pub(super) fn tallies(source: &mut dyn RowSource, regions: &[Region], rails: Lim
                 let side_by_side = of_rows[..seen.len()].par_iter_mut().zip(seen.clone());
                 side_by_side.with_min_len((SHARE / region.width).max(1)).for_each(|(of_row, y)| {
                     of_row.clear();
-                    of_row.add_row(&frame, window, y, *region, rails);
+                    of_row.add_row(&frame, window, y, *region, levels);
                 });
                 for of_row in &of_rows[..seen.len()] {
                     tally.merge(of_row);
@@ -74,7 +54,7 @@ pub(super) fn tallies(source: &mut dyn RowSource, regions: &[Region], rails: Lim
             met.for_each_init(empty, |of_row, (region, tally)| {
                 for y in region.rows_among(&rows) {
                     of_row.clear();
-                    of_row.add_row(&frame, window, y, *region, rails);
+                    of_row.add_row(&frame, window, y, *region, levels);
                     tally.merge(of_row);
                 }
             });
@@ -85,11 +65,9 @@ pub(super) fn tallies(source: &mut dyn RowSource, regions: &[Region], rails: Lim
 }
 
 impl Tally {
-    fn new(frame: &FrameHeader) -> Self {
-        let channels = frame.geometry.channels.len();
-        let is_cfa_plane = channels == 1 && frame.metadata.cfa.is_some();
-        let classes = is_cfa_plane.then(|| [const { 1 }; 3].map(Moments::new));
-        Self { channels: Moments::new(channels), classes }
+    fn new(frame: &FrameHeader, levels: &Levels) -> Self {
+        let classes = levels.array.map(|_| [const { 1 }; 3].map(Moments::new));
+        Self { channels: Moments::new(frame.geometry.channels.len()), classes }
     }
 
     fn clear(&mut self) {
@@ -97,19 +75,41 @@ impl Tally {
         self.classes.iter_mut().flatten().for_each(Moments::clear);
     }
 
-    /// Takes in row `y` of a region; the moments of a CFA plane are merged from those of its two classes.
-    fn add_row(&mut self, frame: &FrameHeader, window: Window<'_>, y: usize, region: Region, rails: Limits) {
+    /// Takes in row `y` of a region; the moments of a CFA plane are merged from those of its classes.
+    fn add_row(&mut self, frame: &FrameHeader, window: Window<'_>, y: usize, region: Region, levels: &Levels) {
         let line = |channel: usize| &window.row(y.cast_signed(), channel)[region.x..][..region.width];
-        let Some((moments, pattern)) = self.classes.as_mut().zip(frame.metadata.cfa) else {
-            return self.channels.add_within(region.width, line, rails);
+        let limits = levels.common_limits();
+        let (Some(classes), Some(array)) = (&mut self.classes, levels.array) else {
+            self.channels.add_within(region.width, line, limits.unwrap_or(Limits::NONE));
+            if limits.is_none() {
+                for (plane, beyond) in self.channels.beyond.iter_mut().enumerate() {
+                    *beyond += beyond_limits(line(plane).iter(), levels.limits_of_plane(plane));
+                }
+            }
+            return;
         };
-        let classes = pattern.row_classes(frame.geometry.origin, y);
-        let classes = [0, 1].map(|parity| classes[(region.x + parity) % 2] as usize);
-        if let Ok(moments) = moments.get_disjoint_mut(classes) {
-            moments::add_alternating(moments, line(0), rails);
+        let Some(pattern) = array.bayer() else {
+            let [x0, y0] = frame.geometry.origin.map(i64::from);
+            for (class, moments) in Class::ALL.into_iter().zip(classes) {
+                let is_seen = |x: usize| array.class(x0 + (region.x + x) as i64, y0 + y as i64) == Some(class);
+                let seen = line(0).iter().enumerate().filter(|(x, _)| is_seen(*x));
+                let samples: Vec<f32> = seen.map(|(_, sample)| *sample).collect();
+                moments.add_within(samples.len(), |_| &samples, levels.limits(class));
+                self.channels.merge(moments);
+            }
+            return;
+        };
+        let of_row = pattern.row_classes(frame.geometry.origin, y);
+        let of_row = [0, 1].map(|parity| of_row[(region.x + parity) % 2]);
+        if let Ok(moments) = classes.get_disjoint_mut(of_row.map(|class| class as usize)) {
+            moments::add_alternating(moments, line(0), limits.unwrap_or(Limits::NONE));
         }
-        for class in classes {
-            self.channels.merge(&moments[class]);
+        for (parity, class) in of_row.into_iter().enumerate() {
+            let moments = &mut classes[class as usize];
+            if limits.is_none() {
+                moments.beyond[0] += beyond_limits(line(0).iter().skip(parity).step_by(2), levels.limits(class));
+            }
+            self.channels.merge(moments);
         }
     }
 
@@ -119,4 +119,9 @@ impl Tally {
             mine.merge(theirs);
         }
     }
+}
+
+/// How many samples lie at limits or beyond.
+fn beyond_limits<'a>(samples: impl Iterator<Item = &'a f32>, limits: Limits) -> u64 {
+    samples.filter(|sample| limits.reached(**sample)).count() as u64
 }

@@ -1,7 +1,7 @@
 //! The fit itself: the matrix, what other noise weights would give, and how it does on its own library.
 
-use super::Fit;
 use super::library::SeenLibrary;
+use super::request::Fit;
 use super::training::Plan;
 use crate::analysis::characterization::evaluation::{
     EvaluationSettings, SampleExposure, evaluate, noise_free, pixel_covariances,
@@ -70,7 +70,7 @@ impl Fitting<'_> {
 
     /// The matrix with all that is known of it, `grid` the wavelengths that signals are sums over.
     pub(super) fn matrix(&self, fitted: &FittedMatrix, grid: WavelengthGrid) -> Result<CameraMatrix> {
-        let glass = self.sensor.cover_glass.as_ref();
+        let glass = self.sensor.response.as_ref().and_then(|files| files.cover_glass.as_ref());
         Ok(CameraMatrix {
             schema: MATRIX_SCHEMA.into(),
             sensor: Some(self.sensor.name.clone()),

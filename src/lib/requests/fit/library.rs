@@ -1,6 +1,6 @@
 //! A library as the camera sees it.
 
-use super::Fit;
+use super::request::Fit;
 use crate::analysis::characterization::{Signals, signals};
 use crate::error::{Error, Result};
 use crate::formats::data::LoadedSensor;
@@ -40,7 +40,7 @@ impl Viewer<'_> {
     /// Reads a library without labels.
     pub(super) fn see(&self, path: &Path, fit: &Fit) -> Result<SeenLibrary> {
         let library = spectral::read_library(path, fit.radiance_unit)?;
-        let LoadedSensor { sensor, response } = self.loaded;
+        let (sensor, response) = (&self.loaded.sensor, self.loaded.response()?);
         let signals = signals(&library, sensor, response, &self.observer, &self.grid)?;
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         Ok(SeenLibrary { name, library, signals, labels: Vec::new() })

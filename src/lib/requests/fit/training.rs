@@ -1,66 +1,11 @@
 //! Which samples of a library the matrix is fitted on, which are held out, and which is kept exact.
 
-use super::Fit;
 use super::library::SeenLibrary;
-use crate::analysis::characterization::regression::{FitSettings, Weights};
+use super::request::{Fit, TrainingChoice};
+use crate::analysis::characterization::regression::FitSettings;
 use crate::analysis::characterization::training::{CHOSEN_BY, average_sample, spanning_subset};
 use crate::error::{Error, Result};
 use crate::names::Named;
-use std::path::PathBuf;
-
-/// Which samples to train on.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum TrainingChoice {
-    /// So many, chosen to span the library.
-    Count(usize),
-    /// These.
-    List(Vec<usize>),
-}
-
-/// Reads sample numbers between commas, or how many.
-///
-/// # Errors
-///
-/// What is expected, in words.
-pub(super) fn training(text: &str) -> std::result::Result<TrainingChoice, String> {
-    let numbers: Option<Vec<usize>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    match numbers.as_deref() {
-        Some([count]) if *count > 0 => Ok(TrainingChoice::Count(*count)),
-        Some(list) if list.len() > 1 => Ok(TrainingChoice::List(list.to_vec())),
-        _ => Err("give sample numbers between commas, or how many".into()),
-    }
-}
-
-/// Reads `equal`, `relative`, or one weight for each training sample.
-///
-/// # Errors
-///
-/// What is expected, in words.
-pub(super) fn weights(text: &str) -> std::result::Result<Weights, String> {
-    match text {
-        "equal" => Ok(Weights::Equal),
-        "relative" => Ok(Weights::Relative),
-        list => {
-            let weight = |part: &str| part.trim().parse().ok().filter(|w: &f64| (0.0..f64::INFINITY).contains(w));
-            let given: Option<Vec<f64>> = list.split(',').map(weight).collect();
-            given.map(Weights::Given).ok_or_else(|| {
-                "give equal, relative, or a weight for each training sample between commas, none below 0".into()
-            })
-        }
-    }
-}
-
-/// Reads `FILE:COLUMN`.
-///
-/// # Errors
-///
-/// What is expected, in words.
-pub(super) fn labels(text: &str) -> std::result::Result<(PathBuf, String), String> {
-    match text.rsplit_once(':') {
-        Some((file, column)) if !file.is_empty() && !column.is_empty() => Ok((file.into(), column.into())),
-        _ => Err("give FILE:COLUMN, such as sky912_meta.csv:aerosol".into()),
-    }
-}
 
 /// What is fitted, and how its samples were chosen.
 pub(super) struct Plan {

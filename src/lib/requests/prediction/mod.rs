@@ -219,7 +219,7 @@ impl NoisePrediction {
             return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
         }
         let color = self.color(&sensor, &mut notes)?;
-        let conditions = Conditions { quadrature_error, ..self.conditions(&sensor, exposure) };
+        let conditions = Conditions { quadrature_error, ..self.conditions(&sensor, exposure)? };
         let mut chain = self.chain(&sensor, exposure, color)?;
         let budgets = match self.sweep {
             Some(sweep) => Budgets::Sweep(sweep_levels(&mut chain, sweep, electrons)?),
@@ -248,7 +248,7 @@ impl NoisePrediction {
         let loaded = data::load_sensor(&self.subject.sensor)?;
         let library = spectral::read_library(input, self.spectrum.radiance_unit)?;
         let observer = data::load_observer()?;
-        let signals = signals(&library, &loaded.sensor, &loaded.response, &observer, &WavelengthGrid::default())?;
+        let signals = signals(&library, &loaded.sensor, loaded.response()?, &observer, &WavelengthGrid::default())?;
         let base = self.exposure.chosen()?;
         let exposing = match self.level.expose_to {
             Some(fraction) => SampleExposure::Filled { base, fraction, by: Filling::Time },
@@ -258,7 +258,7 @@ impl NoisePrediction {
         let color = self.color(&loaded.sensor, &mut notes)?;
         let one = |sample: usize| -> Result<SamplePrediction> {
             let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;
-            let exposure = exposing.of(per_exposure, loaded.sensor.full_well_e)?;
+            let exposure = exposing.of(per_exposure, loaded.sensor.readout()?.full_well_e)?;
             let mut chain = self.chain(&loaded.sensor, exposure, color.clone())?;
             let prediction = chain.predict(per_exposure.map(|e| e * exposure.exposure_s_sr()))?;
             Ok(SamplePrediction { sample, exposure, prediction })
@@ -268,7 +268,7 @@ impl NoisePrediction {
             .map(|sample| one(sample).map_err(|error| of_sample(sample, error)));
         let budgets = Budgets::Samples(found.collect::<Result<_>>()?);
         Ok(PredictedNoise {
-            conditions: self.conditions(&loaded.sensor, base),
+            conditions: self.conditions(&loaded.sensor, base)?,
             budgets,
             notes,
             scene: None,
@@ -276,18 +276,18 @@ impl NoisePrediction {
         })
     }
 
-    fn conditions(&self, sensor: &Sensor, exposure: Exposure) -> Conditions {
-        Conditions {
+    fn conditions(&self, sensor: &Sensor, exposure: Exposure) -> Result<Conditions> {
+        Ok(Conditions {
             sensor: sensor.name.clone(),
             exposure_s: exposure.exposure_s,
             f_number: exposure.f_number,
-            temperature_k: self.noise.temperature_k.unwrap_or(sensor.temperature_k),
+            temperature_k: self.noise.temperature_k.unwrap_or(sensor.readout()?.temperature_k),
             method: self.method.name(),
-            pattern: self.pattern.unwrap_or(sensor.cfa),
+            pattern: self.pattern.map_or_else(|| sensor.bayer(), Ok)?,
             equations: self.equations,
             patch: self.patch,
             quadrature_error: None,
-        }
+        })
     }
 
     fn chain(&self, sensor: &Sensor, exposure: Exposure, color: Option<ColorSettings>) -> Result<Chain> {
@@ -340,7 +340,7 @@ impl PredictedNoise {
         let Some((chain, electrons)) = &mut self.scene else {
             return Err(Error::Usage("a library has no photon transfer curve; choose one sample".into()));
         };
-        let (full_well_e, sensor) = (chain.sensor().full_well_e, chain.sensor().name.clone());
+        let (full_well_e, sensor) = (chain.sensor().readout()?.full_well_e, chain.sensor().name.clone());
         let all = Sweep { start_e: 1.0, end_e: full_well_e, count: 200, is_logarithmic: true };
         let electrons = if *electrons == [0.0; 3] { [1.0; 3] } else { *electrons };
         let levels = sweep_levels(chain, self.sweep.unwrap_or(all), electrons)?;

@@ -1,8 +1,8 @@
 //! The frame that shows a scene: its size, its patches, and what its metadata say.
 
-use super::Scene;
 use super::light::Light;
 use super::open::Prepared;
+use super::request::Scene;
 use crate::camera::optics::Vignetting;
 use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
@@ -28,8 +28,10 @@ impl Scene {
             Light::Image { source, .. } => (source, None),
         };
         let wanted = self.vignetting_focal_length_mm();
-        let vignetting =
-            wanted.map(|focal_length| Vignetting::new(size[0], size[1], sensor.pixel_pitch_um, focal_length));
+        let vignetting = match wanted {
+            Some(focal_length) => Some(Vignetting::new(size[0], size[1], sensor.pixel_pitch_um()?, focal_length)),
+            None => None,
+        };
         let is_negligible = vignetting.as_ref().is_some_and(Vignetting::is_negligible);
         let vignetting = vignetting.filter(|_| !is_negligible);
         let mut metadata = found.metadata.clone();
@@ -45,7 +47,7 @@ impl Scene {
             leave_out(what, "without vignetting they expect the same");
         }
         let is_uniform = uniform.is_some() && vignetting.is_none();
-        metadata.cfa = self.cfa;
+        metadata.cfa = self.cfa.map(Into::into);
         metadata.sensor = Some(sensor.clone());
         metadata.exposure = Some(*exposure);
         metadata.scene = Some(metadata::Scene {
@@ -69,7 +71,8 @@ impl Scene {
                 Err(Error::Usage("--patch is for the pixels of a spectral image, but the scene is uniform".into()))
             }
             Light::Uniform { .. } => {
-                let size = self.size.unwrap_or([sensor.width as usize, sensor.height as usize]);
+                let of_sensor = || sensor.readout().map(|readout| [readout.width as usize, readout.height as usize]);
+                let size = self.size.map_or_else(of_sensor, Ok)?;
                 Ok(Extent { size, patch: size, source_width: None })
             }
             Light::Image { width, height, source, .. } => {

@@ -1,6 +1,6 @@
 //! The light of a scene: expected electrons per pixel of its source, at the exposure for which it was opened.
 
-use crate::camera::sensor::Camera;
+use crate::camera::response::Camera;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
 use crate::formats::spectral::SpectralChannels;

@@ -3,73 +3,20 @@
 mod layout;
 mod light;
 mod open;
+mod request;
+
+pub use request::Scene;
 
 use super::notes::Note;
-use super::options::{ExposureChoice, SignalLevel, SpectrumChoice, Subject, defaults};
-use super::values;
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
-use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
 use crate::formats::files::FileId;
 use crate::metadata::FrameHeader;
-use crate::names::Named;
-use crate::numerics::quadrature::Rule;
-use crate::spectrum::WavelengthGrid;
 use crate::stages::render::Rendering;
 use crate::stream::{MemoryFrame, RowSink};
-use clap::Args;
 use light::Light;
 use open::Prepared;
-
-/// What is to be rendered, and how.
-#[derive(Debug, Clone, Args)]
-pub struct Scene {
-    /// Light and sensor.
-    #[command(flatten)]
-    pub subject: Subject,
-    /// Size of the frame in photosites; by default the sensor's, or that of the patches of a spectral image
-    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = values::size)]
-    pub size: Option<[usize; 2]>,
-    /// Exposure time and lens.
-    #[command(flatten)]
-    pub exposure: ExposureChoice,
-    /// Focal length in mm, for --vignetting
-    #[arg(id = "focal-length", long, value_name = "MM", default_value_t = 50.0, value_parser = values::positive, allow_negative_numbers = true)]
-    pub focal_length_mm: f64,
-    /// Darken the frame away from its centre by the fourth power of the cosine
-    #[arg(long)]
-    pub vignetting: bool,
-    /// How strong the signal is.
-    #[command(flatten)]
-    pub level: SignalLevel,
-    /// Wavelengths to sum over, in nm
-    #[arg(long, value_name = "START:END:STEP", default_value_t, value_parser = values::wavelengths)]
-    pub wavelengths: WavelengthGrid,
-    /// Rule of summation
-    #[arg(long, default_value = Rule::default().name(), value_parser = values::choice::<Rule>())]
-    pub quadrature: Rule,
-    /// Which spectrum of a file.
-    #[command(flatten)]
-    pub spectrum: SpectrumChoice,
-    /// Photosites that show one pixel of a spectral image, by default 1x1; or one spectrum of a table, to show them all
-    #[arg(long, value_name = "WxH", value_parser = values::size)]
-    pub patch: Option<[usize; 2]>,
-    /// Render only the plane that the mosaic of this pattern keeps: rggb, bggr, grbg or gbrg
-    #[arg(long, value_name = "PATTERN", value_parser = values::pattern)]
-    pub cfa: Option<CfaPattern>,
-    /// Part of a multi-part EXR, counted from 0
-    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
-    pub part: usize,
-}
-
-impl Default for Scene {
-    /// The radiance that comes through the standard input, on the default sensor behind the paper's lens, at its exposure,
-    /// and over its wavelengths.
-    fn default() -> Self {
-        defaults(&[])
-    }
-}
 
 /// A scene that is ready to be drawn.
 pub struct OpenScene {
@@ -139,10 +86,6 @@ impl Scene {
             }
         }
     }
-
-    fn vignetting_focal_length_mm(&self) -> Option<f64> {
-        self.vignetting.then_some(self.focal_length_mm)
-    }
 }
 
 impl OpenScene {
@@ -175,7 +118,11 @@ impl OpenScene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cfa::CfaPattern;
     use crate::formats::data::DEFAULT_SENSOR;
+    use crate::numerics::quadrature::Rule;
+    use crate::requests::options::{SignalLevel, Subject};
+    use crate::spectrum::WavelengthGrid;
 
     const TREE: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -223,7 +170,7 @@ mod tests {
         let filled = Scene { level: SignalLevel { expose_to: Some(0.5), ..SignalLevel::default() }, ..scene };
         let filled = filled.uniform().unwrap();
         let brightest = filled.electrons.into_iter().fold(0.0, f64::max);
-        assert!((brightest / (0.5 * filled.sensor.full_well_e) - 1.0).abs() < 1e-12, "{brightest}");
+        assert!((brightest / (0.5 * filled.sensor.readout().unwrap().full_well_e) - 1.0).abs() < 1e-12, "{brightest}");
         assert!(matches!(&filled.notes[0], Note::Remark(text) if text.starts_with("exposure ")), "{:?}", filled.notes);
     }
 

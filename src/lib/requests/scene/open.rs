@@ -1,9 +1,10 @@
 //! Opens the light of a scene, and settles its exposure.
 
-use super::Scene;
 use super::light::{ImageRows, Light, Seen, SpectralRows, brightest, checked};
+use super::request::Scene;
 use crate::camera::optics::Exposure;
-use crate::camera::sensor::{GridWeights, Sensor};
+use crate::camera::response::GridWeights;
+use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::formats::csv::SpectralTable;
 use crate::formats::data::{self, LoadedSensor};
@@ -46,11 +47,8 @@ struct Sums {
 }
 
 impl Sums {
-    fn on(
-        grid: &WavelengthGrid,
-        LoadedSensor { sensor, response }: &LoadedSensor,
-        exposure: &Exposure,
-    ) -> Result<Self> {
+    fn on(grid: &WavelengthGrid, loaded: &LoadedSensor, exposure: &Exposure) -> Result<Self> {
+        let (sensor, response) = (&loaded.sensor, loaded.response()?);
         let weights = response.weights_on(sensor, exposure, grid)?;
         let coarse = grid.doubled().and_then(|grid| response.weights_on(sensor, exposure, &grid).ok());
         Ok(Self { weights, coarse, rule: grid.quadrature })
@@ -101,10 +99,11 @@ impl Scene {
             if brightest <= 0.0 {
                 return Err(Error::Data("the scene is dark: no exposure reaches a fraction of full well".into()));
             }
-            exposure.exposure_s = fraction * loaded.sensor.full_well_e / brightest;
+            let full_well_e = loaded.sensor.readout()?.full_well_e;
+            exposure.exposure_s = fraction * full_well_e / brightest;
             exposure = exposure.checked()?;
             light.scale(exposure.exposure_s);
-            brightest_e = Some(fraction * loaded.sensor.full_well_e);
+            brightest_e = Some(fraction * full_well_e);
             found.notes.push(Note::Remark(format!("exposure {} s", exposure.exposure_s)));
         }
         if let Some([red, green, blue]) = found.metadata.quadrature_error {

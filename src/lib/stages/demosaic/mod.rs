@@ -17,12 +17,13 @@ pub mod weights;
 
 pub use method::Method;
 
+use crate::camera::levels::BlackLevels;
 use crate::cfa::{CfaPattern, Class};
 use crate::error::Result;
-use crate::frame::{Rows, Window};
+use crate::frame::{Rows, Window, mirror};
 use crate::metadata::{DemosaicRecord, FrameHeader};
 use crate::numerics::vectors::{self, Instructions};
-use crate::stages::black::{Black, black_left};
+use crate::stages::black::{Black, black_left, white_left};
 use crate::stream::{Counts, Stage};
 use crate::units::{Any, QuantityKind};
 use rows::{Planes, Ring, masks, mend, strips};
@@ -56,7 +57,7 @@ pub struct Demosaic {
     header: FrameHeader,
     pattern: CfaPattern,
     method: Method,
-    black: f64,
+    black: BlackLevels,
 }
 
 impl Demosaic {
@@ -65,7 +66,9 @@ impl Demosaic {
     /// # Errors
     ///
     /// [`Error::Order`](crate::error::Error::Order) unless the frame is one plane of photosites;
-    /// [`Error::MissingKey`](crate::error::Error::MissingKey) when nothing gives a pattern; a format error below 2×2.
+    /// [`Error::MissingKey`](crate::error::Error::MissingKey) when nothing gives a pattern;
+    /// [`Error::Format`](crate::error::Error::Format) below 2×2, for arrays that are no Bayer pattern, and where what is
+    /// left of the black level differs among photosites.
     pub fn new(input: &FrameHeader, method: Method, black: Black, pattern: Option<CfaPattern>) -> Result<Self> {
         let metadata = &input.metadata;
         let holds = input.holds();
@@ -81,29 +84,49 @@ impl Demosaic {
                 "a CFA plane of {width}x{height} lacks whole classes; demosaicking needs at least 2x2"
             )));
         }
-        let cfa = pattern.or(metadata.cfa).ok_or_else(|| input.missing("cfa"))?;
-        let level = black.level(input);
+        let cfa = match pattern {
+            Some(pattern) => pattern,
+            None => input.bayer("demosaicked")?.ok_or_else(|| input.missing("cfa"))?,
+        };
+        let black = black.levels(input)?;
         let quantity = match metadata.quantity {
             QuantityKind::Unspecified => QuantityKind::Adu,
             known => known,
         };
         let mut made = metadata.becoming(quantity);
-        if metadata.cfa.is_some_and(|known| known != cfa) {
+        if metadata.cfa.is_some_and(|known| known != cfa.into()) {
             // Seen through another pattern than its own, a uniform scene is none.
             made.scene = None;
         }
         made.cfa = None;
-        made.demosaic = Some(DemosaicRecord { method: method.names()[0].into(), cfa, black: level });
+        made.demosaic = Some(DemosaicRecord {
+            method: method.names()[0].into(),
+            cfa,
+            black: black.level(),
+            black_deltas: black.has_deltas(),
+        });
+        let left = |before: Option<&BlackLevels>| {
+            black_left(before, &black).ok_or_else(|| {
+                input.refuse(
+                    "what is left of its black level differs among photosites, which three planes cannot tell; subtract it \
+                     with --black auto",
+                )
+            })
+        };
         match quantity {
             QuantityKind::Adu => {
-                made.white_level_adu = made.white_level_adu.map(|white| white - level);
-                made.black_level_adu = Some(black_left(metadata.black_level_adu, level));
+                let full = |white| white_left(white, &black, &input.geometry, Some(cfa));
+                made.white_level_adu = made.white_level_adu.map(full);
+                made.set_black_adu(Some(left(input.black_levels()?.as_ref())?.into()));
             }
-            _ => made.dark_signal_e = metadata.dark_signal_e.map(|dark| black_left(Some(dark), level)),
+            _ => {
+                let dark = metadata.dark_signal_e.map(BlackLevels::uniform_at);
+                made.dark_signal_e = dark.map(|dark| left(Some(&dark))).transpose()?;
+            }
         }
         let geometry = input.geometry.with_channels(&["R", "G", "B"]);
         let header = FrameHeader { geometry, metadata: made, name: input.name.clone() };
-        Ok(Self { header, pattern: cfa, method, black: level })
+        Ok(Self { header, pattern: cfa, method, black })
     }
 
     /// The head of the demosaicked frame, to add to.
@@ -133,7 +156,8 @@ impl Demosaic {
             for row in rows.clone() {
                 let y = row.cast_signed();
                 while to_load <= y + reach {
-                    cfa.load(instructions, to_load, input.row(to_load, 0), strip.start, self.black);
+                    let black = self.black.row(mirror(to_load, input.frame_height()));
+                    cfa.load(instructions, to_load, input.row(to_load, 0), strip.start, black);
                     to_load += 1;
                 }
                 while to_derive <= y + 1 {
@@ -228,7 +252,7 @@ mod tests {
 
     fn plane(width: usize, height: usize, pattern: CfaPattern, f: impl Fn(usize, usize, Class) -> f32) -> MemoryFrame {
         let mut metadata = Metadata::new(QuantityKind::Adu);
-        metadata.cfa = Some(pattern);
+        metadata.cfa = Some(pattern.into());
         let header = FrameHeader { name: "test".into(), geometry: Geometry::new(width, height, &["Y"]), metadata };
         let sites = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let samples = sites.map(|(x, y)| f(x, y, pattern.class(x as i64, y as i64))).collect();
@@ -339,11 +363,11 @@ mod tests {
     #[test]
     fn the_black_level_comes_off_first() {
         let mut frame = plane(6, 6, CfaPattern::Rggb, |_, _, _| 1757.25);
-        frame.header.metadata.black_level_adu = Some(1757.25);
+        frame.header.metadata.black_level_adu = Some(1757.25.into());
         for method in Method::ALL {
             let (made, _) = demosaicked(&frame, method);
             assert!(made.samples.iter().all(|&s| s == 0.0));
-            assert_eq!(made.header.metadata.black_level_adu, Some(0.0));
+            assert_eq!(made.header.metadata.black_level_adu, Some(0.0.into()));
         }
     }
 

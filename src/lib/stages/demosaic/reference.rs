@@ -75,7 +75,7 @@ impl Plane<'_> {
     /// What the filter makes of it on a set of instructions, `[row][channel][column]`.
     fn filtered(&self, method: Method, set: Instructions) -> (Vec<f32>, Counts) {
         let mut metadata = Metadata::new(QuantityKind::Adu);
-        metadata.cfa = Some(self.pattern);
+        metadata.cfa = Some(self.pattern.into());
         let geometry = Geometry::new(self.width, self.height, &["Y"]);
         let header = FrameHeader { name: "test".into(), geometry, metadata };
         let stage = Demosaic::new(&header, method, Black::Level(self.black), None).unwrap();

@@ -1,6 +1,7 @@
 //! Rows of one plane on their way through a filter: a few at a time, the last over the first, strip by strip of columns,
 //! with margins, so that the inner loops have neither edges nor branches and stay in the level-1 cache.
 
+use crate::camera::levels::RowBlack;
 use crate::frame::{mirror, to_sample};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use std::ops::Range;
@@ -30,6 +31,8 @@ pub(super) struct Ring {
     samples: Vec<f32>,
     /// Whether a row holds large samples, or any that are not finite.
     is_large: [bool; DEPTH],
+    /// Room for the black level of each column, where it differs.
+    blacks: Vec<f64>,
 }
 
 /// One row of a strip and its margins.
@@ -60,7 +63,8 @@ impl<'a> Line<'a> {
 impl Ring {
     /// Room for rows of any strip.
     pub(super) fn new() -> Self {
-        Self { width: 0, samples: vec![0.0; DEPTH * (STRIP + 2 * MARGIN)], is_large: [false; DEPTH] }
+        let samples = vec![0.0; DEPTH * (STRIP + 2 * MARGIN)];
+        Self { width: 0, samples, is_large: [false; DEPTH], blacks: Vec::new() }
     }
 
     /// Begins a strip of `width` columns.
@@ -94,28 +98,46 @@ impl Ring {
         &mut self.line_mut(y)[MARGIN - 1..][..width + 2]
     }
 
-    /// Fills row `y` of the strip that begins at column `first` with the samples of a whole row less a black level.
-    pub(super) fn load(&mut self, instructions: Instructions, y: isize, row: &[f32], first: usize, black: f64) {
+    /// Fills row `y` of the strip that begins at column `first` with the samples of a whole row less their black level.
+    pub(super) fn load(
+        &mut self,
+        instructions: Instructions,
+        y: isize,
+        row: &[f32],
+        first: usize,
+        black: RowBlack<'_>,
+    ) {
         let end = (first + self.width + MARGIN).min(row.len());
         let begin = first.saturating_sub(MARGIN);
+        let mut blacks = std::mem::take(&mut self.blacks);
         let line = self.line_mut(y);
         // Where a column of the row stands in the line.
         let place = |column: usize| column + MARGIN - first;
         let (samples, to) = (&row[begin..end], &mut line[place(begin)..place(end)]);
-        let single = to_sample(black);
-        // A difference of floats that is rounded to a double on its way to a float is the same float, as doubles have more
-        // than twice the digits; a black level that is no float is taken off in doubles.
-        let is_large = if f64::from(single).to_bits() == black.to_bits() {
-            vectors::run_on(instructions, Subtract { samples, less_black: |sample| sample - single, to })
-        } else {
-            let less_black = |sample| to_sample(f64::from(sample) - black);
-            vectors::run_on(instructions, Subtract { samples, less_black, to })
+        let is_large = match black {
+            RowBlack::Uniform(black) => {
+                let single = to_sample(black);
+                // A difference of floats that is rounded to a double on its way to a float is the same float, as doubles
+                // have more than twice the digits; a black level that is no float is taken off in doubles.
+                if f64::from(single).to_bits() == black.to_bits() {
+                    vectors::run_on(instructions, Subtract { samples, less_black: |sample| sample - single, to })
+                } else {
+                    let less_black = |sample| to_sample(f64::from(sample) - black);
+                    vectors::run_on(instructions, Subtract { samples, less_black, to })
+                }
+            }
+            RowBlack::Varying(..) => {
+                blacks.clear();
+                blacks.extend((begin..end).map(|column| black.at(column)));
+                vectors::run_on(instructions, SubtractEach { samples, blacks: &blacks, to })
+            }
         };
         for index in (0..place(begin)).chain(place(end)..line.len()) {
             let column = (index + first).cast_signed() - MARGIN.cast_signed();
             line[index] = line[place(mirror(column, row.len()))];
         }
         self.is_large[Self::place(y)] = is_large;
+        self.blacks = blacks;
     }
 
     /// Whether any of the rows up to `reach` from `y` holds large samples.
@@ -140,6 +162,27 @@ impl<F: Fn(f32) -> f32> Kernel for Subtract<'_, F> {
         let mut large = Excess::default();
         for (to, &sample) in self.to.iter_mut().zip(self.samples) {
             *to = (self.less_black)(sample);
+            large.note(*to, LARGE);
+        }
+        large.is_found()
+    }
+}
+
+/// Takes its own black level off each sample; tells whether large ones are left.
+struct SubtractEach<'a> {
+    samples: &'a [f32],
+    blacks: &'a [f64],
+    to: &'a mut [f32],
+}
+
+impl Kernel for SubtractEach<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let mut large = Excess::default();
+        for ((to, &sample), black) in self.to.iter_mut().zip(self.samples).zip(self.blacks) {
+            *to = to_sample(f64::from(sample) - black);
             large.note(*to, LARGE);
         }
         large.is_found()

@@ -236,7 +236,7 @@ mod tests {
 
     fn demosaicked(method: Method, pattern: CfaPattern, plane: impl Fn(usize, usize) -> f32) -> MemoryFrame {
         let mut metadata = Metadata::new(QuantityKind::Adu);
-        metadata.cfa = Some(pattern);
+        metadata.cfa = Some(pattern.into());
         let header = FrameHeader { name: "test".into(), geometry: Geometry::new(WIDTH, HEIGHT, &["Y"]), metadata };
         let samples = (0..WIDTH * HEIGHT).map(|i| plane(i % WIDTH, i / WIDTH)).collect();
         let stage = Demosaic::new(&header, method, Black::None, None).unwrap();

@@ -121,7 +121,7 @@ pub fn study(study: &Study) -> Result<Section> {
         bias_adu: adc.bias_adu,
         adu_per_e: adc.adu_per_e,
         top: f64::from(adc.top_code()),
-        black_adu: head.metadata.black_level_adu.unwrap_or(0.0),
+        black_adu: head.uniform_black_adu()?,
         xyz_from_adu: [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)])),
     };
     let programs = || -> Result<MemoryFrame> {

@@ -2,7 +2,7 @@
 
 use cyanometer::analysis::characterization::regression::Weights;
 use cyanometer::camera::sensor::Sensor;
-use cyanometer::cfa::Class;
+use cyanometer::cfa::{Class, FilterArray};
 use cyanometer::color::{self, Space};
 use cyanometer::error::{Error, Result};
 use cyanometer::frame::to_sample;
@@ -47,8 +47,9 @@ impl Camera {
         let camera = camera::Camera::new()?;
         let xyz_from_camera = camera.fit_to_skies(Weights::Equal)?;
         let sensor = camera.sensor;
+        let full_well_e = sensor.readout()?.full_well_e;
         let skies = camera.skies.signals.camera.row_iter().map(|row| {
-            let full = 0.75 * sensor.full_well_e / row.max();
+            let full = 0.75 * full_well_e / row.max();
             [row[0] * full, row[1] * full, row[2] * full]
         });
         let skies = skies.collect();
@@ -87,7 +88,9 @@ pub fn demosaicked_above(black_adu: f64, plane: &MemoryFrame, method: Method) ->
 /// Moments of the pixels at the sites of each class, of a demosaicked frame or a plane.
 pub fn class_moments(frame: &MemoryFrame) -> [Moments; 3] {
     let metadata = &frame.header.metadata;
-    let Some(pattern) = metadata.cfa.or(metadata.demosaic.as_ref().map(|record| record.cfa)) else {
+    let Some(pattern) =
+        metadata.cfa.and_then(FilterArray::bayer).or(metadata.demosaic.as_ref().map(|record| record.cfa))
+    else {
         return Class::ALL.map(|_| moments(frame));
     };
     let mut found = Class::ALL.map(|_| Moments::new(frame.header.geometry.channels.len()));

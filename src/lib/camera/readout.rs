@@ -1,0 +1,180 @@
+//! The read-out of a sensor: geometry, wells, noise, converter; and its dark current.
+
+use crate::cfa::FilterArray;
+use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM};
+use serde::{Deserialize, Serialize};
+
+/// What a sensor makes of charge, in numbers: what photon transfer measures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReadOut {
+    /// Photosites in a row.
+    pub width: u32,
+    /// Rows of photosites.
+    pub height: u32,
+    /// Distance of neighboring photosites in µm; only light needs it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixel_pitch_um: Option<f64>,
+    /// Color filter array.
+    pub cfa: FilterArray,
+    /// Charge that a photosite holds, in e⁻.
+    pub full_well_e: f64,
+    /// Dark-current density at 300 K in nA cm⁻², i_d of Eq. 6.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dark_current_na_per_cm2: Option<f64>,
+    /// Dark current of a photosite at `temperature_k` in e⁻ s⁻¹, for sensors whose density is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dark_current_e_per_s: Option<f64>,
+    /// Operating temperature in K.
+    pub temperature_k: f64,
+    /// Dark-current non-uniformity: rms, fraction of 1.
+    pub dcnu: f64,
+    /// Photo-response non-uniformity: rms, fraction of 1.
+    pub prnu: f64,
+    /// Read noise: rms, e⁻.
+    pub read_noise_e: f64,
+    /// Bits of the converter.
+    pub bits: u32,
+    /// What the converter adds, ADU.
+    pub bias_adu: f64,
+    /// Slope of the converter, ADU per e⁻.
+    pub adu_per_e: f64,
+}
+
+impl ReadOut {
+    /// Checks that every number is possible.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong, in words.
+    pub fn check(&self) -> Result<(), String> {
+        let positive = [
+            ("pixel_pitch_um", self.pixel_pitch_um.unwrap_or(1.0)),
+            ("full_well_e", self.full_well_e),
+            ("temperature_k", self.temperature_k),
+            ("adu_per_e", self.adu_per_e),
+            ("width", f64::from(self.width)),
+            ("height", f64::from(self.height)),
+        ];
+        for (key, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(format!("`{key}` is {value}; it must be above 0"));
+            }
+        }
+        let not_negative = [
+            ("dark_current_na_per_cm2", self.dark_current_na_per_cm2.unwrap_or(0.0)),
+            ("dark_current_e_per_s", self.dark_current_e_per_s.unwrap_or(0.0)),
+            ("dcnu", self.dcnu),
+            ("prnu", self.prnu),
+            ("read_noise_e", self.read_noise_e),
+        ];
+        for (key, value) in not_negative {
+            if !(0.0..f64::INFINITY).contains(&value) {
+                return Err(format!("`{key}` is {value}; it must not be negative"));
+            }
+        }
+        if !(1..=16).contains(&self.bits) {
+            return Err(format!("`bits` is {}; it must be 1 to 16", self.bits));
+        }
+        if !self.bias_adu.is_finite() {
+            return Err(format!("`bias_adu` is {}; it must be a finite number", self.bias_adu));
+        }
+        match (self.dark_current_na_per_cm2, self.dark_current_e_per_s, self.pixel_pitch_um) {
+            (Some(_), None, None) => {
+                Err("`dark_current_na_per_cm2` is that of an area, which needs `pixel_pitch_um`".into())
+            }
+            (Some(_), None, Some(_)) | (None, Some(_), _) => Ok(()),
+            _ => Err("it must have one of `dark_current_na_per_cm2` and `dark_current_e_per_s`".into()),
+        }
+    }
+
+    /// Area of a photosite in cm², where the pitch is known.
+    pub fn pixel_area_cm2(&self) -> Option<f64> {
+        self.pixel_pitch_um.map(|pitch| (pitch * CM_PER_UM).powi(2))
+    }
+
+    /// Dark current of a photosite in e⁻ s⁻¹ at a temperature in K.
+    ///
+    /// I = 2.5·10¹⁵ A_p i_d T^1.5 exp(−E_g / 2kT)        [HP2005, Eq. 6]
+    ///
+    /// A dark current that was measured at the sensor's own temperature is scaled by the same law.
+    pub fn dark_current_e_per_s(&self, temperature_k: f64) -> f64 {
+        /// Electrons per s, cm² and nA cm⁻² that Eq. 6 has in front of T^1.5.
+        const PREFACTOR: f64 = 2.5e15;
+        let law = |t: f64| t.powf(1.5) * (-silicon_band_gap_ev(t) / (2.0 * BOLTZMANN_EV_PER_K * t)).exp();
+        match (self.dark_current_na_per_cm2.zip(self.pixel_area_cm2()), self.dark_current_e_per_s) {
+            (Some((density, area)), _) => PREFACTOR * area * density * law(temperature_k),
+            (None, Some(measured)) => measured * law(temperature_k) / law(self.temperature_k),
+            (None, None) => 0.0,
+        }
+    }
+}
+
+/// Band gap of silicon in eV at a temperature in K.
+///
+/// E_g = 1.1557 − 7.021·10⁻⁴ T² / (1108 + T)        [Varshni1967, constants for silicon]
+pub fn silicon_band_gap_ev(temperature_k: f64) -> f64 {
+    1.1557 - 7.021e-4 * temperature_k.powi(2) / (1108.0 + temperature_k)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::cfa::CfaPattern;
+
+    /// That of the default sensor.
+    pub(crate) fn kaf5101ce() -> ReadOut {
+        ReadOut {
+            width: 2654,
+            height: 1996,
+            pixel_pitch_um: Some(6.8),
+            cfa: CfaPattern::Rggb.into(),
+            full_well_e: 40_000.0,
+            dark_current_na_per_cm2: Some(0.068558),
+            dark_current_e_per_s: None,
+            temperature_k: 333.0,
+            dcnu: 0.2,
+            prnu: 0.008,
+            read_noise_e: 15.7,
+            bits: 12,
+            bias_adu: 1753.0,
+            adu_per_e: 0.058824,
+        }
+    }
+
+    /// Table 1 gives 40 mV s⁻¹ at 333 K and 720 mV for 40 000 e⁻; MODEL's recomputation of Eq. 6 gives 2218.6 e⁻ s⁻¹.
+    #[test]
+    fn the_dark_current_is_that_of_the_data_sheet() {
+        let current = kaf5101ce().dark_current_e_per_s(333.0);
+        assert!((current - 2218.6).abs() < 0.05, "{current}");
+        assert!((current * 0.018 - 39.93).abs() < 0.005);
+        assert!((current * 0.033 - 73.21).abs() < 0.005);
+    }
+
+    #[test]
+    fn a_measured_dark_current_follows_the_same_law() {
+        let by_density = kaf5101ce();
+        let measured = ReadOut {
+            pixel_pitch_um: None,
+            dark_current_na_per_cm2: None,
+            dark_current_e_per_s: Some(by_density.dark_current_e_per_s(333.0)),
+            ..kaf5101ce()
+        };
+        assert_eq!(measured.check(), Ok(()));
+        for t in [200.0, 300.0, 350.0] {
+            let ratio = measured.dark_current_e_per_s(t) / by_density.dark_current_e_per_s(t);
+            assert!((ratio - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn impossible_numbers_are_refused_by_key() {
+        let complaint = |readout: ReadOut| readout.check().unwrap_err();
+        assert!(complaint(ReadOut { read_noise_e: f64::NAN, ..kaf5101ce() }).contains("read_noise_e"));
+        assert!(complaint(ReadOut { adu_per_e: 0.0, ..kaf5101ce() }).contains("adu_per_e"));
+        assert!(complaint(ReadOut { bits: 17, ..kaf5101ce() }).contains("bits"));
+        assert!(complaint(ReadOut { dark_current_na_per_cm2: None, ..kaf5101ce() }).contains("one of"));
+        assert!(complaint(ReadOut { pixel_pitch_um: Some(0.0), ..kaf5101ce() }).contains("pixel_pitch_um"));
+        assert!(complaint(ReadOut { pixel_pitch_um: None, ..kaf5101ce() }).contains("needs `pixel_pitch_um`"));
+        assert_eq!(kaf5101ce().check(), Ok(()));
+    }
+}
