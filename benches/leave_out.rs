@@ -53,7 +53,7 @@ fn rendering(criterion: &mut Criterion) {
         let row = vec![SIGNAL; SIZE[0].div_ceil(patch[0])];
         let rendering = Rendering { header, patch, vignetting, cfa };
         move || {
-            let made = rendering.run(|| Ok(row.clone()), &mut Nowhere, &mut |_| ());
+            let made = rendering.draw(0, &vec![&row; rendering.source_rows()], &mut Nowhere, &mut |_| ());
             assert!(made.is_ok());
         }
     };

@@ -313,12 +313,12 @@ fn the_mosaic_commutes_with_noise_and_with_the_converter() {
 
 #[test]
 fn a_plane_rendered_behind_a_pattern_is_the_mosaic_of_three() {
-    let cases = (pattern(), -3..3, -3..3, 1_usize..6, 1_usize..6, any::<bool>());
-    for_all(64, cases, |(cfa, x0, y0, patch_x, patch_y, vignetted)| {
+    let cases = (pattern(), -3..3, -3..3, 1_usize..6, 1_usize..6, any::<bool>(), 1_usize..5);
+    for_all(64, cases, |(cfa, x0, y0, patch_x, patch_y, vignetted, together)| {
         let size: [usize; 2] = [19, 14];
         let pixels = [size[0].div_ceil(patch_x), size[1].div_ceil(patch_y)];
         let vignetting = vignetted.then(|| Vignetting::new(size[0], size[1], 900.0, 30.0));
-        let render = |cfa: Option<CfaPattern>| {
+        let render = |cfa: Option<CfaPattern>, together: usize| {
             let channels: &[&str] = if cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
             let mut header = header(QuantityKind::ExpectedElectrons, Geometry::new(size[0], size[1], channels));
             header.geometry.origin = [x0, y0];
@@ -326,19 +326,19 @@ fn a_plane_rendered_behind_a_pattern_is_the_mosaic_of_three() {
             let rendering =
                 Rendering { header: header.clone(), patch: [patch_x, patch_y], vignetting: vignetting.clone(), cfa };
             let mut sink = MemoryFrame::new(header, Vec::new());
-            let mut row = 0;
-            let mut next_row = || {
-                row += 1;
-                let pixel = |x| [0, 1, 2].map(|class| 3e4 * f64::from(scatter(x, row, class)));
-                Ok((0..pixels[0]).map(pixel).collect())
-            };
-            rendering.run(&mut next_row, &mut sink, &mut |_| ()).unwrap();
-            assert_eq!(row, pixels[1], "the source's rows are asked for once each");
+            let pixel = |x, row| [0, 1, 2].map(|class| 3e4 * f64::from(scatter(x, row, class)));
+            let row = |row| (0..pixels[0]).map(|x| pixel(x, row)).collect();
+            let rows: Vec<Vec<[f64; 3]>> = (0..rendering.source_rows()).map(row).collect();
+            assert_eq!(rows.len(), pixels[1]);
+            // However the source's rows come.
+            for (index, rows) in rows.chunks(together).enumerate() {
+                rendering.draw(index * together, rows, &mut sink, &mut |_| ()).unwrap();
+            }
             sink
         };
-        let three = render(None);
+        let three = render(None, 14);
         let mosaicked = through(&three, &Mosaic::new(&three.header, Some(cfa)).unwrap());
-        prop_assert_eq!(first_difference(&mosaicked, &render(Some(cfa))), None);
+        prop_assert_eq!(first_difference(&mosaicked, &render(Some(cfa), together)), None);
         Ok(())
     });
 }

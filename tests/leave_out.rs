@@ -35,7 +35,7 @@ fn rendered(
     let mut sink = MemoryFrame::new(header.clone(), Vec::new());
     let rendering = Rendering { header, patch, vignetting, cfa };
     let row = vec![SIGNAL; size[0].div_ceil(patch[0])];
-    rendering.run(|| Ok(row.clone()), &mut sink, &mut |_| ()).unwrap();
+    rendering.draw(0, &vec![row; rendering.source_rows()], &mut sink, &mut |_| ()).unwrap();
     sink
 }
 

@@ -118,6 +118,12 @@ impl<'a, Q: Quantity> Window<'a, Q> {
         self.frame_height
     }
 
+    /// All channels of the frame's row `y`, one after another.
+    pub fn all_channels(&self, y: usize) -> &'a [f32] {
+        let row_samples = self.channels * self.width;
+        &self.samples[(y - self.first_row) * row_samples..][..row_samples]
+    }
+
     /// One channel of the frame's row `y`; rows beyond the frame are mirrored as [`mirror`] says.
     pub fn row(&self, y: isize, channel: usize) -> &'a [f32] {
         let y = mirror(y, self.frame_height);

@@ -21,52 +21,53 @@ pub struct Rendering {
 }
 
 impl Rendering {
-    /// Renders the whole frame; `next_row` gives the source's rows one after another, each the expected electrons of
-    /// R, G and B of its pixels on the optical axis.
+    /// Rows of the source that the frame shows.
+    pub fn source_rows(&self) -> usize {
+        self.header.geometry.height.div_ceil(self.patch[1])
+    }
+
+    /// Draws the rows of the frame that show the rows of the source from row `first` on; `pixels` are these, each the
+    /// expected electrons of R, G and B of its pixels on the optical axis.
     ///
     /// Without vignetting the rows of a patch are alike, and are worked out once (twice under a filter array) a band; a band
-    /// of nothing else stays for the next.
+    /// of nothing else stays for the next. `progress` hears of the frame's rows done so far.
     ///
     /// # Errors
     ///
-    /// Those of the source and the sink.
-    pub fn run(
+    /// Those of the sink.
+    pub fn draw(
         &self,
-        mut next_row: impl FnMut() -> Result<Vec<[f64; 3]>>,
+        first: usize,
+        pixels: &[impl AsRef<[[f64; 3]]>],
         sink: &mut dyn RowSink,
         progress: &mut dyn FnMut(usize),
     ) -> Result<()> {
         let geometry = &self.header.geometry;
-        // An even number of rows, so that bands begin at the same phase of the filter array.
+        // An even number of rows, so that the bands of a patch begin at the same phase of the filter array.
         let band_rows = geometry.cached_rows().next_multiple_of(2);
         let row_samples = geometry.row_samples();
         let patch_of = |y: usize| y / self.patch[1];
-        let mut pixels = Vec::new();
+        let rows = first * self.patch[1]..((first + pixels.len()) * self.patch[1]).min(geometry.height);
         let mut band = Vec::new();
         // The patches that all rows of the band belong to, where they do.
         let mut shown = None;
-        let mut first = 0;
-        while first < geometry.height {
-            let end = (first + band_rows).min(geometry.height);
-            let inside = (patch_of(first) == patch_of(end - 1)).then(|| patch_of(first));
+        for start in rows.clone().step_by(band_rows) {
+            let end = (start + band_rows).min(rows.end);
+            let inside = (patch_of(start) == patch_of(end - 1)).then(|| patch_of(start));
             if inside.is_none() || shown != inside || self.vignetting.is_some() {
                 band.clear();
-                for y in first..end {
-                    if y % self.patch[1] == 0 {
-                        pixels = next_row()?;
-                    }
-                    match self.row_alike(y).filter(|alike| *alike >= first) {
+                for y in start..end {
+                    match self.row_alike(y).filter(|alike| *alike >= start) {
                         Some(alike) => {
-                            let start = (alike - first) * row_samples;
-                            band.extend_from_within(start..start + row_samples);
+                            let at = (alike - start) * row_samples;
+                            band.extend_from_within(at..at + row_samples);
                         }
-                        None => self.append_row(y, &pixels, &mut band),
+                        None => self.append_row(y, pixels[patch_of(y) - first].as_ref(), &mut band),
                     }
                 }
                 shown = inside;
             }
-            sink.write(&band[..(end - first) * row_samples])?;
-            first = end;
+            sink.write(&band[..(end - start) * row_samples])?;
             progress(end);
         }
         Ok(())

@@ -5,7 +5,8 @@ use super::outlet::{Outlet, with_outlet};
 use super::stage::{RowSink, RowSource};
 use crate::error::Result;
 
-/// Gives the first `rows` rows of all sources to `take`, in step, band by band; memory is a few bands whatever the height.
+/// Gives the next `rows` rows of all sources to `take`, in step, band by band; memory is a few bands whatever the height.
+/// Rows count from 0, where the sources stand.
 ///
 /// On several threads, the next band is read while `take` works on the last. What it makes of the rows must not depend on
 /// how they are cut into bands.

@@ -6,7 +6,10 @@ use crate::formats::input::FrameReader;
 use crate::formats::spectral::SpectralChannels;
 use crate::numerics::planes::{WeightedPlane, weighted_sums};
 use crate::numerics::quadrature::Rule;
-use crate::stream::RowSource;
+use crate::stages::render::Rendering;
+use crate::stream::{Band, Outlet, RowSink, RowSource, fold, fold_into};
+use crate::units::Any;
+use rayon::prelude::*;
 
 /// Where the light comes from, once opened.
 pub(super) enum Light {
@@ -16,53 +19,90 @@ pub(super) enum Light {
     Image { rows: ImageRows, factor: f64, width: usize, height: usize, source: String },
 }
 
+/// Electrons of R, G and B in the pixels of a row.
+pub(super) type Electrons = Vec<[f64; 3]>;
+
 pub(super) enum ImageRows {
-    /// As the file is read.
-    Streamed(Box<SpectralRows>),
+    /// As the file is read; the first row was read to judge the sum over wavelengths.
+    Streamed { first: Electrons, others: Box<SpectralImage> },
     /// All rows, read once to find the brightest.
-    Kept(std::vec::IntoIter<Vec<[f64; 3]>>),
+    Kept(Vec<Electrons>),
 }
 
-/// Rows of a spectral image as signal electrons.
-pub(super) struct SpectralRows {
+/// A spectral image whose planes are summed up to signal electrons.
+pub(super) struct SpectralImage {
     reader: FrameReader,
     planes: Vec<WeightedPlane>,
-    samples: Vec<f32>,
-    /// The first row, where it was read to judge the sum over wavelengths.
-    ahead: Option<Vec<[f64; 3]>>,
 }
 
-impl SpectralRows {
-    /// Rows of an image, as the sums of these planes.
+impl SpectralImage {
+    /// An image, as the sums of these planes.
     pub(super) fn new(reader: FrameReader, planes: Vec<WeightedPlane>) -> Self {
-        Self { reader, planes, samples: Vec::new(), ahead: None }
+        Self { reader, planes }
     }
 
-    pub(super) fn next(&mut self) -> Result<Vec<[f64; 3]>> {
-        if let Some(row) = self.ahead.take() {
-            return Ok(row);
-        }
-        self.samples.clear();
-        self.reader.read(1, &mut self.samples)?;
-        let header = self.reader.header();
-        let mut row = Vec::with_capacity(header.geometry.width);
-        weighted_sums(&self.samples, header.geometry.width, &self.planes, |electrons| row.push(electrons));
-        row.into_iter().map(|electrons| checked(electrons, &header.name)).collect()
+    /// Gives the electrons of the next `rows` rows to `take`, band by band.
+    fn fold(&mut self, rows: usize, mut take: impl FnMut(&Band, Vec<Electrons>)) -> Result<()> {
+        let (planes, name) = (&self.planes, self.reader.header().name.clone());
+        fold([&mut self.reader as &mut dyn RowSource], rows, |band| {
+            take(band, electrons(band, planes, &name)?);
+            Ok(())
+        })
     }
 
-    /// Reads the first row ahead, and gives the radiance of its brightest pixel.
-    pub(super) fn brightest_ahead(&mut self, spectral: &SpectralChannels) -> Result<Vec<f64>> {
-        let row = self.next()?;
-        let radiance = self.radiance(spectral, brightest(&row));
-        self.ahead = Some(row);
-        Ok(radiance)
+    /// As [`Self::fold`], and has `draw` write what it makes of them to a sink meanwhile.
+    fn fold_into(
+        &mut self,
+        rows: usize,
+        sink: &mut dyn RowSink,
+        mut draw: impl FnMut(&Band, Vec<Electrons>, &mut Outlet<'_>) -> Result<()>,
+    ) -> Result<()> {
+        let (planes, name) = (&self.planes, self.reader.header().name.clone());
+        fold_into([&mut self.reader as &mut dyn RowSource], rows, sink, |band, outlet| {
+            draw(band, electrons(band, planes, &name)?, outlet)
+        })
     }
 
-    /// The radiance of a pixel of the row that was read last, W cm⁻² sr⁻¹ nm⁻¹.
-    pub(super) fn radiance(&self, spectral: &SpectralChannels, x: usize) -> Vec<f64> {
-        let (width, factor) = (self.reader.header().geometry.width, spectral.unit.in_w_per_cm2_sr_nm());
-        spectral.channels.iter().map(|channel| f64::from(self.samples[channel * width + x]) * factor).collect()
+    /// The electrons of the next row, and the radiance of its brightest pixel, W cm⁻² sr⁻¹ nm⁻¹.
+    pub(super) fn first_row(&mut self, spectral: &SpectralChannels) -> Result<(Electrons, Vec<f64>)> {
+        let mut found = None;
+        self.fold(1, |band, rows| {
+            found = rows.into_iter().next().map(|row| {
+                let radiance = radiance(band, 0, brightest(&row), spectral);
+                (row, radiance)
+            });
+        })?;
+        Ok(found.unwrap_or_default())
     }
+
+    /// The electrons of a pixel, and its radiance, W cm⁻² sr⁻¹ nm⁻¹.
+    pub(super) fn pixel(&mut self, [x, y]: [usize; 2], spectral: &SpectralChannels) -> Result<([f64; 3], Vec<f64>)> {
+        let mut found = None;
+        self.fold(y + 1, |band, rows| {
+            if band.rows().end > y {
+                found = rows.last().map(|row| (row[x], radiance(band, y, x, spectral)));
+            }
+        })?;
+        Ok(found.unwrap_or_default())
+    }
+}
+
+/// The electrons of the rows of a band.
+fn electrons(band: &Band, planes: &[WeightedPlane], name: &str) -> Result<Vec<Electrons>> {
+    let window = band.window::<Any>(0);
+    let of_row = |y: usize| {
+        let mut row = Vec::with_capacity(window.width());
+        weighted_sums(window.all_channels(y), window.width(), planes, |electrons| row.push(electrons));
+        row.into_iter().map(|electrons| checked(electrons, name)).collect()
+    };
+    band.rows().into_par_iter().map(of_row).collect()
+}
+
+/// The radiance of a pixel, W cm⁻² sr⁻¹ nm⁻¹.
+fn radiance(band: &Band, y: usize, x: usize, spectral: &SpectralChannels) -> Vec<f64> {
+    let (window, factor) = (band.window::<Any>(0), spectral.unit.in_w_per_cm2_sr_nm());
+    let sample = |&channel: &usize| f64::from(window.row(y.cast_signed(), channel)[x]);
+    spectral.channels.iter().map(|channel| sample(channel) * factor).collect()
 }
 
 /// The place of the brightest of some pixels.
@@ -94,16 +134,29 @@ impl Seen {
 }
 
 impl Light {
-    /// The next row of the source; of a uniform scene its one pixel.
-    pub(super) fn next_row(&mut self) -> Result<Vec<[f64; 3]>> {
+    /// Draws a frame of the light.
+    pub(super) fn draw(
+        self,
+        rendering: &Rendering,
+        sink: &mut dyn RowSink,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<()> {
+        let scaled = |row: Electrons, factor: f64| -> Electrons {
+            row.into_iter().map(|electrons| electrons.map(|e| e * factor)).collect()
+        };
         match self {
-            Self::Uniform { electrons, .. } => Ok(vec![*electrons]),
-            Self::Image { rows, factor, .. } => {
-                let row = match rows {
-                    ImageRows::Streamed(rows) => rows.next()?,
-                    ImageRows::Kept(rows) => rows.next().unwrap_or_default(),
-                };
-                Ok(row.into_iter().map(|electrons| electrons.map(|e| e * *factor)).collect())
+            Self::Uniform { electrons, .. } => rendering.draw(0, &[[electrons]], sink, progress),
+            Self::Image { rows: ImageRows::Kept(rows), factor, .. } => {
+                let shown = rows.into_iter().take(rendering.source_rows());
+                let shown: Vec<Electrons> = shown.map(|row| scaled(row, factor)).collect();
+                rendering.draw(0, &shown, sink, progress)
+            }
+            Self::Image { rows: ImageRows::Streamed { first, mut others }, factor, .. } => {
+                rendering.draw(0, &[scaled(first, factor)], sink, progress)?;
+                others.fold_into(rendering.source_rows() - 1, sink, |band, rows, outlet| {
+                    let rows: Vec<Electrons> = rows.into_iter().map(|row| scaled(row, factor)).collect();
+                    rendering.draw(1 + band.rows().start, &rows, outlet, progress)
+                })
             }
         }
     }
@@ -124,19 +177,17 @@ impl Light {
                 let brightest = largest(&electrons);
                 Ok((Self::Uniform { electrons, source }, brightest))
             }
-            Self::Image { mut rows, factor, width, height, source } => {
-                let mut kept = Vec::with_capacity(height.min(1 << 16));
-                let mut brightest = 0.0;
-                for _ in 0..height {
-                    let row = match &mut rows {
-                        ImageRows::Streamed(rows) => rows.next()?,
-                        ImageRows::Kept(rows) => rows.next().unwrap_or_default(),
-                    };
-                    brightest = row.iter().map(largest).fold(brightest, f64::max);
-                    kept.push(row);
-                }
-                let rows = ImageRows::Kept(kept.into_iter());
-                Ok((Self::Image { rows, factor, width, height, source }, brightest))
+            Self::Image { rows, factor, width, height, source } => {
+                let kept = match rows {
+                    ImageRows::Streamed { first, mut others } => {
+                        let mut kept = vec![first];
+                        others.fold(height - 1, |_, rows| kept.extend(rows))?;
+                        kept
+                    }
+                    ImageRows::Kept(rows) => rows,
+                };
+                let brightest = kept.iter().flatten().map(largest).fold(0.0, f64::max);
+                Ok((Self::Image { rows: ImageRows::Kept(kept), factor, width, height, source }, brightest))
             }
         }
     }

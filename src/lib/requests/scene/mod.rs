@@ -110,8 +110,8 @@ impl OpenScene {
     ///
     /// Those of reader and sink.
     pub fn draw(self, sink: &mut dyn RowSink, progress: &mut dyn FnMut(usize)) -> Result<()> {
-        let Self { rendering, mut light, .. } = self;
-        rendering.run(|| light.next_row(), sink, progress)
+        let Self { rendering, light, .. } = self;
+        light.draw(&rendering, sink, progress)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Opens the light of a scene, and settles its exposure.
 
-use super::light::{ImageRows, Light, Seen, SpectralRows, brightest, checked};
+use super::light::{ImageRows, Light, Seen, SpectralImage, brightest, checked};
 use super::request::Scene;
 use crate::camera::optics::Exposure;
 use crate::camera::response::GridWeights;
@@ -148,8 +148,7 @@ impl Scene {
             let all: Vec<[f64; 3]> = (0..count).map(electrons_of).collect::<Result<_>>()?;
             let width = chart_columns(count);
             found.metadata.quadrature_error = seen.quadrature_error(&radiance_of(brightest(&all[..width])));
-            let rows: Vec<Vec<[f64; 3]>> = all.chunks(width).map(<[_]>::to_vec).collect();
-            let rows = ImageRows::Kept(rows.into_iter());
+            let rows = ImageRows::Kept(all.chunks(width).map(<[_]>::to_vec).collect());
             return Ok(Light::Image { rows, factor: 1.0, width, height: count / width, source: name });
         }
         let index = self.choose(table)?;
@@ -176,20 +175,17 @@ impl Scene {
             found.metadata.leave_out("render-radiance", what, "no class responds to them");
         }
         let Geometry { width, height, .. } = header.geometry;
-        let mut rows = SpectralRows::new(reader, planes);
+        let mut image = SpectralImage::new(reader, planes);
         let Some(sample) = self.spectrum.sample else {
-            found.metadata.quadrature_error = seen.quadrature_error(&rows.brightest_ahead(&spectral)?);
-            let rows = ImageRows::Streamed(Box::new(rows));
+            let (first, radiance) = image.first_row(&spectral)?;
+            found.metadata.quadrature_error = seen.quadrature_error(&radiance);
+            let rows = ImageRows::Streamed { first, others: Box::new(image) };
             return Ok(Light::Image { rows, factor: 1.0, width, height, source: header.name });
         };
         if sample >= width * height {
             return Err(no_sample(&header.name, sample, width * height));
         }
-        for _ in 0..sample / width {
-            rows.next()?;
-        }
-        let electrons = rows.next()?[sample % width];
-        let radiance = rows.radiance(&spectral, sample % width);
+        let (electrons, radiance) = image.pixel([sample % width, sample / width], &spectral)?;
         found.metadata.quadrature_error = seen.quadrature_error(&radiance);
         Ok(Light::Uniform { electrons, source: format!("{}: sample {sample}", header.name) })
     }
