@@ -2,7 +2,8 @@
 //!
 //! [`CfaPattern`] is one of the four Bayer patterns, which most stages work on; [`FilterArray`] describes any array.
 
-use serde::{Deserialize, Serialize};
+use serde::de::Visitor;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::str::FromStr;
 
@@ -113,8 +114,7 @@ impl FromStr for CfaPattern {
 /// What stands before the photosites of a sensor: a Bayer pattern, no filters at all, or another array.
 ///
 /// Written as `rggb`, `monochrome`, or `6x6:` and the letters of the period at the sensor's corner, row by row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FilterArray {
     /// One of the four Bayer patterns.
     Bayer(CfaPattern),
@@ -267,17 +267,28 @@ impl fmt::Display for FilterArray {
     }
 }
 
-impl From<FilterArray> for String {
-    fn from(array: FilterArray) -> Self {
-        array.to_string()
+impl Serialize for FilterArray {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 
-impl TryFrom<String> for FilterArray {
-    type Error = String;
+impl<'de> Deserialize<'de> for FilterArray {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        /// Parses inside the deserializer, which knows the place that a complaint is about.
+        struct Parse;
+        impl Visitor<'_> for Parse {
+            type Value = FilterArray;
 
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a filter array, such as rggb")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<FilterArray, E> {
+                text.parse().map_err(E::custom)
+            }
+        }
+        deserializer.deserialize_str(Parse)
     }
 }
 

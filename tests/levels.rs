@@ -1,0 +1,420 @@
+//! Black levels by site, row and column, white levels by class, and filter arrays that are no Bayer patterns, through all
+//! stages that meet them.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::analysis::statistics::{Report, measure};
+use cyanometer::camera::levels::{BlackLevel, WhiteLevel};
+use cyanometer::cfa::{CfaPattern, Class, FilterArray};
+use cyanometer::color::{Space, White};
+use cyanometer::error::Result;
+use cyanometer::formats::picture::{PictureSettings, Range, write_png};
+use cyanometer::formats::yaml::{parse_metadata, write_metadata};
+use cyanometer::frame::{Geometry, to_sample};
+use cyanometer::metadata::{FrameHeader, Scene};
+use cyanometer::propagation::{self, Equations, Unpredictable};
+use cyanometer::sigma::WithSigma;
+use cyanometer::stages::black::Black;
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::{MemoryFrame, Stage};
+use cyanometer::units::QuantityKind;
+use support::*;
+
+/// None of them a 32-bit float.
+const SITES: [f64; 4] = [100.1, 103.3, 98.7, 101.9];
+const X_TRANS: &str = "6x6:GBGGRGRGRBGBGBGGRGGRGGBGBGBRGRGRGGBG";
+
+/// A plane of codes behind an array, its levels unknown.
+fn plane(width: usize, height: usize, array: FilterArray) -> MemoryFrame {
+    let mut head = header(QuantityKind::Adu, Geometry::new(width, height, &["Y"]));
+    head.metadata.cfa = Some(array);
+    frame(head, |x, y, _| (200.0 + 3000.0 * scatter(x, y, 0)).round())
+}
+
+/// The same with a level for each site, row and column.
+fn with_levels(mut frame: MemoryFrame) -> MemoryFrame {
+    let metadata = &mut frame.header.metadata;
+    metadata.black_level_adu = Some(BlackLevel::Sites(SITES));
+    metadata.black_by_row = (0..40).map(|y| f64::from(y * 7 % 5) / 8.0).collect();
+    metadata.black_by_column = (0..50).map(|x| f64::from(x * 11 % 7) / 10.0).collect();
+    metadata.white_level_adu = Some(4095.0.into());
+    frame
+}
+
+/// Codes less their black level, worked out photosite by photosite.
+fn by_hand(frame: &MemoryFrame) -> MemoryFrame {
+    let metadata = &frame.header.metadata;
+    let [x0, y0] = frame.header.geometry.origin.map(|at| usize::try_from(at).unwrap());
+    let mut made = support::frame(frame.header.clone(), |x, y, channel| {
+        let (column, row) = (x + x0, y + y0);
+        let site = metadata.black_level_adu.unwrap().sites()[row % 2 * 2 + column % 2];
+        let delta = |deltas: &[f64], at: usize| deltas.get(at).copied().unwrap_or(0.0);
+        let black = site + delta(&metadata.black_by_row, row) + delta(&metadata.black_by_column, column);
+        to_sample(f64::from(at(frame, x, y, channel)) - black)
+    });
+    made.header.metadata.set_black_adu(None);
+    made
+}
+
+fn correct(frame: &FrameHeader, black: Black, cte: Option<f64>) -> Result<CorrectFrame> {
+    CorrectFrame::new(frame, &CorrectionSettings { black, cte }, &[])
+}
+
+fn statistics(frame: &MemoryFrame) -> Report {
+    measure(&mut frame.clone(), &[], Equations::Exact, None).unwrap()
+}
+
+fn refused<T>(result: Result<T>, complaint: &str) {
+    match result {
+        Ok(_) => panic!("not refused: {complaint}"),
+        Err(error) => assert!(error.to_string().contains(complaint), "{error}"),
+    }
+}
+
+/// Widths that are cut into strips and that are not; frames that start at every phase of the array.
+#[test]
+fn black_comes_off_each_photosite_before_it_is_interpolated() {
+    for method in Method::ALL {
+        for (width, origin) in [(17, [0, 0]), (17, [1, 0]), (16, [0, 1]), (9, [3, 5])] {
+            let mut codes = with_levels(plane(width, 11, CfaPattern::Grbg.into()));
+            codes.header.geometry.origin = origin;
+            let expected = by_hand(&codes);
+            let corrected = through(&codes, &correct(&codes.header, Black::Auto, None).unwrap());
+            assert_same(&corrected, &expected, "corrected");
+            let at_once = Demosaic::new(&codes.header, method, Black::Auto, None).unwrap();
+            let after = Demosaic::new(&expected.header, method, Black::None, None).unwrap();
+            assert_same(&through(&codes, &at_once), &through(&expected, &after), method.names()[0]);
+            for cuts in [&[1][..], &[2, 7], &[5]] {
+                assert_same(&through_cuts(&codes, &at_once, cuts).0, &through(&codes, &at_once), "in bands");
+            }
+            let metadata = &at_once.header().metadata;
+            assert_eq!(metadata.black_level_adu, Some(0.0.into()));
+            assert!(metadata.black_by_row.is_empty() && metadata.black_by_column.is_empty());
+            let record = metadata.demosaic.as_ref().unwrap();
+            assert_eq!((record.black, record.black_deltas), (BlackLevel::Sites(SITES), true));
+        }
+    }
+    let mut wide = plane(1100, 5, CfaPattern::Rggb.into());
+    wide.header.metadata.black_level_adu = Some(BlackLevel::Sites(SITES));
+    let expected = by_hand(&wide);
+    let at_once = Demosaic::new(&wide.header, Method::Malvar, Black::Auto, None).unwrap();
+    let after = Demosaic::new(&expected.header, Method::Malvar, Black::None, None).unwrap();
+    assert_same(&through(&wide, &at_once), &through(&expected, &after), "wide");
+}
+
+/// Four equal levels are one, with the bits of the short form.
+#[test]
+fn equal_sites_are_a_uniform_level() {
+    let mut short = plane(20, 9, CfaPattern::Rggb.into());
+    let mut long = short.clone();
+    short.header.metadata.black_level_adu = Some(102.34.into());
+    long.header.metadata.black_level_adu = Some(BlackLevel::Sites([102.34; 4]));
+    long.header.metadata.black_by_row = vec![0.0; 9];
+    for method in Method::ALL {
+        let made =
+            |frame: &MemoryFrame| through(frame, &Demosaic::new(&frame.header, method, Black::Auto, None).unwrap());
+        assert_same(&made(&short), &made(&long), method.names()[0]);
+        let level =
+            |black| Demosaic::new(&long.header, method, black, None).unwrap().header().uniform_black_adu().unwrap();
+        assert_eq!([level(Black::None), level(Black::Level(2.34))], [102.34, 102.34 - 2.34]);
+    }
+}
+
+/// The law of crops: what is subtracted hangs on a photosite's place on the sensor.
+#[test]
+fn a_crop_loses_what_the_whole_loses() {
+    let whole = with_levels(plane(30, 24, CfaPattern::Rggb.into()));
+    let subtract = |frame: &MemoryFrame| through(frame, &correct(&frame.header, Black::Auto, None).unwrap());
+    let demosaic = |frame: &MemoryFrame| {
+        through(frame, &Demosaic::new(&frame.header, Method::EffectiveColor, Black::Auto, None).unwrap())
+    };
+    let corner = |x: usize, y: usize| [x, y, 30 - x, 24 - y];
+    for [x, y, width, height] in [corner(1, 0), corner(0, 1), corner(5, 3), [2, 2, 9, 8]] {
+        let part = crop(&whole, x, y, width, height);
+        assert_same(&subtract(&part), &crop(&subtract(&whole), x, y, width, height), "corrected");
+        // Away from the edges, which are mirrored.
+        let margin = Method::EffectiveColor.reach();
+        let inner = |frame: &MemoryFrame, x: usize, y: usize| {
+            crop(frame, x + margin, y + margin, width - 2 * margin, height - 2 * margin)
+        };
+        assert_same(&inner(&demosaic(&part), 0, 0), &inner(&demosaic(&whole), x, y), "demosaicked");
+    }
+    let beyond = {
+        let mut frame = whole.clone();
+        frame.header.geometry.origin = [0, 20];
+        frame
+    };
+    let complaint = "`black_by_row` has the levels of 40 rows, but the frame has rows 20 to 43 of the sensor";
+    refused(correct(&beyond.header, Black::Auto, None), complaint);
+    refused(Demosaic::new(&beyond.header, Method::Bilinear, Black::Auto, None), complaint);
+    refused(measure(&mut beyond.clone(), &[], Equations::Exact, None), complaint);
+}
+
+#[test]
+fn levels_by_site_that_no_word_is_left_for_are_refused() {
+    let codes = with_levels(plane(12, 8, CfaPattern::Rggb.into()));
+    for black in [Black::None, Black::Level(100.0)] {
+        let made = Demosaic::new(&codes.header, Method::Bilinear, black, None);
+        refused(made, "what is left of its black level differs among photosites, which three planes cannot tell");
+    }
+    // Of a plane each site keeps its own.
+    let less = correct(&codes.header, Black::Level(100.0), None).unwrap();
+    let left = less.header().metadata.black_level_adu.unwrap();
+    assert_eq!(left, BlackLevel::Sites(SITES.map(|level| level - 100.0)));
+    assert_eq!(less.header().metadata.black_by_row, codes.header.metadata.black_by_row);
+    for black in [Black::None, Black::Level(100.0)] {
+        let mut codes = codes.clone();
+        codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });
+        refused(correct(&codes.header, black, Some(0.999)), "differs among photosites, so that it is no charge");
+        assert!(correct(&codes.header, Black::Auto, Some(0.999)).is_ok());
+    }
+    let mut three = frame(header(QuantityKind::Adu, Geometry::new(6, 4, &["R", "G", "B"])), |_, _, _| 500.0);
+    three.header.metadata.black_level_adu = Some(BlackLevel::Sites(SITES));
+    refused(ToXyz::new(&three.header, &to_color(Space::Xyz)), "its black level differs among photosites; subtract it");
+    let mut camera = Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None).unwrap();
+    camera.header_mut().metadata.black_level_adu = Some(BlackLevel::Sites(SITES));
+    refused(WithSigma::of_demosaicking(camera), "its black level differs among photosites");
+    // What adds to a level needs one.
+    let mut without = codes.header.clone();
+    without.metadata.black_level_adu = None;
+    refused(correct(&without, Black::Auto, None), "the metadata has no `black_level_adu`");
+}
+
+fn to_color(space: Space) -> ColorSettings {
+    ColorSettings {
+        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
+        method: None,
+        space,
+        white: White::D65,
+        white_luminance: None,
+    }
+}
+
+/// Charge transfer is undone of what is left once each photosite has lost its black.
+#[test]
+fn transfer_is_undone_behind_levels_by_site() {
+    let codes = with_levels(plane(12, 8, CfaPattern::Rggb.into()));
+    let expected = by_hand(&codes);
+    let at_once = through(&codes, &correct(&codes.header, Black::Auto, Some(0.9999)).unwrap());
+    let mut after = expected.header.clone();
+    after.metadata.black_level_adu = Some(0.0.into());
+    let after = MemoryFrame::new(after, expected.samples);
+    let after = through(&after, &correct(&after.header, Black::Level(0.0), Some(0.9999)).unwrap());
+    // The first rounds to 32 bits once, the second twice, of codes below 2¹².
+    let off = at_once.samples.iter().zip(&after.samples).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(off <= 2.0_f32.powi(-11), "{off}");
+}
+
+#[test]
+fn nothing_is_predicted_behind_levels_by_site() {
+    let scene = Scene {
+        source: "test".into(),
+        uniform: true,
+        expected_electrons: Some([100.0; 3]),
+        vignetting_focal_length_mm: None,
+        patch: None,
+        source_width: None,
+        brightest_e: None,
+    };
+    let mut codes = with_levels(plane(12, 8, CfaPattern::Rggb.into()));
+    codes.header.metadata.scene = Some(scene);
+    codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });
+    assert!(propagation::of_frame(&codes.header, Equations::Exact).is_ok());
+    let corrected = correct(&codes.header, Black::Auto, None).unwrap();
+    let camera = Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None).unwrap();
+    for head in [corrected.header(), camera.header()] {
+        let why = propagation::of_frame(head, Equations::Exact).unwrap_err();
+        assert_eq!(why, Unpredictable::Beyond("the black level that was subtracted differs among photosites"));
+    }
+}
+
+/// R is clipped at 1000, G at 2000, B at 3000; the samples on either side of each are counted by hand.
+#[test]
+fn each_class_is_clipped_at_its_own_white() {
+    let whites = [1000.0, 2000.0, 3000.0];
+    let values = [0.0, 1.0, 999.0, 1000.0, 1999.0, 2000.0, 2999.0, 3000.0, f32::NAN];
+    let count = |samples: &[(f32, Class)], class: Option<Class>| {
+        let is_clipped = |(sample, of): &&(f32, Class)| {
+            class.is_none_or(|class| class == *of) && (*sample <= 0.0 || f64::from(*sample) >= whites[*of as usize])
+        };
+        samples.iter().filter(is_clipped).count() as u64
+    };
+    for array in ["rggb", "gbrg", X_TRANS] {
+        let array: FilterArray = array.parse().unwrap();
+        let head = FrameHeader { ..plane(19, 13, array).header };
+        let mut codes = frame(head, |x, y, _| values[(x * 5 + y * 3 + x * y) % 9]);
+        codes.header.geometry.origin = [1, 2];
+        codes.header.metadata.white_level_adu = Some(WhiteLevel::Classes(whites));
+        let class_of = |index: usize| array.class((index % 19 + 1) as i64, (index / 19 + 2) as i64).unwrap();
+        let samples: Vec<_> =
+            codes.samples.iter().enumerate().map(|(index, sample)| (*sample, class_of(index))).collect();
+        let region = &statistics(&codes).regions[0];
+        assert_eq!(region.channels[0].clipped, Some(count(&samples, None)), "{array}");
+        for (class, report) in Class::ALL.into_iter().zip(&region.classes) {
+            assert_eq!(report.clipped, Some(count(&samples, Some(class))), "{array} {class:?}");
+            let finite = samples.iter().filter(|(sample, of)| *of == class && sample.is_finite()).count() as u64;
+            assert_eq!(report.count, finite);
+        }
+    }
+    let head = header(QuantityKind::Adu, Geometry::new(9, 5, &["R", "G", "B"]));
+    let mut three = frame(head, |x, y, channel| values[(x * 5 + y * 3 + channel) % 9]);
+    three.header.metadata.white_level_adu = Some(WhiteLevel::Classes(whites));
+    for (channel, report) in statistics(&three).regions[0].channels.iter().enumerate() {
+        let of_channel: Vec<_> =
+            three.samples.chunks(9).skip(channel).step_by(3).flatten().map(|s| (*s, Class::ALL[channel])).collect();
+        assert_eq!(report.clipped, Some(count(&of_channel, None)), "{channel}");
+    }
+    // A mosaic of them keeps the three levels.
+    let mosaic = Mosaic::new(&three.header, Some(CfaPattern::Gbrg)).unwrap();
+    assert_eq!(mosaic.header().metadata.white_level_adu, Some(WhiteLevel::Classes(whites)));
+}
+
+/// Full photosites of green lie at two levels once black is off: the lower is where the first of them is full.
+#[test]
+fn white_follows_what_is_subtracted_from_its_class() {
+    let mut codes = plane(12, 8, CfaPattern::Grbg.into());
+    codes.header.metadata.white_level_adu = Some(4095.0.into());
+    codes.header.metadata.black_level_adu = Some(BlackLevel::Sites(SITES));
+    // Sites of grbg: green, red, blue, green.
+    let expected = WhiteLevel::Classes([4095.0 - SITES[1], 4095.0 - SITES[3], 4095.0 - SITES[2]]);
+    let camera = Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None).unwrap();
+    assert_eq!(camera.header().metadata.white_level_adu, Some(expected));
+    let corrected = correct(&codes.header, Black::Auto, None).unwrap();
+    assert_eq!(corrected.header().metadata.white_level_adu, Some(expected));
+    // From one white of three classes and one black: three; and on a sensor of unknown classes the least.
+    codes.header.metadata.white_level_adu = Some(WhiteLevel::Classes([1000.0, 2000.0, 3000.0]));
+    codes.header.metadata.black_level_adu = Some(100.0.into());
+    let camera = Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None).unwrap();
+    assert_eq!(camera.header().metadata.white_level_adu, Some(WhiteLevel::Classes([900.0, 1900.0, 2900.0])));
+    let lab = ToXyz::new(camera.header(), &to_color(Space::Lab)).unwrap();
+    let [x, y, z] = sensor().xyz_from_camera.unwrap()[1];
+    let luminance = (x * 900.0 + y * 1900.0 + z * 2900.0) / EXPOSURE.exposure_s_sr();
+    assert!((lab.white()[1] / luminance - 1.0).abs() < 1e-12);
+    let mut x_trans = plane(12, 8, X_TRANS.parse().unwrap());
+    x_trans.header.metadata.white_level_adu = Some(4095.0.into());
+    x_trans.header.metadata.black_level_adu = Some(BlackLevel::Sites(SITES));
+    let corrected = correct(&x_trans.header, Black::Auto, None).unwrap();
+    assert_eq!(corrected.header().metadata.white_level_adu, Some((4095.0 - 103.3).into()));
+}
+
+/// Signal is what lies above the mean black of the photosites that it was measured at.
+#[test]
+fn signal_to_noise_is_above_the_black_of_each_class() {
+    let mut codes = plane(12, 8, CfaPattern::Rggb.into());
+    codes.header.metadata.black_level_adu = Some(BlackLevel::Sites([100.0, 200.0, 300.0, 400.0]));
+    codes.header.metadata.black_by_column = (0..12).map(f64::from).collect();
+    let db = |mean: f64, std: f64| 20.0 * (mean / std).log10();
+    let region = &statistics(&codes).regions[0];
+    // Columns add 5 to red on average, 6 to blue, 5.5 to both greens together and to all.
+    for (report, black) in region.classes.iter().chain(&region.channels).zip([105.0, 255.5, 406.0, 255.5]) {
+        let expected = db(report.mean.unwrap() - black, report.std.unwrap());
+        assert!((report.snr_db.unwrap() - expected).abs() < 1e-9, "{}", report.name);
+    }
+}
+
+/// What is measured of other arrays: each class, whatever the period; of other filters, and none, the whole plane.
+#[test]
+fn other_arrays_are_measured() {
+    let x_trans: FilterArray = X_TRANS.parse().unwrap();
+    let mut codes = plane(20, 15, x_trans);
+    codes.header.geometry.origin = [2, -3];
+    let level = |class: Class| [10.0, 20.0, 30.0][class as usize];
+    let class = |x: usize, y: usize| x_trans.class(x as i64 + 2, y as i64 - 3).unwrap();
+    let codes = frame(codes.header, |x, y, _| level(class(x, y)) + scatter(x, y, 3));
+    let region = &statistics(&codes).regions[0];
+    assert_eq!(region.classes.iter().map(|class| class.count).sum::<u64>(), 300);
+    for (class, report) in Class::ALL.into_iter().zip(&region.classes) {
+        let above = report.mean.unwrap() - f64::from(level(class));
+        assert!((0.3..0.7).contains(&above) && report.max.unwrap() < f64::from(level(class)) + 1.001, "{report:?}");
+    }
+    let mut plain = codes.clone();
+    plain.header.metadata.cfa = None;
+    let plain = &statistics(&plain).regions[0];
+    assert!((region.channels[0].mean.unwrap() - plain.channels[0].mean.unwrap()).abs() < 1e-9);
+    assert!((region.channels[0].std.unwrap() - plain.channels[0].std.unwrap()).abs() < 1e-9);
+    for array in ["monochrome", "2x2:RGBW", "2x2:CYGM"] {
+        let mut codes = codes.clone();
+        codes.header.metadata.cfa = Some(array.parse().unwrap());
+        let region = &statistics(&codes).regions[0];
+        assert!(region.classes.is_empty(), "{array}");
+        assert_eq!(region.channels, plain.channels, "{array}");
+    }
+}
+
+#[test]
+fn other_arrays_are_refused_by_name() {
+    for (array, name) in [
+        (X_TRANS, "an X-Trans filter array"),
+        ("monochrome", "no color filters (monochrome)"),
+        ("4x4:RRGGRRGGGGBBGGBB", "a quad Bayer filter array"),
+        ("2x2:CYGM", "a filter array of 2x2 sites"),
+    ] {
+        let array: FilterArray = array.parse().unwrap();
+        let codes = plane(12, 12, array);
+        let complaint = format!("test: its sensor has {name}; only Bayer arrays are demosaicked");
+        refused(Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None), &complaint);
+        // Who names a pattern knows better.
+        assert!(Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, Some(CfaPattern::Rggb)).is_ok());
+        let mut rates = codes.header.clone();
+        rates.metadata.quantity = QuantityKind::ExpectedElectrons;
+        refused(AddNoise::new(&rates, &NoiseSettings::default()), "only Bayer arrays are given noise");
+        let mut three = expected(4, 4, |_, _, _| 1.0).header;
+        three.metadata.sensor.as_mut().unwrap().readout.as_mut().unwrap().cfa = array;
+        refused(Mosaic::new(&three, None), &format!("its sensor has {name}; mosaics are made of Bayer arrays alone"));
+        assert!(Mosaic::new(&three, Some(CfaPattern::Bggr)).is_ok());
+        refused(Mosaic::new(&codes.header, None), "it is ");
+    }
+    assert_eq!(plane(2, 2, FilterArray::Monochrome).header.holds(), "a monochrome plane of ADU");
+}
+
+/// Corrections serve planes behind any array.
+#[test]
+fn planes_of_a_monochrome_sensor_are_corrected() {
+    let codes = with_levels(plane(12, 8, FilterArray::Monochrome));
+    let corrected = through(&codes, &correct(&codes.header, Black::Auto, None).unwrap());
+    assert_same(&corrected, &by_hand(&codes), "corrected");
+    assert_eq!(corrected.header.metadata.cfa, Some(FilterArray::Monochrome));
+}
+
+/// Metadata say levels as they came, short or long.
+#[test]
+fn levels_and_arrays_are_written_and_read() {
+    let mut metadata = with_levels(plane(4, 4, X_TRANS.parse().unwrap())).header.metadata;
+    metadata.white_level_adu = Some(WhiteLevel::Classes([1.0, 2.0, 3.0]));
+    let text = write_metadata(&metadata).unwrap();
+    assert_eq!(parse_metadata("x", &text).unwrap(), metadata);
+    assert!(text.contains(&format!("cfa: {X_TRANS}\n")), "{text}");
+    metadata.set_black_adu(Some(64.0.into()));
+    metadata.white_level_adu = Some(4095.0.into());
+    metadata.cfa = Some(CfaPattern::Rggb.into());
+    let text = write_metadata(&metadata).unwrap();
+    assert!(text.contains("cfa: rggb\nblack_level_adu: 64.0\nwhite_level_adu: 4095.0\n"), "{text}");
+    let complaint = |of: &str, wrong: &str| {
+        let text = format!("schema: cyanometer/1\n{of}: {wrong}\n");
+        parse_metadata("x", &text).unwrap_err().to_string()
+    };
+    assert!(complaint("black_level_adu", "[1, 2]").contains("four for the 2x2 sites"));
+    assert!(complaint("white_level_adu", "[1, 2]").contains("three for R, G and B"));
+    assert!(complaint("cfa", "6x6:RGB").contains("`6x6:RGB` is no filter array"));
+}
+
+/// A picture runs from the least black to each plane's white.
+#[test]
+fn pictures_know_levels_by_site_and_class() {
+    let directory = tempfile::TempDir::new().unwrap();
+    let path = directory.path().join("a.png");
+    let head = header(QuantityKind::Adu, Geometry::new(2, 1, &["R", "G", "B"]));
+    let mut three = frame(head, |x, _, channel| if x == 0 { 10.0 } else { [100.0, 200.0, 300.0][channel] });
+    three.header.metadata.black_level_adu = Some(BlackLevel::Sites([10.0, 20.0, 30.0, 40.0]));
+    three.header.metadata.white_level_adu = Some(WhiteLevel::Classes([100.0, 200.0, 300.0]));
+    let settings = PictureSettings { region: None, zoom: 1, range: Range::Full };
+    write_png(&mut three, &settings, &path, None).unwrap();
+    let shown = image::open(&path).unwrap().to_rgb8();
+    assert_eq!((shown.get_pixel(0, 0).0, shown.get_pixel(1, 0).0), ([0; 3], [255; 3]));
+}
