@@ -7,12 +7,11 @@ use cyanometer::analysis::characterization::evaluation::{EvaluationSettings, Fil
 use cyanometer::analysis::characterization::signals;
 use cyanometer::analysis::statistics::measure;
 use cyanometer::camera::optics::Exposure;
-use cyanometer::chain::{Chain, ChainSettings};
+use cyanometer::chain::{CameraSetup, Predictor, PredictorSettings, uniform_frame};
 use cyanometer::color::{Space, White};
 use cyanometer::error::Result;
 use cyanometer::formats::{data, spectral};
-use cyanometer::frame::Geometry;
-use cyanometer::metadata::{FrameHeader, Metadata, Scene};
+use cyanometer::metadata::Scene;
 use cyanometer::propagation::Equations;
 use cyanometer::spectrum::WavelengthGrid;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
@@ -22,28 +21,16 @@ use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{MemoryFrame, Stage};
-use cyanometer::units::QuantityKind;
+
+/// 33 ms at f/8.
+const EXPOSURE: Exposure = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
 
 /// A clear sky at three quarters of full well.
 const SKY: [f64; 3] = [4448.0, 16_599.0, 30_000.0];
 
 fn expected() -> Result<MemoryFrame> {
-    let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-    metadata.sensor = Some(data::load_sensor(data::DEFAULT_SENSOR)?.sensor);
-    metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
-    metadata.scene = Some(Scene {
-        source: "bench".into(),
-        uniform: true,
-        expected_electrons: Some(SKY),
-        vignetting_focal_length_mm: None,
-        patch: None,
-        source_width: None,
-        brightest_e: None,
-    });
-    let geometry = Geometry::new(1332, 1000, &["R", "G", "B"]);
-    let row: Vec<f32> = SKY.iter().flat_map(|e| std::iter::repeat_n(cyanometer::frame::to_sample(*e), 1332)).collect();
-    let samples = row.repeat(1000);
-    Ok(MemoryFrame::new(FrameHeader { name: "bench".into(), geometry, metadata }, samples))
+    let setup = CameraSetup::new(data::load_sensor(data::DEFAULT_SENSOR)?.sensor, EXPOSURE);
+    uniform_frame(setup.planes([1332, 1000], Scene::uniform("bench", SKY)), SKY)
 }
 
 fn time<S: Stage>(criterion: &mut Criterion, name: &str, frame: &MemoryFrame, stage: Result<S>) -> MemoryFrame {
@@ -99,21 +86,12 @@ fn predictions(criterion: &mut Criterion) {
     let Ok(loaded) = data::load_sensor(data::DEFAULT_SENSOR) else { return };
     let mut group = criterion.benchmark_group("predictions");
     for method in Method::ALL {
-        let settings = ChainSettings {
-            sensor: loaded.sensor.clone(),
-            exposure: Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 },
-            noise: NoiseSettings::default(),
-            method,
-            pattern: None,
-            color: None,
-            dark_frames: 0,
-            equations: Equations::Exact,
-            patch: None,
-            patch_at: None,
-            wanted: None,
-        };
-        let Ok(mut chain) = Chain::new(settings) else { return };
-        group.bench_function(method.names()[0], |bencher| bencher.iter(|| chain.predict([8000.0, 12_000.0, 20_000.0])));
+        let camera = CameraSetup { method, ..CameraSetup::new(loaded.sensor.clone(), EXPOSURE) };
+        let settings = PredictorSettings::of(camera);
+        let Ok(mut predictor) = Predictor::new(settings) else { return };
+        group.bench_function(method.names()[0], |bencher| {
+            bencher.iter(|| predictor.predict([8000.0, 12_000.0, 20_000.0]))
+        });
     }
     group.finish();
 }
@@ -132,7 +110,7 @@ fn evaluations(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("evaluations");
     group.throughput(Throughput::Elements(signals.camera.nrows() as u64)).sample_size(10);
     for method in Method::ALL {
-        let base = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
+        let base = EXPOSURE;
         let settings = EvaluationSettings {
             exposure: SampleExposure::Filled { base, fraction: 0.75, by: Filling::Time },
             noise: NoiseSettings::default(),

@@ -5,13 +5,12 @@
 #![allow(clippy::print_stdout, reason = "an example talks")]
 
 use cyanometer::camera::optics::Exposure;
-use cyanometer::chain::{Chain, ChainPrediction, ChainSettings};
+use cyanometer::chain::{CameraSetup, ChainPrediction, ChainStage, Predictor, PredictorSettings};
 use cyanometer::color::{Space, White};
 use cyanometer::error::Result;
 use cyanometer::formats::data::load_sensor;
-use cyanometer::propagation::Equations;
+use cyanometer::names::Named;
 use cyanometer::stages::demosaic::Method;
-use cyanometer::stages::noise::NoiseSettings;
 use cyanometer::stages::to_xyz::ColorSettings;
 
 /// XYZ from camera signals, rounded from what `fit-matrix sample_data/skies/sky912.exr` finds.
@@ -27,27 +26,23 @@ pub fn predict(method: Method, electrons: [f64; 3]) -> Result<ChainPrediction> {
         white_luminance: None,
     };
     // The same settings as the programs': `predict-noise --electrons 8000,12000,20000 --method eci --matrix FILE`.
-    let mut chain = Chain::new(ChainSettings {
-        sensor: load_sensor("kaf-5101ce")?.sensor,
-        exposure: Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 },
-        noise: NoiseSettings::default(),
-        method,
-        pattern: None,
+    let exposure = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
+    let camera = CameraSetup { method, ..CameraSetup::new(load_sensor("kaf-5101ce")?.sensor, exposure) };
+    let mut predictor = Predictor::new(PredictorSettings {
         color: Some(color),
-        dark_frames: 0,
-        equations: Equations::Exact,
         // The mean of so many pixels is less uncertain, but not by the root of their number: neighbors share photosites.
         patch: Some([16, 16]),
-        patch_at: None,
-        wanted: None,
+        ..PredictorSettings::of(camera)
     })?;
-    chain.predict(electrons)
+    predictor.predict(electrons)
 }
 
 fn main() -> Result<()> {
     let prediction = predict(Method::EffectiveColor, [8000.0, 12_000.0, 20_000.0])?;
-    for stage in prediction.stages.iter().filter(|stage| ["demosaicked", "xyz"].contains(&stage.stage)) {
-        println!("{}, {}", stage.stage, stage.unit);
+    for stage in
+        prediction.stages.iter().filter(|stage| [ChainStage::Demosaicked, ChainStage::Xyz].contains(&stage.stage))
+    {
+        println!("{}, {}", stage.stage.name(), stage.unit);
         for (i, channel) in stage.channels.iter().enumerate() {
             // What the covariance is over the product of both standard deviations.
             let correlation = |j: usize| stage.covariance[i][j] / (stage.std[i] * stage.std[j]);

@@ -27,15 +27,7 @@ use support::{at, expected, sensor, through};
 /// The frame of a uniform scene.
 fn scene(size: [usize; 2], electrons: [f32; 3]) -> MemoryFrame {
     let mut frame = expected(size[0], size[1], |_, _, class| electrons[class as usize]);
-    frame.header.metadata.scene = Some(Scene {
-        source: "test".into(),
-        uniform: true,
-        expected_electrons: Some(electrons.map(f64::from)),
-        vignetting_focal_length_mm: None,
-        patch: None,
-        source_width: None,
-        brightest_e: None,
-    });
+    frame.header.metadata.scene = Some(Scene::uniform("test", electrons.map(f64::from)));
     frame
 }
 

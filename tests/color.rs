@@ -243,15 +243,7 @@ fn photosites(sensor: &Sensor, sky: &SampleEvaluation) -> [Prediction; 3] {
     let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
     metadata.sensor = Some(sensor.clone());
     metadata.exposure = Some(sky.exposure);
-    metadata.scene = Some(Scene {
-        source: "a sky".into(),
-        uniform: true,
-        expected_electrons: Some(sky.electrons),
-        vignetting_focal_length_mm: None,
-        patch: None,
-        source_width: None,
-        brightest_e: None,
-    });
+    metadata.scene = Some(Scene::uniform("a sky", sky.electrons));
     let frame = FrameHeader { name: "a sky".into(), geometry: Geometry::new(8, 8, &["R", "G", "B"]), metadata };
     let noisy = AddNoise::new(&frame, &NoiseSettings::default()).unwrap();
     let codes = Digitize::new(noisy.header(), &AdcSettings::default()).unwrap();

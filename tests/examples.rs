@@ -10,6 +10,7 @@ mod covariance_of_a_pixel;
 #[path = "../examples/noise_on_an_array.rs"]
 mod noise_on_an_array;
 
+use cyanometer::chain::ChainStage;
 use cyanometer::stages::demosaic::Method;
 
 /// Each level has 2¹⁶ photosites; five standard errors of a mean are 5 σ/2⁸, of a σ near enough 5 σ/√2¹⁷.
@@ -27,7 +28,7 @@ fn noise_on_an_array_is_as_predicted() {
 fn the_covariance_of_a_pixel_is_that_of_the_weights() {
     let prediction = covariance_of_a_pixel::predict(Method::Bilinear, [10_000.0; 3]).unwrap();
     let stage = |name| prediction.stages.iter().find(|stage| stage.stage == name).unwrap();
-    let (codes, pixel) = (stage("adu"), stage("demosaicked"));
+    let (codes, pixel) = (stage(ChainStage::Adu), stage(ChainStage::Demosaicked));
     for (channel, share) in [(0, 9.0 / 16.0), (1, 5.0 / 8.0), (2, 9.0 / 16.0)] {
         let ratio = pixel.covariance[channel][channel] / codes.covariance[channel][channel];
         assert!((ratio / share - 1.0).abs() < 1e-12, "{channel}: {ratio}");

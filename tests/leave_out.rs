@@ -137,15 +137,7 @@ fn dark_signal_far_below_the_read_noise_is_nothing() {
     let dark_e = readout().dark_current_e_per_s(150.0) * EXPOSURE.exposure_s;
     assert!(dark_e > 0.0 && dark_e < 1e-9 * readout().read_noise_e.powi(2));
     let mut without = header.clone();
-    without.metadata.scene = Some(cyanometer::metadata::Scene {
-        source: "test".into(),
-        uniform: true,
-        expected_electrons: Some(SIGNAL),
-        vignetting_focal_length_mm: None,
-        patch: None,
-        source_width: None,
-        brightest_e: None,
-    });
+    without.metadata.scene = Some(cyanometer::metadata::Scene::uniform("test", SIGNAL));
     let mut with = without.clone();
     let record = with.metadata.noise.as_mut().unwrap();
     record.dark_e = dark_e;

@@ -63,7 +63,7 @@ fn by_hand(frame: &MemoryFrame) -> MemoryFrame {
 }
 
 fn correct(frame: &FrameHeader, black: Black, cte: Option<f64>) -> Result<CorrectFrame> {
-    CorrectFrame::new(frame, &CorrectionSettings { black, cte }, &[])
+    CorrectFrame::new(frame, &CorrectionSettings { black, cte }, None)
 }
 
 fn statistics(frame: &MemoryFrame) -> Report {
@@ -213,15 +213,7 @@ fn transfer_is_undone_behind_levels_by_site() {
 
 #[test]
 fn nothing_is_predicted_behind_levels_by_site() {
-    let scene = Scene {
-        source: "test".into(),
-        uniform: true,
-        expected_electrons: Some([100.0; 3]),
-        vignetting_focal_length_mm: None,
-        patch: None,
-        source_width: None,
-        brightest_e: None,
-    };
+    let scene = Scene::uniform("test", [100.0; 3]);
     let mut codes = with_levels(plane(12, 8, CfaPattern::Rggb.into()));
     codes.header.metadata.scene = Some(scene);
     codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });

@@ -66,15 +66,7 @@ fn a_scene_known_to_be_uniform_draws_the_same_noise() {
     let levels = [7.5, 1234.5, 25_000.0];
     let frame = expected(531, 300, |_, _, class| cyanometer::frame::to_sample(levels[class as usize]));
     let mut known = frame.clone();
-    known.header.metadata.scene = Some(Scene {
-        source: "uniform".into(),
-        uniform: true,
-        expected_electrons: Some(levels),
-        vignetting_focal_length_mm: None,
-        patch: None,
-        source_width: None,
-        brightest_e: None,
-    });
+    known.header.metadata.scene = Some(Scene::uniform("uniform", levels));
     for frames in [
         [&frame, &known].map(Clone::clone),
         [&frame, &known].map(|f| f.through(&Mosaic::new(&f.header, None).unwrap()).unwrap().0),

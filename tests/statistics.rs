@@ -21,15 +21,7 @@ fn scene(width: usize, height: usize, electrons: [f64; 3]) -> MemoryFrame {
     #[expect(clippy::cast_possible_truncation, reason = "whole numbers, or nearly so")]
     let samples = electrons.map(|e| e as f32);
     let mut frame = expected(width, height, |_, _, class| samples[class as usize]);
-    frame.header.metadata.scene = Some(Scene {
-        source: "test".into(),
-        uniform: true,
-        expected_electrons: Some(samples.map(f64::from)),
-        vignetting_focal_length_mm: None,
-        patch: None,
-        source_width: None,
-        brightest_e: None,
-    });
+    frame.header.metadata.scene = Some(Scene::uniform("test", samples.map(f64::from)));
     frame
 }
 

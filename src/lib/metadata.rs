@@ -115,6 +115,26 @@ pub struct Scene {
     pub brightest_e: Option<f64>,
 }
 
+impl Scene {
+    /// A scene of which nothing is known but what it is called.
+    pub fn of(source: impl Into<String>) -> Self {
+        Self {
+            source: source.into(),
+            uniform: false,
+            expected_electrons: None,
+            vignetting_focal_length_mm: None,
+            patch: None,
+            source_width: None,
+            brightest_e: None,
+        }
+    }
+
+    /// A scene of which every photosite of a class expects the same signal electrons: of R, G and B.
+    pub fn uniform(source: impl Into<String>, electrons: [f64; 3]) -> Self {
+        Self { uniform: true, expected_electrons: Some(electrons), ..Self::of(source) }
+    }
+}
+
 /// How Poisson numbers are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PoissonKind {

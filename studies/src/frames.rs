@@ -2,9 +2,9 @@
 
 use crate::camera::EXPOSURE;
 use cyanometer::camera::sensor::Sensor;
+use cyanometer::chain::{CameraSetup, uniform_frame};
 use cyanometer::error::Result;
-use cyanometer::frame::{Geometry, to_sample};
-use cyanometer::metadata::{FrameHeader, Metadata, Scene};
+use cyanometer::metadata::{FrameHeader, Scene};
 use cyanometer::numerics::moments::Moments;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
@@ -13,29 +13,25 @@ use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::MemoryFrame;
-use cyanometer::units::QuantityKind;
 
 /// The head of a frame of expected electrons, columns and rows; `uniform` are those of a uniform scene.
-pub fn head(sensor: &Sensor, [width, height]: [usize; 2], uniform: Option<[f64; 3]>) -> FrameHeader {
-    let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-    metadata.sensor = Some(sensor.clone());
-    metadata.exposure = Some(EXPOSURE);
-    metadata.scene = Some(Scene {
-        source: "a study held in memory".into(),
-        uniform: uniform.is_some(),
-        expected_electrons: uniform,
-        vignetting_focal_length_mm: None,
-        patch: None,
-        source_width: None,
-        brightest_e: None,
-    });
-    FrameHeader { name: "memory".into(), geometry: Geometry::new(width, height, &["R", "G", "B"]), metadata }
+pub fn head(sensor: &Sensor, size: [usize; 2], uniform: Option<[f64; 3]>) -> FrameHeader {
+    let source = "a study held in memory";
+    setup(sensor).planes(size, uniform.map_or_else(|| Scene::of(source), |electrons| Scene::uniform(source, electrons)))
+}
+
+/// The camera of all studies: a sensor at the exposure of the paper.
+pub fn setup(sensor: &Sensor) -> CameraSetup {
+    CameraSetup::new(sensor.clone(), EXPOSURE)
 }
 
 /// Three planes of a uniform scene, expected electrons of R, G, B.
-pub fn uniform(sensor: &Sensor, size: [usize; 2], electrons: [f64; 3]) -> MemoryFrame {
-    let row: Vec<f32> = electrons.iter().flat_map(|e| std::iter::repeat_n(to_sample(*e), size[0])).collect();
-    MemoryFrame::new(head(sensor, size, Some(electrons)), row.repeat(size[1]))
+///
+/// # Errors
+///
+/// None: three planes are behind no filter array.
+pub fn uniform(sensor: &Sensor, size: [usize; 2], electrons: [f64; 3]) -> Result<MemoryFrame> {
+    uniform_frame(head(sensor, size, Some(electrons)), electrons)
 }
 
 /// One exposure: temporal noise by `seed`, patterns by `sensor_seed`.

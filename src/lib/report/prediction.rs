@@ -7,6 +7,7 @@ use crate::chain::{ChainPrediction, StagePrediction};
 use crate::error::Result;
 use crate::formats::output;
 use crate::formats::plots::{PlotFormat, write_plot};
+use crate::names::Named;
 use crate::requests::prediction::{Budgets, Conditions, PredictedNoise, SamplePrediction};
 use crate::requests::values;
 use clap::Args;
@@ -132,7 +133,7 @@ fn stages_csv(found: &ChainPrediction) -> Result<String> {
                 stage.patch_mean_std.map(|std| std[i]),
             ];
             let of_causes = (0..causes.len()).map(|cause| cell(stage.causes.get(cause).map(|entry| entry.variance[i])));
-            let words = [stage.stage.to_owned(), channel.clone(), stage.unit.clone()];
+            let words = [stage.stage.name().to_owned(), channel.clone(), stage.unit.clone()];
             writer.write_record(words.into_iter().chain(numbers.map(cell)).chain(of_causes)).map_err(unwritable)?;
         }
     }
@@ -148,7 +149,7 @@ fn scenes_csv<'a>(
     let first = found.clone().next().map(|(_, scene)| scene);
     let stages = first.map(|scene| scene.stages.as_slice()).unwrap_or_default();
     let each = |stage: &StagePrediction| {
-        let name = stage.stage;
+        let name = stage.stage.name();
         let channels = stage.channels.clone();
         channels.into_iter().flat_map(move |channel| {
             ["mean", "std", "snr_db", "patch_mean_std"].map(|what| format!("{name}_{channel}_{what}"))
@@ -214,7 +215,7 @@ fn text(found: &ChainPrediction, quadrature_error: Option<[f64; 3]>) -> String {
 }
 
 fn stage_text(stage: &StagePrediction, out: &mut String) {
-    let _ = writeln!(out, "\n{} [{}]", stage.stage, stage.unit);
+    let _ = writeln!(out, "\n{} [{}]", stage.stage.name(), stage.unit);
     let mut lines: Vec<(String, [Option<f64>; 3])> =
         vec![("mean".into(), stage.mean.map(Some)), ("std".into(), stage.std.map(Some))];
     let mut part = |name: &str, values: Option<[f64; 3]>| {

@@ -1,27 +1,23 @@
-//! How well a matrix does: color differences of each sample of a library, without noise and through the noisy chain.
+//! How well a matrix does: color differences of each sample of a library, without noise and through the noisy shot.
 
 use super::Signals;
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::CfaPattern;
+use crate::chain::{CameraSetup, CameraStages, uniform_frame};
 use crate::color::difference::{Difference, DifferenceReport, Differences, delta_e_76};
 use crate::color::{Space, White, lab_from_xyz, matrix};
 use crate::error::{Error, Result};
-use crate::frame::{Geometry, to_sample};
-use crate::metadata::{FrameHeader, Metadata, Scene};
+use crate::metadata::{FrameHeader, Scene};
 use crate::numerics::normal;
 use crate::propagation::frame::Predicted;
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
-use crate::stages::adc::{AdcSettings, Digitize};
-use crate::stages::black::Black;
-use crate::stages::correct::{CorrectFrame, CorrectionSettings};
-use crate::stages::darks::{DarkFrames, DarkStack, LessDarks};
+use crate::stages::darks::{DarkFrames, LessDarks};
+use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::{PHASES, phase};
-use crate::stages::demosaic::{Demosaic, Method};
 use crate::stages::noise::{AddNoise, NoiseSettings};
 use crate::stages::to_xyz::{ColorSettings, ToXyz};
 use crate::stream::{Counts, MemoryFrame, Stage, run};
-use crate::units::QuantityKind;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -206,11 +202,11 @@ pub fn pixel_covariances(
         .par_iter()
         .map(|&sample| {
             let evaluator = Evaluator { sensor, signals, settings };
-            let chain = evaluator.chain(sample, [8, 8]).map_err(|error| of_sample(sample, error))?;
-            let mixture = pixels_of(&chain.camera)
+            let shot = evaluator.shot(sample, [8, 8]).map_err(|error| of_sample(sample, error))?;
+            let mixture = pixels_of(shot.camera())
                 .map_err(|why| Error::Data(format!("the noise of sample {sample} cannot be predicted: {why}")))?;
-            let exposure_s_sr = chain.exposure.exposure_s_sr();
-            Ok((mixture.covariance / exposure_s_sr.powi(2), chain.white()?))
+            let exposure_s_sr = shot.exposure.exposure_s_sr();
+            Ok((mixture.covariance / exposure_s_sr.powi(2), shot.white()?))
         })
         .collect()
 }
@@ -245,21 +241,22 @@ struct Evaluator<'a> {
     settings: &'a EvaluationSettings,
 }
 
-/// The stages of one sample's patch.
-struct Chain {
+/// The camera in front of one sample.
+struct Shot {
     exposure: Exposure,
     electrons: [f64; 3],
     plane: FrameHeader,
-    noisy: AddNoise,
-    digitize: Digitize,
-    correct: Option<CorrectFrame>,
-    demosaic: Demosaic,
-    camera: FrameHeader,
+    stages: CameraStages,
     xyz: ToXyz,
     lab: FrameHeader,
 }
 
-impl Chain {
+impl Shot {
+    /// The head of the sensor RGB.
+    fn camera(&self) -> &FrameHeader {
+        self.stages.demosaic.header()
+    }
+
     fn white(&self) -> Result<[f64; 3]> {
         let color = self.lab.metadata.color.as_ref();
         color.and_then(|color| color.white).ok_or_else(|| Error::Data("L*a*b* has no white".into()))
@@ -267,11 +264,6 @@ impl Chain {
 }
 
 impl Evaluator<'_> {
-    /// The pattern of the filter array.
-    fn pattern(&self) -> Result<CfaPattern> {
-        self.settings.pattern.map_or_else(|| self.sensor.bayer(), Ok)
-    }
-
     /// Expected electrons of a sample, and what it is exposed to.
     fn exposed(&self, sample: usize) -> Result<(Exposure, [f64; 3])> {
         let per_exposure = per_exposure(self.signals, sample, self.sensor)?;
@@ -279,47 +271,29 @@ impl Evaluator<'_> {
         Ok((exposure, per_exposure.map(|e| e * exposure.exposure_s_sr())))
     }
 
-    /// The stages of a patch of `size`, margins included.
-    fn chain(&self, sample: usize, size: [usize; 2]) -> Result<Chain> {
+    /// The camera in front of a patch of `size`, margins included.
+    fn shot(&self, sample: usize, size: [usize; 2]) -> Result<Shot> {
         let (exposure, electrons) = self.exposed(sample)?;
-        let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-        metadata.sensor = Some(self.sensor.clone());
-        metadata.exposure = Some(exposure);
-        metadata.cfa = Some(self.pattern()?.into());
-        metadata.scene = Some(Scene {
-            source: format!("sample {sample}"),
-            uniform: true,
-            expected_electrons: Some(electrons),
-            vignetting_focal_length_mm: None,
-            patch: None,
-            source_width: None,
-            brightest_e: None,
-        });
-        let place = [sample % self.settings.columns, sample / self.settings.columns];
-        let mut geometry = Geometry::new(size[0], size[1], &["Y"]);
+        let settings = self.settings;
+        let setup = CameraSetup {
+            sensor: self.sensor.clone(),
+            exposure,
+            noise: settings.noise.clone(),
+            pattern: settings.pattern,
+            dark_frames: settings.dark_frames,
+            method: settings.method,
+        };
+        let mut plane = setup.plane(size, Scene::uniform(format!("sample {sample}"), electrons))?;
+        let place = [sample % settings.columns, sample / settings.columns];
         for axis in 0..2 {
-            geometry.origin[axis] = i32::try_from(place[axis] * size[axis])
+            plane.geometry.origin[axis] = i32::try_from(place[axis] * size[axis])
                 .map_err(|_| Error::Data("so many patches do not fit a sensor".into()))?;
         }
-        let plane = FrameHeader { name: format!("sample {sample}"), geometry, metadata };
-        let noisy = AddNoise::new(&plane, &self.settings.noise)?;
-        let digitize = Digitize::new(noisy.header(), &AdcSettings::default())?;
-        let correct = match self.settings.dark_frames {
-            0 => None,
-            frames => {
-                let darks = DarkStack::alike(digitize.header().clone(), frames)?;
-                let nothing_else = CorrectionSettings { black: Black::None, cte: None };
-                Some(CorrectFrame::new(digitize.header(), &nothing_else, Some(&darks))?)
-            }
-        };
-        let codes = correct.as_ref().map_or(digitize.header(), Stage::header);
-        let demosaic = Demosaic::new(codes, self.settings.method, Black::Auto, None)?;
-        let camera = demosaic.header().clone();
-        let white_luminance = self.settings.color.white_luminance.or_else(|| self.saturation(&camera));
-        let made =
-            |space| ToXyz::new(&camera, &ColorSettings { space, white_luminance, ..self.settings.color.clone() });
+        let stages = setup.stages(&plane)?;
+        let white_luminance = settings.color.white_luminance.or_else(|| self.saturation(stages.demosaic.header()));
+        let made = |space| stages.to_xyz(&ColorSettings { space, white_luminance, ..settings.color.clone() });
         let (xyz, lab) = (made(Space::Xyz)?, made(Space::Lab)?.header().clone());
-        Ok(Chain { exposure, electrons, plane, noisy, digitize, correct, demosaic, camera, xyz, lab })
+        Ok(Shot { exposure, electrons, plane, stages, xyz, lab })
     }
 
     /// The luminance at which equal signals reach the top code, by the matrix of the sensor's own file: a matrix that is
@@ -337,8 +311,8 @@ impl Evaluator<'_> {
     fn sample(&self, sample: usize) -> Result<SampleEvaluation> {
         let margin = self.settings.method.reach();
         let patch = self.settings.patch.unwrap_or([1, 1]);
-        let chain = self.chain(sample, patch.map(|pixels| pixels + 2 * margin))?;
-        let white = chain.white()?;
+        let shot = self.shot(sample, patch.map(|pixels| pixels + 2 * margin))?;
+        let white = shot.white()?;
         let (camera, truth) = (self.signals.camera.row(sample), self.signals.xyz.row(sample));
         let xyz = [truth[0], truth[1], truth[2]];
         let signal = Vector3::new(camera[0], camera[1], camera[2]);
@@ -346,13 +320,13 @@ impl Evaluator<'_> {
         let lab = lab_from_xyz(xyz, white);
         let camera_lab = lab_from_xyz(camera_xyz, white);
         let noise = match self.settings.patch {
-            Some(patch) => Some(self.noise(&chain, patch, margin, lab, camera_lab)?),
+            Some(patch) => Some(self.noise(&shot, patch, margin, lab, camera_lab)?),
             None => None,
         };
         Ok(SampleEvaluation {
             sample,
-            exposure: chain.exposure,
-            electrons: chain.electrons,
+            exposure: shot.exposure,
+            electrons: shot.electrons,
             white,
             xyz,
             camera_xyz,
@@ -363,14 +337,14 @@ impl Evaluator<'_> {
 
     fn noise(
         &self,
-        chain: &Chain,
+        shot: &Shot,
         patch: [usize; 2],
         margin: usize,
         lab: [f64; 3],
         camera_lab: [f64; 3],
     ) -> Result<SampleNoise> {
-        let white = chain.white()?;
-        let (pixels, counts) = self.pixels(chain, patch, margin)?;
+        let white = shot.white()?;
+        let (pixels, counts) = self.pixels(shot, patch, margin)?;
         let count = pixels.len() as f64;
         let mean = |of: &dyn Fn(&[f64; 3]) -> f64| pixels.iter().map(of).sum::<f64>() / count;
         let mean_xyz = [0, 1, 2].map(|i| mean(&|xyz| xyz[i]));
@@ -385,9 +359,9 @@ impl Evaluator<'_> {
             })
         };
         // A color without a prediction, such as one beyond the converter's range, has none in the report.
-        let by_formula = pixels_of(chain.xyz.header()).and_then(|xyz| Ok((xyz, pixels_of(&chain.lab)?))).ok();
+        let by_formula = pixels_of(shot.xyz.header()).and_then(|xyz| Ok((xyz, pixels_of(&shot.lab)?))).ok();
         let by_formula =
-            by_formula.map(|(xyz, lab)| predicted(&xyz, &lab, [camera_lab, white], &chain.plane, patch, margin));
+            by_formula.map(|(xyz, lab)| predicted(&xyz, &lab, [camera_lab, white], &shot.plane, patch, margin));
         Ok(SampleNoise {
             patch_mean: Difference::between(lab, lab_from_xyz(mean_xyz, white)),
             pixel_mean,
@@ -403,18 +377,20 @@ impl Evaluator<'_> {
     }
 
     /// XYZ of the pixels within the margin.
-    fn pixels(&self, chain: &Chain, patch: [usize; 2], margin: usize) -> Result<(Vec<[f64; 3]>, Counts)> {
-        let (mut codes, mut counts) = self.codes(chain, chain.electrons, 0)?;
+    fn pixels(&self, shot: &Shot, patch: [usize; 2], margin: usize) -> Result<(Vec<[f64; 3]>, Counts)> {
+        let (mut codes, mut counts) = self.codes(shot, shot.electrons, 0)?;
         let frames = 1..=self.settings.dark_frames;
-        let darks = frames.map(|frame| self.codes(chain, [0.0; 3], frame).map(|(dark, _)| dark));
-        if let Some((correct, mut darks)) = chain.correct.as_ref().zip(DarkFrames::of(darks.collect::<Result<_>>()?)?) {
+        let darks = frames.map(|frame| self.codes(shot, [0.0; 3], frame).map(|(dark, _)| dark));
+        if let Some((correct, mut darks)) =
+            shot.stages.correct.as_ref().zip(DarkFrames::of(darks.collect::<Result<_>>()?)?)
+        {
             let mut corrected = MemoryFrame::new(correct.header().clone(), Vec::new());
             counts =
                 run(correct, &mut LessDarks::new(&mut codes, &mut darks), &mut corrected, &mut |_| ())?.plus(counts);
             codes = corrected;
         }
-        let (rgb, more) = codes.through(&chain.demosaic)?;
-        let (xyz, and_more) = rgb.through(&chain.xyz)?;
+        let (rgb, more) = codes.through(&shot.stages.demosaic)?;
+        let (xyz, and_more) = rgb.through(&shot.xyz)?;
         let geometry = &xyz.header.geometry;
         let at = |x: usize, y: usize, channel: usize| f64::from(xyz.samples[(y * 3 + channel) * geometry.width + x]);
         let inside = (margin..margin + patch[1]).flat_map(|y| (margin..margin + patch[0]).map(move |x| [x, y]));
@@ -423,24 +399,18 @@ impl Evaluator<'_> {
     }
 
     /// Codes of the patch's photosites in exposure number `frame` after the first.
-    fn codes(&self, chain: &Chain, electrons: [f64; 3], frame: u32) -> Result<(MemoryFrame, Counts)> {
-        let geometry = &chain.plane.geometry;
-        let pattern = self.pattern()?;
-        let samples = (0..geometry.height).flat_map(|y| {
-            let classes = pattern.row_classes(geometry.origin, y).map(|class| to_sample(electrons[class as usize]));
-            (0..geometry.width).map(move |x| classes[x % 2])
-        });
-        let expected = MemoryFrame::new(chain.plane.clone(), samples.collect());
+    fn codes(&self, shot: &Shot, electrons: [f64; 3], frame: u32) -> Result<(MemoryFrame, Counts)> {
+        let expected = uniform_frame(shot.plane.clone(), electrons)?;
         let (charge, full_well) = if frame == 0 {
-            expected.through(&chain.noisy)?
+            expected.through(&shot.stages.add_noise)?
         } else {
             let number = self.settings.noise.frame.wrapping_add(frame);
             expected.through(&AddNoise::new(
-                &chain.plane,
+                &shot.plane,
                 &NoiseSettings { frame: number, ..self.settings.noise.clone() },
             )?)?
         };
-        let (codes, clipped) = charge.through(&chain.digitize)?;
+        let (codes, clipped) = charge.through(&shot.stages.digitize)?;
         Ok((codes, full_well.plus(clipped)))
     }
 }

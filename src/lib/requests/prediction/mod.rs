@@ -13,7 +13,7 @@ use crate::analysis::characterization::signals;
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::{CfaPattern, Class};
-use crate::chain::{Chain, ChainPrediction, ChainSettings, Uncertainty};
+use crate::chain::{CameraSetup, ChainPrediction, Predictor, PredictorSettings, Uncertainty};
 use crate::color::Space;
 use crate::error::{Error, Result};
 use crate::formats::{data, spectral};
@@ -164,8 +164,8 @@ pub struct PredictedNoise {
     pub budgets: Budgets,
     /// What came up.
     pub notes: Vec<Note>,
-    /// The chain and the electrons of the scene; none of a library.
-    scene: Option<(Chain, [f64; 3])>,
+    /// The predictor and the electrons of the scene; none of a library.
+    scene: Option<(Predictor, [f64; 3])>,
     sweep: Option<Sweep>,
 }
 
@@ -198,7 +198,7 @@ impl NoisePrediction {
     ///
     /// # Errors
     ///
-    /// Those of readers, sensor and matrix files and of the chain; [`Error::Usage`] where the request makes no sense.
+    /// Those of readers, sensor and matrix files and of the predictor; [`Error::Usage`] where the request makes no sense.
     pub fn run(&self) -> Result<PredictedNoise> {
         let mut found = if self.all_samples { self.of_library()? } else { self.of_scene()? };
         let first_order = found.budgets.scenes().into_iter().filter_map(|scene| scene.first_order);
@@ -220,12 +220,12 @@ impl NoisePrediction {
         }
         let color = self.color(&sensor, &mut notes)?;
         let conditions = Conditions { quadrature_error, ..self.conditions(&sensor, exposure)? };
-        let mut chain = self.chain(&sensor, exposure, color)?;
+        let mut predictor = self.predictor(&sensor, exposure, color)?;
         let budgets = match self.sweep {
-            Some(sweep) => Budgets::Sweep(sweep_levels(&mut chain, sweep, electrons)?),
-            None => Budgets::Scene(chain.predict(electrons)?),
+            Some(sweep) => Budgets::Sweep(sweep_levels(&mut predictor, sweep, electrons)?),
+            None => Budgets::Scene(predictor.predict(electrons)?),
         };
-        Ok(PredictedNoise { conditions, budgets, notes, scene: Some((chain, electrons)), sweep: self.sweep })
+        Ok(PredictedNoise { conditions, budgets, notes, scene: Some((predictor, electrons)), sweep: self.sweep })
     }
 
     /// The scene as it would be rendered; for a sweep any that is not dark.
@@ -259,8 +259,8 @@ impl NoisePrediction {
         let one = |sample: usize| -> Result<SamplePrediction> {
             let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;
             let exposure = exposing.of(per_exposure, loaded.sensor.readout()?.full_well_e)?;
-            let mut chain = self.chain(&loaded.sensor, exposure, color.clone())?;
-            let prediction = chain.predict(per_exposure.map(|e| e * exposure.exposure_s_sr()))?;
+            let mut predictor = self.predictor(&loaded.sensor, exposure, color.clone())?;
+            let prediction = predictor.predict(per_exposure.map(|e| e * exposure.exposure_s_sr()))?;
             Ok(SamplePrediction { sample, exposure, prediction })
         };
         let found = (0..library.radiance.nrows())
@@ -290,15 +290,17 @@ impl NoisePrediction {
         })
     }
 
-    fn chain(&self, sensor: &Sensor, exposure: Exposure, color: Option<ColorSettings>) -> Result<Chain> {
-        Chain::new(ChainSettings {
-            sensor: sensor.clone(),
-            exposure,
-            noise: self.noise.settings(),
-            method: self.method,
-            pattern: self.pattern,
+    fn predictor(&self, sensor: &Sensor, exposure: Exposure, color: Option<ColorSettings>) -> Result<Predictor> {
+        Predictor::new(PredictorSettings {
+            camera: CameraSetup {
+                sensor: sensor.clone(),
+                exposure,
+                noise: self.noise.settings(),
+                pattern: self.pattern,
+                dark_frames: self.dark_frames,
+                method: self.method,
+            },
             color,
-            dark_frames: self.dark_frames,
             equations: self.equations,
             patch: self.patch,
             patch_at: self.patch_at,
@@ -335,24 +337,24 @@ impl PredictedNoise {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] for a library, whose samples are no levels of one scene; those of the chain.
+    /// [`Error::Usage`] for a library, whose samples are no levels of one scene; those of the predictor.
     pub fn transfer_curve(&mut self) -> Result<TransferCurve> {
-        let Some((chain, electrons)) = &mut self.scene else {
+        let Some((predictor, electrons)) = &mut self.scene else {
             return Err(Error::Usage("a library has no photon transfer curve; choose one sample".into()));
         };
-        let (full_well_e, sensor) = (chain.sensor().readout()?.full_well_e, chain.sensor().name.clone());
+        let (full_well_e, sensor) = (predictor.sensor().readout()?.full_well_e, predictor.sensor().name.clone());
         let all = Sweep { start_e: 1.0, end_e: full_well_e, count: 200, is_logarithmic: true };
         let electrons = if *electrons == [0.0; 3] { [1.0; 3] } else { *electrons };
-        let levels = sweep_levels(chain, self.sweep.unwrap_or(all), electrons)?;
+        let levels = sweep_levels(predictor, self.sweep.unwrap_or(all), electrons)?;
         let brightest = (0..3).max_by(|&a, &b| electrons[a].total_cmp(&electrons[b])).unwrap_or_default();
         Ok(TransferCurve { sensor, class: Class::ALL[brightest], full_well_e, levels })
     }
 }
 
 /// Predicts the scene at one level of its brightest class after another.
-fn sweep_levels(chain: &mut Chain, sweep: Sweep, electrons: [f64; 3]) -> Result<Vec<ChainPrediction>> {
+fn sweep_levels(predictor: &mut Predictor, sweep: Sweep, electrons: [f64; 3]) -> Result<Vec<ChainPrediction>> {
     let brightest = electrons.iter().copied().fold(0.0, f64::max);
-    sweep.levels().map(|level| chain.predict(electrons.map(|e| e / brightest * level))).collect()
+    sweep.levels().map(|level| predictor.predict(electrons.map(|e| e / brightest * level))).collect()
 }
 
 #[cfg(test)]
@@ -368,7 +370,7 @@ mod tests {
     fn a_scene_is_predicted_stage_by_stage() {
         let found = given([1000.0, 2000.0, 3000.0]).run().unwrap();
         let Budgets::Scene(scene) = &found.budgets else { panic!("{:?}", found.budgets) };
-        let stages: Vec<&str> = scene.stages.iter().map(|stage| stage.stage).collect();
+        let stages: Vec<&str> = scene.stages.iter().map(|stage| stage.stage.name()).collect();
         assert_eq!(stages, ["electrons", "adu", "demosaicked"]);
         let conditions = &found.conditions;
         assert_eq!((conditions.method, conditions.exposure_s, conditions.quadrature_error), ("eci", 0.033, None));

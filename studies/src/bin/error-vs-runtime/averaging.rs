@@ -5,7 +5,7 @@ use crate::bench::timed;
 use crate::labels::Shape;
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
-use cyanometer::chain::StagePrediction;
+use cyanometer::chain::{ChainStage, StagePrediction};
 use cyanometer::error::{Error, Result};
 use cyanometer::frame::to_sample;
 use cyanometer::numerics::moments::Moments;
@@ -37,10 +37,10 @@ struct Mean {
 pub fn study(study: &Study) -> Result<Section> {
     let (size, frames) = if study.quick { ([96, 64], 8_usize) } else { ([384, 256], 64) };
     let pixels = size[0] * size[1];
-    let mut chain = study.chain(METHOD, Equations::Exact, false)?;
+    let mut chain = study.predictor(METHOD, Equations::Exact, false)?;
     let prediction = chain.predict(SKY)?;
     let missing = || Error::Data("the chain has no such stage".into());
-    let stage = prediction.stages.iter().find(|stage| stage.stage == "demosaicked").ok_or_else(missing)?;
+    let stage = prediction.stages.iter().find(|stage| stage.stage == ChainStage::Demosaicked).ok_or_else(missing)?;
     let expected = study.plane(size, SKY)?;
     let shot = |seed: u64, sensor: u64| demosaicked(&codes(&exposed(&expected, seed, sensor)?)?, METHOD);
 

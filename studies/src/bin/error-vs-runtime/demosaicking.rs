@@ -60,7 +60,7 @@ pub fn study(study: &Study) -> Result<Section> {
         let weights = WeightTable::new(method, CfaPattern::Rggb).about([1.0; 2]);
         let covariance = gains::mean_pixel(&weights).covariance([1.0; 3]);
         gains.push([0, 1, 2].map(|i| covariance[(i, i)].sqrt()));
-        let prediction = study.chain(method, Equations::Exact, true)?.predict(SKY)?;
+        let prediction = study.predictor(method, Equations::Exact, true)?.predict(SKY)?;
         noise.push(prediction.noise_delta_e.map_or(f64::NAN, |delta| delta.mean));
     }
     let timed_frame = mosaicked(&scenes[3].truth)?;

@@ -5,7 +5,7 @@ use crate::bench::{Work, timed};
 use crate::labels::Shape;
 use crate::page::{Section, percent, time};
 use crate::pareto::{self, Choice, Group};
-use cyanometer::chain::{Chain, ChainPrediction};
+use cyanometer::chain::{ChainPrediction, ChainStage, Predictor};
 use cyanometer::error::Result;
 use cyanometer::plot::Plot;
 use cyanometer::propagation::Equations;
@@ -52,12 +52,12 @@ pub fn study(study: &Study) -> Result<Section> {
         }
     }
 
-    let mut chains: Vec<(usize, &'static str, Chain)> = Vec::new();
+    let mut chains: Vec<(usize, &'static str, Predictor)> = Vec::new();
     for (index, (_, method)) in METHODS.into_iter().enumerate() {
         if method != Method::Malvar {
-            chains.push((index, "paper", study.chain(method, Equations::Paper, false)?));
+            chains.push((index, "paper", study.predictor(method, Equations::Paper, false)?));
         }
-        chains.push((index, "exact", study.chain(method, Equations::Exact, false)?));
+        chains.push((index, "exact", study.predictor(method, Equations::Exact, false)?));
     }
     let mut predictions = Vec::new();
     for (index, name, chain) in &mut chains {
@@ -179,5 +179,9 @@ fn scatter(found: &[[f64; 3]], truth: [f64; 3]) -> f64 {
 
 /// σ of the demosaicked channels.
 fn sigma(prediction: &ChainPrediction) -> [f64; 3] {
-    prediction.stages.iter().find(|stage| stage.stage == "demosaicked").map_or([f64::NAN; 3], |stage| stage.std)
+    prediction
+        .stages
+        .iter()
+        .find(|stage| stage.stage == ChainStage::Demosaicked)
+        .map_or([f64::NAN; 3], |stage| stage.std)
 }

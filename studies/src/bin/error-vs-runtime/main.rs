@@ -20,7 +20,7 @@ mod wavelength;
 
 use bench::Bench;
 use cyanometer::analysis::characterization::regression::Weights;
-use cyanometer::chain::{Chain, ChainSettings};
+use cyanometer::chain::{CameraSetup, Predictor, PredictorSettings};
 use cyanometer::color::Space;
 use cyanometer::error::{Error, Result};
 use cyanometer::formats::output::write_text;
@@ -29,10 +29,9 @@ use cyanometer::metadata::FrameHeader;
 use cyanometer::numerics::vectors::Instructions;
 use cyanometer::propagation::Equations;
 use cyanometer::stages::demosaic::Method;
-use cyanometer::stages::noise::NoiseSettings;
 use cyanometer::stages::to_xyz::ColorSettings;
 use cyanometer::stream::MemoryFrame;
-use cyanometer_studies::camera::{Camera, EXPOSURE, color_settings};
+use cyanometer_studies::camera::{Camera, color_settings};
 use cyanometer_studies::{frames, pages};
 use page::Section;
 use std::fmt::Write;
@@ -64,7 +63,7 @@ impl Study {
 
     /// A uniform scene behind the filter array.
     fn plane(&self, size: [usize; 2], electrons: [f64; 3]) -> Result<MemoryFrame> {
-        frames::mosaicked(&frames::uniform(&self.camera.sensor, size, electrons))
+        frames::mosaicked(&frames::uniform(&self.camera.sensor, size, electrons)?)
     }
 
     /// A sky that becomes brighter and whiter downwards, three planes of expected electrons.
@@ -80,20 +79,10 @@ impl Study {
     }
 
     /// The noise budget by formula, ready to predict.
-    fn chain(&self, method: Method, equations: Equations, with_color: bool) -> Result<Chain> {
-        Chain::new(ChainSettings {
-            sensor: self.camera.sensor.clone(),
-            exposure: EXPOSURE,
-            noise: NoiseSettings::default(),
-            method,
-            pattern: None,
-            color: with_color.then(|| self.color.clone()),
-            dark_frames: 0,
-            equations,
-            patch: None,
-            patch_at: None,
-            wanted: None,
-        })
+    fn predictor(&self, method: Method, equations: Equations, with_color: bool) -> Result<Predictor> {
+        let camera = CameraSetup { method, ..frames::setup(&self.camera.sensor) };
+        let color = with_color.then(|| self.color.clone());
+        Predictor::new(PredictorSettings { color, equations, ..PredictorSettings::of(camera) })
     }
 }
 

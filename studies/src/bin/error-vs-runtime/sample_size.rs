@@ -46,7 +46,7 @@ pub fn study(study: &Study) -> Result<Section> {
     let model = NoiseModel::of(&noisy.header, record)?;
     let predicted = Photosite::of_electrons(model, Equations::Exact).digitized(adc).moments(LEVEL_E);
     let sigma = predicted.moments.std();
-    let mut chain = study.chain(Method::Bilinear, Equations::Exact, true)?;
+    let mut chain = study.predictor(Method::Bilinear, Equations::Exact, true)?;
     let mut works: Vec<Work<'_>> = vec![
         Box::new(|| {
             black_box(Photosite::of_electrons(model, Equations::Exact).digitized(adc).moments(black_box(LEVEL_E)));

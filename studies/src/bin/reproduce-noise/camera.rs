@@ -65,13 +65,13 @@ impl Camera {
 
     /// Noisy electrons of three planes. Each seed has patterns of its own: no draw is used twice.
     pub fn electrons(&self, size: [usize; 2], electrons: [f64; 3], seed: u64) -> Result<MemoryFrame> {
-        exposed(&frames::uniform(&self.sensor, size, electrons), seed, seed)
+        exposed(&frames::uniform(&self.sensor, size, electrons)?, seed, seed)
     }
 
     /// Noisy codes behind the filter array.
     pub fn plane(&self, size: [usize; 2], electrons: [f64; 3], seed: u64) -> Result<MemoryFrame> {
         // Mosaicking first gives the same samples to the bit, for a third of the work.
-        codes(&exposed(&mosaicked(&frames::uniform(&self.sensor, size, electrons))?, seed, seed)?)
+        codes(&exposed(&mosaicked(&frames::uniform(&self.sensor, size, electrons)?)?, seed, seed)?)
     }
 
     /// XYZ of a demosaicked frame.

@@ -3,29 +3,22 @@
 //! The heads of the frames that the programs would pass on are made by the stages themselves; only no sample is. So what
 //! is predicted here is what `measure` compares such frames with.
 
-use crate::camera::optics::Exposure;
+use super::camera::CameraSetup;
 use crate::camera::sensor::Sensor;
-use crate::cfa::CfaPattern;
 use crate::color::Space;
 use crate::color::difference::DELTA_E_PER_JND;
 use crate::error::{Error, Result};
-use crate::frame::Geometry;
-use crate::metadata::{CorrectionRecord, FrameHeader, Metadata, Scene};
+use crate::metadata::{CorrectionRecord, FrameHeader, Scene};
+use crate::names::{Named, serde_by_name};
 use crate::numerics::normal;
 use crate::propagation::budget::{Budget, Cause};
 use crate::propagation::frame::{Sites, quantity_of_sites};
 use crate::propagation::gains;
 use crate::propagation::smooth_hue::FirstOrder;
 use crate::propagation::{Equations, FramePrediction, PixelMoments};
-use crate::stages::adc::{AdcSettings, Digitize};
-use crate::stages::black::Black;
-use crate::stages::correct::{CorrectFrame, CorrectionSettings};
-use crate::stages::darks::DarkStack;
+use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::PHASES;
-use crate::stages::demosaic::{Demosaic, Method};
-use crate::stages::mosaic::Mosaic;
-use crate::stages::noise::{AddNoise, NoiseSettings};
-use crate::stages::to_xyz::{ColorSettings, ToXyz};
+use crate::stages::to_xyz::ColorSettings;
 use crate::stream::Stage;
 use crate::units::QuantityKind;
 use nalgebra::{Matrix3, Vector3};
@@ -33,21 +26,11 @@ use serde::Serialize;
 
 /// What a prediction follows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ChainSettings {
-    /// The sensor.
-    pub sensor: Sensor,
-    /// Exposure time and lens.
-    pub exposure: Exposure,
-    /// Noise sources, temperature.
-    pub noise: NoiseSettings,
-    /// Demosaicking method.
-    pub method: Method,
-    /// Pattern of the filter array; the sensor's own where none is given.
-    pub pattern: Option<CfaPattern>,
+pub struct PredictorSettings {
+    /// The camera.
+    pub camera: CameraSetup,
     /// Matrix and white; XYZ and L*a*b* are predicted where there is one.
     pub color: Option<ColorSettings>,
-    /// Dark frames whose mean is subtracted; none where the black level is subtracted as a constant.
-    pub dark_frames: u32,
     /// Equations to predict by.
     pub equations: Equations,
     /// Patch whose mean is predicted, columns and rows.
@@ -57,6 +40,49 @@ pub struct ChainSettings {
     /// The uncertainty that a mean shall have.
     pub wanted: Option<Uncertainty>,
 }
+
+impl PredictorSettings {
+    /// The exact noise of a camera, without colors.
+    pub fn of(camera: CameraSetup) -> Self {
+        let equations = Equations::Exact;
+        Self { camera, color: None, equations, patch: None, patch_at: None, wanted: None }
+    }
+}
+
+/// A stage of the chain that is predicted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ChainStage {
+    /// Electrons of one exposure.
+    Electrons,
+    /// Codes.
+    Adu,
+    /// Codes less the mean of dark frames.
+    DarkSubtracted,
+    /// Sensor RGB.
+    Demosaicked,
+    /// CIE XYZ.
+    Xyz,
+    /// CIE L\*a\*b\*.
+    Lab,
+}
+
+impl Named for ChainStage {
+    const ALL: &'static [Self] =
+        &[Self::Electrons, Self::Adu, Self::DarkSubtracted, Self::Demosaicked, Self::Xyz, Self::Lab];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Electrons => "electrons",
+            Self::Adu => "adu",
+            Self::DarkSubtracted => "dark_subtracted",
+            Self::Demosaicked => "demosaicked",
+            Self::Xyz => "xyz",
+            Self::Lab => "lab",
+        }
+    }
+}
+
+serde_by_name!(ChainStage);
 
 /// A wanted uncertainty of a mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,37 +99,26 @@ pub enum Uncertainty {
 ///
 /// ```
 /// use cyanometer::camera::optics::Exposure;
-/// use cyanometer::chain::{Chain, ChainSettings};
+/// use cyanometer::chain::{CameraSetup, ChainStage, Predictor, PredictorSettings};
 /// use cyanometer::formats::data::load_sensor;
-/// use cyanometer::propagation::Equations;
 /// use cyanometer::stages::demosaic::Method;
-/// use cyanometer::stages::noise::NoiseSettings;
 ///
-/// let mut chain = Chain::new(ChainSettings {
-///     sensor: load_sensor("kaf-5101ce")?.sensor,
-///     exposure: Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 },
-///     noise: NoiseSettings::default(),
-///     method: Method::Bilinear,
-///     pattern: None,
-///     color: None,
-///     dark_frames: 0,
-///     equations: Equations::Exact,
-///     patch: None,
-///     patch_at: None,
-///     wanted: None,
-/// })?;
-/// let stages = chain.predict([10_000.0; 3])?.stages;
-/// let variance = |name: &str| stages.iter().find(|stage| stage.stage == name).map(|stage| stage.covariance[0][0]);
+/// let exposure = Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 };
+/// let camera = CameraSetup::new(load_sensor("kaf-5101ce")?.sensor, exposure);
+/// let camera = CameraSetup { method: Method::Bilinear, ..camera };
+/// let mut predictor = Predictor::new(PredictorSettings::of(camera))?;
+/// let stages = predictor.predict([10_000.0; 3])?.stages;
+/// let variance = |wanted| stages.iter().find(|stage| stage.stage == wanted).map(|stage| stage.covariance[0][0]);
 /// // Red is measured at a quarter of the pixels and else the mean of two neighbors, of two, and of four:
 /// // (1 + ½ + ½ + ¼)/4 of the variance of a photosite.
-/// let ratio = variance("demosaicked").zip(variance("adu")).map(|(pixel, photosite)| pixel / photosite);
+/// let ratio = variance(ChainStage::Demosaicked).zip(variance(ChainStage::Adu)).map(|(pixel, photosite)| pixel / photosite);
 /// assert!((ratio.unwrap() - 9.0 / 16.0).abs() < 1e-12);
 /// # Ok::<(), cyanometer::error::Error>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Chain {
-    settings: ChainSettings,
-    heads: Vec<(&'static str, FrameHeader)>,
+pub struct Predictor {
+    settings: PredictorSettings,
+    heads: Vec<(ChainStage, FrameHeader)>,
 }
 
 /// What is predicted of one scene.
@@ -125,7 +140,7 @@ pub struct ChainPrediction {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StagePrediction {
     /// `electrons`, `adu`, `dark_subtracted` (where dark frames are), `demosaicked`, `xyz` or `lab`.
-    pub stage: &'static str,
+    pub stage: ChainStage,
     /// Unit of the samples.
     pub unit: String,
     /// Names of the channels.
@@ -214,63 +229,43 @@ fn diagonal_std(covariance: &Matrix3<f64>) -> [f64; 3] {
     [0, 1, 2].map(|i| covariance[(i, i)].max(0.0).sqrt())
 }
 
-impl Chain {
+impl Predictor {
     /// Sets the chain up.
     ///
     /// # Errors
     ///
     /// Those of the stages.
-    pub fn new(settings: ChainSettings) -> Result<Self> {
-        let sensor = &settings.sensor;
-        if settings.equations == Equations::Paper && settings.method == Method::Malvar {
+    pub fn new(settings: PredictorSettings) -> Result<Self> {
+        let camera = &settings.camera;
+        if settings.equations == Equations::Paper && camera.method == Method::Malvar {
             return Err(Error::Usage("the paper has no equations for the method mhc; choose bi, shti or eci".into()));
         }
-        let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-        metadata.sensor = Some(sensor.clone());
-        metadata.exposure = Some(settings.exposure);
-        metadata.scene = Some(Scene {
-            source: "formula".into(),
-            uniform: true,
-            expected_electrons: Some([0.0; 3]),
-            vignetting_focal_length_mm: None,
-            patch: None,
-            source_width: None,
-            brightest_e: None,
-        });
-        let readout = sensor.readout()?;
-        let geometry = Geometry::new(readout.width as usize, readout.height as usize, &["R", "G", "B"]);
-        let expected = FrameHeader { name: "the prediction".into(), geometry, metadata };
-        let electrons = AddNoise::new(&expected, &settings.noise)?.header().clone();
-        let adu = Digitize::new(&electrons, &AdcSettings::default())?.header().clone();
-        let mut heads = vec![("electrons", electrons), ("adu", adu.clone())];
-        let codes = if settings.dark_frames > 0 {
-            let darks = DarkStack::alike(adu.clone(), settings.dark_frames)?;
-            let nothing_else = CorrectionSettings { black: Black::None, cte: None };
-            let corrected = CorrectFrame::new(&adu, &nothing_else, Some(&darks))?.header().clone();
-            heads.push(("dark_subtracted", corrected.clone()));
-            corrected
-        } else {
-            adu
-        };
-        let plane = Mosaic::new(&codes, settings.pattern)?.header().clone();
-        let camera = Demosaic::new(&plane, settings.method, Black::Auto, None)?.header().clone();
+        let readout = camera.sensor.readout()?;
+        let size = [readout.width as usize, readout.height as usize];
+        let expected =
+            FrameHeader { name: "the prediction".into(), ..camera.planes(size, Scene::uniform("formula", [0.0; 3])) };
+        let stages = camera.stages(&expected)?;
+        let mut heads = vec![
+            (ChainStage::Electrons, stages.add_noise.header().clone()),
+            (ChainStage::Adu, stages.digitize.header().clone()),
+        ];
+        heads.extend(stages.correct.as_ref().map(|correct| (ChainStage::DarkSubtracted, correct.header().clone())));
+        heads.push((ChainStage::Demosaicked, stages.demosaic.header().clone()));
         if let Some(color) = &settings.color {
-            let made = |space| ToXyz::new(&camera, &ColorSettings { space, ..color.clone() });
-            let (xyz, lab) = (made(Space::Xyz)?.header().clone(), made(Space::Lab)?.header().clone());
-            heads.extend([("demosaicked", camera), ("xyz", xyz), ("lab", lab)]);
-        } else {
-            heads.push(("demosaicked", camera));
+            for (stage, space) in [(ChainStage::Xyz, Space::Xyz), (ChainStage::Lab, Space::Lab)] {
+                heads.push((stage, stages.to_xyz(&ColorSettings { space, ..color.clone() })?.header().clone()));
+            }
         }
         Ok(Self { settings, heads })
     }
 
     /// The sensor.
     pub fn sensor(&self) -> &Sensor {
-        &self.settings.sensor
+        &self.settings.camera.sensor
     }
 
     /// The heads of the frames of each stage.
-    pub fn heads(&self) -> impl Iterator<Item = (&'static str, &FrameHeader)> {
+    pub fn heads(&self) -> impl Iterator<Item = (ChainStage, &FrameHeader)> {
         self.heads.iter().map(|(stage, head)| (*stage, head))
     }
 
@@ -289,8 +284,9 @@ impl Chain {
             if let Some(scene) = &mut head.metadata.scene {
                 scene.expected_electrons = Some(electrons);
             }
-            let none =
-                |why| Error::Data(format!("nothing can be predicted of {stage} at {electrons:?} electrons: {why}"));
+            let none = |why| {
+                Error::Data(format!("nothing can be predicted of {} at {electrons:?} electrons: {why}", stage.name()))
+            };
             let plane = (quantity_of_sites(head), head.metadata.correction);
             let (sites, causes) = match known.take().filter(|(of, ..)| *of == plane) {
                 Some((_, sites, causes)) => (sites, causes),
@@ -302,27 +298,27 @@ impl Chain {
             };
             let prediction = sites.frame(head).map_err(none)?;
             match &prediction {
-                FramePrediction::Pixels(mixture) if *stage == "lab" => {
+                FramePrediction::Pixels(mixture) if *stage == ChainStage::Lab => {
                     noise_delta_e = Some(self.settings.delta_e(mixture));
                 }
-                FramePrediction::Pixels(mixture) if *stage == "demosaicked" => {
+                FramePrediction::Pixels(mixture) if *stage == ChainStage::Demosaicked => {
                     let variances = mixture.sites.map(|site| site.moments.variance);
-                    first_order =
-                        (self.settings.method == Method::SmoothHue).then(|| FirstOrder::of(mixture.mean, variances));
+                    first_order = (self.settings.camera.method == Method::SmoothHue)
+                        .then(|| FirstOrder::of(mixture.mean, variances));
                 }
                 _ => {}
             }
-            stages.push(self.settings.stage(stage, head, &prediction, &causes));
+            stages.push(self.settings.stage(*stage, head, &prediction, &causes));
             known = Some((plane, sites, causes));
         }
         Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order })
     }
 }
 
-impl ChainSettings {
+impl PredictorSettings {
     fn stage(
         &self,
-        stage: &'static str,
+        stage: ChainStage,
         head: &FrameHeader,
         prediction: &FramePrediction,
         causes: &[Budget; 3],
@@ -342,7 +338,9 @@ impl ChainSettings {
             }
         };
         let second_order = match prediction {
-            FramePrediction::Pixels(mixture) if self.method == Method::SmoothHue => Some(rows(&mixture.covariance)),
+            FramePrediction::Pixels(mixture) if self.camera.method == Method::SmoothHue => {
+                Some(rows(&mixture.covariance))
+            }
             _ => None,
         };
         let by_cause = self.by_cause(prediction, causes);
