@@ -258,7 +258,7 @@ fn averaging_as_if_pixels_were_independent_is_caught() {
     for (i, keeps) in [(0, (4.0_f64 / (9.0 / 16.0)).sqrt()), (1, (2.0_f64 / (5.0 / 8.0)).sqrt()), (2, 8.0 / 3.0)] {
         let independent = region.channels[i].predicted_std.unwrap() / 64.0;
         let ratio = region.patch_mean_std.as_ref().unwrap()[i] / independent;
-        // The rim of the patch leans on sites outside, which takes off a per cent or two.
+        // The rim of the patch leans on sites outside, which takes off a percent or two.
         assert!((ratio / keeps - 1.0).abs() < 0.03, "channel {i}: {ratio}, not {keeps}");
     }
 }
@@ -307,7 +307,7 @@ fn charge_transfer_is_in_the_predicted_mean() {
             let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
             let report = measure(&mut source, &[], Equations::Exact, None).unwrap();
             for channel in &report.regions[0].channels {
-                // 5 standard errors; the charge that neighbours share widens them by less than 10 %.
+                // 5 standard errors; the charge that neighbors share widens them by less than 10 %.
                 assert!(channel.z_mean.unwrap().abs() < 5.0 && channel.z_std.unwrap().abs() < 5.0, "{channel:?}");
                 // Without transfer's share of 1 − 2·10⁻⁴ the mean of 9000 e⁻ would be off by 1.8 e⁻, 3 standard errors.
             }

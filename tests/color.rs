@@ -1,4 +1,4 @@
-//! Characterisation on the sky library, and on a camera whose matrix is known.
+//! Characterization on the sky library, and on a camera whose matrix is known.
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use cyanometer::analysis::characterization::evaluation::{
@@ -59,10 +59,10 @@ fn the_default_sensors_matrix_is_the_fit_to_the_sky_library() {
     assert_eq!((fitted.count, fitted.rank), (912, 3));
 }
 
-/// A camera whose response to energy is a mixture of the colour-matching functions obeys Luther's condition: the fit
+/// A camera whose response to energy is a mixture of the color-matching functions obeys Luther's condition: the fit
 /// must find the mixture again, exactly, from any training set that determines it.
 #[test]
-fn a_colorimetric_camera_is_characterised_without_error() {
+fn a_colorimetric_camera_is_characterized_without_error() {
     const MIXTURE: [[f64; 3]; 3] = [[0.5, 0.1, 0.0], [0.2, 0.6, 0.1], [0.0, 0.1, 0.4]];
     let loaded = data::load_sensor(data::DEFAULT_SENSOR).unwrap();
     let observer = data::load_observer().unwrap();
@@ -109,7 +109,7 @@ fn close(ours: f64, theirs: f64) -> bool {
     (ours - theirs).abs() <= 1e-9 * theirs.abs().max(1.0)
 }
 
-/// 400 pairs: any colour, dark ones on the straight part of the curve, neutral ones, ones out of gamut with negative
+/// 400 pairs: any color, dark ones on the straight part of the curve, neutral ones, ones out of gamut with negative
 /// stimuli, and pairs that hardly differ.
 #[test]
 fn colors_and_differences_are_those_of_colour_science() {
@@ -122,7 +122,7 @@ fn colors_and_differences_are_those_of_colour_science() {
         for (ours, theirs) in labs.iter().flatten().zip(&row[9..15]) {
             assert!(close(*ours, *theirs), "{ours} {theirs}");
         }
-        // From their L*a*b*, so that a hue of grey, which is rounding alone, is theirs too.
+        // From their L*a*b*, so that a hue of gray, which is rounding alone, is theirs too.
         let found = Difference::between(three(9), three(12));
         for (ours, theirs) in [found.delta_e_76, found.delta_e_94, found.delta_e_2000].iter().zip(&row[15..]) {
             assert!(close(*ours, *theirs), "{ours} {theirs} {row:?}");

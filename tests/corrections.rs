@@ -75,13 +75,13 @@ fn the_range_of_columns_has_two_too_many() {
     let printed = (-n / 2 - 1..=n / 2).count();
     assert_eq!(printed, 2656);
     says("2656 columns where there are 2654");
-    // Illumination of the first column: printed offset N/2 + 1 against the centre's N/2 − 1/2.
+    // Illumination of the first column: printed offset N/2 + 1 against the center's N/2 − 1/2.
     let pitch_um = 6.8;
     let falloff = |offset: f64| (1.0 + (offset * pitch_um / 50_000.0).powi(2)).powi(-2);
-    let centre = f64::from(n) / 2.0 - 0.5;
+    let center = f64::from(n) / 2.0 - 0.5;
     let first = Vignetting::new(2654, 1, pitch_um, 50.0).row(0).next().unwrap();
-    assert!((first / falloff(centre) - 1.0).abs() < 1e-12);
-    let error = falloff(f64::from(n) / 2.0 + 1.0) / falloff(centre) - 1.0;
+    assert!((first / falloff(center) - 1.0).abs() < 1e-12);
+    let error = falloff(f64::from(n) / 2.0 + 1.0) / falloff(center) - 1.0;
     says(&format!("−{:.0}·10⁻⁶ of the illumination of the first column", -1e6 * error));
 }
 
@@ -194,7 +194,7 @@ fn full_well_lies_above_the_top_code() {
 
 /// A flat field stays flat with the plus sign; with the printed minus sign its interpolated green is red and green added.
 #[test]
-fn the_difference_domain_takes_the_mean_of_its_neighbours() {
+fn the_difference_domain_takes_the_mean_of_its_neighbors() {
     let mut head = header(QuantityKind::Adu, Geometry::new(8, 8, &["Y"]));
     head.metadata.cfa = Some(CfaPattern::Rggb.into());
     let flat = frame(head, |_, _, _| 100.0);
@@ -229,7 +229,7 @@ fn the_bookkeeping_of_populations_loses_degrees_of_freedom() {
 
 /// Green at red is the mean of m = 4: the library's weights, and its equations for measured and interpolated green together.
 #[test]
-fn every_neighbour_has_its_share() {
+fn every_neighbor_has_its_share() {
     let weights = WeightTable::new(Method::Bilinear, CfaPattern::Rggb).about([1.0, 1.0]);
     let red = (0..PHASES.len()).find(|&phase| weights.class(phase, [0, 0]) == Class::Red).unwrap();
     let variance: f64 = weights.stencil(red, Class::Green as usize).sites().map(|(_, weight)| weight * weight).sum();
@@ -386,8 +386,8 @@ fn the_residuals_of_table_7_are_predicted_less_observed() {
     says("in 8 of the 9 rows");
 }
 
-/// Eq. 14 knows no edges; the frame mirrors, which counts some neighbours twice.
+/// Eq. 14 knows no edges; the frame mirrors, which counts some neighbors twice.
 #[test]
-fn edges_count_neighbours_twice() {
+fn edges_count_neighbors_twice() {
     assert_eq!((mirror(-1, 30), mirror(30, 30)), (1, 28));
 }

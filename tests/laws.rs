@@ -287,7 +287,7 @@ fn the_demosaicked_crop_is_the_crop_of_the_demosaicked() {
     });
 }
 
-// --- the colour filter array ---------------------------------------------------------------------------------------
+// --- the color filter array ---------------------------------------------------------------------------------------
 
 #[test]
 fn the_mosaic_commutes_with_noise_and_with_the_converter() {

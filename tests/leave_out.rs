@@ -58,7 +58,7 @@ fn the_plane_that_a_mosaic_keeps_is_all_that_it_needs() {
     }
 }
 
-/// Left out below half a unit in the last place of a sample, 2⁻²⁵: a product may be rounded to a neighbour, no further.
+/// Left out below half a unit in the last place of a sample, 2⁻²⁵: a product may be rounded to a neighbor, no further.
 #[test]
 fn vignetting_of_no_field_is_nothing() {
     let point = Vignetting::new(1, 1, 6.8, 50.0);

@@ -171,7 +171,7 @@ fn a_pipeline_runs_all_at_once_with_tees_between() {
     let names: Vec<&str> = channels.iter().map(|c| c["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["X", "Y", "Z"]);
     // The spectrum's own luminance is 1391.68 cd m⁻², as its file says; a matrix fitted to 912 skies restores that of a
-    // sky to some per cent.
+    // sky to some percent.
     let luminance = channels[1]["mean"].as_f64().unwrap();
     assert!((luminance / 1391.68 - 1.0).abs() < 0.1, "{luminance}");
 
@@ -506,7 +506,7 @@ fn noise_is_predicted_checked_and_carried_along() {
             2,
             "the paper has no equations for the method mhc; choose bi, shti or eci",
         ),
-        ("predict-noise --dark --uncertainty 1jnd", 2, "an uncertainty in jnd needs colours; give --matrix FILE"),
+        ("predict-noise --dark --uncertainty 1jnd", 2, "an uncertainty in jnd needs colors; give --matrix FILE"),
         (
             "predict-noise --dark --plot curve.jpg",
             2,

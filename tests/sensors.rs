@@ -155,7 +155,7 @@ fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
         (
             &parts,
             "{file: qe.csv}",
-            "{file: qe.csv, colour: R}",
+            "{file: qe.csv, color: R}",
             "`response` has an unknown key `quantum_efficiency`; remove it",
         ),
         (&parts, "sensor/2", "sensor/1", "`readout` belongs to the schema `cyanometer-sensor/2`; name that one"),

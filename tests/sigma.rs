@@ -29,7 +29,7 @@ use support::{at, expected, sensor, through};
 const WIDTH: usize = 26;
 const HEIGHT: usize = 18;
 
-/// A scene that darkens towards its corners and turns from red to blue across: a tenth within any pixel's reach.
+/// A scene that darkens toward its corners and turns from red to blue across: a tenth within any pixel's reach.
 fn scene() -> MemoryFrame {
     expected(WIDTH, HEIGHT, |x, y, class| {
         let (dx, dy) = (x as f32 / WIDTH as f32 - 0.5, y as f32 / HEIGHT as f32 - 0.5);
@@ -65,7 +65,7 @@ fn coloring(camera: &FrameHeader, space: Space) -> WithSigma<ToXyz> {
     WithSigma::of_conversion(ToXyz::new(camera, &settings).unwrap(), camera).unwrap()
 }
 
-/// Many exposures of as many sensors, demosaicked with standard deviations or turned into colours with them.
+/// Many exposures of as many sensors, demosaicked with standard deviations or turned into colors with them.
 fn exposures(method: Method, space: Option<Space>) -> Vec<MemoryFrame> {
     let scene = scene();
     // What a stage knows does not hang on the seeds.
@@ -92,7 +92,7 @@ fn group(x: usize, y: usize) -> usize {
 }
 
 /// Mean of (x − x̄)²/σ² over frames and pixels of each group and channel is 1 − 1/n; its error is that of a variance of
-/// 500 frames by pixels, a quarter of which count since neighbours are correlated: √(2 · 4/(500 · 60)) = 1.6 % for a
+/// 500 frames by pixels, a quarter of which count since neighbors are correlated: √(2 · 4/(500 · 60)) = 1.6 % for a
 /// phase. Levels that change by a tenth within reach move variances by their curvature, below 1 %.
 #[test]
 fn pixels_scatter_by_their_standard_deviation() {

@@ -192,7 +192,7 @@ fn gaussian_counts_are_as_noisy_as_predicted() {
     gather(&levels, &[200.0, 333.0, 350.0], PoissonKind::Gaussian).judge();
 }
 
-/// Behind a colour filter array, each class has its own moments, and the plane those of the mixture.
+/// Behind a color filter array, each class has its own moments, and the plane those of the mixture.
 #[test]
 fn classes_of_a_plane_are_as_noisy_as_predicted() {
     let mut means = Deviations::default();

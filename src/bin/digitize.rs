@@ -10,9 +10,9 @@ use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
-/// Turn electrons into the codes of the analogue-to-digital converter (ADU)
+/// Turn electrons into the codes of the analog-to-digital converter (ADU)
 ///
-/// Each sample becomes round(bias + slope * electrons), clipped to 0 ... 2^bits - 1. Rounding is the quantisation noise;
+/// Each sample becomes round(bias + slope * electrons), clipped to 0 ... 2^bits - 1. Rounding is the quantization noise;
 /// nothing else is added.
 #[derive(Parser)]
 #[command(version)]

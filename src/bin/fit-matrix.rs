@@ -1,4 +1,4 @@
-//! `fit-matrix`: a characterisation matrix from a library of spectra, and how well it does.
+//! `fit-matrix`: a characterization matrix from a library of spectra, and how well it does.
 
 use clap::Parser;
 use cyanometer::cli;

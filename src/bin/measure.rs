@@ -15,7 +15,7 @@ use std::process::ExitCode;
 
 /// Measure mean, spread and covariance of a frame, beside what the formulas predict
 ///
-/// Predictions are made for uniform scenes, from electrons to XYZ, xyY and L*a*b*. Planes behind a colour filter array
+/// Predictions are made for uniform scenes, from electrons to XYZ, xyY and L*a*b*. Planes behind a color filter array
 /// are also measured class by class. With --check, means are tested by z, variances by chi-square with the effective
 /// degrees of freedom of correlated pixels, correlations by Fisher's z. With --patches, the spread of each patch is
 /// predicted at the level of its own means.

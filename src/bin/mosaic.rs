@@ -10,7 +10,7 @@ use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
-/// Keep of three planes what a Bayer colour filter array lets through
+/// Keep of three planes what a Bayer color filter array lets through
 ///
 /// Works at any stage: on expected electrons, on noisy ones, on ADU. The noise of a photosite does not depend on when
 /// the mosaic is made, so making it first saves two thirds of the work.

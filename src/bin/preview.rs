@@ -13,7 +13,7 @@ use std::process::ExitCode;
 /// Write a frame as a PNG picture to look at
 ///
 /// Electrons and ADU are shown plane by plane, R as red and so on, from what no light reads to the most that the stage
-/// holds; XYZ in its colours. For measurements use the frame itself: a picture has 8 bits.
+/// holds; XYZ in its colors. For measurements use the frame itself: a picture has 8 bits.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {

@@ -1,4 +1,4 @@
-//! `to-xyz`: colours from sensor RGB.
+//! `to-xyz`: colors from sensor RGB.
 
 use clap::Parser;
 use cyanometer::cli;

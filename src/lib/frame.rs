@@ -13,7 +13,7 @@ pub struct Geometry {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Column and row, on the sensor, of the frame's first sample. A crop keeps it, so that the colour filter array
+    /// Column and row, on the sensor, of the frame's first sample. A crop keeps it, so that the color filter array
     /// and the noise of each photosite stay true.
     pub origin: [i32; 2],
     /// Channel names in the order of the samples.
@@ -216,7 +216,7 @@ pub fn to_sample(value: f64) -> f32 {
     value as f32
 }
 
-/// Mirrors an index into `0..length` without repeating the edge: …2 1 | 0 1 2…, which keeps the phase of a colour
+/// Mirrors an index into `0..length` without repeating the edge: …2 1 | 0 1 2…, which keeps the phase of a color
 /// filter array whose period is 2.
 pub fn mirror(index: isize, length: usize) -> usize {
     if length == 1 {

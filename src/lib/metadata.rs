@@ -71,7 +71,7 @@ pub struct Metadata {
     /// How the missing classes were interpolated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub demosaic: Option<DemosaicRecord>,
-    /// How colours were computed.
+    /// How colors were computed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color: Option<ColorRecord>,
     /// Moments of every sample by formula, where the scene is uniform.
@@ -238,7 +238,7 @@ pub struct DemosaicRecord {
     pub black_deltas: bool,
 }
 
-/// How colours were computed.
+/// How colors were computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ColorRecord {
     /// The matrix, XYZ per black-free ADU per s sr.
@@ -309,7 +309,7 @@ pub struct SamplesRecord {
     /// Hues that could not be formed because green was zero; bilinear values stand in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub undefined_hue: Option<u64>,
-    /// Colours outside sRGB, clipped.
+    /// Colors outside sRGB, clipped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub out_of_gamut: Option<u64>,
     /// Pixels whose noise cannot be propagated, green being too near its noise to divide by.

@@ -13,7 +13,7 @@ pub struct WavelengthGrid {
     pub start_nm: f64,
     /// Last wavelength in nm.
     pub end_nm: f64,
-    /// Distance of neighbours in nm.
+    /// Distance of neighbors in nm.
     pub step_nm: f64,
     /// The rule.
     #[serde(default)]
@@ -39,7 +39,7 @@ impl WavelengthGrid {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] when the grid is empty, runs backwards, does not end on a step or has over 10⁶ points, or when
+    /// [`Error::Usage`] when the grid is empty, runs backward, does not end on a step or has over 10⁶ points, or when
     /// the rule does not fit the number of points.
     pub fn points(&self) -> Result<(Vec<f64>, Vec<f64>)> {
         let Self { start_nm, end_nm, step_nm, quadrature } = *self;
@@ -96,7 +96,7 @@ impl Curve {
 
     /// The value at a wavelength in nm; zero beyond the table.
     pub fn at(&self, wavelength_nm: f64) -> f64 {
-        neighbours(&self.wavelength_nm, wavelength_nm)
+        neighbors(&self.wavelength_nm, wavelength_nm)
             .map_or(0.0, |parts| parts.iter().map(|&(index, share)| share * self.values[index]).sum())
     }
 
@@ -125,7 +125,7 @@ pub fn check_wavelengths(wavelength_nm: &[f64]) -> std::result::Result<(), Strin
 }
 
 /// The two samples that a wavelength lies between, with the share of each; none beyond the table.
-fn neighbours(table: &[f64], wavelength_nm: f64) -> Option<[(usize, f64); 2]> {
+fn neighbors(table: &[f64], wavelength_nm: f64) -> Option<[(usize, f64); 2]> {
     let above = table.partition_point(|&nm| nm < wavelength_nm);
     if above == table.len() {
         return None;
@@ -163,7 +163,7 @@ pub fn fold(sampled_nm: &[f64], grid_nm: &[f64], weights: &[f64]) -> Folded {
     let (mut covered, mut total) = (0.0, 0.0);
     for (&nm, &weight) in grid_nm.iter().zip(weights) {
         total += weight.abs();
-        if let Some(parts) = neighbours(sampled_nm, nm) {
+        if let Some(parts) = neighbors(sampled_nm, nm) {
             covered += weight.abs();
             for (index, share) in parts {
                 folded[index] += weight * share;
@@ -234,7 +234,7 @@ impl SpectralLibrary {
 /// The CIE 1931 2° standard observer x̄, ȳ, z̄.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observer {
-    /// Colour-matching functions x̄, ȳ, z̄.
+    /// Color-matching functions x̄, ȳ, z̄.
     pub matching: [Curve; 3],
 }
 

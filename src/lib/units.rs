@@ -19,13 +19,13 @@ pub const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
 pub const BOLTZMANN_EV_PER_K: f64 = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C;
 /// Maximum luminous efficacy K_m in lm W⁻¹.
 pub const LUMINOUS_EFFICACY_LM_PER_W: f64 = 683.0;
-/// Metres in a nanometre.
+/// Meters in a nanometer.
 pub const M_PER_NM: f64 = 1e-9;
-/// Centimetres in a micrometre.
+/// Centimeters in a micrometer.
 pub const CM_PER_UM: f64 = 1e-4;
-/// Millimetres in a micrometre.
+/// Millimeters in a micrometer.
 pub const MM_PER_UM: f64 = 1e-3;
-/// Square centimetres in a square metre.
+/// Square centimeters in a square meter.
 pub const CM2_PER_M2: f64 = 1e4;
 
 /// The unit in which a file gives spectral radiance.
@@ -113,7 +113,7 @@ pub enum QuantityKind {
     ExpectedElectrons,
     /// Electrons of one noisy exposure.
     Electrons,
-    /// Codes of the analogue-to-digital converter, or values on that scale (signed, fractional once the black level
+    /// Codes of the analog-to-digital converter, or values on that scale (signed, fractional once the black level
     /// is off).
     Adu,
     /// Absolute CIE XYZ; Y in cd m⁻².
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn one_milliwatt_per_micrometre_is_one_watt_per_nanometre_apart_by_area_only() {
+    fn one_milliwatt_per_micrometer_is_one_watt_per_nanometer_apart_by_area_only() {
         // 1 W m⁻² sr⁻¹ µm⁻¹ = 10⁻³ W m⁻² sr⁻¹ nm⁻¹ = 10⁻⁷ W cm⁻² sr⁻¹ nm⁻¹
         assert!((RadianceUnit::WPerM2SrUm.in_w_per_cm2_sr_nm() / 1e-7 - 1.0).abs() < 1e-15);
     }

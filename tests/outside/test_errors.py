@@ -309,7 +309,7 @@ class Usage(Errors):
             *((BAD_DATA, BAD_USAGE), "kaf-1501"),
         )
 
-    def test_sensor_file_with_a_misspelt_key(self):
+    def test_sensor_file_with_a_misspelled_key(self):
         for name in ("kaf-5101ce.yaml", "kaf5101ce_est_qe_1nm.csv", "bg39_1mm.csv"):
             self.write(name, sample_data(f"sensors/{name}").read_bytes())
         light = ["render-radiance", "--electrons", "1,2,3", "--size", "4x4", "-o", "out.exr", "--sensor"]

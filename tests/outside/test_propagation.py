@@ -170,7 +170,7 @@ class Prediction(ProgramCase):
             [(lab(mean + d) - lab(mean - d)) / (2 * d.sum()) for d in np.diag(steps)], axis=1
         )
         self.close(stages["lab"]["covariance"], jacobian @ xyz @ jacobian.T, 1e-6, "Lab")
-        # The mean of noisy colours and their differences, by drawing a million, as many on each phase of the array: errors
+        # The mean of noisy colors and their differences, by drawing a million, as many on each phase of the array: errors
         # of 10⁻³ of a deviation.
         of_phases = [np.asarray(phase["covariance"]) for phase in stages["demosaicked"]["phases"]]
         self.close(np.mean(of_phases, axis=0), camera, 1e-9, "phases")
@@ -207,8 +207,8 @@ class Prediction(ProgramCase):
         cut = stack.reshape(channels, height // size, size, width // size, size).transpose(1, 3, 0, 2, 4)
         cut = cut.reshape(-1, channels, size * size)
         means = cut.mean(axis=2)
-        centred = cut - stack.mean(axis=(1, 2))[None, :, None]
-        return means, np.einsum("nix,njx->nij", centred, centred) / size**2
+        centered = cut - stack.mean(axis=(1, 2))[None, :, None]
+        return means, np.einsum("nix,njx->nij", centered, centered) / size**2
 
     def test_simulated_frames_scatter_as_predicted(self):
         self.matrix()

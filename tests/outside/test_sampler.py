@@ -120,7 +120,7 @@ class Independence(Battery):
         for name, a in noise.items():
             for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1), (0, 2), (2, 0), (0, 16), (0, 256), (64, 0)):
                 product = np.mean(a * np.roll(a, (dy, dx), axis=(0, 1)))
-                self.assertLess(abs(product) * math.sqrt(n), 5.5, f"{name} and its neighbour {dy}, {dx}")
+                self.assertLess(abs(product) * math.sqrt(n), 5.5, f"{name} and its neighbor {dy}, {dx}")
 
     def test_two_dimensional_spectra_are_white(self):
         noise = self.whitened()

@@ -58,11 +58,11 @@ impl Exposure {
     }
 }
 
-/// Natural vignetting of a frame centred on the optical axis.
+/// Natural vignetting of a frame centered on the optical axis.
 ///
 /// cos⁴θ = 1 / (1 + tan²θ_H + tan²θ_V)²        [HP2005, Eq. 1b]
 ///
-/// because cos(arctan t) = 1/√(1 + t²). The tangents are those of the photosites' centres, (j + ½ − N_H/2) · pitch / f;
+/// because cos(arctan t) = 1/√(1 + t²). The tangents are those of the photosites' centers, (j + ½ − N_H/2) · pitch / f;
 /// the paper's range of indices in Eq. 2 has two values too many.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vignetting {

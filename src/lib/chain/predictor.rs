@@ -89,7 +89,7 @@ serde_by_name!(ChainStage);
 pub enum Uncertainty {
     /// Standard deviation over mean signal.
     Relative(f64),
-    /// Expected colour difference, in just noticeable differences of 2.3 ΔE*ab.
+    /// Expected color difference, in just noticeable differences of 2.3 ΔE*ab.
     Jnd(f64),
 }
 
@@ -128,10 +128,10 @@ pub struct ChainPrediction {
     pub electrons: [f64; 3],
     /// One entry per stage.
     pub stages: Vec<StagePrediction>,
-    /// Colour difference that noise makes at a pixel, where there is a matrix.
+    /// Color difference that noise makes at a pixel, where there is a matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_delta_e: Option<NoiseDeltaE>,
-    /// How far to trust the linearisation of smooth hue transition, where that is the method.
+    /// How far to trust the linearization of smooth hue transition, where that is the method.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_order: Option<FirstOrder>,
 }
@@ -201,7 +201,7 @@ pub struct PhaseCovariance {
     pub covariance: [[f64; 3]; 3],
 }
 
-/// Colour difference that noise makes: the distance in L*a*b* between a pixel and the colour without noise.
+/// Color difference that noise makes: the distance in L*a*b* between a pixel and the color without noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NoiseDeltaE {
     /// Expected ΔE*ab.
@@ -442,7 +442,7 @@ impl PredictorSettings {
         }
     }
 
-    /// The colour difference that noise makes in L*a*b*.
+    /// The color difference that noise makes in L*a*b*.
     fn delta_e(&self, mixture: &PixelMoments) -> NoiseDeltaE {
         let found = match self.equations {
             Equations::Exact => mixture.noise_length(mixture.bias, [1.0 / PHASES.len() as f64; PHASES.len()]),

@@ -227,7 +227,7 @@ mod tests {
         assert!((delta_e_94(reference, [57.5, 30.0, 40.0]) - 2.5).abs() < 1e-12);
         assert!((delta_e_94(reference, [60.0, 33.0, 44.0]) - 5.0 / 3.25).abs() < 1e-12);
         assert!((delta_e_94(reference, [60.0, 40.0, 30.0]) - 200f64.sqrt() / 1.75).abs() < 1e-12);
-        // From grey all weights are one.
+        // From gray all weights are one.
         assert!((delta_e_94([50.0, 0.0, 0.0], [50.0, 3.0, 4.0]) - 5.0).abs() < 1e-12);
     }
 

@@ -7,7 +7,7 @@ use crate::names::Named;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 
-/// A colour space that frames are given in.
+/// A color space that frames are given in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Space {
     /// Absolute XYZ, Y in cd m⁻².
@@ -118,10 +118,10 @@ pub fn xyz_from_lab([lightness, a, b]: [f64; 3], white: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// What a curved space does to small changes of XYZ about one colour.
+/// What a curved space does to small changes of XYZ about one color.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Local {
-    /// The colour itself in that space.
+    /// The color itself in that space.
     pub value: [f64; 3],
     /// Derivatives: rows are the space's coordinates, columns X, Y, Z.
     pub jacobian: Matrix3<f64>,
@@ -130,13 +130,13 @@ pub struct Local {
 }
 
 impl Local {
-    /// How far the mean of noisy colours lies from the colour, to second order: ½ tr(H Σ).
+    /// How far the mean of noisy colors lies from the color, to second order: ½ tr(H Σ).
     pub fn bias(&self, covariance: &Matrix3<f64>) -> [f64; 3] {
         self.hessian.map(|hessian| 0.5 * hessian.component_mul(covariance).sum())
     }
 }
 
-/// L*a*b* about a colour.
+/// L*a*b* about a color.
 pub fn lab_about(xyz: [f64; 3], white: [f64; 3]) -> Local {
     const DELTA: f64 = 6.0 / 29.0;
     let derivatives = |i: usize| {
@@ -170,7 +170,7 @@ pub fn lab_about(xyz: [f64; 3], white: [f64; 3]) -> Local {
     Local { value: lab_from_xyz(xyz, white), jacobian, hessian }
 }
 
-/// xyY about a colour; none where X + Y + Z is not above zero.
+/// xyY about a color; none where X + Y + Z is not above zero.
 pub fn xyy_about([x, y, z]: [f64; 3]) -> Option<Local> {
     let sum = x + y + z;
     if !(sum > 0.0 && sum.is_finite()) {
@@ -237,7 +237,7 @@ mod tests {
         }
     }
 
-    /// Sharma, Wu and Dalal's CIEDE2000 data start from L*a*b*; here the classic check of CIELAB itself: a colour of
+    /// Sharma, Wu and Dalal's CIEDE2000 data start from L*a*b*; here the classic check of CIELAB itself: a color of
     /// XYZ (19.01, 20, 21.78) under D65 (95.047, 100, 108.883) is the neutral of L* = 116 · 0.2^⅓ − 16 = 51.837.
     #[test]
     fn neutrals_have_no_chroma_and_the_lightness_of_the_cube_root() {
@@ -264,7 +264,7 @@ mod tests {
         assert!((srgb_encode(0.003_130_8) - srgb_encode(0.003_130_800_1)).abs() < 1e-7);
         assert_eq!(srgb_encode(0.0), 0.0);
         assert!((srgb_encode(1.0) - 1.0).abs() < 1e-15);
-        // Middle grey of IEC 61966-2-1: linear 0.2140 is code 127.5/255.
+        // Middle gray of IEC 61966-2-1: linear 0.2140 is code 127.5/255.
         assert!((srgb_encode(0.214_041_140_482_232_55) - 0.5).abs() < 1e-12);
     }
 

@@ -127,7 +127,7 @@ fn check_keys(name: &str, raw: &Mapping, fields: Keys, parts: &[(&str, Keys)]) -
 fn parse_parts<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8], parts: &[(&str, Keys)]) -> Result<T> {
     let text = checked_text(name, bytes)?;
     let raw = parse_raw(name, text)?;
-    // A misspelt key first: that another is missing then follows from it.
+    // A misspelled key first: that another is missing then follows from it.
     check_keys(name, &raw, field_names::<T>(), parts)?;
     let (typed, unknown) = parse::<T>(name, &raw, text)?;
     match unknown.iter().next() {
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_misspelt_key_is_answered_with_the_right_one() {
+    fn a_misspelled_key_is_answered_with_the_right_one() {
         let complaint = |text: &str| parse_strict::<Small>("s.yaml", text.as_bytes()).unwrap_err().to_string();
         assert_eq!(
             complaint("gain: 1\nread_niose_e: 3\n"),

@@ -118,7 +118,7 @@ impl Distribution {
         below as f64 / self.count.max(1) as f64
     }
 
-    /// The number with `share` of all below it, linear between neighbours: type 7 of \[Hyndman1996].
+    /// The number with `share` of all below it, linear between neighbors: type 7 of \[Hyndman1996].
     fn quantile(&self, sorted: &[f64], share: f64) -> f64 {
         let rank = share * (self.count - 1) as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0, below the count")]

@@ -1,4 +1,4 @@
-//! Linear least squares by orthogonal factorisation, with equations that must hold exactly.
+//! Linear least squares by orthogonal factorization, with equations that must hold exactly.
 
 use nalgebra::DMatrix;
 
@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 /// size would change the solution by a hundredth of itself.
 pub const LARGEST_CONDITION: f64 = 1e4;
 
-/// Finds B that minimises ‖A B − Y‖² + ‖P B‖² where C B = D holds exactly.
+/// Finds B that minimizes ‖A B − Y‖² + ‖P B‖² where C B = D holds exactly.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
     /// A, shape observations × unknowns.

@@ -170,20 +170,20 @@ pub fn rounded(mean: f64, sigma: f64, top: u32, exceeds: impl Fn(f64) -> f64) ->
         code
     };
     let (lowest, highest) = (code((mean - reach).floor()), code((mean + reach).ceil()));
-    let centre = code(mean.round());
+    let center = code(mean.round());
     let mut raw = [0.0; 5];
     for k in lowest..highest {
-        // One step of the code from k to k + 1: below the centre, what falls short of it counts.
-        let offset = (k - centre) as f64;
+        // One step of the code from k to k + 1: below the center, what falls short of it counts.
+        let offset = (k - center) as f64;
         let above = exceeds(k as f64 + 0.5);
-        let share = if k >= centre { above } else { above - 1.0 };
+        let share = if k >= center { above } else { above - 1.0 };
         raw[1] += share;
         raw[2] += (2.0 * offset + 1.0) * share;
         raw[3] += (3.0 * offset * (offset + 1.0) + 1.0) * share;
         raw[4] += (2.0 * offset + 1.0) * (2.0 * offset * (offset + 1.0) + 1.0) * share;
     }
     let variance = (raw[2] - raw[1] * raw[1]).max(0.0);
-    (MeanVariance { mean: centre as f64 + raw[1], variance }, fourth_cumulant(raw))
+    (MeanVariance { mean: center as f64 + raw[1], variance }, fourth_cumulant(raw))
 }
 
 /// Expected length and standard deviation of the length of a normal vector of three components.

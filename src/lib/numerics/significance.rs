@@ -17,7 +17,7 @@ pub fn of_chi_square(x: f64, freedom: f64) -> f64 {
     if x == 0.0 {
         return 0.0;
     }
-    // P and Q are regularised incomplete gamma functions of half of each; both exist for what passed the check.
+    // P and Q are regularized incomplete gamma functions of half of each; both exist for what passed the check.
     let tail =
         if x < freedom { checked_gamma_lr(freedom / 2.0, x / 2.0) } else { checked_gamma_ur(freedom / 2.0, x / 2.0) };
     (2.0 * tail.unwrap_or(0.0)).clamp(0.0, 1.0)

@@ -1,6 +1,6 @@
 //! Runs a loop as it is compiled for the widest vectors that the processor has.
 //!
-//! A [`Kernel`] is plain Rust, written so that the compiler vectorises it. [`run`] compiles it once for every
+//! A [`Kernel`] is plain Rust, written so that the compiler vectorizes it. [`run`] compiles it once for every
 //! [`Instructions`] and picks one at run time. Results have the same bits on all of them: Rust neither contracts a
 //! product and a sum into one rounding nor reorders floating-point sums, so a kernel that calls no function of the
 //! platform's mathematics library gives what its plain version gives.

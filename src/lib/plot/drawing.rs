@@ -2,7 +2,7 @@
 
 use super::figure::Anchor;
 
-/// A place: x to the right, y downwards, in pixels.
+/// A place: x to the right, y downward, in pixels.
 pub(super) type Point = [f64; 2];
 
 /// An upright rectangle.
@@ -64,7 +64,7 @@ pub(super) struct Text {
     pub size: f64,
     pub anchor: Anchor,
     /// Whether it reads from bottom to top.
-    pub upwards: bool,
+    pub upward: bool,
     pub rgb: [u8; 3],
 }
 

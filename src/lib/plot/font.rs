@@ -23,7 +23,7 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| advance(glyph(c))).sum::<f64>() * size / f64::from(FACE.units_per_em())
 }
 
-/// The outlines of a text in units of the font, y upwards, and the scale that gives it a size.
+/// The outlines of a text in units of the font, y upward, and the scale that gives it a size.
 pub(super) fn outline(text: &str, size: f64) -> (Option<tiny_skia::Path>, f64) {
     let mut pen = Pen { path: PathBuilder::new(), x: 0.0 };
     let mut x = 0.0;

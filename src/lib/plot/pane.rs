@@ -8,7 +8,7 @@ use super::marks::{draw_error_bar, draw_mark, point_radius};
 use super::room::{Room, arrange, x_ticks, y_ticks};
 use super::style::{
     DASHES, FRAME, GRID, LABEL, LINE, MARGIN, MIDDLE, MINOR_GRID, REFERENCE, RIGHT, TEXT, TICK, ink, line, write,
-    write_upwards,
+    write_upward,
 };
 
 /// Coordinates end here; beyond, the rounding of 32-bit floats would show.
@@ -168,7 +168,7 @@ impl<'a> Pane<'a> {
         let middle = self.area.top + 0.5 * self.area.height;
         let foot = self.area.bottom() + TICK + LINE + LABEL + 3.0;
         write(drawing, &self.panel.x.label, [center, foot], LABEL, Anchor::Middle);
-        write_upwards(drawing, &self.panel.y.label, [self.cell.left + MARGIN + LABEL, middle], LABEL);
+        write_upward(drawing, &self.panel.y.label, [self.cell.left + MARGIN + LABEL, middle], LABEL);
         write(drawing, &self.panel.title, [center, self.cell.top + 6.0 + LABEL], LABEL, Anchor::Middle);
     }
 

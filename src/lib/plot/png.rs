@@ -111,7 +111,7 @@ fn paint_text(canvas: &mut Pixmap, text: &Text) {
     };
     let ([x, y], scale, shift) = (text.at.map(|place| place as f32), scale as f32, shift as f32);
     // The font's y goes up, the canvas's down; an upward text goes along −y.
-    let transform = if text.upwards {
+    let transform = if text.upward {
         Transform::from_row(0.0, -scale, -scale, 0.0, x, y - shift)
     } else {
         Transform::from_row(scale, 0.0, 0.0, -scale, x + shift, y)

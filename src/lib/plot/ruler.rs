@@ -111,8 +111,8 @@ impl Ruler {
                 continue;
             }
             for digit in 1..=9 {
-                let labelled = digit == 1 || (span < 2.0 && (digit == 2 || digit == 5));
-                let label = labelled.then(|| decade_label(digit, decade));
+                let labeled = digit == 1 || (span < 2.0 && (digit == 2 || digit == 5));
+                let label = labeled.then(|| decade_label(digit, decade));
                 ticks.extend(self.tick(f64::from(digit) * 10_f64.powi(decade), label));
             }
         }

@@ -40,10 +40,10 @@ pub(super) fn line(color: Color, width: f64, dashes: &'static [f64]) -> Stroke {
 
 /// Writes a line of text, its baseline at a place.
 pub(super) fn write(drawing: &mut Drawing, text: &str, at: Point, size: f64, anchor: Anchor) {
-    drawing.text(Text { text: text.into(), at, size, anchor, upwards: false, rgb: TEXT_RGB });
+    drawing.text(Text { text: text.into(), at, size, anchor, upward: false, rgb: TEXT_RGB });
 }
 
 /// Writes a line of text from bottom to top.
-pub(super) fn write_upwards(drawing: &mut Drawing, text: &str, at: Point, size: f64) {
-    drawing.text(Text { text: text.into(), at, size, anchor: Anchor::Middle, upwards: true, rgb: TEXT_RGB });
+pub(super) fn write_upward(drawing: &mut Drawing, text: &str, at: Point, size: f64) {
+    drawing.text(Text { text: text.into(), at, size, anchor: Anchor::Middle, upward: true, rgb: TEXT_RGB });
 }

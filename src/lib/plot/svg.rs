@@ -108,7 +108,7 @@ fn write_text(out: &mut String, text: &Text) {
         Anchor::End => "end",
     };
     let _ = write!(out, "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" text-anchor=\"{anchor}\"", number(text.size));
-    if text.upwards {
+    if text.upward {
         let _ = write!(out, " transform=\"rotate(-90 {x} {y})\"");
     }
     let _ = writeln!(out, " fill=\"{}\">{}</text>", hex(text.rgb), escaped(&text.text));

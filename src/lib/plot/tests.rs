@@ -402,9 +402,9 @@ fn letters_of_a_png_stand_where_the_svg_has_its_text() {
         let expected = [left + 1.3, top + 0.03 * 13.0, right - 1.3, bottom - 0.03 * 13.0];
         assert!(seen.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1.1), "{anchor:?} {seen:?} {expected:?}");
     }
-    // Upwards: the label of the y axis.
-    let labelled = |label| Plot::new("", Panel::new(axis("x"), axis(label)));
-    let (with, other) = (labelled("HxxxH"), labelled(" "));
+    // Upward: the label of the y axis.
+    let labeled = |label| Plot::new("", Panel::new(axis("x"), axis(label)));
+    let (with, other) = (labeled("HxxxH"), labeled(" "));
     let (_, [left, top, right, bottom]) = words(&with).into_iter().find(|(word, _)| word == "HxxxH").unwrap();
     let seen = difference(&with, &other).unwrap();
     let expected = [left + 0.03 * 15.0, top + 1.5, right - 0.24 * 15.0, bottom - 1.5];

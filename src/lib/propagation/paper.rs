@@ -2,7 +2,7 @@
 //!
 //! Mended are: Eqs. 16 and 17, whose 1/32 and 1/16 stand outside the root (Eqs. 55 and 57 have them inside); Eq. 54,
 //! which lacks the factor σ_o after r₁ and r₂; the last term of Eq. 57, which has σ^(g→y) for σ^(g→x); Eqs. 38 and 39a,
-//! which put in the mean number of neighbours, 2.66, where the mean of its inverse, 5/12, belongs; and Eq. 58, whose
+//! which put in the mean number of neighbors, 2.66, where the mean of its inverse, 5/12, belongs; and Eq. 58, whose
 //! 80 for green should be 82.
 
 use super::gains;
@@ -43,7 +43,7 @@ fn bilinear(own: f64, share: f64, all: Option<f64>) -> f64 {
     }
 }
 
-/// Mean of 1/m over the sites where red or blue is interpolated: two thirds have two neighbours, one third four.
+/// Mean of 1/m over the sites where red or blue is interpolated: two thirds have two neighbors, one third four.
 const CHROMINANCE_SHARE: f64 = 2.0 / 3.0 / 2.0 + 1.0 / 3.0 / 4.0;
 
 /// The covariance of demosaicked channels from variances and means (above black) of the photosites of R, G and B; none
@@ -100,7 +100,7 @@ fn smooth_hue(variance: f64, ratio: f64, green_demosaicked: f64, populations: Op
 /// Correlation coefficients of Eqs. 16, 17 and 20.
 ///
 /// The names are the paper's: between red (blue) and the mean of the K domain about it, r₁ (r₂); between measured green
-/// and the K of its red (blue) neighbours, r′₁; between interpolated green and K, r′₂; between interpolated green and
+/// and the K of its red (blue) neighbors, r′₁; between interpolated green and K, r′₂; between interpolated green and
 /// the red (blue) measured there, r₃; between demosaicked channels r_rg, r_rb, r_gb.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Coefficients {

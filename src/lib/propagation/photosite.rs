@@ -226,7 +226,7 @@ mod tests {
                         edge += 1.0;
                     }
                     edges.sort_by(f64::total_cmp);
-                    let centre = mean.round();
+                    let center = mean.round();
                     for pair in edges.windows(2).filter(|pair| pair[1] > pair[0]) {
                         let halves = 2.0 * ((pair[1] - pair[0]) / step).ceil();
                         let h = (pair[1] - pair[0]) / halves;
@@ -237,12 +237,12 @@ mod tests {
                             probability += weight * h / 3.0 * normal::density(pair[0] + k * h);
                             k += 1.0;
                         }
-                        let offset = code(f64::midpoint(pair[0], pair[1])) - centre;
+                        let offset = code(f64::midpoint(pair[0], pair[1])) - center;
                         first += probability * offset;
                         second += probability * offset * offset;
                     }
                     let variance = second - first * first;
-                    assert!((found.mean - centre - first).abs() < 1e-9, "{sigma} {mean}: {}", found.mean);
+                    assert!((found.mean - center - first).abs() < 1e-9, "{sigma} {mean}: {}", found.mean);
                     assert!((found.variance - variance).abs() < 1e-9, "{sigma} {mean}: {}", found.variance - variance);
                 }
             }

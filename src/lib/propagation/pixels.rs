@@ -138,7 +138,7 @@ impl LevelVariance {
     /// The variance at a level; below zero as at zero, beyond the last as there.
     fn at(&self, level: f64) -> f64 {
         let place = (level / self.step).clamp(0.0, STEPS as f64);
-        // A level that is not finite has a neighbour's variance, as its sample has no meaning; `min` and `max` drop NaN.
+        // A level that is not finite has a neighbor's variance, as its sample has no meaning; `min` and `max` drop NaN.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1024; NaN becomes 0")]
         let index = (place as usize).min(STEPS - 1);
         let share = if place.is_nan() { 0.0 } else { place - index as f64 };

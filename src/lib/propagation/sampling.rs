@@ -1,6 +1,6 @@
 //! How far sample means and covariances of a region scatter about what is predicted.
 //!
-//! Pixels are weighted sums of photosites, o_i(a) = Σ_s W_i,a(s) x_s, so neighbours are correlated: C_ij(a, b) =
+//! Pixels are weighted sums of photosites, o_i(a) = Σ_s W_i,a(s) x_s, so neighbors are correlated: C_ij(a, b) =
 //! Σ_s W_i,a(s) W_j,b(s) σ_s². The sample mean of n pixels has the covariance Γ = (1/n²) Σ C(a, b). The sample covariance
 //! s_ij (divisor n − 1) is a quadratic form in the photosites, with P the projection that takes off the mean:
 //!

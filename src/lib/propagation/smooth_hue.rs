@@ -73,11 +73,11 @@ pub fn second_order(
         let linear = gains::pixel(&weights, phase).covariance(variances);
         of_phase(pattern, phase, mean, variances, third, linear)
     });
-    let centre = moments.iter().map(|(mean, _)| mean).sum::<Vector3<f64>>() / 4.0;
-    let spread = |mean: &Vector3<f64>| (mean - centre) * (mean - centre).transpose();
+    let center = moments.iter().map(|(mean, _)| mean).sum::<Vector3<f64>>() / 4.0;
+    let spread = |mean: &Vector3<f64>| (mean - center) * (mean - center).transpose();
     let covariance =
         moments.iter().map(|(mean, covariance)| covariance + spread(mean)).sum::<Matrix3<f64>>() / PHASES.len() as f64;
-    Some(SecondOrder { bias: (centre - Vector3::from(mean)).into(), covariance })
+    Some(SecondOrder { bias: (center - Vector3::from(mean)).into(), covariance })
 }
 
 /// Mean and covariance of the pixels of one phase; `linear` is their covariance to first order.
@@ -101,7 +101,7 @@ fn of_phase(
     };
     let chrominances = [Class::Red, Class::Blue].map(|class| (class, greens_of_hue(pattern, phase, class)));
     let (mut means, mut covariance) = (Vector3::from(mean), linear);
-    // Mean over the neighbours of E (1 + a)ᵖ/(1 + uᵢ) − 1. All expectations are kept less 1, so that nothing cancels.
+    // Mean over the neighbors of E (1 + a)ᵖ/(1 + uᵢ) − 1. All expectations are kept less 1, so that nothing cancels.
     let average = |power: u32, here: &Stencil, around: &[Stencil]| {
         around.iter().map(|stencil| noise.quotient(power, here, stencil, None)).sum::<f64>() / around.len() as f64
     };

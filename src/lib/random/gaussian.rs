@@ -140,7 +140,7 @@ fn upper_quantile(share: f64) -> f64 {
     };
     let q = 0.5 - share;
     if q <= 0.425 {
-        return q * ratio(0.180_625 - q * q, &CENTRE.0, &CENTRE.1);
+        return q * ratio(0.180_625 - q * q, &CENTER.0, &CENTER.1);
     }
     let r = (-libm::log(share)).sqrt();
     if r <= 5.0 { ratio(r - 1.6, &MIDDLE.0, &MIDDLE.1) } else { ratio(r - 5.0, &FAR.0, &FAR.1) }
@@ -149,7 +149,7 @@ fn upper_quantile(share: f64) -> f64 {
 /// Numerator and denominator of a rational approximation.
 type Rational = ([f64; 8], [f64; 8]);
 
-const CENTRE: Rational = (
+const CENTER: Rational = (
     [
         3.387_132_872_796_366_608,
         1.331_416_678_917_843_774_5e2,

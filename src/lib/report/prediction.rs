@@ -190,7 +190,7 @@ fn text(found: &ChainPrediction, quadrature_error: Option<[f64; 3]>) -> String {
     if let Some(noise) = &found.noise_delta_e {
         let _ = write!(
             out,
-            "\ncolour difference that noise makes at a pixel: dE*ab {} +- {}, {} JND",
+            "\ncolor difference that noise makes at a pixel: dE*ab {} +- {}, {} JND",
             shown("std", Some(noise.mean)),
             shown("std", Some(noise.std)),
             shown("std", Some(noise.jnd))

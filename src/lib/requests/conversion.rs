@@ -20,7 +20,7 @@ pub struct Conversion {
     /// Matrix file, as fit-matrix makes it
     #[arg(long, value_name = "FILE")]
     pub matrix: PathBuf,
-    /// Colour space
+    /// Color space
     #[arg(long, default_value = Space::Xyz.name(), value_parser = values::choice::<Space>())]
     pub space: Space,
     /// The white of L\*a\*b\* and sRGB.

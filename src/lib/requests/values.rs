@@ -166,7 +166,7 @@ pub fn place(text: &str) -> Result<[i64; 2], String> {
     }
 }
 
-/// Reads a colour filter array's pattern.
+/// Reads a color filter array's pattern.
 ///
 /// # Errors
 ///

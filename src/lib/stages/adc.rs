@@ -1,4 +1,4 @@
-//! The analogue-to-digital converter.
+//! The analog-to-digital converter.
 
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
@@ -22,7 +22,7 @@ pub struct AdcSettings {
 ///
 /// y = round(K·n + y₀)        n in e⁻, y₀ = bias        [HP2005, Eq. 12]
 ///
-/// Rounding *is* the quantisation noise (variance 1/12 ADU² while σ ≥ ½ ADU); nothing else is added for it. Ties go
+/// Rounding *is* the quantization noise (variance 1/12 ADU² while σ ≥ ½ ADU); nothing else is added for it. Ties go
 /// away from zero. NaN stays NaN.
 ///
 /// # Examples
@@ -288,7 +288,7 @@ mod tests {
         to_sample(level.clamp(0.0, top) + 0.0)
     }
 
-    /// Ties and their neighbours at every code of 16 bits, the ends of the range, and floats of all sizes.
+    /// Ties and their neighbors at every code of 16 bits, the ends of the range, and floats of all sizes.
     #[test]
     fn codes_are_those_of_the_plain_version_on_every_set_of_instructions() {
         let ties = (-4..=2 * 65_540).map(|halves: i32| 0.5 * halves as f32);

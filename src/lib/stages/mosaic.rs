@@ -1,4 +1,4 @@
-//! The colour filter array: of three planes, each photosite keeps the one that its filter lets through.
+//! The color filter array: of three planes, each photosite keeps the one that its filter lets through.
 
 use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::Result;

@@ -1,4 +1,4 @@
-//! From expected electrons per source pixel to a frame of photosites: patches, vignetting, the colour filter array.
+//! From expected electrons per source pixel to a frame of photosites: patches, vignetting, the color filter array.
 
 use crate::camera::optics::Vignetting;
 use crate::cfa::{CfaPattern, Class};

@@ -28,7 +28,7 @@ pub struct ColorSettings {
     pub white_luminance: Option<f64>,
 }
 
-/// Turns demosaicked ADU into colours.
+/// Turns demosaicked ADU into colors.
 ///
 /// x = M ρ / H        ρ: ADU above black; H = t π T / (4N² + 1)        [HP2005, Eq. 18, per exposure]
 ///
@@ -268,7 +268,7 @@ impl Kernel for XyzRow<'_> {
 mod tests {
     use super::*;
 
-    /// Also where one colour of a pixel is no number, at every place of a vector.
+    /// Also where one color of a pixel is no number, at every place of a vector.
     #[test]
     fn rows_of_xyz_are_the_products_of_the_matrix_on_every_set_of_instructions() {
         let matrix = Matrix3::new(8.7e-4, 4.5e-5, 4.4e-5, 3.7e-4, 3.1e-4, -2.6e-5, 1.0e-4, -1.6e-4, 5.3e-4);

@@ -17,7 +17,7 @@ pub struct Counts {
     pub negative: u64,
     /// Demosaicked values without a green to divide by, or beyond the range of samples.
     pub undefined_hue: u64,
-    /// Colours outside sRGB.
+    /// Colors outside sRGB.
     pub out_of_gamut: u64,
     /// Pixels whose noise cannot be propagated.
     pub propagation_void: u64,
@@ -66,7 +66,7 @@ impl Counts {
                 self.undefined_hue,
                 "values had no green to divide by, or lay beyond the range of samples; bilinear ones stand in",
             ),
-            (self.out_of_gamut, "colours lie outside sRGB and were clipped"),
+            (self.out_of_gamut, "colors lie outside sRGB and were clipped"),
             (
                 self.propagation_void,
                 "pixels have a green too near its noise to divide by; their standard deviations say only that they are large",

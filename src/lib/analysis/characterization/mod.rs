@@ -1,4 +1,4 @@
-//! Characterisation: the matrix from camera signals to XYZ, fitted on known radiances or on the responses alone.
+//! Characterization: the matrix from camera signals to XYZ, fitted on known radiances or on the responses alone.
 
 pub mod evaluation;
 pub mod noise_aware;

@@ -104,7 +104,7 @@ fn check_samples(signals: &Signals, samples: impl IntoIterator<Item = usize>) ->
 
 /// Fits the matrix that takes camera signals to XYZ. `responses` are those at single wavelengths, for maximum ignorance.
 ///
-/// All three rows follow from one factorisation: min Σ wᵢ |xᵢ − M ρᵢ|², where M ρ₀ = x₀ for the sample kept exact. Maximum
+/// All three rows follow from one factorization: min Σ wᵢ |xᵢ − M ρᵢ|², where M ρ₀ = x₀ for the sample kept exact. Maximum
 /// ignorance takes each wavelength as a sample; with positivity the correlation of the powers, E(L Lᵀ) = I/12 + 1 1ᵀ/4,
 /// adds one sample of equal power, √3 times as strong. With `noise` the noise of the camera is weighed in.
 ///

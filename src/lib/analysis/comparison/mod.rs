@@ -301,7 +301,7 @@ mod tests {
         Side::Frame(frame(QuantityKind::Lab, white, &["L", "a", "b"]))
     }
 
-    const GREY: Side<MemoryFrame> = Side::Color([20.0, 20.0, 20.0]);
+    const GRAY: Side<MemoryFrame> = Side::Color([20.0, 20.0, 20.0]);
 
     fn white_of(
         a: Side<MemoryFrame>,
@@ -318,22 +318,22 @@ mod tests {
         let d65 = |luminance| Some(xyz_of_chromaticity(D65_XY, luminance));
         let other = Some([1.0, 2.0, 3.0]);
         let found = |a, b| white_of(a, b, None, None, None).unwrap();
-        assert_eq!(found(GREY, GREY), d65(100.0));
-        assert_eq!(found(xyz(Some(WHITE)), GREY), Some(WHITE));
-        assert_eq!(found(GREY, xyz(Some(WHITE))), Some(WHITE));
+        assert_eq!(found(GRAY, GRAY), d65(100.0));
+        assert_eq!(found(xyz(Some(WHITE)), GRAY), Some(WHITE));
+        assert_eq!(found(GRAY, xyz(Some(WHITE))), Some(WHITE));
         assert_eq!(found(xyz(Some(WHITE)), xyz(other)), Some(WHITE));
         assert_eq!(found(xyz(None), xyz(other)), other);
         // L*a*b* cannot be seen under another white; XYZ can.
         assert_eq!(found(xyz(other), lab(Some(WHITE))), Some(WHITE));
         assert_eq!(found(lab(Some(WHITE)), lab(None)), None);
-        assert_eq!(white_of(GREY, GREY, Some(Space::Lab), None, None).unwrap(), None);
-        let asked = |white, luminance| white_of(xyz(Some(WHITE)), GREY, None, white, luminance).unwrap();
+        assert_eq!(white_of(GRAY, GRAY, Some(Space::Lab), None, None).unwrap(), None);
+        let asked = |white, luminance| white_of(xyz(Some(WHITE)), GRAY, None, white, luminance).unwrap();
         assert_eq!(asked(Some(White::D65), None), d65(3100.0));
         assert_eq!(asked(Some(White::D65), Some(50.0)), d65(50.0));
         assert_eq!(asked(Some(White::Absolute([1.0, 2.0, 3.0])), None), other);
         assert_eq!(asked(None, Some(6200.0)), Some([6000.0, 6200.0, 6400.0]));
-        assert_eq!(white_of(xyz(None), GREY, None, None, Some(80.0)).unwrap(), d65(80.0));
-        assert_eq!(white_of(GREY, GREY, None, Some(White::EqualEnergy), Some(3.0)).unwrap().unwrap()[1], 3.0);
+        assert_eq!(white_of(xyz(None), GRAY, None, None, Some(80.0)).unwrap(), d65(80.0));
+        assert_eq!(white_of(GRAY, GRAY, None, Some(White::EqualEnergy), Some(3.0)).unwrap().unwrap()[1], 3.0);
     }
 
     #[test]
@@ -342,14 +342,14 @@ mod tests {
         let absolute = Some(White::Absolute([1.0, 2.0, 3.0]));
         let refused = |a, b, white, luminance| white_of(a, b, None, white, luminance).unwrap_err();
         for white in [None, Some(White::D65)] {
-            assert!(matches!(refused(xyz(None), GREY, white, None), Error::MissingKey { key: "color.white", .. }));
+            assert!(matches!(refused(xyz(None), GRAY, white, None), Error::MissingKey { key: "color.white", .. }));
         }
         assert!(matches!(refused(lab(Some(WHITE)), lab(other), None, None), Error::Format { .. }));
         assert!(matches!(refused(lab(Some(WHITE)), xyz(None), absolute, None), Error::Format { .. }));
-        assert!(matches!(refused(lab(Some(WHITE)), GREY, None, Some(1.0)), Error::Format { .. }));
-        assert!(matches!(refused(GREY, GREY, absolute, Some(1.0)), Error::Usage(_)));
+        assert!(matches!(refused(lab(Some(WHITE)), GRAY, None, Some(1.0)), Error::Format { .. }));
+        assert!(matches!(refused(GRAY, GRAY, absolute, Some(1.0)), Error::Usage(_)));
         let impossible = Some(White::Absolute([1.0, 0.0, 1.0]));
-        assert!(matches!(refused(GREY, GREY, impossible, None), Error::Usage(_)));
+        assert!(matches!(refused(GRAY, GRAY, impossible, None), Error::Usage(_)));
     }
 
     /// xyY and L\*a\*b\* are the same colors as the XYZ that they were made of.
@@ -424,7 +424,7 @@ mod tests {
         wide.header.name = "wide".into();
         let error = compare(lab(None), Side::Frame(wide)).unwrap_err().to_string();
         assert_eq!(error, "wide: its size is 9x1, but that of frame is 2x1; compare images of one size");
-        assert!(matches!(compare(GREY, GREY).unwrap().map_header(), Err(Error::Usage(_))));
+        assert!(matches!(compare(GRAY, GRAY).unwrap().map_header(), Err(Error::Usage(_))));
         let mut lost = frame(QuantityKind::Lab, None, &["L", "a", "b"]);
         lost.samples.fill(f32::NAN);
         let mut comparison = compare(Side::Frame(lost), lab(None)).unwrap();

@@ -209,8 +209,8 @@ fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Te
     let variance: f64 =
         terms.iter().flat_map(|(a, f)| terms.iter().map(move |(b, g)| f * g * sampling.spread[*a][*b])).sum();
     let freedom = (1.0 - expected * expected).powi(2) / variance;
-    let centre = expected.atanh() + expected / (2.0 * freedom);
-    let z = (found.clamp(-1.0, 1.0).atanh() - centre) * (freedom - 2.0).max(f64::MIN_POSITIVE).sqrt();
+    let center = expected.atanh() + expected / (2.0 * freedom);
+    let z = (found.clamp(-1.0, 1.0).atanh() - center) * (freedom - 2.0).max(f64::MIN_POSITIVE).sqrt();
     Test {
         subject: Subject::Correlation,
         channels: vec![measured.names[i].clone(), measured.names[j].clone()],

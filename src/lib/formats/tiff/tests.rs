@@ -595,7 +595,7 @@ fn tiles_and_planes_are_put_together() {
             for rows in [1, 2, 3, 7] {
                 assert_eq!(read_all(&mut reader, rows).unwrap(), wanted, "{tiled} {planar} {method} {rows}");
             }
-            // And upwards.
+            // And upward.
             for row in (0..7).rev() {
                 let mut samples = [0.0; 15];
                 reader.read_rows(row, 1, &mut samples).unwrap();

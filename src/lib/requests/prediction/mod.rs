@@ -312,7 +312,7 @@ impl NoisePrediction {
         let Some(path) = &self.matrix else {
             return match self.uncertainty {
                 Some(Uncertainty::Jnd(_)) => {
-                    Err(Error::Usage("an uncertainty in jnd needs colours; give --matrix FILE".into()))
+                    Err(Error::Usage("an uncertainty in jnd needs colors; give --matrix FILE".into()))
                 }
                 _ => Ok(None),
             };

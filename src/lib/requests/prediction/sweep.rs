@@ -64,7 +64,7 @@ pub(super) fn uncertainty(text: &str) -> Result<Uncertainty, String> {
     let jnd = text.strip_suffix("jnd").and_then(positive).map(Uncertainty::Jnd);
     relative
         .or(jnd)
-        .ok_or_else(|| "give per cent of the signal, such as 0.5%, or a colour difference, such as 0.1jnd".into())
+        .ok_or_else(|| "give percent of the signal, such as 0.5%, or a color difference, such as 0.1jnd".into())
 }
 
 #[cfg(test)]

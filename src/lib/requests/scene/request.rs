@@ -23,7 +23,7 @@ pub struct Scene {
     /// Focal length in mm, for --vignetting
     #[arg(id = "focal-length", long, value_name = "MM", default_value_t = 50.0, value_parser = values::positive, allow_negative_numbers = true)]
     pub focal_length_mm: f64,
-    /// Darken the frame away from its centre by the fourth power of the cosine
+    /// Darken the frame away from its center by the fourth power of the cosine
     #[arg(long)]
     pub vignetting: bool,
     /// How strong the signal is.

@@ -1,4 +1,4 @@
-//! Bilinear interpolation: each missing sample is the mean of its nearest neighbours of that class [HP2005, Sec. 6.1].
+//! Bilinear interpolation: each missing sample is the mean of its nearest neighbors of that class [HP2005, Sec. 6.1].
 
 use super::rows::{Line, Planes, pick};
 use crate::numerics::vectors::Kernel;

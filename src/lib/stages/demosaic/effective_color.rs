@@ -1,4 +1,4 @@
-//! Effective colour interpolation: everything through the differences K_R = G − R and K_B = G − B
+//! Effective color interpolation: everything through the differences K_R = G − R and K_B = G − B
 //! [HP2005, Sec. 6.3; PeiTam2003].
 
 use super::rows::{Line, Planes, pick};
@@ -7,7 +7,7 @@ use crate::numerics::vectors::Kernel;
 /// The differences K of a row from five rows of photosites; what it gives at green sites is not used.
 ///
 /// K_R at a green site is G − (R_above + R_below)/2 (the printed minus sign between the two is a misprint), or the same
-/// with the red neighbours at its sides; that at a red site is the mean of the four around it. In samples x around a
+/// with the red neighbors at its sides; that at a red site is the mean of the four around it. In samples x around a
 /// red site, d sites away,
 ///
 /// K = ¼ Σ x₁ − ⅛ Σ x₂ − ½ x₀

@@ -8,9 +8,9 @@ use crate::numerics::vectors::Kernel;
 
 /// Fills a row of the output from five rows of photosites.
 ///
-/// At a red or blue site, green is the mean of its four neighbours and half the curvature of the class measured there,
-/// and the opposite class the mean of four diagonal neighbours and three quarters of that curvature; at a green site,
-/// red and blue are the mean of their two neighbours and five eighths of the curvature of green.
+/// At a red or blue site, green is the mean of its four neighbors and half the curvature of the class measured there,
+/// and the opposite class the mean of four diagonal neighbors and three quarters of that curvature; at a green site,
+/// red and blue are the mean of their two neighbors and five eighths of the curvature of green.
 ///
 /// With samples of at most M in size, values are off by at most 10·2⁻²⁴ M from those of the same samples in doubles.
 pub(super) struct Row<'a> {
@@ -51,8 +51,8 @@ impl Kernel for Row<'_> {
     }
 }
 
-/// Eighths of the 5×5 stencils of \[MHC2004, Fig. 2], top left quarter and centre lines: green at red or blue; red or
-/// blue at green with its neighbours of that class beside it; red at blue, blue at red.
+/// Eighths of the 5×5 stencils of \[MHC2004, Fig. 2], top left quarter and center lines: green at red or blue; red or
+/// blue at green with its neighbors of that class beside it; red at blue, blue at red.
 const GREEN: [[f64; 3]; 3] = [[0.0, 0.0, -1.0], [0.0, 0.0, 2.0], [-1.0, 2.0, 4.0]];
 const BESIDE: [[f64; 3]; 3] = [[0.0, 0.0, 0.5], [0.0, -1.0, 0.0], [-1.0, 4.0, 5.0]];
 const OPPOSITE: [[f64; 3]; 3] = [[0.0, 0.0, -1.5], [0.0, 2.0, 0.0], [-1.5, 0.0, 6.0]];

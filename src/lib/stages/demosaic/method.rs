@@ -9,7 +9,7 @@ pub enum Method {
     Bilinear,
     /// Smooth hue transition interpolation (SHTI), of the ratios R/G and B/G \[Cok1987].
     SmoothHue,
-    /// Effective colour interpolation (ECI), of the differences G − R and G − B \[PeiTam2003].
+    /// Effective color interpolation (ECI), of the differences G − R and G − B \[PeiTam2003].
     #[default]
     EffectiveColor,
     /// Malvar, He and Cutler's linear filters of 5×5 sites (MHC) \[MHC2004].

@@ -1,4 +1,4 @@
-//! Demosaicking: the two classes that each photosite did not measure, from its neighbours [HP2005, App. A].
+//! Demosaicking: the two classes that each photosite did not measure, from its neighbors [HP2005, App. A].
 //!
 //! One file a method. Each fills a row of the output from a few rows of the CFA plane, black level removed, edges
 //! mirrored without repeating the edge sample, which keeps the phase of the filter array. Interpolation is in 32-bit

@@ -31,7 +31,7 @@ impl Plane<'_> {
         self.pattern.class(x as i64, y as i64)
     }
 
-    /// Mean of a function over the neighbours of another class than the pixel's own, which are beside it, above and below
+    /// Mean of a function over the neighbors of another class than the pixel's own, which are beside it, above and below
     /// it, or diagonal to it, never both.
     fn mean(&self, x: isize, y: isize, class: Class, f: impl Fn(isize, isize) -> f64) -> f64 {
         let near = [[-1, 0], [1, 0], [0, -1], [0, 1], [-1, -1], [1, -1], [-1, 1], [1, 1]];

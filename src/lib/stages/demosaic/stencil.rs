@@ -70,7 +70,7 @@ fn offsets() -> impl Iterator<Item = [isize; 2]> {
     (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| [x, y]))
 }
 
-/// A place in the 2×2 period of a colour filter array: parities of the sensor's column and row.
+/// A place in the 2×2 period of a color filter array: parities of the sensor's column and row.
 pub const PHASES: [[isize; 2]; 4] = [[0, 0], [1, 0], [0, 1], [1, 1]];
 
 /// The phase, as an index into [`PHASES`], of the sensor's column `x` and row `y`.

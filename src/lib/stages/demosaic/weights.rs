@@ -1,6 +1,6 @@
 //! The table of weights: what each demosaicked value is made of, site by site.
 //!
-//! About a uniform scene every method is a linear filter whose stencils repeat with the 2×2 phases of the colour filter
+//! About a uniform scene every method is a linear filter whose stencils repeat with the 2×2 phases of the color filter
 //! array. The table is built from the definition of each method in [HP2005, App. A] as a sum of sites, apart from the
 //! filters themselves; tests drive impulses through the filters and get it back. Propagation takes its covariances
 //! from it.
@@ -32,7 +32,7 @@ impl Surroundings {
         if near.is_empty() { diagonals.to_vec() } else { near }
     }
 
-    /// Green at a site, bilinear, or through the differences G − X at its four neighbours as ECI has it.
+    /// Green at a site, bilinear, or through the differences G − X at its four neighbors as ECI has it.
     fn green(&self, site: [isize; 2], through_differences: bool) -> Stencil {
         if self.class(site) == Class::Green {
             return Stencil::site(site);
@@ -55,7 +55,7 @@ impl Surroundings {
     ///
     /// X̂ = mean of xᵢ + ρ (ĝ₀ − mean of ĝᵢ)
     ///
-    /// over the neighbours i of that class. Bilinear interpolation is ρ = 0, effective colour interpolation ρ = 1, and
+    /// over the neighbors i of that class. Bilinear interpolation is ρ = 0, effective color interpolation ρ = 1, and
     /// smooth hue transition, X̂ = ĝ₀ · mean of xᵢ/ĝᵢ, is ρ = x̄/ḡ to first order about its means.
     fn chrominance(&self, wanted: Class, through_differences: bool) -> (Stencil, Stencil) {
         let here = [0, 0];
@@ -73,7 +73,7 @@ impl Surroundings {
 }
 
 /// The greens that smooth hue transition restores `wanted` from at the pixels of a phase: that of the pixel itself, and
-/// those of the neighbours whose hues it takes the mean of; none where `wanted` is measured.
+/// those of the neighbors whose hues it takes the mean of; none where `wanted` is measured.
 pub fn greens_of_hue(pattern: CfaPattern, phase: usize, wanted: Class) -> (Stencil, Vec<Stencil>) {
     let surroundings = Surroundings { pattern, phase: PHASES[phase] };
     let green = |site| surroundings.green(site, false);
@@ -289,7 +289,7 @@ mod tests {
     /// about 64, of weights below 4; eleven roundings of values up to 192 in single precision, half of them of either
     /// sign, add 11 · 2⁻²⁴ · 192 / ½ = 2.5·10⁻⁴.
     #[test]
-    fn small_impulses_through_smooth_hue_give_its_linearisation_back() {
+    fn small_impulses_through_smooth_hue_give_its_linearization_back() {
         for means in [[64.0, 64.0, 64.0], [96.0, 64.0, 128.0], [32.0, 64.0, 16.0]] {
             check(Method::SmoothHue, means, 0.5, 5e-4);
         }

@@ -160,7 +160,7 @@ fn trade(errors: &[Vec<f64>], judged: usize, noise: &[f64]) -> Panel {
     let ends = noise.iter().fold([f64::INFINITY, 0.0], |[low, high], &value| [value.min(low), value.max(high)]);
     for choice in &points {
         let [x, y] = place(choice);
-        // Beside the point, towards the middle.
+        // Beside the point, toward the middle.
         let aside = 0.015 * (ends[1] - ends[0]);
         let is_left = x < 0.5 * (ends[0] + ends[1]);
         let (x, anchor) = if is_left { (x + aside, Anchor::Start) } else { (x - aside, Anchor::End) };

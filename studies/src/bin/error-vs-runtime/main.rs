@@ -66,7 +66,7 @@ impl Study {
         frames::mosaicked(&frames::uniform(&self.camera.sensor, size, electrons)?)
     }
 
-    /// A sky that becomes brighter and whiter downwards, three planes of expected electrons.
+    /// A sky that becomes brighter and whiter downward, three planes of expected electrons.
     fn sky_with_gradient(&self, [width, height]: [usize; 2]) -> MemoryFrame {
         let mut samples = Vec::with_capacity(3 * width * height);
         for y in 0..height {

@@ -71,7 +71,7 @@ pub fn digits(value: f64, count: usize) -> String {
     }
 }
 
-/// A fraction as per cent.
+/// A fraction as percent.
 pub fn percent(fraction: f64) -> String {
     format!("{} %", digits(100.0 * fraction, 2))
 }

@@ -108,7 +108,7 @@ fn panel([low, high]: [f64; 2], title: &str) -> Panel {
     Panel { title: title.into(), equal_scale: true, ..Panel::new(axis("x"), axis("y")) }
 }
 
-/// From 2000 K upwards, in even steps of 1/T, as the locus runs.
+/// From 2000 K upward, in even steps of 1/T, as the locus runs.
 fn black_bodies(observer: &Observer) -> Vec<[f64; 2]> {
     const COLDEST_K: f64 = 2000.0;
     const STEPS: u32 = 100;

@@ -10,7 +10,7 @@ use cyanometer_studies::camera::EXPOSURE;
 use cyanometer_studies::pages::{Table, number};
 use std::fmt::Write;
 
-/// A row of parts (a) of Tables 3 to 6: shares below 1/10, 1/4, 1/2 in per cent, minimum, maximum, mean, median.
+/// A row of parts (a) of Tables 3 to 6: shares below 1/10, 1/4, 1/2 in percent, minimum, maximum, mean, median.
 type Performance = [f64; 7];
 /// A row of parts (b): minimum, maximum, mean, median.
 type Spread = [f64; 4];

@@ -45,7 +45,7 @@ fn paper_xyz(camera: &Camera, equation: Equation, electrons: f64) -> [f64; 3] {
 /// Places for lines.
 fn places() -> Vec<f64> {
     let even = (0..120).map(|step| 20.0 * 2000.0_f64.powf(f64::from(step) / 120.0)).filter(|&e| e < 37_000.0);
-    // Towards full well the converter clips, and lines bend.
+    // Toward full well the converter clips, and lines bend.
     even.chain((0..=30).map(|step| 37_000.0 + 100.0 * f64::from(step))).collect()
 }
 
