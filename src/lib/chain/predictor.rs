@@ -324,19 +324,7 @@ impl PredictorSettings {
         causes: &[Budget; 3],
     ) -> StagePrediction {
         let metadata = &head.metadata;
-        let (mean, covariance) = match prediction {
-            FramePrediction::Planes(classes) => {
-                let variances = classes.map(|class| class.moments.variance);
-                (classes.map(|class| class.moments.mean), Matrix3::from_diagonal(&variances.into()))
-            }
-            FramePrediction::Pixels(mixture) if self.equations == Equations::Paper => {
-                (mixture.mean, mixture.covariance)
-            }
-            FramePrediction::Pixels(mixture) => {
-                let variances = mixture.sites.map(|site| site.moments.variance);
-                (mixture.mean, gains::mean_pixel(&mixture.weights).covariance(variances))
-            }
-        };
+        let (mean, covariance) = self.mean_and_covariance(prediction);
         let second_order = match prediction {
             FramePrediction::Pixels(mixture) if self.camera.method == Method::SmoothHue => {
                 Some(rows(&mixture.covariance))
@@ -344,13 +332,7 @@ impl PredictorSettings {
             _ => None,
         };
         let by_cause = self.by_cause(prediction, causes);
-        let part = |fixed: bool| {
-            (!by_cause.is_empty()).then(|| {
-                let chosen = by_cause.iter().filter(|entry| entry.cause.is_fixed_pattern() == fixed);
-                let sum = chosen.fold([0.0; 3], |sum, entry| [0, 1, 2].map(|i| sum[i] + entry.variance[i]));
-                sum.map(|variance| variance.max(0.0).sqrt())
-            })
-        };
+        let part = |fixed: bool| spread_of(&by_cause, fixed);
         let std = diagonal_std(&covariance);
         let black = match metadata.quantity {
             QuantityKind::Electrons => metadata.dark_signal_e.unwrap_or(0.0),
@@ -365,14 +347,14 @@ impl PredictorSettings {
             (is_signal && ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
         });
         let patch = self.patch.map(|size| self.patch_mean(prediction, &covariance, size));
+        let certain_enough = |wanted: f64, i: usize, side: usize| {
+            let variance = self.patch_mean(prediction, &covariance, [side; 2])[(i, i)];
+            variance.max(0.0).sqrt() <= wanted * signal[i]
+        };
         let pixels_needed = match self.wanted {
             Some(Uncertainty::Relative(wanted)) if is_signal => Some([0, 1, 2].map(|i| {
-                (signal[i] > 0.0).then_some(()).and_then(|()| {
-                    smallest_square(|side| {
-                        let variance = self.patch_mean(prediction, &covariance, [side; 2])[(i, i)];
-                        variance.max(0.0).sqrt() <= wanted * signal[i]
-                    })
-                })
+                let is_lit = signal[i] > 0.0;
+                is_lit.then(|| smallest_square(|side| certain_enough(wanted, i, side))).flatten()
             })),
             _ => None,
         };
@@ -396,6 +378,23 @@ impl PredictorSettings {
             patch_mean_std: patch.as_ref().map(diagonal_std),
             patch_mean_covariance: patch.as_ref().map(rows),
             pixels_needed,
+        }
+    }
+
+    /// Mean and covariance of a pixel, to first order by the exact equations.
+    fn mean_and_covariance(&self, prediction: &FramePrediction) -> ([f64; 3], Matrix3<f64>) {
+        match prediction {
+            FramePrediction::Planes(classes) => {
+                let variances = classes.map(|class| class.moments.variance);
+                (classes.map(|class| class.moments.mean), Matrix3::from_diagonal(&variances.into()))
+            }
+            FramePrediction::Pixels(mixture) if self.equations == Equations::Paper => {
+                (mixture.mean, mixture.covariance)
+            }
+            FramePrediction::Pixels(mixture) => {
+                let variances = mixture.sites.map(|site| site.moments.variance);
+                (mixture.mean, gains::mean_pixel(&mixture.weights).covariance(variances))
+            }
         }
     }
 
@@ -466,6 +465,13 @@ impl PredictorSettings {
             pixels_needed,
         }
     }
+}
+
+/// Standard deviations of the causes that are fixed patterns, or of those that are not; none where causes are not kept apart.
+fn spread_of(by_cause: &[CauseVariance], fixed: bool) -> Option<[f64; 3]> {
+    let chosen = by_cause.iter().filter(|entry| entry.cause.is_fixed_pattern() == fixed);
+    let sum = chosen.fold([0.0; 3], |sum, entry| [0, 1, 2].map(|i| sum[i] + entry.variance[i]));
+    (!by_cause.is_empty()).then(|| sum.map(|variance| variance.max(0.0).sqrt()))
 }
 
 /// Pixels of the smallest square that is large enough; none up to 2²⁰ on a side.

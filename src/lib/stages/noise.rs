@@ -5,6 +5,7 @@
 //! DCNU and PRNU are fixed patterns: they hang on the sensor's seed alone. DCSN, SSN and RON are temporal: they hang on
 //! seed and frame. Where charge transfer is simulated, it takes light and dark charge to the output before RON is added.
 
+use crate::camera::readout::ReadOut;
 use crate::cfa::{CfaPattern, Class};
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
@@ -165,19 +166,7 @@ impl AddNoise {
     /// or exposure; [`Error::Usage`] for an impossible temperature or charge transfer efficiency; [`Error::Format`]
     /// where charge of a crop would be transferred, and for planes behind another array than Bayer's.
     pub fn new(input: &FrameHeader, settings: &NoiseSettings) -> Result<Self> {
-        let holds = input.holds();
-        match input.metadata.quantity {
-            QuantityKind::ExpectedElectrons if input.metadata.demosaic.is_none() => {}
-            QuantityKind::Electrons => {
-                return Err(
-                    input.refuse(format!("it holds {holds} that have their noise already; noise is added once"))
-                );
-            }
-            _ => {
-                let problem = format!("it holds {holds}, not expected electrons of photosites");
-                return Err(input.out_of_order(problem, "render-radiance"));
-            }
-        }
+        check_expected(input)?;
         let pattern = input.bayer("given noise")?;
         check_planes(input)?;
         let readout = input.readout()?;
@@ -211,12 +200,7 @@ impl AddNoise {
         if dark_e == 0.0 {
             sources.retain(|source| !matches!(source, Source::Dcsn | Source::Dcnu));
         }
-        sources.retain(|source| match source {
-            Source::Dcnu => readout.dcnu > 0.0,
-            Source::Prnu => readout.prnu > 0.0,
-            Source::Ron => readout.read_noise_e > 0.0,
-            Source::Dcsn | Source::Ssn => true,
-        });
+        sources.retain(|source| has_noise(readout, *source));
         let record = NoiseRecord {
             sources,
             seed: settings.seed,
@@ -256,6 +240,35 @@ impl AddNoise {
              sensor does run `mosaic` first"
                 .into()
         })
+    }
+}
+
+/// Makes sure that a frame holds expected electrons of photosites.
+///
+/// # Errors
+///
+/// [`Error::Format`] where noise was added already, else [`Error::Order`].
+fn check_expected(frame: &FrameHeader) -> Result<()> {
+    let holds = frame.holds();
+    match frame.metadata.quantity {
+        QuantityKind::ExpectedElectrons if frame.metadata.demosaic.is_none() => Ok(()),
+        QuantityKind::Electrons => {
+            Err(frame.refuse(format!("it holds {holds} that have their noise already; noise is added once")))
+        }
+        _ => {
+            let problem = format!("it holds {holds}, not expected electrons of photosites");
+            Err(frame.out_of_order(problem, "render-radiance"))
+        }
+    }
+}
+
+/// Whether a sensor has a source of noise at all.
+fn has_noise(readout: &ReadOut, source: Source) -> bool {
+    match source {
+        Source::Dcnu => readout.dcnu > 0.0,
+        Source::Prnu => readout.prnu > 0.0,
+        Source::Ron => readout.read_noise_e > 0.0,
+        Source::Dcsn | Source::Ssn => true,
     }
 }
 

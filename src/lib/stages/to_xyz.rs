@@ -83,20 +83,7 @@ impl ToXyz {
     /// [`Error::Usage`] for an impossible white; [`Error::Format`](crate::error::Error::Format) where the black level
     /// differs among photosites.
     pub fn new(input: &FrameHeader, settings: &ColorSettings) -> Result<Self> {
-        let holds = input.holds();
-        match input.metadata.quantity {
-            QuantityKind::Adu | QuantityKind::Unspecified => {}
-            QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
-                return Err(input.out_of_order(format!("it holds {holds}, not ADU"), "digitize"));
-            }
-            _ => return Err(input.refuse(format!("it holds {holds}: it is converted already"))),
-        }
-        if input.metadata.cfa.is_some() || input.geometry.channels.len() == 1 {
-            return Err(input.out_of_order(format!("it holds {holds}, not three classes at each pixel"), "demosaic"));
-        }
-        if !input.has_three_planes() {
-            return Err(input.refuse(format!("it holds {holds}; a camera has the three planes R, G and B")));
-        }
+        check_camera(input)?;
         let exposure = input.exposure()?;
         let black = input.uniform_black_adu()?;
         let xyz_from_adu = matrix(&settings.xyz_from_camera) / exposure.exposure_s_sr();
@@ -215,6 +202,25 @@ impl ToXyz {
         }
         counts
     }
+}
+
+/// Makes sure that a frame holds the three planes of a camera's codes.
+fn check_camera(frame: &FrameHeader) -> Result<()> {
+    let holds = frame.holds();
+    match frame.metadata.quantity {
+        QuantityKind::Adu | QuantityKind::Unspecified => {}
+        QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
+            return Err(frame.out_of_order(format!("it holds {holds}, not ADU"), "digitize"));
+        }
+        _ => return Err(frame.refuse(format!("it holds {holds}: it is converted already"))),
+    }
+    if frame.metadata.cfa.is_some() || frame.geometry.channels.len() == 1 {
+        return Err(frame.out_of_order(format!("it holds {holds}, not three classes at each pixel"), "demosaic"));
+    }
+    if !frame.has_three_planes() {
+        return Err(frame.refuse(format!("it holds {holds}; a camera has the three planes R, G and B")));
+    }
+    Ok(())
 }
 
 impl Stage for ToXyz {

@@ -42,10 +42,10 @@ use std::time::Instant;
 const RAMP_E: [f64; 2] = [10.0, 30_000.0];
 
 /// One run over the whole frame.
-type Kernel = Box<dyn FnMut()>;
+type Workload = Box<dyn FnMut()>;
 
 /// Makes a kernel for a frame of some width and height.
-type Maker = fn(usize, usize) -> Result<Kernel>;
+type Maker = fn(usize, usize) -> Result<Workload>;
 
 /// Names of the kernels, and what makes them.
 const KERNELS: [(&str, Maker); 15] = [
@@ -94,7 +94,7 @@ fn demosaicked(width: usize, height: usize) -> Result<MemoryFrame> {
 }
 
 /// A stage on a frame, band by band, into a buffer that the next band uses again, as programs do.
-fn over<S: Stage + 'static>(stage: S, input: MemoryFrame) -> Kernel {
+fn over<S: Stage + 'static>(stage: S, input: MemoryFrame) -> Workload {
     let from = input.header.geometry.clone();
     let to = stage.header().geometry.clone();
     let rows = from.cached_rows().min(to.cached_rows());
@@ -109,11 +109,11 @@ fn over<S: Stage + 'static>(stage: S, input: MemoryFrame) -> Kernel {
     })
 }
 
-fn noise(frame: MemoryFrame) -> Result<Kernel> {
+fn noise(frame: MemoryFrame) -> Result<Workload> {
     Ok(over(AddNoise::new(&frame.header, &NoiseSettings::default())?, frame))
 }
 
-fn copy(samples: Vec<f32>) -> Kernel {
+fn copy(samples: Vec<f32>) -> Workload {
     let mut output = vec![0.0; samples.len()];
     Box::new(move || {
         output.copy_from_slice(black_box(&samples));
@@ -121,12 +121,12 @@ fn copy(samples: Vec<f32>) -> Kernel {
     })
 }
 
-fn interpolation(method: Method, width: usize, height: usize) -> Result<Kernel> {
+fn interpolation(method: Method, width: usize, height: usize) -> Result<Workload> {
     let plane = codes(width, height)?;
     Ok(over(Demosaic::new(&plane.header, method, Black::Auto, None)?, plane))
 }
 
-fn matrix(width: usize, height: usize) -> Result<Kernel> {
+fn matrix(width: usize, height: usize) -> Result<Workload> {
     let rgb = demosaicked(width, height)?;
     let xyz_from_camera = [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]];
     let settings = color_settings(xyz_from_camera, Space::Xyz);
@@ -134,11 +134,11 @@ fn matrix(width: usize, height: usize) -> Result<Kernel> {
 }
 
 /// Mean, extremes and covariance of three planes.
-fn moments(width: usize, height: usize) -> Result<Kernel> {
+fn moments(width: usize, height: usize) -> Result<Workload> {
     Ok(moments_of(demosaicked(width, height)?))
 }
 
-fn moments_of(frame: MemoryFrame) -> Kernel {
+fn moments_of(frame: MemoryFrame) -> Workload {
     let geometry = frame.header.geometry.clone();
     Box::new(move || {
         let mut moments = Moments::new(geometry.channels.len());
@@ -151,7 +151,7 @@ fn moments_of(frame: MemoryFrame) -> Kernel {
 }
 
 /// Spectral radiances at 471 wavelengths to the electrons of three classes, from rows as an EXR holds them.
-fn spectral(width: usize, height: usize) -> Result<Kernel> {
+fn spectral(width: usize, height: usize) -> Result<Workload> {
     let loaded = sensor()?;
     let (wavelengths_nm, _) = WavelengthGrid::default().points()?;
     let weights = loaded.response()?.weights_on(&loaded.sensor, &EXPOSURE, &WavelengthGrid::default())?;
@@ -174,7 +174,7 @@ fn spectral_samples(width: usize, height: usize, bands: usize) -> Vec<f32> {
 }
 
 /// Reading the samples of such an image, and nothing more than adding them up: what memory allows.
-fn spectral_read(width: usize, height: usize) -> Result<Kernel> {
+fn spectral_read(width: usize, height: usize) -> Result<Workload> {
     let samples = spectral_samples(width, height, WavelengthGrid::default().points()?.0.len());
     Ok(Box::new(move || {
         black_box(vectors::run(Reading(&samples)));
@@ -199,7 +199,7 @@ impl vectors::Kernel for Reading<'_> {
 }
 
 /// The noise of a CFA plane as one writes it down with rand_distr, on the same generator with the same keys.
-fn noise_by_rand_distr(width: usize, height: usize) -> Result<Kernel> {
+fn noise_by_rand_distr(width: usize, height: usize) -> Result<Workload> {
     let plane = cfa_plane(width, height)?;
     let readout = sensor()?.sensor.readout()?.clone();
     let dark_e = readout.dark_current_e_per_s(readout.temperature_k) * EXPOSURE.exposure_s;
@@ -267,7 +267,7 @@ impl TryRng for Draws {
     }
 }
 
-fn repeat(mut kernel: Kernel, repeats: usize, step: bool) -> std::io::Result<()> {
+fn repeat(mut kernel: Workload, repeats: usize, step: bool) -> std::io::Result<()> {
     let mut output = std::io::stdout().lock();
     let mut turns = std::io::stdin().lock().lines();
     kernel();

@@ -167,18 +167,7 @@ pub fn fit(
         camera.row_mut(row).scale_mut(weight.sqrt());
         xyz.row_mut(row).scale_mut(weight.sqrt());
     }
-    let kept = match (regression.keeps_a_sample(), settings.kept) {
-        (true, Some(sample)) if signals.camera.row(sample).amax() == 0.0 => {
-            return Err(Error::Data(format!("sample {sample} is dark: it cannot be kept exact")));
-        }
-        (true, Some(sample)) => {
-            Some((signals.camera.rows(sample, 1).into_owned(), signals.xyz.rows(sample, 1).into_owned()))
-        }
-        (true, None) => {
-            return Err(Error::Usage(format!("{} keeps a sample exact; choose it", regression.name())));
-        }
-        (false, _) => None,
-    };
+    let kept = kept_sample(signals, settings)?;
     let count = camera.nrows();
     let refused = |undetermined: Undetermined| refuse(undetermined, count, trained, kept.is_some());
     let (fit, elements) = match noise {
@@ -209,6 +198,20 @@ pub fn fit(
         uncertainty: uncertainty(&fit),
         count,
     })
+}
+
+/// Signals and XYZ of the sample that is kept exact, where one is.
+fn kept_sample(signals: &Signals, settings: &FitSettings) -> Result<Option<(DMatrix<f64>, DMatrix<f64>)>> {
+    match (settings.regression.keeps_a_sample(), settings.kept) {
+        (true, Some(sample)) if signals.camera.row(sample).amax() == 0.0 => {
+            Err(Error::Data(format!("sample {sample} is dark: it cannot be kept exact")))
+        }
+        (true, Some(sample)) => {
+            Ok(Some((signals.camera.rows(sample, 1).into_owned(), signals.xyz.rows(sample, 1).into_owned())))
+        }
+        (true, None) => Err(Error::Usage(format!("{} keeps a sample exact; choose it", settings.regression.name()))),
+        (false, _) => Ok(None),
+    }
 }
 
 /// The rows and their sum, √3 times as strong.

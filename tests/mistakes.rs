@@ -1,0 +1,381 @@
+//! Mistakes with the programs: the complaint, the exit status, and that nothing is lost.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use std::fs;
+use std::process::Command;
+use support::TREE;
+use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
+
+/// The likeliest mistakes with each program: the command, the exit status, the line.
+const MISTAKES: [(&str, i32, &str); 74] = [
+    ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
+    (
+        "render-radiance --dark --size 8",
+        BAD_USAGE,
+        "`8` is no value for --size <WIDTHxHEIGHT>: a size is WIDTHxHEIGHT in photosites, such as 1332x1000; see \
+         `render-radiance --help`",
+    ),
+    (
+        "render-radiance --electrons 1,2",
+        BAD_USAGE,
+        "`1,2` is no value for --electrons <R,G,B>: give the electrons of R,G,B between commas, none below 0; see \
+         `render-radiance --help`",
+    ),
+    (
+        "render-radiance --dark --sensor kaf-5101",
+        BAD_USAGE,
+        "there is no sensor `kaf-5101`; known are kaf-5101ce; for a file of your own give its path, ending in .yaml",
+    ),
+    (
+        "render-radiance sky.csv --electrons 1,2,3",
+        BAD_USAGE,
+        "[INPUT] and --electrons <R,G,B> exclude each other; see `render-radiance --help`",
+    ),
+    ("add-noise", BAD_DATA, "standard input: it is empty; the program before it wrote nothing"),
+    (
+        "add-noise noisy.exr",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons that have their noise already; noise is added once",
+    ),
+    (
+        "add-noise codes.exr",
+        BAD_DATA,
+        "codes.exr: it holds three planes of ADU, not expected electrons of photosites; run `render-radiance` first",
+    ),
+    (
+        "add-noise expected.exr --without ssm",
+        BAD_USAGE,
+        "`ssm` is no value for --without <SOURCES>; it is one of dcsn, dcnu, ssn, prnu, ron; did you mean `ssn`?; see \
+         `add-noise --help`",
+    ),
+    (
+        "add-noise expected.exr --sed 7",
+        BAD_USAGE,
+        "unknown option or extra argument `--sed`; did you mean `--seed`?; see `add-noise --help`",
+    ),
+    (
+        "add-noise expected.exr -o expected.exr",
+        BAD_USAGE,
+        "expected.exr: it is the same file as the input expected.exr; name another output",
+    ),
+    (
+        "add-noise matrix.yaml",
+        BAD_DATA,
+        "matrix.yaml: it is neither an EXR nor a TIFF file; it looks like text (a spectrum goes into \
+         `render-radiance`)",
+    ),
+    (
+        "add-noise expected.exr --cte 1.1",
+        BAD_USAGE,
+        "`1.1` is no value for --cte <X>: give a fraction above 0 and at most 1; see `add-noise --help`",
+    ),
+    ("correct-frame codes.exr", BAD_USAGE, "there is nothing to correct; give --black, --dark or --cte"),
+    (
+        "correct-frame noisy.exr --cte 0.9",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons, not ADU; run `digitize` first",
+    ),
+    (
+        "correct-frame rgb.exr --black 3",
+        BAD_DATA,
+        "rgb.exr: it holds three demosaicked planes of ADU; corrections come before demosaicking",
+    ),
+    (
+        "correct-frame codes.exr --cte 0.1",
+        BAD_USAGE,
+        "a charge transfer efficiency of 0.1 is too poor to be undone over 6 moves; errors would grow more than 1000 times",
+    ),
+    (
+        "correct-frame codes.exr --dark plane.exr",
+        BAD_DATA,
+        "plane.exr: its number of planes is 1, but that of codes.exr is 3",
+    ),
+    (
+        "correct-frame codes.exr --dark noisy.exr",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons, not ADU; run `digitize` first",
+    ),
+    (
+        "correct-frame codes.exr --dark codes.exr --black 3",
+        BAD_USAGE,
+        "--dark <FILE> and --black <auto|none|N> exclude each other; see `correct-frame --help`",
+    ),
+    ("correct-frame codes.exr --dark missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
+    ("digitize codes.exr", BAD_DATA, "codes.exr: it holds three planes of ADU: it is digitized already"),
+    ("digitize noisy.exr --bits 20", BAD_USAGE, "a converter of 20 bits is impossible here; give 1 to 16"),
+    (
+        "digitize noisy.exr --slope 0",
+        BAD_USAGE,
+        "`0` is no value for --slope <ADU_PER_E>: give a number above 0; see `digitize --help`",
+    ),
+    (
+        "digitize noisy.exr -o codes.png",
+        BAD_USAGE,
+        "codes.png: `.png` names no format that is written here; end the name in .exr or .tiff, or give --format",
+    ),
+    ("mosaic plane.exr", BAD_DATA, "plane.exr: it is a CFA plane already, rggb"),
+    (
+        "mosaic codes.exr --pattern rgbg",
+        BAD_USAGE,
+        "`rgbg` is no value for --pattern <PATTERN>: a pattern is rggb, bggr, grbg or gbrg; see `mosaic --help`",
+    ),
+    (
+        "mosaic xyz.exr",
+        BAD_DATA,
+        "xyz.exr: it holds three demosaicked planes of XYZ; a mosaic is made of the three planes R, G and B of a sensor",
+    ),
+    ("demosaic codes.exr", BAD_DATA, "codes.exr: it holds three planes of ADU, not a CFA plane; run `mosaic` first"),
+    (
+        "demosaic plane.exr --black dark",
+        BAD_USAGE,
+        "`dark` is no value for --black <auto|none|N>: give auto, none or a number; see `demosaic --help`",
+    ),
+    ("demosaic rgb.exr", BAD_DATA, "rgb.exr: it holds three demosaicked planes of ADU; demosaicking is done once"),
+    ("demosaic plane.exr -o no/where.exr", BAD_DATA, "no/where.exr: there is no directory `no`; make it first"),
+    ("to-xyz rgb.exr", BAD_USAGE, "--matrix <FILE> is missing; see `to-xyz --help`"),
+    (
+        "to-xyz plane.exr --matrix matrix.yaml",
+        BAD_DATA,
+        "plane.exr: it holds a CFA plane of ADU, not three classes at each pixel; run `demosaic` first",
+    ),
+    ("to-xyz rgb.exr --matrix missing.yaml", BAD_DATA, "missing.yaml: cannot open: no such file or directory"),
+    (
+        "to-xyz noisy.exr --matrix matrix.yaml",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons, not ADU; run `digitize` first",
+    ),
+    ("measure missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
+    ("measure noisy.exr --region 0,0,9,9", BAD_USAGE, "noisy.exr: region 0,0,9,9 does not lie within the frame of 8x6"),
+    (
+        "measure --patches noisy.exr",
+        BAD_USAGE,
+        "noisy.exr: its metadata tell of no patches of several photosites; give --patches=WxH",
+    ),
+    ("measure --patches=4x9 noisy.exr", BAD_USAGE, "noisy.exr: no patch of 4x9 lies whole within the frame of 8x6"),
+    (
+        "measure --patches=4x3 rgb.exr",
+        BAD_USAGE,
+        "rgb.exr: patches of 4x3 have no interior: eci mixes colors up to 3 pixels from their edges; they must be 7x7 at least",
+    ),
+    (
+        "measure --patches=4 noisy.exr",
+        BAD_USAGE,
+        "`4` is no value for --patches[=<WxH>]: a size is WIDTHxHEIGHT in photosites, such as 1332x1000; see `measure --help`",
+    ),
+    (
+        "measure --patches=4x3 noisy.exr --check",
+        BAD_USAGE,
+        "--patches[=<WxH>] and --check exclude each other; see `measure --help`",
+    ),
+    (
+        "measure --patches=4x3 noisy.exr --region 0,0,1,1",
+        BAD_USAGE,
+        "--patches[=<WxH>] and --region <X,Y,W,H> exclude each other; see `measure --help`",
+    ),
+    ("measure noisy.exr codes.exr", BAD_USAGE, "unknown option or extra argument `codes.exr`; see `measure --help`"),
+    (
+        "measure noisy.exr --output-format xml",
+        BAD_USAGE,
+        "`xml` is no value for --output-format <OUTPUT_FORMAT>; it is one of text, json, yaml, csv; did you mean `yaml`?; see \
+         `measure --help`",
+    ),
+    ("color-difference xyz.exr", BAD_USAGE, "<B> is missing; see `color-difference --help`"),
+    ("color-difference xyz.exr missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
+    (
+        "color-difference xyz.exr 1,2",
+        BAD_USAGE,
+        "`1,2` is no value for <B>: it is no option, no file, and no color, which is three numbers between commas; see \
+         `color-difference --help`",
+    ),
+    (
+        "color-difference rgb.exr xyz.exr",
+        BAD_DATA,
+        "rgb.exr: it holds three demosaicked planes of ADU, not colors; run `to-xyz` first",
+    ),
+    (
+        "color-difference xyz.exr plane.exr",
+        BAD_DATA,
+        "plane.exr: it holds a CFA plane of ADU, not colors; run `to-xyz` first",
+    ),
+    (
+        "color-difference xyz.exr noisy.exr",
+        BAD_DATA,
+        "noisy.exr: it holds three planes of electrons, not colors; run `to-xyz` first",
+    ),
+    ("color-difference - -", BAD_USAGE, "only one of A and B can be the standard input; name a file for the other"),
+    (
+        "color-difference 1,2,3 4,5,6 --map map.exr",
+        BAD_USAGE,
+        "a map needs an image; two colors have no map of differences",
+    ),
+    (
+        "color-difference xyz.exr 4,5,6 --map map.tiff",
+        BAD_USAGE,
+        "`map.tiff` is no value for --map <FILE.exr>: end the name in .exr; see `color-difference --help`",
+    ),
+    (
+        "color-difference xyz.exr 4,5,6 --map map.exr -o ./map.exr",
+        BAD_USAGE,
+        "the map and the report have the same place; name a file for each",
+    ),
+    (
+        "color-difference 1,2,3 4,5,6 --white 1,0,1",
+        BAD_USAGE,
+        "a white of XYZ 1.000000 0.000000 1.000000 is impossible; all three must be above 0",
+    ),
+    (
+        "color-difference 1,2,3 4,5,6 --white 1,1,1 --white-luminance 2",
+        BAD_USAGE,
+        "a white of X,Y,Z has its luminance already; leave out --white-luminance",
+    ),
+    (
+        "color-difference xyz.exr 4,5,6 --map -",
+        BAD_USAGE,
+        "the map and the report have the same place; name a file for each",
+    ),
+    ("fit-matrix", BAD_USAGE, "<LIBRARY> is missing; see `fit-matrix --help`"),
+    ("fit-matrix missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --hold-out maritime23",
+        BAD_USAGE,
+        "--hold-out names labels; give them with --labels FILE:COLUMN",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --labels SAMPLES/skies/sky912_meta.csv:aerosol --hold-out marine",
+        BAD_USAGE,
+        "no sample has the label `marine`; there are maritime23, none, rural25, rural5, tropospheric50, urban5",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --white-sample 3",
+        BAD_USAGE,
+        "sky-rad-ls keeps no sample exact; leave out --white-sample, or choose another --method",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --method max-ign-sppls --train 20",
+        BAD_USAGE,
+        "max-ign-sppls is fitted on the responses alone; it has no training samples",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --train 5,5,5,5",
+        BAD_DATA,
+        "4 training samples do not determine the matrix: only 1 of the 3 signals they need are independent; give more \
+         varied ones",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --plot x.svg",
+        BAD_USAGE,
+        "--plot draws the trade-off of --noise-weight; give that too",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --evaluate SAMPLES/skies/sky912.exr --expose-to 1.5",
+        BAD_USAGE,
+        "`1.5` is no value for --expose-to <FRACTION>: give a fraction above 0 and at most 1; see `fit-matrix --help`",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --white 0,0,0",
+        BAD_USAGE,
+        "a white of XYZ 0 0 0 is impossible; all three must be above 0",
+    ),
+    ("predict-noise --all-samples", BAD_USAGE, "--all-samples is for a library of spectra; name one"),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --train 2000",
+        BAD_USAGE,
+        "the library has 912 samples to train on, fewer than 2000",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --train 0,1",
+        BAD_DATA,
+        "2 training samples do not determine the matrix: only 2 of the 3 signals they need are independent; give more \
+         varied ones",
+    ),
+    ("preview expected.exr", BAD_USAGE, "--output <FILE.png> is missing; see `preview --help`"),
+    ("preview missing.exr -o picture.png", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
+];
+
+#[test]
+fn mistakes_are_answered_in_one_line() {
+    let shop = Workshop::with_frames();
+    let files = shop.files();
+    for (line, status, complaint) in MISTAKES {
+        let output = shop.attempt(line, &[]);
+        let program = line.split(' ').next().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(said, format!("{program}: {complaint}\n"), "{line}");
+        assert_eq!(output.status.code(), Some(status), "{line}");
+        assert!(output.stdout.is_empty(), "{line}");
+        assert_eq!(shop.files(), files, "{line} leaves something behind");
+    }
+}
+
+#[test]
+fn an_unknown_set_of_instructions_is_a_mistake() {
+    let shop = Workshop::with_frames();
+    for (name, is_known) in [("avx2", true), ("baseline", true), ("", true), ("sse9", false)] {
+        let output = shop.command("mosaic expected.exr").env("CYANOMETER_VECTORS", name).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let complaint =
+            format!("mosaic: CYANOMETER_VECTORS={name} names no instructions; give one of baseline, avx2, avx512\n");
+        assert_eq!(said, if is_known { "" } else { &complaint });
+        assert_eq!(output.status.code(), Some(if is_known { 0 } else { 2 }));
+    }
+}
+
+/// What is read is not written over, whatever it is called; devices are written to, not replaced.
+#[test]
+fn inputs_and_devices_are_not_written_over() {
+    let shop = Workshop::with_frames();
+    fs::copy(format!("{TREE}/sample_data/skies/sky912.exr"), shop.path("library.exr")).unwrap();
+    std::os::unix::fs::symlink(shop.path("expected.exr"), shop.path("link.exr")).unwrap();
+    for (line, input) in [
+        ("add-noise", "expected.exr"),
+        ("mosaic", "noisy.exr"),
+        ("measure", "noisy.exr"),
+        ("preview", "noisy.exr"),
+        ("fit-matrix", "library.exr"),
+    ] {
+        let before = shop.bytes(input);
+        for output in [input.to_owned(), format!("./{input}")] {
+            let done = shop.attempt(&format!("{line} {input} -o {output}"), &[]);
+            assert_eq!(
+                String::from_utf8_lossy(&done.stderr),
+                format!("{line}: {output}: it is the same file as the input {input}; name another output\n")
+            );
+            assert_eq!(done.status.code(), Some(BAD_USAGE), "{line}");
+            assert!(shop.bytes(input) == before, "{line} has written over its input");
+        }
+    }
+    assert_eq!(shop.attempt("measure expected.exr -o link.exr", &[]).status.code(), Some(BAD_USAGE));
+    // A named pipe stands for all devices: replacing it harms nobody.
+    let fifo = shop.path("fifo");
+    assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
+    for line in ["measure noisy.exr -o fifo", "preview noisy.exr -o fifo", "add-noise expected.exr -o fifo"] {
+        let listener = std::thread::spawn({
+            let fifo = fifo.clone();
+            move || fs::read(fifo).unwrap().len()
+        });
+        let done = shop.attempt(line, &[]);
+        let is_kept = std::os::unix::fs::FileTypeExt::is_fifo(&fifo.metadata().unwrap().file_type());
+        assert!(done.status.success() && is_kept, "{line} has replaced a named pipe");
+        assert!(listener.join().unwrap() > 0, "{line}");
+    }
+}
+
+/// A run that fails in the middle leaves the output of the run before as it was.
+#[test]
+fn a_failed_run_keeps_the_old_output() {
+    let shop = Workshop::with_frames();
+    let (old, old_sidecar) = (shop.bytes("noisy.exr"), shop.bytes("noisy.exr.yaml"));
+    let files = shop.files();
+    let whole = shop.bytes("expected.exr");
+    let output = shop.attempt("add-noise -o noisy.exr", &whole[..whole.len() - 20]);
+    assert_eq!(output.status.code(), Some(BAD_DATA));
+    assert_eq!(
+        String::from_utf8_lossy(&output.stderr),
+        "add-noise: standard input: the file ends before its last row; it was cut short\n"
+    );
+    assert_eq!((shop.bytes("noisy.exr"), shop.bytes("noisy.exr.yaml")), (old, old_sidecar));
+    assert_eq!(shop.files(), files);
+}
