@@ -1,5 +1,12 @@
 //! What is known about a frame: its quantity, its camera, and everything that was done to it.
 
+mod records;
+
+pub use records::{
+    AdcRecord, ColorRecord, CorrectionRecord, DemosaicRecord, HistoryEntry, LeftOut, NoiseRecord, PoissonKind,
+    PredictedRecord, SamplesRecord, Scene,
+};
+
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
 use crate::camera::optics::Exposure;
 use crate::camera::readout::ReadOut;
@@ -7,8 +14,6 @@ use crate::camera::sensor::Sensor;
 use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, bare_name};
-use crate::names::{Named, serde_by_name};
-use crate::random::Source;
 use crate::units::QuantityKind;
 use serde::{Deserialize, Serialize};
 use serde_yaml::Mapping;
@@ -89,232 +94,6 @@ pub struct Metadata {
     /// What this version does not know, passed on as it came.
     #[serde(skip)]
     pub unknown: Mapping,
-}
-
-/// What the camera looked at.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Scene {
-    /// File, column or sample, or `--electrons`.
-    pub source: String,
-    /// Whether every photosite of a class expects the same.
-    pub uniform: bool,
-    /// Expected signal electrons of R, G and B where the scene is uniform.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub expected_electrons: Option<[f64; 3]>,
-    /// Focal length in mm where natural vignetting was applied.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub vignetting_focal_length_mm: Option<f64>,
-    /// Photosites that show one pixel of the source, width and height.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub patch: Option<[usize; 2]>,
-    /// Pixels in a row of the source, where each is shown as a patch.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub source_width: Option<usize>,
-    /// Largest expected signal of any class in e⁻, where it was worked out for `--expose-to`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub brightest_e: Option<f64>,
-}
-
-impl Scene {
-    /// A scene of which nothing is known but what it is called.
-    pub fn of(source: impl Into<String>) -> Self {
-        Self {
-            source: source.into(),
-            uniform: false,
-            expected_electrons: None,
-            vignetting_focal_length_mm: None,
-            patch: None,
-            source_width: None,
-            brightest_e: None,
-        }
-    }
-
-    /// A scene of which every photosite of a class expects the same signal electrons: of R, G and B.
-    pub fn uniform(source: impl Into<String>, electrons: [f64; 3]) -> Self {
-        Self { uniform: true, expected_electrons: Some(electrons), ..Self::of(source) }
-    }
-}
-
-/// How Poisson numbers are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum PoissonKind {
-    /// Exactly.
-    #[default]
-    Exact,
-    /// As normal numbers of the same mean and variance, to see what that approximation costs.
-    Gaussian,
-}
-
-impl Named for PoissonKind {
-    const ALL: &'static [Self] = &[Self::Exact, Self::Gaussian];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Exact => "exact",
-            Self::Gaussian => "gaussian",
-        }
-    }
-}
-
-serde_by_name!(PoissonKind);
-
-/// The noise that was drawn, enough to draw it again.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NoiseRecord {
-    /// Sources drawn, in the order of Eq. 9.
-    pub sources: Vec<Source>,
-    /// Seed of the temporal noise.
-    pub seed: u64,
-    /// Seed of the fixed patterns.
-    pub sensor_seed: u64,
-    /// Number of the exposure.
-    pub frame: u32,
-    /// Temperature of the sensor in K.
-    pub temperature_k: f64,
-    /// Mean dark signal of a photosite before non-uniformity, Q_DC of Eq. 7, in e⁻.
-    pub dark_e: f64,
-    /// How Poisson numbers were drawn.
-    pub poisson: PoissonKind,
-    /// Share of a packet that each move to the output takes along, where charge transfer was simulated.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cte: Option<f64>,
-}
-
-/// The converter as it was set.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct AdcRecord {
-    /// Bits.
-    pub bits: u32,
-    /// Bias in ADU.
-    pub bias_adu: f64,
-    /// Slope in ADU per e⁻.
-    pub adu_per_e: f64,
-}
-
-impl AdcRecord {
-    /// The converter of a sensor as the description of its read-out has it.
-    pub fn of_readout(readout: &ReadOut) -> Self {
-        Self { bits: readout.bits, bias_adu: readout.bias_adu, adu_per_e: readout.adu_per_e }
-    }
-}
-
-/// What was taken back of a frame of codes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct CorrectionRecord {
-    /// What was subtracted as a constant, or by site, ADU.
-    pub black_adu: BlackLevel,
-    /// Whether what rows and columns add came off with it.
-    #[serde(default, skip_serializing_if = "is_false")]
-    pub black_deltas: bool,
-    /// How many dark frames the mean was of that was subtracted sample by sample.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub dark_frames: u32,
-    /// Charge transfer efficiency that was undone.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cte: Option<f64>,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
-fn is_zero(count: &u32) -> bool {
-    *count == 0
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
-fn is_false(flag: &bool) -> bool {
-    !*flag
-}
-
-/// How the missing classes were interpolated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DemosaicRecord {
-    /// Method.
-    pub method: String,
-    /// Pattern of the plane.
-    pub cfa: CfaPattern,
-    /// What was subtracted first, in the unit of the samples.
-    pub black: BlackLevel,
-    /// Whether what rows and columns add came off with it.
-    #[serde(default, skip_serializing_if = "is_false")]
-    pub black_deltas: bool,
-}
-
-/// How colors were computed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ColorRecord {
-    /// The matrix, XYZ per black-free ADU per s sr.
-    pub xyz_from_camera: [[f64; 3]; 3],
-    /// What it was fitted by.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub method: Option<String>,
-    /// Black level that was left in the camera's signals and subtracted first, ADU.
-    #[serde(default)]
-    pub black_adu: f64,
-    /// XYZ of the white that Lab and sRGB refer to, absolute.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub white: Option<[f64; 3]>,
-}
-
-/// Moments by formula.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PredictedRecord {
-    /// Mean of R, G and B in the unit of the samples.
-    pub mean: [f64; 3],
-    /// Standard deviation of R, G and B over the photosites of a frame, fixed patterns included.
-    pub std: [f64; 3],
-}
-
-/// Work that was left out.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LeftOut {
-    /// The program.
-    pub program: String,
-    /// What was left out.
-    pub what: String,
-    /// Why the result is the same.
-    pub why: String,
-}
-
-/// One program of the chain.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct HistoryEntry {
-    /// Name.
-    pub program: String,
-    /// Version.
-    pub version: String,
-    /// Arguments that bear on the samples: where and how the output is stored is left out.
-    pub arguments: Vec<String>,
-}
-
-/// What is known only after the last row.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SamplesRecord {
-    /// `blake3:`, or `sha256:` in older sidecars, and the digest of all samples as little-endian 32-bit floats, rows top
-    /// to bottom, in each row channel by channel.
-    pub digest: String,
-    /// Photosites whose charge was clipped at full well.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub full_well: Option<u64>,
-    /// Samples clipped to the smallest code.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub clipped_low: Option<u64>,
-    /// Samples clipped to the largest code.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub clipped_high: Option<u64>,
-    /// Samples that are NaN or infinite.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub not_finite: Option<u64>,
-    /// Expected electrons below zero, taken as zero.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub negative: Option<u64>,
-    /// Hues that could not be formed because green was zero; bilinear values stand in.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub undefined_hue: Option<u64>,
-    /// Colors outside sRGB, clipped.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub out_of_gamut: Option<u64>,
-    /// Pixels whose noise cannot be propagated, green being too near its noise to divide by.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub propagation_void: Option<u64>,
 }
 
 impl Metadata {
