@@ -215,7 +215,10 @@ const COMPLAINTS: [(&str, &str); 20] = [
         "render-radiance SAMPLES/skies/clear_zenith.csv --size 4x4 --sensor ./mono.yaml",
         "sensor small: it has no color filters (monochrome); only the response of the classes R, G and B is followed",
     ),
-    ("add-noise rates.exr", "rates.exr: the metadata has no `sensor.readout`; give --sensor NAME|FILE"),
+    (
+        "add-noise rates.exr",
+        "rates.exr: the metadata has no `sensor.readout`; give a sensor that has it, --sensor NAME|FILE",
+    ),
     (
         "digitize rates.exr",
         "rates.exr: the metadata has no `sensor.readout.bits`; give --sensor NAME|FILE, or all of --bits, --bias and --slope",
@@ -225,7 +228,10 @@ const COMPLAINTS: [(&str, &str); 20] = [
         "rates.exr: the metadata has no `sensor.readout.bias_adu`; give --sensor NAME|FILE, or all of --bits, --bias and \
          --slope",
     ),
-    ("demosaic codes.exr --sigma", "codes.exr: the metadata has no `sensor.readout`; give --sensor NAME|FILE"),
+    (
+        "demosaic codes.exr --sigma",
+        "codes.exr: the metadata has no `sensor.readout`; give a sensor that has it, --sensor NAME|FILE",
+    ),
     (
         "measure rates.exr --check",
         "rates.exr: nothing can be checked: a prediction needs a uniform scene and metadata that say what was done to it, up \

@@ -145,6 +145,14 @@ impl Error {
         Self::format(file, "the file ends before its last row; it was cut short")
     }
 
+    /// What is wrong, without advice.
+    pub fn bare(self) -> Self {
+        match self {
+            Self::Advised { error, .. } => error.bare(),
+            other => other,
+        }
+    }
+
     /// The exit status that a program ends with.
     pub fn exit_status(&self) -> u8 {
         match self {

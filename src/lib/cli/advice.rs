@@ -4,8 +4,10 @@ use crate::error::Error;
 use clap::Command;
 
 /// What supplies a key that metadata lack, the better choice first; it counts where the program has all its options.
-const SUPPLIES: [(&str, &str); 10] = [
+const SUPPLIES: [(&str, &str); 12] = [
     ("sensor", "--sensor NAME|FILE, or all of --bits, --bias and --slope"),
+    ("sensor.readout", "a sensor that has it, --sensor NAME|FILE"),
+    ("sensor.response", "a sensor that has it, --sensor NAME|FILE"),
     ("sensor", "--sensor NAME|FILE"),
     ("exposure", "--exposure S and --f-number N"),
     ("white_level_adu", "--white-luminance CD_PER_M2"),

@@ -255,8 +255,9 @@ mod tests {
             change(&mut changed);
             changed
         };
-        let refused =
-            |input: &FrameHeader, black, cte, darks: &[&FrameHeader]| correct(input, black, cte, darks).unwrap_err();
+        let refused = |input: &FrameHeader, black, cte, darks: &[&FrameHeader]| {
+            correct(input, black, cte, darks).unwrap_err().bare()
+        };
         assert!(matches!(refused(&frame, Black::None, None, &[]), Error::Usage(_)));
         assert!(matches!(refused(&frame, Black::Auto, None, &[&frame]), Error::Usage(_)));
         assert!(matches!(refused(&frame, Black::None, Some(0.0), &[]), Error::Usage(_)));

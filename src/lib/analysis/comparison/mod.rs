@@ -340,7 +340,7 @@ mod tests {
     fn whites_that_are_unknown_or_disagree_are_errors() {
         let other = Some([1.0, 2.0, 3.0]);
         let absolute = Some(White::Absolute([1.0, 2.0, 3.0]));
-        let refused = |a, b, white, luminance| white_of(a, b, None, white, luminance).unwrap_err();
+        let refused = |a, b, white, luminance| white_of(a, b, None, white, luminance).unwrap_err().bare();
         for white in [None, Some(White::D65)] {
             assert!(matches!(refused(xyz(None), GRAY, white, None), Error::MissingKey { key: "color.white", .. }));
         }

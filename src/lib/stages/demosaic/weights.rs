@@ -99,7 +99,7 @@ type Stencils = [[Stencil; 3]; 4];
 /// let weights = WeightTable::of(Method::Bilinear, CfaPattern::Rggb).about([1.0, 1.0]);
 /// // The phase whose photosites are blue: there red is the mean of the four at the corners.
 /// let blue = (0..4).find(|&phase| weights.class(phase, [0, 0]) == Class::Blue).unwrap();
-/// let red = weights.kernel(blue, Class::Red as usize);
+/// let red = weights.stencil(blue, Class::Red as usize);
 /// assert_eq!([[-1, -1], [1, -1], [-1, 1], [1, 1]].map(|corner| red.at(corner)), [0.25; 4]);
 /// assert_eq!(red.at([0, 0]), 0.0);
 /// ```
@@ -114,7 +114,8 @@ pub struct WeightTable {
 impl WeightTable {
     /// The weights of `method` on an array of `pattern`, worked out once.
     pub fn of(method: Method, pattern: CfaPattern) -> &'static Self {
-        static TABLES: [[OnceLock<WeightTable>; 4]; 4] = [const { [const { OnceLock::new() }; 4] }; 4];
+        static TABLES: [[OnceLock<WeightTable>; CfaPattern::ALL.len()]; Method::ALL.len()] =
+            [const { [const { OnceLock::new() }; CfaPattern::ALL.len()] }; Method::ALL.len()];
         TABLES[method as usize][pattern as usize].get_or_init(|| Self::new(method, pattern))
     }
 
