@@ -126,22 +126,20 @@ impl WeightTable {
         for (index, phase) in PHASES.into_iter().enumerate() {
             let surroundings = Surroundings { pattern, phase };
             for class in Class::ALL {
-                let channel = class as usize;
                 let through_differences = method == Method::EffectiveColor;
-                if method == Method::Malvar {
-                    fixed[index][channel] = malvar::stencil(class, |offset| surroundings.class(offset));
-                } else if class == Class::Green {
-                    fixed[index][channel] = surroundings.green([0, 0], through_differences);
-                } else {
-                    let (mean, slope) = surroundings.chrominance(class, through_differences);
-                    match method {
-                        Method::EffectiveColor => fixed[index][channel] = mean.plus(1.0, &slope),
-                        _ => fixed[index][channel] = mean,
+                let green = || (surroundings.green([0, 0], through_differences), Stencil::zero());
+                let chrominance = || surroundings.chrominance(class, through_differences);
+                let (always, by_hue) = match method {
+                    Method::Malvar => (malvar::stencil(class, |offset| surroundings.class(offset)), Stencil::zero()),
+                    Method::Bilinear | Method::SmoothHue | Method::EffectiveColor if class == Class::Green => green(),
+                    Method::Bilinear => (chrominance().0, Stencil::zero()),
+                    Method::SmoothHue => chrominance(),
+                    Method::EffectiveColor => {
+                        let (mean, slope) = chrominance();
+                        (mean.plus(1.0, &slope), Stencil::zero())
                     }
-                    if method == Method::SmoothHue {
-                        of_hue[index][channel] = slope;
-                    }
-                }
+                };
+                (fixed[index][class as usize], of_hue[index][class as usize]) = (always, by_hue);
             }
         }
         Self { pattern, fixed, of_hue }
@@ -281,7 +279,7 @@ mod tests {
     /// All weights are whole multiples of 1/64 and the samples small whole numbers: nothing is rounded.
     #[test]
     fn impulses_through_the_linear_filters_give_the_table_back() {
-        for method in [Method::Bilinear, Method::EffectiveColor, Method::Malvar] {
+        for method in Method::ALL.into_iter().filter(|method| *method != Method::SmoothHue) {
             check(method, [64.0, 128.0, 32.0], 64.0, 1e-12);
         }
     }
