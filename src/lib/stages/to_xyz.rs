@@ -80,7 +80,7 @@ impl ToXyz {
     /// # Errors
     ///
     /// [`Error::Order`] unless the frame holds three planes of ADU; [`Error::MissingKey`] without exposure;
-    /// [`Error::Usage`] for an impossible white; [`Error::Format`](crate::error::Error::Format) where the black level
+    /// [`Error::Usage`] for an impossible white; [`Error::Format`] where the black level
     /// differs among photosites.
     pub fn new(input: &FrameHeader, settings: &ColorSettings) -> Result<Self> {
         check_camera(input)?;

@@ -1,4 +1,4 @@
-//! Frames in motion: a [`Stage`] maps bands to bands; [`run`] drives one from a source of rows to a sink, [`fold`] takes in
+//! Frames in motion: a [`Stage`] maps bands to bands; [`run`] drives one from a source of rows to a sink, [`fold()`] takes in
 //! the rows of one or several sources.
 
 mod bands;

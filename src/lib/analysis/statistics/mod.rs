@@ -1,6 +1,6 @@
 //! Statistics of frames and regions, beside what propagation predicts.
 //!
-//! [`measure`] reads a frame and sums up its regions; what it saw of each is laid beside what is predicted, and tested by
+//! [`measure()`] reads a frame and sums up its regions; what it saw of each is laid beside what is predicted, and tested by
 //! [`check`]. [`patches`] does so for the patches of a chart.
 
 mod assessment;

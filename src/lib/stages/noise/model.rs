@@ -30,7 +30,7 @@ impl NoiseModel {
     ///
     /// # Errors
     ///
-    /// [`Error::MissingKey`] when the frame has no sensor, or that no read-out.
+    /// [`Error::MissingKey`](crate::error::Error::MissingKey) when the frame has no sensor, or that no read-out.
     pub fn of(frame: &FrameHeader, record: &NoiseRecord) -> Result<Self> {
         let readout = frame.readout()?;
         let drawn = |source| record.sources.contains(&source);
