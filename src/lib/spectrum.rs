@@ -198,7 +198,7 @@ pub fn chart_columns(samples: usize) -> usize {
 ///
 /// // Equal energy lies at (⅓, ⅓), and twice the light is twice the signal.
 /// let camera = load_sensor("kaf-5101ce")?;
-/// let seen = signals(&library, &camera.sensor, &camera.response, &load_observer()?, &WavelengthGrid::default())?;
+/// let seen = signals(&library, &camera.sensor, camera.response()?, &load_observer()?, &WavelengthGrid::default())?;
 /// let [x, y, z] = [0, 1, 2].map(|i| seen.xyz[(0, i)]);
 /// assert!((x / (x + y + z) - 1.0 / 3.0).abs() < 1e-4);
 /// assert!((seen.camera[(1, 0)] / seen.camera[(0, 0)] - 2.0).abs() < 1e-12);
