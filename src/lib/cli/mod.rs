@@ -26,6 +26,9 @@ use std::process::ExitCode;
 /// Exit status after an interrupt, as shells have it: 128 + SIGINT.
 const INTERRUPTED: i32 = 130;
 
+/// Exit status after an internal error, as Rust's programs have it.
+const PANICKED: i32 = 101;
+
 /// What a running program says besides its output.
 #[derive(Debug)]
 pub struct Session {
@@ -42,6 +45,8 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     std::panic::set_hook(Box::new(move |panic| {
         let place = panic.location().map_or(String::new(), |at| format!(" at {}:{}", at.file(), at.line()));
         complain(program, &format!("internal error{place}; please report it with the command that led to it"));
+        remove_pending();
+        std::process::exit(PANICKED);
     }));
     // Without a handler an interrupt ends the program all the same, only less tidily.
     drop(ctrlc::set_handler(|| {

@@ -114,9 +114,9 @@ pub struct WeightTable {
 impl WeightTable {
     /// The weights of `method` on an array of `pattern`, worked out once.
     pub fn of(method: Method, pattern: CfaPattern) -> &'static Self {
-        static TABLES: [[OnceLock<WeightTable>; CfaPattern::ALL.len()]; Method::ALL.len()] =
+        static TABLES: [[OnceLock<Box<WeightTable>>; CfaPattern::ALL.len()]; Method::ALL.len()] =
             [const { [const { OnceLock::new() }; CfaPattern::ALL.len()] }; Method::ALL.len()];
-        TABLES[method as usize][pattern as usize].get_or_init(|| Self::new(method, pattern))
+        TABLES[method as usize][pattern as usize].get_or_init(|| Box::new(Self::new(method, pattern)))
     }
 
     /// The weights of `method` on an array of `pattern`.
