@@ -5,7 +5,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use cyanometer::analysis::characterization::evaluation::{EvaluationSettings, Filling, SampleExposure, evaluate};
 use cyanometer::analysis::characterization::signals;
-use cyanometer::analysis::statistics::measure;
+use cyanometer::analysis::statistics::{Saturated, measure};
 use cyanometer::camera::optics::Exposure;
 use cyanometer::chain::{CameraSetup, Predictor, PredictorSettings, uniform_frame};
 use cyanometer::color::{Space, White};
@@ -64,6 +64,7 @@ fn stages(criterion: &mut Criterion) {
         let settings = ColorSettings {
             xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
             method: None,
+            residual: None,
             space,
             white: White::D65,
             white_luminance: None,
@@ -75,7 +76,7 @@ fn stages(criterion: &mut Criterion) {
     group.bench_function("measure", |bencher| {
         bencher.iter(|| {
             let mut source = MemoryFrame::new(rgb.header.clone(), rgb.samples.clone());
-            measure(&mut source, &[], Equations::Exact, None)
+            measure(&mut source, &[], Saturated::Kept, Equations::Exact, None)
         });
     });
     group.finish();
@@ -119,6 +120,7 @@ fn evaluations(criterion: &mut Criterion) {
             color: ColorSettings {
                 xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
                 method: None,
+                residual: None,
                 space: Space::Lab,
                 white: White::D65,
                 white_luminance: None,

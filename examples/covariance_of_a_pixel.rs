@@ -21,6 +21,7 @@ pub fn predict(method: Method, electrons: [f64; 3]) -> Result<ChainPrediction> {
     let color = ColorSettings {
         xyz_from_camera: XYZ_FROM_CAMERA,
         method: None,
+        residual: None,
         space: Space::Xyz,
         white: White::D65,
         white_luminance: None,

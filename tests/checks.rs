@@ -6,7 +6,7 @@
 mod support;
 
 use cyanometer::analysis::statistics::check::Verdict;
-use cyanometer::analysis::statistics::{Region, RegionReport, measure};
+use cyanometer::analysis::statistics::{Region, RegionReport, Saturated, measure};
 use cyanometer::color::{Space, White};
 use cyanometer::metadata::Scene;
 use cyanometer::numerics::significance::{of_chi_square, of_smallest};
@@ -49,6 +49,7 @@ fn colored(camera: &MemoryFrame, space: Space) -> MemoryFrame {
     let settings = ColorSettings {
         xyz_from_camera: sensor().xyz_from_camera.unwrap(),
         method: None,
+        residual: None,
         space,
         white: White::D65,
         white_luminance: None,
@@ -58,12 +59,12 @@ fn colored(camera: &MemoryFrame, space: Space) -> MemoryFrame {
 
 fn regions(frame: &MemoryFrame, regions: &[Region], equations: Equations) -> Vec<RegionReport> {
     let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-    measure(&mut source, regions, equations, Some(0.5)).unwrap().regions
+    measure(&mut source, regions, Saturated::Kept, equations, Some(0.5)).unwrap().regions
 }
 
 fn verdict(frame: &MemoryFrame, equations: Equations) -> Verdict {
     let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-    measure(&mut source, &[], equations, Some(1e-4)).unwrap().check.unwrap()
+    measure(&mut source, &[], Saturated::Kept, equations, Some(1e-4)).unwrap().check.unwrap()
 }
 
 /// The smallest probability of a region, corrected for the number of tests.
@@ -197,7 +198,7 @@ fn wrong_predictions_are_caught() {
     levels[1] *= 1.01;
     assert!(!verdict(&brighter, Equations::Exact).passed);
     brighter.header.metadata.scene = None;
-    let refused = measure(&mut brighter, &[], Equations::Exact, Some(0.1)).unwrap_err();
+    let refused = measure(&mut brighter, &[], Saturated::Kept, Equations::Exact, Some(0.1)).unwrap_err();
     assert!(refused.to_string().contains("nothing can be checked"), "{refused}");
 }
 
@@ -305,17 +306,22 @@ fn charge_transfer_is_in_the_predicted_mean() {
     for electrons in [noisy(&planes), noisy(&plane(&level))] {
         for frame in [digitized(&electrons), electrons] {
             let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-            let report = measure(&mut source, &[], Equations::Exact, None).unwrap();
+            let report = measure(&mut source, &[], Saturated::Kept, Equations::Exact, None).unwrap();
             for channel in &report.regions[0].channels {
                 // 5 standard errors; the charge that neighbors share widens them by less than 10 %.
                 assert!(channel.z_mean.unwrap().abs() < 5.0 && channel.z_std.unwrap().abs() < 5.0, "{channel:?}");
                 // Without transfer's share of 1 − 2·10⁻⁴ the mean of 9000 e⁻ would be off by 1.8 e⁻, 3 standard errors.
             }
             let mut again = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-            let refused = measure(&mut again, &[], Equations::Exact, Some(1e-4)).unwrap_err().to_string();
+            let refused =
+                measure(&mut again, &[], Saturated::Kept, Equations::Exact, Some(1e-4)).unwrap_err().to_string();
             assert!(refused.contains("charge transfer"), "{refused}");
         }
     }
     let mut mixed = noisy(&plane(&planes));
-    assert_eq!(measure(&mut mixed, &[], Equations::Exact, None).unwrap().regions[0].channels[0].predicted_mean, None);
+    assert_eq!(
+        measure(&mut mixed, &[], Saturated::Kept, Equations::Exact, None).unwrap().regions[0].channels[0]
+            .predicted_mean,
+        None
+    );
 }

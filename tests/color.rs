@@ -227,6 +227,7 @@ fn evaluated(sensor: &Sensor, found: &Signals, method: Method, seed: u64) -> Vec
         color: ColorSettings {
             xyz_from_camera,
             method: None,
+            residual: None,
             space: Space::Lab,
             white: White::D65,
             white_luminance: None,

@@ -67,6 +67,7 @@ fn color_settings(space: Space) -> ColorSettings {
     ColorSettings {
         xyz_from_camera: [[0.9, 0.4, 0.3], [0.3, 0.9, 0.1], [0.05, -0.1, 1.4]],
         method: None,
+        residual: None,
         space,
         white: White::D65,
         white_luminance: None,

@@ -5,7 +5,7 @@
 
 mod support;
 
-use cyanometer::analysis::statistics::{Report, measure};
+use cyanometer::analysis::statistics::{Report, Saturated, measure};
 use cyanometer::camera::levels::{BlackLevel, WhiteLevel};
 use cyanometer::cfa::{CfaPattern, Class, FilterArray};
 use cyanometer::color::{Space, White};
@@ -67,7 +67,7 @@ fn correct(frame: &FrameHeader, black: Black, cte: Option<f64>) -> Result<Correc
 }
 
 fn statistics(frame: &MemoryFrame) -> Report {
-    measure(&mut frame.clone(), &[], Equations::Exact, None).unwrap()
+    measure(&mut frame.clone(), &[], Saturated::Kept, Equations::Exact, None).unwrap()
 }
 
 fn refused<T>(result: Result<T>, complaint: &str) {
@@ -153,7 +153,7 @@ fn a_crop_loses_what_the_whole_loses() {
     let complaint = "`black_by_row` has the levels of 40 rows, but the frame has rows 20 to 43 of the sensor";
     refused(correct(&beyond.header, Black::Auto, None), complaint);
     refused(Demosaic::new(&beyond.header, Method::Bilinear, Black::Auto, None), complaint);
-    refused(measure(&mut beyond.clone(), &[], Equations::Exact, None), complaint);
+    refused(measure(&mut beyond.clone(), &[], Saturated::Kept, Equations::Exact, None), complaint);
 }
 
 #[test]
@@ -190,6 +190,7 @@ fn to_color(space: Space) -> ColorSettings {
     ColorSettings {
         xyz_from_camera: sensor().xyz_from_camera.unwrap(),
         method: None,
+        residual: None,
         space,
         white: White::D65,
         white_luminance: None,

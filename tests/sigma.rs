@@ -58,6 +58,7 @@ fn coloring(camera: &FrameHeader, space: Space) -> WithSigma<ToXyz> {
     let settings = ColorSettings {
         xyz_from_camera: sensor().xyz_from_camera.unwrap(),
         method: None,
+        residual: None,
         space,
         white: White::D65,
         white_luminance: None,

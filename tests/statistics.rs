@@ -5,7 +5,7 @@
 
 mod support;
 
-use cyanometer::analysis::statistics::{ChannelReport, measure};
+use cyanometer::analysis::statistics::{ChannelReport, Saturated, measure};
 use cyanometer::cfa::Class;
 use cyanometer::metadata::{PoissonKind, Scene};
 use cyanometer::propagation::Equations;
@@ -37,7 +37,7 @@ fn digitized(frame: &MemoryFrame) -> MemoryFrame {
 
 fn channels(frame: &MemoryFrame, equations: Equations) -> Vec<ChannelReport> {
     let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-    measure(&mut source, &[], equations, None).unwrap().regions.remove(0).channels
+    measure(&mut source, &[], Saturated::Kept, equations, None).unwrap().regions.remove(0).channels
 }
 
 /// Deviations in units of their sampling error, gathered to be judged together.
@@ -203,7 +203,7 @@ fn classes_of_a_plane_are_as_noisy_as_predicted() {
         let mosaic = Mosaic::new(&scene.header, None).unwrap();
         let plane = digitized(&noisy(&through_blocks(&scene, &mosaic, 1, 2).0, &settings));
         let mut source = MemoryFrame::new(plane.header.clone(), plane.samples.clone());
-        let report = measure(&mut source, &[], Equations::Exact, None).unwrap().regions.remove(0);
+        let report = measure(&mut source, &[], Saturated::Kept, Equations::Exact, None).unwrap().regions.remove(0);
         assert_eq!(report.classes.len(), 3);
         for class in &report.classes {
             means.z.push((class.z_mean.unwrap(), class.name.clone()));

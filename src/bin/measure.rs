@@ -1,7 +1,7 @@
 //! `measure`: statistics of a frame beside what propagation predicts.
 
 use clap::Parser;
-use cyanometer::analysis::statistics::{Region, measure, patches};
+use cyanometer::analysis::statistics::{Region, Saturated, measure, patches};
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::{input::FrameReader, input::InputOptions, output};
@@ -31,6 +31,9 @@ struct Arguments {
     /// demosaicking mixes
     #[arg(long, value_name = "WxH", num_args = 0..=1, require_equals = true, value_parser = values::size, conflicts_with_all = ["region", "check"])]
     patches: Option<Option<[usize; 2]>>,
+    /// Keep pixels in the statistics that were made of saturated samples
+    #[arg(long)]
+    keep_saturated: bool,
     /// Form of the report
     #[arg(long, default_value = "text", value_parser = values::choice::<ReportFormat>())]
     output_format: ReportFormat,
@@ -61,9 +64,10 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&options)?;
     session.report_reader(&reader);
     let level = arguments.check.then_some(arguments.level);
+    let saturated = if arguments.keep_saturated { Saturated::Kept } else { Saturated::LeftOut };
     let report = match arguments.patches {
-        Some(size) => patches::measure(&mut reader, size, arguments.equations)?,
-        None => measure(&mut reader, &arguments.region, arguments.equations, level)?,
+        Some(size) => patches::measure(&mut reader, size, saturated, arguments.equations)?,
+        None => measure(&mut reader, &arguments.region, saturated, arguments.equations, level)?,
     };
     let text = report::render(&report, arguments.output_format)?;
     output::write_text(arguments.output.as_deref(), &text, reader.file().as_ref())?;
@@ -72,5 +76,8 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     }
     let not_finite = report.regions.iter().map(|region| region.not_finite).sum();
     session.tell(Note::not_finite(not_finite).as_slice());
+    let saturated = report.regions.iter().map(|region| region.saturated).sum();
+    let left_out = report.regions.iter().any(|region| region.leaves_saturated_out);
+    session.tell(Note::saturated(saturated, left_out).as_slice());
     report.check.map_or(Ok(()), |verdict| verdict.judge(&reader.header().name))
 }

@@ -41,9 +41,10 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
     check_outputs(&[output.output.as_deref()], &[&conversion.matrix])?;
+    let matrix = conversion.load_matrix()?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
     arguments.sensor.apply(&mut reader)?;
-    let (mut stage, notes) = conversion.stage(reader.header_mut())?;
+    let (mut stage, notes) = conversion.stage(matrix, reader.header_mut())?;
     session.tell(&notes);
     session.sign(stage.header_mut());
     if arguments.sigma {

@@ -44,7 +44,7 @@ pub enum Error {
     },
 
     /// The metadata lacks a key that is needed. The command line adds the option that supplies it.
-    #[error("{file}: the metadata has no `{key}`")]
+    #[error("{file}: {} has no `{}`", holder_of(.key), .key.strip_prefix("sensor.").unwrap_or(.key))]
     MissingKey {
         /// The file as the user named it.
         file: String,
@@ -104,6 +104,11 @@ impl fmt::Display for Advice {
 
 /// A result with the project's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// What a key should stand in.
+fn holder_of(key: &str) -> &'static str {
+    if key.starts_with("sensor.") { "its sensor" } else { "the metadata" }
+}
 
 impl Error {
     /// An [`Error::Format`] about `file`.

@@ -12,7 +12,7 @@
 //! | 3 frames in motion | [`metadata`], [`stream`] | what is known of a frame, and how its rows move |
 //! | 4 stages | [`stages`] | what each step does to rows, in the order in which light meets them |
 //! | 5 prediction | [`propagation`] | moments by formula, from the head of a frame |
-//! | 6 the chain | [`chain`], [`sigma`] | stages and predictions together |
+//! | 6 the chain | [`chain`], [`sigma`], [`masking`] | stages and predictions together |
 //! | 7 analysis | [`analysis`] | statistics beside predictions, differences, matrices |
 //! | 8 files | [`formats`] | bytes to frames and back |
 //! | 9 requests | [`requests`] | what a program does, from its arguments to results and notes |
@@ -59,6 +59,7 @@ pub mod stages;
 pub mod propagation;
 
 pub mod chain;
+pub mod masking;
 pub mod sigma;
 
 pub mod analysis;

@@ -6,12 +6,12 @@
 use crate::color::{Space, lab_about, xyy_about};
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
-use crate::metadata::FrameHeader;
+use crate::metadata::{Coverage, FrameHeader};
 use crate::propagation::covariance::{stds, through};
 use crate::propagation::pixels::PixelNoise;
 use crate::stages::demosaic::Demosaic;
 use crate::stages::to_xyz::ToXyz;
-use crate::stream::{Counts, Stage};
+use crate::stream::{Counts, Footprint, Stage};
 
 /// Channels of the layer of covariances of XYZ.
 pub const COVARIANCE_LAYER: [&str; 6] =
@@ -75,6 +75,8 @@ impl<S: Propagating> WithSigma<S> {
     fn new(stage: S, noise: PixelNoise) -> Result<Self> {
         let mut header = stage.header().clone();
         header.geometry.channels.extend(stage.layers()?.into_iter().map(str::to_owned));
+        let residual = header.metadata.color.as_ref().and_then(|color| color.matrix_residual.clone());
+        header.metadata.uncertainty = Some(Coverage::noise_only(residual));
         Ok(Self { stage, header, noise })
     }
 
@@ -94,6 +96,10 @@ impl<S: Propagating> Stage for WithSigma<S> {
 
     fn reach(&self) -> usize {
         self.stage.reach()
+    }
+
+    fn footprint(&self) -> Footprint {
+        self.stage.footprint()
     }
 
     fn apply(&self, input: Window<'_, S::Input>, mut output: Rows<'_, S::Output>) -> Counts {

@@ -13,10 +13,7 @@ from programs import BINARIES, TIMEOUT_S, ProgramCase, read_planes, sample_data,
 
 BAD_DATA, BAD_USAGE = 1, 2
 
-PROGRAMS = [
-    *("render-radiance", "add-noise", "digitize", "mosaic", "demosaic"),
-    *("to-xyz", "fit-matrix", "measure"),
-]
+PROGRAMS = sorted(path.stem for path in (pathlib.Path(__file__).parents[2] / "src" / "bin").glob("*.rs"))
 
 
 def naming(option, value):

@@ -8,7 +8,7 @@ use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::formats::yaml::parse_metadata;
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata};
-use cyanometer::stream::{Counts, RowSink, RowSource};
+use cyanometer::stream::{Counts, MemoryFrame, RowSink, RowSource};
 use cyanometer::units::QuantityKind;
 use std::fs;
 use std::io::Write;
@@ -136,6 +136,15 @@ impl Workshop {
         let (height, mut samples) = (reader.header().geometry.height, Vec::new());
         reader.read(height, &mut samples).unwrap();
         (samples, reader.header().metadata.clone())
+    }
+
+    /// A whole frame in memory.
+    pub fn frame(&self, name: &str) -> MemoryFrame {
+        let options = InputOptions { path: Some(self.path(name)), ..Default::default() };
+        let mut reader = FrameReader::open(&options).unwrap();
+        let mut samples = Vec::new();
+        reader.read(reader.header().geometry.height, &mut samples).unwrap();
+        MemoryFrame::new(reader.header().clone(), samples)
     }
 
     /// One frame of each stage, and a matrix.

@@ -14,6 +14,7 @@ use crate::numerics::normal;
 use crate::propagation::budget::{Budget, Cause};
 use crate::propagation::frame::{Sites, quantity_of_sites};
 use crate::propagation::gains;
+use crate::propagation::saturation;
 use crate::propagation::smooth_hue::FirstOrder;
 use crate::propagation::{Equations, FramePrediction, PixelMoments};
 use crate::stages::demosaic::Method;
@@ -156,8 +157,11 @@ pub struct StagePrediction {
     pub temporal_std: Option<[f64; 3]>,
     /// The part that is the same in every exposure of one sensor.
     pub fixed_pattern_std: Option<[f64; 3]>,
-    /// 20 log₁₀ of the mean above black over the standard deviation; none where the mean is no signal.
+    /// 20 log₁₀ of the mean above black over the standard deviation; none where the mean is no signal, or saturated.
     pub snr_db: [Option<f64>; 3],
+    /// Share of the samples that are saturated, or of the pixels that were made of such; none below 10⁻¹².
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub saturated: Option<[f64; 3]>,
     /// Covariance of the channels of a pixel, over the phases of the filter array.
     pub covariance: [[f64; 3]; 3],
     /// The same to second order, of smooth hue transition; `covariance` and `std` are its first.
@@ -217,6 +221,10 @@ pub struct NoiseDeltaE {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixels_needed: Option<u64>,
 }
+
+/// The share of saturated samples from which a signal has no ratio to its noise: what is left of the noise says nothing of
+/// the light.
+const SATURATED: f64 = 1e-3;
 
 /// What photosites are: their quantity, and how they were corrected.
 type Plane = (QuantityKind, Option<CorrectionRecord>);
@@ -341,10 +349,12 @@ impl PredictorSettings {
             _ => 0.0,
         };
         let signal = mean.map(|mean| mean - black);
+        let saturated = saturation::expected(head);
         let is_signal = metadata.quantity != QuantityKind::Lab;
         let snr_db = [0, 1, 2].map(|i| {
             let ratio = signal[i] / std[i];
-            (is_signal && ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
+            let is_clear = saturated.is_none_or(|shares| shares[i] < SATURATED);
+            (is_signal && is_clear && ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
         });
         let patch = self.patch.map(|size| self.patch_mean(prediction, &covariance, size));
         let certain_enough = |wanted: f64, i: usize, side: usize| {
@@ -371,6 +381,7 @@ impl PredictorSettings {
             temporal_std: part(false),
             fixed_pattern_std: part(true),
             snr_db,
+            saturated,
             covariance: rows(&covariance),
             second_order_covariance: second_order.filter(|_| self.equations == Equations::Exact),
             phases: self.phases(prediction),

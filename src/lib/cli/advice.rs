@@ -4,7 +4,7 @@ use crate::error::Error;
 use clap::Command;
 
 /// What supplies a key that metadata lack, the better choice first; it counts where the program has all its options.
-const SUPPLIES: [(&str, &str); 12] = [
+const SUPPLIES: [(&str, &str); 11] = [
     ("sensor", "--sensor NAME|FILE, or all of --bits, --bias and --slope"),
     ("sensor.readout", "a sensor that has it, --sensor NAME|FILE"),
     ("sensor.response", "a sensor that has it, --sensor NAME|FILE"),
@@ -13,7 +13,6 @@ const SUPPLIES: [(&str, &str); 12] = [
     ("white_level_adu", "--white-luminance CD_PER_M2"),
     ("white_level_adu", "--white N"),
     ("black_level_adu", "--black N"),
-    ("adc", "--black N"),
     ("cfa", "--pattern rggb|bggr|grbg|gbrg"),
     ("cfa", "--cfa PATTERN"),
     ("color.white", "--white-luminance CD_PER_M2"),
@@ -77,7 +76,7 @@ mod tests {
         let said = |key, options: &[&'static str]| {
             advised(&Error::MissingKey { file: "a.exr".into(), key }, &program(options))
         };
-        let missing = "a.exr: the metadata has no `sensor.bits`";
+        let missing = "a.exr: its sensor has no `bits`";
         let all = "; give --sensor NAME|FILE, or all of --bits, --bias and --slope";
         assert_eq!(said("sensor.bits", &["sensor", "bits", "bias", "slope"]), format!("{missing}{all}"));
         assert_eq!(said("sensor.bits", &["sensor"]), format!("{missing}; give --sensor NAME|FILE"));

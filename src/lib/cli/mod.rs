@@ -12,12 +12,13 @@ use crate::error::{Error, Result};
 use crate::formats::atomic::remove_pending;
 use crate::formats::input::FrameReader;
 use crate::formats::output::FrameWriter;
+use crate::masking::Masking;
 use crate::metadata::FrameHeader;
 use crate::numerics::vectors::Instructions;
 use crate::requests::options::Output;
 use crate::requests::{self, Note};
-use crate::stages::darks::{DarkFrames, LessDarks};
-use crate::stream::{Counts, Stage, run};
+use crate::stages::darks::DarkFrames;
+use crate::stream::{Counts, RowSource, Stage};
 use clap::{CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
@@ -189,13 +190,14 @@ impl Session {
         let readers = || std::iter::once(&reader).chain(darks.iter().flat_map(DarkFrames::frames));
         readers().for_each(|reader| self.report_reader(reader));
         let inputs: Vec<_> = readers().filter_map(FrameReader::file).collect();
-        let mut writer = FrameWriter::create(&output.options(), stage.header(), &inputs)?;
-        let bar = self.progress(stage.header().geometry.height);
+        let layers = output.options().holds_layers()?;
+        let masking = Masking::of(reader.header(), reader.has_mask(), stage.header(), layers);
+        let made = masking.header(stage);
+        reader.keep_mask();
+        let mut writer = FrameWriter::create(&output.options(), &made, &inputs)?;
+        let bar = self.progress(made.geometry.height);
         let mut progress = |rows| bar.set_position(rows as u64);
-        let counts = match &mut darks {
-            None => run(stage, &mut reader, &mut writer, &mut progress)?,
-            Some(darks) => run(stage, &mut LessDarks::new(&mut reader, darks), &mut writer, &mut progress)?,
-        };
+        let counts = masking.run(stage, &mut reader, darks.as_mut(), &mut writer, &mut progress)?;
         bar.finish_and_clear();
         self.finish(reader, writer, counts)?;
         for warning in darks.iter_mut().flat_map(DarkFrames::frames_mut).filter_map(FrameReader::check_digest) {

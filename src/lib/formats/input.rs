@@ -7,6 +7,7 @@ use super::{pipe, table, tiff, yaml};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
+use crate::stages::saturation::MASK_LAYER;
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use std::fs::File;
@@ -65,6 +66,9 @@ pub struct FrameReader {
     /// What stored samples are divided by: sRGB in 16 bits runs to 65535.
     divisor: Option<f32>,
     notes: Vec<String>,
+    /// The place of the layer of marks among the stored channels, where stages do not see it.
+    mask: Option<usize>,
+    keeps_mask: bool,
 }
 
 /// A digest to compare with once all samples are in.
@@ -103,9 +107,11 @@ impl FrameReader {
         let (metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
         let stored = reader.geometry();
         let geometry = keep_planes(stored, options.all_channels, metadata.quantity);
-        if geometry.channels.len() < stored.channels.len() {
-            let dropped = stored.channels[geometry.channels.len()..].join(", ");
-            notes.push(format!("{name}: channels {dropped} are left out"));
+        let left_out = &stored.channels[geometry.channels.len()..];
+        let mask = left_out.iter().position(|channel| channel == MASK_LAYER).map(|at| geometry.channels.len() + at);
+        let dropped: Vec<&str> = left_out.iter().map(String::as_str).filter(|channel| *channel != MASK_LAYER).collect();
+        if !dropped.is_empty() {
+            notes.push(format!("{name}: channels {} are left out", dropped.join(", ")));
         }
         let check = metadata.samples.as_ref().zip(sidecar).map(|(samples, sidecar)| DigestCheck {
             digest: SamplesDigest::like(&samples.digest),
@@ -116,7 +122,18 @@ impl FrameReader {
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
         let header = FrameHeader { name: name.into(), geometry, metadata };
         let id = about.is_file().then(|| file_id(&about));
-        Ok(Self { reader, header, id, rows_read: 0, check, buffer: Vec::new(), divisor, notes })
+        Ok(Self {
+            reader,
+            header,
+            id,
+            rows_read: 0,
+            check,
+            buffer: Vec::new(),
+            divisor,
+            notes,
+            mask,
+            keeps_mask: false,
+        })
     }
 
     /// Metadata to amend before a stage is built on them.
@@ -132,6 +149,19 @@ impl FrameReader {
     /// The file that is read, so that it is not written over; none for pipes.
     pub fn file(&self) -> Option<(FileId, String)> {
         self.id.map(|id| (id, self.header.name.clone()))
+    }
+
+    /// Whether the frame has a layer that marks pixels beside the channels that stages see.
+    pub fn has_mask(&self) -> bool {
+        self.mask.is_some()
+    }
+
+    /// Gives the layer of marks as the last channel from now on, where there is one.
+    pub fn keep_mask(&mut self) {
+        if self.mask.is_some() && !self.keeps_mask {
+            self.keeps_mask = true;
+            self.header.geometry.channels.push(MASK_LAYER.into());
+        }
     }
 
     /// What a careful user should know: channels left out, tags passed over.
@@ -169,7 +199,9 @@ impl RowSource for FrameReader {
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
         let whole = self.reader.geometry().row_samples();
-        let kept = self.header.geometry.row_samples();
+        let mask = self.mask.filter(|_| self.keeps_mask);
+        let width = self.header.geometry.width;
+        let kept = self.header.geometry.row_samples() - mask.map_or(0, |_| width);
         let mut buffer = std::mem::take(&mut self.buffer);
         let direct = kept == whole;
         let start = if direct { samples.len() } else { 0 };
@@ -185,6 +217,9 @@ impl RowSource for FrameReader {
         if !direct {
             for row in buffer.chunks_exact(whole) {
                 samples.extend_from_slice(&row[..kept]);
+                if let Some(mask) = mask {
+                    samples.extend_from_slice(&row[mask * width..][..width]);
+                }
             }
         }
         self.buffer = buffer;

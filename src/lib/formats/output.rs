@@ -151,6 +151,15 @@ impl OutputOptions {
     }
 
     /// The format, by the file's extension where none is given.
+    /// Whether the file has names for layers beside the samples.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where nothing says which format it is.
+    pub fn holds_layers(&self) -> Result<bool> {
+        Ok(self.format()? == Format::Exr)
+    }
+
     fn format(&self) -> Result<Format> {
         let path = named(self.path.as_deref());
         let extension = path.and_then(Path::extension).map(|end| end.to_string_lossy().to_ascii_lowercase());

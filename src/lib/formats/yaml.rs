@@ -64,6 +64,12 @@ pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -
 pub fn parse_sensor(name: &str, bytes: &[u8]) -> Result<Sensor> {
     let raw = parse_raw(name, checked_text(name, bytes)?)?;
     if !is_flat(&raw) {
+        let schema = raw.get("schema").and_then(Value::as_str);
+        if let Some(other) = schema.filter(|schema| *schema != SENSOR_SCHEMA) {
+            let problem =
+                format!("its schema is `{other}`, but this version reads `{SENSOR_SCHEMA}` and `{FLAT_SENSOR_SCHEMA}`");
+            return Err(Error::format(name, problem));
+        }
         return parse_parts(name, bytes, &sensor_parts());
     }
     if let Some((part, _)) = sensor_parts().iter().find(|(part, _)| raw.contains_key(*part)) {

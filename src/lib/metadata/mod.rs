@@ -3,8 +3,8 @@
 mod records;
 
 pub use records::{
-    AdcRecord, ColorRecord, CorrectionRecord, DemosaicRecord, HistoryEntry, LeftOut, NoiseRecord, PoissonKind,
-    PredictedRecord, SamplesRecord, Scene,
+    AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
+    NoiseRecord, PoissonKind, PredictedRecord, SamplesRecord, Scene,
 };
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
@@ -82,6 +82,12 @@ pub struct Metadata {
     /// Moments of every sample by formula, where the scene is uniform.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted: Option<PredictedRecord>,
+    /// What the layers of standard deviations count, where there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Coverage>,
+    /// Expected share of the pixels that were made of saturated samples, by the law of a uniform scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub saturated_share: Option<f64>,
     /// What was left out because the scene did not need it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
@@ -119,6 +125,8 @@ impl Metadata {
             demosaic: None,
             color: None,
             predicted: None,
+            uncertainty: None,
+            saturated_share: None,
             left_out: Vec::new(),
             history: Vec::new(),
             samples: None,
@@ -128,7 +136,14 @@ impl Metadata {
 
     /// The same record about samples of another quantity: what held for the old samples alone is dropped.
     pub fn becoming(&self, quantity: QuantityKind) -> Self {
-        Self { quantity, unit: quantity.unit().into(), predicted: None, samples: None, ..self.clone() }
+        Self {
+            quantity,
+            unit: quantity.unit().into(),
+            predicted: None,
+            uncertainty: None,
+            samples: None,
+            ..self.clone()
+        }
     }
 
     /// The black level in ADU, 0 where none is known; none where it differs among photosites.
@@ -238,7 +253,10 @@ impl FrameHeader {
             if black_by_row.is_empty() && black_by_column.is_empty() {
                 return Ok(None);
             }
-            return Err(self.missing("black_level_adu"));
+            return Err(self.refuse(
+                "what rows or columns add to the black level is given, but not the level itself; write `black_level_adu` \
+                 beside it, 0 if that is meant",
+            ));
         };
         let size = [geometry.width, geometry.height];
         let levels = BlackLevels::new(level, black_by_row, black_by_column, geometry.origin, size);

@@ -168,6 +168,49 @@ pub struct ColorRecord {
     /// XYZ of the white that Lab and sRGB refer to, absolute.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub white: Option<[f64; 3]>,
+    /// How far the matrix is off without noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matrix_residual: Option<MatrixResidual>,
+}
+
+/// How far a matrix is off on the spectra that it was judged by, without noise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MatrixResidual {
+    /// Where the spectra come from.
+    pub library: String,
+    /// Root of the mean squared relative error of X, Y and Z.
+    pub relative_rms: [f64; 3],
+}
+
+impl MatrixResidual {
+    /// The same in words.
+    pub fn in_words(&self) -> String {
+        let [x, y, z] = self.relative_rms.map(|rms| 100.0 * rms);
+        format!("the matrix is off by {x:.2} % of X, {y:.2} % of Y and {z:.2} % of Z, rms over {}", self.library)
+    }
+}
+
+/// What standard deviations count in all reports and layers: noise. What a matrix is off by is told beside them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Coverage {
+    /// `noise only`.
+    pub std_counts: String,
+    /// What is beside the noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matrix_residual: Option<MatrixResidual>,
+}
+
+impl Coverage {
+    /// That of noise, beside what a matrix is off by.
+    pub fn noise_only(matrix_residual: Option<MatrixResidual>) -> Self {
+        Self { std_counts: "noise only".into(), matrix_residual }
+    }
+
+    /// The same in words.
+    pub fn in_words(&self) -> String {
+        let beside = self.matrix_residual.as_ref().map(|residual| format!("; {}", residual.in_words()));
+        format!("standard deviations count {}{}", self.std_counts, beside.unwrap_or_default())
+    }
 }
 
 /// Moments by formula.
@@ -177,6 +220,9 @@ pub struct PredictedRecord {
     pub mean: [f64; 3],
     /// Standard deviation of R, G and B over the photosites of a frame, fixed patterns included.
     pub std: [f64; 3],
+    /// Share of the samples of R, G and B that are saturated; of electrons, of photosites whose charge reaches full well.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub saturated: Option<[f64; 3]>,
 }
 
 /// Work that was left out.
@@ -231,4 +277,7 @@ pub struct SamplesRecord {
     /// Pixels whose noise cannot be propagated, green being too near its noise to divide by.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub propagation_void: Option<u64>,
+    /// Samples at full well or the white level or above; of demosaicked frames and colors, pixels that were made of such.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub saturated: Option<u64>,
 }

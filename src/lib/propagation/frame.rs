@@ -10,7 +10,7 @@ use crate::camera::levels::BlackLevel;
 use crate::cfa::Class;
 use crate::color;
 use crate::error::Error;
-use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind, PredictedRecord};
+use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::names::Named;
 use crate::numerics::normal::MeanVariance;
 use crate::stages::demosaic::Method;
@@ -94,20 +94,6 @@ pub type Predicted<T> = Result<T, Unpredictable>;
 /// ```
 pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
     Sites::of(frame, equations)?.frame(frame)
-}
-
-/// Writes the predicted moments of a frame into its metadata, where there are any.
-pub fn note(frame: &mut FrameHeader, equations: Equations) {
-    // A frame of which nothing can be predicted carries no prediction; `of_frame` tells why to whoever asks.
-    frame.metadata.predicted = of_frame(frame, equations).ok().map(|prediction| match prediction {
-        FramePrediction::Planes(classes) => PredictedRecord {
-            mean: classes.map(|class| class.moments.mean),
-            std: classes.map(|class| class.moments.std()),
-        },
-        FramePrediction::Pixels(pixels) => {
-            PredictedRecord { mean: pixels.mean, std: [0, 1, 2].map(|i| pixels.covariance[(i, i)].max(0.0).sqrt()) }
-        }
-    });
 }
 
 /// The quantity of the photosites that a frame was made of.
@@ -222,6 +208,7 @@ fn subtracted(level: BlackLevel, with_deltas: bool) -> Predicted<f64> {
 /// Codes as the converter gave them and charge transfer left them, or as they were corrected.
 fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Predicted<(Photosite, [Prediction; 3])> {
     let metadata = &frame.metadata;
+    check_levels(frame, &codes)?;
     let shifted = |prediction: Prediction, by: f64| Prediction {
         moments: MeanVariance { mean: prediction.moments.mean + by, ..prediction.moments },
         ..prediction
@@ -243,6 +230,22 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
         _ => 0.0,
     };
     Ok((corrected, expected_e.map(|mean| shifted(corrected.moments(mean), -black_adu))))
+}
+
+/// Makes sure that levels of the metadata are those of the converter, from which codes are predicted.
+fn check_levels(frame: &FrameHeader, codes: &Photosite) -> Predicted<()> {
+    let metadata = &frame.metadata;
+    if metadata.correction.is_some() {
+        return Ok(());
+    }
+    if metadata.uniform_black_adu().is_none() {
+        return Err(Unpredictable::Beyond("the black level differs among photosites"));
+    }
+    let top = codes.adc.map(|adc| f64::from(adc.top_code()));
+    if metadata.demosaic.is_none() && metadata.white_level_adu.is_some_and(|white| white.uniform() != top) {
+        return Err(Unpredictable::Beyond("the white level is not the largest code of the converter"));
+    }
+    Ok(())
 }
 
 /// What charge transfer leaves of photosites whose mean is in proportion to charge: the same share of the mean everywhere,

@@ -14,12 +14,15 @@ pub mod paper;
 pub mod photosite;
 pub mod pixel_moments;
 pub mod pixels;
+mod record;
 pub mod sampling;
+pub mod saturation;
 pub mod smooth_hue;
 mod tail;
 
-pub use frame::{FramePrediction, Unpredictable, note, of_frame};
+pub use frame::{FramePrediction, Unpredictable, of_frame};
 pub use moments::{Equations, Prediction};
 pub use photosite::Photosite;
 pub use pixel_moments::PixelMoments;
+pub use record::note;
 pub use smooth_hue::hues;

@@ -163,6 +163,13 @@ impl PixelNoise {
         })?;
         let method = Method::named(&record.method)
             .ok_or_else(|| frame.refuse(format!("it was demosaicked by `{}`, a method unknown here", record.method)))?;
+        let transferred = metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
+        if transferred || metadata.correction.is_some_and(|correction| correction.cte.is_some()) {
+            return Err(frame.refuse(
+                "its charge was transferred, and what that does to noise differs from place to place; no standard \
+                 deviations can be told",
+            ));
+        }
         let readout = frame.readout()?;
         let noise = match &metadata.noise {
             Some(noise) => noise.clone(),

@@ -14,18 +14,17 @@ use std::ops::Range;
 
 /// A source of noise, as the paper lists them (Sec. 3.3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u8)]
 pub enum Source {
     /// Dark-current shot noise, temporal.
-    Dcsn = 0,
+    Dcsn,
     /// Dark-current non-uniformity, a fixed pattern.
-    Dcnu = 1,
+    Dcnu,
     /// Signal shot noise, temporal.
-    Ssn = 2,
+    Ssn,
     /// Photo-response non-uniformity, a fixed pattern.
-    Prnu = 3,
+    Prnu,
     /// Read-out noise, temporal.
-    Ron = 4,
+    Ron,
 }
 
 impl Source {
@@ -42,7 +41,13 @@ impl Named for Source {
     const ALL: &'static [Self] = &Self::ALL;
 
     fn name(self) -> &'static str {
-        ["dcsn", "dcnu", "ssn", "prnu", "ron"][self as usize]
+        match self {
+            Self::Dcsn => "dcsn",
+            Self::Dcnu => "dcnu",
+            Self::Ssn => "ssn",
+            Self::Prnu => "prnu",
+            Self::Ron => "ron",
+        }
     }
 }
 

@@ -130,11 +130,14 @@ fn text(report: &Report) -> String {
     let mut out = String::new();
     if report.regions.iter().any(|region| region.patch.is_some()) {
         patches_text(&report.regions, &mut out);
-        return out;
+    } else {
+        for region in &report.regions {
+            region_text(region, &mut out);
+            tests_text(region, &mut out);
+        }
     }
-    for region in &report.regions {
-        region_text(region, &mut out);
-        tests_text(region, &mut out);
+    if tells_uncertainty(report) {
+        let _ = writeln!(out, "{}", report.uncertainty.in_words());
     }
     if let Some(verdict) = report.check {
         let outcome = if verdict.passed { "as predicted" } else { "not as predicted" };
@@ -145,6 +148,12 @@ fn text(report: &Report) -> String {
         );
     }
     out
+}
+
+/// Whether a report has predicted standard deviations, or layers of them.
+fn tells_uncertainty(report: &Report) -> bool {
+    let channels = || report.regions.iter().flat_map(|region| region.channels.iter().chain(&region.classes));
+    channels().any(|channel| channel.predicted_std.is_some() || channel.name.starts_with("sigma."))
 }
 
 /// A number in as many digits as a reader compares.
@@ -180,6 +189,10 @@ fn region_text(region: &RegionReport, out: &mut String) {
     );
     if region.not_finite > 0 {
         let _ = write!(line, ", {} not finite left out", region.not_finite);
+    }
+    if region.saturated > 0 {
+        let left_out = if region.leaves_saturated_out { " left out" } else { "" };
+        let _ = write!(line, ", {} saturated{left_out}", region.saturated);
     }
     out.push_str(&line);
     out.push('\n');
@@ -244,6 +257,9 @@ fn patches_text(regions: &[RegionReport], out: &mut String) {
     columns.push(column("count".into(), &|region| region.count.to_string()));
     if regions.iter().any(|region| region.not_finite > 0) {
         columns.push(column("not finite".into(), &|region| region.not_finite.to_string()));
+    }
+    if regions.iter().any(|region| region.saturated > 0) {
+        columns.push(column("saturated".into(), &|region| region.saturated.to_string()));
     }
     for (index, channel) in channels(first).iter().take(3).enumerate() {
         for (wanted, (key, heading)) in COLUMNS.into_iter().enumerate() {

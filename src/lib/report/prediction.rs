@@ -93,7 +93,9 @@ pub fn prediction(found: &PredictedNoise, format: Option<ReportFormat>) -> Resul
     match (format, budgets) {
         (ReportFormat::Json, _) => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
         (ReportFormat::Yaml, _) => serde_yaml::to_string(&whole).map_err(unwritable),
-        (ReportFormat::Text, Budgets::Scene(scene)) => Ok(text(scene, conditions.quadrature_error)),
+        (ReportFormat::Text, Budgets::Scene(scene)) => {
+            Ok(text(scene, conditions.quadrature_error) + "\n" + &conditions.uncertainty.in_words() + "\n")
+        }
         (ReportFormat::Csv, Budgets::Scene(scene)) => stages_csv(scene),
         (_, Budgets::Sweep(levels)) => scenes_csv(&[], levels.iter().map(|scene| (Vec::new(), scene))),
         (_, Budgets::Samples(samples)) => {
@@ -227,6 +229,10 @@ fn stage_text(stage: &StagePrediction, out: &mut String) {
     part("patch mean std", stage.patch_mean_std);
     if stage.snr_db.iter().any(Option::is_some) {
         lines.push(("SNR/dB".into(), stage.snr_db));
+    }
+    if let Some(shares) = stage.saturated {
+        let only_there = |share: f64| (share > 0.0).then_some(share);
+        lines.push(("saturated share".into(), shares.map(only_there)));
     }
     for entry in stage.causes.iter().filter(|entry| entry.variance.iter().any(|variance| *variance != 0.0)) {
         lines.push((format!("variance: {}", entry.cause.name().replace('_', " ")), entry.variance.map(Some)));

@@ -3,6 +3,7 @@
 use super::notes::Note;
 use super::options::WhiteChoice;
 use super::values;
+use crate::analysis::characterization::CameraMatrix;
 use crate::camera::optics::Exposure;
 use crate::color::Space;
 use crate::error::Result;
@@ -38,13 +39,21 @@ pub struct Conversion {
 }
 
 impl Conversion {
+    /// The matrix, before any frame is waited for.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`data::load_matrix`].
+    pub fn load_matrix(&self) -> Result<CameraMatrix> {
+        data::load_matrix(&self.matrix)
+    }
+
     /// The stage that converts a frame, into whose metadata the chosen exposure goes; with what came up.
     ///
     /// # Errors
     ///
-    /// Those of [`data::load_matrix`], [`Exposure::checked`] and [`ToXyz::new`].
-    pub fn stage(&self, frame: &mut FrameHeader) -> Result<(ToXyz, Vec<Note>)> {
-        let matrix = data::load_matrix(&self.matrix)?;
+    /// Those of [`Exposure::checked`] and [`ToXyz::new`].
+    pub fn stage(&self, matrix: CameraMatrix, frame: &mut FrameHeader) -> Result<(ToXyz, Vec<Note>)> {
         let metadata = &mut frame.metadata;
         let known = metadata.exposure;
         let exposure_s = self.exposure_s.or(known.map(|e| e.exposure_s));
@@ -63,6 +72,7 @@ impl Conversion {
         }
         let settings = ColorSettings {
             xyz_from_camera: matrix.xyz_from_camera,
+            residual: matrix.residual(),
             method: matrix.method,
             space: self.space,
             white: self.white.white,

@@ -25,6 +25,20 @@ impl Note {
         let text = || format!("{pixels} pixels are NaN or infinite; they are left out of the statistics");
         (pixels > 0).then(|| Self::Warning(text()))
     }
+
+    /// A warning of saturated samples, or of pixels that were made of such; none where there are none.
+    pub fn saturated(pixels: u64, left_out: bool) -> Option<Self> {
+        let text = || match left_out {
+            true => format!(
+                "{pixels} pixels were made of saturated samples; they are left out of the statistics, so that these are of \
+                 the darker part alone (--keep-saturated keeps them in)"
+            ),
+            false => {
+                format!("{pixels} samples are saturated; the statistics hold for what was recorded, not for the light")
+            }
+        };
+        (pixels > 0).then(|| Self::Warning(text()))
+    }
 }
 
 /// What a reader found.

@@ -186,13 +186,14 @@ impl<S: RowSource> DarkFrames<S> {
 
 /// The rows of a frame less the mean of dark frames, all read in step.
 pub struct LessDarks<'a, S> {
-    frame: &'a mut S,
+    frame: &'a mut dyn RowSource,
     darks: &'a mut DarkFrames<S>,
 }
 
 impl<'a, S: RowSource> LessDarks<'a, S> {
-    /// `frame` less `darks`, which fit it as [`CorrectFrame::new`](super::correct::CorrectFrame::new) makes sure.
-    pub fn new(frame: &'a mut S, darks: &'a mut DarkFrames<S>) -> Self {
+    /// `frame` less `darks`, which fit it as [`CorrectFrame::new`](super::correct::CorrectFrame::new) makes sure. What
+    /// channels it has behind those of the darks stay as they are.
+    pub fn new(frame: &'a mut dyn RowSource, darks: &'a mut DarkFrames<S>) -> Self {
         Self { frame, darks }
     }
 }
@@ -213,8 +214,13 @@ impl<S: RowSource> RowSource for LessDarks<'_, S> {
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
         let start = samples.len();
         self.frame.read(rows, samples)?;
-        for (sample, dark) in samples[start..].iter_mut().zip(self.darks.next_mean(rows)?) {
-            *sample = to_sample(f64::from(*sample) - dark);
+        let of_frame = self.frame.header().geometry.row_samples();
+        let of_dark = self.darks.stack.head.geometry.row_samples();
+        let means = self.darks.next_mean(rows)?;
+        for (row, means) in samples[start..].chunks_exact_mut(of_frame).zip(means.chunks_exact(of_dark)) {
+            for (sample, dark) in row.iter_mut().zip(means) {
+                *sample = to_sample(f64::from(*sample) - dark);
+            }
         }
         Ok(())
     }

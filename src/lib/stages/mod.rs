@@ -14,6 +14,8 @@ pub mod darks;
 
 pub mod mosaic;
 
+pub mod saturation;
+
 pub mod demosaic;
 
 pub mod to_xyz;

@@ -6,7 +6,7 @@ use crate::color::{
 };
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
-use crate::metadata::{ColorRecord, FrameHeader};
+use crate::metadata::{ColorRecord, FrameHeader, MatrixResidual};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::stream::{Counts, Stage};
 use crate::units::{Adu, QuantityKind, Tristimulus};
@@ -19,6 +19,8 @@ pub struct ColorSettings {
     pub xyz_from_camera: [[f64; 3]; 3],
     /// How it was fitted, for the record.
     pub method: Option<String>,
+    /// How far it is off without noise, for the record.
+    pub residual: Option<MatrixResidual>,
     /// The space.
     pub space: Space,
     /// The white of L*a*b* and sRGB.
@@ -52,6 +54,7 @@ pub struct ColorSettings {
 /// let settings = ColorSettings {
 ///     xyz_from_camera: [[2e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 4e-3]],
 ///     method: None,
+///     residual: None,
 ///     space: Space::Xyz,
 ///     white: White::D65,
 ///     white_luminance: None,
@@ -130,6 +133,7 @@ impl ToXyz {
             method: settings.method.clone(),
             black_adu: black,
             white: known_white.then_some(white),
+            matrix_residual: settings.residual.clone(),
         });
         let geometry = input.geometry.with_channels(&channels);
         let srgb_from_xyz = if needs_white { linear_srgb_from_xyz(white) } else { Matrix3::identity() };
@@ -214,6 +218,7 @@ fn check_camera(frame: &FrameHeader) -> Result<()> {
         }
         _ => return Err(frame.refuse(format!("it holds {holds}: it is converted already"))),
     }
+    frame.bayer("turned into colors")?;
     if frame.metadata.cfa.is_some() || frame.geometry.channels.len() == 1 {
         return Err(frame.out_of_order(format!("it holds {holds}, not three classes at each pixel"), "demosaic"));
     }

@@ -21,6 +21,10 @@ pub struct Counts {
     pub out_of_gamut: u64,
     /// Pixels whose noise cannot be propagated.
     pub propagation_void: u64,
+    /// Samples at or above the level from which they are full.
+    pub saturated_samples: u64,
+    /// Pixels that were made of such samples.
+    pub saturated_pixels: u64,
 }
 
 impl Counts {
@@ -35,6 +39,8 @@ impl Counts {
             undefined_hue: self.undefined_hue + other.undefined_hue,
             out_of_gamut: self.out_of_gamut + other.out_of_gamut,
             propagation_void: self.propagation_void + other.propagation_void,
+            saturated_samples: self.saturated_samples + other.saturated_samples,
+            saturated_pixels: self.saturated_pixels + other.saturated_pixels,
         }
     }
 
@@ -51,12 +57,20 @@ impl Counts {
             undefined_hue: some(self.undefined_hue),
             out_of_gamut: some(self.out_of_gamut),
             propagation_void: some(self.propagation_void),
+            saturated: some(self.saturated_samples + self.saturated_pixels),
         }
     }
 
     /// What a user should hear about, one sentence each.
     pub fn warnings(self) -> Vec<String> {
+        // What was clipped here is saturated; that is said once.
+        let only_met = self.saturated_samples > self.full_well.max(self.clipped_high);
         [
+            (if only_met { self.saturated_samples } else { 0 }, "samples are saturated, at full well or the white level"),
+            (
+                self.saturated_pixels,
+                "pixels were made of saturated samples: their values are wrong, and their uncertainty is infinite",
+            ),
             (self.full_well, "photosites were clipped at full well"),
             (self.clipped_low, "samples were clipped to the smallest code"),
             (self.clipped_high, "samples were clipped to the largest code"),

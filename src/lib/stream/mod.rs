@@ -17,4 +17,4 @@ pub use drive::run;
 pub use fold::{fold, fold_into};
 pub use memory::MemoryFrame;
 pub use outlet::Outlet;
-pub use stage::{RowSink, RowSource, Stage};
+pub use stage::{Footprint, RowSink, RowSource, Stage};

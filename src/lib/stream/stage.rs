@@ -34,6 +34,16 @@ pub trait RowSink: Send {
     fn write(&mut self, samples: &[f32]) -> Result<()>;
 }
 
+/// Which pixels of the input a pixel of the output is made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Footprint {
+    /// The one at its place.
+    Own,
+    /// Those at offsets (column, row), by the parities of the frame's row and column: even row and column first, then odd
+    /// columns. What lies beyond the edges is mirrored.
+    Around([Vec<[isize; 2]>; 4]),
+}
+
 /// A step of the chain: a value with a method from band to band.
 ///
 /// # Examples
@@ -86,6 +96,11 @@ pub trait Stage: Sync {
     /// Rows above and below that a row of the output depends on.
     fn reach(&self) -> usize {
         0
+    }
+
+    /// Which pixels of the input a pixel of the output is made of.
+    fn footprint(&self) -> Footprint {
+        Footprint::Own
     }
 
     /// Fills `output` from `input`, which holds the same rows and [`Self::reach`] more on either side.

@@ -10,6 +10,7 @@ use crate::camera::response::SpectralResponse;
 use crate::camera::sensor::Sensor;
 use crate::color::difference::DifferenceReport;
 use crate::error::{Error, Result};
+use crate::metadata::MatrixResidual;
 use crate::spectrum::{Observer, SpectralLibrary, WavelengthGrid, fold};
 use crate::units::{CM2_PER_M2, LUMINOUS_EFFICACY_LM_PER_W};
 use nalgebra::DMatrix;
@@ -60,6 +61,14 @@ pub struct CameraMatrix {
     /// The wavelengths summed over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wavelengths: Option<WavelengthGrid>,
+}
+
+impl CameraMatrix {
+    /// How far it is off on what it was fitted on.
+    pub fn residual(&self) -> Option<MatrixResidual> {
+        let Training { library, relative_rms, .. } = self.training.as_ref()?;
+        Some(MatrixResidual { library: library.clone(), relative_rms: *relative_rms })
+    }
 }
 
 /// What a matrix was fitted on, and how well.

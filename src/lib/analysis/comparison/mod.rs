@@ -287,6 +287,7 @@ mod tests {
             method: None,
             black_adu: 0.0,
             white: Some(white),
+            matrix_residual: None,
         });
         let header = FrameHeader { name: "frame".into(), geometry: Geometry::new(2, 1, channels), metadata };
         let samples = vec![1.0; header.geometry.row_samples()];

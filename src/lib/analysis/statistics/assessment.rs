@@ -86,6 +86,8 @@ impl<'a> Assessment<'a> {
             sample: None,
             count: moments.count,
             not_finite: moments.not_finite,
+            saturated: 0,
+            leaves_saturated_out: false,
             quantity: metadata.quantity,
             unit: metadata.unit.clone(),
             classes: of_classes.flat_map(|(group, black)| reports(group, black)).collect(),

@@ -5,8 +5,9 @@ use super::check::Verdict;
 use super::laws::Samplings;
 use super::levels::Levels;
 use super::region::Region;
-use super::report::{RegionReport, Report};
+use super::report::{RegionReport, Report, coverage};
 use super::tally::{Tally, tallies};
+use super::watch::{Saturated, Watch};
 use crate::error::{Error, Result};
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments};
 use crate::stream::RowSource;
@@ -23,15 +24,17 @@ use crate::stream::RowSource;
 pub fn measure(
     source: &mut dyn RowSource,
     regions: &[Region],
+    saturated: Saturated,
     equations: Equations,
     level: Option<f64>,
 ) -> Result<Report> {
-    let frame = source.header().clone();
-    let whole = [Region::whole(&frame)];
+    let whole = [Region::whole(source.header())];
     let regions = if regions.is_empty() { &whole } else { regions };
     for region in regions {
-        region.check(&frame)?;
+        region.check(source.header())?;
     }
+    let mut watch = Watch::new(source, saturated, regions);
+    let frame = watch.header().clone();
     let levels = Levels::of(&frame)?;
     // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
     let prediction = propagation::of_frame(&frame, equations);
@@ -41,21 +44,31 @@ pub fn measure(
             samplings.of(mixture, &frame, *region);
         }
     }
-    let tallies = tallies(source, regions, &levels)?;
+    let tallies = tallies(&mut watch, regions, &levels)?;
+    let (counts, left_out) = watch.seen();
     if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
         return Err(Error::Data(format!(
             "{}: nothing can be checked: charge transfer mixes neighbors, differently from place to place",
             frame.name
         )));
     }
-    let report = |(region, tally): (&Region, &Tally)| {
+    if let (Some(_), true, Some(pixels)) = (level, left_out, counts.iter().find(|count| **count > 0)) {
+        return Err(Error::Data(format!(
+            "{}: nothing can be checked: {pixels} pixels used saturated samples; without them the others are no fair sample",
+            frame.name
+        ))
+        .give(&["keep_saturated"]));
+    }
+    let report = |((region, tally), pixels): ((&Region, &Tally), &u64)| {
         let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, *region);
-        let assessment = Assessment::new(tally, &frame, prediction.as_ref().ok(), sampling);
+        // What is left where pixels are left out by their values follows no formula.
+        let prediction = prediction.as_ref().ok().filter(|_| !left_out || *pixels == 0);
+        let assessment = Assessment::new(tally, &frame, prediction, sampling);
         let tests = if level.is_some() { assessment.tests() } else { Vec::new() };
-        RegionReport { tests, ..assessment.report(&frame, *region, &levels) }
+        RegionReport { tests, ..assessment.report(&frame, *region, &levels).with_saturated(*pixels, left_out) }
     };
-    let regions = regions.iter().zip(&tallies).map(report).collect();
-    let mut report = Report { regions, check: None, unpredicted: prediction.err() };
+    let regions = regions.iter().zip(&tallies).zip(&counts).map(report).collect();
+    let mut report = Report { regions, check: None, uncertainty: coverage(&frame), unpredicted: prediction.err() };
     if let Some(level) = level {
         let regions = report.regions.iter().map(|region| (&region.tests[..], region.not_finite));
         report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted)?);
@@ -83,11 +96,12 @@ mod tests {
     fn regions_see_their_own_samples() {
         let mut ramp = frame(&["Y"], 10, 8, |i| i as f32);
         let region = Region { x: 2, y: 3, width: 3, height: 2 };
-        let report = measure(&mut ramp, &[region], Equations::Exact, None).unwrap();
+        let report = measure(&mut ramp, &[region], Saturated::LeftOut, Equations::Exact, None).unwrap();
         let channel = &report.regions[0].channels[0];
         assert_eq!((channel.min, channel.max, channel.mean), (Some(32.0), Some(44.0), Some(38.0)));
         let outside = Region { x: 8, ..region };
-        let again = measure(&mut frame(&["Y"], 10, 8, |i| i as f32), &[outside], Equations::Exact, None);
+        let again =
+            measure(&mut frame(&["Y"], 10, 8, |i| i as f32), &[outside], Saturated::LeftOut, Equations::Exact, None);
         assert!(again.unwrap_err().to_string().contains("does not lie within"));
     }
 
@@ -96,7 +110,7 @@ mod tests {
         let mut plane = frame(&["Y"], 8, 6, |i| [10.0, 20.0, 20.0, 30.0][(i / 8 % 2) * 2 + i % 2]);
         plane.header.metadata.cfa = Some(CfaPattern::Rggb.into());
         let region = Region { x: 1, y: 1, width: 5, height: 4 };
-        let report = measure(&mut plane, &[region], Equations::Exact, None).unwrap();
+        let report = measure(&mut plane, &[region], Saturated::LeftOut, Equations::Exact, None).unwrap();
         let means: Vec<_> = report.regions[0].classes.iter().map(|class| class.mean).collect();
         assert_eq!(means, [Some(10.0), Some(20.0), Some(30.0)]);
     }
@@ -105,7 +119,8 @@ mod tests {
     #[test]
     fn errors_are_those_of_independent_samples() {
         let noise = |i: usize| ((i * 7919 + i * i * 31) % 1009) as f32 / 1009.0;
-        let report = measure(&mut frame(&["Y"], 40, 30, noise), &[], Equations::Exact, None).unwrap();
+        let report =
+            measure(&mut frame(&["Y"], 40, 30, noise), &[], Saturated::LeftOut, Equations::Exact, None).unwrap();
         let channel = &report.regions[0].channels[0];
         let std = channel.std.unwrap();
         assert!((channel.mean_error.unwrap() / std * 1200_f64.sqrt() - 1.0).abs() < 1e-12);
@@ -113,7 +128,7 @@ mod tests {
         // Classes 100 apart: the error of the mean is that of their own scatter, not of their distance.
         let mut plane = frame(&["Y"], 40, 30, |i| noise(i) + 100.0 * [1.0, 2.0, 2.0, 3.0][(i / 40 % 2) * 2 + i % 2]);
         plane.header.metadata.cfa = Some(CfaPattern::Rggb.into());
-        let report = measure(&mut plane, &[], Equations::Exact, None).unwrap();
+        let report = measure(&mut plane, &[], Saturated::LeftOut, Equations::Exact, None).unwrap();
         let (whole, classes) = (&report.regions[0].channels[0], &report.regions[0].classes);
         let of_classes = |k: usize| classes[k].mean_error.unwrap() * [0.25, 0.5, 0.25][k];
         let expected = (0..3).map(|k| of_classes(k).powi(2)).sum::<f64>().sqrt();
@@ -123,7 +138,8 @@ mod tests {
 
     #[test]
     fn one_sample_has_a_mean_and_no_spread() {
-        let report = measure(&mut frame(&["Y"], 1, 1, |_| 7.0), &[], Equations::Exact, None).unwrap();
+        let report =
+            measure(&mut frame(&["Y"], 1, 1, |_| 7.0), &[], Saturated::LeftOut, Equations::Exact, None).unwrap();
         let channel = &report.regions[0].channels[0];
         assert_eq!((channel.mean, channel.std, channel.snr_db), (Some(7.0), None, None));
         assert_eq!(report.regions[0].covariance, None);

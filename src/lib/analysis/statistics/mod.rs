@@ -13,7 +13,9 @@ pub mod patches;
 mod region;
 mod report;
 mod tally;
+mod watch;
 
 pub use measure::measure;
 pub use region::Region;
 pub use report::{ChannelReport, RegionReport, Report};
+pub use watch::Saturated;

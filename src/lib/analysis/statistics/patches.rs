@@ -7,8 +7,9 @@ use super::assessment::Assessment;
 use super::laws::{Samplings, beyond_weights};
 use super::levels::Levels;
 use super::region::Region;
-use super::report::{RegionReport, Report};
+use super::report::{RegionReport, Report, coverage};
 use super::tally::{Tally, tallies};
+use super::watch::{Saturated, Watch};
 use crate::color;
 use crate::error::{Error, Result};
 use crate::metadata::{FrameHeader, Scene};
@@ -100,14 +101,21 @@ fn whole(origin: i32, length: usize, size: usize) -> Vec<(usize, usize)> {
 /// # Errors
 ///
 /// Those of [`of_frame`] and of the source.
-pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: Equations) -> Result<Report> {
-    let frame = source.header().clone();
-    let patches = of_frame(&frame, size)?;
+pub fn measure(
+    source: &mut dyn RowSource,
+    size: Option<[usize; 2]>,
+    saturated: Saturated,
+    equations: Equations,
+) -> Result<Report> {
+    let patches = of_frame(source.header(), size)?;
     let regions: Vec<Region> = patches.iter().map(|patch| patch.interior).collect();
+    let mut watch = Watch::new(source, saturated, &regions);
+    let frame = watch.header().clone();
     let levels = Levels::of(&frame)?;
-    let tallies = tallies(source, &regions, &levels)?;
+    let tallies = tallies(&mut watch, &regions, &levels)?;
+    let (counts, left_out) = watch.seen();
     let mut unpredicted = None;
-    let mut reports: Vec<RegionReport> = match propagation::of_frame(&frame, equations) {
+    let reports: Vec<RegionReport> = match propagation::of_frame(&frame, equations) {
         Ok(known) => {
             let mut samplings = Samplings::default();
             let tallies = tallies.iter().zip(regions);
@@ -136,10 +144,13 @@ pub fn measure(source: &mut dyn RowSource, size: Option<[usize; 2]>, equations: 
                 .collect()
         }
     };
-    for (report, patch) in reports.iter_mut().zip(patches) {
-        (report.patch, report.sample) = (Some(patch.at), patch.sample);
-    }
-    Ok(Report { regions: reports, check: None, unpredicted })
+    let reports = reports.into_iter().zip(patches).zip(counts).map(|((report, patch), pixels)| {
+        let report = RegionReport { patch: Some(patch.at), sample: patch.sample, ..report };
+        let report = report.with_saturated(pixels, left_out);
+        if left_out && pixels > 0 { report.without_predictions() } else { report }
+    });
+    let reports = reports.collect();
+    Ok(Report { regions: reports, check: None, uncertainty: coverage(&frame), unpredicted })
 }
 
 /// Sampling laws of the places of patches, at any level; none where the weights hang on the level.
@@ -345,7 +356,13 @@ mod tests {
         let xyz_from_camera = [[0.4, 0.3, 0.2], [0.2, 0.7, 0.1], [0.01, 0.1, 0.9]];
         let white = [950.0, 1000.0, 1080.0];
         frame.metadata.exposure = Some(exposure);
-        frame.metadata.color = Some(ColorRecord { xyz_from_camera, method: None, black_adu: 7.0, white: Some(white) });
+        frame.metadata.color = Some(ColorRecord {
+            xyz_from_camera,
+            method: None,
+            black_adu: 7.0,
+            white: Some(white),
+            matrix_residual: None,
+        });
         let camera = Vector3::from(electrons.map(|e| 0.25 * e));
         let xyz: [f64; 3] = (color::matrix(&xyz_from_camera) / exposure.exposure_s_sr() * camera).into();
         for (quantity, means) in [
@@ -366,10 +383,11 @@ mod tests {
         let header = chart(37, 18, [2, 0]);
         let samples: Vec<f32> = (0..37 * 3 * 18).map(|i| ((i * 7919) % 1013) as f32).collect();
         let frame = || MemoryFrame::new(header.clone(), samples.clone());
-        let patches = measure(&mut frame(), None, Equations::Exact).unwrap();
+        let patches = measure(&mut frame(), None, Saturated::LeftOut, Equations::Exact).unwrap();
         let regions: Vec<Region> = patches.regions.iter().map(|report| report.region).collect();
         assert_eq!(regions.len(), 9);
-        let plain = super::super::measure::measure(&mut frame(), &regions, Equations::Exact, None).unwrap();
+        let plain =
+            super::super::measure::measure(&mut frame(), &regions, Saturated::LeftOut, Equations::Exact, None).unwrap();
         for (patch, region) in patches.regions.iter().zip(&plain.regions) {
             assert!(patch.patch.is_some() && patch.sample.is_some() && region.patch.is_none());
             assert_eq!(patch.covariance, region.covariance);
@@ -379,7 +397,7 @@ mod tests {
         }
         let mut other = frame();
         other.header.metadata.scene = None;
-        let unknown = measure(&mut other, Some([8, 6]), Equations::Exact).unwrap();
+        let unknown = measure(&mut other, Some([8, 6]), Saturated::LeftOut, Equations::Exact).unwrap();
         assert!(
             unknown.regions.iter().flat_map(|region| &region.channels).all(|channel| channel.predicted_std.is_none())
         );

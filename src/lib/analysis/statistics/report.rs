@@ -2,6 +2,7 @@
 
 use super::check::{Test, Verdict};
 use super::region::Region;
+use crate::metadata::{Coverage, FrameHeader};
 use crate::propagation::Unpredictable;
 use crate::units::QuantityKind;
 use serde::Serialize;
@@ -14,9 +15,16 @@ pub struct Report {
     /// Whether all predictions hold, where that was asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub check: Option<Verdict>,
+    /// What predicted standard deviations, and layers of them, count.
+    pub uncertainty: Coverage,
     /// Why nothing is predicted of the frame as a whole, where that is so.
     #[serde(skip)]
     pub unpredicted: Option<Unpredictable>,
+}
+
+/// What standard deviations of a frame count.
+pub(super) fn coverage(frame: &FrameHeader) -> Coverage {
+    Coverage::noise_only(frame.metadata.color.as_ref().and_then(|color| color.matrix_residual.clone()))
 }
 
 /// What is said of a region.
@@ -34,6 +42,12 @@ pub struct RegionReport {
     pub count: u64,
     /// Pixels left out because a sample is NaN or infinite.
     pub not_finite: u64,
+    /// Pixels that were made of saturated samples, which are left out unless they are asked for; of the samples of
+    /// photosites those at full well or the white level, which are not.
+    pub saturated: u64,
+    /// Whether these are left out.
+    #[serde(skip)]
+    pub leaves_saturated_out: bool,
     /// Quantity and unit of the samples.
     pub quantity: QuantityKind,
     /// Unit.
@@ -52,6 +66,36 @@ pub struct RegionReport {
     /// Tests of the predictions, where they were asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tests: Vec<Test>,
+}
+
+impl RegionReport {
+    /// The same with so many saturated pixels; those that were left out were taken as not finite before.
+    #[must_use]
+    pub(super) fn with_saturated(self, saturated: u64, left_out: bool) -> Self {
+        let not_finite = if left_out { self.not_finite.saturating_sub(saturated) } else { self.not_finite };
+        Self { not_finite, saturated, leaves_saturated_out: left_out, ..self }
+    }
+}
+
+impl RegionReport {
+    /// The same with nothing predicted: what is left where pixels are left out by their values follows no formula.
+    #[must_use]
+    pub(super) fn without_predictions(self) -> Self {
+        let without = |channel: ChannelReport| ChannelReport {
+            predicted_mean: None,
+            predicted_std: None,
+            z_mean: None,
+            z_std: None,
+            ..channel
+        };
+        Self {
+            channels: self.channels.into_iter().map(without).collect(),
+            classes: self.classes.into_iter().map(without).collect(),
+            predicted_covariance: None,
+            patch_mean_std: None,
+            ..self
+        }
+    }
 }
 
 /// Statistics of one channel, or of one class of a CFA plane.

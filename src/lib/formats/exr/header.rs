@@ -8,6 +8,7 @@ use crate::formats::format::SampleType;
 use crate::frame::{Geometry, bare_name};
 use crate::metadata::Metadata;
 use crate::spectrum::channel_wavelength_nm;
+use crate::stages::saturation::MASK_LAYER;
 use crate::units::QuantityKind;
 use exr::compression::Compression;
 use exr::math::Vec2;
@@ -161,7 +162,7 @@ fn read_tags(header: &Header) -> ExrTags {
 
 /// The order in which channels are worked on: R, G, B (or Y; x, y, Y; L, a, b) first, the rest layer by layer as the file
 /// has them, each again R, G, B (or the like) first. Where all belong to layers, as in `left.R`, what stands behind the
-/// last dot counts.
+/// last dot counts. Marks come last of all, as they are made.
 fn canonical_order(names: &[String]) -> Vec<usize> {
     let place = |wanted: &str| {
         let exact = names.iter().position(|name| name == wanted);
@@ -185,7 +186,13 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
     };
     order.sort_by_key(|&place| {
         let leads = leading.iter().position(|leader| *leader == place);
-        (leads.unwrap_or(leading.len()), if leads.is_none() { first_of_layer(place) } else { None }, rank(place))
+        let is_mask = names[place] == MASK_LAYER;
+        (
+            is_mask,
+            leads.unwrap_or(leading.len()),
+            if leads.is_none() { first_of_layer(place) } else { None },
+            rank(place),
+        )
     });
     order
 }

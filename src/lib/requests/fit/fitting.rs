@@ -147,6 +147,7 @@ impl Fitting<'_> {
             color: ColorSettings {
                 xyz_from_camera,
                 method: None,
+                residual: None,
                 space: Space::Lab,
                 white: self.fit.white.white,
                 white_luminance: self.fit.white.white_luminance,

@@ -17,6 +17,7 @@ use crate::chain::{CameraSetup, ChainPrediction, Predictor, PredictorSettings, U
 use crate::color::Space;
 use crate::error::{Error, Result};
 use crate::formats::{data, spectral};
+use crate::metadata::Coverage;
 use crate::names::Named;
 use crate::propagation::Equations;
 use crate::spectrum::WavelengthGrid;
@@ -119,6 +120,8 @@ pub struct Conditions {
     /// Of the expected electrons of R, G and B, relative; where a spectrum was summed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature_error: Option<[f64; 3]>,
+    /// What standard deviations count.
+    pub uncertainty: Coverage,
 }
 
 /// What is predicted of one sample of a library.
@@ -219,7 +222,7 @@ impl NoisePrediction {
             return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
         }
         let color = self.color(&sensor, &mut notes)?;
-        let conditions = Conditions { quadrature_error, ..self.conditions(&sensor, exposure)? };
+        let conditions = Conditions { quadrature_error, ..self.conditions(&sensor, exposure, color.as_ref())? };
         let mut predictor = self.predictor(&sensor, exposure, color)?;
         let budgets = match self.sweep {
             Some(sweep) => Budgets::Sweep(sweep_levels(&mut predictor, sweep, electrons)?),
@@ -268,7 +271,7 @@ impl NoisePrediction {
             .map(|sample| one(sample).map_err(|error| of_sample(sample, error)));
         let budgets = Budgets::Samples(found.collect::<Result<_>>()?);
         Ok(PredictedNoise {
-            conditions: self.conditions(&loaded.sensor, base)?,
+            conditions: self.conditions(&loaded.sensor, base, color.as_ref())?,
             budgets,
             notes,
             scene: None,
@@ -276,7 +279,7 @@ impl NoisePrediction {
         })
     }
 
-    fn conditions(&self, sensor: &Sensor, exposure: Exposure) -> Result<Conditions> {
+    fn conditions(&self, sensor: &Sensor, exposure: Exposure, color: Option<&ColorSettings>) -> Result<Conditions> {
         Ok(Conditions {
             sensor: sensor.name.clone(),
             exposure_s: exposure.exposure_s,
@@ -287,6 +290,7 @@ impl NoisePrediction {
             equations: self.equations,
             patch: self.patch,
             quadrature_error: None,
+            uncertainty: Coverage::noise_only(color.and_then(|color| color.residual.clone())),
         })
     }
 
@@ -324,6 +328,7 @@ impl NoisePrediction {
         }
         Ok(Some(ColorSettings {
             xyz_from_camera: matrix.xyz_from_camera,
+            residual: matrix.residual(),
             method: matrix.method,
             space: Space::Xyz,
             white: self.white.white,

@@ -3,8 +3,10 @@
 use super::light::{ImageRows, Light, Seen, SpectralImage, brightest, checked};
 use super::request::Scene;
 use crate::camera::optics::Exposure;
+use crate::camera::readout::ReadOut;
 use crate::camera::response::GridWeights;
 use crate::camera::sensor::Sensor;
+use crate::cfa::Class;
 use crate::error::{Error, Result};
 use crate::formats::csv::SpectralTable;
 use crate::formats::data::{self, LoadedSensor};
@@ -106,6 +108,7 @@ impl Scene {
             brightest_e = Some(fraction * full_well_e);
             found.notes.push(Note::Remark(format!("exposure {} s", exposure.exposure_s)));
         }
+        found.notes.extend(overfull(&light, loaded.sensor.readout.as_ref()));
         if let Some([red, green, blue]) = found.metadata.quadrature_error {
             found.notes.push(Note::Remark(format!(
                 "the sum over wavelengths is off by about {red:.1e} of R, {green:.1e} of G, {blue:.1e} of B, as twice the \
@@ -204,6 +207,21 @@ impl Scene {
             ))),
         }
     }
+}
+
+/// A warning of light that fills photosites; none of light that does not, or that is not known before it is read.
+fn overfull(light: &Light, readout: Option<&ReadOut>) -> Option<Note> {
+    let (Light::Uniform { electrons, .. }, Some(readout)) = (light, readout) else { return None };
+    let full = Class::ALL.into_iter().zip(electrons).filter(|(_, e)| **e >= readout.full_well_e);
+    let full: Vec<String> = full.map(|(class, e)| format!("{} expects {e:.0} e-", class.letter())).collect();
+    (!full.is_empty()).then(|| {
+        Note::Warning(format!(
+            "{}, but full well is {} e-: these samples will be saturated; a shorter exposure, or --expose-to 0.8, keeps \
+             them below",
+            full.join(", "),
+            readout.full_well_e
+        ))
+    })
 }
 
 fn no_sample(name: &str, sample: usize, count: usize) -> Error {

@@ -24,9 +24,11 @@ use crate::frame::{Rows, Window, mirror};
 use crate::metadata::{DemosaicRecord, FrameHeader};
 use crate::numerics::vectors::{self, Instructions};
 use crate::stages::black::{Black, black_left, white_left};
-use crate::stream::{Counts, Stage};
+use crate::stream::{Counts, Footprint, Stage};
 use crate::units::{Any, QuantityKind};
 use rows::{Planes, Ring, masks, mend, strips};
+use stencil::phase;
+use weights::WeightTable;
 
 /// Interpolates the classes that each photosite of a CFA plane did not measure; values stay signed.
 ///
@@ -236,6 +238,12 @@ impl Stage for Demosaic {
 
     fn reach(&self) -> usize {
         self.method.reach()
+    }
+
+    fn footprint(&self) -> Footprint {
+        let table = WeightTable::of(self.method, self.pattern);
+        let [x0, y0] = self.header.geometry.origin.map(i64::from);
+        Footprint::Around([[0, 0], [1, 0], [0, 1], [1, 1]].map(|[x, y]| table.sites(phase(x0 + x, y0 + y))))
     }
 
     fn apply(&self, input: Window<'_>, output: Rows<'_>) -> Counts {

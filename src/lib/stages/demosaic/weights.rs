@@ -10,6 +10,7 @@ use super::method::Method;
 use super::stencil::{PHASES, Stencil};
 use crate::cfa::{CfaPattern, Class};
 use nalgebra::Matrix3;
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 /// What surrounds the pixels of one phase.
@@ -166,6 +167,13 @@ impl WeightTable {
     /// What is added to [`Self::fixed`] in proportion to the ratio of the channel's mean to that of green.
     pub fn of_hue(&self, phase: usize) -> &[Stencil; 3] {
         &self.of_hue[phase]
+    }
+
+    /// The sites that any of R, G and B at the pixels of a phase is made of: offsets (column, row).
+    pub fn sites(&self, phase: usize) -> Vec<[isize; 2]> {
+        let stencils = self.fixed[phase].iter().chain(&self.of_hue[phase]);
+        let sites: BTreeSet<_> = stencils.flat_map(Stencil::sites).map(|(offset, _)| offset).collect();
+        sites.into_iter().collect()
     }
 
     /// The class of the site `offset` away from a pixel of a phase.

@@ -1,0 +1,127 @@
+//! How the marks of saturated samples come through a stage: where they are made, carried, counted, or not needed.
+
+use crate::error::Result;
+use crate::metadata::FrameHeader;
+use crate::propagation::saturation;
+use crate::stages::darks::{DarkFrames, LessDarks};
+use crate::stages::saturation::{Counted, FullLevels, Marked, WithMask, samples_tell};
+use crate::stream::{Counts, RowSink, RowSource, Stage, run};
+use crate::units::QuantityKind;
+
+/// How the marks of saturated samples come through a stage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Need {
+    /// No sample can be saturated, or nothing tells from what level on.
+    Needless,
+    /// What the stage makes are samples that tell by their level, and these are counted.
+    Counted(FullLevels),
+    /// The layer is made from the samples that come in.
+    Made(FullLevels),
+    /// The layer comes with the samples.
+    Carried,
+}
+
+impl Need {
+    fn of(input: &FrameHeader, is_masked: bool, output: &FrameHeader) -> Self {
+        if is_masked {
+            return Self::Carried;
+        }
+        let (levels, make): (_, fn(FullLevels) -> Self) = if samples_tell(output) {
+            (FullLevels::of(output).map(|levels| (levels, output)), Self::Counted)
+        } else {
+            (FullLevels::of(input).map(|levels| (levels, input)), Self::Made)
+        };
+        match levels {
+            Some((levels, frame)) if saturation::is_possible(frame, &levels) => make(levels),
+            _ => Self::Needless,
+        }
+    }
+}
+
+/// The marks of saturated samples on their way through a stage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Masking {
+    need: Need,
+    /// Whether what is made has the layer.
+    is_kept: bool,
+}
+
+impl Masking {
+    /// What is needed between frames: `is_masked` where the layer comes with `input`, `holds_layers` where what is made can
+    /// have it. A picture to look at has none.
+    pub fn of(input: &FrameHeader, is_masked: bool, output: &FrameHeader, holds_layers: bool) -> Self {
+        let need = Need::of(input, is_masked, output);
+        let is_layer = matches!(need, Need::Made(_) | Need::Carried);
+        Self { need, is_kept: is_layer && holds_layers && output.metadata.quantity != QuantityKind::Srgb }
+    }
+
+    /// The head of the frame that a stage makes.
+    pub fn header<S: Stage>(self, stage: &S) -> FrameHeader {
+        let mut header = if self.is_kept { WithMask::new(stage).header().clone() } else { stage.header().clone() };
+        if matches!(self.need, Need::Made(_)) {
+            header.metadata.saturated_share = saturation::share_of_pixels(&header);
+        }
+        header
+    }
+
+    /// Drives a frame, less the mean of dark frames where there are any, through a stage; `progress` hears the rows done.
+    ///
+    /// # Errors
+    ///
+    /// Those of the source, the darks and the sink.
+    pub fn run<S: Stage, D: RowSource>(
+        self,
+        stage: &S,
+        frame: &mut dyn RowSource,
+        darks: Option<&mut DarkFrames<D>>,
+        sink: &mut dyn RowSink,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<Counts> {
+        let mut marked;
+        let frame: &mut dyn RowSource = match self.need {
+            Need::Made(levels) => {
+                marked = Marked::new(frame, levels);
+                &mut marked
+            }
+            _ => frame,
+        };
+        let mut less_darks;
+        let source: &mut dyn RowSource = match darks {
+            Some(darks) => {
+                less_darks = LessDarks::new(frame, darks);
+                &mut less_darks
+            }
+            None => frame,
+        };
+        match self.need {
+            Need::Needless => run(stage, source, sink, progress),
+            Need::Counted(levels) => {
+                let mut counted = Counted::new(sink, stage.header(), levels);
+                let counts = run(stage, source, &mut counted, progress)?;
+                Ok(Counts { saturated_samples: counted.count, ..counts })
+            }
+            Need::Made(_) | Need::Carried => {
+                let masked = WithMask::new(stage);
+                let row_samples = masked.header().geometry.row_samples();
+                let kept = if self.is_kept { row_samples } else { stage.header().geometry.row_samples() };
+                run(&masked, source, &mut FirstSamples { sink, row_samples, kept }, progress)
+            }
+        }
+    }
+}
+
+/// Hands on the first samples of each row: channels that follow them stay behind.
+struct FirstSamples<'a> {
+    sink: &'a mut dyn RowSink,
+    row_samples: usize,
+    kept: usize,
+}
+
+impl RowSink for FirstSamples<'_> {
+    fn write(&mut self, samples: &[f32]) -> Result<()> {
+        if self.kept == self.row_samples {
+            return self.sink.write(samples);
+        }
+        samples.chunks_exact(self.row_samples).try_for_each(|row| self.sink.write(&row[..self.kept]))
+    }
+}

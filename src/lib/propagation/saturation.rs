@@ -1,0 +1,101 @@
+//! How much of a frame is saturated, by the law of its scene.
+
+use super::charge::charge;
+use super::frame::{FramePrediction, Sites, of_frame, quantity_of_sites};
+use super::moments::Equations;
+use super::tail::Tail;
+use crate::cfa::CfaPattern;
+use crate::metadata::{FrameHeader, Scene};
+use crate::names::Named;
+use crate::stages::demosaic::Method;
+use crate::stages::demosaic::stencil::PHASES;
+use crate::stages::demosaic::weights::WeightTable;
+use crate::stages::saturation::FullLevels;
+use crate::units::QuantityKind;
+
+/// Standard deviations below the level at which no sample of any frame reaches it: beyond 12 a normal variable lies in one
+/// of 10³² cases.
+const OUT_OF_REACH: f64 = 12.0;
+
+/// Whether samples of a frame may reach the levels from which they are full: not where the law of a uniform scene, or the
+/// brightest signal of another, keeps them 12 standard deviations below.
+pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
+    let mut bounding = frame.clone();
+    if let Some(scene) = &frame.metadata.scene
+        && let (false, Some(brightest_e)) = (scene.uniform, scene.brightest_e)
+    {
+        bounding.metadata.scene = Some(Scene::uniform(scene.source.clone(), [brightest_e; 3]));
+    }
+    let moments: [(f64, f64); 3] = match of_frame(&bounding, Equations::Exact) {
+        Ok(FramePrediction::Planes(classes)) => classes.map(|class| (class.moments.mean, class.moments.std())),
+        Ok(FramePrediction::Pixels(pixels)) => {
+            [0, 1, 2].map(|k| (pixels.mean[k], pixels.covariance[(k, k)].max(0.0).sqrt()))
+        }
+        Err(_) => return true,
+    };
+    let is_beyond = |(level, (mean, std)): (f32, (f64, f64))| f64::from(level) - mean > OUT_OF_REACH * std;
+    !levels.classes().into_iter().zip(moments).all(is_beyond)
+}
+
+/// The expected shares of the samples of R, G and B that are full; of electrons, of photosites whose charge reaches full
+/// well, before read noise. None where the scene is not uniform, or the samples are not those of photosites.
+pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
+    let Sites { photosite, expected_e, .. } = Sites::of(frame, Equations::Exact).ok()?;
+    let full_well_e = photosite.model.full_well_e;
+    let of_charge = |expected_e: f64| charge(&photosite.model, expected_e).exceeds(full_well_e);
+    match (quantity_of_sites(frame), photosite.adc) {
+        (QuantityKind::Electrons, _) => Some(expected_e.map(of_charge)),
+        (QuantityKind::Adu, Some(adc)) => {
+            let full_well = (adc.bias_adu + adc.adu_per_e * full_well_e).floor();
+            let first_full = f64::from(adc.top_code()).min(full_well);
+            let of_code =
+                |expected_e| Tail::of(&photosite.model, &adc, expected_e).exceeds(adc.electrons_at(first_full - 0.5));
+            Some(expected_e.map(of_code).map(|share| share.clamp(0.0, 1.0)))
+        }
+        _ => None,
+    }
+}
+
+/// The expected share of the pixels of a demosaicked frame that used a full sample; of a frame far from its edges.
+///
+/// 1 − ⟨Π (1 − pₖ)⟩ over the sites that a pixel is made of, k their classes, and the mean that of the four phases
+pub fn share_of_pixels(frame: &FrameHeader) -> Option<f64> {
+    let record = frame.metadata.demosaic.as_ref()?;
+    let method = Method::named(&record.method)?;
+    Some(used(method, record.cfa, shares(frame)?))
+}
+
+/// Shares below which nothing is told: the law's tails are no better than this.
+const TOLD: f64 = 1e-12;
+
+/// What is expected of the samples of R, G and B, or of all pixels that are made of several; none where next to nothing is
+/// saturated, or nothing is known.
+pub fn expected(frame: &FrameHeader) -> Option<[f64; 3]> {
+    let shares = match frame.metadata.demosaic {
+        None => shares(frame),
+        Some(_) => share_of_pixels(frame).map(|share| [share; 3]),
+    };
+    shares.filter(|shares| shares.iter().any(|share| *share > TOLD))
+}
+
+fn used(method: Method, pattern: CfaPattern, shares: [f64; 3]) -> f64 {
+    let table = WeightTable::of(method, pattern);
+    let free = |phase: usize| -> f64 {
+        table.sites(phase).into_iter().map(|offset| 1.0 - shares[table.class(phase, offset) as usize]).product()
+    };
+    1.0 - (0..PHASES.len()).map(free).sum::<f64>() / PHASES.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: bilinear red sites use all nine about them (1 red, 4 green, 4 blue), green ones five (1 green, 2 red, 2 blue).
+    #[test]
+    fn the_share_of_bilinear_pixels_is_that_of_their_sites() {
+        let [r, g, b] = [0.1_f64, 0.02, 0.3].map(|share| 1.0 - share);
+        let full = r * g.powi(4) * b.powi(4) + b * g.powi(4) * r.powi(4) + 2.0 * g * r * r * b * b;
+        assert!((used(Method::Bilinear, CfaPattern::Rggb, [0.1, 0.02, 0.3]) - (1.0 - full / 4.0)).abs() < 1e-15);
+        assert_eq!(used(Method::EffectiveColor, CfaPattern::Gbrg, [0.0; 3]), 0.0);
+    }
+}

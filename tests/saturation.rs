@@ -1,0 +1,249 @@
+//! Saturation, from the sample that is full to the pixel that used it, its uncertainty and its statistics.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::cfa::{CfaPattern, Class};
+use cyanometer::frame::Geometry;
+use cyanometer::masking::Masking;
+use cyanometer::metadata::{AdcRecord, FrameHeader};
+use cyanometer::propagation::saturation;
+use cyanometer::sigma::WithSigma;
+use cyanometer::stages::black::Black;
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::darks::{DarkFrames, DarkStack};
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::saturation::FullLevels;
+use cyanometer::stream::{Counts, MemoryFrame, Stage};
+use cyanometer::units::QuantityKind;
+use serde_json::Value;
+use support::workshop::{BAD_DATA, Workshop};
+use support::{at, crop, frame, header, readout, scatter};
+
+const WHITE: f32 = 4095.0;
+
+/// The head of a plane of codes from a real camera: levels, and no scene.
+fn plane_header(width: usize, height: usize, pattern: CfaPattern) -> FrameHeader {
+    let mut header = header(QuantityKind::Adu, Geometry::new(width, height, &["Y"]));
+    header.metadata.cfa = Some(pattern.into());
+    header.metadata.black_level_adu = Some(100.0.into());
+    header.metadata.white_level_adu = Some(f64::from(WHITE).into());
+    header.metadata.adc = Some(AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });
+    header
+}
+
+/// Drives a frame through a stage with marks as they are needed.
+fn masked<S: Stage>(input: &MemoryFrame, stage: &S) -> (MemoryFrame, Counts) {
+    let masking = Masking::of(&input.header, false, stage.header(), true);
+    let mut sink = MemoryFrame::new(masking.header(stage), Vec::new());
+    let mut source = input.clone();
+    let no_darks: Option<&mut DarkFrames<MemoryFrame>> = None;
+    let counts = masking.run(stage, &mut source, no_darks, &mut sink, &mut |_| ()).unwrap();
+    (sink, counts)
+}
+
+fn demosaicking(plane: &MemoryFrame, method: Method) -> Demosaic {
+    Demosaic::new(&plane.header, method, Black::Auto, None).unwrap()
+}
+
+/// Which pixels are marked is asked of the filters themselves: those that another value of the full sample changes.
+#[test]
+fn a_pixel_is_marked_where_another_value_of_a_full_sample_would_change_it() {
+    let (width, height) = (9, 8);
+    for (method, pattern) in
+        Method::ALL.into_iter().flat_map(|method| CfaPattern::ALL.map(|pattern| (*method, pattern)))
+    {
+        for origin in [[0, 0], [1, 0], [3, 5]] {
+            let mut header = plane_header(width, height, pattern);
+            header.geometry.origin = origin;
+            let plane = frame(header, |x, y, _| 500.0 + 300.0 * scatter(x, y, 0));
+            for [x, y] in [[0, 0], [4, 3], [5, 3], [4, 4], [5, 4], [8, 7], [8, 0], [1, 6]] {
+                let with = |value: f32| {
+                    let mut plane = plane.clone();
+                    plane.samples[y * width + x] = value;
+                    plane
+                };
+                let (full, lower) = (with(WHITE), with(WHITE - 1000.0));
+                let (made, counts) = masked(&full, &demosaicking(&full, method));
+                let (other, none) = masked(&lower, &demosaicking(&lower, method));
+                assert_eq!((none.saturated_pixels, made.header.geometry.channels.len()), (0, 4));
+                let changes = |x, y| (0..3).any(|channel| at(&made, x, y, channel) != at(&other, x, y, channel));
+                let mut marked = 0;
+                for (px, py) in (0..height).flat_map(|py| (0..width).map(move |px| (px, py))) {
+                    let is_marked = at(&made, px, py, 3) == 1.0;
+                    marked += u64::from(is_marked);
+                    assert_eq!(is_marked, changes(px, py), "{method:?} {pattern:?} {origin:?} {x},{y} at {px},{py}");
+                }
+                assert_eq!(counts.saturated_pixels, marked);
+            }
+        }
+    }
+}
+
+/// What is full is told by class, above black, and by the full well where that lies below the largest code.
+#[test]
+fn levels_are_those_of_the_class_and_of_the_full_well() {
+    let levels = |header: &FrameHeader| FullLevels::of(header).unwrap().classes();
+    let mut header = plane_header(6, 4, CfaPattern::Rggb);
+    // 40 000 e⁻ at 0.1 ADU lie at 4100, above the largest code.
+    assert_eq!(levels(&header), [WHITE; 3]);
+    header.metadata.adc = Some(AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.05 });
+    assert_eq!(levels(&header), [2100.0; 3]);
+    header.metadata.adc = None;
+    header.metadata.white_level_adu = Some(cyanometer::camera::levels::WhiteLevel::Classes([3000.0, 3500.0, 4000.0]));
+    assert_eq!(levels(&header), [3000.0, 3500.0, 4000.0]);
+    let plane = frame(header, |_, _, _| 3600.0);
+    let (made, counts) = masked(&plane, &less_black(&plane));
+    // Every red and green sample, each less the black level; no layer, as the levels still tell.
+    assert_eq!((made.header.geometry.channels.len(), counts.saturated_samples), (1, 6 * 4 * 3 / 4));
+    let mut electrons = support::header(QuantityKind::Electrons, Geometry::new(4, 4, &["R", "G", "B"]));
+    #[expect(clippy::cast_possible_truncation, reason = "a full well is a small number")]
+    let full_well = readout().full_well_e as f32;
+    assert_eq!(levels(&electrons), [full_well; 3]);
+    electrons.metadata.sensor = None;
+    assert_eq!(FullLevels::of(&electrons), None);
+}
+
+fn less_black(plane: &MemoryFrame) -> CorrectFrame {
+    let settings = CorrectionSettings { black: Black::Auto, cte: None };
+    CorrectFrame::new(&plane.header, &settings, None).unwrap()
+}
+
+/// A dark frame takes off more here than there: the marks are made before.
+#[test]
+fn marks_are_made_before_dark_frames_come_off() {
+    let plane = frame(plane_header(8, 6, CfaPattern::Gbrg), |x, y, _| if (x, y) == (3, 2) { WHITE } else { 900.0 });
+    let dark = frame(plane.header.clone(), |x, y, _| 90.0 + 40.0 * scatter(x, y, 1));
+    let settings = CorrectionSettings { black: Black::None, cte: None };
+    let stack = DarkStack::of([&dark.header]).unwrap();
+    let stage = CorrectFrame::new(&plane.header, &settings, stack.as_ref()).unwrap();
+    let masking = Masking::of(&plane.header, false, stage.header(), true);
+    let mut sink = MemoryFrame::new(masking.header(&stage), Vec::new());
+    let mut darks = DarkFrames::of(vec![dark.clone()]).unwrap().unwrap();
+    let counts = masking.run(&stage, &mut plane.clone(), Some(&mut darks), &mut sink, &mut |_| ()).unwrap();
+    assert_eq!((counts.saturated_pixels, sink.header.geometry.channels.len()), (1, 2));
+    for (x, y) in (0..6).flat_map(|y| (0..8).map(move |x| (x, y))) {
+        assert_eq!(at(&sink, x, y, 1), if (x, y) == (3, 2) { 1.0 } else { 0.0 });
+        assert_eq!(at(&sink, x, y, 0), at(&plane, x, y, 0) - at(&dark, x, y, 0));
+    }
+}
+
+/// Of marked pixels sigma is infinite; of others it is what it was without the layer.
+#[test]
+fn the_uncertainty_of_a_marked_pixel_is_infinite() {
+    let mut header = plane_header(12, 10, CfaPattern::Rggb);
+    header.metadata.adc = Some(AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });
+    let plane = frame(header, |x, y, _| if (x, y) == (6, 5) { WHITE } else { 700.0 });
+    let stage = WithSigma::of_demosaicking(demosaicking(&plane, Method::EffectiveColor)).unwrap();
+    let (made, counts) = masked(&plane, &stage);
+    let plain = support::through(&plane, &stage);
+    assert_eq!(made.header.geometry.channels[3..], ["sigma.R", "sigma.G", "sigma.B", "mask"]);
+    assert!(counts.saturated_pixels > 0);
+    for (x, y) in (0..10).flat_map(|y| (0..12).map(move |x| (x, y))) {
+        for channel in 0..6 {
+            let expected = at(&plain, x, y, channel);
+            let is_unknown = channel >= 3 && at(&made, x, y, 6) != 0.0;
+            assert_eq!(at(&made, x, y, channel), if is_unknown { f32::INFINITY } else { expected });
+        }
+    }
+}
+
+/// Marks of a crop are those of the whole, away from its edges; a scene whose law keeps it far below has none to make.
+#[test]
+fn marks_do_not_hang_on_the_frame() {
+    let plane =
+        frame(plane_header(24, 20, CfaPattern::Grbg), |x, y, _| if scatter(x, y, 2) > 0.9 { WHITE } else { 600.0 });
+    let whole = masked(&plane, &demosaicking(&plane, Method::Malvar)).0;
+    let part = crop(&plane, 5, 3, 15, 12);
+    let of_part = masked(&part, &demosaicking(&part, Method::Malvar)).0;
+    support::assert_same(&crop(&of_part, 2, 2, 11, 8), &crop(&whole, 7, 5, 11, 8), "marks of a crop");
+
+    let shop = Workshop::new();
+    for (electrons, is_possible) in [("9000,20000,30000", false), ("9000,20000,39500", true)] {
+        shop.pipe(&format!(
+            "render-radiance --electrons {electrons} --size 16x12 | add-noise --without ron -q | digitize -q -o c.exr"
+        ));
+        let header = shop.frame("c.exr").header;
+        let levels = FullLevels::of(&header).unwrap();
+        assert_eq!(saturation::is_possible(&header, &levels), is_possible, "{electrons}");
+    }
+}
+
+/// The law of a uniform scene against its frames: samples by class, and pixels by what they use. Samples are independent
+/// draws; of pixels neighbors share sites, at most 25 each, so that their number scatters at most √25 times as much.
+#[test]
+fn shares_are_those_that_the_law_expects() {
+    let shop = Workshop::new();
+    shop.pipe(
+        "render-radiance --electrons 38900,39300,39700 --size 200x160 | mosaic | add-noise --seed 5 -q | digitize -q -o c.exr",
+    );
+    let plane = shop.frame("c.exr");
+    let header = plane.header.clone();
+    let shares = saturation::shares(&header).unwrap();
+    let levels = FullLevels::of(&header).unwrap().classes();
+    for class in Class::ALL {
+        let of_class = (0..160).flat_map(|y| (0..200).map(move |x| (x, y)));
+        let of_class: Vec<f32> = of_class
+            .filter(|(x, y)| CfaPattern::Rggb.class(*x as i64, *y as i64) == class)
+            .map(|(x, y)| at(&plane, x, y, 0))
+            .collect();
+        let (n, share) = (of_class.len() as f64, shares[class as usize]);
+        let full = of_class.iter().filter(|sample| **sample >= levels[class as usize]).count() as f64;
+        let sigma = (n * share * (1.0 - share)).sqrt();
+        assert!(share > 1e-3 && (full - n * share).abs() < 5.0 * sigma, "{class:?}: {full} of {n}, expected {share}");
+    }
+    for method in Method::ALL {
+        let (made, counts) = masked(&plane, &demosaicking(&plane, *method));
+        let (n, share) = (200.0 * 160.0, made.header.metadata.saturated_share.unwrap());
+        let sigma = (25.0 * n * share * (1.0 - share)).sqrt();
+        let found = counts.saturated_pixels as f64;
+        assert!((found - n * share).abs() < 4.0 * sigma, "{method:?}: {found}, expected {}", n * share);
+    }
+}
+
+fn json(bytes: &[u8]) -> Value {
+    serde_json::from_slice(bytes).unwrap()
+}
+
+/// Blue is clipped: each program says how many, files keep it, statistics leave it out, and a check refuses.
+#[test]
+fn a_clipped_blue_is_known_to_the_end() {
+    let shop = Workshop::with_frames();
+    let said = |line: &str, what: &str| {
+        let output = shop.attempt(line, &[]);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(text.contains(what), "{line}: {text}");
+        assert!(output.status.success(), "{line}: {text}");
+        output.stdout
+    };
+    said(
+        "render-radiance --electrons 15000,25000,60000 --size 40x30 -o e.exr",
+        "B expects 60000 e-, but full well is 40000 e-: these samples will be saturated",
+    );
+    said("add-noise e.exr -o n.exr", "1200 photosites were clipped at full well");
+    said("digitize n.exr -o d.exr", "1200 samples were clipped to the largest code");
+    said("mosaic d.exr -o c.exr", "300 samples are saturated");
+    said("demosaic c.exr --sigma -o rgb.exr", "1200 pixels were made of saturated samples");
+    said("to-xyz rgb.exr --sigma --matrix matrix.yaml -o xyz.exr", "1200 pixels were made of saturated samples");
+    for name in ["rgb.exr", "xyz.exr"] {
+        let report = json(&said(&format!("measure {name} --output-format json"), "are left out of the statistics"));
+        let region = &report["regions"][0];
+        assert_eq!((&region["saturated"], &region["count"]), (&Value::from(1200), &Value::from(0)));
+        let kept = json(&said(&format!("measure {name} --keep-saturated --output-format json"), "1200"));
+        assert_eq!(kept["regions"][0]["count"], 1200);
+        assert_eq!(shop.read(name).1.saturated_share, Some(1.0));
+        let sidecar = String::from_utf8(shop.bytes(&format!("{name}.yaml"))).unwrap();
+        assert!(sidecar.contains("saturated: 1200"), "{sidecar}");
+    }
+    let refused = shop.attempt("measure xyz.exr --check", &[]);
+    let text = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(BAD_DATA));
+    assert!(text.contains("nothing can be checked: 1200 pixels") && text.contains("give --keep-saturated"), "{text}");
+    said("measure xyz.exr --check --keep-saturated", "1200");
+    // A picture to look at has no layer, nor has a TIFF, and the warning is the same.
+    said("demosaic c.exr -o rgb.tiff", "1200 pixels were made of saturated samples");
+    assert_eq!(shop.frame("rgb.tiff").header.geometry.channels, ["R", "G", "B"]);
+    said("to-xyz rgb.exr --space srgb --matrix matrix.yaml -o s.tiff", "1200 pixels were made of saturated samples");
+    assert_eq!(shop.frame("s.tiff").header.geometry.channels, ["R", "G", "B"]);
+}
