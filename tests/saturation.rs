@@ -52,7 +52,7 @@ fn demosaicking(plane: &MemoryFrame, method: Method) -> Demosaic {
 fn a_pixel_is_marked_where_another_value_of_a_full_sample_would_change_it() {
     let (width, height) = (9, 8);
     for (method, pattern) in
-        Method::ALL.into_iter().flat_map(|method| CfaPattern::ALL.map(|pattern| (*method, pattern)))
+        Method::ALL.into_iter().flat_map(|method| CfaPattern::ALL.map(|pattern| (method, pattern)))
     {
         for origin in [[0, 0], [1, 0], [3, 5]] {
             let mut header = plane_header(width, height, pattern);
@@ -194,7 +194,7 @@ fn shares_are_those_that_the_law_expects() {
         assert!(share > 1e-3 && (full - n * share).abs() < 5.0 * sigma, "{class:?}: {full} of {n}, expected {share}");
     }
     for method in Method::ALL {
-        let (made, counts) = masked(&plane, &demosaicking(&plane, *method));
+        let (made, counts) = masked(&plane, &demosaicking(&plane, method));
         let (n, share) = (200.0 * 160.0, made.header.metadata.saturated_share.unwrap());
         let sigma = (25.0 * n * share * (1.0 - share)).sqrt();
         let found = counts.saturated_pixels as f64;

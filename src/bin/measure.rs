@@ -8,7 +8,7 @@ use cyanometer::formats::{input::FrameReader, input::InputOptions, output};
 use cyanometer::names::Named;
 use cyanometer::propagation::Equations;
 use cyanometer::report::{self, ReportFormat};
-use cyanometer::requests::{Note, options, values};
+use cyanometer::requests::{self, options, values};
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -74,10 +74,6 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     if let Some(warning) = reader.check_digest() {
         session.warn(&warning);
     }
-    let not_finite = report.regions.iter().map(|region| region.not_finite).sum();
-    session.tell(Note::not_finite(not_finite).as_slice());
-    let saturated = report.regions.iter().map(|region| region.saturated).sum();
-    let left_out = report.regions.iter().any(|region| region.leaves_saturated_out);
-    session.tell(Note::saturated(saturated, left_out).as_slice());
+    session.tell(&requests::of_statistics(&report));
     report.check.map_or(Ok(()), |verdict| verdict.judge(&reader.header().name))
 }

@@ -1,5 +1,6 @@
 //! What comes up on the way, for the user to hear.
 
+use crate::analysis::statistics::Report;
 use crate::formats::input::FrameReader;
 use crate::stream::RowSource;
 
@@ -25,20 +26,23 @@ impl Note {
         let text = || format!("{pixels} pixels are NaN or infinite; they are left out of the statistics");
         (pixels > 0).then(|| Self::Warning(text()))
     }
+}
 
-    /// A warning of saturated samples, or of pixels that were made of such; none where there are none.
-    pub fn saturated(pixels: u64, left_out: bool) -> Option<Self> {
-        let text = || match left_out {
-            true => format!(
-                "{pixels} pixels were made of saturated samples; they are left out of the statistics, so that these are of \
-                 the darker part alone (--keep-saturated keeps them in)"
-            ),
-            false => {
-                format!("{pixels} samples are saturated; the statistics hold for what was recorded, not for the light")
-            }
-        };
-        (pixels > 0).then(|| Self::Warning(text()))
-    }
+/// What came up among statistics.
+pub fn of_statistics(report: &Report) -> Vec<Note> {
+    let not_finite = report.regions.iter().map(|region| region.not_finite).sum();
+    let pixels: u64 = report.regions.iter().map(|region| region.saturated).sum();
+    let saturated = match report.regions.iter().any(|region| region.leaves_saturated_out) {
+        _ if pixels == 0 => None,
+        true => Some(format!(
+            "{pixels} pixels were made of saturated samples; they are left out of the statistics, so that these are of the \
+             darker part alone (--keep-saturated keeps them in)"
+        )),
+        false => {
+            Some(format!("{pixels} samples are saturated; the statistics hold for what was recorded, not for the light"))
+        }
+    };
+    Note::not_finite(not_finite).into_iter().chain(saturated.map(Note::Warning)).collect()
 }
 
 /// What a reader found.
