@@ -4,7 +4,6 @@ use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
-use cyanometer::formats::output::check_outputs;
 use cyanometer::requests::{Conversion, options};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stream::RowSource;
@@ -40,7 +39,6 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
-    check_outputs(&[output.output.as_deref()], &[&conversion.matrix])?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
     arguments.sensor.apply(&mut reader)?;
     let (mut stage, notes) = conversion.stage(reader.header_mut())?;

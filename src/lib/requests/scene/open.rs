@@ -8,7 +8,6 @@ use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::formats::csv::SpectralTable;
 use crate::formats::data::{self, LoadedSensor};
-use crate::formats::files::{FileId, regular_file};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::frame::Geometry;
@@ -33,8 +32,6 @@ pub(super) struct Prepared {
 pub(super) struct Found {
     /// What is left out, and the error of the sum over wavelengths.
     pub(super) metadata: Metadata,
-    /// The file that is read, where it is one.
-    pub(super) input: Option<(FileId, String)>,
     pub(super) notes: Vec<Note>,
 }
 
@@ -82,7 +79,6 @@ impl Scene {
         }
         let mut found = Found {
             metadata: Metadata::new(QuantityKind::ExpectedElectrons),
-            input: self.subject.input.as_deref().and_then(regular_file),
             notes: Vec::new(),
         };
         let mut light = match self.level.given() {
@@ -164,7 +160,6 @@ impl Scene {
             return Err(Error::Usage("a spectral image has no columns; choose a pixel with --sample N".into()));
         }
         found.notes.extend(notes::of_reader(&reader));
-        found.input = reader.file();
         let header = reader.header().clone();
         let spectral = SpectralChannels::of(&header, self.spectrum.radiance_unit)?;
         let seen = sums.camera(&spectral.wavelength_nm, &header.name, &mut found.notes);
