@@ -27,7 +27,8 @@ pub fn one_line(message: &str) -> String {
 /// Escapes what steers a terminal, directions of writing included, but for what is `plain`.
 fn escaped(text: &str, plain: impl Fn(char) -> bool) -> Cow<'_, str> {
     let steers = |c: char| {
-        let turns = matches!(c, '\u{061C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
+        let turns =
+            matches!(c, '\u{061C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
         (c.is_control() || turns || matches!(c, '\u{2028}' | '\u{2029}')) && !plain(c)
     };
     if !text.contains(steers) {
@@ -54,7 +55,10 @@ mod tests {
     #[test]
     fn nothing_steers_a_terminal() {
         assert_eq!(visible("a\tb\nc"), "a\tb\nc");
-        assert_eq!(visible("\u{1b}[2J\u{9b}1m\u{7f}\r\u{202e}x\u{2028}"), "\\u{1b}[2J\\u{9b}1m\\u{7f}\\r\\u{202e}x\\u{2028}");
+        assert_eq!(
+            visible("\u{1b}[2J\u{9b}1m\u{7f}\r\u{202e}x\u{2028}"),
+            "\\u{1b}[2J\\u{9b}1m\\u{7f}\\r\\u{202e}x\\u{2028}"
+        );
         assert_eq!(one_line("a\tb\nµ"), "a\\tb\\nµ");
     }
 

@@ -166,7 +166,8 @@ mod nameless {
 
     /// Gives a file its name. What has that name already is replaced by way of a temporary one.
     pub fn give_name(file: &File, directory: &Path, target: &Path) -> io::Result<()> {
-        let link = |path: &Path| linkat(CWD, place_of(file), CWD, path, AtFlags::SYMLINK_FOLLOW).map_err(io::Error::from);
+        let link =
+            |path: &Path| linkat(CWD, place_of(file), CWD, path, AtFlags::SYMLINK_FOLLOW).map_err(io::Error::from);
         match link(target) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                 let temporary = tempfile::Builder::new().prefix(PREFIX).make_in(directory, link)?.into_temp_path();

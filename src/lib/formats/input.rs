@@ -147,7 +147,8 @@ impl FrameReader {
         let Some(DigestCheck { expected, sidecar, digest }) = self.check.take() else { return };
         if digest.finish() != expected {
             let name = &self.header.name;
-            let text = format!("{name}: its samples are not those that {sidecar} describes; one of the two was changed");
+            let text =
+                format!("{name}: its samples are not those that {sidecar} describes; one of the two was changed");
             register::doubt(text.clone());
             self.mismatch = Some(text);
         }

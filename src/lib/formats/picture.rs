@@ -49,11 +49,7 @@ pub struct PictureSettings {
 ///
 /// [`Error::Usage`] for a region outside the frame, a picture too large, or an output that is a terminal or a file that is read;
 /// [`Error::Format`] for quantities that are no picture; those of the reader; [`Error::Disk`].
-pub fn write_png(
-    source: &mut dyn RowSource,
-    settings: &PictureSettings,
-    path: &Path,
-) -> Result<()> {
+pub fn write_png(source: &mut dyn RowSource, settings: &PictureSettings, path: &Path) -> Result<()> {
     let frame = source.header().clone();
     let region = settings.region.unwrap_or(Region::whole(&frame));
     region.check(&frame)?;

@@ -42,7 +42,8 @@ pub fn checked_text(bytes: &[u8]) -> Result<&str, &'static str> {
             return Err("its brackets nest too deep");
         }
     }
-    let indent = |line: &str| line.len() - line.trim_start_matches(|c| c == ' ' || c == '\t' || INDENTING.contains(&c)).len();
+    let indent =
+        |line: &str| line.len() - line.trim_start_matches(|c| c == ' ' || c == '\t' || INDENTING.contains(&c)).len();
     if text.lines().any(|line| indent(line) > MAX_INDENT) {
         return Err("its lines nest too deep");
     }

@@ -83,7 +83,8 @@ fn stood_in(value: &Value, escaped: &dyn Fn(char) -> bool, quoted: &mut Vec<Stri
         }
         Value::Sequence(items) => items.iter().map(|item| stood_in(item, escaped, quoted)).collect::<Vec<_>>().into(),
         Value::Mapping(mapping) => {
-            let pairs = mapping.iter().map(|(key, value)| (stood_in(key, escaped, quoted), stood_in(value, escaped, quoted)));
+            let pairs =
+                mapping.iter().map(|(key, value)| (stood_in(key, escaped, quoted), stood_in(value, escaped, quoted)));
             Value::Mapping(pairs.collect::<Mapping>())
         }
         Value::Tagged(tagged) => {
@@ -118,8 +119,38 @@ mod tests {
 
     /// What YAML, the guard or the stand-ins might stumble over.
     const HOSTILE: [&str; 32] = [
-        "[", "]", "{", "}", "&", " & ", "*", " *a", "!", " !x", "'", "\"", "\\", "\n", "\r", "\t", "\0", "\u{1b}[2J", "\u{7f}",
-        "\u{85}", "\u{2028}", "\u{feff}", "\u{ffff}", "é", "𝄞", ": ", " #", "- ", "?", "---", "~", "QuotedStringNo00000000_",
+        "[",
+        "]",
+        "{",
+        "}",
+        "&",
+        " & ",
+        "*",
+        " *a",
+        "!",
+        " !x",
+        "'",
+        "\"",
+        "\\",
+        "\n",
+        "\r",
+        "\t",
+        "\0",
+        "\u{1b}[2J",
+        "\u{7f}",
+        "\u{85}",
+        "\u{2028}",
+        "\u{feff}",
+        "\u{ffff}",
+        "é",
+        "𝄞",
+        ": ",
+        " #",
+        "- ",
+        "?",
+        "---",
+        "~",
+        "QuotedStringNo00000000_",
     ];
 
     fn strings() -> impl Strategy<Value = String> {

@@ -93,7 +93,9 @@ pub fn prediction(found: &PredictedNoise, format: Option<ReportFormat>) -> Resul
     match (format, budgets) {
         (ReportFormat::Json, _) => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
         (ReportFormat::Yaml, _) => yaml_writer::document("the report", &whole),
-        (ReportFormat::Text, Budgets::Scene(scene)) => Ok(visible(&text(scene, conditions.quadrature_error)).into_owned()),
+        (ReportFormat::Text, Budgets::Scene(scene)) => {
+            Ok(visible(&text(scene, conditions.quadrature_error)).into_owned())
+        }
         (ReportFormat::Csv, Budgets::Scene(scene)) => stages_csv(scene),
         (_, Budgets::Sweep(levels)) => scenes_csv(&[], levels.iter().map(|scene| (Vec::new(), scene))),
         (_, Budgets::Samples(samples)) => {

@@ -77,10 +77,7 @@ impl Scene {
             // The signal is proportional to time: work it out for 1 s, then choose.
             exposure.exposure_s = 1.0;
         }
-        let mut found = Found {
-            metadata: Metadata::new(QuantityKind::ExpectedElectrons),
-            notes: Vec::new(),
-        };
+        let mut found = Found { metadata: Metadata::new(QuantityKind::ExpectedElectrons), notes: Vec::new() };
         let mut light = match self.level.given() {
             Some(electrons) => {
                 let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
