@@ -65,6 +65,11 @@ impl AtomicFile {
     ///
     /// [`Error::Disk`] when the directory is missing or cannot be written, [`Error::Usage`] when the target is read.
     pub fn create(target: &Path) -> Result<Self> {
+        Self::begin(target, nameless::create)
+    }
+
+    /// The same, with a way to make files that have no name.
+    fn begin(target: &Path, nameless: impl FnOnce(&Path, u32) -> Option<File>) -> Result<Self> {
         let name = target.display().to_string();
         let existing = std::fs::metadata(target).ok();
         existing.as_ref().map_or(Ok(()), |about| register::check_output(about, &name))?;
@@ -83,7 +88,7 @@ impl AtomicFile {
             ));
         }
         let permissions = existing.map_or(Permissions::from_mode(0o666), |about| about.permissions());
-        let (file, temporary) = match nameless::create(&directory, permissions.mode()) {
+        let (file, temporary) = match nameless(&directory, permissions.mode()) {
             Some(file) => (file, None),
             None => create_temporary(&directory, permissions)
                 .map(|(file, path)| (file, Some(path)))
@@ -353,6 +358,51 @@ impl Seek for Target {
             Kind::Named(file) => file.output.seek(to),
             Kind::Spooled { spool, .. } => spool.seek(to),
             Kind::Stream(_) => Err(io::Error::from(io::ErrorKind::NotSeekable)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// File systems without files that have no name are not at hand everywhere.
+    #[test]
+    fn a_temporary_name_serves_where_files_need_one() {
+        let directory = tempfile::tempdir().unwrap();
+        let target = directory.path().join("out.exr");
+        let names = || {
+            let entries = std::fs::read_dir(directory.path()).unwrap();
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect::<Vec<_>>()
+        };
+        for round in 0..2 {
+            let mut file = AtomicFile::begin(&target, |_, _| None).unwrap();
+            file.write_all(&[round]).unwrap();
+            assert!(names().iter().any(|name| name.starts_with(PREFIX)), "{:?}", names());
+            assert!(PENDING.lock().unwrap().iter().any(|path| path.parent() == Some(directory.path())));
+            file.commit().unwrap();
+            assert_eq!((names(), std::fs::read(&target).unwrap()), (vec!["out.exr".to_owned()], vec![round]));
+            assert!(!PENDING.lock().unwrap().iter().any(|path| path.parent() == Some(directory.path())));
+        }
+        drop(AtomicFile::begin(&target, |_, _| None).unwrap());
+        assert_eq!((names(), std::fs::read(&target).unwrap()), (vec!["out.exr".to_owned()], vec![1]));
+    }
+
+    #[test]
+    fn a_file_has_no_name_before_it_is_whole() {
+        let directory = tempfile::tempdir().unwrap();
+        let entries = || std::fs::read_dir(directory.path()).unwrap().count();
+        if nameless::create(directory.path(), 0o666).is_none() {
+            // This file system has no such files.
+            return;
+        }
+        let target = directory.path().join("out.exr");
+        for before in [0, 1] {
+            let mut file = AtomicFile::create(&target).unwrap();
+            file.write_all(&[before]).unwrap();
+            assert_eq!(entries(), usize::from(before));
+            file.commit().unwrap();
+            assert_eq!((entries(), std::fs::read(&target).unwrap()), (1, vec![before]));
         }
     }
 }
