@@ -4,6 +4,7 @@ use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
+use cyanometer::formats::register::announce;
 use cyanometer::requests::{Conversion, options};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stream::RowSource;
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
+    announce(&[output.output.as_deref()])?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
     arguments.sensor.apply(&mut reader)?;
     let (mut stage, notes) = conversion.stage(reader.header_mut())?;
