@@ -450,28 +450,23 @@ fn every_reader_tells_of_a_sidecar_that_is_not_its_images() {
 #[test]
 fn text_from_files_is_tame() {
     let shop = Workshop::with_frames();
-    let evil = "\\e[2J\\x9B1m\\u202E\\nfake: line";
-    let sensor = fs::read_to_string(format!("{TREE}/sample_data/sensors/kaf-5101ce.yaml")).unwrap();
-    let line = sensor.lines().find(|line| line.starts_with("name:")).unwrap();
-    fs::write(shop.path("s.yaml"), sensor.replace(line, &format!("name: \"{evil}\""))).unwrap();
-    for file in ["kaf5101ce_est_qe_1nm.csv", "bg39_1mm.csv"] {
-        fs::copy(format!("{TREE}/sample_data/sensors/{file}"), shop.path(file)).unwrap();
-    }
-    fs::write(shop.path("long.yaml"), format!("schema: \"{}\"\nquantity: adu\n", "\\e[31mx".repeat(100_000))).unwrap();
+    let labels = fs::read_to_string(format!("{TREE}/sample_data/skies/sky912_meta.csv")).unwrap();
+    fs::write(shop.path("labels.csv"), labels.replace("maritime23", "\u{1b}[2J\u{9b}1m\u{202e}")).unwrap();
+    fs::write(shop.path("long.yaml"), format!("schema: \"{}\"\nquantity: adu\n", "\\ex".repeat(100_000))).unwrap();
     fs::write(shop.path("word.yaml"), format!("{}\n", "y".repeat(100_000))).unwrap();
-    fs::write(shop.path("key.yaml"), format!("\"{}\": 1\n", "\\e[31mz".repeat(10_000))).unwrap();
+    fs::write(shop.path("key.yaml"), format!("\"{}\": 1\n", "\\ez".repeat(300))).unwrap();
     for line in [
-        "predict-noise --sensor s.yaml --electrons 1,2,3",
+        "fit-matrix SAMPLES/skies/sky912.exr --labels labels.csv:aerosol --evaluate SAMPLES/skies/sky912.exr",
+        "fit-matrix SAMPLES/skies/sky912.exr --labels labels.csv:aerosol --hold-out none",
         "measure noisy.exr --metadata long.yaml",
         "measure noisy.exr --metadata word.yaml",
         "predict-noise --dark --sensor key.yaml",
-        "fit-matrix SAMPLES/skies/sky912.exr --sensor s.yaml --evaluate SAMPLES/skies/kider2014.exr",
         "render-radiance long.yaml",
     ] {
         let done = shop.attempt(line, &[]);
         let shown = String::from_utf8(done.stdout.clone()).unwrap() + &said(&done);
         let steers = |c: char| c.is_control() && c != '\n' || c == '\u{202E}';
-        assert!(!shown.contains(steers) && !shown.contains("\nfake"), "{line}: {shown:?}");
+        assert!(!shown.contains(steers), "{line}: {shown:?}");
         assert!(done.stderr.len() < 2000, "{line}: {} bytes", done.stderr.len());
     }
 }
