@@ -407,7 +407,7 @@ fn pictures_know_levels_by_site_and_class() {
     three.header.metadata.black_level_adu = Some(BlackLevel::Sites([10.0, 20.0, 30.0, 40.0]));
     three.header.metadata.white_level_adu = Some(WhiteLevel::Classes([100.0, 200.0, 300.0]));
     let settings = PictureSettings { region: None, zoom: 1, range: Range::Full };
-    write_png(&mut three, &settings, &path, None).unwrap();
+    write_png(&mut three, &settings, &path).unwrap();
     let shown = image::open(&path).unwrap().to_rgb8();
     assert_eq!((shown.get_pixel(0, 0).0, shown.get_pixel(1, 0).0), ([0; 3], [255; 3]));
 }

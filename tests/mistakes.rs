@@ -205,7 +205,7 @@ const MISTAKES: [(&str, i32, &str); 74] = [
         BAD_DATA,
         "noisy.exr: it holds three planes of electrons, not colors; run `to-xyz` first",
     ),
-    ("color-difference - -", BAD_USAGE, "only one of A and B can be the standard input; name a file for the other"),
+    ("color-difference - -", BAD_USAGE, "only one input can be the standard input; name a file for the others"),
     (
         "color-difference 1,2,3 4,5,6 --map map.exr",
         BAD_USAGE,

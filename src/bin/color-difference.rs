@@ -3,9 +3,9 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::{Error, Result};
-use cyanometer::formats::files::sidecar_path;
-use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::output::{self, FrameWriter, OutputOptions};
+use cyanometer::formats::places::{same_place, sidecar_path};
+use cyanometer::formats::register;
 use cyanometer::report::{self, ReportFormat};
 use cyanometer::requests::{ColorPair, Note, values};
 use cyanometer::stream::{Counts, RowSink};
@@ -41,20 +41,19 @@ fn main() -> ExitCode {
 }
 
 fn run(Arguments { pair, map, output, output_format, .. }: &Arguments, session: &cli::Session) -> Result<()> {
-    if map.is_some() && output::same_place(map.as_deref(), output.as_deref()) {
+    if map.is_some() && same_place(map.as_deref(), output.as_deref()) {
         return Err(Error::Usage("the map and the report have the same place; name a file for each".into()));
     }
+    let sidecar = map.as_deref().map(sidecar_path);
+    register::announce(&[output.as_deref(), map.as_deref(), sidecar.as_deref()])?;
     let (mut comparison, notes) = pair.open()?;
     session.tell(&notes);
-    let sidecar = map.as_deref().map(sidecar_path);
-    output::check_outputs(&[output.as_deref(), map.as_deref(), sidecar.as_deref()], &pair.inputs())?;
     let mut writer = None;
     if let Some(map) = map {
         let mut header = comparison.map_header()?;
         session.sign(&mut header);
-        let inputs: Vec<_> = comparison.frames().filter_map(FrameReader::file).collect();
         let options = OutputOptions { path: Some(map.clone()), ..Default::default() };
-        writer = Some(FrameWriter::create(&options, &header, &inputs)?);
+        writer = Some(FrameWriter::create(&options, &header)?);
     }
     let bar = session.progress(comparison.height());
     let sink = writer.as_mut().map(|writer| -> &mut dyn RowSink { writer });
@@ -64,10 +63,7 @@ fn run(Arguments { pair, map, output, output_format, .. }: &Arguments, session: 
     if let Some(writer) = writer {
         writer.finish(Counts { not_finite: report.not_finite, ..Default::default() })?;
     }
-    output::write_text(output.as_deref(), &report::difference(&report, *output_format)?, None)?;
-    for warning in comparison.frames_mut().filter_map(FrameReader::check_digest) {
-        session.warn(&warning);
-    }
+    output::write_text(output.as_deref(), &report::difference(&report, *output_format)?)?;
     session.tell(Note::not_finite(report.not_finite).as_slice());
     Ok(())
 }

@@ -4,6 +4,7 @@ use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::formats::register::check_inputs;
 use cyanometer::requests::{options, values};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
@@ -42,6 +43,8 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    let darks = arguments.dark.iter().map(PathBuf::as_path);
+    check_inputs(darks.map(Some).chain([arguments.input.input.as_deref()]))?;
     let reader = FrameReader::open(&arguments.input.options())?;
     let open = |path: &PathBuf| FrameReader::open(&InputOptions { path: Some(path.clone()), ..Default::default() });
     let darks = DarkFrames::of(arguments.dark.iter().map(open).collect::<Result<_>>()?)?;

@@ -4,7 +4,7 @@ use clap::Parser;
 use cyanometer::analysis::statistics::{Region, Saturated, measure, patches};
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::{input::FrameReader, input::InputOptions, output};
+use cyanometer::formats::{input::FrameReader, input::InputOptions, output, register};
 use cyanometer::names::Named;
 use cyanometer::propagation::Equations;
 use cyanometer::report::{self, ReportFormat};
@@ -60,7 +60,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let options = InputOptions { all_channels: true, ..arguments.input.options() };
-    output::check_outputs(&[arguments.output.as_deref()], options.path.as_deref().as_slice())?;
+    register::announce(&[arguments.output.as_deref()])?;
     let mut reader = FrameReader::open(&options)?;
     session.report_reader(&reader);
     let level = arguments.check.then_some(arguments.level);
@@ -70,10 +70,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         None => measure(&mut reader, &arguments.region, saturated, arguments.equations, level)?,
     };
     let text = report::render(&report, arguments.output_format)?;
-    output::write_text(arguments.output.as_deref(), &text, reader.file().as_ref())?;
-    if let Some(warning) = reader.check_digest() {
-        session.warn(&warning);
-    }
+    output::write_text(arguments.output.as_deref(), &text)?;
     session.tell(&requests::of_statistics(&report));
     report.check.map_or(Ok(()), |verdict| verdict.judge(&reader.header().name))
 }

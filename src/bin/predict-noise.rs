@@ -27,7 +27,7 @@ fn main() -> ExitCode {
 }
 
 fn run(Arguments { prediction, outputs, .. }: &Arguments, session: &cli::Session) -> Result<()> {
-    outputs.check(&prediction.inputs()?)?;
+    outputs.check()?;
     let mut found = prediction.run()?;
     session.tell(&found.notes);
     outputs.write(&mut found)

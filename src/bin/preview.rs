@@ -6,6 +6,7 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::picture::{PictureSettings, Range, write_png};
+use cyanometer::formats::register::announce;
 use cyanometer::requests::{options, values};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -19,7 +20,7 @@ use std::process::ExitCode;
 struct Arguments {
     #[command(flatten)]
     input: options::Input,
-    /// PNG file to write
+    /// PNG file to write; `-` for standard output
     #[arg(short, long, value_name = "FILE.png")]
     output: PathBuf,
     /// Rectangle X,Y,W,H in pixels to show; by default the whole frame
@@ -53,9 +54,9 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    announce(&[Some(&arguments.output)])?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
     session.report_reader(&reader);
     let settings = PictureSettings { region: arguments.region, zoom: arguments.zoom, range: arguments.range };
-    let input = reader.file();
-    write_png(&mut reader, &settings, &arguments.output, input.as_ref())
+    write_png(&mut reader, &settings, &arguments.output)
 }

@@ -4,7 +4,7 @@ use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
-use cyanometer::formats::output::check_outputs;
+use cyanometer::formats::register::announce;
 use cyanometer::requests::{Conversion, options};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stream::RowSource;
@@ -40,7 +40,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
-    check_outputs(&[output.output.as_deref()], &[&conversion.matrix])?;
+    announce(&[output.output.as_deref()])?;
     let matrix = conversion.load_matrix()?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
     arguments.sensor.apply(&mut reader)?;

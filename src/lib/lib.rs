@@ -6,7 +6,7 @@
 //!
 //! | floor | modules | what they know |
 //! |---|---|---|
-//! | 0 words | [`error`], [`units`], [`names`], [`cfa`], [`frame`] | no files, no chance |
+//! | 0 words | [`error`], [`text`], [`units`], [`names`], [`cfa`], [`frame`] | no files, no chance |
 //! | 1 mathematics | [`numerics`], [`random`], [`plot`] | no camera, no file |
 //! | 2 light and camera | [`spectrum`], [`color`], [`camera`] | curves, color spaces, lens and sensor in numbers; no frame |
 //! | 3 frames in motion | [`metadata`], [`stream`] | what is known of a frame, and how its rows move |
@@ -41,6 +41,7 @@ pub mod cfa;
 pub mod error;
 pub mod frame;
 pub mod names;
+pub mod text;
 pub mod units;
 
 pub mod numerics;

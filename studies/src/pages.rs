@@ -41,7 +41,7 @@ pub fn make_directory(directory: &Path) -> Result<()> {
 ///
 /// Those of [`write_plot`].
 pub fn write_figure(directory: &Path, name: &str, plot: &Plot) -> Result<()> {
-    ["svg", "png"].iter().try_for_each(|end| write_plot(&directory.join(format!("{name}.{end}")), plot, None))
+    ["svg", "png"].iter().try_for_each(|end| write_plot(&directory.join(format!("{name}.{end}")), plot))
 }
 
 /// A table of Markdown.

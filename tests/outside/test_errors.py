@@ -526,5 +526,5 @@ class Output(Errors):
                 program.stdin.close()
                 program.stdout.close()
                 program.stderr.close()
-            self.assertNotEqual(program.returncode, 0)
+            self.assertEqual(program.returncode, -number)
             self.assertEqual(self.listing(), before, f"signal {number}")

@@ -177,7 +177,7 @@ impl Workshop {
             metadata: Metadata::new(quantity),
         };
         let options = OutputOptions { path: Some(self.path(name)), ..Default::default() };
-        let mut writer = FrameWriter::create(&options, &header, &[]).unwrap();
+        let mut writer = FrameWriter::create(&options, &header).unwrap();
         writer.write(pixels.as_flattened()).unwrap();
         writer.finish(Counts::default()).unwrap();
     }

@@ -3,15 +3,18 @@
 mod advice;
 mod general;
 mod history;
+mod signals;
 mod usage;
 
 pub use general::{General, ProgressWhen};
 pub use history::history_entry;
 
 use crate::error::{Error, Result};
-use crate::formats::atomic::remove_pending;
+use crate::formats::atomic::remove_pending_now;
 use crate::formats::input::FrameReader;
 use crate::formats::output::FrameWriter;
+use crate::formats::places::STDOUT_NAME;
+use crate::formats::{register, standard};
 use crate::masking::Masking;
 use crate::metadata::FrameHeader;
 use crate::numerics::vectors::Instructions;
@@ -19,13 +22,11 @@ use crate::requests::options::Output;
 use crate::requests::{self, Note};
 use crate::stages::darks::DarkFrames;
 use crate::stream::{Counts, RowSource, Stage};
+use crate::text::one_line;
 use clap::{CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
-
-/// Exit status after an interrupt, as shells have it: 128 + SIGINT.
-const INTERRUPTED: i32 = 130;
 
 /// Exit status after an internal error, as Rust's programs have it.
 const PANICKED: i32 = 101;
@@ -46,23 +47,16 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     std::panic::set_hook(Box::new(move |panic| {
         let place = panic.location().map_or(String::new(), |at| format!(" at {}:{}", at.file(), at.line()));
         complain(program, &format!("internal error{place}; please report it with the command that led to it"));
-        remove_pending();
+        remove_pending_now();
         std::process::exit(PANICKED);
     }));
-    // Without a handler an interrupt ends the program all the same, only less tidily.
-    drop(ctrlc::set_handler(|| {
-        remove_pending();
-        std::process::exit(INTERRUPTED);
-    }));
+    signals::tidy_up_first();
+    register::keep();
     let command = A::command().name(program).bin_name(program);
     let parsed = command.try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
     let arguments = match parsed {
         Ok(arguments) => arguments,
-        Err(error) if !error.use_stderr() => {
-            // Help or version; a closed pipe is no error.
-            drop(error.print());
-            return ExitCode::SUCCESS;
-        }
+        Err(error) if !error.use_stderr() => return show(program, &error),
         Err(error) => {
             complain(program, &usage::one_line(program, &error));
             return ExitCode::from(2);
@@ -71,7 +65,9 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     let general = general(&arguments);
     let session = Session { program, general };
     session.settle_threads();
-    match Instructions::allowed().and_then(|_| body(&arguments, &session)) {
+    let done = Instructions::allowed().and_then(|_| body(&arguments, &session));
+    register::doubts().iter().for_each(|doubt| session.warn(doubt));
+    match done {
         Ok(()) | Err(Error::ClosedPipe) => ExitCode::SUCCESS,
         Err(error) => {
             complain(program, &advice::advised(&error, &A::command()));
@@ -80,19 +76,25 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     }
 }
 
-/// Writes one line to the standard error, control characters shown as escapes.
+/// Writes help or version; a closed pipe is no error.
+fn show(program: &str, text: &clap::Error) -> ExitCode {
+    let printed = standard::open_stdout().and_then(|_| {
+        let printed = text.print().and_then(|()| std::io::stdout().flush());
+        printed.map_err(|e| Error::disk(STDOUT_NAME, "write", e))
+    });
+    match printed {
+        Ok(()) | Err(Error::ClosedPipe) => ExitCode::SUCCESS,
+        Err(error) => {
+            complain(program, &error.to_string());
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Writes one line to the standard error.
 fn complain(program: &str, text: &str) {
-    let shown: String = text
-        .chars()
-        .flat_map(|c| {
-            let is_bidi = matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
-            let escape = c.is_control() || is_bidi;
-            let plain = (!escape).then_some(c);
-            plain.into_iter().chain(c.escape_default().take(if escape { usize::MAX } else { 0 }))
-        })
-        .collect();
     // Where the standard error is closed there is nobody to tell.
-    drop(writeln!(std::io::stderr(), "{program}: {shown}"));
+    drop(writeln!(std::io::stderr(), "{program}: {}", one_line(text)));
 }
 
 impl Session {
@@ -121,14 +123,18 @@ impl Session {
     }
 
     /// Settles how many threads work: what was asked for; or one where frames come or go through a pipe, at whose other end
-    /// another program has a processor of its own; or all.
+    /// another program has a processor of its own; or all; or one where the system starts no more.
     fn settle_threads(&self) {
         let General { threads, pipeline, .. } = self.general;
-        let Some(count) = threads.or(pipeline.then_some(1)) else { return };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(count);
-        // One thread is this one: no other is started. Only a second pool in one process could fail.
-        drop(if count == 1 { pool.use_current_thread() } else { pool }.build_global());
-        if threads.is_none() {
+        let count = threads.or(pipeline.then_some(1)).unwrap_or_default();
+        let pool = |count| rayon::ThreadPoolBuilder::new().num_threads(count);
+        // One thread is this one: no other is started.
+        let global = if count == 1 { pool(count).use_current_thread() } else { pool(count) };
+        if global.build_global().is_err() {
+            // Only the first global pool counts, and that has failed: one of this thread alone stands in.
+            self.note("the system starts no more threads; one works");
+            std::mem::forget(pool(1).use_current_thread().build());
+        } else if threads.is_none() && count == 1 {
             self.note("one thread, as frames pass through a pipe; --threads gives it more");
         }
     }
@@ -187,22 +193,18 @@ impl Session {
         stage: &S,
         output: &Output,
     ) -> Result<Counts> {
-        let readers = || std::iter::once(&reader).chain(darks.iter().flat_map(DarkFrames::frames));
-        readers().for_each(|reader| self.report_reader(reader));
-        let inputs: Vec<_> = readers().filter_map(FrameReader::file).collect();
+        let readers = std::iter::once(&reader).chain(darks.iter().flat_map(DarkFrames::frames));
+        readers.for_each(|reader| self.report_reader(reader));
         let layers = output.options().holds_layers()?;
         let masking = Masking::of(reader.header(), reader.has_mask(), stage.header(), layers);
         let made = masking.header(stage);
         reader.keep_mask();
-        let mut writer = FrameWriter::create(&output.options(), &made, &inputs)?;
+        let mut writer = FrameWriter::create(&output.options(), &made)?;
         let bar = self.progress(made.geometry.height);
         let mut progress = |rows| bar.set_position(rows as u64);
         let counts = masking.run(stage, &mut reader, darks.as_mut(), &mut writer, &mut progress)?;
         bar.finish_and_clear();
-        self.finish(reader, writer, counts)?;
-        for warning in darks.iter_mut().flat_map(DarkFrames::frames_mut).filter_map(FrameReader::check_digest) {
-            self.warn(&warning);
-        }
+        self.finish(writer, counts)?;
         Ok(counts)
     }
 
@@ -211,13 +213,10 @@ impl Session {
     /// # Errors
     ///
     /// Those of the writer.
-    pub fn finish(&self, mut reader: FrameReader, writer: FrameWriter, counts: Counts) -> Result<()> {
+    pub fn finish(&self, writer: FrameWriter, counts: Counts) -> Result<()> {
         let did_not_fit = writer.finish(counts)?;
         if did_not_fit > 0 {
             self.warn(&format!("{did_not_fit} samples do not fit 16 bits; they are stored as 0 or 65535, NaN as 0"));
-        }
-        if let Some(warning) = reader.check_digest() {
-            self.warn(&warning);
         }
         for warning in counts.warnings() {
             self.warn(&warning);

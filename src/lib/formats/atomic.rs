@@ -1,29 +1,49 @@
 //! Outputs that are whole or not at all.
 //!
-//! A named file is written beside its target and renamed when complete; on an error or an interrupt nothing is left.
-//! Devices, named pipes and the standard output are written as they are.
+//! A named file is written beside its target without a name, and gets one when it is complete: whatever ends the program, the
+//! system takes the rest away. Where a file system knows no files without names, it is written under a temporary one, which
+//! an error or a signal removes. Devices, named pipes and the standard output are written as they are.
 
-use super::files::{FileId, STDOUT_NAME, file_id, same_file};
-use super::pipe;
+use super::places::{STDOUT_NAME, named};
+use super::standard::open_stdout;
+use super::{pipe, register};
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, IsTerminal, Read, Seek, SeekFrom, Write};
-use std::os::fd::AsFd;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use tempfile::{NamedTempFile, TempPath};
+use std::sync::{Mutex, PoisonError, TryLockError};
+use tempfile::TempPath;
 
-/// Temporary files to remove when the program is interrupted.
+/// Temporary names to remove when the program is ended. Whoever makes one holds the lock until it stands here, and whoever
+/// gives files their names holds it until all have them, so that a signal comes before or after.
 static PENDING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Removes what is half-written; for the handler of interrupts, which then ends the program.
+/// What temporary names begin with.
+const PREFIX: &str = ".cyanometer-";
+
+/// Removes what is half-written, for whoever ends the program at a signal; waits until files that are complete have their
+/// names, and lets none be made any more.
 pub fn remove_pending() {
-    if let Ok(pending) = PENDING.lock() {
-        for path in pending.iter() {
-            // The file may be gone already; there is nobody left to tell.
-            drop(std::fs::remove_file(path));
-        }
+    let pending = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+    remove(&pending);
+    // Held until the program has ended.
+    std::mem::forget(pending);
+}
+
+/// The same after a panic, which may have come while files got their names: then they get them.
+pub fn remove_pending_now() {
+    match PENDING.try_lock() {
+        Ok(pending) => remove(&pending),
+        Err(TryLockError::Poisoned(pending)) => remove(&pending.into_inner()),
+        Err(TryLockError::WouldBlock) => {}
+    }
+}
+
+fn remove(pending: &[PathBuf]) {
+    for path in pending {
+        // The file may be gone already; there is nobody left to tell.
+        drop(std::fs::remove_file(path));
     }
 }
 
@@ -31,18 +51,28 @@ pub fn remove_pending() {
 #[derive(Debug)]
 pub struct AtomicFile {
     output: BufWriter<File>,
-    temporary: TempPath,
+    /// The name that the file has meanwhile, where it must have one.
+    temporary: Option<TempPath>,
+    directory: PathBuf,
     target: PathBuf,
+    name: String,
 }
 
 impl AtomicFile {
-    /// Opens a temporary file beside `target`; a symbolic link is followed.
+    /// Opens a file beside `target`; a symbolic link is followed.
     ///
     /// # Errors
     ///
-    /// [`Error::Disk`] when the directory is missing or cannot be written.
+    /// [`Error::Disk`] when the directory is missing or cannot be written, [`Error::Usage`] when the target is read.
     pub fn create(target: &Path) -> Result<Self> {
+        Self::begin(target, nameless::create)
+    }
+
+    /// The same, with a way to make files that have no name.
+    fn begin(target: &Path, nameless: impl FnOnce(&Path, u32) -> Option<File>) -> Result<Self> {
         let name = target.display().to_string();
+        let existing = std::fs::metadata(target).ok();
+        existing.as_ref().map_or(Ok(()), |about| register::check_output(about, &name))?;
         let resolved = std::fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
         if resolved.is_dir() {
             return Err(Error::format(&name, "it is a directory; name a file in it"));
@@ -57,17 +87,19 @@ impl AtomicFile {
                 format!("there is no directory `{}`; make it first", directory.display()),
             ));
         }
-        let permissions = std::fs::metadata(&resolved).map_or(Permissions::from_mode(0o666), |m| m.permissions());
-        let temporary: NamedTempFile = tempfile::Builder::new()
-            .prefix(".cyanometer-")
-            .permissions(permissions)
-            .tempfile_in(&directory)
-            .map_err(|e| Error::disk(&name, "write", plain(&e)))?;
-        let (file, temporary) = temporary.into_parts();
-        if let Ok(mut pending) = PENDING.lock() {
-            pending.push(temporary.to_path_buf());
-        }
-        Ok(Self { output: BufWriter::with_capacity(1 << 16, file), temporary, target: resolved })
+        let permissions = existing.map_or(Permissions::from_mode(0o666), |about| about.permissions());
+        let (file, temporary) = match nameless(&directory, permissions.mode()) {
+            Some(file) => (file, None),
+            None => create_temporary(&directory, permissions)
+                .map(|(file, path)| (file, Some(path)))
+                .map_err(|e| Error::disk(&name, "write", plain(&e)))?,
+        };
+        Ok(Self { output: BufWriter::with_capacity(1 << 16, file), temporary, directory, target: resolved, name })
+    }
+
+    /// The file as messages call it.
+    pub fn name(&self) -> &str {
+        &self.name
     }
 
     /// Gives the file its name.
@@ -75,15 +107,95 @@ impl AtomicFile {
     /// # Errors
     ///
     /// [`Error::Disk`]; nothing is left behind then.
-    pub fn commit(mut self) -> Result<()> {
-        let name = self.target.display().to_string();
-        self.output.flush().map_err(|e| Error::disk(&name, "write", e))?;
-        let temporary = self.temporary.to_path_buf();
-        self.temporary.persist(&self.target).map_err(|e| Error::disk(&name, "write", e.error))?;
-        if let Ok(mut pending) = PENDING.lock() {
-            pending.retain(|path| *path != temporary);
+    pub fn commit(self) -> Result<()> {
+        Self::commit_all([self])
+    }
+
+    /// Gives files their names, one right after the other; a signal comes before the first or after the last.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Disk`]; files that have no name yet are not left behind.
+    pub fn commit_all(files: impl IntoIterator<Item = Self>) -> Result<()> {
+        let mut files: Vec<Self> = files.into_iter().collect();
+        for file in &mut files {
+            file.output.flush().map_err(|e| Error::disk(&file.name, "write", e))?;
+        }
+        let mut pending = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+        for file in files {
+            let Self { output, temporary, directory, target, name } = file;
+            let named = match temporary {
+                Some(temporary) => {
+                    pending.retain(|path| *path != *temporary);
+                    temporary.persist(&target).map_err(|e| e.error)
+                }
+                None => nameless::give_name(output.get_ref(), &directory, &target),
+            };
+            named.map_err(|e| Error::disk(&name, "write", plain(&e)))?;
         }
         Ok(())
+    }
+}
+
+/// A file with a temporary name in a directory.
+fn create_temporary(directory: &Path, permissions: Permissions) -> io::Result<(File, TempPath)> {
+    let mut pending = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+    let made = tempfile::Builder::new().prefix(PREFIX).permissions(permissions).tempfile_in(directory)?;
+    pending.push(made.path().to_path_buf());
+    Ok(made.into_parts())
+}
+
+/// Files that have no name while they are written.
+#[cfg(target_os = "linux")]
+mod nameless {
+    use super::PREFIX;
+    use rustix::fs::{AtFlags, CWD, Mode, OFlags, linkat, open};
+    use std::fs::File;
+    use std::io;
+    use std::os::fd::AsRawFd;
+    use std::path::{Path, PathBuf};
+
+    /// A file without a name in a directory; none where the file system has no such files, or where no name could be given
+    /// to it.
+    pub fn create(directory: &Path, mode: u32) -> Option<File> {
+        let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
+        let file = File::from(open(directory, flags, Mode::from_raw_mode(mode)).ok()?);
+        place_of(&file).symlink_metadata().ok()?;
+        Some(file)
+    }
+
+    /// Where the system shows an open file.
+    fn place_of(file: &File) -> PathBuf {
+        PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
+    }
+
+    /// Gives a file its name. What has that name already is replaced by way of a temporary one.
+    pub fn give_name(file: &File, directory: &Path, target: &Path) -> io::Result<()> {
+        let link =
+            |path: &Path| linkat(CWD, place_of(file), CWD, path, AtFlags::SYMLINK_FOLLOW).map_err(io::Error::from);
+        match link(target) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                let temporary = tempfile::Builder::new().prefix(PREFIX).make_in(directory, link)?.into_temp_path();
+                temporary.persist(target).map_err(|error| error.error)
+            }
+            done => done,
+        }
+    }
+}
+
+/// Files that have no name while they are written: there are none on this system.
+#[cfg(not(target_os = "linux"))]
+mod nameless {
+    use std::fs::File;
+    use std::io;
+    use std::path::Path;
+
+    pub fn create(_: &Path, _: u32) -> Option<File> {
+        None
+    }
+
+    pub fn give_name(_: &File, _: &Path, _: &Path) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
     }
 }
 
@@ -100,6 +212,14 @@ impl Write for AtomicFile {
 /// The system's error without the temporary file's name, which means nothing to the user.
 fn plain(error: &io::Error) -> io::Error {
     error.raw_os_error().map_or_else(|| io::Error::from(error.kind()), io::Error::from_raw_os_error)
+}
+
+fn binary_to_terminal(path: Option<&Path>) -> Error {
+    let problem = "a frame or a picture is binary and does not go to a terminal; pipe it on, or name a file with -o";
+    Error::Usage(match named(path) {
+        Some(path) => format!("{}: {problem}", path.display()),
+        None => problem.into(),
+    })
 }
 
 /// Where the bytes of a frame go.
@@ -121,42 +241,44 @@ enum Kind {
 }
 
 impl Target {
-    /// Opens `path`, or the standard output where there is none. A stream is spooled when the writer needs to seek.
+    /// Opens `path`, or the standard output for `-` or none. A stream is spooled when the writer needs to seek.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] when the output is a terminal or one of the files `inputs`; [`Error::Disk`].
-    pub fn open(path: Option<&Path>, needs_seek: bool, inputs: &[(FileId, String)]) -> Result<Self> {
+    /// [`Error::Usage`] when the output is a terminal or a file that is read; [`Error::Disk`].
+    pub fn open(path: Option<&Path>, needs_seek: bool) -> Result<Self> {
+        let target = Self::open_any(path, needs_seek)?;
+        match &target.kind {
+            Kind::Stream(output) if output.get_ref().is_terminal() => Err(binary_to_terminal(path)),
+            Kind::Spooled { output, .. } if output.is_terminal() => Err(binary_to_terminal(path)),
+            _ => Ok(target),
+        }
+    }
+
+    /// Opens the output for a text, which may go to a terminal.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`], terminals apart.
+    pub fn open_text(path: &Path) -> Result<Self> {
+        Self::open_any(Some(path), false)
+    }
+
+    fn open_any(path: Option<&Path>, needs_seek: bool) -> Result<Self> {
+        let path = named(path);
         let name = path.map_or_else(|| STDOUT_NAME.to_owned(), |path| path.display().to_string());
-        let check = |metadata: &std::fs::Metadata| match inputs.iter().find(|(id, _)| *id == file_id(metadata)) {
-            Some((_, input)) => Err(same_file(&name, input)),
-            None => Ok(()),
-        };
         let output = match path {
-            None => {
-                let stdout = io::stdout();
-                if stdout.is_terminal() {
-                    return Err(Error::Usage(
-                        "a frame is binary and does not go to a terminal; pipe it on, or name a file with -o".into(),
-                    ));
-                }
-                File::from(stdout.as_fd().try_clone_to_owned().map_err(|e| Error::disk(&name, "open", e))?)
-            }
+            None => open_stdout()?,
             Some(path) => {
                 // What cannot be looked at cannot be written either, which is told when that is tried.
                 let existing = std::fs::metadata(path).ok();
-                existing.as_ref().map_or(Ok(()), check)?;
-                if existing.is_none_or(|metadata| metadata.is_file() || metadata.is_dir()) {
+                if existing.is_none_or(|about| about.is_file() || about.is_dir()) {
                     let file = AtomicFile::create(path)?;
                     return Ok(Self { name, path: Some(path.to_owned()), kind: Kind::Named(file) });
                 }
                 OpenOptions::new().write(true).open(path).map_err(|e| Error::disk(&name, "open", e))?
             }
         };
-        let about = output.metadata().map_err(|e| Error::disk(&name, "open", e))?;
-        if about.is_file() {
-            check(&about)?;
-        }
         let kind = if needs_seek {
             let spool = tempfile::tempfile().map_err(|e| Error::disk(&name, "write", e))?;
             Kind::Spooled { spool: BufWriter::with_capacity(1 << 16, spool), output }
@@ -183,9 +305,18 @@ impl Target {
     ///
     /// [`Error::Disk`].
     pub fn commit(self) -> Result<()> {
+        self.commit_with(None)
+    }
+
+    /// The same; a file and its sidecar get their names together.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Disk`].
+    pub fn commit_with(self, sidecar: Option<AtomicFile>) -> Result<()> {
         let failed = |e| Error::disk(&self.name, "write", e);
         match self.kind {
-            Kind::Named(file) => file.commit(),
+            Kind::Named(file) => AtomicFile::commit_all(std::iter::once(file).chain(sidecar)),
             Kind::Stream(mut output) => output.flush().map_err(failed),
             Kind::Spooled { spool, mut output } => {
                 let copy = || -> io::Result<()> {
@@ -227,6 +358,51 @@ impl Seek for Target {
             Kind::Named(file) => file.output.seek(to),
             Kind::Spooled { spool, .. } => spool.seek(to),
             Kind::Stream(_) => Err(io::Error::from(io::ErrorKind::NotSeekable)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// File systems without files that have no name are not at hand everywhere.
+    #[test]
+    fn a_temporary_name_serves_where_files_need_one() {
+        let directory = tempfile::tempdir().unwrap();
+        let target = directory.path().join("out.exr");
+        let names = || {
+            let entries = std::fs::read_dir(directory.path()).unwrap();
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect::<Vec<_>>()
+        };
+        for round in 0..2 {
+            let mut file = AtomicFile::begin(&target, |_, _| None).unwrap();
+            file.write_all(&[round]).unwrap();
+            assert!(names().iter().any(|name| name.starts_with(PREFIX)), "{:?}", names());
+            assert!(PENDING.lock().unwrap().iter().any(|path| path.parent() == Some(directory.path())));
+            file.commit().unwrap();
+            assert_eq!((names(), std::fs::read(&target).unwrap()), (vec!["out.exr".to_owned()], vec![round]));
+            assert!(!PENDING.lock().unwrap().iter().any(|path| path.parent() == Some(directory.path())));
+        }
+        drop(AtomicFile::begin(&target, |_, _| None).unwrap());
+        assert_eq!((names(), std::fs::read(&target).unwrap()), (vec!["out.exr".to_owned()], vec![1]));
+    }
+
+    #[test]
+    fn a_file_has_no_name_before_it_is_whole() {
+        let directory = tempfile::tempdir().unwrap();
+        let entries = || std::fs::read_dir(directory.path()).unwrap().count();
+        if nameless::create(directory.path(), 0o666).is_none() {
+            // This file system has no such files.
+            return;
+        }
+        let target = directory.path().join("out.exr");
+        for before in [0, 1] {
+            let mut file = AtomicFile::create(&target).unwrap();
+            file.write_all(&[before]).unwrap();
+            assert_eq!(entries(), usize::from(before));
+            file.commit().unwrap();
+            assert_eq!((entries(), std::fs::read(&target).unwrap()), (1, vec![before]));
         }
     }
 }

@@ -142,17 +142,6 @@ pub fn load_matrix(path: &Path) -> Result<CameraMatrix> {
     Ok(matrix)
 }
 
-/// The files that a sensor of this name or path is read from, where they are the user's own.
-pub fn sensor_files(name: &str, sensor: &Sensor) -> Vec<PathBuf> {
-    let path = Path::new(name);
-    if !path.is_file() {
-        return Vec::new();
-    }
-    let curves = sensor.response.iter().flat_map(|files| [Some(&files.quantum_efficiency), files.cover_glass.as_ref()]);
-    let beside = |file: &str| path.parent().unwrap_or(Path::new("")).join(file);
-    std::iter::once(path.to_owned()).chain(curves.flatten().map(|curve| beside(&curve.file))).collect()
-}
-
 /// The CIE 1931 2° observer, built in.
 ///
 /// # Errors

@@ -1,9 +1,9 @@
 //! Opens frames of any format, from files and pipes, with the metadata that belongs to them.
 
 use super::digest::SamplesDigest;
-use super::files::{FileId, STDIN_NAME, file_id, named, open_named, read_file, sidecar_path, spool};
+use super::files::{STDIN_NAME, named, open_named, read_file, sidecar_path, spool};
 use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, U16_FULL_SCALE};
-use super::{pipe, table, tiff, yaml};
+use super::{pipe, register, table, tiff, yaml};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
@@ -44,7 +44,7 @@ pub struct InputOptions {
 ///
 /// let directory = tempfile::tempdir().unwrap();
 /// let path = directory.path().join("codes.exr");
-/// let mut writer = FrameWriter::create(&OutputOptions { path: Some(path.clone()), ..Default::default() }, &header, &[])?;
+/// let mut writer = FrameWriter::create(&OutputOptions { path: Some(path.clone()), ..Default::default() }, &header)?;
 /// writer.write(&[1.0, 2.0, 3.0, 4.0])?;
 /// writer.finish(Counts::default())?;
 ///
@@ -59,9 +59,9 @@ pub struct InputOptions {
 pub struct FrameReader {
     reader: Box<dyn SampleReader>,
     header: FrameHeader,
-    id: Option<FileId>,
     rows_read: usize,
     check: Option<DigestCheck>,
+    mismatch: Option<String>,
     buffer: Vec<f32>,
     /// What stored samples are divided by: sRGB in 16 bits runs to 65535.
     divisor: Option<f32>,
@@ -87,6 +87,7 @@ impl FrameReader {
     /// opened or is no frame.
     pub fn open(options: &InputOptions) -> Result<Self> {
         let path = named(options.path.as_deref());
+        register::check_inputs(options.metadata.as_deref().map(Some).into_iter().chain([path]))?;
         let (input, name) = open_named(path)?;
         Self::open_file(input, &name, path, options)
     }
@@ -121,13 +122,12 @@ impl FrameReader {
         let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
         let header = FrameHeader { name: name.into(), geometry, metadata };
-        let id = about.is_file().then(|| file_id(&about));
         Ok(Self {
             reader,
             header,
-            id,
             rows_read: 0,
             check,
+            mismatch: None,
             buffer: Vec::new(),
             divisor,
             notes,
@@ -144,11 +144,6 @@ impl FrameReader {
     /// How the file stores its samples, in a word: `u16`, `f32` …; `mixed` where channels differ.
     pub fn stored_as(&self) -> &'static str {
         self.reader.stored_as().map_or("mixed", SampleType::name)
-    }
-
-    /// The file that is read, so that it is not written over; none for pipes.
-    pub fn file(&self) -> Option<(FileId, String)> {
-        self.id.map(|id| (id, self.header.name.clone()))
     }
 
     /// Whether the frame has a layer that marks pixels beside the channels that stages see.
@@ -169,18 +164,24 @@ impl FrameReader {
         &self.notes
     }
 
-    /// Compares the digest once the last row is in; gives the warning, if any.
-    pub fn check_digest(&mut self) -> Option<String> {
+    /// The warning that the sidecar describes other samples; none before the last row is in.
+    pub fn mismatch(&self) -> Option<&str> {
+        self.mismatch.as_deref()
+    }
+
+    /// Compares the digest once the last row is in.
+    fn check_digest(&mut self) {
         if self.rows_read < self.header.geometry.height {
-            return None;
+            return;
         }
-        let DigestCheck { expected, sidecar, digest } = self.check.take()?;
-        (digest.finish() != expected).then(|| {
-            format!(
-                "{}: its samples are not those that {sidecar} describes; one of the two was changed",
-                self.header.name
-            )
-        })
+        let Some(DigestCheck { expected, sidecar, digest }) = self.check.take() else { return };
+        if digest.finish() != expected {
+            let name = &self.header.name;
+            let text =
+                format!("{name}: its samples are not those that {sidecar} describes; one of the two was changed");
+            register::doubt(text.clone());
+            self.mismatch = Some(text);
+        }
     }
 }
 
@@ -224,6 +225,7 @@ impl RowSource for FrameReader {
         }
         self.buffer = buffer;
         self.rows_read += rows;
+        self.check_digest();
         Ok(())
     }
 }
@@ -297,6 +299,7 @@ fn find_metadata(
     path: Option<&Path>,
     options: &InputOptions,
 ) -> Result<(Metadata, Option<String>)> {
+    path.map_or(Ok(()), register::note_sidecar)?;
     let from_file = |path: &Path| -> Result<Metadata> {
         let shown = path.display().to_string();
         let bytes = read_file(path)?;

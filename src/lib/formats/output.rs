@@ -3,8 +3,9 @@
 use super::atomic::{AtomicFile, Target};
 use super::digest::SamplesDigest;
 use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMARIES};
-use super::files::{FileId, STDOUT_NAME, named, regular_file, same_file, sidecar_path};
 use super::format::U16_FULL_SCALE;
+use super::places::{STDOUT_NAME, named, sidecar_path};
+use super::standard::open_stdout;
 use super::tiff::{TiffCompression, TiffSamples, TiffSettings, TiffTags, TiffWriter};
 use super::yaml;
 use crate::color;
@@ -13,9 +14,10 @@ use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
 use crate::names::Named;
 use crate::stream::{Counts, RowSink};
+use crate::text::visible;
 use crate::units::QuantityKind;
 use half::f16;
-use std::io::{self, Write};
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 /// A file format for frames.
@@ -232,7 +234,7 @@ fn tiff_compression(compression: CompressionKind) -> Result<TiffCompression> {
 /// let path = directory.path().join("codes.tiff");
 /// let options = OutputOptions { path: Some(path.clone()), ..OutputOptions::default() };
 ///
-/// let mut writer = FrameWriter::create(&options, &header, &[])?;
+/// let mut writer = FrameWriter::create(&options, &header)?;
 /// writer.write(&[1.0, 2.0, 3.0, 4.0])?;
 /// // The file has its name once it is complete, and its sidecar beside it.
 /// assert!(!path.exists());
@@ -244,8 +246,8 @@ pub struct FrameWriter {
     encoder: Encoder,
     header: FrameHeader,
     name: String,
-    /// The digest of what a reader will get, and the sidecar's path; only for named files.
-    record: Option<(SamplesDigest, PathBuf)>,
+    /// The digest of what a reader will get, and the sidecar; only for named files.
+    record: Option<(SamplesDigest, AtomicFile)>,
     encoding: Encoding,
     stored: Vec<f32>,
 }
@@ -256,18 +258,19 @@ enum Encoder {
 }
 
 impl FrameWriter {
-    /// Opens the output and writes the head of the frame. `inputs` are the files that are being read.
+    /// Opens the output and its sidecar, and writes the head of the frame.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] where options do not go together, the output is a terminal or an input; [`Error::Disk`].
-    pub fn create(options: &OutputOptions, header: &FrameHeader, inputs: &[(FileId, String)]) -> Result<Self> {
+    /// [`Error::Usage`] where options do not go together, the output is a terminal, or it or its sidecar is a file that is
+    /// read; [`Error::Disk`].
+    pub fn create(options: &OutputOptions, header: &FrameHeader) -> Result<Self> {
         let encoding = options.encoding(header)?;
-        let path = named(options.path.as_deref());
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
-        let target = Target::open(path, needs_seek, inputs)?;
+        let target = Target::open(options.path.as_deref(), needs_seek)?;
         let name = target.name().to_owned();
-        let record = target.named_file().map(|path| (SamplesDigest::new(), sidecar_path(path)));
+        let sidecar = target.named_file().map(|path| AtomicFile::create(&sidecar_path(path))).transpose()?;
+        let record = sidecar.map(|sidecar| (SamplesDigest::new(), sidecar));
         let description = Some(yaml::write_metadata(&header.metadata)?);
         let software = Some(format!("cyanometer {}", env!("CARGO_PKG_VERSION")));
         let geometry = &header.geometry;
@@ -310,21 +313,18 @@ impl FrameWriter {
         };
         target.flush().map_err(|e| Error::disk(&self.name, "write", e))?;
         let sidecar = match self.record {
-            Some((digest, path)) => {
+            Some((digest, mut sidecar)) => {
                 let mut metadata = self.header.metadata;
                 metadata.samples = Some(counts.record(digest.finish()));
-                let mut file = AtomicFile::create(&path)?;
                 let text = yaml::write_metadata(&metadata)?;
-                file.write_all(text.as_bytes())
-                    .and_then(|()| file.flush())
-                    .map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
-                Some(file)
+                let written = sidecar.write_all(text.as_bytes()).and_then(|()| sidecar.flush());
+                written.map_err(|e| Error::disk(sidecar.name(), "write", e))?;
+                Some(sidecar)
             }
             None => None,
         };
         // Both files are complete before either gets its name.
-        target.commit()?;
-        sidecar.map_or(Ok(()), AtomicFile::commit)?;
+        target.commit_with(sidecar)?;
         Ok(did_not_fit)
     }
 }
@@ -403,69 +403,37 @@ impl FrameWriter {
     }
 }
 
-/// Makes sure that an output, written once all is done, is none of the files `inputs`.
+/// Writes a text (a report, a matrix) to a named file or the standard output. A pipe that its reader has closed is no error:
+/// what remains to be done is done.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`].
-fn check_output(output: Option<&Path>, inputs: &[(FileId, String)]) -> Result<()> {
-    let Some((id, name)) = output.and_then(regular_file) else { return Ok(()) };
-    inputs.iter().find(|(input, _)| *input == id).map_or(Ok(()), |(_, input)| Err(same_file(&name, input)))
-}
-
-/// Whether two outputs are one file, or both the standard output.
-pub fn same_place(a: Option<&Path>, b: Option<&Path>) -> bool {
-    let place = |path: Option<&Path>| {
-        let path = named(path)?;
-        let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let beside = || Some(directory.canonicalize().ok()?.join(path.file_name()?));
-        Some(path.canonicalize().ok().or_else(beside).unwrap_or_else(|| path.to_owned()))
-    };
-    place(a) == place(b)
-}
-
-/// Makes sure, before any work, that outputs are neither files that are read, nor sidecars of these, nor one another.
-///
-/// # Errors
-///
-/// [`Error::Usage`].
-pub fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> {
-    let guarded: Vec<(FileId, String)> =
-        inputs.iter().flat_map(|path| [regular_file(path), regular_file(&sidecar_path(path))]).flatten().collect();
-    let named: Vec<&Path> = outputs.iter().filter_map(|path| named(*path)).collect();
-    for (index, output) in named.iter().enumerate() {
-        check_output(Some(output), &guarded)?;
-        if named[..index].iter().any(|other| same_place(Some(other), Some(output))) {
-            return Err(Error::Usage(format!("{}: two outputs cannot be one file", output.display())));
-        }
-    }
-    Ok(())
-}
-
-/// Writes a text (a report, a matrix) to a named file or the standard output. `input` is the file that was read, if it
-/// is one.
-///
-/// # Errors
-///
-/// [`Error::Usage`] where the output is the input; [`Error::Disk`].
-pub fn write_text(path: Option<&Path>, text: &str, input: Option<&(FileId, String)>) -> Result<()> {
-    match named(path) {
-        Some(path) => write_bytes(path, text.as_bytes(), input),
+/// [`Error::Usage`] where the output is a file that is read; [`Error::Disk`].
+pub fn write_text(path: Option<&Path>, text: &str) -> Result<()> {
+    let written = match named(path) {
+        Some(path) => write_all(Target::open_text(path)?, text.as_bytes()),
         None => {
-            let mut output = io::stdout().lock();
-            let written = output.write_all(text.as_bytes()).and_then(|()| output.flush());
-            written.map_err(|e| Error::disk(STDOUT_NAME, "write", e))
+            let mut output = open_stdout()?;
+            let text = if output.is_terminal() { visible(text) } else { text.into() };
+            output.write_all(text.as_bytes()).map_err(|e| Error::disk(STDOUT_NAME, "write", e))
         }
+    };
+    match written {
+        Err(Error::ClosedPipe) => Ok(()),
+        other => other,
     }
 }
 
-/// Writes what is complete in memory (a text, a plot) to a named file. `input` is the file that was read, if it is one.
+/// Writes what is complete in memory (a plot) to a named file or the standard output, which is no terminal.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] where the output is the input; [`Error::Disk`].
-pub fn write_bytes(path: &Path, bytes: &[u8], input: Option<&(FileId, String)>) -> Result<()> {
-    let mut file = Target::open(Some(path), false, input.map_or(&[], std::slice::from_ref))?;
-    file.write_all(bytes).map_err(|e| Error::disk(&path.display().to_string(), "write", e))?;
-    file.commit()
+/// [`Error::Usage`] where the output is a terminal or a file that is read; [`Error::Disk`].
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_all(Target::open(Some(path), false)?, bytes)
+}
+
+fn write_all(mut target: Target, bytes: &[u8]) -> Result<()> {
+    target.write_all(bytes).map_err(|e| Error::disk(target.name(), "write", e))?;
+    target.commit()
 }

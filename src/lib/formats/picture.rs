@@ -1,7 +1,6 @@
 //! Pictures for people: 8-bit PNG of any frame.
 
 use super::atomic::Target;
-use super::files::FileId;
 use super::foreign::png_complaint;
 use crate::analysis::statistics::Region;
 use crate::color::{linear_srgb_from_xyz, srgb_encode};
@@ -48,14 +47,9 @@ pub struct PictureSettings {
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for a region outside the frame, a picture too large or the file `input` as the output;
+/// [`Error::Usage`] for a region outside the frame, a picture too large, or an output that is a terminal or a file that is read;
 /// [`Error::Format`] for quantities that are no picture; those of the reader; [`Error::Disk`].
-pub fn write_png(
-    source: &mut dyn RowSource,
-    settings: &PictureSettings,
-    path: &Path,
-    input: Option<&(FileId, String)>,
-) -> Result<()> {
+pub fn write_png(source: &mut dyn RowSource, settings: &PictureSettings, path: &Path) -> Result<()> {
     let frame = source.header().clone();
     let region = settings.region.unwrap_or(Region::whole(&frame));
     region.check(&frame)?;
@@ -76,7 +70,7 @@ pub fn write_png(
     let (kept, moments) = read_region(source, region, planes)?;
     let shade = Shade::new(&frame, settings.range, &moments)?;
     let bytes = shown(&kept, planes, region.width, settings.zoom, &shade);
-    encode(&bytes, size, planes, path, input)
+    encode(&bytes, size, planes, path)
 }
 
 /// Samples of a region, laid out as a frame's, and their moments plane by plane.
@@ -98,9 +92,9 @@ fn read_region(source: &mut dyn RowSource, region: Region, planes: usize) -> Res
 }
 
 /// Writes the bytes of a picture as a PNG.
-fn encode(bytes: &[u8], size: [usize; 2], planes: usize, path: &Path, input: Option<&(FileId, String)>) -> Result<()> {
-    let name = path.display().to_string();
-    let mut file = Target::open(Some(path), false, input.map_or(&[], std::slice::from_ref))?;
+fn encode(bytes: &[u8], size: [usize; 2], planes: usize, path: &Path) -> Result<()> {
+    let mut file = Target::open(Some(path), false)?;
+    let name = file.name().to_owned();
     let color = if planes == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
     let [width, height] = size.map(|length| u32::try_from(length).unwrap_or(u32::MAX));
     PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Adaptive)

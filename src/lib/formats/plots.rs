@@ -1,6 +1,5 @@
 //! Plots as files.
 
-use super::files::FileId;
 use super::output::write_bytes;
 use crate::error::{Error, Result};
 use crate::plot::Plot;
@@ -33,23 +32,22 @@ impl PlotFormat {
     }
 }
 
-/// Writes a plot to a file, as its extension says. `input` is the file that was read, if it is one.
+/// Writes a plot to a file, as its extension says.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for an extension other than `.svg` and `.png`, or where the output is the input; [`Error::Disk`].
-pub fn write_plot(path: &Path, plot: &Plot, input: Option<&(FileId, String)>) -> Result<()> {
+/// [`Error::Usage`] for an extension other than `.svg` and `.png`, or where the output is a file that is read; [`Error::Disk`].
+pub fn write_plot(path: &Path, plot: &Plot) -> Result<()> {
     let bytes = match PlotFormat::of_path(path)? {
         PlotFormat::Svg => plot.svg().into_bytes(),
         PlotFormat::Png => plot.png()?,
     };
-    write_bytes(path, &bytes, input)
+    write_bytes(path, &bytes)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::files::regular_file;
     use crate::plot::{Axis, Panel};
 
     #[test]
@@ -57,27 +55,15 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let plot = Plot::new("title", Panel::new(Axis::linear("x"), Axis::log10("y")));
         let path = |name: &str| directory.path().join(name);
-        write_plot(&path("a.svg"), &plot, None).unwrap();
-        write_plot(&path("a.PNG"), &plot, None).unwrap();
+        write_plot(&path("a.svg"), &plot).unwrap();
+        write_plot(&path("a.PNG"), &plot).unwrap();
         assert_eq!(std::fs::read_to_string(path("a.svg")).unwrap(), plot.svg());
         assert_eq!(std::fs::read(path("a.PNG")).unwrap(), plot.png().unwrap());
         for name in ["a.pdf", "a", "svg"] {
-            let error = write_plot(&path(name), &plot, None).unwrap_err();
+            let error = write_plot(&path(name), &plot).unwrap_err();
             assert!(matches!(&error, Error::Usage(text) if text.contains(".svg or .png")), "{error}");
         }
         // Nothing but the two files is left.
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 2);
-    }
-
-    #[test]
-    fn a_plot_does_not_replace_what_was_read() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("input.svg");
-        std::fs::write(&path, "spectrum").unwrap();
-        let plot = Plot::new("title", Panel::new(Axis::linear("x"), Axis::linear("y")));
-        let input = regular_file(&path);
-        let error = write_plot(&path, &plot, input.as_ref()).unwrap_err();
-        assert!(matches!(&error, Error::Usage(text) if text.contains("input.svg")), "{error}");
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), "spectrum");
     }
 }

@@ -1,6 +1,7 @@
 //! YAML, read with limits: metadata, sensors and matrices all come through here.
 
 use super::foreign::yaml_complaint;
+use super::{yaml_guard, yaml_writer};
 use crate::camera::readout::ReadOut;
 use crate::camera::sensor::{FLAT_SENSOR_SCHEMA, FlatSensor, ResponseFiles, SENSOR_SCHEMA, Sensor};
 use crate::error::{Error, Result};
@@ -8,15 +9,6 @@ use crate::metadata::{METADATA_SCHEMA, Metadata};
 use serde::Serialize;
 use serde::de::{DeserializeOwned, Deserializer, Visitor, value};
 use serde_yaml::{Mapping, Value};
-
-/// A document may be this long.
-const MAX_BYTES: usize = 1 << 20;
-/// Brackets may nest this deep.
-const MAX_BRACKETS: usize = 32;
-/// A line may be indented by this many columns.
-const MAX_INDENT: usize = 128;
-/// A document may have this many anchors, aliases and tags each: a handful cannot blow up.
-const MAX_REFERENCES: usize = 8;
 
 /// Reads a document as what it is, before it is read as what it should be.
 ///
@@ -183,7 +175,7 @@ pub fn parse_metadata(name: &str, text: &str) -> Result<Metadata> {
 ///
 /// # Errors
 ///
-/// [`Error::Data`] when it cannot be written as YAML.
+/// [`Error::Data`] when it cannot be written as YAML that is read again.
 pub fn write_metadata(metadata: &Metadata) -> Result<String> {
     let wrong = |error: serde_yaml::Error| Error::Data(format!("the metadata cannot be written: {error}"));
     let mut value = serde_yaml::to_value(metadata).map_err(wrong)?;
@@ -196,48 +188,12 @@ pub fn write_metadata(metadata: &Metadata) -> Result<String> {
             "the metadata cannot be written: `{key}` is not a finite number; choose less extreme settings"
         )));
     }
-    serde_yaml::to_string(&value).map_err(wrong)
+    yaml_writer::write("the metadata", &value)
 }
 
-/// Checks length, encoding and nesting before any parser sees the text.
+/// The text of a document that a parser may see.
 fn checked_text<'a>(name: &str, bytes: &'a [u8]) -> Result<&'a str> {
-    let refuse = |problem: &str| Err(Error::format(name, problem));
-    if bytes.len() > MAX_BYTES {
-        return refuse("it is longer than 1 MiB; no metadata, sensor or matrix is");
-    }
-    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
-        return refuse("it is UTF-16 text; save it as UTF-8");
-    }
-    let Ok(text) = std::str::from_utf8(bytes) else { return refuse("it is not UTF-8 text") };
-    let text = text.strip_prefix('\u{FEFF}').unwrap_or(text);
-    let mut depth = 0_usize;
-    for bracket in text.bytes() {
-        match bracket {
-            b'[' | b'{' => depth += 1,
-            b']' | b'}' => depth = depth.saturating_sub(1),
-            _ => {}
-        }
-        if depth > MAX_BRACKETS {
-            return refuse("its brackets nest too deep");
-        }
-    }
-    let indent = |line: &str| line.len() - line.trim_start_matches([' ', '-', '?', ':', '\t']).len();
-    if text.lines().any(|line| indent(line) > MAX_INDENT) {
-        return refuse("its lines nest too deep");
-    }
-    for mark in ['&', '*', '!'] {
-        let mut before = '\n';
-        let mut count = 0;
-        for character in text.chars() {
-            let starts = before.is_whitespace() || "[{,:-?".contains(before);
-            count += usize::from(character == mark && starts);
-            before = character;
-        }
-        if count > MAX_REFERENCES {
-            return refuse("it has too many anchors, aliases or tags; write the values out");
-        }
-    }
-    Ok(text)
+    yaml_guard::checked_text(bytes).map_err(|problem| Error::format(name, problem))
 }
 
 /// The key of a number that is NaN or infinite.

@@ -7,13 +7,14 @@ use crate::analysis::characterization::noise_aware::TradeOff;
 use crate::color::difference::{Difference, DifferenceReport};
 use crate::error::{Error, Result};
 use crate::formats::plots::{PlotFormat, write_plot};
-use crate::formats::{files, output};
+use crate::formats::{files, output, register, yaml_writer};
 use crate::requests::fit::{Characterization, Conditions, Evaluation, Fit, Group, NoiseReport};
 use crate::requests::values;
+use crate::text::visible;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Where a matrix and its report go, in which form, and the plot.
 #[derive(Debug, Clone, Default, Args)]
@@ -34,7 +35,7 @@ impl MatrixOutputs {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`]; those of [`Fit::inputs`], [`PlotFormat::of_path`] and [`output::check_outputs`].
+    /// [`Error::Usage`]; those of [`PlotFormat::of_path`] and [`register::announce`].
     pub fn check(&self, fit: &Fit) -> Result<()> {
         if let Some(plot) = &self.plot {
             PlotFormat::of_path(plot)?;
@@ -49,9 +50,7 @@ impl MatrixOutputs {
                     .into(),
             ));
         }
-        let inputs = fit.inputs()?;
-        let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
-        output::check_outputs(&[self.output.as_deref(), self.plot.as_deref()], &inputs)
+        register::announce(&[self.output.as_deref(), self.plot.as_deref()])
     }
 
     /// Writes matrix file, plot and report.
@@ -62,15 +61,15 @@ impl MatrixOutputs {
     pub fn write(&self, found: &Characterization) -> Result<()> {
         let to_file = files::named(self.output.as_deref());
         if let Some(path) = to_file {
-            output::write_text(Some(path), &matrix(&found.matrix)?, None)?;
+            output::write_text(Some(path), &matrix(&found.matrix)?)?;
         }
         if let Some(plot) = &self.plot {
-            write_plot(plot, &trade_off(&found.trade_off), None)?;
+            write_plot(plot, &trade_off(&found.trade_off))?;
         }
         let has_report = found.evaluation.is_some() || !found.trade_off.is_empty();
         let format = self.output_format.unwrap_or(if has_report { ReportFormat::Text } else { ReportFormat::Yaml });
         if to_file.is_none() || has_report || format != ReportFormat::Yaml {
-            output::write_text(None, &characterization(found, format)?, None)?;
+            output::write_text(None, &characterization(found, format)?)?;
         }
         Ok(())
     }
@@ -84,7 +83,7 @@ impl MatrixOutputs {
 pub fn characterization(found: &Characterization, format: ReportFormat) -> Result<String> {
     match format {
         ReportFormat::Yaml if found.evaluation.is_none() && found.trade_off.is_empty() => matrix(&found.matrix),
-        ReportFormat::Yaml => serde_yaml::to_string(&Whole::of(found)).map_err(unwritable),
+        ReportFormat::Yaml => yaml_writer::document("the report", &Whole::of(found)),
         ReportFormat::Json => {
             serde_json::to_string_pretty(&Whole::of(found)).map(|text| text + "\n").map_err(unwritable)
         }
@@ -92,7 +91,7 @@ pub fn characterization(found: &Characterization, format: ReportFormat) -> Resul
             Some(evaluation) => samples_csv(evaluation),
             None => trade_off_csv(&found.trade_off),
         },
-        ReportFormat::Text => Ok(text(found)),
+        ReportFormat::Text => Ok(visible(&text(found)).into_owned()),
     }
 }
 
@@ -102,7 +101,7 @@ pub fn characterization(found: &Characterization, format: ReportFormat) -> Resul
 ///
 /// [`crate::error::Error::Data`] when the form cannot hold it.
 pub fn matrix(matrix: &CameraMatrix) -> Result<String> {
-    serde_yaml::to_string(matrix).map_err(unwritable)
+    yaml_writer::write("the matrix", matrix)
 }
 
 /// The report as a document.

@@ -4,6 +4,8 @@ use super::{ReportFormat, in_digits, table, unwritable};
 use crate::analysis::comparison::ComparisonReport;
 use crate::color::difference::DifferenceSummary;
 use crate::error::Result;
+use crate::formats::yaml_writer;
+use crate::text::visible;
 use std::fmt::Write;
 
 /// The numbers of a formula by their keys, with the headings of the table.
@@ -28,9 +30,9 @@ fn values(formula: &DifferenceSummary) -> [(&'static str, &'static str, f64); 8]
 pub fn difference(report: &ComparisonReport, format: ReportFormat) -> Result<String> {
     match format {
         ReportFormat::Json => serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable),
-        ReportFormat::Yaml => serde_yaml::to_string(report).map_err(unwritable),
+        ReportFormat::Yaml => yaml_writer::document("the report", report),
         ReportFormat::Csv => csv(report),
-        ReportFormat::Text => Ok(text(report)),
+        ReportFormat::Text => Ok(visible(&text(report)).into_owned()),
     }
 }
 

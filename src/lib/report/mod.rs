@@ -15,7 +15,9 @@ pub use trade_off::trade_off;
 use crate::analysis::statistics::check::{Subject, Test};
 use crate::analysis::statistics::{ChannelReport, RegionReport, Report};
 use crate::error::{Error, Result};
+use crate::formats::yaml_writer;
 use crate::names::Named;
+use crate::text::visible;
 use std::fmt::Write;
 
 /// The form of a report.
@@ -56,9 +58,9 @@ fn unwritable(error: impl std::fmt::Display) -> Error {
 pub fn render(report: &Report, format: ReportFormat) -> Result<String> {
     match format {
         ReportFormat::Json => serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable),
-        ReportFormat::Yaml => serde_yaml::to_string(report).map_err(unwritable),
+        ReportFormat::Yaml => yaml_writer::document("the report", report),
         ReportFormat::Csv => csv(report),
-        ReportFormat::Text => Ok(text(report)),
+        ReportFormat::Text => Ok(visible(&text(report)).into_owned()),
     }
 }
 

@@ -5,15 +5,16 @@ use super::{ReportFormat, shown, table, unwritable};
 use crate::camera::optics::Exposure;
 use crate::chain::{ChainPrediction, StagePrediction};
 use crate::error::Result;
-use crate::formats::output;
 use crate::formats::plots::{PlotFormat, write_plot};
+use crate::formats::{output, register, yaml_writer};
 use crate::names::Named;
 use crate::requests::prediction::{Budgets, Conditions, PredictedNoise, SamplePrediction};
 use crate::requests::values;
+use crate::text::visible;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Where a report of noise budgets goes, in which form, and its plot.
 #[derive(Debug, Clone, Default, Args)]
@@ -30,17 +31,16 @@ pub struct BudgetOutputs {
 }
 
 impl BudgetOutputs {
-    /// Refuses, before any work, what cannot be written; `inputs` are the files that are read.
+    /// Refuses, before any work, what cannot be written.
     ///
     /// # Errors
     ///
-    /// Those of [`PlotFormat::of_path`] and [`output::check_outputs`].
-    pub fn check(&self, inputs: &[PathBuf]) -> Result<()> {
+    /// Those of [`PlotFormat::of_path`] and [`register::announce`].
+    pub fn check(&self) -> Result<()> {
         if let Some(plot) = &self.plot {
             PlotFormat::of_path(plot)?;
         }
-        let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
-        output::check_outputs(&[self.output.as_deref(), self.plot.as_deref()], &inputs)
+        register::announce(&[self.output.as_deref(), self.plot.as_deref()])
     }
 
     /// Writes report and plot.
@@ -51,9 +51,9 @@ impl BudgetOutputs {
     pub fn write(&self, found: &mut PredictedNoise) -> Result<()> {
         let text = prediction(found, self.output_format)?;
         if let Some(plot) = &self.plot {
-            write_plot(plot, &photon_transfer(&found.transfer_curve()?), None)?;
+            write_plot(plot, &photon_transfer(&found.transfer_curve()?))?;
         }
-        output::write_text(self.output.as_deref(), &text, None)
+        output::write_text(self.output.as_deref(), &text)
     }
 }
 
@@ -92,9 +92,10 @@ pub fn prediction(found: &PredictedNoise, format: Option<ReportFormat>) -> Resul
     let whole = Whole { conditions, budgets: document };
     match (format, budgets) {
         (ReportFormat::Json, _) => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
-        (ReportFormat::Yaml, _) => serde_yaml::to_string(&whole).map_err(unwritable),
+        (ReportFormat::Yaml, _) => yaml_writer::document("the report", &whole),
         (ReportFormat::Text, Budgets::Scene(scene)) => {
-            Ok(text(scene, conditions.quadrature_error) + "\n" + &conditions.uncertainty.in_words() + "\n")
+            let text = text(scene, conditions.quadrature_error) + "\n" + &conditions.uncertainty.in_words() + "\n";
+            Ok(visible(&text).into_owned())
         }
         (ReportFormat::Csv, Budgets::Scene(scene)) => stages_csv(scene),
         (_, Budgets::Sweep(levels)) => scenes_csv(&[], levels.iter().map(|scene| (Vec::new(), scene))),

@@ -4,9 +4,10 @@ use super::notes::{self, Note};
 use super::values;
 use crate::analysis::comparison::{Comparison, ComparisonSettings, Side};
 use crate::color::{Space, White};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::pipe;
+use crate::formats::register::check_inputs;
 use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use std::ffi::OsString;
@@ -90,11 +91,6 @@ pub struct ColorPair {
 }
 
 impl ColorPair {
-    /// The files that are read, so that no output is written over one.
-    pub fn inputs(&self) -> Vec<&Path> {
-        [&self.a, &self.b].into_iter().filter_map(FrameOrColor::path).collect()
-    }
-
     /// Whether one of the two comes through a pipe.
     pub fn is_pipe(&self) -> bool {
         self.a.is_pipe() || self.b.is_pipe()
@@ -106,10 +102,7 @@ impl ColorPair {
     ///
     /// Those of readers, and of [`Comparison::new`].
     pub fn open(&self) -> Result<(Comparison<FrameReader>, Vec<Note>)> {
-        if self.a.is_standard_input() && self.b.is_standard_input() {
-            let problem = "only one of A and B can be the standard input; name a file for the other";
-            return Err(Error::Usage(problem.into()));
-        }
+        check_inputs([&self.a, &self.b].into_iter().filter_map(FrameOrColor::path).map(Some))?;
         let Self { space, white, white_luminance, .. } = *self;
         let settings = ComparisonSettings { space, white, white_luminance };
         let comparison = Comparison::new(self.a.open()?, self.b.open()?, &settings)?;

@@ -1,7 +1,7 @@
 //! Bands of rows of one or several frames, read in step: each when the work on the last is done, or meanwhile.
 
 use super::stage::RowSource;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::{Geometry, Window};
 use crate::units::Quantity;
 use std::ops::Range;
@@ -147,7 +147,7 @@ impl<'a> Bands<'a> {
                 // The receiver is at hand.
                 drop(give_back.send(Band::default()));
             }
-            let reader = scope.spawn(move || -> Result<()> {
+            let reader = thread::Builder::new().spawn_scoped(scope, move || -> Result<()> {
                 // Either channel is closed where no more is wanted.
                 while let Ok(spare) = spare.recv()
                     && let Some(band) = self.next(spare)?
@@ -155,6 +155,7 @@ impl<'a> Bands<'a> {
                 {}
                 Ok(())
             });
+            let reader = reader.map_err(|_| no_more_threads())?;
             let worked = read.iter().try_for_each(|band| {
                 work(&band)?;
                 drop(give_back.send(band));
@@ -184,6 +185,11 @@ impl Input<'_> {
         self.kept.extend_from_slice(&part.samples[(self.kept_from - part.first_row) * row_samples..]);
         Ok(())
     }
+}
+
+/// The complaint where the system refuses another thread.
+pub(super) fn no_more_threads() -> Error {
+    Error::Data("the system starts no more threads".into()).change(&["threads"])
 }
 
 /// What a thread ended with; a panic goes on here.

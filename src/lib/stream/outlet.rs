@@ -1,6 +1,6 @@
 //! Where the rows go that work makes: into a sink at once, or to a thread that writes them behind the work.
 
-use super::bands::{UNDER_WAY, ended};
+use super::bands::{UNDER_WAY, ended, no_more_threads};
 use super::stage::RowSink;
 use crate::error::{Error, Result};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
@@ -77,7 +77,8 @@ pub(super) fn with_outlet<T>(
             // The receiver is at hand.
             drop(give_back.send(Vec::new()));
         }
-        let writer = scope.spawn(move || write_behind(sink, &made, &give_back));
+        let writer = thread::Builder::new().spawn_scoped(scope, move || write_behind(sink, &made, &give_back));
+        let writer = writer.map_err(|_| no_more_threads())?;
         let worked = work(&mut Outlet(Way::Behind(hand_on, spare)));
         // What the writer met belongs to an earlier band than what the work met.
         ended(writer).and(worked)

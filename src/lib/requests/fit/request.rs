@@ -146,17 +146,6 @@ impl Fit {
         defaults(&["--".into(), library.into().into_os_string()])
     }
 
-    /// The files that are read, so that no output is written over one.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`data::load_sensor`].
-    pub fn inputs(&self) -> Result<Vec<PathBuf>> {
-        let own = data::sensor_files(&self.sensor, &data::load_sensor(&self.sensor)?.sensor);
-        let labels = self.labels.as_ref().map(|(file, _)| file);
-        Ok(std::iter::once(&self.library).chain(&self.evaluate).chain(labels).cloned().chain(own).collect())
-    }
-
     /// Refuses a white that cannot be.
     pub(super) fn check_white(&self) -> Result<()> {
         match self.white.white {

@@ -186,17 +186,6 @@ pub struct TransferCurve {
 }
 
 impl NoisePrediction {
-    /// The files that are read, so that no output is written over one.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`data::load_sensor`].
-    pub fn inputs(&self) -> Result<Vec<PathBuf>> {
-        let Subject { input, sensor } = &self.subject;
-        let own = data::sensor_files(sensor, &data::load_sensor(sensor)?.sensor);
-        Ok(input.iter().chain(&self.matrix).cloned().chain(own).collect())
-    }
-
     /// Predicts.
     ///
     /// # Errors

@@ -11,7 +11,6 @@ use super::notes::Note;
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
-use crate::formats::files::FileId;
 use crate::metadata::FrameHeader;
 use crate::stages::render::Rendering;
 use crate::stream::{MemoryFrame, RowSink};
@@ -22,7 +21,6 @@ use open::Prepared;
 pub struct OpenScene {
     rendering: Rendering,
     light: Light,
-    input: Option<(FileId, String)>,
     /// What came up.
     pub notes: Vec<Note>,
 }
@@ -53,7 +51,7 @@ impl Scene {
         let prepared = self.prepare()?;
         let rendering = self.rendering(&prepared)?;
         let Prepared { light, found, .. } = prepared;
-        Ok(OpenScene { rendering, light, input: found.input, notes: found.notes })
+        Ok(OpenScene { rendering, light, notes: found.notes })
     }
 
     /// Renders the frame into memory.
@@ -97,11 +95,6 @@ impl OpenScene {
     /// The same, to add to.
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.rendering.header
-    }
-
-    /// The file that is read, so that it is not written over; none for pipes.
-    pub fn inputs(&self) -> &[(FileId, String)] {
-        self.input.as_slice()
     }
 
     /// Draws the whole frame into a sink; `progress` hears the number of rows that are done.

@@ -10,7 +10,6 @@ use crate::cfa::Class;
 use crate::error::{Error, Result};
 use crate::formats::csv::SpectralTable;
 use crate::formats::data::{self, LoadedSensor};
-use crate::formats::files::{FileId, regular_file};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::frame::Geometry;
@@ -35,8 +34,6 @@ pub(super) struct Prepared {
 pub(super) struct Found {
     /// What is left out, and the error of the sum over wavelengths.
     pub(super) metadata: Metadata,
-    /// The file that is read, where it is one.
-    pub(super) input: Option<(FileId, String)>,
     pub(super) notes: Vec<Note>,
 }
 
@@ -82,11 +79,7 @@ impl Scene {
             // The signal is proportional to time: work it out for 1 s, then choose.
             exposure.exposure_s = 1.0;
         }
-        let mut found = Found {
-            metadata: Metadata::new(QuantityKind::ExpectedElectrons),
-            input: self.subject.input.as_deref().and_then(regular_file),
-            notes: Vec::new(),
-        };
+        let mut found = Found { metadata: Metadata::new(QuantityKind::ExpectedElectrons), notes: Vec::new() };
         let mut light = match self.level.given() {
             Some(electrons) => {
                 let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
@@ -167,7 +160,6 @@ impl Scene {
             return Err(Error::Usage("a spectral image has no columns; choose a pixel with --sample N".into()));
         }
         found.notes.extend(notes::of_reader(&reader));
-        found.input = reader.file();
         let header = reader.header().clone();
         let spectral = SpectralChannels::of(&header, self.spectrum.radiance_unit)?;
         let seen = sums.camera(&spectral.wavelength_nm, &header.name, &mut found.notes);

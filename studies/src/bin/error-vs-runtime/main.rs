@@ -144,7 +144,7 @@ fn run(directory: &Path, quick: bool, only: Option<&str>, scene: Option<PathBuf>
     for (index, section) in sections.iter().enumerate() {
         text.push_str(&section.write(index + 1, &plots)?);
     }
-    write_text(Some(&directory.join("error-vs-runtime.md")), &format!("{}\n", text.trim_end()), None)
+    write_text(Some(&directory.join("error-vs-runtime.md")), &format!("{}\n", text.trim_end()))
 }
 
 fn head(study: &Study) -> String {

@@ -27,7 +27,7 @@ impl Section {
         let mut text = format!("## {place}. {}\n\n{}\n\n", self.title, self.method);
         let _ = writeln!(text, "**Advice.** {}\n", self.advice);
         for (name, alt, plot) in &self.figures {
-            write_plot(&directory.join(format!("{name}.svg")), plot, None)?;
+            write_plot(&directory.join(format!("{name}.svg")), plot)?;
             let _ = writeln!(text, "![{alt}](error-vs-runtime/{name}.svg)\n");
         }
         for (head, table) in &self.tables {

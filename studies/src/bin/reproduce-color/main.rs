@@ -100,7 +100,7 @@ fn run(directory: &Path) -> Result<()> {
         methods,
         studio,
     };
-    write_text(Some(&directory.join("color.md")), &report::markdown(&results)?, None)
+    write_text(Some(&directory.join("color.md")), &report::markdown(&results)?)
 }
 
 /// Fig. 3.

@@ -86,7 +86,7 @@ fn run(directory: &Path) -> Result<()> {
     figure("fig6", &figures::hue(&camera, &hues))?;
     figure("fig7", &xyz("Fig. 7: noise of XYZ after ECI", Equation::EciEqual, None, (0.94, 1.08)))?;
     let results = Results { camera, levels, rows, factor_rows, sky_rows, hues, correlations, limits, edges };
-    write_text(Some(&directory.join("noise.md")), &report::markdown(&results)?, None)
+    write_text(Some(&directory.join("noise.md")), &report::markdown(&results)?)
 }
 
 /// Simulates the 912 skies after ECI: the last rows of Table 7, and Table 8.

@@ -1,0 +1,170 @@
+//! What a running program reads and writes, so that no output is written over an input, whatever it is called.
+//!
+//! A program that starts [`keep`]s a register. From then on every file that is opened for reading is noted by its identity,
+//! which links, symbolic or hard, do not change; every output is compared with all of them, and those that are announced
+//! before the work with every file that is opened later. Library users who read a file and write it again later are left
+//! alone: without [`keep`] there is no register.
+
+use super::places::{STDIN_NAME, named, same_place, sidecar_path};
+use crate::error::{Error, Result};
+use std::fs::Metadata;
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Identity of a file: device and inode.
+type FileId = (u64, u64);
+
+/// Device and inode of a file.
+fn file_id(about: &Metadata) -> FileId {
+    use std::os::unix::fs::MetadataExt;
+    (about.dev(), about.ino())
+}
+
+static REGISTER: Mutex<Option<Register>> = Mutex::new(None);
+
+#[derive(Debug, Default)]
+struct Register {
+    inputs: Vec<(FileId, String)>,
+    outputs: Vec<(FileId, String)>,
+    reads_stdin: bool,
+    doubts: Vec<String>,
+}
+
+fn register() -> MutexGuard<'static, Option<Register>> {
+    // Whoever panics leaves it as it was.
+    REGISTER.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Begins a register; programs call it once, before they open anything.
+pub fn keep() {
+    *register() = Some(Register::default());
+}
+
+/// Notes a file that is read.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where it is one of the outputs that were announced.
+pub(super) fn note_input(about: &Metadata, name: &str) -> Result<()> {
+    match &mut *register() {
+        Some(register) if about.is_file() => register.note_input(file_id(about), name),
+        _ => Ok(()),
+    }
+}
+
+/// Notes the sidecar of a frame that is read, whether or not it is looked at.
+///
+/// # Errors
+///
+/// As [`note_input`].
+pub(super) fn note_sidecar(frame: &Path) -> Result<()> {
+    let sidecar = sidecar_path(frame);
+    std::fs::metadata(&sidecar).map_or(Ok(()), |about| note_input(&about, &sidecar.display().to_string()))
+}
+
+/// Notes that the standard input is read.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where it is read already: the second would get what the first has left.
+pub(super) fn note_stdin() -> Result<()> {
+    let is_read = register().as_mut().is_some_and(|register| std::mem::replace(&mut register.reads_stdin, true));
+    if is_read { Err(read_twice()) } else { Ok(()) }
+}
+
+/// Makes sure, before it is waited for, that at most one of some inputs is the standard input: `-` or none.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_inputs<'a>(inputs: impl IntoIterator<Item = Option<&'a Path>>) -> Result<()> {
+    let from_stdin = inputs.into_iter().filter(|input| named(*input).is_none()).count();
+    if from_stdin > 1 { Err(read_twice()) } else { Ok(()) }
+}
+
+fn read_twice() -> Error {
+    Error::Usage(format!("only one input can be the {STDIN_NAME}; name a file for the others"))
+}
+
+/// Makes sure that a file about to be written is none that is read.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub(super) fn check_output(about: &Metadata, name: &str) -> Result<()> {
+    match &*register() {
+        Some(register) if about.is_file() => register.check_output(file_id(about), name),
+        _ => Ok(()),
+    }
+}
+
+/// Makes sure, before any work, that outputs are neither files that are read, then or later, nor one another.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn announce(outputs: &[Option<&Path>]) -> Result<()> {
+    let named: Vec<&Path> = outputs.iter().filter_map(|path| named(*path)).collect();
+    for (index, output) in named.iter().enumerate() {
+        let name = output.display().to_string();
+        if named[..index].iter().any(|other| same_place(Some(other), Some(output))) {
+            return Err(Error::Usage(format!("{name}: two outputs cannot be one file")));
+        }
+        if let Some(register) = &mut *register()
+            && let Ok(about) = std::fs::metadata(output)
+            && about.is_file()
+        {
+            register.check_output(file_id(&about), &name)?;
+            register.outputs.push((file_id(&about), name));
+        }
+    }
+    Ok(())
+}
+
+/// Notes what makes a result doubtful and was found out too late to refuse it: an image that its sidecar does not describe.
+pub(super) fn doubt(text: String) {
+    if let Some(register) = &mut *register() {
+        register.doubts.push(text);
+    }
+}
+
+/// The doubts that came up since the last call, for a program to warn of.
+pub fn doubts() -> Vec<String> {
+    register().as_mut().map(|register| std::mem::take(&mut register.doubts)).unwrap_or_default()
+}
+
+impl Register {
+    fn note_input(&mut self, id: FileId, name: &str) -> Result<()> {
+        if let Some((_, output)) = self.outputs.iter().find(|(output, _)| *output == id) {
+            return Err(same_file(output, name));
+        }
+        self.inputs.push((id, name.to_owned()));
+        Ok(())
+    }
+
+    fn check_output(&self, id: FileId, name: &str) -> Result<()> {
+        self.inputs.iter().find(|(input, _)| *input == id).map_or(Ok(()), |(_, input)| Err(same_file(name, input)))
+    }
+}
+
+/// The complaint about an output that would be written over an input.
+fn same_file(output: &str, input: &str) -> Error {
+    Error::Usage(format!("{output}: it is the same file as the input {input}; name another output"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_input_is_known_whichever_comes_first() {
+        let mut register = Register::default();
+        register.note_input((1, 1), "sky.csv").unwrap();
+        register.check_output((1, 2), "out.csv").unwrap();
+        let complaint = register.check_output((1, 1), "link.csv").unwrap_err().to_string();
+        assert_eq!(complaint, "link.csv: it is the same file as the input sky.csv; name another output");
+        register.outputs.push(((1, 3), "plot.svg".into()));
+        let complaint = register.note_input((1, 3), "s.yaml").unwrap_err().to_string();
+        assert_eq!(complaint, "plot.svg: it is the same file as the input s.yaml; name another output");
+    }
+}

@@ -1,0 +1,192 @@
+//! Writes YAML that our own reader takes, whatever strings it holds.
+
+use super::yaml_guard::{checked_text, may_count, may_indent};
+use crate::error::{Error, Result};
+use serde::Serialize;
+use serde_yaml::value::TaggedValue;
+use serde_yaml::{Mapping, Value};
+
+/// What stands in for a string until the text around it is written; a string that holds it has a stand-in too.
+const STAND_IN: &str = "QuotedStringNo";
+/// Digits of a stand-in's number.
+const DIGITS: usize = 8;
+
+/// Writes a document. Strings that YAML has no plain form for, such as those with control characters, are quoted with
+/// escapes; where the whole would not pass the reader's guard, brackets and marks in strings are escaped too.
+///
+/// # Errors
+///
+/// [`Error::Data`] when `what` cannot be written as YAML, or not so that it could be read again: it is too long or too deep.
+pub fn write(what: &str, document: &impl Serialize) -> Result<String> {
+    let text = self::document(what, document)?;
+    if checked_text(text.as_bytes()).is_ok() {
+        return Ok(text);
+    }
+    let text = escaping(what, document, &|c| is_unprintable(c) || may_count(c))?;
+    checked_text(text.as_bytes()).map_err(|problem| unwritable(what, problem))?;
+    Ok(text)
+}
+
+/// Writes a document that is not for our own reader: it may be as long and as deep as it likes.
+///
+/// # Errors
+///
+/// [`Error::Data`] when `what` cannot be written as YAML.
+pub fn document(what: &str, document: &impl Serialize) -> Result<String> {
+    escaping(what, document, &is_unprintable)
+}
+
+fn escaping(what: &str, document: &impl Serialize, escaped: &dyn Fn(char) -> bool) -> Result<String> {
+    let text = serde_yaml::to_value(document).and_then(|value| written(&value, escaped));
+    text.map_err(|error| unwritable(what, &error.to_string()))
+}
+
+fn unwritable(what: &str, problem: &str) -> Error {
+    Error::Data(format!("{what} cannot be written: {problem}"))
+}
+
+/// Characters that YAML has only as escapes, and those that break lines.
+fn is_unprintable(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{FEFF}' | '\u{FFFE}' | '\u{FFFF}')
+}
+
+/// The text of a value, the strings that hold what is to be `escaped` in quotes.
+fn written(value: &Value, escaped: &dyn Fn(char) -> bool) -> std::result::Result<String, serde_yaml::Error> {
+    let mut quoted = Vec::new();
+    let text = serde_yaml::to_string(&stood_in(value, escaped, &mut quoted))?;
+    let mut parts = text.split(STAND_IN);
+    let mut whole = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (number, rest) = part.split_at_checked(DIGITS).unwrap_or_default();
+        whole.push_str(number.parse().ok().and_then(|number: usize| quoted.get(number)).map_or("", String::as_str));
+        whole.push_str(rest.trim_start_matches(PADDING));
+    }
+    Ok(whole)
+}
+
+/// What makes a stand-in as long as the string that it stands for: a key that is long is written in another way.
+const PADDING: char = '_';
+
+/// A value whose strings with something to be `escaped` are stood in for by numbers in `quoted`.
+fn stood_in(value: &Value, escaped: &dyn Fn(char) -> bool, quoted: &mut Vec<String>) -> Value {
+    match value {
+        Value::String(string) => {
+            let wants_quotes = escaped('[') && may_indent(string);
+            if !wants_quotes && !string.contains(escaped) && !string.contains(STAND_IN) {
+                return value.clone();
+            }
+            let whole = in_quotes(string, escaped);
+            let start = format!("{STAND_IN}{:0DIGITS$}", quoted.len());
+            let padding = whole.len().saturating_sub(start.len());
+            quoted.push(whole);
+            Value::String(start + &PADDING.to_string().repeat(padding))
+        }
+        Value::Sequence(items) => items.iter().map(|item| stood_in(item, escaped, quoted)).collect::<Vec<_>>().into(),
+        Value::Mapping(mapping) => {
+            let pairs =
+                mapping.iter().map(|(key, value)| (stood_in(key, escaped, quoted), stood_in(value, escaped, quoted)));
+            Value::Mapping(pairs.collect::<Mapping>())
+        }
+        Value::Tagged(tagged) => {
+            let value = stood_in(&tagged.value, escaped, quoted);
+            Value::Tagged(Box::new(TaggedValue { tag: tagged.tag.clone(), value }))
+        }
+        Value::Null | Value::Bool(_) | Value::Number(_) => value.clone(),
+    }
+}
+
+/// A string in double quotes.
+fn in_quotes(string: &str, escaped: &dyn Fn(char) -> bool) -> String {
+    let mut quoted = String::with_capacity(string.len() + 2);
+    quoted.push('"');
+    for c in string.chars() {
+        match (c, u32::from(c)) {
+            ('"' | '\\', _) => quoted.extend(['\\', c]),
+            _ if !escaped(c) => quoted.push(c),
+            (_, code @ ..0x100) => quoted.push_str(&format!("\\x{code:02X}")),
+            (_, code @ ..0x1_0000) => quoted.push_str(&format!("\\u{code:04X}")),
+            (_, code) => quoted.push_str(&format!("\\U{code:08X}")),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// What YAML, the guard or the stand-ins might stumble over.
+    const HOSTILE: [&str; 32] = [
+        "[",
+        "]",
+        "{",
+        "}",
+        "&",
+        " & ",
+        "*",
+        " *a",
+        "!",
+        " !x",
+        "'",
+        "\"",
+        "\\",
+        "\n",
+        "\r",
+        "\t",
+        "\0",
+        "\u{1b}[2J",
+        "\u{7f}",
+        "\u{85}",
+        "\u{2028}",
+        "\u{feff}",
+        "\u{ffff}",
+        "é",
+        "𝄞",
+        ": ",
+        " #",
+        "- ",
+        "?",
+        "---",
+        "~",
+        "QuotedStringNo00000000_",
+    ];
+
+    fn strings() -> impl Strategy<Value = String> {
+        let part = prop_oneof![prop::sample::select(&HOSTILE[..]).prop_map(str::to_owned), any::<String>()];
+        let parts = prop::collection::vec((part, prop_oneof![4 => Just(1_usize), 1 => 1..200_usize]), 0..8);
+        parts.prop_map(|parts| parts.into_iter().map(|(part, times)| part.repeat(times)).collect())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+
+        /// What is written passes the guard, and is what it was.
+        #[test]
+        fn what_is_written_can_be_read(keys in prop::collection::vec(strings(), 0..4), values in prop::collection::vec(strings(), 0..12)) {
+            let mut document = Mapping::new();
+            for key in keys {
+                document.insert(key.into(), values.first().cloned().unwrap_or_default().into());
+            }
+            document.insert("list".into(), values.into_iter().map(Value::from).collect::<Vec<_>>().into());
+            let text = write("it", &document).unwrap();
+            prop_assert!(checked_text(text.as_bytes()).is_ok());
+            prop_assert_eq!(serde_yaml::from_str::<Mapping>(&text).unwrap(), document, "{}", text);
+        }
+    }
+
+    #[test]
+    fn plain_strings_stay_plain() {
+        let text = write("it", &["L*a*b* [cd/m2]", "--seed", "a!"]).unwrap();
+        assert_eq!(text, "- L*a*b* [cd/m2]\n- --seed\n- a!\n");
+    }
+
+    #[test]
+    fn what_is_too_much_is_refused() {
+        let complaint = write("the metadata", &["x".repeat(1 << 20)]).unwrap_err().to_string();
+        assert!(complaint.starts_with("the metadata cannot be written: it is longer than 1 MiB"), "{complaint}");
+        let deep = (0..100).fold(Value::Null, |inner, _| Value::Mapping([("a".into(), inner)].into_iter().collect()));
+        assert!(write("it", &deep).unwrap_err().to_string().contains("nest too deep"));
+    }
+}

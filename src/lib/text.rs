@@ -1,0 +1,76 @@
+//! Text that comes from files, as it may be shown: nothing in it steers a terminal, and it ends somewhere.
+
+use std::borrow::Cow;
+
+/// A quotation in a message shows this many characters of its beginning and of its end.
+const QUOTED: (usize, usize) = (80, 30);
+/// A message shows this many characters of its beginning, where the file is named, and of its end, where the advice is.
+const MESSAGE: (usize, usize) = (1200, 400);
+
+/// Text whose lines stay, control characters apart from tabs shown as escapes.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    escaped(text, |c| c == '\n' || c == '\t')
+}
+
+/// A message in one line of bounded length: control characters shown as escapes, what stands between backticks shortened,
+/// then the whole.
+pub fn one_line(message: &str) -> String {
+    let parts: Vec<Cow<'_, str>> = message
+        .split('`')
+        .enumerate()
+        .map(|(place, part)| if place % 2 == 1 { shortened(part, QUOTED) } else { part.into() })
+        .collect();
+    let whole = parts.join("`");
+    escaped(&shortened(&whole, MESSAGE), |_| false).into_owned()
+}
+
+/// Escapes what steers a terminal, directions of writing included, but for what is `plain`.
+fn escaped(text: &str, plain: impl Fn(char) -> bool) -> Cow<'_, str> {
+    let steers = |c: char| {
+        let turns =
+            matches!(c, '\u{061C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
+        (c.is_control() || turns || matches!(c, '\u{2028}' | '\u{2029}')) && !plain(c)
+    };
+    if !text.contains(steers) {
+        return text.into();
+    }
+    let mut shown = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if steers(c) { shown.extend(c.escape_default()) } else { shown.push(c) }
+    }
+    shown.into()
+}
+
+/// The first and the last characters of what is longer than both together.
+fn shortened(text: &str, (first, last): (usize, usize)) -> Cow<'_, str> {
+    let Some((head, _)) = text.char_indices().nth(first) else { return text.into() };
+    let Some((tail, _)) = text.char_indices().rev().nth(last.saturating_sub(1)) else { return text.into() };
+    if tail <= head { text.into() } else { format!("{} […] {}", &text[..head], &text[tail..]).into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_steers_a_terminal() {
+        assert_eq!(visible("a\tb\nc"), "a\tb\nc");
+        assert_eq!(
+            visible("\u{1b}[2J\u{9b}1m\u{7f}\r\u{202e}x\u{2028}"),
+            "\\u{1b}[2J\\u{9b}1m\\u{7f}\\r\\u{202e}x\\u{2028}"
+        );
+        assert_eq!(one_line("a\tb\nµ"), "a\\tb\\nµ");
+    }
+
+    #[test]
+    fn a_message_ends_somewhere() {
+        let quoted = one_line(&format!("f.yaml: `{}` is no unit; give --unit", "é".repeat(100_000)));
+        let wanted = format!("f.yaml: `{} […] {}` is no unit; give --unit", "é".repeat(80), "é".repeat(30));
+        assert_eq!(quoted, wanted);
+        let long = one_line(&format!("f.yaml: {}; give --unit", "x".repeat(100_000)));
+        assert!(long.chars().count() < 1700 && long.starts_with("f.yaml: x") && long.ends_with("x; give --unit"));
+        for short in ["`a` or `b`", "", "`", &"y".repeat(1600)] {
+            assert_eq!(one_line(short), short);
+        }
+    }
+}
