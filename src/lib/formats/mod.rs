@@ -13,6 +13,7 @@ pub mod output;
 pub mod picture;
 pub mod pipe;
 pub mod plots;
+pub mod radiance_unit;
 pub mod spectral;
 pub mod table;
 pub mod tiff;

@@ -182,8 +182,8 @@ pub fn pattern(text: &str) -> Result<CfaPattern, String> {
 /// The units that there are.
 pub fn radiance_unit(text: &str) -> Result<RadianceUnit, String> {
     RadianceUnit::parse(text).ok_or_else(|| {
-        let names: Vec<&str> = RadianceUnit::ALL.into_iter().map(RadianceUnit::name).collect();
-        format!("known units are {}", names.join("; "))
+        let names: Vec<String> = RadianceUnit::USUAL.iter().map(ToString::to_string).collect();
+        format!("known units are {} and the like", names.join("; "))
     })
 }
 

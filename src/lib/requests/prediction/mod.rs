@@ -246,7 +246,7 @@ impl NoisePrediction {
             return Err(Error::Usage("--all-samples is for a library of spectra; name one".into()));
         };
         let loaded = data::load_sensor(&self.subject.sensor)?;
-        let library = spectral::read_library(input, self.spectrum.radiance_unit)?;
+        let (library, warnings) = spectral::read_library(input, self.spectrum.radiance_unit)?;
         let observer = data::load_observer()?;
         let signals = signals(&library, &loaded.sensor, loaded.response()?, &observer, &WavelengthGrid::default())?;
         let base = self.exposure.chosen()?;
@@ -254,7 +254,7 @@ impl NoisePrediction {
             Some(fraction) => SampleExposure::Filled { base, fraction, by: Filling::Time },
             None => SampleExposure::Fixed(base),
         };
-        let mut notes = Vec::new();
+        let mut notes: Vec<Note> = warnings.into_iter().map(Note::Warning).collect();
         let color = self.color(&loaded.sensor, &mut notes)?;
         let one = |sample: usize| -> Result<SamplePrediction> {
             let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;
