@@ -7,7 +7,7 @@
 use super::foreign::csv_complaint;
 use super::radiance_unit::{self, FileSays};
 use crate::error::{Error, Result};
-use crate::spectrum::{Curve, check_wavelengths};
+use crate::spectrum::{Curve, SHORTEST_NM, check_wavelengths};
 use crate::units::{RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
 use csv::StringRecord;
 use flate2::read::GzDecoder;
@@ -93,7 +93,8 @@ impl SpectralTable {
         };
         let comments = Comments::of(&bytes);
         let headings = headings(&columns, units.as_ref(), by_rows.then_some(&first[0]));
-        let heading = units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && unit_of_heading(cell).is_none());
+        let heading =
+            units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && unit_of_heading(cell).is_none());
         let unit = wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength);
         let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
         wavelength_nm.iter_mut().for_each(|wavelength: &mut f64| *wavelength = unit.nm(*wavelength));
@@ -212,8 +213,6 @@ fn wavelength_unit(heading: Option<&str>) -> std::result::Result<Option<Waveleng
     })
 }
 
-/// Below this all wavelengths look like micrometers, in nm: no sensor behind a lens sees less.
-const SHORTEST_NM: f64 = 100.0;
 /// Above this all wavelengths look like angstroms or wavenumbers, in nm: no silicon responds.
 const LONGEST_NM: f64 = 2000.0;
 
@@ -226,7 +225,9 @@ fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
         return Err(format!("{range}, which looks like micrometers; {name} `wavelength_um`"));
     }
     if *first > LONGEST_NM {
-        return Err(format!("{range}, which looks like angstroms or wavenumbers; {name} `wavelength_angstrom`, or give nm"));
+        return Err(format!(
+            "{range}, which looks like angstroms or wavenumbers; {name} `wavelength_angstrom`, or give nm"
+        ));
     }
     Ok(())
 }
@@ -368,7 +369,9 @@ mod tests {
         let given = Some(RadianceUnit::USUAL[1]);
         let refused = |text: &str, given| unit(text, given).unwrap_err().to_string();
         for given in [None, given] {
-            assert!(refused("nm,E (W m-2 nm-1)\n400,1\n", given).contains("`W m-2 nm-1`, an irradiance, which has no sr-1"));
+            assert!(
+                refused("nm,E (W m-2 nm-1)\n400,1\n", given).contains("`W m-2 nm-1`, an irradiance, which has no sr-1")
+            );
             assert!(refused("nm,photon_radiance\n400,1\n", given).contains("a unit of photons"));
         }
         assert!(refused("nm,L (1e-3 W m-2 sr-1 nm-1)\n400,1\n", None).contains("a number before it"));

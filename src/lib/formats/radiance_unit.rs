@@ -29,7 +29,10 @@ pub fn settle(says: FileSays<'_>, given: Option<RadianceUnit>) -> Result<(Radian
         Some(Stated::Radiance(unit)) => agreed(name, *unit, given).map(|unit| (unit, None)),
         Some(Stated::Other { text, kind }) if kind.is_another_quantity() => {
             let problem = is_in(text, kind.in_words());
-            Err(Error::format(name, format!("{problem}; spectral radiances are wanted, such as {}", RadianceUnit::USUAL[1])))
+            Err(Error::format(
+                name,
+                format!("{problem}; spectral radiances are wanted, such as {}", RadianceUnit::USUAL[1]),
+            ))
         }
         Some(Stated::Other { text, kind }) => match given {
             Some(unit) => Ok((unit, None)),

@@ -53,7 +53,9 @@ impl CorrectFrame {
         let mut warnings = Vec::new();
         if let Some(darks) = darks {
             check_alike(input, darks.head())?;
+            darks.check_dark()?;
             warnings = differences(input, darks.head());
+            warnings.extend(darks.taken_on_trust(input));
             warnings.extend_from_slice(darks.warnings());
         }
         let known_black = input.black_levels()?;
@@ -83,14 +85,14 @@ impl CorrectFrame {
         let off = if darks.is_none() { Some(&levels) } else { known_black.as_ref() };
         note_levels(&mut metadata, input, off, is_subtracted)?;
         if let Some(cte) = cte {
-            let black_left = metadata.uniform_black_adu().ok_or_else(|| {
-                input.refuse(
+            if metadata.black_level_adu.is_some() && metadata.uniform_black_adu().is_none() {
+                return Err(input.refuse(
                     "what is left of its black level differs among photosites, so that it is no charge; subtract it with \
                      --black auto as transfer is undone",
-                )
-            })?;
+                ));
+            }
             let restored = |level: f64| bias_adu + (level - bias_adu) / uniform_share(cte);
-            metadata.black_level_adu = metadata.black_level_adu.map(|_| restored(black_left).into());
+            metadata.black_level_adu = metadata.black_level_adu.map(|level| level.map(restored));
             metadata.white_level_adu = metadata.white_level_adu.map(|white| white.map(restored));
         }
         if is_subtracted && darks.is_none() && levels.uniform() == Some(0.0) {

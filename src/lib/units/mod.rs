@@ -22,6 +22,8 @@ pub const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
 pub const BOLTZMANN_EV_PER_K: f64 = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C;
 /// Maximum luminous efficacy K_m in lm W⁻¹.
 pub const LUMINOUS_EFFICACY_LM_PER_W: f64 = 683.0;
+/// 0 °C in K (exact).
+pub const ZERO_CELSIUS_K: f64 = 273.15;
 /// Meters in a nanometer.
 pub const M_PER_NM: f64 = 1e-9;
 /// Centimeters in a micrometer.

@@ -557,7 +557,8 @@ mod tests {
     #[test]
     fn radiances_are_read_as_people_write_them() {
         for (text, factor) in RADIANCES {
-            for shown in [text.to_owned(), format!("radiance ({text})"), format!("sky1 [{text}]"), format!("L, {text}")] {
+            for shown in [text.to_owned(), format!("radiance ({text})"), format!("sky1 [{text}]"), format!("L, {text}")]
+            {
                 let read = match unit_of_heading(&shown) {
                     Some(Stated::Radiance(unit)) => unit.in_w_per_cm2_sr_nm(),
                     other => panic!("{shown}: {other:?}"),
@@ -604,7 +605,8 @@ mod tests {
             );
             assert_eq!(RadianceUnit::parse(text), None, "{text}");
         }
-        for text in ["radiance", "L", "W", "A", "sky (measured)", "MW m-2 sr-1 nm-1", "Y 1391.68 cd m-2", "a work of W"] {
+        for text in ["radiance", "L", "W", "A", "sky (measured)", "MW m-2 sr-1 nm-1", "Y 1391.68 cd m-2", "a work of W"]
+        {
             assert_eq!(unit_of_heading(text), None, "{text}");
         }
     }

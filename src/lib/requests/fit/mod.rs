@@ -51,6 +51,8 @@ impl Fit {
         let fitting = Fitting { fit: self, sensor: &loaded.sensor, seen: &seen, responses, plan, exposure };
         let (fitted, trade_off) = fitting.fit()?;
         let mut notes = seen.notes.clone();
+        let long = self.exposure.exposure_s.and_then(|exposure_s| self.exposure.lens.exposed(exposure_s).ok()?.doubt());
+        notes.extend(loaded.sensor.doubts().into_iter().chain(long).map(Note::Warning));
         notes.push(Note::Remark(format!(
             "fitted {} observations, condition number {:.1}",
             fitted.count, fitted.condition

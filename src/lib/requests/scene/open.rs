@@ -85,6 +85,7 @@ impl Scene {
             input: self.subject.input.as_deref().and_then(regular_file),
             notes: Vec::new(),
         };
+        found.notes.extend(loaded.sensor.doubts().into_iter().chain(self.doubt(exposure)).map(Note::Warning));
         let mut light = match self.level.given() {
             Some(electrons) => {
                 let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
@@ -113,6 +114,11 @@ impl Scene {
             )));
         }
         Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, found })
+    }
+
+    /// A warning of an exposure that was given.
+    fn doubt(&self, exposure: Exposure) -> Option<String> {
+        exposure.doubt().filter(|_| self.level.expose_to.is_none())
     }
 
     /// Opens the radiance at an exposure.
