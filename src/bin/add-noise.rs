@@ -56,6 +56,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
+    session.tell(arguments.noise.doubt().as_slice());
     let settings = NoiseSettings {
         seed: arguments.seed,
         sensor_seed: arguments.sensor_seed,

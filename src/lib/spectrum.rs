@@ -286,9 +286,13 @@ mod tests {
     #[test]
     fn grids_that_make_no_sense_are_refused() {
         let grid = |start_nm, end_nm, step_nm| WavelengthGrid { start_nm, end_nm, step_nm, ..Default::default() };
-        for bad in
-            [grid(830.0, 360.0, 1.0), grid(360.0, 830.0, 0.0), grid(360.0, 830.0, f64::NAN), grid(360.0, 830.5, 1.0)]
-        {
+        for bad in [
+            grid(830.0, 360.0, 1.0),
+            grid(360.0, 830.0, 0.0),
+            grid(360.0, 830.0, f64::NAN),
+            grid(360.0, 830.5, 1.0),
+            grid(0.36, 0.83, 0.01),
+        ] {
             assert!(bad.points().is_err(), "{bad:?}");
         }
     }

@@ -144,8 +144,12 @@ mod tests {
             Exposure { exposure_s: f64::NAN, ..good },
             Exposure { f_number: 0.0, ..good },
             Exposure { lens_transmittance: 1.1, ..good },
+            Exposure { f_number: 0.125, ..good },
         ] {
             assert!(bad.checked().is_err());
         }
+        assert_eq!(good.doubt(), None);
+        let doubt = Exposure { exposure_s: 33.0, ..good }.doubt().unwrap();
+        assert_eq!(doubt, "an exposure of 33 s is long; 33 ms is 0.033 s");
     }
 }

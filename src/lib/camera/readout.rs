@@ -1,7 +1,7 @@
 //! The read-out of a sensor: geometry, wells, noise, converter; and its dark current.
 
 use crate::cfa::FilterArray;
-use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, ZERO_CELSIUS_K};
+use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, kelvin};
 use serde::{Deserialize, Serialize};
 
 /// The smallest and the largest pitch in µm that does not look like another unit.
@@ -115,7 +115,7 @@ impl ReadOut {
             return suspect("pixel_pitch_um", pitch, "um", "nm".into());
         }
         if self.temperature_k < LEAST_TEMPERATURE_K {
-            let kelvin = self.temperature_k + ZERO_CELSIUS_K;
+            let kelvin = kelvin(self.temperature_k);
             return suspect("temperature_k", self.temperature_k, "K", format!("degrees Celsius, which is {kelvin} K"));
         }
         for (key, value, most) in [("dcnu", self.dcnu, MOST_DCNU), ("prnu", self.prnu, MOST_PRNU)] {
@@ -253,5 +253,28 @@ pub(crate) mod tests {
         assert!(complaint(ReadOut { pixel_pitch_um: Some(0.0), ..kaf5101ce() }).contains("pixel_pitch_um"));
         assert!(complaint(ReadOut { pixel_pitch_um: None, ..kaf5101ce() }).contains("needs `pixel_pitch_um`"));
         assert_eq!(kaf5101ce().check(), Ok(()));
+    }
+
+    #[test]
+    fn numbers_that_look_like_another_unit_are_refused() {
+        for (readout, wanted) in [
+            (ReadOut { pixel_pitch_um: Some(0.0068), ..kaf5101ce() }, "it is in um, and 0.0068 looks like mm or m"),
+            (ReadOut { pixel_pitch_um: Some(6800.0), ..kaf5101ce() }, "6800 looks like nm"),
+            (ReadOut { temperature_k: 20.0, ..kaf5101ce() }, "looks like degrees Celsius, which is 293.15 K"),
+            (
+                ReadOut { prnu: 5.0, ..kaf5101ce() },
+                "`prnu` is 5; it is in fractions of 1, and 5 looks like per cent, which is 0.05",
+            ),
+            (ReadOut { dcnu: 20.0, ..kaf5101ce() }, "20 looks like per cent, which is 0.2"),
+            (ReadOut { full_well_e: 40.0, ..kaf5101ce() }, "40 looks like thousands of them, which is 40000"),
+            (ReadOut { read_noise_e: 50_000.0, ..kaf5101ce() }, "no less than `full_well_e`"),
+            (ReadOut { bits: 8, ..kaf5101ce() }, "the largest code of 8 bits is 255"),
+        ] {
+            let said = readout.check().unwrap_err();
+            assert!(said.contains(wanted), "{said}");
+        }
+        let [doubt] = &ReadOut { adu_per_e: 17.0, ..kaf5101ce() }.doubts()[..] else { panic!("no doubt") };
+        assert!(doubt.contains("166 times the range of 12 bits; it looks like electrons per ADU"), "{doubt}");
+        assert!(kaf5101ce().doubts().is_empty());
     }
 }

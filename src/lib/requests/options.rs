@@ -12,7 +12,7 @@ use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind}
 use crate::formats::pipe;
 use crate::random::Source;
 use crate::stages::noise::NoiseSettings;
-use crate::units::{RadianceUnit, ZERO_CELSIUS_K};
+use crate::units::{RadianceUnit, kelvin};
 use clap::{Args, Command};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -257,7 +257,7 @@ impl NoiseChoice {
         /// Temperatures, in K, that no silicon works at.
         const COLD_K: std::ops::Range<f64> = 2.0..70.0;
         let cold = self.temperature_k.filter(|kelvin| COLD_K.contains(kelvin))?;
-        let meant = cold + ZERO_CELSIUS_K;
+        let meant = kelvin(cold);
         Some(Note::Warning(format!("a temperature of {cold} K looks like degrees Celsius, which is {meant} K")))
     }
 

@@ -6,7 +6,7 @@ use crate::color::White;
 use crate::names::Named;
 use crate::spectrum::WavelengthGrid;
 use crate::stages::black::Black;
-use crate::units::{RadianceUnit, ZERO_CELSIUS_K};
+use crate::units::{self, RadianceUnit};
 use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
 
@@ -151,8 +151,8 @@ const PER_CENT_FROM: f64 = 5.0;
 /// What is expected, in words.
 pub fn kelvin(text: &str) -> Result<f64, String> {
     let celsius = number(text).ok().filter(|x| (-200.0..=0.0).contains(x));
-    let hint = celsius
-        .map_or(String::new(), |x| format!("; {x} looks like degrees Celsius, which is {} K", x + ZERO_CELSIUS_K));
+    let hint =
+        celsius.map_or(String::new(), |x| format!("; {x} looks like degrees Celsius, which is {} K", units::kelvin(x)));
     positive(text).map_err(|_| format!("give a temperature in K, above 0{hint}"))
 }
 

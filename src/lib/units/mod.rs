@@ -22,8 +22,6 @@ pub const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
 pub const BOLTZMANN_EV_PER_K: f64 = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C;
 /// Maximum luminous efficacy K_m in lm W⁻¹.
 pub const LUMINOUS_EFFICACY_LM_PER_W: f64 = 683.0;
-/// 0 °C in K (exact).
-pub const ZERO_CELSIUS_K: f64 = 273.15;
 /// Meters in a nanometer.
 pub const M_PER_NM: f64 = 1e-9;
 /// Centimeters in a micrometer.
@@ -32,6 +30,13 @@ pub const CM_PER_UM: f64 = 1e-4;
 pub const MM_PER_UM: f64 = 1e-3;
 /// Square centimeters in a square meter.
 pub const CM2_PER_M2: f64 = 1e4;
+
+/// A temperature in K of one in °C, to the hundredth that people read.
+pub fn kelvin(celsius: f64) -> f64 {
+    /// 0 °C in hundredths of a K (exact).
+    const ZERO_CELSIUS: f64 = 27_315.0;
+    (celsius * 100.0 + ZERO_CELSIUS).round() / 100.0
+}
 
 /// What the samples of a frame are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
