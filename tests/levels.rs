@@ -350,7 +350,8 @@ fn other_arrays_are_refused_by_name() {
         ("2x2:CYGM", "a filter array of 2x2 sites"),
     ] {
         let array: FilterArray = array.parse().unwrap();
-        let codes = plane(12, 12, array);
+        let mut codes = plane(12, 12, array);
+        codes.header.metadata.black_level_adu = Some(64.0.into());
         let complaint = format!("test: its sensor has {name}; only Bayer arrays are demosaicked");
         refused(Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None), &complaint);
         // Who names a pattern knows better.

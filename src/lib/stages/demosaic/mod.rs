@@ -253,6 +253,7 @@ mod tests {
     fn plane(width: usize, height: usize, pattern: CfaPattern, f: impl Fn(usize, usize, Class) -> f32) -> MemoryFrame {
         let mut metadata = Metadata::new(QuantityKind::Adu);
         metadata.cfa = Some(pattern.into());
+        metadata.black_level_adu = Some(0.0.into());
         let header = FrameHeader { name: "test".into(), geometry: Geometry::new(width, height, &["Y"]), metadata };
         let sites = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let samples = sites.map(|(x, y)| f(x, y, pattern.class(x as i64, y as i64))).collect();
