@@ -168,6 +168,7 @@ impl Comments {
     /// Those of a table.
     fn of(bytes: &[u8]) -> Self {
         let mut found = Self::default();
+        let bytes = without_mark(bytes);
         for line in bytes.split(|byte| *byte == b'\n').filter(|line| line.starts_with(b"#")).take(MAX_COMMENTS) {
             let line = String::from_utf8_lossy(line);
             found.units.extend(units_in(&line));
@@ -281,7 +282,12 @@ fn reader(bytes: &[u8], has_headers: bool) -> csv::Reader<&[u8]> {
         .comment(Some(b'#'))
         .has_headers(has_headers)
         .trim(csv::Trim::All)
-        .from_reader(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes))
+        .from_reader(without_mark(bytes))
+}
+
+/// Bytes without a byte order mark.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
 }
 
 /// A finite number, if it is one.
@@ -366,7 +372,8 @@ mod tests {
     #[test]
     fn what_is_no_radiance_or_says_nothing_is_told() {
         let unit = |text: &str, given| SpectralTable::parse("a", text.as_bytes()).unwrap().radiance_unit(0, given);
-        let given = Some(RadianceUnit::USUAL[1]);
+        let watts = RadianceUnit::USUAL[1];
+        let given = Some(watts);
         let refused = |text: &str, given| unit(text, given).unwrap_err().to_string();
         for given in [None, given] {
             assert!(
@@ -375,14 +382,14 @@ mod tests {
             assert!(refused("nm,photon_radiance\n400,1\n", given).contains("a unit of photons"));
         }
         assert!(refused("nm,L (1e-3 W m-2 sr-1 nm-1)\n400,1\n", None).contains("a number before it"));
-        assert_eq!(unit("nm,L (1e-3 W m-2 sr-1 nm-1)\n400,1\n", given).unwrap().0, given.unwrap());
+        assert_eq!(unit("nm,L (1e-3 W m-2 sr-1 nm-1)\n400,1\n", given).unwrap().0, watts);
         let both = "# from W m-2 sr-1 nm-1 to W cm-2 sr-1 nm-1\nnm,L\n400,1\n";
         assert!(refused(both, None).contains("name the units of radiance W m-2 sr-1 nm-1 and W cm-2 sr-1 nm-1"));
-        assert_eq!(unit(both, given).unwrap().0, given.unwrap());
+        assert_eq!(unit(both, given).unwrap().0, watts);
         let (assumed, warning) = unit("nm,L\n400,1\n", None).unwrap();
         assert_eq!(assumed, RadianceUnit::default());
         assert!(warning.unwrap().contains("taken as W cm-2 sr-1 nm-1"));
-        assert_eq!(unit("nm,L\n400,1\n", given).unwrap(), (given.unwrap(), None));
+        assert_eq!(unit("nm,L\n400,1\n", given).unwrap(), (watts, None));
     }
 
     #[test]

@@ -76,7 +76,14 @@ impl Demosaic {
             return Err(input.refuse(format!("it holds {holds}; demosaicking is done once")));
         }
         if input.geometry.channels.len() != 1 {
-            return Err(input.out_of_order(format!("it holds {holds}, not a CFA plane"), "mosaic"));
+            let hint = match metadata.quantity {
+                QuantityKind::Unspecified => {
+                    " (where one of its channels is such a plane, take that alone, for example with `oiiotool in.exr --ch R -o \
+                     out.exr`)"
+                }
+                _ => "",
+            };
+            return Err(input.out_of_order(format!("it holds {holds}, not a CFA plane{hint}"), "mosaic"));
         }
         let (width, height) = (input.geometry.width, input.geometry.height);
         if width < 2 || height < 2 {
