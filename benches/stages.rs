@@ -100,7 +100,7 @@ fn predictions(criterion: &mut Criterion) {
 /// The 912 skies through the noisy camera, 20×16 pixels each, with all differences and predictions.
 fn evaluations(criterion: &mut Criterion) {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_data/skies/sky912.exr");
-    let (Ok(loaded), Ok(observer), Ok(library)) =
+    let (Ok(loaded), Ok(observer), Ok((library, _))) =
         (data::load_sensor(data::DEFAULT_SENSOR), data::load_observer(), spectral::read_library(&path, None))
     else {
         return;

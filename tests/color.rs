@@ -31,7 +31,9 @@ use std::path::Path;
 
 fn sky_library() -> SpectralLibrary {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_data/skies/sky912.exr");
-    spectral::read_library(&path, None).unwrap()
+    let (library, warnings) = spectral::read_library(&path, None).unwrap();
+    assert!(warnings.is_empty(), "{warnings:?}");
+    library
 }
 
 /// Least squares on some samples.

@@ -13,11 +13,13 @@ use cyanometer::error::Result;
 use cyanometer::formats::picture::{PictureSettings, Range, write_png};
 use cyanometer::formats::yaml::{parse_metadata, write_metadata};
 use cyanometer::frame::{Geometry, to_sample};
-use cyanometer::metadata::{FrameHeader, Scene};
+use cyanometer::metadata::{FrameHeader, Metadata, Scene};
 use cyanometer::propagation::{self, Equations, Unpredictable};
 use cyanometer::sigma::WithSigma;
+use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::darks::DarkStack;
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
@@ -349,7 +351,8 @@ fn other_arrays_are_refused_by_name() {
         ("2x2:CYGM", "a filter array of 2x2 sites"),
     ] {
         let array: FilterArray = array.parse().unwrap();
-        let codes = plane(12, 12, array);
+        let mut codes = plane(12, 12, array);
+        codes.header.metadata.black_level_adu = Some(64.0.into());
         let complaint = format!("test: its sensor has {name}; only Bayer arrays are demosaicked");
         refused(Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None), &complaint);
         // Who names a pattern knows better.
@@ -410,4 +413,85 @@ fn pictures_know_levels_by_site_and_class() {
     write_png(&mut three, &settings, &path).unwrap();
     let shown = image::open(&path).unwrap().to_rgb8();
     assert_eq!((shown.get_pixel(0, 0).0, shown.get_pixel(1, 0).0), ([0; 3], [255; 3]));
+}
+
+/// An unknown black level is not zero: what subtracts black refuses, and says by which key.
+#[test]
+fn a_black_level_that_nobody_states_is_not_taken_as_zero() {
+    let codes = plane(12, 8, CfaPattern::Rggb.into());
+    let complaint = "the metadata has no `black_level_adu`";
+    refused(Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None), complaint);
+    refused(correct(&codes.header, Black::Auto, None), complaint);
+    let three = header(QuantityKind::Adu, Geometry::new(6, 4, &["R", "G", "B"]));
+    let three = FrameHeader { name: "test".into(), ..three };
+    refused(ToXyz::new(&three, &to_color(Space::Xyz)), complaint);
+    // Who says that there is none goes on.
+    for black in [Black::None, Black::Level(0.0), Black::Level(70.0)] {
+        let made = Demosaic::new(&codes.header, Method::Bilinear, black, None).unwrap();
+        assert_eq!(made.header().metadata.black_level_adu, Some(0.0.into()));
+    }
+    // Noisy electrons have a dark signal; where it is not known, neither is the black level of their codes.
+    for (quantity, known) in [(QuantityKind::Electrons, None), (QuantityKind::ExpectedElectrons, Some(1753.0.into()))] {
+        let mut electrons = codes.header.clone();
+        electrons.metadata.quantity = quantity;
+        let made = Digitize::new(&electrons, &AdcSettings::default()).unwrap();
+        assert_eq!(made.header().metadata.black_level_adu, known);
+        let made = Demosaic::new(&electrons, Method::Bilinear, Black::Auto, None);
+        match known {
+            Some(_) => assert!(made.is_ok()),
+            None => refused(made, "the metadata has no `dark_signal_e`"),
+        }
+    }
+}
+
+/// What demosaicking took off stays off when a mosaic is made of it again: to the bit, whatever is asked.
+#[test]
+fn a_mosaic_of_demosaicked_planes_has_lost_its_black() {
+    let codes = with_levels(plane(12, 8, CfaPattern::Rggb.into()));
+    let rgb = through(&codes, &Demosaic::new(&codes.header, Method::Malvar, Black::Auto, None).unwrap());
+    let again = through(&rgb, &Mosaic::new(&rgb.header, Some(CfaPattern::Rggb)).unwrap());
+    assert_same(&again, &by_hand(&codes), "measured samples, less black");
+    let record = again.header.metadata.correction.unwrap();
+    assert_eq!((record.black_adu, record.black_deltas), (BlackLevel::Sites(SITES), true));
+    let twice = through(&again, &Demosaic::new(&again.header, Method::Malvar, Black::Auto, None).unwrap());
+    assert_same(&twice, &rgb, "demosaicked twice");
+    let more = Demosaic::new(&again.header, Method::Malvar, Black::Level(100.0), None);
+    refused(more, "its black level is off already");
+    refused(correct(&again.header, Black::None, Some(0.999)), "corrected already");
+    // Where nothing was taken off, nothing is noted.
+    let mut black_free = codes.clone();
+    black_free.header.metadata.set_black_adu(Some(0.0.into()));
+    let rgb = through(&black_free, &Demosaic::new(&black_free.header, Method::Malvar, Black::Auto, None).unwrap());
+    let again = Mosaic::new(&rgb.header, None).unwrap();
+    assert_eq!(again.header().metadata.correction, None);
+}
+
+/// Darks are those of the same sensor, without light, as far as metadata tell; where they do not, a warning says so.
+#[test]
+fn darks_of_other_sensors_or_lit_scenes_are_refused() {
+    let taken = |electrons: f64, sensor_seed: u64| {
+        let mut light = header(QuantityKind::ExpectedElectrons, Geometry::new(8, 6, &["R", "G", "B"]));
+        light.metadata.scene = Some(Scene::uniform("test", [electrons; 3]));
+        let noise = NoiseSettings { sensor_seed, ..NoiseSettings::default() };
+        let noisy = AddNoise::new(&light, &noise).unwrap();
+        Digitize::new(noisy.header(), &AdcSettings::default()).unwrap().header().clone()
+    };
+    let corrected = |frame: &FrameHeader, dark: &FrameHeader| {
+        let stack = DarkStack::of([dark]).unwrap();
+        CorrectFrame::new(frame, &CorrectionSettings { black: Black::None, cte: None }, stack.as_ref())
+    };
+    let frame = taken(100.0, 1);
+    assert!(corrected(&frame, &taken(0.0, 1)).unwrap().warnings().is_empty());
+    refused(corrected(&frame, &taken(0.0, 2)), "its sensor seed is 2, but that of test is 1");
+    refused(corrected(&frame, &taken(50.0, 1)), "its scene, test, was lit");
+    let mut other = taken(0.0, 1);
+    other.metadata.sensor.as_mut().unwrap().name = "other".into();
+    refused(corrected(&frame, &other), "its sensor is other, but that of test is kaf-5101ce");
+    for unsaid in [|m: &mut Metadata| m.scene = None, |m: &mut Metadata| (m.noise, m.scene) = (None, None)] {
+        let mut silent = taken(0.0, 1);
+        unsaid(&mut silent.metadata);
+        let made = corrected(&frame, &silent).unwrap();
+        let [warning] = made.warnings() else { panic!("{:?}", made.warnings()) };
+        assert!(warning.contains("do not tell whether it is a dark frame of the sensor that took test"), "{warning}");
+    }
 }

@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 74] = [
+const MISTAKES: [(&str, i32, &str); 78] = [
     ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
@@ -292,6 +292,27 @@ const MISTAKES: [(&str, i32, &str); 74] = [
          varied ones",
     ),
     ("preview expected.exr", BAD_USAGE, "--output <FILE.png> is missing; see `preview --help`"),
+    (
+        "preview noisy.exr -o picture.jpg",
+        BAD_USAGE,
+        "`picture.jpg` is no value for --output <FILE.png>: end the name in .png; see `preview --help`",
+    ),
+    (
+        "correct-frame codes.exr --dark codes.exr",
+        BAD_DATA,
+        "codes.exr: its scene, --electrons, was lit; a dark frame is taken without light, as `render-radiance --dark` renders it",
+    ),
+    (
+        "to-xyz rgb.exr --matrix matrix.yaml --black 5",
+        BAD_USAGE,
+        "rgb.exr: its metadata state another black level than 5; leave out --black",
+    ),
+    (
+        "add-noise expected.exr --temperature -20",
+        BAD_USAGE,
+        "`-20` is no value for --temperature <K>: give a temperature in K, above 0; -20 looks like degrees Celsius, which is \
+         253.15 K; see `add-noise --help`",
+    ),
     ("preview missing.exr -o picture.png", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
 ];
 
@@ -328,12 +349,14 @@ fn an_unknown_set_of_instructions_is_a_mistake() {
 fn inputs_and_devices_are_not_written_over() {
     let shop = Workshop::with_frames();
     fs::copy(format!("{TREE}/sample_data/skies/sky912.exr"), shop.path("library.exr")).unwrap();
+    // Whatever the name, an EXR is read as one.
+    fs::copy(shop.path("noisy.exr"), shop.path("noisy.png")).unwrap();
     std::os::unix::fs::symlink(shop.path("expected.exr"), shop.path("link.exr")).unwrap();
     for (line, input) in [
         ("add-noise", "expected.exr"),
         ("mosaic", "noisy.exr"),
         ("measure", "noisy.exr"),
-        ("preview", "noisy.exr"),
+        ("preview", "noisy.png"),
         ("fit-matrix", "library.exr"),
     ] {
         let before = shop.bytes(input);

@@ -456,7 +456,7 @@ fn two_colors_are_compared() {
 #[test]
 fn a_table_of_spectra_makes_a_chart() {
     let shop = Workshop::with_frames();
-    let mut table = String::from("wavelength_nm,a,b,c,d,e,f\n");
+    let mut table = String::from("# Unit: W cm-2 sr-1 nm-1\nwavelength_nm,a,b,c,d,e,f\n");
     for nm in (360..=830).step_by(10) {
         let radiance = |i: i32| f64::from(1 + i) * 1e-6 * (1.0 + 0.3 * (f64::from(nm + 40 * i) / 60.0).sin());
         let cells: Vec<String> = (0..6).map(|i| radiance(i).to_string()).collect();

@@ -55,7 +55,8 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
-    arguments.sensor.apply(&mut reader)?;
+    session.tell(&arguments.sensor.apply(&mut reader)?);
+    session.tell(arguments.noise.doubt().as_slice());
     let settings = NoiseSettings {
         seed: arguments.seed,
         sensor_seed: arguments.sensor_seed,

@@ -49,7 +49,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
-    arguments.sensor.apply(&mut reader)?;
+    session.tell(&arguments.sensor.apply(&mut reader)?);
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
     session.sign(stage.header_mut());
     if arguments.sigma {

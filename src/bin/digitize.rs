@@ -43,7 +43,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
-    arguments.sensor.apply(&mut reader)?;
+    session.tell(&arguments.sensor.apply(&mut reader)?);
     let settings = AdcSettings { bits: arguments.bits, bias_adu: arguments.bias, adu_per_e: arguments.slope };
     let mut stage = Digitize::new(reader.header(), &settings)?;
     propagation::note(stage.header_mut(), Equations::Exact);

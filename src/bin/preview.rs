@@ -21,7 +21,7 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// PNG file to write; `-` for standard output
-    #[arg(short, long, value_name = "FILE.png")]
+    #[arg(short, long, value_name = "FILE.png", value_parser = values::png_file())]
     output: PathBuf,
     /// Rectangle X,Y,W,H in pixels to show; by default the whole frame
     #[arg(long, value_name = "X,Y,W,H", value_parser = values::region)]

@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use cyanometer::cli;
+use cyanometer::color::Space;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::register::announce;
@@ -43,9 +44,15 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     announce(&[output.output.as_deref()])?;
     let matrix = conversion.load_matrix()?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
-    arguments.sensor.apply(&mut reader)?;
+    session.tell(&arguments.sensor.apply(&mut reader)?);
     let (mut stage, notes) = conversion.stage(matrix, reader.header_mut())?;
     session.tell(&notes);
+    if conversion.space == Space::Srgb && output.is_exr() {
+        session.warn(
+            "other programs take an EXR for linear light, and these are samples encoded for viewing; for a picture name a \
+             .tiff, or let `preview` make one",
+        );
+    }
     session.sign(stage.header_mut());
     if arguments.sigma {
         let stage = WithSigma::of_conversion(stage, reader.header())?;

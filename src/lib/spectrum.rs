@@ -6,6 +6,9 @@ use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
+/// Wavelengths that are all shorter than this, in nm, look like micrometers: no sensor behind a lens sees them.
+pub const SHORTEST_NM: f64 = 100.0;
+
 /// An even grid of wavelengths, and the rule that sums over it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WavelengthGrid {
@@ -50,6 +53,9 @@ impl WavelengthGrid {
                 "{self} nm make no grid; give START:END:STEP, such as {}",
                 Self::default()
             )));
+        }
+        if end_nm < SHORTEST_NM {
+            return Err(Error::Usage(format!("{self} nm look like micrometers; give nm, such as {}", Self::default())));
         }
         if (steps - steps.round()).abs() > 1e-6 {
             return Err(Error::Usage(format!("{self} nm do not end on a step; change the end or the step")));
@@ -280,9 +286,13 @@ mod tests {
     #[test]
     fn grids_that_make_no_sense_are_refused() {
         let grid = |start_nm, end_nm, step_nm| WavelengthGrid { start_nm, end_nm, step_nm, ..Default::default() };
-        for bad in
-            [grid(830.0, 360.0, 1.0), grid(360.0, 830.0, 0.0), grid(360.0, 830.0, f64::NAN), grid(360.0, 830.5, 1.0)]
-        {
+        for bad in [
+            grid(830.0, 360.0, 1.0),
+            grid(360.0, 830.0, 0.0),
+            grid(360.0, 830.0, f64::NAN),
+            grid(360.0, 830.5, 1.0),
+            grid(0.36, 0.83, 0.01),
+        ] {
             assert!(bad.points().is_err(), "{bad:?}");
         }
     }

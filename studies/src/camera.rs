@@ -105,7 +105,7 @@ impl Camera {
 }
 
 fn see(sensor: &Sensor, response: &SpectralResponse, observer: &Observer, file: &str) -> Result<Seen> {
-    let library = spectral::read_library(&sample_data(file), None)?;
+    let (library, _) = spectral::read_library(&sample_data(file), None)?;
     let signals = signals(&library, sensor, response, observer, &WavelengthGrid::default())?;
     Ok(Seen { library, signals })
 }

@@ -301,7 +301,7 @@ class Refusals(Case):
 
     def write_library(self, name, spectra):
         names = [f"s{number}" for number in range(len(spectra))]
-        lines = ["wavelength_nm," + ",".join(names)]
+        lines = ["# Unit: W cm-2 sr-1 nm-1", "wavelength_nm," + ",".join(names)]
         columns = np.asarray(spectra).T.tolist()
         for row, values in enumerate(columns):
             lines.append(",".join([f"{360 + row}", *(f"{value:.17g}" for value in values)]))

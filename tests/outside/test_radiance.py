@@ -131,7 +131,7 @@ class RadianceToElectrons(ProgramCase):
 
     def test_column_of_a_table(self):
         spectra = {"haze": self.random_radiance(), "clear": self.random_radiance()}
-        lines = ["wavelength_nm,haze,clear"]
+        lines = ["# Unit: W cm-2 sr-1 nm-1", "wavelength_nm,haze,clear"]
         lines += [f"{360 + i},{spectra['haze'][i]!r},{spectra['clear'][i]!r}" for i in range(471)]
         text = "\n".join(lines).replace("np.float64(", "").replace(")", "")
         (self.directory / "two.csv").write_text(text + "\n", encoding="utf-8")

@@ -5,6 +5,11 @@ use crate::units::MM_PER_UM;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
+/// In air no lens has a smaller f-number.
+const LEAST_F_NUMBER: f64 = 0.5;
+/// Times from here on look like ms, s.
+const LONG_S: f64 = 5.0;
+
 /// Exposure time and lens setting.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
@@ -42,7 +47,20 @@ impl Exposure {
                 self.lens_transmittance
             )));
         }
+        if self.f_number < LEAST_F_NUMBER {
+            return Err(Error::Usage(format!(
+                "an f-number of {} is beyond any lens; it looks like the inverse of {}",
+                self.f_number,
+                1.0 / self.f_number
+            )));
+        }
         Ok(self)
+    }
+
+    /// A warning of a time that looks as if it were in ms.
+    pub fn doubt(self) -> Option<String> {
+        let time = self.exposure_s;
+        (time >= LONG_S).then(|| format!("an exposure of {time} s is long; {time} ms is {} s", time / 1000.0))
     }
 
     /// Irradiance on the axis per radiance, in sr.
@@ -126,8 +144,12 @@ mod tests {
             Exposure { exposure_s: f64::NAN, ..good },
             Exposure { f_number: 0.0, ..good },
             Exposure { lens_transmittance: 1.1, ..good },
+            Exposure { f_number: 0.125, ..good },
         ] {
             assert!(bad.checked().is_err());
         }
+        assert_eq!(good.doubt(), None);
+        let doubt = Exposure { exposure_s: 33.0, ..good }.doubt().unwrap();
+        assert_eq!(doubt, "an exposure of 33 s is long; 33 ms is 0.033 s");
     }
 }

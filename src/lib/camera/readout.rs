@@ -1,8 +1,23 @@
 //! The read-out of a sensor: geometry, wells, noise, converter; and its dark current.
 
 use crate::cfa::FilterArray;
-use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM};
+use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, kelvin};
 use serde::{Deserialize, Serialize};
+
+/// The smallest and the largest pitch in µm that does not look like another unit.
+const LEAST_PITCH_UM: f64 = 0.2;
+/// See [`LEAST_PITCH_UM`].
+const MOST_PITCH_UM: f64 = 300.0;
+/// The lowest temperature in K that does not look like °C: charge freezes out below.
+const LEAST_TEMPERATURE_K: f64 = 70.0;
+/// The largest non-uniformity of dark current that does not look like per cent.
+const MOST_DCNU: f64 = 2.0;
+/// The same of the response.
+const MOST_PRNU: f64 = 0.5;
+/// The smallest full well in e⁻ that does not look like thousands of them.
+const LEAST_WELL_E: f64 = 100.0;
+/// So many times the range of the converter is beyond what amplifiers are set to.
+const MOST_RANGES: f64 = 100.0;
 
 /// What a sensor makes of charge, in numbers: what photon transfer measures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -78,6 +93,7 @@ impl ReadOut {
         if !self.bias_adu.is_finite() {
             return Err(format!("`bias_adu` is {}; it must be a finite number", self.bias_adu));
         }
+        self.check_units()?;
         match (self.dark_current_na_per_cm2, self.dark_current_e_per_s, self.pixel_pitch_um) {
             (Some(_), None, None) => {
                 Err("`dark_current_na_per_cm2` is that of an area, which needs `pixel_pitch_um`".into())
@@ -85,6 +101,67 @@ impl ReadOut {
             (Some(_), None, Some(_)) | (None, Some(_), _) => Ok(()),
             _ => Err("it must have one of `dark_current_na_per_cm2` and `dark_current_e_per_s`".into()),
         }
+    }
+
+    /// Checks that no number looks as if it were in another unit.
+    fn check_units(&self) -> Result<(), String> {
+        let suspect = |key: &str, value: f64, unit: &str, like: String| {
+            Err(format!("`{key}` is {value}; it is in {unit}, and {value} looks like {like}"))
+        };
+        if let Some(pitch) = self.pixel_pitch_um.filter(|pitch| *pitch < LEAST_PITCH_UM) {
+            return suspect("pixel_pitch_um", pitch, "um", "mm or m".into());
+        }
+        if let Some(pitch) = self.pixel_pitch_um.filter(|pitch| *pitch > MOST_PITCH_UM) {
+            return suspect("pixel_pitch_um", pitch, "um", "nm".into());
+        }
+        if self.temperature_k < LEAST_TEMPERATURE_K {
+            let kelvin = kelvin(self.temperature_k);
+            return suspect("temperature_k", self.temperature_k, "K", format!("degrees Celsius, which is {kelvin} K"));
+        }
+        for (key, value, most) in [("dcnu", self.dcnu, MOST_DCNU), ("prnu", self.prnu, MOST_PRNU)] {
+            if value > most {
+                return suspect(key, value, "fractions of 1", format!("per cent, which is {}", value / 100.0));
+            }
+        }
+        if self.full_well_e < LEAST_WELL_E {
+            let electrons = self.full_well_e * 1000.0;
+            return suspect(
+                "full_well_e",
+                self.full_well_e,
+                "electrons",
+                format!("thousands of them, which is {electrons}"),
+            );
+        }
+        if self.read_noise_e >= self.full_well_e {
+            return Err(format!(
+                "`read_noise_e` is {}, no less than `full_well_e`, {}; both are in electrons",
+                self.read_noise_e, self.full_well_e
+            ));
+        }
+        let top_code = 2_f64.powi(i32::try_from(self.bits).unwrap_or_default()) - 1.0;
+        if self.bias_adu > top_code {
+            return Err(format!(
+                "`bias_adu` is {}; the largest code of {} bits is {top_code}",
+                self.bias_adu, self.bits
+            ));
+        }
+        Ok(())
+    }
+
+    /// What is possible, but may not be meant: a warning each.
+    pub fn doubts(&self) -> Vec<String> {
+        let codes = 2_f64.powi(i32::try_from(self.bits).unwrap_or_default());
+        let reached = self.full_well_e * self.adu_per_e / codes;
+        let inverse = (reached > MOST_RANGES).then(|| {
+            format!(
+                "`adu_per_e` is {}, with which full well reaches {reached:.0} times the range of {} bits; it looks like \
+                 electrons per ADU, which is {} ADU per electron",
+                self.adu_per_e,
+                self.bits,
+                1.0 / self.adu_per_e
+            )
+        });
+        inverse.into_iter().collect()
     }
 
     /// Area of a photosite in cm², where the pitch is known.
@@ -176,5 +253,28 @@ pub(crate) mod tests {
         assert!(complaint(ReadOut { pixel_pitch_um: Some(0.0), ..kaf5101ce() }).contains("pixel_pitch_um"));
         assert!(complaint(ReadOut { pixel_pitch_um: None, ..kaf5101ce() }).contains("needs `pixel_pitch_um`"));
         assert_eq!(kaf5101ce().check(), Ok(()));
+    }
+
+    #[test]
+    fn numbers_that_look_like_another_unit_are_refused() {
+        for (readout, wanted) in [
+            (ReadOut { pixel_pitch_um: Some(0.0068), ..kaf5101ce() }, "it is in um, and 0.0068 looks like mm or m"),
+            (ReadOut { pixel_pitch_um: Some(6800.0), ..kaf5101ce() }, "6800 looks like nm"),
+            (ReadOut { temperature_k: 20.0, ..kaf5101ce() }, "looks like degrees Celsius, which is 293.15 K"),
+            (
+                ReadOut { prnu: 5.0, ..kaf5101ce() },
+                "`prnu` is 5; it is in fractions of 1, and 5 looks like per cent, which is 0.05",
+            ),
+            (ReadOut { dcnu: 20.0, ..kaf5101ce() }, "20 looks like per cent, which is 0.2"),
+            (ReadOut { full_well_e: 40.0, ..kaf5101ce() }, "40 looks like thousands of them, which is 40000"),
+            (ReadOut { read_noise_e: 50_000.0, ..kaf5101ce() }, "no less than `full_well_e`"),
+            (ReadOut { bits: 8, ..kaf5101ce() }, "the largest code of 8 bits is 255"),
+        ] {
+            let said = readout.check().unwrap_err();
+            assert!(said.contains(wanted), "{said}");
+        }
+        let [doubt] = &ReadOut { adu_per_e: 17.0, ..kaf5101ce() }.doubts()[..] else { panic!("no doubt") };
+        assert!(doubt.contains("166 times the range of 12 bits; it looks like electrons per ADU"), "{doubt}");
+        assert!(kaf5101ce().doubts().is_empty());
     }
 }

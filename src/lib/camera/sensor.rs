@@ -75,6 +75,12 @@ impl Sensor {
         }
     }
 
+    /// What is possible, but may not be meant: a warning each.
+    pub fn doubts(&self) -> Vec<String> {
+        let doubts = self.readout.as_ref().map(ReadOut::doubts).unwrap_or_default();
+        doubts.into_iter().map(|doubt| format!("{}: {doubt}", self.called())).collect()
+    }
+
     /// The read-out.
     ///
     /// # Errors

@@ -4,7 +4,7 @@ use crate::error::Error;
 use clap::Command;
 
 /// What supplies a key that metadata lack, the better choice first; it counts where the program has all its options.
-const SUPPLIES: [(&str, &str); 11] = [
+const SUPPLIES: [(&str, &str); 12] = [
     ("sensor", "--sensor NAME|FILE, or all of --bits, --bias and --slope"),
     ("sensor.readout", "a sensor that has it, --sensor NAME|FILE"),
     ("sensor.response", "a sensor that has it, --sensor NAME|FILE"),
@@ -12,7 +12,8 @@ const SUPPLIES: [(&str, &str); 11] = [
     ("exposure", "--exposure S and --f-number N"),
     ("white_level_adu", "--white-luminance CD_PER_M2"),
     ("white_level_adu", "--white N"),
-    ("black_level_adu", "--black N"),
+    ("black_level_adu", "--black N, 0 where it is off already"),
+    ("dark_signal_e", "--black N, 0 where it is off already"),
     ("cfa", "--pattern rggb|bggr|grbg|gbrg"),
     ("cfa", "--cfa PATTERN"),
     ("color.white", "--white-luminance CD_PER_M2"),
@@ -37,7 +38,8 @@ fn supply(key: &str, command: &Command) -> Option<String> {
     let of_key = |known: &str| key.strip_prefix(known).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
     let known = SUPPLIES.into_iter().filter(|(known, _)| of_key(known)).map(|(_, supply)| supply);
     let mut usable = known.filter(|supply| options_of(supply).all(|option| has(option, command)));
-    let in_metadata = || has("metadata", command).then(|| "--metadata FILE with it".to_owned());
+    let in_metadata =
+        || has("metadata", command).then(|| "--metadata FILE with it beside all else that is known".to_owned());
     usable.next().map(str::to_owned).or_else(in_metadata)
 }
 
@@ -80,11 +82,17 @@ mod tests {
         let all = "; give --sensor NAME|FILE, or all of --bits, --bias and --slope";
         assert_eq!(said("sensor.bits", &["sensor", "bits", "bias", "slope"]), format!("{missing}{all}"));
         assert_eq!(said("sensor.bits", &["sensor"]), format!("{missing}; give --sensor NAME|FILE"));
-        assert_eq!(said("sensor.bits", &["metadata"]), format!("{missing}; give --metadata FILE with it"));
+        assert_eq!(
+            said("sensor.bits", &["metadata"]),
+            format!("{missing}; give --metadata FILE with it beside all else that is known")
+        );
         assert_eq!(said("sensor.bits", &[]), missing);
         assert_eq!(said("sensors", &["sensor"]), "a.exr: the metadata has no `sensors`");
         let exposure = "a.exr: the metadata has no `exposure`";
-        assert_eq!(said("exposure", &["exposure", "metadata"]), format!("{exposure}; give --metadata FILE with it"));
+        assert_eq!(
+            said("exposure", &["exposure", "metadata"]),
+            format!("{exposure}; give --metadata FILE with it beside all else that is known")
+        );
     }
 
     #[test]

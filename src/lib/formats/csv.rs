@@ -1,12 +1,14 @@
 //! Tables of spectra as CSV, plain or gzipped.
 //!
-//! Lines that start with `#` are comments. Two layouts are read: a column of wavelengths in nm and one column per curve,
-//! or one row per spectrum under a header of wavelengths.
+//! Lines that start with `#` are comments. Two layouts are read: a column of wavelengths and one column per curve, or one
+//! row per spectrum under a header of wavelengths. Units stand in the header, in a row of their own below it, or in
+//! comments; wavelengths without a unit are in nm.
 
 use super::foreign::csv_complaint;
+use super::radiance_unit::{self, FileSays};
 use crate::error::{Error, Result};
-use crate::spectrum::{Curve, check_wavelengths};
-use crate::units::RadianceUnit;
+use crate::spectrum::{Curve, SHORTEST_NM, check_wavelengths};
+use crate::units::{RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
 use csv::StringRecord;
 use flate2::read::GzDecoder;
 use ndarray::Array2;
@@ -44,6 +46,10 @@ pub struct SpectralTable {
     pub columns: Vec<String>,
     /// Values, shape curves × wavelengths.
     pub values: Array2<f64>,
+    /// What the heading of each curve says about its unit.
+    headings: Vec<Option<Stated>>,
+    /// What comments say about units.
+    remarks: Vec<Stated>,
 }
 
 impl SpectralTable {
@@ -65,13 +71,18 @@ impl SpectralTable {
         }
         let has_header = number(&first[0]).is_none();
         let by_rows = has_header && first.len() > 2 && first.iter().skip(1).all(|cell| number(cell).is_some());
-        let Cells { numbers, labels } = Cells::read(name, &mut reader, (!has_header).then_some(&first), by_rows)?;
+        let below = if has_header && !by_rows { record_below(name, &mut reader)? } else { None };
+        let (units, at_hand) = match below {
+            Some(record) if is_units(&record) => (Some(record), None),
+            record => (None, record.or_else(|| (!has_header).then(|| first.clone()))),
+        };
+        let Cells { numbers, labels } = Cells::read(name, &mut reader, at_hand.as_ref(), by_rows)?;
         let (rows, width) = numbers.dim();
         if width < 2 || rows == 0 {
             return refuse("it needs a column of wavelengths in nm and at least one of values");
         }
         let values = numbers.slice(ndarray::s![.., 1..]);
-        let (wavelength_nm, columns, values) = if by_rows {
+        let (mut wavelength_nm, columns, values) = if by_rows {
             (first.iter().skip(1).filter_map(number).collect(), labels, values.to_owned())
         } else {
             let columns = match has_header {
@@ -80,8 +91,17 @@ impl SpectralTable {
             };
             (numbers.column(0).to_vec(), columns, values.t().to_owned())
         };
-        check_wavelengths(&wavelength_nm).map_err(|problem| Error::format(name, problem))?;
-        Ok(Self { name: name.into(), wavelength_nm, columns, values })
+        let comments = Comments::of(&bytes);
+        let headings = headings(&columns, units.as_ref(), by_rows.then_some(&first[0]));
+        let heading =
+            units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && unit_of_heading(cell).is_none());
+        let unit = wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength);
+        let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
+        wavelength_nm.iter_mut().for_each(|wavelength: &mut f64| *wavelength = unit.nm(*wavelength));
+        check_wavelengths(&wavelength_nm)
+            .and_then(|()| check_likely(&wavelength_nm))
+            .map_err(|problem| Error::format(name, problem))?;
+        Ok(Self { name: name.into(), wavelength_nm, columns, values, headings, remarks: comments.units })
     }
 
     /// The file as messages call it.
@@ -113,19 +133,104 @@ impl SpectralTable {
             .map_err(|problem| Error::format(&self.name, problem))
     }
 
-    /// The unit of radiance that a column's name ends with, such as `radiance_w_per_m2_sr_nm`.
-    pub fn unit_of(&self, index: usize) -> Option<RadianceUnit> {
-        let lower = self.columns.get(index)?.to_ascii_lowercase();
-        [
-            ("_mw_per_m2_sr_nm", RadianceUnit::MwPerM2SrNm),
-            ("_uw_per_cm2_sr_nm", RadianceUnit::UwPerCm2SrNm),
-            ("w_per_cm2_sr_nm", RadianceUnit::WPerCm2SrNm),
-            ("w_per_m2_sr_nm", RadianceUnit::WPerM2SrNm),
-            ("w_per_m2_sr_um", RadianceUnit::WPerM2SrUm),
-        ]
-        .into_iter()
-        .find_map(|(suffix, unit)| lower.ends_with(suffix).then_some(unit))
+    /// The unit of a curve of radiances, with a warning where it is assumed; `given` is what the user says.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`radiance_unit::settle`].
+    pub fn radiance_unit(&self, index: usize, given: Option<RadianceUnit>) -> Result<(RadianceUnit, Option<String>)> {
+        let heading = self.headings.get(index).and_then(Option::as_ref);
+        let place = "in the heading, as in `radiance (W m-2 sr-1 nm-1)`";
+        radiance_unit::settle(FileSays { name: &self.name, heading, remarks: &self.remarks, place }, given)
     }
+
+    /// A warning of values below zero in a curve of radiances, if there are any.
+    pub fn negative(&self, index: usize) -> Option<String> {
+        let values = self.values.row(index);
+        let count = values.iter().filter(|value| **value < 0.0).count();
+        let least = values.iter().copied().fold(0.0, f64::min);
+        let which = if self.columns.len() > 1 { format!("`{}`: ", self.columns[index]) } else { String::new() };
+        (count > 0).then(|| {
+            let all = values.len();
+            format!("{}: {which}{count} of {all} radiances are below 0, down to {least}, which no light is", self.name)
+        })
+    }
+}
+
+/// What comments say about units.
+#[derive(Debug, Default)]
+struct Comments {
+    units: Vec<Stated>,
+    wavelength: Option<WavelengthUnit>,
+}
+
+impl Comments {
+    /// Those of a table.
+    fn of(bytes: &[u8]) -> Self {
+        let mut found = Self::default();
+        let bytes = without_mark(bytes);
+        for line in bytes.split(|byte| *byte == b'\n').filter(|line| line.starts_with(b"#")).take(MAX_COMMENTS) {
+            let line = String::from_utf8_lossy(line);
+            found.units.extend(units_in(&line));
+            let mut clauses = line.split([',', ';']).filter(|clause| clause.to_lowercase().contains("wavelength"));
+            let unit = clauses.find_map(|clause| WavelengthUnit::of_heading(clause.trim()).ok().flatten());
+            found.wavelength = found.wavelength.or(unit);
+        }
+        found
+    }
+}
+
+/// So many comments are searched for units.
+const MAX_COMMENTS: usize = 1000;
+
+/// The record below the header, if there is one.
+fn record_below(name: &str, reader: &mut csv::Reader<&[u8]>) -> Result<Option<StringRecord>> {
+    let mut record = StringRecord::new();
+    let is_there = reader.read_record(&mut record).map_err(|e| csv_complaint(name, &e))?;
+    Ok(is_there.then_some(record))
+}
+
+/// Whether a record below the header holds units.
+fn is_units(record: &StringRecord) -> bool {
+    record.iter().all(|cell| number(cell).is_none())
+        && !matches!(WavelengthUnit::of_heading(record.get(0).unwrap_or_default()), Ok(None))
+}
+
+/// What headings say about the unit of each curve: those of its column in a row of units and in the header; where curves are
+/// rows, those of the row and of the header's first cell.
+fn headings(columns: &[String], units: Option<&StringRecord>, corner: Option<&str>) -> Vec<Option<Stated>> {
+    let unit_below = |index: usize| units.and_then(|units| units.get(index + 1)).and_then(unit_of_heading);
+    let of_corner = corner.and_then(unit_of_heading);
+    let one = |(index, column): (usize, &String)| {
+        unit_below(index).or_else(|| unit_of_heading(column)).or_else(|| of_corner.clone())
+    };
+    columns.iter().enumerate().map(one).collect()
+}
+
+/// The unit of wavelengths that their heading names.
+fn wavelength_unit(heading: Option<&str>) -> std::result::Result<Option<WavelengthUnit>, String> {
+    WavelengthUnit::of_heading(heading.unwrap_or_default()).map_err(|counted| {
+        format!("its first column holds {counted}; wavelengths are wanted, under a heading such as `wavelength_nm`")
+    })
+}
+
+/// Above this all wavelengths look like angstroms or wavenumbers, in nm: no silicon responds.
+const LONGEST_NM: f64 = 2000.0;
+
+/// Checks that wavelengths look like nm.
+fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
+    let [first, .., last] = wavelength_nm else { return Ok(()) };
+    let range = format!("its wavelengths run from {first} to {last} nm");
+    let name = "name their unit in the heading, such as";
+    if *last < SHORTEST_NM {
+        return Err(format!("{range}, which looks like micrometers; {name} `wavelength_um`"));
+    }
+    if *first > LONGEST_NM {
+        return Err(format!(
+            "{range}, which looks like angstroms or wavenumbers; {name} `wavelength_angstrom`, or give nm"
+        ));
+    }
+    Ok(())
 }
 
 /// A table's rows below its header.
@@ -177,7 +282,12 @@ fn reader(bytes: &[u8], has_headers: bool) -> csv::Reader<&[u8]> {
         .comment(Some(b'#'))
         .has_headers(has_headers)
         .trim(csv::Trim::All)
-        .from_reader(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes))
+        .from_reader(without_mark(bytes))
+}
+
+/// Bytes without a byte order mark.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
 }
 
 /// A finite number, if it is one.
@@ -237,9 +347,59 @@ mod tests {
         assert!(complaint(&packed.finish().unwrap()).contains("more than 256 MiB"));
     }
 
+    /// The unit is found wherever tables name it, that of the heading first.
     #[test]
-    fn a_column_may_name_its_unit() {
-        let table = SpectralTable::parse("a", b"nm,radiance_W_per_m2_sr_nm\n400,1\n").unwrap();
-        assert_eq!(table.unit_of(0), Some(RadianceUnit::WPerM2SrNm));
+    fn a_table_may_name_its_units_anywhere() {
+        let watts = RadianceUnit::parse("W m-2 sr-1 nm-1");
+        for text in [
+            "nm,radiance_W_per_m2_sr_nm\n400,1\n500,2\n",
+            "nm,radiance (W m-2 sr-1 nm-1)\n400,1\n500,2\n",
+            "# Unit: W/m²/sr/nm\nnm,L\n400,1\n500,2\n",
+            "wavelength,radiance\nnm,W/(m2 sr nm)\n400,1\n500,2\n",
+            "# computed from an irradiance in W m-2 nm-1\num,L [W/m2/sr/nm]\n0.4,1\n0.5,2\n",
+            "# Wavelength: um, radiance: W m-2 sr-1 nm-1\nwavelength,L\n0.4,1\n0.5,2\n",
+            "id W/m2/sr/nm,400,500\nx,1,2\n",
+        ] {
+            let table = SpectralTable::parse("a", text.as_bytes()).unwrap();
+            assert_eq!(table.wavelength_nm, [400.0, 500.0], "{text}");
+            assert_eq!(table.radiance_unit(0, None).unwrap(), (watts.unwrap(), None), "{text}");
+            assert_eq!(table.radiance_unit(0, watts).unwrap(), (watts.unwrap(), None), "{text}");
+            let other = table.radiance_unit(0, Some(RadianceUnit::default())).unwrap_err().to_string();
+            assert!(other.ends_with("not W cm-2 sr-1 nm-1; leave out `radiance_unit`"), "{other}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_radiance_or_says_nothing_is_told() {
+        let unit = |text: &str, given| SpectralTable::parse("a", text.as_bytes()).unwrap().radiance_unit(0, given);
+        let watts = RadianceUnit::USUAL[1];
+        let given = Some(watts);
+        let refused = |text: &str, given| unit(text, given).unwrap_err().to_string();
+        for given in [None, given] {
+            assert!(
+                refused("nm,E (W m-2 nm-1)\n400,1\n", given).contains("`W m-2 nm-1`, an irradiance, which has no sr-1")
+            );
+            assert!(refused("nm,photon_radiance\n400,1\n", given).contains("a unit of photons"));
+        }
+        assert!(refused("nm,L (1e-3 W m-2 sr-1 nm-1)\n400,1\n", None).contains("a number before it"));
+        assert_eq!(unit("nm,L (1e-3 W m-2 sr-1 nm-1)\n400,1\n", given).unwrap().0, watts);
+        let both = "# from W m-2 sr-1 nm-1 to W cm-2 sr-1 nm-1\nnm,L\n400,1\n";
+        assert!(refused(both, None).contains("name the units of radiance W m-2 sr-1 nm-1 and W cm-2 sr-1 nm-1"));
+        assert_eq!(unit(both, given).unwrap().0, watts);
+        let (assumed, warning) = unit("nm,L\n400,1\n", None).unwrap();
+        assert_eq!(assumed, RadianceUnit::default());
+        assert!(warning.unwrap().contains("taken as W cm-2 sr-1 nm-1"));
+        assert_eq!(unit("nm,L\n400,1\n", given).unwrap(), (watts, None));
+    }
+
+    #[test]
+    fn wavelengths_that_look_like_something_else_are_refused() {
+        let complaint = |text: &str| SpectralTable::parse("t", text.as_bytes()).unwrap_err().to_string();
+        assert!(complaint("wavelength,L\n0.4,1\n0.7,2\n").contains("0.4 to 0.7 nm, which looks like micrometers"));
+        assert!(complaint("wavelength,L\n4000,1\n7000,2\n").contains("looks like angstroms or wavenumbers"));
+        assert!(complaint("nu (cm-1),L\n14000,1\n25000,2\n").contains("holds wavenumbers"));
+        let table = SpectralTable::parse("t", b"nm,a,b\n400,1,1\n500,1,-2\n").unwrap();
+        assert_eq!(table.negative(0), None);
+        assert_eq!(table.negative(1).unwrap(), "t: `b`: 1 of 2 radiances are below 0, down to -2, which no light is");
     }
 }

@@ -157,7 +157,9 @@ pub fn load_observer() -> Result<Observer> {
 fn within_unit(sensor: &str, key: &str, curve: Curve) -> Result<Curve> {
     let (low, high) = curve.extremes();
     if low < 0.0 || high > 1.0 {
-        return Err(Error::format(sensor, format!("`{key}` runs from {low} to {high}; it must lie within 0 and 1")));
+        let per_cent = if low >= 0.0 && high <= 100.0 { ", and looks like per cent: divide it by 100" } else { "" };
+        let problem = format!("`{key}` runs from {low} to {high}; it must lie within 0 and 1{per_cent}");
+        return Err(Error::format(sensor, problem));
     }
     Ok(curve)
 }

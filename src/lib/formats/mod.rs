@@ -14,6 +14,7 @@ pub mod picture;
 pub mod pipe;
 pub mod places;
 pub mod plots;
+pub mod radiance_unit;
 pub mod register;
 pub mod spectral;
 pub mod standard;

@@ -152,7 +152,10 @@ impl Shade {
                 QuantityKind::Xyz => {
                     let white = metadata.color.as_ref().and_then(|color| color.white);
                     let white = white.ok_or_else(|| {
-                        frame.refuse("the metadata name no white; convert it with `to-xyz --space srgb` instead")
+                        frame.refuse(
+                            "the metadata name no white; give --range LOW,HIGH, or make it anew with `to-xyz \
+                             --white-luminance CD_PER_M2`",
+                        )
                     })?;
                     return Ok(Self::Xyz(linear_srgb_from_xyz(white)));
                 }
@@ -171,9 +174,8 @@ impl Shade {
                 }
                 QuantityKind::Unspecified => (lowest.min(0.0), highest),
                 other => {
-                    return Err(frame.refuse(format!(
-                        "{other} is no picture; convert it with `to-xyz --space srgb`, or give --range"
-                    )));
+                    return Err(frame
+                        .refuse(format!("{other} is no picture; give --range LOW,HIGH, or show what it was made of")));
                 }
             },
         };

@@ -4,12 +4,13 @@ use super::csv::SpectralTable;
 use super::files::{named, open_named, read_table, spool};
 use super::format::HEAD_BYTES;
 use super::input::{FrameReader, InputOptions};
+use super::radiance_unit::{self, FileSays};
 use super::table;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::spectrum::{SpectralLibrary, channel_wavelength_nm, chart_columns, check_wavelengths};
 use crate::stream::{RowSource, fold};
-use crate::units::{Any, RadianceUnit};
+use crate::units::{Any, OtherUnit, RadianceUnit, Stated, unit_of_heading};
 use ndarray::Array2;
 use std::io::{self, Read, Seek};
 use std::path::Path;
@@ -23,14 +24,16 @@ pub struct SpectralChannels {
     pub wavelength_nm: Vec<f64>,
     /// The unit of their samples.
     pub unit: RadianceUnit,
+    /// A warning, where the unit is assumed.
+    pub warning: Option<String>,
 }
 
 impl SpectralChannels {
-    /// Finds the spectral channels; `unit` overrides what the file says.
+    /// Finds the spectral channels; `unit` is what the user says of them.
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] when there are none, two share a wavelength, or the unit is none that is known.
+    /// [`Error::Format`] when there are none or two share a wavelength; those of [`radiance_unit::settle`].
     pub fn of(frame: &FrameHeader, unit: Option<RadianceUnit>) -> Result<Self> {
         let mut found: Vec<(f64, usize)> = frame
             .geometry
@@ -48,15 +51,14 @@ impl SpectralChannels {
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (wavelength_nm, channels): (Vec<f64>, Vec<usize>) = found.into_iter().unzip();
         check_wavelengths(&wavelength_nm).map_err(|problem| frame.refuse(problem))?;
-        let stated = &frame.metadata.unit;
-        let unit = match unit {
-            Some(unit) => unit,
-            None if stated.is_empty() => RadianceUnit::default(),
-            None => RadianceUnit::parse(stated).ok_or_else(|| {
-                frame.refuse(format!("its unit of radiance, `{stated}`, is not known; give --radiance-unit"))
-            })?,
-        };
-        Ok(Self { channels, wavelength_nm, unit })
+        let stated = frame.metadata.unit.as_str();
+        // What is no unit at all is none of radiance.
+        let unknown = || Stated::Other { text: stated.to_owned(), kind: OtherUnit::Unknown };
+        let heading = (!stated.is_empty()).then(|| unit_of_heading(stated).unwrap_or_else(unknown));
+        let place = "in the attribute `emissiveUnits`, as `W.m^-2.sr^-1.nm^-1`";
+        let says = FileSays { name: &frame.name, heading: heading.as_ref(), remarks: &[], place };
+        let (unit, warning) = radiance_unit::settle(says, unit)?;
+        Ok(Self { channels, wavelength_nm, unit, warning })
     }
 }
 
@@ -93,17 +95,20 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
     Ok(Radiances::Table(SpectralTable::parse(&name, &bytes)?))
 }
 
-/// Reads a whole library of spectra, CSV or spectral EXR, in W cm⁻² sr⁻¹ nm⁻¹; pixels count row by row.
+/// Reads a whole library of spectra, CSV or spectral EXR, in W cm⁻² sr⁻¹ nm⁻¹, with what a user should be warned of; pixels
+/// count row by row.
 ///
 /// # Errors
 ///
 /// [`Error::Format`] for what is no library, or a radiance that is not finite.
-pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralLibrary> {
+pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(SpectralLibrary, Vec<String>)> {
     let name = path.display().to_string();
     let options = InputOptions { path: Some(path.to_owned()), ..InputOptions::default() };
+    let mut warnings = Vec::new();
     let library = match open(&options)? {
         Radiances::Image(mut reader) => {
             let spectral = SpectralChannels::of(reader.header(), unit)?;
+            warnings.extend(spectral.warning);
             let geometry = reader.header().geometry.clone();
             let factor = spectral.unit.in_w_per_cm2_sr_nm();
             let mut radiance = Array2::zeros((geometry.width * geometry.height, spectral.channels.len()));
@@ -121,14 +126,28 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<SpectralL
             SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance, columns: geometry.width }
         }
         Radiances::Table(table) => {
-            let unit = unit.or_else(|| table.unit_of(0)).unwrap_or_default();
-            let radiance = table.values * unit.in_w_per_cm2_sr_nm();
+            let mut radiance = table.values.clone();
+            for (index, mut curve) in radiance.rows_mut().into_iter().enumerate() {
+                let (unit, warning) = table.radiance_unit(index, unit)?;
+                curve *= unit.in_w_per_cm2_sr_nm();
+                warnings.extend(warning.into_iter().filter(|_| index == 0));
+            }
             let columns = chart_columns(radiance.nrows());
             SpectralLibrary { wavelength_nm: table.wavelength_nm, radiance, columns }
         }
     };
     match library.radiance.indexed_iter().find(|(_, value)| !value.is_finite()) {
         Some(((sample, _), _)) => Err(Error::format(&name, format!("sample {sample} is not finite"))),
-        None => Ok(library),
+        None => {
+            warnings.extend(negative(&name, &library.radiance));
+            Ok((library, warnings))
+        }
     }
+}
+
+/// A warning of radiances below zero, if there are any.
+fn negative(name: &str, radiance: &Array2<f64>) -> Option<String> {
+    let samples = radiance.rows().into_iter().filter(|sample| sample.iter().any(|value| *value < 0.0)).count();
+    let all = radiance.nrows();
+    (samples > 0).then(|| format!("{name}: {samples} of {all} samples have radiances below 0, which no light is"))
 }

@@ -13,6 +13,7 @@ pub const FORMATS: &[FrameFormat] = &[
     unread::NEF,
     unread::ARW,
     unread::PEF,
+    unread::OTHER_RAW,
     unread::CR2,
     unread::CR3,
     unread::CRW,
@@ -92,6 +93,9 @@ mod tests {
     const RAW: &str = "which is not read yet; write its codes as a TIFF first, for example with `unprocessed_raw -T` of \
                        LibRaw, and name that file";
 
+    const OF_DNG: &str =
+        "; of DNG that are demosaicked or hold floats, which that program refuses, take what they were made of";
+
     /// Opens bytes as a file or as what comes down a pipe, which holds them.
     fn open(bytes: &[u8], piped: bool) -> Result<FrameReader> {
         let input = if piped {
@@ -161,8 +165,10 @@ mod tests {
             (vec![make("NIKON CORPORATION"), dng], "a DNG"),
             (vec![make("NIKON CORPORATION"), reduced.clone(), below.clone()], "a Nikon NEF"),
             (vec![make("SONY"), reduced.clone(), below.clone()], "a Sony ARW"),
+            (vec![make("SEIKO EPSON CORP."), reduced.clone(), below.clone()], "a camera's raw file"),
         ] {
-            assert_eq!(complaint(&tiff(&tags)), format!("in: it is {name}, {RAW}"));
+            let more = if name == "a DNG" { OF_DNG } else { "" };
+            assert_eq!(complaint(&tiff(&tags)), format!("in: it is {name}, {RAW}{more}"));
         }
         let mut pef = tiff(&[make("PENTAX Corporation")]);
         let compression = pef.windows(8).position(|entry| entry == [3, 1, 3, 0, 1, 0, 0, 0]).unwrap() + 8;

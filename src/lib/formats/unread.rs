@@ -12,16 +12,25 @@ use tiff::tags::Tag;
 const RAW: Reading = Reading::NotYet(
     "write its codes as a TIFF first, for example with `unprocessed_raw -T` of LibRaw, and name that file",
 );
+/// That program takes of DNG those alone that hold the integers of a plane.
+const RAW_DNG: Reading = Reading::NotYet(
+    "write its codes as a TIFF first, for example with `unprocessed_raw -T` of LibRaw, and name that file; of DNG that \
+     are demosaicked or hold floats, which that program refuses, take what they were made of",
+);
 
 /// Adobe's raw format, which also cameras write.
 pub const DNG: FrameFormat =
-    FrameFormat { name: "a DNG", sign: Sign::Tags(|_, directory| Ok(directory.has(DNG_VERSION))), reading: RAW };
+    FrameFormat { name: "a DNG", sign: Sign::Tags(|_, directory| Ok(directory.has(DNG_VERSION))), reading: RAW_DNG };
 /// Nikon's raw format.
 pub const NEF: FrameFormat = tagged("a Nikon NEF", |file, directory| is_raw_of(file, directory, &["NIKON"]));
 /// Sony's raw format.
 pub const ARW: FrameFormat = tagged("a Sony ARW", |file, directory| is_raw_of(file, directory, &["SONY"]));
 /// Pentax's raw format.
 pub const PEF: FrameFormat = tagged("a Pentax PEF", |file, directory| is_raw_of(file, directory, &["PENTAX", "RICOH"]));
+/// Those of other makers, such as Epson, Hasselblad, Kodak, Leaf, Mamiya and Samsung, that begin with a small picture.
+pub const OTHER_RAW: FrameFormat = tagged("a camera's raw file", |file, directory| {
+    Ok(directory.has(Tag::Make) && is_reduced(file, directory)? && directory.has(Tag::SubIfd))
+});
 /// Canon's raw format of 2004 to 2018.
 pub const CR2: FrameFormat = raw("a Canon CR2", |head| {
     head.starts_with(b"II*\0") && head.get(8..).is_some_and(|at| at.starts_with(b"CR\x02\0"))
@@ -75,7 +84,12 @@ fn is_raw_of(file: &mut TiffFile, directory: &Directory, makers: &[&str]) -> Res
     if !makers.iter().any(|maker| make.starts_with(maker)) {
         return Ok(false);
     }
-    let is_reduced = file.one(directory, Tag::NewSubfileType)?.is_some_and(|kind| kind & 1 == 1);
+    let is_reduced = is_reduced(file, directory)?;
     let compression = file.one(directory, Tag::Compression)?;
     Ok(is_reduced && directory.has(Tag::SubIfd) || compression.is_some_and(|number| OWN_COMPRESSIONS.contains(&number)))
+}
+
+/// Whether the first image is a smaller one of another.
+fn is_reduced(file: &mut TiffFile, directory: &Directory) -> Result<bool> {
+    Ok(file.one(directory, Tag::NewSubfileType)?.is_some_and(|kind| kind & 1 == 1))
 }

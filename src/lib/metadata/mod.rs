@@ -146,11 +146,22 @@ impl Metadata {
         }
     }
 
-    /// The black level in ADU, 0 where none is known; none where it differs among photosites.
+    /// The black level in ADU; none where none is known, or where it differs among photosites.
     pub fn uniform_black_adu(&self) -> Option<f64> {
         let is_level = |deltas: &[f64]| deltas.iter().all(|delta| *delta == 0.0);
-        let level = self.black_level_adu.map_or(Some(0.0), BlackLevel::uniform);
+        let level = self.black_level_adu.and_then(BlackLevel::uniform);
         level.filter(|_| is_level(&self.black_by_row) && is_level(&self.black_by_column))
+    }
+
+    /// What is possible, but may not be meant: a warning each.
+    pub fn doubts(&self) -> Vec<String> {
+        let black = self.black_level_adu.map(|level| level.sites().into_iter().fold(f64::NEG_INFINITY, f64::max));
+        let levels = black.zip(self.white_level_adu).filter(|(black, white)| *black >= white.largest());
+        let of_levels = levels.map(|(black, white)| {
+            format!("the black level, {black} ADU, is no less than the white level, {} ADU", white.largest())
+        });
+        let of_sensor = self.sensor.iter().flat_map(Sensor::doubts);
+        self.exposure.and_then(Exposure::doubt).into_iter().chain(of_levels).chain(of_sensor).collect()
     }
 
     /// Sets a black level that no row or column adds to.
@@ -263,12 +274,15 @@ impl FrameHeader {
         levels.map(Some).map_err(|problem| self.refuse(problem))
     }
 
-    /// The black level in ADU, 0 where none is known.
+    /// The black level in ADU.
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] where it differs among photosites.
+    /// [`Error::MissingKey`] where none is known; [`Error::Format`] where it differs among photosites.
     pub fn uniform_black_adu(&self) -> Result<f64> {
+        if self.black_levels()?.is_none() {
+            return Err(self.missing("black_level_adu"));
+        }
         self.metadata.uniform_black_adu().ok_or_else(|| {
             self.refuse("its black level differs among photosites; subtract it with `correct-frame --black auto` first")
         })

@@ -130,6 +130,22 @@ pub struct CorrectionRecord {
     pub cte: Option<f64>,
 }
 
+impl CorrectionRecord {
+    /// Whether anything was subtracted.
+    pub fn took_black(&self) -> bool {
+        self.black_adu.uniform() != Some(0.0) || self.black_deltas || self.dark_frames > 0
+    }
+
+    /// The same with what was subtracted later.
+    #[must_use]
+    pub fn and_black(self, black: BlackLevel, black_deltas: bool) -> Self {
+        let ([a, b, c, d], [e, f, g, h]) = (self.black_adu.sites(), black.sites());
+        let sum = BlackLevel::Sites([a + e, b + f, c + g, d + h]);
+        let black_adu = sum.uniform().map_or(sum, BlackLevel::from);
+        Self { black_adu, black_deltas: self.black_deltas || black_deltas, ..self }
+    }
+}
+
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
 fn is_zero(count: &u32) -> bool {
     *count == 0

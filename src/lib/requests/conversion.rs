@@ -6,7 +6,7 @@ use super::values;
 use crate::analysis::characterization::CameraMatrix;
 use crate::camera::optics::Exposure;
 use crate::color::Space;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::formats::data;
 use crate::metadata::FrameHeader;
 use crate::names::Named;
@@ -27,6 +27,9 @@ pub struct Conversion {
     /// The white of L\*a\*b\* and sRGB.
     #[command(flatten)]
     pub white: WhiteChoice,
+    /// Black level that is left in the frame, in ADU, for one whose metadata do not state it; 0 where it is off
+    #[arg(long, value_name = "N", value_parser = values::number, allow_negative_numbers = true)]
+    pub black: Option<f64>,
     /// Exposure time in s, for a frame whose metadata do not state it
     #[arg(id = "exposure", long, value_name = "S", value_parser = values::positive, allow_negative_numbers = true)]
     pub exposure_s: Option<f64>,
@@ -48,12 +51,19 @@ impl Conversion {
         data::load_matrix(&self.matrix)
     }
 
-    /// The stage that converts a frame, into whose metadata the chosen exposure goes; with what came up.
+    /// The stage that converts a frame, into whose metadata the chosen black level and exposure go; with what came up.
     ///
     /// # Errors
     ///
-    /// Those of [`Exposure::checked`] and [`ToXyz::new`].
+    /// Those of [`Exposure::checked`] and [`ToXyz::new`]; [`Error::Usage`] for another black level than the metadata state.
     pub fn stage(&self, matrix: CameraMatrix, frame: &mut FrameHeader) -> Result<(ToXyz, Vec<Note>)> {
+        if let Some(black) = self.black {
+            if frame.black_levels()?.is_some_and(|known| known.uniform() != Some(black)) {
+                let problem = format!("{}: its metadata state another black level than {black}", frame.name);
+                return Err(Error::Usage(problem).leave_out(&["black"]));
+            }
+            frame.metadata.set_black_adu(Some(black.into()));
+        }
         let metadata = &mut frame.metadata;
         let known = metadata.exposure;
         let exposure_s = self.exposure_s.or(known.map(|e| e.exposure_s));
@@ -62,7 +72,8 @@ impl Conversion {
         if let Some((exposure_s, f_number)) = exposure_s.zip(f_number) {
             metadata.exposure = Some(Exposure { exposure_s, f_number, lens_transmittance }.checked()?);
         }
-        let mut notes = Vec::new();
+        let long = metadata.exposure.and_then(Exposure::doubt).filter(|_| self.exposure_s.is_some());
+        let mut notes: Vec<Note> = long.map(Note::Warning).into_iter().collect();
         if let (Some(of_matrix), Some(of_frame)) = (&matrix.sensor, metadata.sensor.as_ref().map(|sensor| &sensor.name))
             && of_matrix != of_frame
         {

@@ -56,5 +56,8 @@ pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
         header.holds(),
         reader.stored_as()
     );
-    std::iter::once(found).chain(reader.notes().iter().cloned()).map(Note::Remark).collect()
+    let remarks = std::iter::once(found).chain(reader.notes().iter().cloned()).map(Note::Remark);
+    // Where a program of ours wrote the metadata, it has warned already.
+    let doubts = if header.metadata.history.is_empty() { header.metadata.doubts() } else { Vec::new() };
+    remarks.chain(doubts.into_iter().map(|doubt| Note::Warning(format!("{}: {doubt}", header.name)))).collect()
 }

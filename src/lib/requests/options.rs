@@ -1,5 +1,6 @@
 //! Groups of options that several programs share.
 
+use super::notes::Note;
 use super::values;
 use crate::analysis::characterization::evaluation::{Filling, SampleExposure};
 use crate::camera::optics::Exposure;
@@ -11,7 +12,7 @@ use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind}
 use crate::formats::pipe;
 use crate::random::Source;
 use crate::stages::noise::NoiseSettings;
-use crate::units::RadianceUnit;
+use crate::units::{RadianceUnit, kelvin};
 use clap::{Args, Command};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -57,16 +58,17 @@ pub struct SensorChoice {
 }
 
 impl SensorChoice {
-    /// Puts the sensor, if one was chosen, into the metadata of a frame.
+    /// Puts the sensor, if one was chosen, into the metadata of a frame; gives what in its description may not be meant.
     ///
     /// # Errors
     ///
     /// Those of [`data::load_sensor`].
-    pub fn apply(&self, reader: &mut FrameReader) -> Result<()> {
-        if let Some(sensor) = &self.sensor {
-            reader.header_mut().metadata.sensor = Some(data::load_sensor(sensor)?.sensor);
-        }
-        Ok(())
+    pub fn apply(&self, reader: &mut FrameReader) -> Result<Vec<Note>> {
+        let Some(sensor) = &self.sensor else { return Ok(Vec::new()) };
+        let loaded = data::load_sensor(sensor)?.sensor;
+        let doubts = loaded.doubts();
+        reader.header_mut().metadata.sensor = Some(loaded);
+        Ok(doubts.into_iter().map(Note::Warning).collect())
     }
 }
 
@@ -91,6 +93,12 @@ impl Output {
     /// Whether the frame goes through a pipe.
     pub fn is_pipe(&self) -> bool {
         pipe::is_output(self.output.as_deref())
+    }
+
+    /// Whether a file is named whose format is EXR.
+    pub fn is_exr(&self) -> bool {
+        let ends_so = |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr"));
+        self.output.as_ref().is_some_and(ends_so) && self.format.is_none_or(|format| format == Format::Exr)
     }
 
     /// Where and how to write.
@@ -164,7 +172,7 @@ impl ExposureChoice {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct SignalLevel {
     /// Choose the exposure time that puts the brightest class, on the axis, at this fraction of full well
-    #[arg(long, value_name = "FRACTION", value_parser = values::positive, allow_negative_numbers = true, conflicts_with_all = ["electrons", "dark", "exposure"])]
+    #[arg(long, value_name = "FRACTION", value_parser = values::filling, allow_negative_numbers = true, conflicts_with_all = ["electrons", "dark", "exposure"])]
     pub expose_to: Option<f64>,
     /// Expected electrons of R,G,B, given outright
     #[arg(long, value_name = "R,G,B", value_parser = values::electrons, allow_hyphen_values = true)]
@@ -239,11 +247,20 @@ pub struct NoiseChoice {
     #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = values::choice::<Source>())]
     pub without: Vec<Source>,
     /// Temperature of the sensor in K; by default the sensor's own
-    #[arg(id = "temperature", long, value_name = "K", value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(id = "temperature", long, value_name = "K", value_parser = values::kelvin, allow_negative_numbers = true)]
     pub temperature_k: Option<f64>,
 }
 
 impl NoiseChoice {
+    /// A warning of a temperature that looks like °C; next to none, which leaves out the dark signal, is meant.
+    pub fn doubt(&self) -> Option<Note> {
+        /// Temperatures, in K, that no silicon works at.
+        const COLD_K: std::ops::Range<f64> = 2.0..70.0;
+        let cold = self.temperature_k.filter(|kelvin| COLD_K.contains(kelvin))?;
+        let meant = kelvin(cold);
+        Some(Note::Warning(format!("a temperature of {cold} K looks like degrees Celsius, which is {meant} K")))
+    }
+
     /// The noise of the seeds 0.
     pub fn settings(&self) -> NoiseSettings {
         NoiseSettings { without: self.without.clone(), temperature_k: self.temperature_k, ..NoiseSettings::default() }

@@ -6,7 +6,7 @@ use crate::color::White;
 use crate::names::Named;
 use crate::spectrum::WavelengthGrid;
 use crate::stages::black::Black;
-use crate::units::RadianceUnit;
+use crate::units::{self, RadianceUnit};
 use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
 
@@ -23,8 +23,17 @@ pub fn one_of<T: Named>(values: &'static [T]) -> impl TypedValueParser<Value = T
 
 /// A parser for the name of an EXR file to write; other names without an extension may be devices.
 pub fn exr_file() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(|path: PathBuf| match path.extension() {
-        Some(end) if !end.eq_ignore_ascii_case("exr") => Err("end the name in .exr"),
+    file_of_kind("exr", "end the name in .exr")
+}
+
+/// The same for the name of a PNG file.
+pub fn png_file() -> impl TypedValueParser<Value = PathBuf> {
+    file_of_kind("png", "end the name in .png")
+}
+
+fn file_of_kind(end: &'static str, advice: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path: PathBuf| match path.extension() {
+        Some(other) if !other.eq_ignore_ascii_case(end) => Err(advice),
         _ => Ok(path),
     })
 }
@@ -109,7 +118,42 @@ pub fn patch(text: &str) -> Result<[usize; 2], String> {
 ///
 /// What is expected, in words.
 pub fn fraction(text: &str) -> Result<f64, String> {
-    positive(text).ok().filter(|x| *x <= 1.0).ok_or_else(|| "give a fraction above 0 and at most 1".into())
+    let wrong = || format!("give a fraction above 0 and at most 1{}", per_cent(text));
+    positive(text).ok().filter(|x| *x <= 1.0).ok_or_else(wrong)
+}
+
+/// Reads a fraction of full well, which may be more than 1.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn filling(text: &str) -> Result<f64, String> {
+    match positive(text) {
+        Ok(found) if per_cent(text).is_empty() => Ok(found),
+        Ok(_) => Err(format!("give a fraction of full well{}", per_cent(text))),
+        Err(problem) => Err(problem),
+    }
+}
+
+/// What to say of a number that looks like per cent where a fraction is wanted; nothing of others.
+fn per_cent(text: &str) -> String {
+    let found = number(text).ok().filter(|x| (PER_CENT_FROM..=100.0).contains(x));
+    found.map_or(String::new(), |x| format!("; {x} looks like per cent, which is {}", x / 100.0))
+}
+
+/// From here on a number looks like per cent; below, like a fraction that is too large.
+const PER_CENT_FROM: f64 = 5.0;
+
+/// Reads a temperature in K.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn kelvin(text: &str) -> Result<f64, String> {
+    let celsius = number(text).ok().filter(|x| (-200.0..=0.0).contains(x));
+    let hint =
+        celsius.map_or(String::new(), |x| format!("; {x} looks like degrees Celsius, which is {} K", units::kelvin(x)));
+    positive(text).map_err(|_| format!("give a temperature in K, above 0{hint}"))
 }
 
 /// Reads a black level: `auto`, `none`, or a number.
@@ -182,8 +226,8 @@ pub fn pattern(text: &str) -> Result<CfaPattern, String> {
 /// The units that there are.
 pub fn radiance_unit(text: &str) -> Result<RadianceUnit, String> {
     RadianceUnit::parse(text).ok_or_else(|| {
-        let names: Vec<&str> = RadianceUnit::ALL.into_iter().map(RadianceUnit::name).collect();
-        format!("known units are {}", names.join("; "))
+        let names: Vec<String> = RadianceUnit::USUAL.iter().map(ToString::to_string).collect();
+        format!("known units are {} and the like", names.join("; "))
     })
 }
 

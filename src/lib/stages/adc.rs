@@ -111,8 +111,10 @@ impl Digitize {
         }
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
         metadata.adc = Some(adc);
-        let dark_signal_e = metadata.dark_signal_e.take().unwrap_or(0.0);
-        metadata.set_black_adu(Some((adc.bias_adu + adc.adu_per_e * dark_signal_e).into()));
+        // Expected electrons are those of light alone.
+        let is_light = input.metadata.quantity == QuantityKind::ExpectedElectrons;
+        let dark_signal_e = metadata.dark_signal_e.take().or(is_light.then_some(0.0));
+        metadata.set_black_adu(dark_signal_e.map(|dark_e| (adc.bias_adu + adc.adu_per_e * dark_e).into()));
         metadata.white_level_adu = Some(f64::from(adc.top_code()).into());
         Ok(Self { header: FrameHeader { metadata, ..input.clone() }, adc })
     }

@@ -2,7 +2,7 @@
 
 use crate::camera::levels::{BlackLevels, WhiteLevel};
 use crate::cfa::CfaPattern;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
 use crate::units::QuantityKind;
@@ -19,24 +19,35 @@ pub enum Black {
 }
 
 impl Black {
-    /// What comes off each photosite of a frame; zero where the metadata know of nothing.
+    /// What comes off each photosite of a frame.
     ///
     /// # Errors
     ///
-    /// Those of [`FrameHeader::black_levels`].
+    /// [`Error::MissingKey`] where the metadata shall say it and do not; [`Error::Usage`] for a level of a frame that has
+    /// lost its black; those of [`FrameHeader::black_levels`].
     pub fn levels(self, frame: &FrameHeader) -> Result<BlackLevels> {
         let metadata = &frame.metadata;
         let level = match self {
+            Self::Level(level) if level != 0.0 && is_off(frame)? => {
+                let problem = format!("{}: its black level is off already, as its metadata say", frame.name);
+                return Err(Error::Usage(problem).leave_out(&["black"]));
+            }
             Self::Level(level) => level,
             Self::None => 0.0,
             Self::Auto => match metadata.quantity {
-                QuantityKind::Electrons => metadata.dark_signal_e.unwrap_or(0.0),
+                QuantityKind::Electrons => metadata.dark_signal_e.ok_or_else(|| frame.missing("dark_signal_e"))?,
                 QuantityKind::ExpectedElectrons => 0.0,
-                _ => return Ok(frame.black_levels()?.unwrap_or(BlackLevels::uniform_at(0.0))),
+                _ => return frame.black_levels()?.ok_or_else(|| frame.missing("black_level_adu")),
             },
         };
         Ok(BlackLevels::uniform_at(level))
     }
+}
+
+/// Whether a program has subtracted all of the black level.
+fn is_off(frame: &FrameHeader) -> Result<bool> {
+    let is_left = frame.black_levels()?.is_none_or(|black| black.uniform() != Some(0.0));
+    Ok(frame.metadata.correction.is_some_and(|record| record.took_black()) && !is_left)
 }
 
 /// What no light reads once `subtracted` is off; a frame of unknown black counts as black-free after a subtraction. None

@@ -53,7 +53,9 @@ impl CorrectFrame {
         let mut warnings = Vec::new();
         if let Some(darks) = darks {
             check_alike(input, darks.head())?;
+            darks.check_dark()?;
             warnings = differences(input, darks.head());
+            warnings.extend(darks.taken_on_trust(input));
             warnings.extend_from_slice(darks.warnings());
         }
         let known_black = input.black_levels()?;
@@ -88,14 +90,14 @@ impl CorrectFrame {
         let off = if darks.is_none() { Some(&levels) } else { known_black.as_ref() };
         note_levels(&mut metadata, input, off, is_subtracted)?;
         if let Some(cte) = cte {
-            let black_left = metadata.uniform_black_adu().ok_or_else(|| {
-                input.refuse(
+            if metadata.black_level_adu.is_some() && metadata.uniform_black_adu().is_none() {
+                return Err(input.refuse(
                     "what is left of its black level differs among photosites, so that it is no charge; subtract it with \
                      --black auto as transfer is undone",
-                )
-            })?;
+                ));
+            }
             let restored = |level: f64| bias_adu + (level - bias_adu) / uniform_share(cte);
-            metadata.black_level_adu = metadata.black_level_adu.map(|_| restored(black_left).into());
+            metadata.black_level_adu = metadata.black_level_adu.map(|level| level.map(restored));
             metadata.white_level_adu = metadata.white_level_adu.map(|white| white.map(restored));
         }
         if is_subtracted && darks.is_none() && levels.uniform() == Some(0.0) {
@@ -296,7 +298,14 @@ mod tests {
         let mut long = frame.clone();
         long.name = "long".into();
         long.metadata.exposure = Some(Exposure { exposure_s: 0.5, f_number: 8.0, lens_transmittance: 1.0 });
-        let said = |darks: &[&FrameHeader]| correct(&frame, Black::None, None, darks).unwrap().warnings().to_vec();
+        let said = |darks: &[&FrameHeader]| {
+            let made = correct(&frame, Black::None, None, darks).unwrap();
+            let (on_trust, others): (Vec<_>, Vec<_>) =
+                made.warnings().iter().cloned().partition(|text| text.contains("the metadata do not tell whether"));
+            // None of them says which sensor took it, and that none is lit.
+            assert_eq!(on_trust.len(), 1);
+            others
+        };
         let differ = "its exposure is 0.5 s, but that of codes is 0.1 s; their dark signals differ";
         assert_eq!(said(&[&long]), [format!("long: {differ}")]);
         assert_eq!(said(&[&frame, &long]), [format!("long: {differ}")]);

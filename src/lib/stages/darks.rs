@@ -1,9 +1,9 @@
 //! Dark frames that count as one: their mean, taken off a frame while its rows are read.
 
 use crate::cfa::FilterArray;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::to_sample;
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, Metadata};
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 
@@ -13,6 +13,10 @@ pub struct DarkStack {
     head: FrameHeader,
     frames: u32,
     warnings: Vec<String>,
+    /// Name and scene of the first that was lit.
+    lit: Option<(String, String)>,
+    /// Names of those whose metadata do not say that they are dark, or what sensor drew their noise.
+    silent: Vec<String>,
 }
 
 impl DarkStack {
@@ -24,7 +28,8 @@ impl DarkStack {
     /// as the converter gave them.
     pub fn alike(head: FrameHeader, frames: u32) -> Result<Self> {
         check_codes(&head)?;
-        Ok(Self { head, frames, warnings: Vec::new() })
+        let (lit, silent) = (lit(&head), if says_enough(&head) { Vec::new() } else { vec![head.name.clone()] });
+        Ok(Self { head, frames, warnings: Vec::new(), lit, silent })
     }
 
     /// Frames with heads of their own; none of none.
@@ -41,6 +46,8 @@ impl DarkStack {
             check_codes(head)?;
             check_alike(first, head)?;
             stack.warnings.extend(differences(first, head));
+            stack.lit = stack.lit.or_else(|| lit(head));
+            stack.silent.extend((!says_enough(head)).then(|| head.name.clone()));
             stack.frames += 1;
         }
         match stack.frames {
@@ -59,6 +66,33 @@ impl DarkStack {
     /// How many there are.
     pub fn frames(&self) -> u32 {
         self.frames
+    }
+
+    /// Makes sure that no light fell on any of them, as far as their metadata tell.
+    pub(super) fn check_dark(&self) -> Result<()> {
+        match &self.lit {
+            None => Ok(()),
+            Some((name, scene)) => Err(Error::format(
+                name,
+                format!(
+                    "its scene, {scene}, was lit; a dark frame is taken without light, as `render-radiance --dark` renders it"
+                ),
+            )),
+        }
+    }
+
+    /// A warning where nothing says that they are dark frames of the sensor that took `frame`.
+    pub(super) fn taken_on_trust(&self, frame: &FrameHeader) -> Option<String> {
+        let named = match self.silent.as_slice() {
+            [] if says_enough_of_sensor(frame) => return None,
+            [] => self.head.name.clone(),
+            [one] => one.clone(),
+            [first, others @ ..] => format!("{first} and {} more", others.len()),
+        };
+        Some(format!(
+            "{named}: the metadata do not tell whether it is a dark frame of the sensor that took {}",
+            frame.name
+        ))
     }
 
     /// What makes the dark signal of one differ from that of the first.
@@ -85,7 +119,23 @@ pub(super) fn check_codes(frame: &FrameHeader) -> Result<()> {
     }
 }
 
-/// Makes sure that a dark frame shows the photosites of `frame`.
+/// Name and scene of a frame on which light fell, as its metadata tell.
+fn lit(frame: &FrameHeader) -> Option<(String, String)> {
+    let scene = frame.metadata.scene.as_ref()?;
+    (scene.expected_electrons != Some([0.0; 3])).then(|| (frame.name.clone(), scene.source.clone()))
+}
+
+/// Whether the metadata of a frame tell its scene and its sensor.
+fn says_enough(frame: &FrameHeader) -> bool {
+    frame.metadata.scene.is_some() && says_enough_of_sensor(frame)
+}
+
+/// Whether the metadata of a frame tell which sensor drew its noise; one without noise has any.
+fn says_enough_of_sensor(frame: &FrameHeader) -> bool {
+    frame.metadata.noise.is_some() || frame.metadata.scene.is_some() && frame.metadata.sensor.is_some()
+}
+
+/// Makes sure that a dark frame shows the photosites of `frame`, of the same sensor as far as metadata tell.
 pub(super) fn check_alike(frame: &FrameHeader, dark: &FrameHeader) -> Result<()> {
     let differs = |what: &str, its: String, theirs: String| {
         Err(dark.refuse(format!("its {what} is {its}, but that of {} is {theirs}", frame.name)))
@@ -106,7 +156,17 @@ pub(super) fn check_alike(frame: &FrameHeader, dark: &FrameHeader) -> Result<()>
         let name = |cfa: Option<FilterArray>| cfa.map_or("none".to_owned(), |cfa| cfa.to_string());
         return differs("pattern", name(b), name(a));
     }
-    Ok(())
+    let sensor = |metadata: &Metadata| metadata.sensor.as_ref().map(|sensor| sensor.name.clone());
+    if let (Some(a), Some(b)) = (sensor(&frame.metadata), sensor(&dark.metadata))
+        && a != b
+    {
+        return differs("sensor", b, a);
+    }
+    let seed = |metadata: &Metadata| metadata.noise.as_ref().map(|noise| noise.sensor_seed);
+    match (seed(&frame.metadata), seed(&dark.metadata)) {
+        (Some(a), Some(b)) if a != b => differs("sensor seed", b.to_string(), a.to_string()),
+        _ => Ok(()),
+    }
 }
 
 /// What makes the dark signal of two frames differ.

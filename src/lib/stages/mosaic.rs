@@ -1,9 +1,10 @@
 //! The color filter array: of three planes, each photosite keeps the one that its filter lets through.
 
+use crate::camera::levels::BlackLevel;
 use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::Result;
 use crate::frame::{Rows, Window};
-use crate::metadata::FrameHeader;
+use crate::metadata::{CorrectionRecord, FrameHeader, Metadata};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::stream::{Counts, Stage};
 use crate::units::{Any, QuantityKind};
@@ -77,6 +78,7 @@ impl Mosaic {
         let mut metadata = input.metadata.becoming(input.metadata.quantity);
         metadata.predicted.clone_from(&input.metadata.predicted);
         metadata.cfa = Some(pattern.into());
+        metadata.correction = correction_of(&metadata);
         metadata.demosaic = None;
         let header = FrameHeader { geometry: input.geometry.with_channels(&["Y"]), metadata, name: input.name.clone() };
         Ok(Self { header, pattern })
@@ -95,6 +97,20 @@ impl Mosaic {
             vectors::run_on(instructions, Alternate { even, odd, to: output.row(y, 0) });
         }
         Counts::default()
+    }
+}
+
+/// What is off the codes of a plane: what demosaicking subtracted, which it no longer tells, with what came off before.
+fn correction_of(metadata: &Metadata) -> Option<CorrectionRecord> {
+    let nothing = CorrectionRecord { black_adu: BlackLevel::from(0.0), black_deltas: false, dark_frames: 0, cte: None };
+    let is_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
+    match metadata.demosaic.as_ref().filter(|_| is_codes) {
+        Some(record) => {
+            let before = metadata.correction.unwrap_or(nothing);
+            let sum = before.and_black(record.black, record.black_deltas);
+            Some(sum).filter(|sum| *sum != nothing)
+        }
+        None => metadata.correction,
     }
 }
 

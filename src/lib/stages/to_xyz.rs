@@ -48,6 +48,7 @@ pub struct ColorSettings {
 /// # let mut metadata = Metadata::new(QuantityKind::Adu);
 /// # metadata.sensor = Some(load_sensor("kaf-5101ce")?.sensor);
 /// # metadata.exposure = Some(Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
+/// # metadata.black_level_adu = Some(0.0.into());
 /// # let geometry = Geometry::new(1, 1, &["R", "G", "B"]);
 /// # let header = FrameHeader { name: "example".into(), geometry, metadata };
 ///
@@ -82,7 +83,7 @@ impl ToXyz {
     ///
     /// # Errors
     ///
-    /// [`Error::Order`] unless the frame holds three planes of ADU; [`Error::MissingKey`] without exposure;
+    /// [`Error::Order`] unless the frame holds three planes of ADU; [`Error::MissingKey`] without exposure or black level;
     /// [`Error::Usage`] for an impossible white; [`Error::Format`] where the black level
     /// differs among photosites.
     pub fn new(input: &FrameHeader, settings: &ColorSettings) -> Result<Self> {

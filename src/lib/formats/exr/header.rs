@@ -116,7 +116,9 @@ fn own_tags(tags: &ExrTags, geometry: &Geometry, notes: &mut Vec<String>) -> Met
 fn check_kind(header: &Header, name: &str) -> Result<()> {
     let refuse = |problem: &str| Err(Error::format(name, problem));
     if header.deep {
-        return refuse("deep data are not supported; flatten them first, for example with `oiiotool --flatten`");
+        return refuse(
+            "deep data are not supported; flatten them first, for example with `oiiotool in.exr --flatten -o out.exr`",
+        );
     }
     if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
         return refuse(SUBSAMPLED);

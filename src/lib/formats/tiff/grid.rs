@@ -104,7 +104,7 @@ impl Grid {
             return Ok(());
         }
         Err(file.problem(format!(
-            "{} rows are compressed as one piece of {} MiB, more than fits into memory; rewrite it with smaller strips, for example with `tiffcp -r 64`",
+            "{} rows are compressed as one piece of {} MiB, more than fits into memory; rewrite it with smaller strips, for example with `tiffcp -s -r 64 in.tif out.tif`",
             self.chunk_rows,
             together >> 20
         )))

@@ -136,7 +136,7 @@ fn size(file: &mut TiffFile, directory: &Directory) -> Result<[u64; 3]> {
 fn is_planar(file: &mut TiffFile, directory: &Directory, channels: u64) -> Result<bool> {
     if file.one(directory, Tag::FillOrder)?.unwrap_or(1) != 1 {
         return Err(file.problem(
-            "bits in reversed order (FillOrder 2) are not supported; rewrite it, for example with `tiffcp -f msb2lsb`",
+            "bits in reversed order (FillOrder 2) are not supported; rewrite it, for example with `tiffcp -f msb2lsb in.tif out.tif`",
         ));
     }
     match file.one(directory, Tag::PlanarConfiguration)?.unwrap_or(1) {

@@ -160,7 +160,7 @@ impl TiffReader {
         if self.decoded.try_reserve_exact(one * fitting).is_err() {
             let mebibytes = one >> 20;
             return Err(self.file.problem(format!(
-                "its strips or tiles need {mebibytes} MiB of memory at a time, and there is not so much; rewrite it with smaller ones, for example with `tiffcp -r 64`"
+                "its strips or tiles need {mebibytes} MiB of memory at a time, and there is not so much; rewrite it with smaller ones, for example with `tiffcp -s -r 64 in.tif out.tif`"
             )));
         }
         self.decoded.resize(one * fitting, 0);

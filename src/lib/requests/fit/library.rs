@@ -5,6 +5,7 @@ use crate::analysis::characterization::{Signals, signals};
 use crate::error::{Error, Result};
 use crate::formats::data::LoadedSensor;
 use crate::formats::{csv, files, spectral};
+use crate::requests::notes::Note;
 use crate::spectrum::{Observer, SpectralLibrary, WavelengthGrid};
 use std::path::Path;
 
@@ -16,6 +17,8 @@ pub(super) struct SeenLibrary {
     pub(super) signals: Signals,
     /// The label of each sample; empty where samples have none.
     pub(super) labels: Vec<String>,
+    /// What came up as it was read.
+    pub(super) notes: Vec<Note>,
 }
 
 /// Who looks at libraries.
@@ -39,11 +42,12 @@ impl Viewer<'_> {
 
     /// Reads a library without labels.
     pub(super) fn see(&self, path: &Path, fit: &Fit) -> Result<SeenLibrary> {
-        let library = spectral::read_library(path, fit.radiance_unit)?;
+        let (library, warnings) = spectral::read_library(path, fit.radiance_unit)?;
         let (sensor, response) = (&self.loaded.sensor, self.loaded.response()?);
         let signals = signals(&library, sensor, response, &self.observer, &self.grid)?;
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        Ok(SeenLibrary { name, library, signals, labels: Vec::new() })
+        let notes = warnings.into_iter().map(Note::Warning).collect();
+        Ok(SeenLibrary { name, library, signals, labels: Vec::new(), notes })
     }
 }
 

@@ -50,15 +50,22 @@ impl Fit {
         let responses = responses(&loaded.sensor, loaded.response()?, &viewer.observer, &viewer.grid)?;
         let fitting = Fitting { fit: self, sensor: &loaded.sensor, seen: &seen, responses, plan, exposure };
         let (fitted, trade_off) = fitting.fit()?;
-        let mut notes = vec![Note::Remark(format!(
+        let mut notes = seen.notes.clone();
+        let long = self.exposure.exposure_s.and_then(|exposure_s| self.exposure.lens.exposed(exposure_s).ok()?.doubt());
+        notes.extend(loaded.sensor.doubts().into_iter().chain(long).map(Note::Warning));
+        notes.push(Note::Remark(format!(
             "fitted {} observations, condition number {:.1}",
             fitted.count, fitted.condition
-        ))];
+        )));
         let matrix = fitting.matrix(&fitted, viewer.grid)?;
         let evaluation = match &self.evaluate {
             None => None,
             Some(path) if is_same(path, &self.library) => Some(fitting.evaluation(&fitted, &seen)?),
-            Some(path) => Some(fitting.evaluation(&fitted, &viewer.see(path, self)?)?),
+            Some(path) => {
+                let other = viewer.see(path, self)?;
+                notes.extend(other.notes.iter().cloned());
+                Some(fitting.evaluation(&fitted, &other)?)
+            }
         };
         let full_well_e = loaded.sensor.readout()?.full_well_e;
         match evaluation.as_ref().map_or(0, |evaluation| evaluation.beyond_full_well(full_well_e)) {

@@ -193,6 +193,7 @@ impl NoisePrediction {
     /// Those of readers, sensor and matrix files and of the predictor; [`Error::Usage`] where the request makes no sense.
     pub fn run(&self) -> Result<PredictedNoise> {
         let mut found = if self.all_samples { self.of_library()? } else { self.of_scene()? };
+        found.notes.extend(self.noise.doubt());
         let first_order = found.budgets.scenes().into_iter().filter_map(|scene| scene.first_order);
         if let Some(void) = first_order.into_iter().find(|first_order| !first_order.holds) {
             found.notes.push(Note::Warning(format!(
@@ -238,15 +239,17 @@ impl NoisePrediction {
             return Err(Error::Usage("--all-samples is for a library of spectra; name one".into()));
         };
         let loaded = data::load_sensor(&self.subject.sensor)?;
-        let library = spectral::read_library(input, self.spectrum.radiance_unit)?;
+        let (library, warnings) = spectral::read_library(input, self.spectrum.radiance_unit)?;
         let observer = data::load_observer()?;
         let signals = signals(&library, &loaded.sensor, loaded.response()?, &observer, &WavelengthGrid::default())?;
         let base = self.exposure.chosen()?;
+        let long = base.doubt().filter(|_| self.level.expose_to.is_none());
         let exposing = match self.level.expose_to {
             Some(fraction) => SampleExposure::Filled { base, fraction, by: Filling::Time },
             None => SampleExposure::Fixed(base),
         };
-        let mut notes = Vec::new();
+        let mut notes: Vec<Note> =
+            warnings.into_iter().chain(loaded.sensor.doubts()).chain(long).map(Note::Warning).collect();
         let color = self.color(&loaded.sensor, &mut notes)?;
         let one = |sample: usize| -> Result<SamplePrediction> {
             let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;

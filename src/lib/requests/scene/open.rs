@@ -80,6 +80,7 @@ impl Scene {
             exposure.exposure_s = 1.0;
         }
         let mut found = Found { metadata: Metadata::new(QuantityKind::ExpectedElectrons), notes: Vec::new() };
+        found.notes.extend(loaded.sensor.doubts().into_iter().chain(self.doubt(exposure)).map(Note::Warning));
         let mut light = match self.level.given() {
             Some(electrons) => {
                 let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
@@ -111,6 +112,11 @@ impl Scene {
         Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, found })
     }
 
+    /// A warning of an exposure that was given.
+    fn doubt(&self, exposure: Exposure) -> Option<String> {
+        exposure.doubt().filter(|_| self.level.expose_to.is_none())
+    }
+
     /// Opens the radiance at an exposure.
     fn open_light(&self, loaded: &LoadedSensor, exposure: &Exposure, found: &mut Found) -> Result<Light> {
         let grid = WavelengthGrid { quadrature: self.quadrature, ..self.wavelengths };
@@ -133,23 +139,31 @@ impl Scene {
     fn light_of_table(&self, table: &SpectralTable, sums: &Sums, found: &mut Found) -> Result<Light> {
         let name = table.name().to_owned();
         let seen = sums.camera(&table.wavelength_nm, &name, &mut found.notes);
-        let radiance_of = |index: usize| -> Vec<f64> {
-            let unit = self.spectrum.radiance_unit.or_else(|| table.unit_of(index)).unwrap_or_default();
-            table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect()
+        let given = self.spectrum.radiance_unit;
+        let radiance_of = |index: usize| -> Result<Vec<f64>> {
+            let (unit, _) = table.radiance_unit(index, given)?;
+            Ok(table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect())
         };
-        let electrons_of = |index: usize| checked(seen.camera.electrons(&radiance_of(index)), &name);
+        let electrons_of = |index: usize| checked(seen.camera.electrons(&radiance_of(index)?), &name);
+        let warn = |index: usize, notes: &mut Vec<Note>| -> Result<()> {
+            let (_, assumed) = table.radiance_unit(index, given)?;
+            notes.extend(assumed.into_iter().chain(table.negative(index)).map(Note::Warning));
+            Ok(())
+        };
         let count = table.columns.len();
         let is_chosen = self.spectrum.column.is_some() || self.spectrum.sample.is_some();
         if self.patch.is_some() && count > 1 && !is_chosen {
             let all: Vec<[f64; 3]> = (0..count).map(electrons_of).collect::<Result<_>>()?;
             let width = chart_columns(count);
-            found.metadata.quadrature_error = seen.quadrature_error(&radiance_of(brightest(&all[..width])));
+            warn(0, &mut found.notes)?;
+            found.metadata.quadrature_error = seen.quadrature_error(&radiance_of(brightest(&all[..width]))?);
             let rows = ImageRows::Kept(all.chunks(width).map(<[_]>::to_vec).collect());
             return Ok(Light::Image { rows, factor: 1.0, width, height: count / width, source: name });
         }
         let index = self.choose(table)?;
+        warn(index, &mut found.notes)?;
         let electrons = electrons_of(index)?;
-        found.metadata.quadrature_error = seen.quadrature_error(&radiance_of(index));
+        found.metadata.quadrature_error = seen.quadrature_error(&radiance_of(index)?);
         let source = if count > 1 { format!("{name}: {}", table.columns[index]) } else { name };
         Ok(Light::Uniform { electrons, source })
     }
@@ -162,6 +176,7 @@ impl Scene {
         found.notes.extend(notes::of_reader(&reader));
         let header = reader.header().clone();
         let spectral = SpectralChannels::of(&header, self.spectrum.radiance_unit)?;
+        found.notes.extend(spectral.warning.clone().map(Note::Warning));
         let seen = sums.camera(&spectral.wavelength_nm, &header.name, &mut found.notes);
         let planes = seen.camera.planes(&spectral.channels, spectral.unit.in_w_per_cm2_sr_nm());
         let all = spectral.channels.len();

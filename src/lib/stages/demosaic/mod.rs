@@ -78,7 +78,14 @@ impl Demosaic {
             return Err(input.refuse(format!("it holds {holds}; demosaicking is done once")));
         }
         if input.geometry.channels.len() != 1 {
-            return Err(input.out_of_order(format!("it holds {holds}, not a CFA plane"), "mosaic"));
+            let hint = match metadata.quantity {
+                QuantityKind::Unspecified => {
+                    " (where one of its channels is such a plane, take that alone, for example with `oiiotool in.exr --ch R -o \
+                     out.exr`)"
+                }
+                _ => "",
+            };
+            return Err(input.out_of_order(format!("it holds {holds}, not a CFA plane{hint}"), "mosaic"));
         }
         let (width, height) = (input.geometry.width, input.geometry.height);
         if width < 2 || height < 2 {
@@ -261,6 +268,7 @@ mod tests {
     fn plane(width: usize, height: usize, pattern: CfaPattern, f: impl Fn(usize, usize, Class) -> f32) -> MemoryFrame {
         let mut metadata = Metadata::new(QuantityKind::Adu);
         metadata.cfa = Some(pattern.into());
+        metadata.black_level_adu = Some(0.0.into());
         let header = FrameHeader { name: "test".into(), geometry: Geometry::new(width, height, &["Y"]), metadata };
         let sites = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let samples = sites.map(|(x, y)| f(x, y, pattern.class(x as i64, y as i64))).collect();

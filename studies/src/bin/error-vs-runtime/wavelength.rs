@@ -39,7 +39,7 @@ struct Scene {
 
 impl Scene {
     fn library(name: &'static str, file: &str, every: usize) -> Result<Self> {
-        let library = spectral::read_library(&sample_data(file), None)?;
+        let (library, _) = spectral::read_library(&sample_data(file), None)?;
         let spectra = library.radiance.rows().into_iter().step_by(every).map(|row| row.to_vec()).collect();
         Ok(Self { name, wavelength_nm: library.wavelength_nm, spectra })
     }

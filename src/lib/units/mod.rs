@@ -3,7 +3,10 @@
 //! Wavelengths are in nm, spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, areas in cm², charge in electrons, luminance in
 //! cd m⁻². Every conversion stands here; a bare power of ten elsewhere is a defect.
 
-use crate::names::{Named, serde_by_name};
+mod spectral;
+
+pub use spectral::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
+
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -28,77 +31,12 @@ pub const MM_PER_UM: f64 = 1e-3;
 /// Square centimeters in a square meter.
 pub const CM2_PER_M2: f64 = 1e4;
 
-/// The unit in which a file gives spectral radiance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum RadianceUnit {
-    /// W cm⁻² sr⁻¹ nm⁻¹, ours.
-    #[default]
-    WPerCm2SrNm,
-    /// W m⁻² sr⁻¹ nm⁻¹.
-    WPerM2SrNm,
-    /// mW m⁻² sr⁻¹ nm⁻¹.
-    MwPerM2SrNm,
-    /// W m⁻² sr⁻¹ µm⁻¹.
-    WPerM2SrUm,
-    /// µW cm⁻² sr⁻¹ nm⁻¹.
-    UwPerCm2SrNm,
+/// A temperature in K of one in °C, to the hundredth that people read.
+pub fn kelvin(celsius: f64) -> f64 {
+    /// 0 °C in hundredths of a K (exact).
+    const ZERO_CELSIUS: f64 = 27_315.0;
+    (celsius * 100.0 + ZERO_CELSIUS).round() / 100.0
 }
-
-impl RadianceUnit {
-    /// All units, in the order in which help lists them.
-    pub const ALL: [Self; 5] =
-        [Self::WPerCm2SrNm, Self::WPerM2SrNm, Self::MwPerM2SrNm, Self::WPerM2SrUm, Self::UwPerCm2SrNm];
-
-    /// What one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    pub fn in_w_per_cm2_sr_nm(self) -> f64 {
-        match self {
-            Self::WPerCm2SrNm => 1.0,
-            Self::WPerM2SrNm => 1.0 / CM2_PER_M2,
-            Self::MwPerM2SrNm | Self::WPerM2SrUm => 1e-3 / CM2_PER_M2,
-            Self::UwPerCm2SrNm => 1e-6,
-        }
-    }
-
-    /// Reads a unit as people write it: `W cm-2 sr-1 nm-1`, `W.m^-2.sr^-1.nm^-1`, `W/m2/sr/nm`, `µW/cm2/sr/nm`.
-    pub fn parse(text: &str) -> Option<Self> {
-        // Squeezes every spelling into the form `W/cm2/sr/nm`.
-        let mut squeezed = String::new();
-        for factor in text.replace(['µ', 'μ'], "u").split([' ', '.', '/', '*']).filter(|part| !part.is_empty()) {
-            let factor = factor.replace('^', "");
-            let factor = factor.trim_end_matches("-1").replace("-2", "2");
-            if !squeezed.is_empty() {
-                squeezed.push('/');
-            }
-            squeezed.push_str(&factor);
-        }
-        Self::ALL.into_iter().find(|unit| {
-            let [power, area] = match unit {
-                Self::WPerCm2SrNm => ["W", "cm2"],
-                Self::WPerM2SrNm | Self::WPerM2SrUm => ["W", "m2"],
-                Self::MwPerM2SrNm => ["mW", "m2"],
-                Self::UwPerCm2SrNm => ["uW", "cm2"],
-            };
-            let length = if *unit == Self::WPerM2SrUm { "um" } else { "nm" };
-            squeezed == format!("{power}/{area}/sr/{length}")
-        })
-    }
-}
-
-impl Named for RadianceUnit {
-    const ALL: &'static [Self] = &Self::ALL;
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::WPerCm2SrNm => "W cm-2 sr-1 nm-1",
-            Self::WPerM2SrNm => "W m-2 sr-1 nm-1",
-            Self::MwPerM2SrNm => "mW m-2 sr-1 nm-1",
-            Self::WPerM2SrUm => "W m-2 sr-1 um-1",
-            Self::UwPerCm2SrNm => "uW cm-2 sr-1 nm-1",
-        }
-    }
-}
-
-serde_by_name!(RadianceUnit);
 
 /// What the samples of a frame are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
@@ -133,7 +71,7 @@ impl QuantityKind {
     pub fn unit(self) -> &'static str {
         match self {
             Self::Unspecified => "unspecified",
-            Self::SpectralRadiance => RadianceUnit::WPerCm2SrNm.name(),
+            Self::SpectralRadiance => "W cm-2 sr-1 nm-1",
             Self::ExpectedElectrons | Self::Electrons => "e-",
             Self::Adu => "ADU",
             Self::Xyz => "cd m-2",
@@ -187,18 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn radiance_units_are_read_as_people_write_them() {
-        for unit in RadianceUnit::ALL {
-            assert_eq!(RadianceUnit::parse(unit.name()), Some(unit), "{}", unit.name());
-        }
-        assert_eq!(RadianceUnit::parse("W.m^-2.sr^-1.nm^-1"), Some(RadianceUnit::WPerM2SrNm));
-        assert_eq!(RadianceUnit::parse("µW/cm2/sr/nm"), Some(RadianceUnit::UwPerCm2SrNm));
-        assert_eq!(RadianceUnit::parse("W/m2/sr"), None);
-    }
-
-    #[test]
-    fn one_milliwatt_per_micrometer_is_one_watt_per_nanometer_apart_by_area_only() {
-        // 1 W m⁻² sr⁻¹ µm⁻¹ = 10⁻³ W m⁻² sr⁻¹ nm⁻¹ = 10⁻⁷ W cm⁻² sr⁻¹ nm⁻¹
-        assert!((RadianceUnit::WPerM2SrUm.in_w_per_cm2_sr_nm() / 1e-7 - 1.0).abs() < 1e-15);
+    fn spectral_radiance_is_in_our_unit() {
+        assert_eq!(QuantityKind::SpectralRadiance.unit(), RadianceUnit::default().to_string());
     }
 }

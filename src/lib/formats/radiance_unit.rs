@@ -1,0 +1,91 @@
+//! The unit of a file's radiances: what the file says, what the user says, and what is assumed where nobody says anything.
+
+use crate::error::{Error, Result};
+use crate::units::{RadianceUnit, Stated};
+
+/// What a file says about the unit of its radiances.
+#[derive(Debug, Clone, Copy)]
+pub struct FileSays<'a> {
+    /// The file as messages call it.
+    pub name: &'a str,
+    /// What it says where units belong: in the heading of the column, in an attribute.
+    pub heading: Option<&'a Stated>,
+    /// What it mentions in passing: in comments.
+    pub remarks: &'a [Stated],
+    /// Where a file of its kind names the unit, for advice: `in the heading`.
+    pub place: &'a str,
+}
+
+/// The unit of a file's radiances, with a warning where it is assumed.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where `given` is not what the file says; [`Error::Format`] for a file that says that it holds something
+/// else, or units that are not understood.
+pub fn settle(says: FileSays<'_>, given: Option<RadianceUnit>) -> Result<(RadianceUnit, Option<String>)> {
+    let FileSays { name, heading, remarks, place } = says;
+    let is_in = |text: &str, kind: &str| format!("its values are in `{text}`, {kind}");
+    match heading {
+        Some(Stated::Radiance(unit)) => agreed(name, *unit, given).map(|unit| (unit, None)),
+        Some(Stated::Other { text, kind }) if kind.is_another_quantity() => {
+            let problem = is_in(text, kind.in_words());
+            Err(Error::format(
+                name,
+                format!("{problem}; spectral radiances are wanted, such as {}", RadianceUnit::USUAL[1]),
+            ))
+        }
+        Some(Stated::Other { text, kind }) => match given {
+            Some(unit) => Ok((unit, None)),
+            None => Err(Error::format(name, is_in(text, kind.in_words())).give(&["radiance_unit"])),
+        },
+        None if remarks.is_empty() && given.is_none() => {
+            let unit = RadianceUnit::default();
+            let problem = format!("{name}: it does not say the unit of its radiance, which is taken as {unit}");
+            Ok((unit, Some(format!("{problem}; name the unit {place}, or give --radiance-unit"))))
+        }
+        None => of_remarks(name, remarks, given).map(|unit| (unit, None)),
+    }
+}
+
+/// The unit that a file and a user agree on.
+fn agreed(name: &str, stated: RadianceUnit, given: Option<RadianceUnit>) -> Result<RadianceUnit> {
+    match given {
+        Some(given) if given != stated => {
+            let problem = format!("{name}: it says that its unit of radiance is {stated}, not {given}");
+            Err(Error::Usage(problem).leave_out(&["radiance_unit"]))
+        }
+        _ => Ok(stated),
+    }
+}
+
+/// The unit where comments alone may tell it.
+fn of_remarks(name: &str, remarks: &[Stated], given: Option<RadianceUnit>) -> Result<RadianceUnit> {
+    let mut units: Vec<RadianceUnit> = Vec::new();
+    for remark in remarks {
+        if let Stated::Radiance(unit) = remark
+            && !units.contains(unit)
+        {
+            units.push(*unit);
+        }
+    }
+    match (units.as_slice(), given) {
+        ([unit], given) => agreed(name, *unit, given),
+        // Another unit in a comment may be that of something else.
+        ([], Some(given)) => Ok(given),
+        ([], None) => {
+            let other = remarks.iter().find_map(|remark| match remark {
+                Stated::Radiance(_) => None,
+                Stated::Other { text, kind } => Some(format!("`{text}`, {}", kind.in_words())),
+            });
+            let spoken_of = other.unwrap_or_default();
+            let problem = format!("its comments speak of {spoken_of}; if its values are spectral radiances");
+            Err(Error::format(name, problem).give(&["radiance_unit"]))
+        }
+        (several, Some(given)) if several.contains(&given) => Ok(given),
+        (several, given) => {
+            let named: Vec<String> = several.iter().map(ToString::to_string).collect();
+            let error = Error::format(name, format!("its comments name the units of radiance {}", named.join(" and ")));
+            Err(if given.is_none() { error.give(&["radiance_unit"]) } else { error.change(&["radiance_unit"]) })
+        }
+    }
+}

@@ -1,0 +1,639 @@
+//! Units of spectral radiance and of wavelength, read as people write them.
+//!
+//! `W m-2 sr-1 nm-1`, `W/(m2 sr nm)`, `W·m⁻²·sr⁻¹·nm⁻¹`, `mW m^-2 sr^-1 nm^-1`, `uW/cm2/sr/nm`, `w_per_m2_sr_nm`, in any
+//! order, alone or within a heading such as `radiance (W m-2 sr-1 nm-1)`. What follows a slash or `per` is divided by.
+
+use std::fmt;
+
+/// A unit of power in which radiance is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Power {
+    Kilowatt,
+    Watt,
+    Milliwatt,
+    Microwatt,
+    Nanowatt,
+}
+
+impl Power {
+    fn symbol(self) -> &'static str {
+        match self {
+            Self::Kilowatt => "kW",
+            Self::Watt => "W",
+            Self::Milliwatt => "mW",
+            Self::Microwatt => "uW",
+            Self::Nanowatt => "nW",
+        }
+    }
+
+    fn in_w(self) -> f64 {
+        match self {
+            Self::Kilowatt => 1e3,
+            Self::Watt => 1.0,
+            Self::Milliwatt => 1e-3,
+            Self::Microwatt => 1e-6,
+            Self::Nanowatt => 1e-9,
+        }
+    }
+}
+
+/// A unit of length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Length {
+    Nanometer,
+    Micrometer,
+    Angstrom,
+    Millimeter,
+    Centimeter,
+    Meter,
+}
+
+impl Length {
+    fn symbol(self) -> &'static str {
+        match self {
+            Self::Nanometer => "nm",
+            Self::Micrometer => "um",
+            Self::Angstrom => "angstrom",
+            Self::Millimeter => "mm",
+            Self::Centimeter => "cm",
+            Self::Meter => "m",
+        }
+    }
+}
+
+/// The unit in which a file gives spectral radiance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RadianceUnit {
+    power: Power,
+    /// The side of the square.
+    area: Length,
+    wavelength: WavelengthUnit,
+}
+
+impl Default for RadianceUnit {
+    /// W cm⁻² sr⁻¹ nm⁻¹, ours.
+    fn default() -> Self {
+        Self::W_PER_CM2_SR_NM
+    }
+}
+
+impl RadianceUnit {
+    /// W cm⁻² sr⁻¹ nm⁻¹, ours.
+    pub const W_PER_CM2_SR_NM: Self =
+        Self { power: Power::Watt, area: Length::Centimeter, wavelength: WavelengthUnit::Nanometer };
+
+    /// Those in use, in the order in which help lists them.
+    pub const USUAL: [Self; 5] = [
+        Self::W_PER_CM2_SR_NM,
+        Self { area: Length::Meter, ..Self::W_PER_CM2_SR_NM },
+        Self { power: Power::Milliwatt, area: Length::Meter, ..Self::W_PER_CM2_SR_NM },
+        Self { area: Length::Meter, wavelength: WavelengthUnit::Micrometer, ..Self::W_PER_CM2_SR_NM },
+        Self { power: Power::Microwatt, ..Self::W_PER_CM2_SR_NM },
+    ];
+
+    /// What one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
+    pub fn in_w_per_cm2_sr_nm(self) -> f64 {
+        let in_cm2 = match self.area {
+            Length::Meter => 1e4,
+            Length::Millimeter => 1e-2,
+            _ => 1.0,
+        };
+        self.power.in_w() / self.wavelength.in_nm() / in_cm2
+    }
+
+    /// Reads a unit that is all of a text.
+    pub fn parse(text: &str) -> Option<Self> {
+        let tokens = tokens(text);
+        match units_among(&tokens).as_slice() {
+            [found] if found.begin == 0 && found.end == tokens.len() => match found.says {
+                Stated::Radiance(unit) => Some(unit),
+                Stated::Other { .. } => None,
+            },
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for RadianceUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}-2 sr-1 {}-1", self.power.symbol(), self.area.symbol(), self.wavelength.symbol())
+    }
+}
+
+/// The unit in which a file gives wavelengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WavelengthUnit {
+    /// nm, ours.
+    Nanometer,
+    /// µm.
+    Micrometer,
+    /// 0.1 nm.
+    Angstrom,
+    /// m.
+    Meter,
+}
+
+impl WavelengthUnit {
+    fn symbol(self) -> &'static str {
+        match self {
+            Self::Nanometer => Length::Nanometer.symbol(),
+            Self::Micrometer => Length::Micrometer.symbol(),
+            Self::Angstrom => Length::Angstrom.symbol(),
+            Self::Meter => Length::Meter.symbol(),
+        }
+    }
+
+    /// What one such unit is in nm.
+    fn in_nm(self) -> f64 {
+        match self {
+            Self::Nanometer => 1.0,
+            Self::Micrometer => 1e3,
+            Self::Angstrom => 0.1,
+            Self::Meter => 1e9,
+        }
+    }
+
+    /// A wavelength in nm, to the millionth of one: decimal fractions of µm become whole numbers again.
+    pub fn nm(self, value: f64) -> f64 {
+        /// Parts of a nanometer that are told apart.
+        const PARTS: f64 = 1e6;
+        if self == Self::Nanometer { value } else { (value * self.in_nm() * PARTS).round() / PARTS }
+    }
+
+    /// The unit that the heading of a column of wavelengths ends with: `wavelength (nm)`, `lambda_um`; none where it names
+    /// none.
+    ///
+    /// # Errors
+    ///
+    /// What it counts instead of wavelengths, in words.
+    pub fn of_heading(heading: &str) -> Result<Option<Self>, &'static str> {
+        let tokens = tokens(heading);
+        let words = || tokens.iter().filter_map(Token::lower);
+        if words().any(|word| word.starts_with("wavenumber")) || heading.contains("1/cm") {
+            return Err("wavenumbers");
+        }
+        if words().any(|word| matches!(word.as_str(), "hz" | "thz" | "frequency")) {
+            return Err("frequencies");
+        }
+        if words().any(|word| matches!(word.as_str(), "ev" | "energy")) {
+            return Err("energies of photons");
+        }
+        Ok(match tokens.last() {
+            Some(Token::Factor { exponent: Some(-1), .. }) => return Err("wavenumbers"),
+            // A single letter alone is a name.
+            Some(Token::Factor { word, exponent: None }) if word.len() > 1 || tokens.len() > 1 => match base(word) {
+                Some(Base::Length(Length::Nanometer)) => Some(Self::Nanometer),
+                Some(Base::Length(Length::Micrometer)) => Some(Self::Micrometer),
+                Some(Base::Length(Length::Angstrom)) => Some(Self::Angstrom),
+                Some(Base::Length(Length::Meter)) => Some(Self::Meter),
+                _ => None,
+            },
+            _ => None,
+        })
+    }
+}
+
+/// What a text says about the unit of its numbers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Stated {
+    /// A spectral radiance.
+    Radiance(RadianceUnit),
+    /// The unit of something else.
+    Other {
+        /// The unit as it is written, words between spaces.
+        text: String,
+        /// What it is.
+        kind: OtherUnit,
+    },
+}
+
+/// What a unit is that is none of spectral radiance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OtherUnit {
+    /// Power per area, from all directions.
+    Irradiance,
+    /// Photons instead of energy.
+    Photons,
+    /// Per interval of frequency or wavenumber.
+    PerFrequency,
+    /// Radiance over all wavelengths.
+    AllWavelengths,
+    /// With a number before it.
+    Scaled,
+    /// None that is known.
+    Unknown,
+}
+
+impl OtherUnit {
+    /// What it is, in words.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Irradiance => "an irradiance, which has no sr-1",
+            Self::Photons => "a unit of photons, not of energy",
+            Self::PerFrequency => "per interval of frequency or wavenumber, not of wavelength",
+            Self::AllWavelengths => "a radiance over all wavelengths, which has no nm-1",
+            Self::Scaled => "a unit with a number before it",
+            Self::Unknown => "no unit of spectral radiance that is known",
+        }
+    }
+
+    /// Whether the numbers cannot be spectral radiances, whatever a user says.
+    pub fn is_another_quantity(self) -> bool {
+        matches!(self, Self::Irradiance | Self::Photons | Self::PerFrequency)
+    }
+}
+
+/// The units of radiance, or of what may be taken for it, that a text names, first to last.
+pub fn units_in(text: &str) -> Vec<Stated> {
+    units_among(&tokens(text)).into_iter().map(|found| found.says).collect()
+}
+
+/// What the heading of a column says about the unit of its numbers; a name such as `irradiance` counts where there is no
+/// unit.
+pub fn unit_of_heading(heading: &str) -> Option<Stated> {
+    let tokens = tokens(heading);
+    let named = |kind| Some(Stated::Other { text: heading.to_owned(), kind });
+    units_among(&tokens).pop().map(|found| found.says).or_else(|| {
+        tokens.iter().filter_map(Token::lower).find_map(|word| match (word.as_str(), base(&word)) {
+            ("irradiance", _) => named(OtherUnit::Irradiance),
+            (_, Some(Base::Photons)) => named(OtherUnit::Photons),
+            _ => None,
+        })
+    })
+}
+
+/// A piece of a text.
+#[derive(Debug, Clone, PartialEq)]
+enum Token {
+    /// Letters, perhaps with a power.
+    Factor { word: String, exponent: Option<i32> },
+    /// A slash, or `per`.
+    Per,
+    /// `square`, of the next factor.
+    Square,
+    /// A number.
+    Number(String),
+    /// What ends a unit.
+    End,
+}
+
+impl Token {
+    fn lower(&self) -> Option<String> {
+        match self {
+            Self::Factor { word, .. } => Some(word.to_ascii_lowercase()),
+            _ => None,
+        }
+    }
+
+    fn shown(&self) -> String {
+        match self {
+            Self::Factor { word, exponent: None } => word.clone(),
+            Self::Factor { word, exponent: Some(exponent) } => format!("{word}{exponent}"),
+            Self::Per => "/".into(),
+            Self::Square => "square".into(),
+            Self::Number(number) => number.clone(),
+            Self::End => String::new(),
+        }
+    }
+}
+
+/// Takes a text to pieces, every spelling of powers and products to one.
+fn tokens(text: &str) -> Vec<Token> {
+    let mut plain = String::with_capacity(text.len());
+    for character in text.replace("**", "").chars() {
+        match character {
+            'µ' | 'μ' => plain.push('u'),
+            'Å' | '\u{212B}' => plain.push_str("angstrom"),
+            '⁻' | '−' | '–' => plain.push('-'),
+            '⁰' | '¹' | '²' | '³' | '⁴' | '⁵' | '⁶' | '⁷' | '⁸' | '⁹' => {
+                let digit = "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|digit| digit == character).unwrap_or_default();
+                plain.push_str(&digit.to_string());
+            }
+            '^' | '{' | '}' | '$' => {}
+            '*' | '·' | '⋅' | '×' | '•' | '.' | '_' | '(' | ')' | '[' | ']' | '"' => plain.push(' '),
+            '/' => plain.push_str(" / "),
+            ':' | ';' | ',' | '=' | '<' | '>' => plain.push_str(" | "),
+            other => plain.push(other),
+        }
+    }
+    plain.split_whitespace().flat_map(pieces).collect()
+}
+
+/// The pieces of a word: a hyphen before a letter parts factors, before a digit it is the sign of a power.
+fn pieces(word: &str) -> Vec<Token> {
+    let mut parts = vec![String::new()];
+    let mut characters = word.chars().peekable();
+    while let Some(character) = characters.next() {
+        if character == '-' && characters.peek().is_none_or(|next| !next.is_ascii_digit()) {
+            parts.push(String::new());
+        } else if let Some(part) = parts.last_mut() {
+            part.push(character);
+        }
+    }
+    parts.iter().filter(|part| !part.is_empty()).map(|part| piece(part)).collect()
+}
+
+fn piece(text: &str) -> Token {
+    let letters = text.find(|c: char| !c.is_alphabetic()).unwrap_or(text.len());
+    let (word, power) = text.split_at(letters);
+    match (word.to_ascii_lowercase().as_str(), power) {
+        ("", "/") => Token::Per,
+        ("per", "") => Token::Per,
+        ("square" | "sq", "") => Token::Square,
+        ("", number) if number.starts_with(|c: char| c.is_ascii_digit() || "+-".contains(c)) => {
+            Token::Number(number.to_owned())
+        }
+        ("", _) => Token::End,
+        (_, "") => Token::Factor { word: word.to_owned(), exponent: None },
+        (_, power) => match power.parse() {
+            Ok(exponent) => Token::Factor { word: word.to_owned(), exponent: Some(exponent) },
+            Err(_) => Token::End,
+        },
+    }
+}
+
+/// What a factor of a unit measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Base {
+    Power(Power),
+    Photons,
+    /// J, erg: of a radiance with a time, or of none.
+    Energy,
+    Length(Length),
+    SolidAngle,
+    Time,
+    Frequency,
+}
+
+fn base(word: &str) -> Option<Base> {
+    let lower = word.to_ascii_lowercase();
+    let singular = if lower.len() > 3 { lower.strip_suffix('s').unwrap_or(&lower) } else { &lower };
+    Some(match singular {
+        // A megawatt is none of radiance, and may be a milliwatt.
+        "mw" if word.starts_with('M') => return None,
+        "kw" | "kilowatt" => Base::Power(Power::Kilowatt),
+        "w" | "watt" => Base::Power(Power::Watt),
+        "mw" | "milliwatt" => Base::Power(Power::Milliwatt),
+        "uw" | "microwatt" => Base::Power(Power::Microwatt),
+        "nw" | "nanowatt" => Base::Power(Power::Nanowatt),
+        "ph" | "photon" | "quanta" | "quantum" | "mol" | "mmol" | "umol" | "nmol" | "mole" | "micromole"
+        | "einstein" => Base::Photons,
+        "j" | "joule" | "erg" => Base::Energy,
+        "nm" | "nanometer" | "nanometre" => Base::Length(Length::Nanometer),
+        "um" | "micron" | "micrometer" | "micrometre" => Base::Length(Length::Micrometer),
+        "angstrom" | "ang" => Base::Length(Length::Angstrom),
+        "a" if word == "A" => Base::Length(Length::Angstrom),
+        "mm" | "millimeter" | "millimetre" => Base::Length(Length::Millimeter),
+        "cm" | "centimeter" | "centimetre" => Base::Length(Length::Centimeter),
+        "m" | "meter" | "metre" => Base::Length(Length::Meter),
+        "sr" | "steradian" => Base::SolidAngle,
+        "s" | "sec" | "second" => Base::Time,
+        "hz" | "thz" => Base::Frequency,
+        _ => return None,
+    })
+}
+
+/// A unit among the pieces of a text.
+struct Found {
+    begin: usize,
+    end: usize,
+    says: Stated,
+}
+
+/// The units among pieces: each a power (or photons, or energy) and what it is divided by; before it stand factors with
+/// negative powers alone.
+fn units_among(tokens: &[Token]) -> Vec<Found> {
+    let known = |place: usize| match &tokens[place] {
+        Token::Factor { word, exponent } => base(word).map(|base| (base, *exponent)),
+        _ => None,
+    };
+    let heads =
+        |place: usize| matches!(known(place), Some((Base::Power(_) | Base::Photons | Base::Energy, None | Some(1))));
+    let is_divisor = |place: usize| known(place).is_some_and(|(_, exponent)| exponent.is_some_and(|power| power < 0));
+    let mut found: Vec<Found> = Vec::new();
+    for place in (0..tokens.len()).filter(|&place| heads(place)) {
+        let mut begin = place;
+        while begin > found.last().map_or(0, |before| before.end) && is_divisor(begin - 1) {
+            begin -= 1;
+        }
+        let mut end = place + 1;
+        let mut is_divided = false;
+        while end < tokens.len() {
+            match &tokens[end] {
+                Token::Per | Token::Square => is_divided |= tokens[end] == Token::Per,
+                Token::Factor { .. } if is_divisor(end) || is_divided && known(end).is_some() && !heads(end) => {}
+                _ => break,
+            }
+            end += 1;
+        }
+        if end - begin > 1 {
+            let is_scaled = begin > 0 && matches!(tokens[begin - 1], Token::Number(_));
+            let from = if is_scaled { begin - 1 } else { begin };
+            let text = tokens[from..end].iter().map(Token::shown).collect::<Vec<_>>().join(" ");
+            let says = match (is_scaled, product(&tokens[begin..end])) {
+                (false, Ok(unit)) => Stated::Radiance(unit),
+                (true, Ok(_)) => Stated::Other { text, kind: OtherUnit::Scaled },
+                (_, Err(kind)) => Stated::Other { text, kind },
+            };
+            found.push(Found { begin, end, says });
+        }
+    }
+    found
+}
+
+/// What a product of factors is: a unit of spectral radiance, or what else.
+fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
+    let [mut is_divided, mut is_square] = [false; 2];
+    let (mut power, mut photons, mut others) = (None, false, false);
+    let (mut per_sr, mut per_frequency) = (0, false);
+    let mut lengths: Vec<(Length, i32)> = Vec::new();
+    for token in tokens {
+        let Token::Factor { word, exponent } = token else {
+            is_divided |= *token == Token::Per;
+            is_square |= *token == Token::Square;
+            continue;
+        };
+        let squared = if std::mem::take(&mut is_square) { 2 } else { 1 };
+        let exponent = match *exponent {
+            // `mW/(m2 sr cm-1)`: an interval of wavenumber.
+            Some(negative) if negative < 0 && is_divided => {
+                per_frequency |= matches!(base(word), Some(Base::Length(_)));
+                others = true;
+                negative
+            }
+            exponent => exponent.unwrap_or(squared) * if is_divided { -1 } else { 1 },
+        };
+        match base(word) {
+            Some(Base::Power(unit)) => power = Some(unit),
+            Some(Base::Photons) => photons = true,
+            Some(Base::Length(length)) => match lengths.iter_mut().find(|(known, _)| *known == length) {
+                Some((_, sum)) => *sum += exponent,
+                None => lengths.push((length, exponent)),
+            },
+            Some(Base::SolidAngle) => per_sr += exponent,
+            Some(Base::Frequency) => per_frequency = true,
+            Some(Base::Energy | Base::Time) | None => others = true,
+        }
+    }
+    if photons {
+        return Err(OtherUnit::Photons);
+    }
+    if per_frequency {
+        return Err(OtherUnit::PerFrequency);
+    }
+    if others {
+        return Err(OtherUnit::Unknown);
+    }
+    lengths.sort_by_key(|(_, exponent)| *exponent);
+    let wavelength = |length| match length {
+        Length::Nanometer => Ok(WavelengthUnit::Nanometer),
+        Length::Micrometer => Ok(WavelengthUnit::Micrometer),
+        Length::Angstrom => Ok(WavelengthUnit::Angstrom),
+        // Whoever writes so may mean wavenumbers.
+        Length::Centimeter => Err(OtherUnit::PerFrequency),
+        Length::Millimeter | Length::Meter => Err(OtherUnit::Unknown),
+    };
+    let is_area = |length| matches!(length, Length::Millimeter | Length::Centimeter | Length::Meter);
+    let power = power.ok_or(OtherUnit::Unknown)?;
+    match (per_sr, lengths.as_slice()) {
+        (-1, [(area, -2), (length, -1)]) if is_area(*area) => {
+            Ok(RadianceUnit { power, area: *area, wavelength: wavelength(*length)? })
+        }
+        (-1, [(Length::Meter, -3)]) => {
+            Ok(RadianceUnit { power, area: Length::Meter, wavelength: WavelengthUnit::Meter })
+        }
+        (-1, [(area, -2)]) if is_area(*area) => Err(OtherUnit::AllWavelengths),
+        (0, [(area, -2), ..] | [(area, -3)]) if is_area(*area) => Err(OtherUnit::Irradiance),
+        _ => Err(OtherUnit::Unknown),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Spellings, and what one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
+    const RADIANCES: [(&str, f64); 38] = [
+        ("W cm-2 sr-1 nm-1", 1.0),
+        ("W m-2 sr-1 nm-1", 1e-4),
+        ("W.m^-2.sr^-1.nm^-1", 1e-4),
+        ("W/(m2 sr nm)", 1e-4),
+        ("W/(m^2*sr*nm)", 1e-4),
+        ("W/(m**2 sr nm)", 1e-4),
+        ("W·m⁻²·sr⁻¹·nm⁻¹", 1e-4),
+        ("W⋅m−2⋅sr−1⋅nm−1", 1e-4),
+        ("W m^{-2} sr^{-1} nm^{-1}", 1e-4),
+        ("W/m²/sr/nm", 1e-4),
+        ("W/m2-sr-nm", 1e-4),
+        ("W/m2 sr nm", 1e-4),
+        ("W m-2 sr-1/nm", 1e-4),
+        ("(W/m2)/(sr nm)", 1e-4),
+        ("sr-1 nm-1 m-2 W", 1e-4),
+        ("nm^-1 W sr^-1 m^-2", 1e-4),
+        ("W nm-1 sr-1 m-2", 1e-4),
+        ("w_per_m2_sr_nm", 1e-4),
+        ("W per square meter per steradian per nanometer", 1e-4),
+        ("watts per square metre per steradian per nanometre", 1e-4),
+        ("mW m^-2 sr^-1 nm^-1", 1e-7),
+        ("mW/m2/sr/nm", 1e-7),
+        ("milliwatts/m2/sr/nm", 1e-7),
+        ("uW/cm2/sr/nm", 1e-6),
+        ("µW/cm2/sr/nm", 1e-6),
+        ("μW cm⁻² sr⁻¹ nm⁻¹", 1e-6),
+        ("uW cm-2 sr-1 nm-1", 1e-6),
+        ("nW cm-2 sr-1 nm-1", 1e-9),
+        ("kW m-2 sr-1 um-1", 1e-4),
+        ("W/m²/sr/µm", 1e-7),
+        ("W m-2 sr-1 um-1", 1e-7),
+        ("W/(m2 sr micron)", 1e-7),
+        ("W m-2 um-1 sr-1", 1e-7),
+        ("W cm-2 sr-1 um-1", 1e-3),
+        ("W/cm2/sr/Å", 10.0),
+        ("W/cm2/sr/A", 10.0),
+        ("W mm-2 sr-1 nm-1", 100.0),
+        ("W m-3 sr-1", 1e-13),
+    ];
+
+    #[test]
+    fn radiances_are_read_as_people_write_them() {
+        for (text, factor) in RADIANCES {
+            for shown in [text.to_owned(), format!("radiance ({text})"), format!("sky1 [{text}]"), format!("L, {text}")]
+            {
+                let read = match unit_of_heading(&shown) {
+                    Some(Stated::Radiance(unit)) => unit.in_w_per_cm2_sr_nm(),
+                    other => panic!("{shown}: {other:?}"),
+                };
+                assert!((read / factor - 1.0).abs() < 1e-15, "{shown}: {read}");
+            }
+            let unit = RadianceUnit::parse(text).unwrap_or_else(|| panic!("{text}"));
+            assert_eq!(RadianceUnit::parse(&unit.to_string()), Some(unit));
+        }
+        for unit in RadianceUnit::USUAL {
+            assert_eq!(RadianceUnit::parse(&unit.to_string()), Some(unit));
+        }
+    }
+
+    #[test]
+    fn other_units_are_told_from_radiances() {
+        use OtherUnit::{AllWavelengths, Irradiance, PerFrequency, Photons, Scaled, Unknown};
+        for (text, kind) in [
+            ("irradiance (W m-2 nm-1)", Irradiance),
+            ("E [W/m2/nm]", Irradiance),
+            ("W/m²/µm", Irradiance),
+            ("W m-3", Irradiance),
+            ("irradiance", Irradiance),
+            ("spectral_irradiance_w_per_m2_nm", Irradiance),
+            ("photons s-1 m-2 sr-1 nm-1", Photons),
+            ("L (umol m-2 s-1 sr-1 nm-1)", Photons),
+            ("µmol/m2/s", Photons),
+            ("quanta/s/cm2/sr/nm", Photons),
+            ("photon_radiance", Photons),
+            ("mW/(m^2 sr cm^-1)", PerFrequency),
+            ("W m-2 sr-1 cm-1", PerFrequency),
+            ("W m-2 sr-1 Hz-1", PerFrequency),
+            ("W m-2 sr-1", AllWavelengths),
+            ("W.m^-2.sr^-1", AllWavelengths),
+            ("10^-3 W m-2 sr-1 nm-1", Scaled),
+            ("radiance (1e-6 W cm-2 sr-1 nm-1)", Scaled),
+            ("erg s-1 cm-2 sr-1 A-1", Unknown),
+            ("W sr-1 nm-1", Unknown),
+        ] {
+            assert!(
+                matches!(unit_of_heading(text), Some(Stated::Other { kind: found, .. }) if found == kind),
+                "{text}: {:?}",
+                unit_of_heading(text)
+            );
+            assert_eq!(RadianceUnit::parse(text), None, "{text}");
+        }
+        for text in ["radiance", "L", "W", "A", "sky (measured)", "MW m-2 sr-1 nm-1", "Y 1391.68 cd m-2", "a work of W"]
+        {
+            assert_eq!(unit_of_heading(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn wavelengths_are_read_as_people_write_them() {
+        for (heading, unit) in [
+            ("wavelength_nm", Some(WavelengthUnit::Nanometer)),
+            ("Wavelength (nm)", Some(WavelengthUnit::Nanometer)),
+            ("nm", Some(WavelengthUnit::Nanometer)),
+            ("lambda [µm]", Some(WavelengthUnit::Micrometer)),
+            ("wl_um", Some(WavelengthUnit::Micrometer)),
+            ("wavelength in micrometers", Some(WavelengthUnit::Micrometer)),
+            ("wavelength (A)", Some(WavelengthUnit::Angstrom)),
+            ("Å", Some(WavelengthUnit::Angstrom)),
+            ("Wavelength, Angstrom", Some(WavelengthUnit::Angstrom)),
+            ("wavelength (m)", Some(WavelengthUnit::Meter)),
+            ("wavelength", None),
+            ("A", None),
+            ("id", None),
+        ] {
+            assert_eq!(WavelengthUnit::of_heading(heading), Ok(unit), "{heading}");
+        }
+        for heading in ["wavenumber", "nu (cm-1)", "k [cm^-1]", "1/cm", "frequency (THz)", "energy_eV"] {
+            assert!(WavelengthUnit::of_heading(heading).is_err(), "{heading}");
+        }
+        assert_eq!(WavelengthUnit::Micrometer.nm(0.57), 570.0);
+        assert_eq!(WavelengthUnit::Angstrom.nm(5550.0), 555.0);
+    }
+}
