@@ -237,47 +237,47 @@ const SPECTRA: &[Advice] = &[
         "render-radiance bare.csv --size 2x2 -o out.exr",
         UNIT,
         &[
-            "render-radiance named.csv --size 2x2 -o out.exr",
-            "render-radiance bare.csv --radiance-unit W/m2/sr/nm --size 2x2 -o out.exr",
+            "render-radiance named.csv --exposure 0.005 --size 2x2 -o out.exr",
+            "render-radiance bare.csv --radiance-unit W/m2/sr/nm --exposure 0.005 --size 2x2 -o out.exr",
         ],
     ),
     advice(
         "render-radiance named.csv --radiance-unit W/cm2/sr/nm --size 2x2 -o out.exr",
         "leave out --radiance-unit",
-        &["render-radiance named.csv --size 2x2 -o out.exr"],
+        &["render-radiance named.csv --exposure 0.005 --size 2x2 -o out.exr"],
     ),
     advice(
         "render-radiance scaled.csv --size 2x2 -o out.exr",
         "a unit with a number before it; give --radiance-unit",
-        &["render-radiance scaled.csv --radiance-unit W/m2/sr/nm --size 2x2 -o out.exr"],
+        &["render-radiance scaled.csv --radiance-unit W/m2/sr/nm --exposure 0.001 --size 2x2 -o out.exr"],
     ),
     advice(
         "render-radiance two.csv --size 2x2 -o out.exr",
         "choose one with --column NAME or --sample N",
         &[
-            "render-radiance two.csv --column b --size 2x2 -o out.exr",
-            "render-radiance two.csv --sample 1 --size 2x2 -o out.exr",
+            "render-radiance two.csv --column b --exposure 0.001 --size 2x2 -o out.exr",
+            "render-radiance two.csv --sample 1 --exposure 0.001 --size 2x2 -o out.exr",
         ],
     ),
     advice(
         "render-radiance micrometers.csv --size 2x2 -o out.exr",
         "name their unit in the heading, such as `wavelength_um`",
-        &["render-radiance renamed.csv --size 2x2 -o out.exr"],
+        &["render-radiance renamed.csv --exposure 0.005 --size 2x2 -o out.exr"],
     ),
     advice(
         "render-radiance named.csv --wavelengths 0.36:0.83:0.01 --size 2x2 -o out.exr",
         "give nm, such as 360:830:1",
-        &["render-radiance named.csv --wavelengths 360:830:1 --size 2x2 -o out.exr"],
+        &["render-radiance named.csv --exposure 0.005 --wavelengths 360:830:1 --size 2x2 -o out.exr"],
     ),
     advice(
         "predict-noise SAMPLES/skies/kider2014.exr",
         "choose one with --sample N",
-        &["predict-noise SAMPLES/skies/kider2014.exr --sample 3"],
+        &["predict-noise SAMPLES/skies/kider2014.exr --sample 3 --exposure 0.001"],
     ),
     advice(
         "predict-noise",
         "give a spectrum, --electrons R,G,B, --dark or --sweep",
-        &["predict-noise named.csv", "predict-noise --electrons 1,2,3", "predict-noise --dark"],
+        &["predict-noise named.csv --exposure 0.005", "predict-noise --electrons 1,2,3", "predict-noise --dark"],
     ),
     advice(
         "predict-noise --electrons 1,2,3 --uncertainty 1jnd",

@@ -238,7 +238,8 @@ fn check_levels(frame: &FrameHeader, codes: &Photosite) -> Predicted<()> {
     if metadata.correction.is_some() {
         return Ok(());
     }
-    if metadata.uniform_black_adu().is_none() {
+    let is_known = metadata.black_level_adu.is_some() || !metadata.black_by_row.is_empty();
+    if is_known && metadata.uniform_black_adu().is_none() {
         return Err(Unpredictable::Beyond("the black level differs among photosites"));
     }
     let top = codes.adc.map(|adc| f64::from(adc.top_code()));

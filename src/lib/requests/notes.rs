@@ -2,6 +2,7 @@
 
 use crate::analysis::statistics::Report;
 use crate::formats::input::FrameReader;
+use crate::metadata::FrameHeader;
 use crate::stream::RowSource;
 
 /// Something that came up; whoever asked decides what to do with it.
@@ -59,5 +60,18 @@ pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
     let remarks = std::iter::once(found).chain(reader.notes().iter().cloned()).map(Note::Remark);
     // Where a program of ours wrote the metadata, it has warned already.
     let doubts = if header.metadata.history.is_empty() { header.metadata.doubts() } else { Vec::new() };
-    remarks.chain(doubts.into_iter().map(|doubt| Note::Warning(format!("{}: {doubt}", header.name)))).collect()
+    let doubts = doubts.into_iter().map(|doubt| format!("{}: {doubt}", header.name));
+    remarks.chain(doubts.chain(no_range(header)).map(Note::Warning)).collect()
+}
+
+/// What is wrong with a frame whose black level leaves no room for light.
+fn no_range(frame: &FrameHeader) -> Option<String> {
+    let metadata = &frame.metadata;
+    let (black, white) = (metadata.uniform_black_adu()?, metadata.white_level_adu?.largest());
+    (black >= white).then(|| {
+        format!(
+            "{}: its black level, {black} ADU, is not below its white level, {white} ADU: no sample tells of light",
+            frame.name
+        )
+    })
 }

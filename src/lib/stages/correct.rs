@@ -77,12 +77,7 @@ impl CorrectFrame {
             input.check_corner()?;
             transfer = Some(Transfer::undoing(cte, &input.geometry)?);
             if !is_subtracted {
-                let adc = input.metadata.adc.ok_or_else(|| {
-                    input.refuse(
-                        "the metadata has no `adc`, whose bias is no charge; subtract the black level with --black auto",
-                    )
-                })?;
-                bias_adu = adc.bias_adu;
+                bias_adu = input.metadata.adc.ok_or_else(|| input.missing("adc"))?.bias_adu;
             }
         }
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
@@ -277,7 +272,7 @@ mod tests {
         assert!(correct(&crop, Black::Auto, None, &[]).is_ok());
         let bare = with(&|f| (f.metadata.adc, f.metadata.black_level_adu) = (None, None));
         assert!(matches!(refused(&bare, Black::Auto, None, &[]), Error::MissingKey { key: "black_level_adu", .. }));
-        assert!(refused(&bare, Black::None, Some(0.99), &[]).to_string().contains("no `adc`"));
+        assert!(matches!(refused(&bare, Black::None, Some(0.99), &[]), Error::MissingKey { key: "adc", .. }));
         assert!(correct(&bare, Black::Level(100.0), Some(0.99), &[]).is_ok());
         let unlike = [
             with(&|f| f.geometry.width = 9),

@@ -15,7 +15,8 @@ pub(super) struct Levels {
     /// The filter array of a plane whose classes R, G and B are told apart.
     pub array: Option<FilterArray>,
     rails: Rails,
-    black: BlackLevels,
+    /// None where the metadata do not know it.
+    black: Option<BlackLevels>,
 }
 
 /// Which samples of a frame count as clipped.
@@ -45,9 +46,10 @@ impl Levels {
     pub fn of(frame: &FrameHeader) -> Result<Self> {
         let metadata = &frame.metadata;
         let black = match metadata.quantity {
-            QuantityKind::Adu => frame.black_levels()?.unwrap_or(BlackLevels::uniform_at(0.0)),
-            QuantityKind::Electrons => BlackLevels::uniform_at(metadata.dark_signal_e.unwrap_or(0.0)),
-            _ => BlackLevels::uniform_at(0.0),
+            QuantityKind::Adu => frame.black_levels()?,
+            QuantityKind::Electrons => metadata.dark_signal_e.map(BlackLevels::uniform_at),
+            QuantityKind::Unspecified => None,
+            _ => Some(BlackLevels::uniform_at(0.0)),
         };
         let is_plane = frame.geometry.channels.len() == 1;
         let array = metadata.cfa.filter(|array| is_plane && array.has_three_classes());
@@ -87,15 +89,18 @@ impl Levels {
         }
     }
 
-    /// The mean black level of a region: columns and rows of the frame.
+    /// The mean black level of a region: columns and rows of the frame; NaN where it is not known.
     pub fn mean_black(&self, frame: &FrameHeader, columns: Range<usize>, rows: Range<usize>) -> MeanBlack {
-        if let Some(level) = self.black.uniform() {
+        let Some(levels) = &self.black else {
+            return MeanBlack { whole: f64::NAN, classes: [f64::NAN; 3] };
+        };
+        if let Some(level) = levels.uniform() {
             return MeanBlack { whole: level, classes: [level; 3] };
         }
         let [x0, y0] = frame.geometry.origin.map(i64::from);
         let (mut sums, mut counts) = ([0.0; 4], [0_u64; 4]);
         for y in rows {
-            let black = self.black.row(y);
+            let black = levels.row(y);
             for x in columns.clone() {
                 let class = self.array.and_then(|array| array.class(x0 + x as i64, y0 + y as i64));
                 let level = black.at(x);
