@@ -220,7 +220,8 @@ fn nothing_is_predicted_behind_levels_by_site() {
     let mut codes = with_levels(plane(12, 8, CfaPattern::Rggb.into()));
     codes.header.metadata.scene = Some(scene);
     codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });
-    assert!(propagation::of_frame(&codes.header, Equations::Exact).is_ok());
+    let why = propagation::of_frame(&codes.header, Equations::Exact).unwrap_err();
+    assert_eq!(why, Unpredictable::Beyond("the black level differs among photosites"));
     let corrected = correct(&codes.header, Black::Auto, None).unwrap();
     let camera = Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None).unwrap();
     for head in [corrected.header(), camera.header()] {

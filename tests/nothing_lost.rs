@@ -65,6 +65,7 @@ fn inputs_are_never_written() {
     for (from, to) in [
         ("expected.exr.yaml", "q.exr.yaml"),
         ("noisy.exr.yaml", "q.txt"),
+        ("noisy.exr.yaml", "q.png"),
         ("matrix.yaml", "m.exr.yaml"),
         ("expected.exr", "i.exr.yaml"),
         ("codes.exr", "d.exr"),
@@ -93,7 +94,7 @@ fn inputs_are_never_written() {
         ("digitize noisy.exr --sensor ./s.exr.yaml -o bg39_1mm.csv --format exr", "bg39_1mm.csv", "./bg39_1mm.csv"),
         ("add-noise i.exr.yaml -o i.exr", "i.exr.yaml", "i.exr.yaml"),
         ("measure noisy.exr --metadata q.txt -o q.txt", "q.txt", "q.txt"),
-        ("preview noisy.exr --metadata q.txt -o ./q.txt", "./q.txt", "q.txt"),
+        ("preview noisy.exr --metadata q.png -o ./q.png", "./q.png", "q.png"),
         ("mosaic noisy.exr -o noisy.exr.yaml --format exr", "noisy.exr.yaml", "noisy.exr.yaml"),
         ("mosaic noisy.exr --metadata q.txt -o noisy.exr.yaml --format exr", "noisy.exr.yaml", "noisy.exr.yaml"),
         ("mosaic noisy.exr -o new.exr", "new.exr.yaml", "noisy.exr.yaml"),

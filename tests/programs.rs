@@ -597,14 +597,14 @@ fn the_sidecar_tells_what_was_done_and_what_came_of_it() {
     let shop = Workshop::new();
     shop.run("fit-matrix SAMPLES/skies/sky912.exr -o matrix.yaml", &[]);
     let bright = "render-radiance --electrons 100,39900,45000 --size 32x20";
-    shop.run(&format!("{bright} -o expected.exr"), &[]);
+    shop.run(&format!("{bright} -q -o expected.exr"), &[]);
     let output = shop.attempt("add-noise expected.exr --seed 7 --frame 2 -v -o noisy.exr", &[]);
     assert!(output.status.success());
     let output = shop.attempt("digitize noisy.exr -q --threads 2 -o codes.tiff", &[]);
     assert!(output.status.success() && output.stderr.is_empty(), "--quiet is quiet");
-    shop.run("mosaic codes.tiff --compression zip -o plane.exr", &[]);
-    shop.run("demosaic plane.exr --method bi -orgb.exr", &[]);
-    shop.run("to-xyz --output=xyz.exr --matrix matrix.yaml rgb.exr", &[]);
+    shop.run("mosaic codes.tiff -q --compression zip -o plane.exr", &[]);
+    shop.run("demosaic plane.exr -q --method bi -orgb.exr", &[]);
+    shop.run("to-xyz -q --output=xyz.exr --matrix matrix.yaml rgb.exr", &[]);
 
     let metadata = shop.sidecar("xyz.exr");
     let history: Vec<String> =

@@ -51,8 +51,7 @@ fn demosaicking(plane: &MemoryFrame, method: Method) -> Demosaic {
 #[test]
 fn a_pixel_is_marked_where_another_value_of_a_full_sample_would_change_it() {
     let (width, height) = (9, 8);
-    for (method, pattern) in
-        Method::ALL.into_iter().flat_map(|method| CfaPattern::ALL.map(|pattern| (method, pattern)))
+    for (method, pattern) in Method::ALL.into_iter().flat_map(|method| CfaPattern::ALL.map(|pattern| (method, pattern)))
     {
         for origin in [[0, 0], [1, 0], [3, 5]] {
             let mut header = plane_header(width, height, pattern);

@@ -193,44 +193,41 @@ fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
 const COMPLAINTS: [(&str, &str); 20] = [
     (
         "render-radiance SAMPLES/skies/clear_zenith.csv --size 4x4 --sensor ./readout.yaml",
-        "sensor small: the metadata has no `sensor.response`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `response`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "render-radiance SAMPLES/skies/clear_zenith.csv --size 4x4 --sensor ./response.yaml",
-        "sensor small: the metadata has no `sensor.readout`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "render-radiance SAMPLES/skies/clear_zenith.csv --size 4x4 --sensor ./pitchless.yaml",
-        "sensor small: the metadata has no `sensor.readout.pixel_pitch_um`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout.pixel_pitch_um`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "render-radiance --dark --sensor ./response.yaml",
-        "sensor small: the metadata has no `sensor.readout`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "render-radiance --electrons 1,2,3 --size 4x4 --vignetting --sensor ./pitchless.yaml",
-        "sensor small: the metadata has no `sensor.readout.pixel_pitch_um`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout.pixel_pitch_um`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "render-radiance SAMPLES/skies/clear_zenith.csv --size 4x4 --sensor ./mono.yaml",
         "sensor small: it has no color filters (monochrome); only the response of the classes R, G and B is followed",
     ),
-    (
-        "add-noise rates.exr",
-        "rates.exr: the metadata has no `sensor.readout`; give a sensor that has it, --sensor NAME|FILE",
-    ),
+    ("add-noise rates.exr", "rates.exr: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE"),
     (
         "digitize rates.exr",
-        "rates.exr: the metadata has no `sensor.readout.bits`; give --sensor NAME|FILE, or all of --bits, --bias and --slope",
+        "rates.exr: its sensor has no `readout.bits`; give --sensor NAME|FILE, or all of --bits, --bias and --slope",
     ),
     (
         "digitize rates.exr --bits 12",
-        "rates.exr: the metadata has no `sensor.readout.bias_adu`; give --sensor NAME|FILE, or all of --bits, --bias and \
+        "rates.exr: its sensor has no `readout.bias_adu`; give --sensor NAME|FILE, or all of --bits, --bias and \
          --slope",
     ),
     (
         "demosaic codes.exr --sigma",
-        "codes.exr: the metadata has no `sensor.readout`; give a sensor that has it, --sensor NAME|FILE",
+        "codes.exr: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "measure rates.exr --check",
@@ -239,19 +236,19 @@ const COMPLAINTS: [(&str, &str); 20] = [
     ),
     (
         "fit-matrix SAMPLES/skies/sky912.exr --sensor ./response.yaml",
-        "sensor small: the metadata has no `sensor.readout`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "fit-matrix SAMPLES/skies/sky912.exr --sensor ./readout.yaml",
-        "sensor small: the metadata has no `sensor.response`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `response`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "predict-noise --electrons 1,2,3 --sensor ./response.yaml",
-        "sensor small: the metadata has no `sensor.readout`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "predict-noise SAMPLES/skies/clear_zenith.csv --sensor ./readout.yaml",
-        "sensor small: the metadata has no `sensor.response`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `response`; give a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "predict-noise --electrons 1,2,3 --sensor ./mono.yaml",

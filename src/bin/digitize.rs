@@ -5,7 +5,7 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::propagation::{self, Equations};
-use cyanometer::requests::{options, values};
+use cyanometer::requests::{self, options, values};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
@@ -48,6 +48,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut stage = Digitize::new(reader.header(), &settings)?;
     propagation::note(stage.header_mut(), Equations::Exact);
     session.sign(stage.header_mut());
+    session.tell(requests::of_levels(stage.header()).as_slice());
     session.drive(reader, &stage, &arguments.output)?;
     Ok(())
 }

@@ -5,7 +5,7 @@ use cyanometer::cli;
 use cyanometer::color::Space;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
-use cyanometer::formats::register::announce;
+use cyanometer::formats::register::{announce, check_inputs};
 use cyanometer::requests::{Conversion, options};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stream::RowSource;
@@ -42,6 +42,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
     announce(&[output.output.as_deref()])?;
+    check_inputs([arguments.input.input.as_deref(), Some(&*conversion.matrix)])?;
     let matrix = conversion.load_matrix()?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);

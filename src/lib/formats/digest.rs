@@ -1,5 +1,7 @@
 //! Digests: of a frame's samples, by which a sidecar knows its frame, and of data files.
 
+use crate::frame::Geometry;
+use crate::stages::saturation::MASK_LAYER;
 use sha2::{Digest, Sha256};
 
 /// Digest of samples as little-endian 32-bit floats.
@@ -27,6 +29,17 @@ impl SamplesDigest {
             self.update_bytes(bytemuck::cast_slice(samples));
         } else {
             samples.iter().for_each(|sample| self.update_bytes(&sample.to_le_bytes()));
+        }
+    }
+
+    /// Adds whole rows of a frame; a layer of marks, the last of its channels, is not of the samples.
+    pub fn update_rows(&mut self, rows: &[f32], geometry: &Geometry) {
+        match geometry.channels.split_last() {
+            Some((last, others)) if last == MASK_LAYER && !others.is_empty() => {
+                let kept = others.len() * geometry.width;
+                rows.chunks_exact(geometry.row_samples()).for_each(|row| self.update(&row[..kept]));
+            }
+            _ => self.update(rows),
         }
     }
 

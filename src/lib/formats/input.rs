@@ -210,7 +210,7 @@ impl RowSource for FrameReader {
         into.truncate(start);
         self.reader.read(rows, into)?;
         if let Some(check) = &mut self.check {
-            check.digest.update(&into[start..]);
+            check.digest.update_rows(&into[start..], self.reader.geometry());
         }
         if let Some(divisor) = self.divisor {
             into[start..].iter_mut().for_each(|sample| *sample /= divisor);

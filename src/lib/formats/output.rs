@@ -377,7 +377,7 @@ impl RowSink for FrameWriter {
                 Encoding::Exr(ExrSamples::F16, _) => None,
                 Encoding::Tiff(TiffSamples::U16, _) => Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16)),
                 _ => {
-                    digest.update(samples);
+                    digest.update_rows(samples, &self.header.geometry);
                     return self.encode(samples);
                 }
             };
@@ -388,7 +388,7 @@ impl RowSink for FrameWriter {
                     to_sample(f64::from((sample * scale).round_ties_even().clamp(0.0, U16_FULL_SCALE)).max(0.0))
                 }
             }));
-            digest.update(&self.stored);
+            digest.update_rows(&self.stored, &self.header.geometry);
         }
         self.encode(samples)
     }

@@ -58,8 +58,7 @@ pub fn parse_sensor(name: &str, bytes: &[u8]) -> Result<Sensor> {
     if !is_flat(&raw) {
         let schema = raw.get("schema").and_then(Value::as_str);
         if let Some(other) = schema.filter(|schema| *schema != SENSOR_SCHEMA) {
-            let problem =
-                format!("its schema is `{other}`, but this version reads `{SENSOR_SCHEMA}` and `{FLAT_SENSOR_SCHEMA}`");
+            let problem = format!("schema is `{other}`, not `{SENSOR_SCHEMA}` or `{FLAT_SENSOR_SCHEMA}`");
             return Err(Error::format(name, problem));
         }
         return parse_parts(name, bytes, &sensor_parts());

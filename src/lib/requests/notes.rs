@@ -39,9 +39,9 @@ pub fn of_statistics(report: &Report) -> Vec<Note> {
             "{pixels} pixels were made of saturated samples; they are left out of the statistics, so that these are of the \
              darker part alone (--keep-saturated keeps them in)"
         )),
-        false => {
-            Some(format!("{pixels} samples are saturated; the statistics hold for what was recorded, not for the light"))
-        }
+        false => Some(format!(
+            "{pixels} samples are saturated; the statistics hold for what was recorded, not for the light"
+        )),
     };
     Note::not_finite(not_finite).into_iter().chain(saturated.map(Note::Warning)).collect()
 }
@@ -61,17 +61,17 @@ pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
     // Where a program of ours wrote the metadata, it has warned already.
     let doubts = if header.metadata.history.is_empty() { header.metadata.doubts() } else { Vec::new() };
     let doubts = doubts.into_iter().map(|doubt| format!("{}: {doubt}", header.name));
-    remarks.chain(doubts.chain(no_range(header)).map(Note::Warning)).collect()
+    remarks.chain(doubts.map(Note::Warning)).chain(of_levels(header)).collect()
 }
 
-/// What is wrong with a frame whose black level leaves no room for light.
-fn no_range(frame: &FrameHeader) -> Option<String> {
+/// A warning of a black level that leaves no room for light.
+pub fn of_levels(frame: &FrameHeader) -> Option<Note> {
     let metadata = &frame.metadata;
     let (black, white) = (metadata.uniform_black_adu()?, metadata.white_level_adu?.largest());
     (black >= white).then(|| {
-        format!(
+        Note::Warning(format!(
             "{}: its black level, {black} ADU, is not below its white level, {white} ADU: no sample tells of light",
             frame.name
-        )
+        ))
     })
 }

@@ -94,15 +94,6 @@ impl Digitize {
         if !adc.bias_adu.is_finite() {
             return Err(Error::Usage(format!("a bias of {} ADU is impossible", adc.bias_adu)));
         }
-        if adc.bias_adu >= f64::from(adc.top_code()) {
-            return Err(Error::Usage(format!(
-                "a bias of {} ADU leaves no codes for light: the largest of {} bits is {}",
-                adc.bias_adu,
-                adc.bits,
-                adc.top_code()
-            ))
-            .change(&["bias", "bits"]));
-        }
         if !(adc.adu_per_e > 0.0 && adc.adu_per_e.is_finite()) {
             return Err(Error::Usage(format!(
                 "a slope of {} ADU per electron is impossible; give one above 0",
