@@ -185,7 +185,7 @@ fn levels_by_site_that_no_word_is_left_for_are_refused() {
     // What adds to a level needs one.
     let mut without = codes.header.clone();
     without.metadata.black_level_adu = None;
-    refused(correct(&without, Black::Auto, None), "the metadata has no `black_level_adu`");
+    refused(correct(&without, Black::Auto, None), "but not the level itself; write `black_level_adu`");
 }
 
 fn to_color(space: Space) -> ColorSettings {

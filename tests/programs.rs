@@ -163,7 +163,8 @@ fn patches_of_a_library_are_as_noisy_as_predicted() {
     }
     let text = String::from_utf8(shop.run("measure --patches rgb.exr", &[])).unwrap();
     assert!(text.starts_with("912 patches, 14x10 pixels of ADU [ADU] in each\nsample  count   R mean"), "{text}");
-    assert_eq!(text.lines().count(), 914);
+    // Title, heading, patches, and what standard deviations count.
+    assert_eq!(text.lines().count(), 915);
     let csv = String::from_utf8(shop.run("measure --patches=20x16 rgb.exr --output-format csv", &[])).unwrap();
     assert!(csv.lines().next().unwrap().ends_with(",z_std,sample,patch_column,patch_row,mean_error,std_error"));
     assert!(csv.lines().last().unwrap().contains(",911,37,23,"));

@@ -7,7 +7,7 @@ use cyanometer::formats::input::FrameReader;
 use cyanometer::propagation::{self, Equations};
 use cyanometer::requests::{self, options, values};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
-use cyanometer::stream::RowSource;
+use cyanometer::stream::{RowSource, Stage};
 use std::process::ExitCode;
 
 /// Turn electrons into the codes of the analog-to-digital converter (ADU)
