@@ -30,12 +30,13 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut scene = arguments.scene.open()?;
-    session.tell(&scene.notes);
+    let notes = std::mem::take(&mut scene.notes);
     session.sign(scene.header_mut());
     let mut writer = FrameWriter::create(&arguments.output.options(), scene.header())?;
     let bar = session.progress(scene.header().geometry.height);
     scene.draw(&mut writer, &mut |rows| bar.set_position(rows as u64))?;
     bar.finish_and_clear();
     writer.finish(Counts::default())?;
+    session.tell(&notes);
     Ok(())
 }

@@ -106,7 +106,9 @@ impl CameraSetup {
         let correct = match self.dark_frames {
             0 => None,
             frames => {
-                let darks = DarkStack::alike(digitize.header().clone(), frames)?;
+                let mut dark = digitize.header().clone();
+                dark.metadata.scene = Some(Scene::uniform("dark", [0.0; 3]));
+                let darks = DarkStack::alike(dark, frames)?;
                 let nothing_else = CorrectionSettings { black: Black::None, cte: None };
                 Some(CorrectFrame::new(digitize.header(), &nothing_else, Some(&darks))?)
             }

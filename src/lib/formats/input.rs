@@ -109,7 +109,10 @@ impl FrameReader {
         let stored = reader.geometry();
         let geometry = keep_planes(stored, options.all_channels, metadata.quantity);
         let left_out = &stored.channels[geometry.channels.len()..];
+        // Only what our programs made marks what they mean by it.
+        let is_ours = !metadata.history.is_empty();
         let mask = left_out.iter().position(|channel| channel == MASK_LAYER).map(|at| geometry.channels.len() + at);
+        let mask = mask.filter(|_| is_ours);
         let dropped: Vec<&str> = left_out.iter().map(String::as_str).filter(|channel| *channel != MASK_LAYER).collect();
         if !dropped.is_empty() {
             notes.push(format!("{name}: channels {} are left out", dropped.join(", ")));

@@ -24,7 +24,7 @@ impl DarkStack {
     ///
     /// # Errors
     ///
-    /// [`Error::Order`](crate::error::Error::Order) and [`Error::Format`](crate::error::Error::Format) unless they hold ADU
+    /// [`Error::Order`] and [`Error::Format`] unless they hold ADU
     /// as the converter gave them.
     pub fn alike(head: FrameHeader, frames: u32) -> Result<Self> {
         check_codes(&head)?;
@@ -36,7 +36,7 @@ impl DarkStack {
     ///
     /// # Errors
     ///
-    /// As [`Self::alike`], and [`Error::Format`](crate::error::Error::Format) for a frame that does not show the photosites
+    /// As [`Self::alike`], and [`Error::Format`] for a frame that does not show the photosites
     /// of the first.
     pub fn of<'a>(heads: impl IntoIterator<Item = &'a FrameHeader>) -> Result<Option<Self>> {
         let mut heads = heads.into_iter();

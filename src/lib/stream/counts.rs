@@ -69,7 +69,8 @@ impl Counts {
             (if only_met { self.saturated_samples } else { 0 }, "samples are saturated, at full well or the white level"),
             (
                 self.saturated_pixels,
-                "pixels were made of saturated samples: their values are wrong, and their uncertainty is infinite",
+                "pixels were made of saturated samples: their values are wrong, and their uncertainty, which --sigma tells, is \
+                 infinite",
             ),
             (self.full_well, "photosites were clipped at full well"),
             (self.clipped_low, "samples were clipped to the smallest code"),

@@ -41,8 +41,8 @@ impl<'a> Watch<'a> {
     pub fn new(source: &'a mut dyn RowSource, saturated: Saturated, regions: &[Region]) -> Self {
         let mut header = source.header().clone();
         let layer = header.geometry.channels.iter().position(|channel| channel == MASK_LAYER);
-        // A frame of marks alone is measured as any other; elsewhere they come last.
-        let layer = layer.filter(|layer| *layer > 0);
+        // What other programs call so is measured as any channel; ours comes last.
+        let layer = layer.filter(|layer| *layer > 0 && !header.metadata.history.is_empty());
         if let Some(layer) = layer {
             header.geometry.channels.truncate(layer);
             if saturated == Saturated::Kept && header.leads_with_three_planes() {
