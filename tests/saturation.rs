@@ -47,6 +47,11 @@ fn demosaicking(plane: &MemoryFrame, method: Method) -> Demosaic {
     Demosaic::new(&plane.header, method, Black::Auto, None).unwrap()
 }
 
+/// Demosaicking with its uncertainty, which has the layer of marks wherever samples may be full.
+fn uncertain(plane: &MemoryFrame, method: Method) -> WithSigma<Demosaic> {
+    WithSigma::of_demosaicking(demosaicking(plane, method)).unwrap()
+}
+
 /// Which pixels are marked is asked of the filters themselves: those that another value of the full sample changes.
 #[test]
 fn a_pixel_is_marked_where_another_value_of_a_full_sample_would_change_it() {
@@ -64,13 +69,13 @@ fn a_pixel_is_marked_where_another_value_of_a_full_sample_would_change_it() {
                     plane
                 };
                 let (full, lower) = (with(WHITE), with(WHITE - 1000.0));
-                let (made, counts) = masked(&full, &demosaicking(&full, method));
-                let (other, none) = masked(&lower, &demosaicking(&lower, method));
-                assert_eq!((none.saturated_pixels, made.header.geometry.channels.len()), (0, 4));
+                let (made, counts) = masked(&full, &uncertain(&full, method));
+                let (other, none) = masked(&lower, &uncertain(&lower, method));
+                assert_eq!((none.saturated_pixels, made.header.geometry.channels.len()), (0, 7));
                 let changes = |x, y| (0..3).any(|channel| at(&made, x, y, channel) != at(&other, x, y, channel));
                 let mut marked = 0;
                 for (px, py) in (0..height).flat_map(|py| (0..width).map(move |px| (px, py))) {
-                    let is_marked = at(&made, px, py, 3) == 1.0;
+                    let is_marked = at(&made, px, py, 6) == 1.0;
                     marked += u64::from(is_marked);
                     assert_eq!(is_marked, changes(px, py), "{method:?} {pattern:?} {origin:?} {x},{y} at {px},{py}");
                 }
@@ -153,9 +158,9 @@ fn the_uncertainty_of_a_marked_pixel_is_infinite() {
 fn marks_do_not_hang_on_the_frame() {
     let plane =
         frame(plane_header(24, 20, CfaPattern::Grbg), |x, y, _| if scatter(x, y, 2) > 0.9 { WHITE } else { 600.0 });
-    let whole = masked(&plane, &demosaicking(&plane, Method::Malvar)).0;
+    let whole = masked(&plane, &uncertain(&plane, Method::Malvar)).0;
     let part = crop(&plane, 5, 3, 15, 12);
-    let of_part = masked(&part, &demosaicking(&part, Method::Malvar)).0;
+    let of_part = masked(&part, &uncertain(&part, Method::Malvar)).0;
     support::assert_same(&crop(&of_part, 2, 2, 11, 8), &crop(&whole, 7, 5, 11, 8), "marks of a crop");
 
     let shop = Workshop::new();
