@@ -62,6 +62,7 @@ fn a_pixel_is_marked_where_another_value_of_a_full_sample_would_change_it() {
             let mut header = plane_header(width, height, pattern);
             header.geometry.origin = origin;
             let plane = frame(header, |x, y, _| 500.0 + 300.0 * scatter(x, y, 0));
+            let stage = uncertain(&plane, method);
             for [x, y] in [[0, 0], [4, 3], [5, 3], [4, 4], [5, 4], [8, 7], [8, 0], [1, 6]] {
                 let with = |value: f32| {
                     let mut plane = plane.clone();
@@ -69,8 +70,8 @@ fn a_pixel_is_marked_where_another_value_of_a_full_sample_would_change_it() {
                     plane
                 };
                 let (full, lower) = (with(WHITE), with(WHITE - 1000.0));
-                let (made, counts) = masked(&full, &uncertain(&full, method));
-                let (other, none) = masked(&lower, &uncertain(&lower, method));
+                let (made, counts) = masked(&full, &stage);
+                let (other, none) = masked(&lower, &stage);
                 assert_eq!((none.saturated_pixels, made.header.geometry.channels.len()), (0, 7));
                 let changes = |x, y| (0..3).any(|channel| at(&made, x, y, channel) != at(&other, x, y, channel));
                 let mut marked = 0;
