@@ -12,6 +12,9 @@ use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Draw one noisy exposure from expected electrons
 ///
 /// Takes the frame of expected electrons that render-radiance makes, three planes or one CFA plane, and gives the

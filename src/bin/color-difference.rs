@@ -12,6 +12,9 @@ use cyanometer::stream::{Counts, RowSink};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Compare two images or colors by the CIE 1976, 1994 and 2000 formulas
 ///
 /// Each of A and B is an image of XYZ, xyY or L*a*b* (EXR or TIFF, `-` for standard input), or a color: three numbers

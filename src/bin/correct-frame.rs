@@ -13,6 +13,9 @@ use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Take black level, dark frames and charge transfer back from a frame of ADU
 ///
 /// Works before demosaicking. What no light reads is subtracted first, as a constant or as the mean of dark frames; then

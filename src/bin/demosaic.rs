@@ -13,6 +13,9 @@ use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Interpolate the two classes that each photosite did not measure
 ///
 /// The black level (bias plus mean dark signal) is removed first and values stay signed. Edges are mirrored without

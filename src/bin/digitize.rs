@@ -10,6 +10,9 @@ use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stream::{RowSource, Stage};
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Turn electrons into the codes of the analog-to-digital converter (ADU)
 ///
 /// Each sample becomes round(bias + slope * electrons), clipped to 0 ... 2^bits - 1. Rounding is the quantization noise;

@@ -7,6 +7,9 @@ use cyanometer::report::characterization::MatrixOutputs;
 use cyanometer::requests::Fit;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Fit the matrix that turns a sensor's signals into CIE XYZ
 ///
 /// The training samples are spectral radiances: a spectral EXR (channels named like S0.550,000000nm), or a CSV table with one spectrum in

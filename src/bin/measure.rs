@@ -13,6 +13,9 @@ use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Measure mean, spread and covariance of a frame, beside what the formulas predict
 ///
 /// Predictions are made for uniform scenes, from electrons to XYZ, xyY and L*a*b*. Planes behind a color filter array

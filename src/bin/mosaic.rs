@@ -10,6 +10,9 @@ use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Keep of three planes what a Bayer color filter array lets through
 ///
 /// Works at any stage: on expected electrons, on noisy ones, on ADU. The noise of a photosite does not depend on when

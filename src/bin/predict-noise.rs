@@ -7,6 +7,9 @@ use cyanometer::report::BudgetOutputs;
 use cyanometer::requests::NoisePrediction;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Predict the noise of a uniform scene at every stage, by formula and without pixels
 ///
 /// Takes a spectrum or the electrons of R,G,B, and gives mean, spread, covariance and signal-to-noise ratio of electrons,

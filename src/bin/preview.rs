@@ -11,6 +11,9 @@ use cyanometer::requests::{options, values};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Write a frame as a PNG picture to look at
 ///
 /// Electrons and ADU are shown plane by plane, R as red and so on, from what no light reads to the most that the stage

@@ -8,6 +8,9 @@ use cyanometer::requests::{Scene, options};
 use cyanometer::stream::Counts;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Render what a camera expects to collect of a spectral radiance: electrons per photosite and sensor class
 ///
 /// Takes a spectrum (CSV: wavelength in nm, radiance), one of a library, or a spectral EXR (channels like S0.550,000000nm) whose

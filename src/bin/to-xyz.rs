@@ -11,6 +11,9 @@ use cyanometer::sigma::WithSigma;
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
+#[global_allocator]
+static MEMORY: cli::Memory = cli::Memory;
+
 /// Turn demosaicked ADU into CIE XYZ, xyY, L*a*b* or a viewable sRGB picture
 ///
 /// XYZ is absolute, Y in cd/m2. L*a*b* and sRGB refer to a white; by default that of D65, as bright as makes the camera

@@ -45,7 +45,7 @@ impl Geometry {
     /// Rows to ask a source for together that decodes `natural` of them at a time: so many, unless they are too large to
     /// hold more than once.
     pub fn step_rows(&self, natural: usize) -> usize {
-        if natural * self.row_bytes() <= STEP_BYTES { natural } else { 1 }
+        if natural.saturating_mul(self.row_bytes()) <= STEP_BYTES { natural } else { 1 }
     }
 
     /// Rows of a band for one thread that may begin at any row: as many as fit a cache.

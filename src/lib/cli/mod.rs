@@ -3,11 +3,13 @@
 mod advice;
 mod general;
 mod history;
+mod memory;
 mod signals;
 mod usage;
 
 pub use general::{General, ProgressWhen};
 pub use history::history_entry;
+pub use memory::Memory;
 
 use crate::error::{Error, Result};
 use crate::formats::atomic::remove_pending_now;
@@ -50,6 +52,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         remove_pending_now();
         std::process::exit(PANICKED);
     }));
+    memory::complain_as(program);
     signals::tidy_up_first();
     register::keep();
     let command = A::command().name(program).bin_name(program);

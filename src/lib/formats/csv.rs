@@ -19,6 +19,8 @@ use std::io::Read;
 const MAX_BYTES: u64 = 256 << 20;
 /// A table may have this many numbers: 256 MiB of them.
 const MAX_CELLS: usize = 1 << 25;
+/// A table may have this many columns: as text they take many times the memory of their numbers.
+const MAX_COLUMNS: usize = 1 << 20;
 
 /// Reads one column of a table of any kind as text; `name` is the file in messages.
 ///
@@ -27,6 +29,7 @@ const MAX_CELLS: usize = 1 << 25;
 /// [`Error::Format`] for what is no CSV table, or has no such column, naming those that there are.
 pub fn text_column(name: &str, bytes: &[u8], column: &str) -> Result<Vec<String>> {
     let not_csv = |error: csv::Error| csv_complaint(name, &error);
+    check_cells(name, bytes)?;
     let mut reader = reader(bytes, true);
     let headers = reader.headers().map_err(not_csv)?;
     let place = headers.iter().position(|header| header == column).ok_or_else(|| {
@@ -64,10 +67,14 @@ impl SpectralTable {
         if bytes.contains(&0) {
             return refuse("it is not a CSV table but a binary file");
         }
+        check_cells(name, &bytes)?;
         let mut reader = reader(&bytes, false);
         let mut first = StringRecord::new();
         if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, &e))? {
             return refuse("it holds no rows");
+        }
+        if first.len() > MAX_COLUMNS {
+            return Err(Error::format(name, format!("it has more than {MAX_COLUMNS} columns; no table has")));
         }
         let has_header = number(&first[0]).is_none();
         let by_rows = has_header && first.len() > 2 && first.iter().skip(1).all(|cell| number(cell).is_some());
@@ -274,6 +281,15 @@ impl Cells {
             Array2::from_shape_vec((rows, width), numbers).map_err(|_| refuse("its rows differ in length".into()))?;
         Ok(Self { numbers, labels })
     }
+}
+
+/// Refuses a table of too many cells, before any of them is told apart: each row is held as a whole.
+fn check_cells(name: &str, bytes: &[u8]) -> Result<()> {
+    let commas = bytes.iter().filter(|byte| **byte == b',').count();
+    if commas < MAX_CELLS {
+        return Ok(());
+    }
+    Err(Error::format(name, format!("it has more than {MAX_CELLS} numbers; no table has")))
 }
 
 /// A reader of CSV that knows our comments; a byte order mark is passed over.

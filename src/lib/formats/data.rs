@@ -172,7 +172,12 @@ fn read_beside(place: &Place, sensor: &str, file: &str) -> Result<(String, Vec<u
     match place {
         Place::Directory(directory) => {
             let path = directory.join(file);
-            Ok((path.display().to_string(), read_file(&path)?))
+            let shown = path.display().to_string();
+            // A named pipe, which a reader would wait on, is nothing that a user has named; what is missing, reading tells.
+            if std::fs::metadata(&path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
+                return Err(Error::format(&shown, "it is no file but a pipe or a device; a table must be a file"));
+            }
+            Ok((shown, read_file(&path)?))
         }
         Place::BuiltIn => match built_in(&format!("sensors/{file}")) {
             Some(bytes) => Ok((file.to_owned(), bytes.to_vec())),

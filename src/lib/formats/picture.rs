@@ -149,6 +149,9 @@ impl Shade {
             }
             Range::Full => match metadata.quantity {
                 QuantityKind::Srgb => return Ok(Self::Encoded),
+                QuantityKind::Xyz if moments.len() != 3 => {
+                    return Err(frame.refuse("a single plane of XYZ is no picture; give --range LOW,HIGH"));
+                }
                 QuantityKind::Xyz => {
                     let white = metadata.color.as_ref().and_then(|color| color.white);
                     let white = white.ok_or_else(|| {

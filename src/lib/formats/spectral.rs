@@ -111,18 +111,21 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
             warnings.extend(spectral.warning);
             let geometry = reader.header().geometry.clone();
             let factor = spectral.unit.in_w_per_cm2_sr_nm();
-            let mut radiance = Array2::zeros((geometry.width * geometry.height, spectral.channels.len()));
+            // A header may declare any size: memory is taken as rows come.
+            let mut radiance = Vec::new();
             fold([&mut *reader as &mut dyn RowSource], geometry.height, |band| {
                 let window = band.window::<Any>(0);
                 for y in band.rows() {
-                    for (index, &channel) in spectral.channels.iter().enumerate() {
-                        for (x, &sample) in window.row(y.cast_signed(), channel).iter().enumerate() {
-                            radiance[(y * geometry.width + x, index)] = f64::from(sample) * factor;
-                        }
-                    }
+                    let lines: Vec<&[f32]> =
+                        spectral.channels.iter().map(|&channel| window.row(y.cast_signed(), channel)).collect();
+                    let pixels = (0..geometry.width).flat_map(|x| lines.iter().map(move |line| line[x]));
+                    radiance.extend(pixels.map(|sample| f64::from(sample) * factor));
                 }
                 Ok(())
             })?;
+            let samples = radiance.len() / spectral.channels.len();
+            let radiance = Array2::from_shape_vec((samples, spectral.channels.len()), radiance)
+                .map_err(|_| Error::format(&name, "its rows differ in length"))?;
             SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance, columns: geometry.width }
         }
         Radiances::Table(table) => {

@@ -4,6 +4,9 @@
 const MAX_BYTES: usize = 1 << 20;
 /// Brackets may nest this deep.
 const MAX_BRACKETS: usize = 32;
+/// A document may open so many brackets: some in strings and comments may close none that a parser sees, so that depth alone
+/// does not tell how deep they nest, and time goes by the square of that.
+const MAX_OPENED: usize = 10_000;
 /// A line may be indented by this many columns.
 const MAX_INDENT: usize = 128;
 /// A document may have this many anchors, aliases and tags each: a handful cannot blow up.
@@ -31,16 +34,19 @@ pub fn checked_text(bytes: &[u8]) -> Result<&str, &'static str> {
     }
     let text = std::str::from_utf8(bytes).map_err(|_| "it is not UTF-8 text")?;
     let text = text.strip_prefix('\u{FEFF}').unwrap_or(text);
-    let mut depth = 0_usize;
+    let (mut depth, mut opened) = (0_usize, 0_usize);
     for bracket in text.bytes() {
         match bracket {
-            b'[' | b'{' => depth += 1,
+            b'[' | b'{' => (depth, opened) = (depth + 1, opened + 1),
             b']' | b'}' => depth = depth.saturating_sub(1),
             _ => {}
         }
         if depth > MAX_BRACKETS {
             return Err("its brackets nest too deep");
         }
+    }
+    if opened > MAX_OPENED {
+        return Err("it has more than 10000 brackets; no metadata, sensor or matrix has");
     }
     let indent =
         |line: &str| line.len() - line.trim_start_matches(|c| c == ' ' || c == '\t' || INDENTING.contains(&c)).len();

@@ -5,6 +5,20 @@ use super::sums::{self, Limits, Sums};
 /// Samples of a channel that are summed about one center.
 pub const BLOCK: usize = 4096;
 
+/// So many channels are followed together; of more, each is followed by itself, and covariances are not known: time and
+/// memory go by the square of their number. A spectrum of 360 to 830 nm in steps of 1 nm has 471.
+pub const MOST_TOGETHER: usize = 512;
+
+/// The channels from `i` on whose products with channel `i` are summed, of so many.
+fn partners(i: usize, channels: usize) -> std::ops::Range<usize> {
+    i..if channels > MOST_TOGETHER { i + 1 } else { channels }
+}
+
+/// How many products are summed of so many channels.
+pub fn pairs(channels: usize) -> usize {
+    if channels > MOST_TOGETHER { channels } else { channels * (channels + 1) / 2 }
+}
+
 /// Count, means, extremes and sums of products of deviations of `channels` variables observed together.
 ///
 /// Blocks of up to [`BLOCK`] observations are summed about a center, the block's first observation, or its mean where the
@@ -65,7 +79,7 @@ impl Moments {
             beyond: vec![0; channels],
             origin: vec![0.0; channels],
             offset: vec![0.0; channels],
-            comoments: vec![0.0; channels * (channels + 1) / 2],
+            comoments: vec![0.0; pairs(channels)],
             block: Block::new(channels),
         }
     }
@@ -138,7 +152,7 @@ impl Moments {
         let mut pair = 0;
         for i in 0..channels {
             let shift_i = shift(self, i);
-            for j in i..channels {
+            for j in partners(i, channels) {
                 self.comoments[pair] += comoments[pair] + shift_i * shift(self, j) * mine * share;
                 pair += 1;
             }
@@ -152,10 +166,16 @@ impl Moments {
         self.count += count;
     }
 
-    /// Sample covariance of channels `i` and `j` (divisor n − 1); none below two observations.
+    /// Sample covariance of channels `i` and `j` (divisor n − 1); none below two observations, nor of two of more than
+    /// [`MOST_TOGETHER`] channels.
     pub fn covariance(&self, i: usize, j: usize) -> Option<f64> {
         let (i, j) = (i.min(j), i.max(j));
-        let pair = i * (2 * self.channels() - i + 1) / 2 + (j - i);
+        let channels = self.channels();
+        let pair = match channels > MOST_TOGETHER {
+            true if i != j => return None,
+            true => i,
+            false => i * (2 * channels - i + 1) / 2 + (j - i),
+        };
         (self.count > 1).then(|| self.comoments[pair] / (self.count - 1) as f64)
     }
 
@@ -200,7 +220,7 @@ impl Block {
             count: 0,
             center: vec![0.0; channels],
             sums: vec![0.0; channels],
-            products: vec![0.0; channels * (channels + 1) / 2],
+            products: vec![0.0; pairs(channels)],
             min: vec![0.0; channels],
             max: vec![0.0; channels],
             beyond: vec![0; channels],
@@ -281,11 +301,12 @@ impl Block {
                 for i in 0..channels {
                     let ([sums], []) = sums::together([line(i)], [self.center[i]]);
                     self.keep(i, pair, &sums, beyond(i, &sums));
-                    for j in i + 1..channels {
+                    let partners = partners(i, channels);
+                    for j in partners.clone().skip(1) {
                         let centers = [self.center[i], self.center[j]];
                         self.products[pair + j - i] = sums::product([line(i), line(j)], centers);
                     }
-                    pair += channels - i;
+                    pair += partners.len();
                 }
             }
         }
@@ -330,7 +351,7 @@ impl Block {
                 self.sums[i] += deviation;
                 self.min[i] = self.min[i].min(value);
                 self.max[i] = self.max[i].max(value);
-                for j in i..channels {
+                for j in partners(i, channels) {
                     self.products[pair] += deviation * (f64::from(sample(j, x)) - self.center[j]);
                     pair += 1;
                 }
@@ -353,7 +374,7 @@ impl Block {
                 self.center[i] += self.sums[i] / count;
                 moved = true;
             }
-            pair += channels - i;
+            pair += partners(i, channels).len();
         }
         moved
     }
@@ -363,7 +384,7 @@ impl Block {
         let (channels, count) = (self.center.len(), self.count.max(1) as f64);
         let mut pair = 0;
         for i in 0..channels {
-            for j in i..channels {
+            for j in partners(i, channels) {
                 self.products[pair] -= self.sums[i] * (self.sums[j] / count);
                 pair += 1;
             }

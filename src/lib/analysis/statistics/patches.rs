@@ -14,7 +14,7 @@ use crate::color;
 use crate::error::{Error, Result};
 use crate::metadata::{FrameHeader, Scene};
 use crate::names::Named;
-use crate::numerics::moments::Moments;
+use crate::numerics::moments::{self, Moments};
 use crate::propagation::sampling::{Place, Sampling, SamplingBasis};
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments};
 use crate::stages::demosaic::Method;
@@ -24,6 +24,7 @@ use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A patch that lies whole within a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,13 +67,21 @@ pub fn of_frame(frame: &FrameHeader, size: Option<[usize; 2]>) -> Result<Vec<Pat
     let of_source = scene.filter(|_| recorded == Some(size)).and_then(|scene| scene.source_width);
     let of_frame = (geometry.origin == [0, 0] && geometry.width.is_multiple_of(width)).then(|| geometry.width / width);
     let columns = of_source.or(of_frame);
-    let columns_of_patches = whole(geometry.origin[0], geometry.width, width);
+    let [across, down] =
+        [whole(geometry.origin[0], geometry.width, width), whole(geometry.origin[1], geometry.height, height)];
+    let count = across.len() as u128 * down.len() as u128;
+    let most = most_patches(geometry.channels.len());
+    if count > most as u128 {
+        let problem = format!("it has {count} patches of {width}x{height}; {most} are measured at a time at most");
+        return Err(usage(problem).change(&["patches"]));
+    }
+    let columns_of_patches: Vec<(usize, usize)> = across.collect();
     let mut patches = Vec::new();
-    for (row, y) in whole(geometry.origin[1], geometry.height, height) {
+    for (row, y) in down {
         for &(column, x) in &columns_of_patches {
             let interior =
                 Region { x: x + margin, y: y + margin, width: width - 2 * margin, height: height - 2 * margin };
-            let sample = columns.map(|columns| row * columns + column);
+            let sample = columns.and_then(|columns| row.checked_mul(columns)?.checked_add(column));
             patches.push(Patch { at: [column, row], sample, interior });
         }
     }
@@ -85,13 +94,47 @@ pub fn of_frame(frame: &FrameHeader, size: Option<[usize; 2]>) -> Result<Vec<Pat
     Ok(patches)
 }
 
+/// So many patches of frames of so many channels are measured at a time: what is kept of each until the report is written
+/// takes some kilobytes, and for each pair of channels a number twice.
+fn most_patches(channels: usize) -> usize {
+    /// Of frames of a few channels: a chart of 256x256 patches.
+    const MOST: usize = 1 << 16;
+    /// Pairs of channels whose room is that of the rest.
+    const FREE_PAIRS: usize = 128;
+    MOST / (1 + moments::pairs(channels) / FREE_PAIRS)
+}
+
 /// Along one axis of a frame, the patches that lie whole within it: number, and first sample in the frame.
-fn whole(origin: i32, length: usize, size: usize) -> Vec<(usize, usize)> {
+fn whole(origin: i32, length: usize, size: usize) -> Places {
+    if size > length {
+        return Places { origin: 0, size: 1, numbers: 0..0 };
+    }
     let (origin, length, size) = (i64::from(origin), length as i64, size as i64);
     let first = (origin + size - 1).div_euclid(size).max(0);
-    let end = (origin + length).div_euclid(size);
-    let place = |index: i64| Some((usize::try_from(index).ok()?, usize::try_from(index * size - origin).ok()?));
-    (first..end).filter_map(place).collect()
+    let end = (origin + length).div_euclid(size).max(first);
+    Places { origin, size, numbers: first..end }
+}
+
+/// Patches along one axis.
+struct Places {
+    origin: i64,
+    size: i64,
+    numbers: Range<i64>,
+}
+
+impl Places {
+    fn len(&self) -> u64 {
+        (self.numbers.end - self.numbers.start).unsigned_abs()
+    }
+}
+
+impl Iterator for Places {
+    type Item = (usize, usize);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let index = self.numbers.next()?;
+        Some((usize::try_from(index).ok()?, usize::try_from(index * self.size - self.origin).ok()?))
+    }
 }
 
 /// Reads a whole frame and works out the statistics of the interiors of its patches.

@@ -15,6 +15,7 @@ use exr::math::Vec2;
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, SampleType as ExrSampleType, Text};
 use exr::meta::header::Header;
+use std::collections::HashMap;
 use std::io::Read;
 
 /// A block (a tile, or the scanlines that are compressed together) may take this much memory, not more.
@@ -42,6 +43,9 @@ pub(super) struct Contents {
 pub(super) fn read_meta(input: &mut impl Read, name: &str) -> Result<MetaData> {
     let complaint = |error| foreign::exr_complaint(name, &error);
     let meta = MetaData::read_from_buffered(input.take(MAX_HEADER_BYTES), false).map_err(complaint)?;
+    if meta.requirements.has_deep_data && !meta.headers.iter().any(|header| header.deep) {
+        return Err(Error::format(name, "its flags speak of deep data and its headers do not; it is damaged"));
+    }
     // The strict check of the whole, as the crate makes it before it writes.
     for header in &meta.headers {
         let mut long_names = false;
@@ -175,18 +179,30 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
         .find_map(|set| set.iter().map(|name| place(name)).collect())
         .unwrap_or_default();
     let mut order: Vec<usize> = (0..names.len()).collect();
-    let layer = |place: usize| names[place].len() - bare_name(&names[place]).len();
-    let first_of_layer = |place: usize| {
-        let prefix = &names[place].as_bytes()[..layer(place)];
-        names.iter().position(|name| name.as_bytes().starts_with(prefix))
+    let prefix = |place: usize| {
+        let name = &names[place];
+        &name.as_bytes()[..name.len() - bare_name(name).len()]
     };
+    // Each layer stands where the first name does that begins so; names are looked up in order, so that many take no time.
+    let mut sorted: Vec<usize> = (0..names.len()).collect();
+    sorted.sort_by(|a, b| names[*a].as_bytes().cmp(names[*b].as_bytes()));
+    let mut first_of: HashMap<&[u8], usize> = HashMap::new();
+    for place in 0..names.len() {
+        let prefix = prefix(place);
+        first_of.entry(prefix).or_insert_with(|| {
+            let from = sorted.partition_point(|place| names[*place].as_bytes() < prefix);
+            let with = sorted[from..].iter().take_while(|place| names[**place].as_bytes().starts_with(prefix));
+            with.min().copied().unwrap_or(place)
+        });
+    }
+    let first_of_layer = |place: usize| first_of.get(prefix(place)).copied();
     let rank = |place: usize| {
         ["R", "G", "B", "x", "y", "Y", "L", "a", "b"]
             .iter()
             .position(|name| *name == bare_name(&names[place]))
             .unwrap_or(9)
     };
-    order.sort_by_key(|&place| {
+    order.sort_by_cached_key(|&place| {
         let leads = leading.iter().position(|leader| *leader == place);
         let is_mask = names[place] == MASK_LAYER;
         (

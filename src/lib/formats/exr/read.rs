@@ -1,6 +1,7 @@
 //! Reads EXR parts, from files by their offset tables and from pipes as blocks come.
 
 use super::PARALLEL_BLOCK_BYTES;
+use super::blocks::Blocks;
 use super::header::{Contents, read_meta};
 use super::read_ahead::ReadAhead;
 use super::straight::{Offsets, Straight};
@@ -20,6 +21,11 @@ use rayon::prelude::*;
 use std::fs::File;
 use std::io::{self, Read};
 
+/// Blocks that are decoded together may take this much, however little is stored of them.
+const SMALL: u128 = 64 << 20;
+/// Larger ones may take so many times what has been read of the image's blocks.
+const MOST_EXPANSION: u64 = 64;
+
 /// OpenEXR.
 pub const FORMAT: FrameFormat = FrameFormat {
     name: "an EXR",
@@ -32,7 +38,7 @@ pub const FORMAT: FrameFormat = FrameFormat {
 
 /// Reads a part of an EXR file or stream.
 pub struct ExrReader {
-    input: Input,
+    blocks: Blocks,
     name: String,
     meta: MetaData,
     part: usize,
@@ -42,13 +48,6 @@ pub struct ExrReader {
     rows_read: usize,
     /// Decoded rows that were not asked for yet.
     ahead: Vec<f32>,
-}
-
-enum Input {
-    /// Blocks come as they come.
-    Pipe(ReadAhead<Box<dyn Read + Send>>),
-    /// Blocks are found by the offset table; `position` is where the reader stands.
-    File { reader: ReadAhead<File>, position: u64, length: u64, offsets: Offsets },
 }
 
 impl ExrReader {
@@ -74,9 +73,8 @@ impl ExrReader {
             }
         }
         let position = reader.stream_position().map_err(|e| Error::disk(name, "read", e))?;
-        check_offsets(&offsets, length, name)?;
-        let input = Input::File { reader, position, length, offsets };
-        Ok(Self::new(input, name, meta, part, contents))
+        let blocks = Blocks::of_file(reader, name, position, length, offsets)?;
+        Ok(Self::new(blocks, name, meta, part, contents))
     }
 
     /// Opens a stream that cannot seek: scanlines in increasing order, a single part.
@@ -86,7 +84,8 @@ impl ExrReader {
     /// [`Error::Format`] for what is damaged, not supported, or needs a seek.
     pub fn stream(input: Box<dyn Read + Send>, name: &str) -> Result<Self> {
         let mut input = ReadAhead::new(input);
-        let meta = read_meta(&mut input, name)?;
+        let mut counted = Counted { inner: &mut input, count: 0 };
+        let meta = read_meta(&mut counted, name)?;
         let contents = Contents::of(&meta, 0, name)?;
         if meta.headers[0].line_order != LineOrder::Increasing {
             return Err(Error::format(
@@ -94,14 +93,15 @@ impl ExrReader {
                 "its rows are stored from bottom to top, which a pipe cannot turn round; name the file instead",
             ));
         }
-        skip_table(&mut input, meta.headers[0].chunk_count, name)?;
-        Ok(Self::new(Input::Pipe(input), name, meta, 0, contents))
+        let offsets = read_table(&mut counted, meta.headers[0].chunk_count, name)?;
+        let position = counted.count;
+        Ok(Self::new(Blocks::of_pipe(input, name, position, offsets), name, meta, 0, contents))
     }
 
-    fn new(input: Input, name: &str, meta: MetaData, part: usize, contents: Contents) -> Self {
+    fn new(blocks: Blocks, name: &str, meta: MetaData, part: usize, contents: Contents) -> Self {
         let straight = Straight::of(&meta, part, &contents.order);
         let name = name.into();
-        Self { input, name, meta, part, contents, straight, rows_read: 0, ahead: Vec::new() }
+        Self { blocks, name, meta, part, contents, straight, rows_read: 0, ahead: Vec::new() }
     }
 
     fn header(&self) -> &Header {
@@ -114,27 +114,11 @@ impl ExrReader {
         let Some(straight) = &self.straight else { return Ok(false) };
         let (first, block) = (self.rows_read, straight.block_bytes);
         let left = self.contents.geometry.height - first;
-        let mut append = |blocks: &[u8]| {
-            let fit = |(index, block): &(usize, &[u8])| straight.is_row(block, first + index);
-            let fitting = blocks.chunks_exact(block).take(rows).enumerate().take_while(fit);
-            fitting.map(|(_, block)| straight.append(block, samples)).count()
-        };
-        let taken = match &mut self.input {
-            Input::Pipe(input) => {
-                let taken = append(input.peek(block, left));
-                input.skip(taken * block);
-                taken
-            }
-            Input::File { reader, position, length, offsets } => {
-                if !go_to(offsets.at(first), position, reader, *length, &self.name)? {
-                    return Ok(false);
-                }
-                let taken = append(reader.peek(block, offsets.run(first, block, left)));
-                reader.skip(taken * block);
-                *position += (taken * block) as u64;
-                taken
-            }
-        };
+        let blocks = self.blocks.peek(first, block, left)?;
+        let fit = |(index, block): &(usize, &[u8])| straight.is_row(block, first + index);
+        let fitting = blocks.chunks_exact(block).take(rows).enumerate().take_while(fit);
+        let taken = fitting.map(|(_, block)| straight.append(block, samples)).count();
+        self.blocks.skip(taken * block);
         self.rows_read += taken;
         Ok(taken > 0)
     }
@@ -156,6 +140,7 @@ impl ExrReader {
             let chunks: Vec<Chunk> = (done..done + count)
                 .map(|column| self.next_chunk(first / natural * across + column, column, first))
                 .collect::<Result<_>>()?;
+            self.check_proportion(rows, count)?;
             let (meta, name) = (&self.meta, &self.name);
             let decode =
                 |chunk| UncompressedBlock::decompress_chunk(chunk, meta, true).map_err(|e| exr_complaint(name, &e));
@@ -175,21 +160,30 @@ impl ExrReader {
         Ok(())
     }
 
+    /// Refuses `count` blocks of so many rows each that become out of all proportion to what is stored of them, and rows of
+    /// tiles that do: where nothing but a header says how large they are, small files would take much memory.
+    fn check_proportion(&self, rows: usize, count: usize) -> Result<()> {
+        let Geometry { width, .. } = self.contents.geometry;
+        let columns = self.header().max_block_pixel_size().width().min(width);
+        let pixel = self.header().channels.bytes_per_pixel as u128;
+        let block = columns as u128 * rows as u128 * pixel * count as u128;
+        let row = width as u128 * rows as u128 * pixel;
+        let within = |bytes: u128, stored: u64| bytes <= u128::from(stored.saturating_mul(MOST_EXPANSION)).max(SMALL);
+        if within(block, self.blocks.stored()) && within(row, self.blocks.known()) {
+            return Ok(());
+        }
+        let (mebibytes, stored) = (block >> 20, self.blocks.stored() >> 10);
+        Err(Error::format(
+            &self.name,
+            format!(
+                "its first blocks hold {stored} KiB and would become {mebibytes} MiB; it is damaged, or stored in blocks that are too large: store it in smaller ones"
+            ),
+        ))
+    }
+
     /// Reads the chunk of block `index` (blocks counted row by row), which must lie at `column` and row `first`.
     fn next_chunk(&mut self, index: usize, column: usize, first: usize) -> Result<Chunk> {
-        let name = &self.name;
-        let chunk = match &mut self.input {
-            Input::Pipe(input) => Chunk::read(input, &self.meta).map_err(|e| exr_complaint(name, &e))?,
-            Input::File { reader, position, length, offsets } => {
-                if !go_to(offsets.at(index), position, reader, *length, name)? {
-                    return Err(Error::format(name, "its table of blocks points outside the file; it is damaged"));
-                }
-                let mut counted = Counted { inner: reader, count: 0 };
-                let chunk = Chunk::read(&mut counted, &self.meta).map_err(|e| exr_complaint(name, &e))?;
-                *position += counted.count;
-                chunk
-            }
-        };
+        let chunk = self.blocks.chunk(index, &self.meta, self.part)?;
         let header = &self.meta.headers[self.part];
         let in_place = chunk.layer_index == self.part
             && match &chunk.compressed_block {
@@ -205,7 +199,10 @@ impl ExrReader {
         if in_place {
             Ok(chunk)
         } else {
-            Err(Error::format(name, format!("the block of row {first} is missing or out of order; it is damaged")))
+            Err(Error::format(
+                &self.name,
+                format!("the block of row {first} is missing or out of order; it is damaged"),
+            ))
         }
     }
 
@@ -268,7 +265,7 @@ impl SampleReader for ExrReader {
     }
 
     fn may_wait(&self) -> bool {
-        matches!(self.input, Input::Pipe(_))
+        self.blocks.is_pipe()
     }
 
     fn embedded(&self) -> Option<&str> {
@@ -300,31 +297,12 @@ impl SampleReader for ExrReader {
             }
             debug_assert!(samples.len() > start);
         }
+        let is_single = !self.meta.requirements.is_multilayer() && self.header().blocks == BlockDescription::ScanLines;
+        if is_single && self.ahead.is_empty() && self.rows_read == self.contents.geometry.height {
+            self.blocks.end()?;
+        }
         Ok(())
     }
-}
-
-/// Every block of a part must have a place of its own within the file.
-fn check_offsets(offsets: &Offsets, length: u64, name: &str) -> Result<()> {
-    let (extent, twice) = offsets.extent();
-    if extent.is_some_and(|(first, last)| first == 0 || last >= length) {
-        return Err(Error::cut_short(name));
-    }
-    if twice {
-        return Err(Error::format(name, "two entries of its table of blocks are the same; it is damaged"));
-    }
-    Ok(())
-}
-
-/// Goes to `offset` from `position`, where the reader stands; says whether that lies within the file.
-fn go_to(offset: u64, position: &mut u64, reader: &mut ReadAhead<File>, length: u64, name: &str) -> Result<bool> {
-    let delta = i64::try_from(offset).ok().zip(i64::try_from(*position).ok()).map(|(to, from)| to - from);
-    let Some(delta) = delta.filter(|_| offset < length) else { return Ok(false) };
-    if delta != 0 {
-        reader.seek_relative(delta).map_err(|e| Error::disk(name, "read", e))?;
-        *position = offset;
-    }
-    Ok(true)
 }
 
 /// Whether the bytes are the start of an EXR file that can be read without seeking: one part of scanlines.
@@ -341,16 +319,6 @@ fn read_table(input: &mut impl Read, entries: usize, name: &str) -> Result<Offse
         table.push(u64::from_le_bytes(entry));
     }
     Ok(table)
-}
-
-/// Reads past an offset table, which may claim any length, without keeping it.
-fn skip_table(input: &mut impl Read, entries: usize, name: &str) -> Result<()> {
-    let length = 8 * entries as u64;
-    match io::copy(&mut input.take(length), &mut io::sink()) {
-        Ok(skipped) if skipped == length => Ok(()),
-        Ok(_) => Err(Error::cut_short(name)),
-        Err(error) => Err(Error::disk(name, "read", error)),
-    }
 }
 
 /// Counts the bytes that pass, to know where a reader stands.

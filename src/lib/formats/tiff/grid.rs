@@ -7,6 +7,9 @@ use tiff::tags::Tag;
 
 /// Chunks that decode together may have this many bytes; they are held in memory.
 const MOST_DECODED_BYTES: u128 = 1 << 30;
+/// So many they may have however small the file is; if more, then so many times what the file has.
+const SMALL_BYTES: u128 = 64 << 20;
+const MOST_EXPANSION: u128 = 64;
 
 /// The strips or tiles of an image, as its tags say. Strips are tiles as wide as the image.
 pub(super) struct Grid {
@@ -100,8 +103,17 @@ impl Grid {
     fn check_memory(&self, file: &TiffFile) -> Result<()> {
         let pieces = u128::from(self.across) * u128::from(self.planes);
         let together = self.chunk_row_bytes * u128::from(self.chunk_rows) * pieces;
-        if self.compression == Compression::None || together <= MOST_DECODED_BYTES {
+        let in_proportion = SMALL_BYTES.max(u128::from(file.length) * MOST_EXPANSION);
+        if self.compression == Compression::None || together <= MOST_DECODED_BYTES.min(in_proportion) {
             return Ok(());
+        }
+        if together > in_proportion {
+            return Err(file.problem(format!(
+                "{} rows would become {} MiB at a time of a file of {} KiB; it is damaged, or compressed in pieces that are too large: rewrite it with smaller strips, for example with `tiffcp -s -r 64 in.tif out.tif`",
+                self.chunk_rows,
+                together >> 20,
+                file.length >> 10
+            )));
         }
         Err(file.problem(format!(
             "{} rows are compressed as one piece of {} MiB, more than fits into memory; rewrite it with smaller strips, for example with `tiffcp -s -r 64 in.tif out.tif`",

@@ -1,0 +1,393 @@
+//! Input that was made to hurt: small files that say they are large, numbers of everything, text that takes parsers long. A
+//! result or one line, within bounds of time and memory that go with the size of the file.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::error::Result;
+use cyanometer::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter};
+use cyanometer::formats::format::SampleReader;
+use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::frame::Geometry;
+use cyanometer::stream::RowSource;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use std::fs::{self, File, OpenOptions};
+use std::io::{Cursor, Seek, Write};
+use std::process::Output;
+use support::TREE;
+use support::bounds::{Bounded, memory_for};
+use support::workshop::{BAD_DATA, Workshop};
+
+/// Runs a line on a file within bounds that go with its size.
+#[track_caller]
+fn bounded(shop: &Workshop, line: &str, file: &str) -> Output {
+    let memory = memory_for(fs::metadata(shop.path(file)).unwrap().len());
+    let run = Bounded { shop, line, piped: None, memory };
+    run.run().unwrap_or_else(|what| panic!("{what}"))
+}
+
+/// Runs a line that shall be refused, and gives the complaint.
+#[track_caller]
+fn refused(shop: &Workshop, line: &str, file: &str) -> String {
+    let done = bounded(shop, line, file);
+    assert!(!done.status.success(), "{line} is taken");
+    String::from_utf8(done.stderr).unwrap()
+}
+
+/// An attribute of an EXR: name, type, length, value.
+fn attribute(name: &str, kind: &str, value: &[u8]) -> Vec<u8> {
+    let length = u32::try_from(value.len()).unwrap().to_le_bytes();
+    [name.as_bytes(), b"\0", kind.as_bytes(), b"\0", &length, value].concat()
+}
+
+/// The begin of an EXR of f32 channels, up to its table of blocks; `more` are attributes of others' making.
+fn exr_begin(channels: &[String], width: i32, height: i32, compression: u8, more: &[u8]) -> Vec<u8> {
+    let mut list = Vec::new();
+    for name in channels {
+        list.extend(
+            [name.as_bytes(), b"\0", &2_i32.to_le_bytes(), &[0; 4], &1_i32.to_le_bytes(), &1_i32.to_le_bytes()]
+                .concat(),
+        );
+    }
+    list.push(0);
+    let window: Vec<u8> = [0, 0, width - 1, height - 1].iter().flat_map(|corner: &i32| corner.to_le_bytes()).collect();
+    // The second flag says that names may be long.
+    let mut bytes = vec![0x76, 0x2F, 0x31, 0x01, 2, 4, 0, 0];
+    bytes.extend(attribute("channels", "chlist", &list));
+    bytes.extend(attribute("compression", "compression", &[compression]));
+    bytes.extend(attribute("dataWindow", "box2i", &window));
+    bytes.extend(attribute("displayWindow", "box2i", &window));
+    bytes.extend(attribute("lineOrder", "lineOrder", &[0]));
+    bytes.extend(attribute("pixelAspectRatio", "float", &1_f32.to_le_bytes()));
+    bytes.extend(attribute("screenWindowCenter", "v2f", &[0; 8]));
+    bytes.extend(attribute("screenWindowWidth", "float", &1_f32.to_le_bytes()));
+    bytes.extend(more);
+    bytes.push(0);
+    bytes
+}
+
+/// An EXR of one row, stored as it is.
+fn exr_row(channels: &[String], samples: &[f32], more: &[u8]) -> Vec<u8> {
+    let width = samples.len() / channels.len();
+    let mut bytes = exr_begin(channels, i32::try_from(width).unwrap(), 1, 0, more);
+    let block = bytes.len() as u64 + 8;
+    bytes.extend(block.to_le_bytes());
+    bytes.extend(0_i32.to_le_bytes());
+    bytes.extend(i32::try_from(4 * samples.len()).unwrap().to_le_bytes());
+    bytes.extend(samples.iter().flat_map(|sample| sample.to_le_bytes()));
+    bytes
+}
+
+/// A TIFF of one row of bytes, all channels of a pixel together.
+fn tiff_row(channels: u16, samples: &[u8]) -> Vec<u8> {
+    let width = samples.len() / usize::from(channels);
+    let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+    let tags: [(u16, u16, u32); 9] = [
+        (256, 4, u32::try_from(width).unwrap()),
+        (257, 4, 1),
+        (258, 3, 8),
+        (259, 3, 1),
+        (262, 3, 1),
+        (273, 4, 8 + 2 + 9 * 12 + 4),
+        (277, 3, channels.into()),
+        (278, 4, 1),
+        (279, 4, u32::try_from(samples.len()).unwrap()),
+    ];
+    bytes.extend(9_u16.to_le_bytes());
+    for (tag, kind, value) in tags {
+        bytes
+            .extend([&tag.to_le_bytes()[..], &kind.to_le_bytes(), &1_u32.to_le_bytes(), &value.to_le_bytes()].concat());
+    }
+    bytes.extend([0; 4]);
+    bytes.extend(samples);
+    bytes
+}
+
+fn names(count: usize, name: impl Fn(usize) -> String) -> Vec<String> {
+    let mut names: Vec<String> = (0..count).map(name).collect();
+    names.sort();
+    names
+}
+
+/// Time and memory for all pairs of channels would go by the square; each is measured by itself.
+#[test]
+fn many_channels_are_measured_one_by_one() {
+    let shop = Workshop::new();
+    let samples: Vec<f32> = (0..20_000 * 6).map(|i| (i % 1009) as f32).collect();
+    fs::write(shop.path("many.exr"), exr_row(&names(20_000, |i| format!("c{i:05}")), &samples, &[])).unwrap();
+    fs::write(shop.path("many.tiff"), tiff_row(u16::MAX, &[7; u16::MAX as usize])).unwrap();
+    for (file, channels) in [("many.exr", 20_000), ("many.tiff", usize::from(u16::MAX))] {
+        let done = bounded(&shop, &format!("measure {file} --output-format json"), file);
+        let report: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+        let region = &report["regions"][0];
+        assert_eq!(region["channels"].as_array().unwrap().len(), channels);
+        assert!(region["covariance"].is_null());
+        let expected = if file == "many.tiff" { 7.0 } else { samples[6 * 17..][..6].iter().sum::<f32>() / 6.0 };
+        assert!((region["channels"][17]["mean"].as_f64().unwrap() - f64::from(expected)).abs() < 1e-6);
+        assert_eq!(region["channels"][17]["std"].is_null(), file == "many.tiff");
+    }
+}
+
+/// Names of layers are looked up, not compared one with another; a million attributes are passed over.
+#[test]
+fn many_layers_and_attributes_take_little() {
+    let shop = Workshop::new();
+    let layers = names(60_000, |i| format!("layer{i}.Y"));
+    fs::write(shop.path("layers.exr"), exr_row(&layers, &vec![1.5; layers.len()], &[])).unwrap();
+    let more: Vec<u8> = (0..1_000_000).flat_map(|i| attribute(&format!("a{i}"), "x", &[])).collect();
+    fs::write(shop.path("attributes.exr"), exr_row(&["Y".to_owned()], &[1.5], &more)).unwrap();
+    for file in ["layers.exr", "attributes.exr"] {
+        assert!(bounded(&shop, &format!("measure {file}"), file).status.success(), "{file}");
+    }
+}
+
+/// Memory is taken as samples come, not as headers declare them.
+#[test]
+fn what_a_header_declares_takes_no_memory() {
+    let shop = Workshop::new();
+    // A library of 100 bands, 7·10⁷ pixels.
+    let bands = names(100, |i| format!("S0.{},000000nm", 400 + i));
+    let mut library = exr_begin(&bands, 70_000, 1000, 0, &attribute("emissiveUnits", "string", b"W.m^-2.sr^-1.nm^-1"));
+    let blocks = library.len() as u64 + 8000;
+    library.extend((0..1000_u64).flat_map(|row| (blocks + row).to_le_bytes()));
+    library.extend([0; 15_000]);
+    fs::write(shop.path("library.exr"), library).unwrap();
+    for line in ["fit-matrix library.exr", "render-radiance library.exr --patch 2x2 -o out.exr", "measure library.exr"]
+    {
+        let said = refused(&shop, line, "library.exr");
+        assert!(said.contains("damaged") || said.contains("cut short"), "{said}");
+    }
+    // A chart of 10¹² patches, in patches of one pixel.
+    fs::write(shop.path("chart.exr"), exr_begin(&["Y".to_owned()], 1_000_000, 1_000_000, 0, &[])).unwrap();
+    drop(refused(&shop, "measure --patches=1x1 chart.exr", "chart.exr"));
+    // One row of 2²⁸ samples that are said to be there, in a block of 1 GiB.
+    for (compression, length) in [(0_u8, 1 << 30), (2, 100), (4, 100), (1, 100)] {
+        let mut wide = exr_begin(&["Y".to_owned()], 1 << 28, 1, compression, &[]);
+        wide.extend((wide.len() as u64 + 8).to_le_bytes());
+        wide.extend(0_i32.to_le_bytes());
+        wide.extend(i32::to_le_bytes(length));
+        wide.extend([1; 100]);
+        fs::write(shop.path("wide.exr"), wide).unwrap();
+        drop(refused(&shop, "measure wide.exr", "wide.exr"));
+    }
+}
+
+/// What deflate makes of nothing: a thousand times as much.
+#[test]
+fn a_block_out_of_all_proportion_is_refused() {
+    let shop = Workshop::new();
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
+    for _ in 0..1 << 10 {
+        encoder.write_all(&[0; 1 << 20]).unwrap();
+    }
+    let packed = encoder.finish().unwrap();
+    let mut bytes = exr_begin(&["Y".to_owned()], 1 << 28, 1, 2, &[]);
+    bytes.extend((bytes.len() as u64 + 8).to_le_bytes());
+    bytes.extend(0_i32.to_le_bytes());
+    bytes.extend(i32::try_from(packed.len()).unwrap().to_le_bytes());
+    bytes.extend(&packed);
+    fs::write(shop.path("packed.exr"), bytes).unwrap();
+    let said = refused(&shop, "measure packed.exr", "packed.exr");
+    assert!(said.contains("would become 1024 MiB"), "{said}");
+    // The same as a TIFF, of bytes.
+    let mut tiff = tiff_row(1, &[0]);
+    for (tag, value) in [(256_u16, 1_u32 << 30), (259, 8), (279, u32::try_from(packed.len()).unwrap())] {
+        let place = tiff.chunks_exact(2).skip(5).position(|bytes| bytes == tag.to_le_bytes()).unwrap();
+        tiff[10 + 2 * place + 8..][..4].copy_from_slice(&value.to_le_bytes());
+    }
+    tiff.pop();
+    tiff.extend(packed);
+    fs::write(shop.path("packed.tiff"), tiff).unwrap();
+    let said = refused(&shop, "measure packed.tiff", "packed.tiff");
+    assert!(said.contains("would become 1024 MiB"), "{said}");
+}
+
+/// Statistics of each patch are kept until the report is written.
+#[test]
+fn as_many_patches_as_a_report_can_hold() {
+    let shop = Workshop::new();
+    shop.run("render-radiance --electrons 100,200,300 --size 260x256 -o e.exr", &[]);
+    shop.run("add-noise e.exr -o n.exr", &[]);
+    let said = refused(&shop, "measure --patches=1x1 n.exr", "n.exr");
+    assert_eq!(
+        said,
+        "measure: n.exr: it has 66560 patches of 1x1; 62415 are measured at a time at most; give another --patches\n"
+    );
+    let done = bounded(&shop, "measure --patches=2x1 n.exr --output-format csv", "n.exr");
+    let lines = done.stdout.iter().filter(|byte| **byte == b'\n').count();
+    assert!(done.status.success() && lines > 130 * 256, "{lines}");
+}
+
+#[test]
+fn text_that_takes_parsers_long_is_refused_at_once() {
+    let shop = Workshop::with_frames();
+    // A bracket in quotes closes none: these nest, and seem not to.
+    for (unit, end) in [("[\"]\",", ""), ("[ #]\n ", ""), ("{']':", ""), ("[\"\n]\",", "")] {
+        fs::write(shop.path("deep.yaml"), unit.repeat((1 << 20) / unit.len() - 1) + end).unwrap();
+        for line in ["predict-noise --dark --sensor deep.yaml", "measure noisy.exr --metadata deep.yaml"] {
+            let said = refused(&shop, line, "deep.yaml");
+            assert!(said.contains("more than 10000 brackets"), "{said}");
+        }
+        // What is not too much is left to the parser.
+        fs::write(shop.path("deep.yaml"), unit.repeat(9_999)).unwrap();
+        drop(refused(&shop, "measure noisy.exr --metadata deep.yaml", "deep.yaml"));
+    }
+    let mut row = b"nm".to_vec();
+    row.resize(40 << 20, b',');
+    fs::write(shop.path("row.csv"), row).unwrap();
+    for line in ["render-radiance row.csv -o out.exr", "fit-matrix SAMPLES/skies/sky912.exr --labels row.csv:a"] {
+        let said = refused(&shop, line, "row.csv");
+        assert!(said.contains("more than 33554432 numbers"), "{said}");
+    }
+}
+
+/// Metadata may say that one plane is XYZ.
+#[test]
+fn one_plane_of_xyz_is_no_picture() {
+    let shop = Workshop::with_frames();
+    let said = refused(&shop, "preview plane.exr --metadata xyz.exr.yaml -o out.png", "plane.exr");
+    assert_eq!(said, "preview: plane.exr: a single plane of XYZ is no picture; give --range LOW,HIGH\n");
+    assert!(
+        bounded(&shop, "preview plane.exr --metadata xyz.exr.yaml --range 0,1 -o out.png", "plane.exr")
+            .status
+            .success()
+    );
+}
+
+/// Nobody has named it: it stands in a sensor file, and reading it would wait for a writer.
+#[test]
+fn a_pipe_among_data_files_is_not_waited_for() {
+    let shop = Workshop::new();
+    for file in ["kaf-5101ce.yaml", "bg39_1mm.csv"] {
+        fs::copy(format!("{TREE}/sample_data/sensors/{file}"), shop.path(file)).unwrap();
+    }
+    let made = shop.command("mkfifo kaf5101ce_est_qe_1nm.csv").status().unwrap();
+    assert!(made.success());
+    let said = refused(&shop, "predict-noise --dark --sensor ./kaf-5101ce.yaml", "kaf-5101ce.yaml");
+    assert_eq!(
+        said,
+        "predict-noise: ./kaf5101ce_est_qe_1nm.csv: it is no file but a pipe or a device; a table must be a file\n"
+    );
+}
+
+#[test]
+fn bytes_behind_a_frame_are_told() {
+    let shop = Workshop::with_frames();
+    for (more, compression) in [(&b"x"[..], "none"), (b"a second frame", "none"), (b"x", "zip")] {
+        shop.run(&format!("mosaic noisy.exr --compression {compression} -o long.exr"), &[]);
+        fs::remove_file(shop.path("long.exr.yaml")).unwrap();
+        OpenOptions::new().append(true).open(shop.path("long.exr")).unwrap().write_all(more).unwrap();
+        for (line, name) in [("digitize long.exr -o out.exr", "long.exr"), ("digitize -o out.exr", "standard input")] {
+            let done = shop.attempt(line, &shop.bytes("long.exr"));
+            let said = String::from_utf8(done.stderr).unwrap();
+            let wanted =
+                format!("digitize: {name}: behind its last row come bytes that are no part of it; cut them off\n");
+            assert_eq!((said, done.status.code()), (wanted, Some(BAD_DATA)));
+            assert!(!shop.path("out.exr").exists());
+        }
+    }
+}
+
+fn read_file(bytes: &[u8]) -> Result<Vec<f32>> {
+    let mut file: File = tempfile::tempfile().unwrap();
+    file.write_all(bytes).unwrap();
+    file.rewind().unwrap();
+    let mut reader =
+        FrameReader::open_file(file, "in", None, &InputOptions { all_channels: true, ..Default::default() })?;
+    let (height, mut samples) = (reader.header().geometry.height, Vec::new());
+    for _ in 0..height {
+        reader.read(1, &mut samples)?;
+    }
+    Ok(samples)
+}
+
+fn read_pipe(bytes: &[u8]) -> Result<Vec<f32>> {
+    let mut reader = ExrReader::stream(Box::new(Cursor::new(bytes.to_vec())), "in")?;
+    let (height, mut samples) = (reader.geometry().height, Vec::new());
+    for _ in 0..height {
+        reader.read(1, &mut samples)?;
+    }
+    Ok(samples)
+}
+
+/// Each byte of small files, changed in some ways: a file is taken if and only if a pipe is, and gives the same samples.
+#[test]
+fn damaged_files_and_pipes_are_taken_or_refused_alike() {
+    for compression in [ExrCompression::None, ExrCompression::Zips, ExrCompression::Rle, ExrCompression::Piz] {
+        let geometry = Geometry::new(5, 36, &["R", "G", "B"]);
+        let tags = ExrTags::default();
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.exr");
+        let samples: Vec<f32> = (0..5 * 36 * 3).map(|i| (i * 31 % 17) as f32).collect();
+        let mut writer =
+            ExrWriter::create(Vec::new(), "a.exr", &geometry, ExrSamples::F32, compression, &tags).unwrap();
+        writer.write(&samples).unwrap();
+        let (mut whole, patch) = writer.finish().unwrap();
+        if let Some(patch) = patch {
+            fs::write(&path, &whole).unwrap();
+            let mut file = OpenOptions::new().read(true).write(true).open(&path).unwrap();
+            cyanometer::formats::exr::patch_table(&mut file, "a.exr", patch).unwrap();
+            whole = fs::read(&path).unwrap();
+        }
+        assert!(read_file(&whole).is_ok() && read_pipe(&whole).is_ok());
+        let mut both = [0, 0];
+        for place in 4..whole.len() {
+            for change in [0x01, 0x80, 0xFF] {
+                let mut bytes = whole.clone();
+                bytes[place] ^= change;
+                // What is tiled, deep or of several parts is copied to a file before it is read.
+                if bytes[5] & 0x1A != 0 {
+                    continue;
+                }
+                let bits = |read: Result<Vec<f32>>| read.map(|s| s.into_iter().map(f32::to_bits).collect::<Vec<_>>());
+                let (file, pipe) = (bits(read_file(&bytes)), bits(read_pipe(&bytes)));
+                match (file, pipe) {
+                    (Ok(file), Ok(pipe)) => assert_eq!(file, pipe, "{place} {change}"),
+                    (Err(_), Err(_)) => both[1] += 1,
+                    // Rows stored from bottom to top cannot be turned round in a pipe, which says so.
+                    (_, Err(error)) if error.to_string().contains("from bottom to top") => {}
+                    (file, pipe) => {
+                        panic!("{compression:?}, byte {place} ^ {change}: {:?} {:?}", file.err(), pipe.err())
+                    }
+                }
+                both[0] += 1;
+            }
+        }
+        assert!(both[1] > both[0] / 20, "hardly any change was met: {both:?}");
+    }
+}
+
+/// Stacks that no system gives: no thread can be started, as where the number of processes is limited.
+#[test]
+fn one_thread_works_where_the_system_starts_no_more() {
+    let shop = Workshop::with_frames();
+    for line in [
+        "digitize noisy.exr -o out.exr",
+        "digitize --threads 4 --compression zip noisy.exr -o out.exr",
+        "measure noisy.exr",
+    ] {
+        let done = shop.command(line).env("RUST_MIN_STACK", "70368744177664").output().unwrap();
+        assert!(done.status.success() && done.stderr.is_empty(), "{line}: {}", String::from_utf8_lossy(&done.stderr));
+    }
+    assert_eq!(shop.frame("out.exr").samples, shop.frame("codes.exr").samples);
+}
+
+#[test]
+fn where_there_is_no_memory_it_is_said_in_a_line() {
+    let shop = Workshop::new();
+    shop.run("render-radiance --electrons 100,200,300 --size 3000000x2 -o wide.exr", &[]);
+    let files = shop.files();
+    for line in ["add-noise wide.exr -o out.exr", "measure wide.exr", "mosaic wide.exr --compression zip -o out.tiff"] {
+        let mut command = shop.command("sh -c");
+        let mut words = line.split(' ');
+        command.arg("ulimit -v 60000; exec \"$0\" \"$@\"").arg(support::workshop::path_of(words.next().unwrap()));
+        let done = command.args(words).env("MALLOC_ARENA_MAX", "1").output().unwrap();
+        let said = String::from_utf8(done.stderr).unwrap();
+        let program = line.split(' ').next().unwrap();
+        assert!(said.starts_with(&format!("{program}: the system gives no more memory; ")), "{line}: {said}");
+        assert_eq!((said.lines().count(), done.status.code()), (1, Some(BAD_DATA)), "{line}: {said}");
+        assert_eq!(shop.files(), files, "{line}");
+    }
+}
