@@ -64,7 +64,7 @@ const FRAMES: [&str; 18] = [
     "mosaic --metadata codes.exr.yaml IN -o OUT",
     "demosaic --pattern rggb --black 0 IN -o OUT",
     "demosaic --metadata plane.exr.yaml IN -o OUT",
-    "correct-frame --metadata plane.exr.yaml IN -o OUT",
+    "correct-frame --metadata plane.exr.yaml --black auto IN -o OUT",
     "correct-frame plane.exr --dark IN -o OUT",
     "to-xyz --metadata rgb.exr.yaml --matrix matrix.yaml IN -o OUT",
     "color-difference IN xyz.exr",

@@ -252,3 +252,38 @@ fn a_clipped_blue_is_known_to_the_end() {
     said("to-xyz rgb.exr --space srgb --matrix matrix.yaml -o s.tiff", "1200 pixels were made of saturated samples");
     assert_eq!(shop.frame("s.tiff").header.geometry.channels, ["R", "G", "B"]);
 }
+
+/// Who looks at a frame hears of its marks, as often as the layer has them.
+#[test]
+fn pictures_and_differences_tell_of_marked_pixels() {
+    let shop = Workshop::new();
+    shop.run("fit-matrix SAMPLES/skies/sky912.exr -o matrix.yaml", &[]);
+    // Green is beyond the largest code in most photosites.
+    shop.run("render-radiance --electrons 8000,39900,20000 --size 32x24 -o e.exr", &[]);
+    let quiet =
+        ["add-noise e.exr --quiet -o n.exr", "digitize n.exr --quiet -o c.exr", "mosaic c.exr --quiet -o p.exr"];
+    let more =
+        ["demosaic p.exr --sigma --quiet -o rgb.exr", "to-xyz rgb.exr --matrix matrix.yaml --sigma --quiet -o xyz.exr"];
+    for line in quiet.into_iter().chain(more) {
+        shop.run(line, &[]);
+    }
+    let options = cyanometer::formats::input::InputOptions {
+        path: Some(shop.path("xyz.exr")),
+        all_channels: true,
+        ..Default::default()
+    };
+    let mut reader = cyanometer::formats::input::FrameReader::open(&options).unwrap();
+    let mut samples = Vec::new();
+    cyanometer::stream::RowSource::read(&mut reader, 24, &mut samples).unwrap();
+    let channels = samples.len() / (32 * 24);
+    let marked =
+        samples.chunks_exact(32).skip(channels - 1).step_by(channels).flatten().filter(|mark| **mark != 0.0).count();
+    assert!(marked > 0);
+    let text =
+        format!("xyz.exr: {marked} of the pixels read were made of saturated samples; they are taken as they are\n");
+    for line in ["preview xyz.exr -o a.png", "color-difference 1,1,1 xyz.exr"] {
+        let done = shop.attempt(line, &[]);
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert!(done.status.success() && said.contains(&text), "{line}: {said}");
+    }
+}

@@ -24,8 +24,8 @@ use cyanometer_fuzz::settle;
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
 
-/// Stages in a row: the whole chain, and one more.
-const DEPTH: usize = 7;
+/// Stages in a row: the frames of every stage are seeds, so that two reach everything.
+const DEPTH: usize = 2;
 
 fuzz_target!(|bytes: &[u8]| {
     settle();
@@ -67,8 +67,11 @@ fn follow(frame: &MemoryFrame, depth: usize) {
         }
     }
     for method in Method::ALL {
-        let Ok(stage) = Demosaic::new(head, *method, Black::Auto, None) else { continue };
-        go_on(frame, &stage, if *method == Method::default() { depth } else { 1 });
+        let Ok(stage) = Demosaic::new(head, method, Black::Auto, None) else { continue };
+        go_on(frame, &stage, 1);
+        if method != Method::default() {
+            continue;
+        }
         if let Ok(stage) = WithSigma::of_demosaicking(stage) {
             go_on(frame, &stage, 1);
         }
@@ -101,12 +104,10 @@ fn look_at(frame: &MemoryFrame) {
     let again = || MemoryFrame::new(frame.header.clone(), frame.samples.clone());
     for equations in [Equations::Exact, Equations::Paper] {
         drop(propagation::of_frame(&frame.header, equations));
-        if let Ok(report) = measure(&mut again(), &[], Saturated::LeftOut, equations, Some(1e-4)) {
-            drop(report::render(&report, ReportFormat::Text));
-            drop(report::render(&report, ReportFormat::Json));
-        }
     }
-    drop(measure(&mut again(), &[], Saturated::Kept, Equations::Exact, None));
+    if let Ok(report) = measure(&mut again(), &[], Saturated::LeftOut, Equations::Exact, Some(1e-4)) {
+        drop(report::render(&report, ReportFormat::Text));
+    }
     for size in [None, Some([5, 4])] {
         drop(patches::measure(&mut again(), size, Saturated::LeftOut, Equations::Exact));
     }

@@ -7,7 +7,7 @@ use cyanometer::formats::output::{self, FrameWriter, OutputOptions};
 use cyanometer::formats::places::{same_place, sidecar_path};
 use cyanometer::formats::register;
 use cyanometer::report::{self, ReportFormat};
-use cyanometer::requests::{ColorPair, Note, values};
+use cyanometer::requests::{self, ColorPair, Note, values};
 use cyanometer::stream::{Counts, RowSink};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -68,5 +68,6 @@ fn run(Arguments { pair, map, output, output_format, .. }: &Arguments, session: 
     }
     output::write_text(output.as_deref(), &report::difference(&report, *output_format)?)?;
     session.tell(Note::not_finite(report.not_finite).as_slice());
+    comparison.frames().for_each(|frame| session.tell(requests::of_marks(frame).as_slice()));
     Ok(())
 }

@@ -7,7 +7,7 @@ use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::picture::{PictureSettings, Range, write_png};
 use cyanometer::formats::register::announce;
-use cyanometer::requests::{options, values};
+use cyanometer::requests::{self, options, values};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -61,5 +61,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
     session.report_reader(&reader);
     let settings = PictureSettings { region: arguments.region, zoom: arguments.zoom, range: arguments.range };
-    write_png(&mut reader, &settings, &arguments.output)
+    write_png(&mut reader, &settings, &arguments.output)?;
+    session.tell(requests::of_marks(&reader).as_slice());
+    Ok(())
 }

@@ -69,6 +69,8 @@ pub struct FrameReader {
     /// The place of the layer of marks among the stored channels, where stages do not see it.
     mask: Option<usize>,
     keeps_mask: bool,
+    /// Pixels that the layer has marked so far, where stages do not see it.
+    marked: u64,
 }
 
 /// A digest to compare with once all samples are in.
@@ -136,6 +138,7 @@ impl FrameReader {
             notes,
             mask,
             keeps_mask: false,
+            marked: 0,
         })
     }
 
@@ -160,6 +163,12 @@ impl FrameReader {
             self.keeps_mask = true;
             self.header.geometry.channels.push(MASK_LAYER.into());
         }
+    }
+
+    /// Pixels among those read so far that were made of saturated samples, as the frame's layer of marks says; of one that is
+    /// handed on ([`Self::keep_mask`]) none are counted here.
+    pub fn marked(&self) -> u64 {
+        self.marked
     }
 
     /// What a careful user should know: channels left out, tags passed over.
@@ -223,6 +232,9 @@ impl RowSource for FrameReader {
                 samples.extend_from_slice(&row[..kept]);
                 if let Some(mask) = mask {
                     samples.extend_from_slice(&row[mask * width..][..width]);
+                } else if let Some(mask) = self.mask {
+                    let marks = &row[mask * width..][..width];
+                    self.marked += marks.iter().filter(|mark| **mark != 0.0).count() as u64;
                 }
             }
         }

@@ -401,6 +401,40 @@ mod tests {
 
     use super::*;
 
+    /// More channels than are followed together have the moments that each has by itself, a sample that is not finite
+    /// leaving out its fellows as before.
+    #[test]
+    fn too_many_channels_are_followed_each_by_itself() {
+        for channels in [MOST_TOGETHER, MOST_TOGETHER + 1] {
+            for with_nan in [false, true] {
+                let sample = |channel: usize, x: usize| match with_nan && channel == 3 && x == 4 {
+                    true => f32::NAN,
+                    false => ((channel * 31 + x * x * 17) % 101) as f32,
+                };
+                let mut moments = Moments::new(channels);
+                for rows in [0..9, 9..10, 10..40] {
+                    let lines: Vec<Vec<f32>> =
+                        (0..channels).map(|channel| rows.clone().map(|x| sample(channel, x)).collect()).collect();
+                    let mut part = Moments::new(channels);
+                    part.add(&lines.iter().map(Vec::as_slice).collect::<Vec<_>>());
+                    moments.merge(&part);
+                }
+                let seen: Vec<usize> = (0..40).filter(|x| !(with_nan && *x == 4)).collect();
+                for channel in [0, 3, channels - 1] {
+                    let values: Vec<f64> = seen.iter().map(|&x| f64::from(sample(channel, x))).collect();
+                    let mean = values.iter().sum::<f64>() / values.len() as f64;
+                    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+                    let variance = squares / (values.len() - 1) as f64;
+                    // Sums of 40 terms of up to 10⁴: a few of their roundings, of 10⁻¹⁶ each.
+                    assert!((moments.mean[channel] / mean - 1.0).abs() < 1e-14);
+                    assert!((moments.covariance(channel, channel).unwrap() / variance - 1.0).abs() < 1e-13);
+                }
+                assert_eq!((moments.count, moments.not_finite), (seen.len() as u64, u64::from(with_nan)));
+                assert_eq!(moments.covariance(0, 1).is_some(), channels == MOST_TOGETHER);
+            }
+        }
+    }
+
     #[test]
     fn rows_merge_into_the_moments_of_the_whole() {
         // Deviations of order 1 on a mean of 10⁶, where the textbook sum of squares loses 10 digits.

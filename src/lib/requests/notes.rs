@@ -29,6 +29,14 @@ impl Note {
     }
 }
 
+/// A warning of pixels that a frame marks as made of saturated samples, if those read were any.
+pub fn of_marks(reader: &FrameReader) -> Option<Note> {
+    let (name, pixels) = (&reader.header().name, reader.marked());
+    let text =
+        || format!("{name}: {pixels} of the pixels read were made of saturated samples; they are taken as they are");
+    (pixels > 0).then(|| Note::Warning(text()))
+}
+
 /// What came up among statistics.
 pub fn of_statistics(report: &Report) -> Vec<Note> {
     let not_finite = report.regions.iter().map(|region| region.not_finite).sum();

@@ -1,6 +1,6 @@
 //! What the headers of an EXR file say about its parts, or why a part cannot be read.
 
-use super::{ExrTags, METADATA_ATTRIBUTE, Primaries, XYZ_PRIMARIES};
+use super::{ExrTags, METADATA_ATTRIBUTE, Primaries, XYZ_PRIMARIES, attributes};
 use crate::camera::optics::Exposure;
 use crate::error::{Error, Result};
 use crate::formats::foreign::{self, STORE_WITHOUT_LOSS, SUBSAMPLED};
@@ -42,7 +42,8 @@ pub(super) struct Contents {
 /// Reads the headers of all parts.
 pub(super) fn read_meta(input: &mut impl Read, name: &str) -> Result<MetaData> {
     let complaint = |error| foreign::exr_complaint(name, &error);
-    let meta = MetaData::read_from_buffered(input.take(MAX_HEADER_BYTES), false).map_err(complaint)?;
+    let headers = attributes::headers(&mut input.take(MAX_HEADER_BYTES), name)?;
+    let meta = MetaData::read_from_buffered(headers.as_slice(), false).map_err(complaint)?;
     if meta.requirements.has_deep_data && !meta.headers.iter().any(|header| header.deep) {
         return Err(Error::format(name, "its flags speak of deep data and its headers do not; it is damaged"));
     }

@@ -4,6 +4,7 @@
 //! stream by and a pipe needs no seek. Uncompressed scanlines of one type of float, which is what pipes carry, are moved
 //! without the crate.
 
+mod attributes;
 mod blocks;
 mod header;
 mod read;
