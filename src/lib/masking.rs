@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::metadata::FrameHeader;
 use crate::propagation::saturation;
 use crate::stages::darks::{DarkFrames, LessDarks};
-use crate::stages::saturation::{Counted, FullLevels, Marked, WithMask, samples_tell};
+use crate::stages::saturation::{Counted, FullLevels, Marked, WithMask, samples_tell, with_mask};
 use crate::stream::{Counts, RowSink, RowSource, Stage, run};
 use crate::units::QuantityKind;
 
@@ -66,7 +66,10 @@ impl Masking {
 
     /// The head of the frame that a stage makes.
     pub fn header<S: Stage>(self, stage: &S) -> FrameHeader {
-        let mut header = if self.is_kept { WithMask::new(stage).header().clone() } else { stage.header().clone() };
+        let mut header = stage.header().clone();
+        if self.is_kept {
+            header = with_mask(header);
+        }
         if matches!(self.need, Need::Made(_)) {
             header.metadata.saturated_share = saturation::share_of_pixels(&header);
         }

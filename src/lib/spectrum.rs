@@ -68,11 +68,20 @@ impl WavelengthGrid {
 }
 
 impl WavelengthGrid {
-    /// Every second wavelength, for an estimate of the error; none where the rule does not fit these.
-    pub fn doubled(&self) -> Option<Self> {
-        let (wavelengths, _) = self.points().ok()?;
-        let doubled = Self { step_nm: 2.0 * self.step_nm, ..*self };
-        self.quadrature.can_double(wavelengths.len()).then_some(doubled)
+    /// Whether of some samples two neighbors lie closer on the grid than its steps: what is between steps would be missed.
+    pub fn is_coarser_than(&self, sampled_nm: &[f64]) -> bool {
+        let is_closer = |pair: &[f64]| pair[1] - pair[0] < self.step_nm * (1.0 - 1e-6);
+        sampled_nm.windows(2).any(|pair| pair[1] > self.start_nm && pair[0] < self.end_nm && is_closer(pair))
+    }
+
+    /// The wavelengths in nm, with the weight of each in nm, of the integral over the extent of the grid that is exact where
+    /// no more than five factors are linear between `knots_nm`, in any order.
+    pub fn points_between(&self, knots_nm: impl IntoIterator<Item = f64>) -> (Vec<f64>, Vec<f64>) {
+        let inside = |nm: &f64| *nm > self.start_nm && *nm < self.end_nm;
+        let mut knots: Vec<f64> = knots_nm.into_iter().filter(inside).chain([self.start_nm, self.end_nm]).collect();
+        knots.sort_by(f64::total_cmp);
+        knots.dedup();
+        quadrature::between(&knots)
     }
 }
 
@@ -104,6 +113,11 @@ impl Curve {
     pub fn at(&self, wavelength_nm: f64) -> f64 {
         neighbors(&self.wavelength_nm, wavelength_nm)
             .map_or(0.0, |parts| parts.iter().map(|&(index, share)| share * self.values[index]).sum())
+    }
+
+    /// The wavelengths in nm between which it is linear.
+    pub fn wavelengths_nm(&self) -> &[f64] {
+        &self.wavelength_nm
     }
 
     /// The smallest and the largest value.

@@ -4,7 +4,6 @@ use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::numerics::planes::WeightedPlane;
-use crate::numerics::quadrature::Rule;
 use crate::spectrum::{Curve, WavelengthGrid, fold};
 use crate::units::{LIGHT_M_PER_S, M_PER_NM, PLANCK_J_S};
 
@@ -51,7 +50,59 @@ impl SpectralResponse {
     ///
     /// As [`WavelengthGrid::points`] and [`Self::electron_weights`]; [`Error::Data`] when no class responds anywhere on the grid.
     pub fn weights_on(&self, sensor: &Sensor, exposure: &Exposure, grid: &WavelengthGrid) -> Result<GridWeights> {
-        let (all_nm, widths) = grid.points()?;
+        self.weights_at(sensor, exposure, grid, grid.points()?)
+    }
+
+    /// The same for the integral over the extent of the grid of a radiance that is linear between `sampled_nm`, as the tables
+    /// of the response are between their own wavelengths: exact but for rounding.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::weights_on`].
+    pub fn weights_between(
+        &self,
+        sensor: &Sensor,
+        exposure: &Exposure,
+        grid: &WavelengthGrid,
+        sampled_nm: &[f64],
+    ) -> Result<GridWeights> {
+        let knots = self.knots_nm().chain(sampled_nm.iter().copied());
+        self.weights_at(sensor, exposure, grid, grid.points_between(knots))
+    }
+
+    /// The wavelengths of all tables.
+    pub fn knots_nm(&self) -> impl Iterator<Item = f64> {
+        let curves = self.quantum_efficiency.iter().chain(&self.cover_glass);
+        curves.flat_map(|curve| curve.wavelengths_nm().iter().copied())
+    }
+
+    /// The share of the response to a radiance that is the same everywhere which lies beyond the extent of a grid, of the
+    /// class that loses most.
+    pub fn beyond(&self, grid: &WavelengthGrid) -> f64 {
+        let (start_nm, end_nm) =
+            self.knots_nm().fold((grid.start_nm, grid.end_nm), |(a, b), nm| (a.min(nm), b.max(nm)));
+        let (points, widths) = WavelengthGrid { start_nm, end_nm, ..*grid }
+            .points_between(self.knots_nm().chain([grid.start_nm, grid.end_nm]));
+        let share = |efficiency: &Curve| {
+            let (mut inside, mut all) = (0.0, 0.0);
+            for (&nm, &width) in points.iter().zip(&widths) {
+                let response =
+                    nm * efficiency.at(nm) * self.cover_glass.as_ref().map_or(1.0, |glass| glass.at(nm)) * width;
+                all += response;
+                inside += if (grid.start_nm..=grid.end_nm).contains(&nm) { response } else { 0.0 };
+            }
+            if all > 0.0 { 1.0 - inside / all } else { 0.0 }
+        };
+        self.quantum_efficiency.iter().map(share).fold(0.0, f64::max)
+    }
+
+    fn weights_at(
+        &self,
+        sensor: &Sensor,
+        exposure: &Exposure,
+        grid: &WavelengthGrid,
+        (all_nm, widths): (Vec<f64>, Vec<f64>),
+    ) -> Result<GridWeights> {
         let all = self.electron_weights(sensor, exposure, &all_nm, &widths)?;
         let kept: Vec<usize> = (0..all_nm.len()).filter(|&i| all.iter().any(|class| class[i] != 0.0)).collect();
         if kept.is_empty() {
@@ -107,12 +158,15 @@ impl Camera {
         planes.filter(|plane| plane.weights != [0.0; 3]).collect()
     }
 
-    /// Relative error of [`Self::electrons`] of R, G and B by `rule`, as the same camera at twice the step tells it; none
-    /// where no estimate is possible.
-    pub fn quadrature_error(&self, rule: Rule, at_twice_the_step: &Self, radiance: &[f64]) -> Option<[f64; 3]> {
-        let (fine, coarse) = (self.electrons(radiance), at_twice_the_step.electrons(radiance));
-        let [red, green, blue] = [0, 1, 2].map(|k| rule.relative_error(fine[k], coarse[k]));
-        Some([red?, green?, blue?])
+    /// Relative error of [`Self::electrons`] of R, G and B, `exact` the camera that integrates between all samples; none
+    /// where a sum stands for an integral of zero.
+    pub fn quadrature_error(&self, exact: &Self, radiance: &[f64]) -> Option<[f64; 3]> {
+        let (sum, integral) = (self.electrons(radiance), exact.electrons(radiance));
+        let error = |k: usize| {
+            let error = (sum[k] - integral[k]).abs();
+            if error == 0.0 { Some(0.0) } else { Some(error / integral[k].abs()).filter(|error| error.is_finite()) }
+        };
+        Some([error(0)?, error(1)?, error(2)?])
     }
 }
 
@@ -132,5 +186,29 @@ mod tests {
         let photons = 1.0 / (1.986_445_857e-25 / 500e-9);
         let expected = photons * 6.8e-4f64.powi(2) * 2.0 * std::f64::consts::FRAC_PI_2;
         assert!((weights[0][0] / expected - 1.0).abs() < 1e-9);
+    }
+
+    /// A triangle of light, 0.1 nm wide at its foot, that no whole nanometer meets, through an efficiency that rises with
+    /// wavelength: ∫ λ Q L dλ by the moments of a triangle, λ₀ (λ₀/1000) + σ²/1000 of its area, σ² = w²/24.
+    #[test]
+    fn a_line_between_steps_is_whole_in_the_integral_and_the_sum_admits_its_loss() {
+        let rising = Curve::new(vec![300.0, 1000.0], vec![0.3, 1.0]).unwrap();
+        let response =
+            SpectralResponse { quantum_efficiency: [rising.clone(), rising.clone(), rising], cover_glass: None };
+        let exposure = Exposure { exposure_s: 2.0, f_number: 8.0, lens_transmittance: 1.0 };
+        let (grid, sensor) = (WavelengthGrid::default(), kaf5101ce());
+        let line_nm = [300.0, 589.25, 589.3, 589.35, 900.0];
+        let radiance = [0.0, 0.0, 1e-6, 0.0, 0.0];
+        assert!(grid.is_coarser_than(&line_nm));
+        let exact = response.weights_between(&sensor, &exposure, &grid, &line_nm).unwrap().camera(&line_nm).0;
+        let per_nm = response.electron_weights(&sensor, &exposure, &[500.0], &[1.0]).unwrap()[0][0] / (500.0 * 0.5);
+        let expected = per_nm * 1e-6 * 0.05 * (589.3_f64.powi(2) + 0.1_f64.powi(2) / 24.0) / 1000.0;
+        assert!((exact.electrons(&radiance)[0] / expected - 1.0).abs() < 1e-12);
+        let sum = response.weights_on(&sensor, &exposure, &grid).unwrap().camera(&line_nm).0;
+        assert_eq!(sum.electrons(&radiance), [0.0; 3]);
+        assert_eq!(sum.quadrature_error(&exact, &radiance), Some([1.0; 3]));
+        // (830² − 360²) of (1000² − 300²), both weighted with λ Q ∝ λ²: cubes.
+        let inside = (0.83_f64.powi(3) - 0.36_f64.powi(3)) / (1.0 - 0.3_f64.powi(3));
+        assert!((response.beyond(&grid) - (1.0 - inside)).abs() < 1e-12);
     }
 }

@@ -7,7 +7,7 @@ use super::{pipe, register, table, tiff, yaml};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
-use crate::stages::saturation::MASK_LAYER;
+use crate::stages::saturation::{MASK_LAYER, with_mask};
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use std::fs::File;
@@ -161,7 +161,7 @@ impl FrameReader {
     pub fn keep_mask(&mut self) {
         if self.mask.is_some() && !self.keeps_mask {
             self.keeps_mask = true;
-            self.header.geometry.channels.push(MASK_LAYER.into());
+            self.header = with_mask(self.header.clone());
         }
     }
 

@@ -60,8 +60,9 @@ pub struct Metadata {
     /// What the camera looked at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<Scene>,
-    /// Estimated relative error that the sum over wavelengths makes in the expected electrons of R, G and B, by doubling
-    /// the step: of the scene's spectrum, or of the brightest pixel in the first row of an image or chart.
+    /// Relative error that the sum over wavelengths makes in the expected electrons of R, G and B, against the integral of
+    /// what is linear between samples: of the scene's spectrum, or of the brightest pixel in the first row of an image or
+    /// chart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quadrature_error: Option<[f64; 3]>,
     /// The noise that was drawn.

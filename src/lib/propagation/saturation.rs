@@ -46,10 +46,8 @@ pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
     match (quantity_of_sites(frame), photosite.adc) {
         (QuantityKind::Electrons, _) => Some(expected_e.map(of_charge)),
         (QuantityKind::Adu, Some(adc)) => {
-            let full_well = (adc.bias_adu + adc.adu_per_e * full_well_e).floor();
-            let first_full = f64::from(adc.top_code()).min(full_well);
-            let of_code =
-                |expected_e| Tail::of(&photosite.model, &adc, expected_e).exceeds(adc.electrons_at(first_full - 0.5));
+            let first_full_e = adc.electrons_at(adc.full_code(full_well_e) - 0.5);
+            let of_code = |expected_e| Tail::of(&photosite.model, &adc, expected_e).exceeds(first_full_e);
             Some(expected_e.map(of_code).map(|share| share.clamp(0.0, 1.0)))
         }
         _ => None,

@@ -182,10 +182,7 @@ fn text(found: &ChainPrediction, quadrature_error: Option<[f64; 3]>) -> String {
     let [red, green, blue] = found.electrons.map(|e| shown("mean", Some(e)));
     let _ = writeln!(out, "expected signal: R {red}, G {green}, B {blue} e-");
     if let Some([red, green, blue]) = quadrature_error {
-        let _ = writeln!(
-            out,
-            "relative error of the sum over wavelengths, by doubling the step: R {red:.1e}, G {green:.1e}, B {blue:.1e}"
-        );
+        let _ = writeln!(out, "relative error of the sum over wavelengths: R {red:.1e}, G {green:.1e}, B {blue:.1e}");
     }
     for stage in &found.stages {
         stage_text(stage, &mut out);

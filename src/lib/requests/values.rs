@@ -70,9 +70,9 @@ pub fn three_numbers(text: &str) -> Result<[f64; 3], String> {
 ///
 /// What is expected, in words.
 pub fn electrons(text: &str) -> Result<[f64; 3], String> {
-    let wrong = || "give the electrons of R,G,B between commas, none below 0".to_owned();
+    let wrong = || "give the electrons of R,G,B between commas, none below 0 or above 3.4e38".to_owned();
     let found = three_numbers(text).map_err(|_| wrong())?;
-    if found.iter().all(|e| *e >= 0.0) { Ok(found) } else { Err(wrong()) }
+    if found.iter().all(|e| (0.0..=f64::from(f32::MAX)).contains(e)) { Ok(found) } else { Err(wrong()) }
 }
 
 /// Reads a finite number.

@@ -55,6 +55,11 @@ impl AdcRecord {
     pub fn top_code(&self) -> u32 {
         (1 << self.bits) - 1
     }
+
+    /// The lowest code of a full photosite: the largest, or that of full well (electrons) where it is smaller.
+    pub fn full_code(&self, full_well_e: f64) -> f64 {
+        f64::from(self.top_code()).min((self.bias_adu + self.adu_per_e * full_well_e).floor())
+    }
 }
 
 impl Digitize {

@@ -36,11 +36,8 @@ impl FullLevels {
             QuantityKind::Adu | QuantityKind::Unspecified => {
                 let white = metadata.white_level_adu?;
                 // Both levels are shifted alike by what was subtracted.
-                let below_top = |adc: AdcRecord| {
-                    let full_well =
-                        (adc.bias_adu + adc.adu_per_e * readout.map_or(f64::INFINITY, |r| r.full_well_e)).floor();
-                    (f64::from(adc.top_code()) - full_well).max(0.0)
-                };
+                let full_well_e = readout.map_or(f64::INFINITY, |readout| readout.full_well_e);
+                let below_top = |adc: AdcRecord| f64::from(adc.top_code()) - adc.full_code(full_well_e);
                 let missing = metadata.adc.map_or(0.0, below_top);
                 white.classes().map(|level| level - missing)
             }
@@ -70,18 +67,16 @@ impl FullLevels {
         }
     }
 
-    /// Marks the full samples of row `y` of a channel; gives their number.
-    pub fn mark(&self, y: usize, channel: usize, samples: &[f32], marks: &mut [f32]) -> u64 {
+    /// Marks the full samples of row `y` of a channel.
+    fn mark(&self, y: usize, channel: usize, samples: &[f32], marks: &mut [f32]) {
         let levels = self.of_row(y, channel);
-        let count = full(samples, levels);
-        if count > 0 {
+        if full(samples, levels) > 0 {
             for (x, (sample, mark)) in samples.iter().zip(marks).enumerate() {
                 if *sample >= levels[x % 2] {
                     *mark = SATURATED as f32;
                 }
             }
         }
-        count
     }
 }
 
@@ -110,11 +105,19 @@ pub fn samples_tell(frame: &FrameHeader) -> bool {
     is_of_photosites && is_shifted && metadata.demosaic.is_none()
 }
 
-/// The rows of a source and, behind its channels, the layer that marks full samples.
+/// The head of a frame that has the layer of marks behind its channels.
+pub fn with_mask(mut frame: FrameHeader) -> FrameHeader {
+    frame.geometry.channels.push(MASK_LAYER.into());
+    frame
+}
+
+/// The rows of a source and, behind its channels, the layer that marks full samples of its planes: the first three where
+/// they are those of colors, otherwise the first. What follows says how uncertain these are.
 pub struct Marked<'a> {
     source: &'a mut dyn RowSource,
     levels: FullLevels,
     header: FrameHeader,
+    planes: usize,
     rows_read: usize,
     buffer: Vec<f32>,
 }
@@ -122,9 +125,9 @@ pub struct Marked<'a> {
 impl<'a> Marked<'a> {
     /// The rows of `source`, whose samples are full from `levels` on.
     pub fn new(source: &'a mut dyn RowSource, levels: FullLevels) -> Self {
-        let mut header = source.header().clone();
-        header.geometry.channels.push(MASK_LAYER.into());
-        Self { source, levels, header, rows_read: 0, buffer: Vec::new() }
+        let header = with_mask(source.header().clone());
+        let planes = if header.leads_with_three_planes() { 3 } else { 1 };
+        Self { source, levels, header, planes, rows_read: 0, buffer: Vec::new() }
     }
 }
 
@@ -149,7 +152,7 @@ impl RowSource for Marked<'_> {
             samples.extend_from_slice(row);
             let marks = samples.len();
             samples.resize(marks + width, 0.0);
-            for (channel, line) in row.chunks_exact(width).enumerate() {
+            for (channel, line) in row.chunks_exact(width).take(self.planes).enumerate() {
                 self.levels.mark(self.rows_read, channel, line, &mut samples[marks..]);
             }
             self.rows_read += 1;
@@ -169,8 +172,7 @@ pub struct WithMask<'a, S> {
 impl<'a, S: Stage> WithMask<'a, S> {
     /// A stage with the layer.
     pub fn new(stage: &'a S) -> Self {
-        let mut header = stage.header().clone();
-        header.geometry.channels.push(MASK_LAYER.into());
+        let header = with_mask(stage.header().clone());
         Self { stage, header, footprint: stage.footprint() }
     }
 

@@ -165,9 +165,12 @@ pub struct Signals {
 ///
 /// X = K_m Σ_j L_j x̄_j Δλ, K_m = 683 lm W⁻¹, L in W m⁻² sr⁻¹ nm⁻¹.
 ///
+/// A library whose wavelengths are closer than the grid's is integrated between them.
+///
 /// # Errors
 ///
-/// Those of the grid; [`Error::MissingKey`] for a sensor of unknown read-out; [`Error::Data`] where the library leaves out more than 10⁻³ of what camera or observer respond to.
+/// Those of the grid; [`Error::MissingKey`] for a sensor of unknown read-out; [`Error::Data`] where the library leaves out
+/// more than 10⁻³ of what camera or observer respond to.
 pub fn signals(
     library: &SpectralLibrary,
     sensor: &Sensor,
@@ -175,7 +178,14 @@ pub fn signals(
     observer: &Observer,
     grid: &WavelengthGrid,
 ) -> Result<Signals> {
-    let (wavelengths, camera, matching) = weights(sensor, response, observer, grid)?;
+    let at = if grid.is_coarser_than(&library.wavelength_nm) {
+        let knots = observer.matching.iter().flat_map(|curve| curve.wavelengths_nm().iter().copied());
+        grid.points_between(knots.chain(response.knots_nm()).chain(library.wavelength_nm.iter().copied()))
+    } else {
+        grid.points()?
+    };
+    let wavelengths = at.0.clone();
+    let (camera, matching) = weights(sensor, response, observer, at)?;
     let project = |weights: &[f64], what: &str| -> Result<Vec<f64>> {
         let folded = fold(&library.wavelength_nm, &wavelengths, weights);
         if folded.uncovered > 1e-3 {
@@ -212,23 +222,24 @@ pub fn responses(
     observer: &Observer,
     grid: &WavelengthGrid,
 ) -> Result<Signals> {
-    let (wavelengths, camera, xyz) = weights(sensor, response, observer, grid)?;
-    let columns = |weights: [Vec<f64>; 3]| DMatrix::from_fn(wavelengths.len(), 3, |i, j| weights[j][i]);
+    let at = grid.points()?;
+    let count = at.0.len();
+    let (camera, xyz) = weights(sensor, response, observer, at)?;
+    let columns = |weights: [Vec<f64>; 3]| DMatrix::from_fn(count, 3, |i, j| weights[j][i]);
     Ok(Signals { camera: columns(camera), xyz: columns(xyz) })
 }
 
 /// Weights of three sums over wavelengths.
 type Three = [Vec<f64>; 3];
 
-/// The wavelengths of a grid, with what a radiance of 1 W cm⁻² sr⁻¹ nm⁻¹ at each adds to the signals of R, G, B and to
-/// X, Y, Z.
+/// What a radiance of 1 W cm⁻² sr⁻¹ nm⁻¹ at each of some wavelengths, with their weights, adds to the signals of R, G, B and
+/// to X, Y, Z.
 fn weights(
     sensor: &Sensor,
     response: &SpectralResponse,
     observer: &Observer,
-    grid: &WavelengthGrid,
-) -> Result<(Vec<f64>, Three, Three)> {
-    let (wavelengths, widths) = grid.points()?;
+    (wavelengths, widths): (Vec<f64>, Vec<f64>),
+) -> Result<(Three, Three)> {
     let unit = Exposure { exposure_s: 1.0, f_number: 1.0, lens_transmittance: 1.0 };
     let per_exposure = sensor.readout()?.adu_per_e / unit.exposure_s_sr();
     let camera = response
@@ -238,5 +249,5 @@ fn weights(
         let weight = |(&nm, width): (&f64, &f64)| LUMINOUS_EFFICACY_LM_PER_W * CM2_PER_M2 * curve.at(nm) * width;
         wavelengths.iter().zip(&widths).map(weight).collect()
     });
-    Ok((wavelengths, camera, matching))
+    Ok((camera, matching))
 }

@@ -73,10 +73,17 @@ impl<'a> Assessment<'a> {
         let reports = |group: &Group<'_>, black: f64| -> Vec<ChannelReport> {
             (0..group.names.len()).map(|index| group.channel(index, black, has_rails)).collect()
         };
-        let of_classes = self.classes.iter().zip(black.classes);
         let mut channels = reports(&self.channels, black.whole);
         if let ([plane], false) = (&mut channels[..], self.classes.is_empty()) {
             (plane.mean_error, plane.std_error) = self.plane_errors();
+        }
+        let mut classes: Vec<ChannelReport> =
+            self.classes.iter().zip(black.classes).flat_map(|(group, black)| reports(group, black)).collect();
+        let mut mean_std = self.channels.predicted.mean_std.clone();
+        if metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+            // Charge transfer mixes neighbors: no sampling error is that of independent samples.
+            channels.iter_mut().chain(&mut classes).for_each(ChannelReport::forget_errors);
+            mean_std = None;
         }
         let Group { moments, predicted, .. } = &self.channels;
         let row = |i| (0..channels.len()).map(|j| moments.covariance(i, j)).collect::<Option<Vec<f64>>>();
@@ -90,11 +97,11 @@ impl<'a> Assessment<'a> {
             leaves_saturated_out: false,
             quantity: metadata.quantity,
             unit: metadata.unit.clone(),
-            classes: of_classes.flat_map(|(group, black)| reports(group, black)).collect(),
+            classes,
             covariance: (0..channels.len()).map(row).collect(),
             channels,
             predicted_covariance: predicted.covariance.clone(),
-            patch_mean_std: predicted.mean_std.clone(),
+            patch_mean_std: mean_std,
             tests: Vec::new(),
         }
     }
@@ -138,7 +145,7 @@ impl Group<'_> {
             let ratio = (mean - black) / std;
             (ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
         };
-        let spread = expectation.filter(|expected| expected.std > 0.0);
+        let spread = expectation.filter(|expected| expected.is_resolved());
         let n = count as f64;
         // Errors of independent normal samples, relative to their standard deviation.
         let independent = (1.0 / n.sqrt(), (2.0 * (n - 1.0)).sqrt().recip());

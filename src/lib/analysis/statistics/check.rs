@@ -129,12 +129,24 @@ pub(super) struct Expected {
 /// Fewer samples off their usual step than this make sums that are no normal deviates.
 const RARE: f64 = 25.0;
 
+/// Fewer effective degrees of freedom than this, and a variance follows no χ² well enough: the inequality of Chebyshev holds
+/// of any law.
+const FEW: f64 = 12.0;
+
+/// Channels that are correlated more closely than this are functions of each other: nothing is left to chance.
+const TIED: f64 = 1.0 - 1e-9;
+
 /// Tests the channels `0..count` and their correlations.
 pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     let sampling = &expected.sampling;
     let channels = measured.names.len();
     let least = expected.site_variances.iter().copied().fold(f64::INFINITY, f64::min);
-    let is_rare = |i: usize| sampling.count * if expected.is_plane { expected.site_variances[i] } else { least } < RARE;
+    let is_rare = |i: usize| {
+        let of_sites = if expected.is_plane { expected.site_variances[i] } else { least };
+        // Where samples scatter by less than their rounding, neither mean nor variance follows a law that is known.
+        let is_rounded = sampling.covariance[(i, i)].max(0.0).sqrt() <= rounding(expected.mean[i]);
+        sampling.count * of_sites < RARE || is_rounded
+    };
     let mut found = Vec::new();
     for i in 0..channels {
         if is_rare(i) {
@@ -149,10 +161,15 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     for (index, [i, j]) in PAIRS.into_iter().enumerate() {
         // Four pixels are the fewest whose correlation says anything.
         if i != j && j < channels && !is_rare(i) && !is_rare(j) && sampling.count >= 4.0 {
-            found.push(correlation(measured, sampling, index));
+            found.extend(correlation(measured, sampling, index));
         }
     }
     found
+}
+
+/// What rounding to single precision may take a sample of this mean off by, with some room.
+pub(super) fn rounding(mean: f64) -> f64 {
+    4.0 * f64::from(f32::EPSILON) * mean.abs()
 }
 
 /// Where a pair of channels stands in [`PAIRS`].
@@ -174,7 +191,8 @@ fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
     }
 }
 
-/// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946].
+/// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946]. Where ν is small, the
+/// probability is Chebyshev's bound, var s²/(s² − E s²)².
 fn variance(measured: &Measured<'_>, sampling: &Sampling, i: usize) -> Test {
     let expected = sampling.covariance[(i, i)];
     let pair = pair([i, i]);
@@ -188,18 +206,26 @@ fn variance(measured: &Measured<'_>, sampling: &Sampling, i: usize) -> Test {
         expected,
         z: Some((found - expected) / scatter.sqrt()),
         degrees_of_freedom: Some(freedom),
-        p: significance::of_chi_square(freedom * found / expected, freedom),
+        p: if freedom < FEW {
+            (scatter / (found - expected).powi(2)).min(1.0)
+        } else {
+            significance::of_chi_square(freedom * found / expected, freedom)
+        },
     }
 }
 
 /// artanh r about artanh ρ + ρ/2ν, with variance 1/(ν − 2), as of ν + 1 independent normal pairs \[Fisher1921].
 ///
 /// The effective ν makes 1/ν the variance to first order: r = s_ij/√(s_ii s_jj) varies as its differential does,
-/// dr = ds_ij/√(s_ii s_jj) − ½ r (ds_ii/s_ii + ds_jj/s_jj), and artanh r by dr/(1 − ρ²).
-fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Test {
+/// dr = ds_ij/√(s_ii s_jj) − ½ r (ds_ii/s_ii + ds_jj/s_jj), and artanh r by dr/(1 − ρ²). None of channels that are functions
+/// of each other, nor where ν is too small for the law of the transformed correlation to be normal.
+fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Option<Test> {
     let [i, j] = PAIRS[index];
     let correlation = |c: &Matrix3<f64>| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
     let (found, expected) = (correlation(&measured.covariance), correlation(&sampling.covariance));
+    if !found.is_finite() || expected.abs() > TIED {
+        return None;
+    }
     let c = &sampling.covariance;
     let terms = [
         (index, 1.0 / (c[(i, i)] * c[(j, j)]).sqrt()),
@@ -209,9 +235,12 @@ fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Te
     let variance: f64 =
         terms.iter().flat_map(|(a, f)| terms.iter().map(move |(b, g)| f * g * sampling.spread[*a][*b])).sum();
     let freedom = (1.0 - expected * expected).powi(2) / variance;
+    if freedom < FEW {
+        return None;
+    }
     let center = expected.atanh() + expected / (2.0 * freedom);
-    let z = (found.clamp(-1.0, 1.0).atanh() - center) * (freedom - 2.0).max(f64::MIN_POSITIVE).sqrt();
-    Test {
+    let z = (found.clamp(-1.0, 1.0).atanh() - center) * (freedom - 2.0).sqrt();
+    Some(Test {
         subject: Subject::Correlation,
         channels: vec![measured.names[i].clone(), measured.names[j].clone()],
         measured: found,
@@ -219,7 +248,7 @@ fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Te
         z: Some(z),
         degrees_of_freedom: Some(freedom),
         p: significance::of_normal(z),
-    }
+    })
 }
 
 /// Where hardly a sample should deviate: P(mean square deviation ≥ d²) ≤ E d²/d² by Markov's inequality. What single
@@ -231,8 +260,7 @@ fn deviation(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
     let found = offset * offset + spread;
     let population =
         expected.sampling.covariance[(i, i)] * (n - 1.0).max(0.0) / n + expected.sampling.mean_covariance[(i, i)];
-    let rounding = (4.0 * f64::from(f32::EPSILON) * expected.mean[i].abs()).powi(2);
-    let p = if found <= population + rounding { 1.0 } else { (population / found).min(1.0) };
+    let p = if found <= population + rounding(expected.mean[i]).powi(2) { 1.0 } else { (population / found).min(1.0) };
     Test {
         subject: Subject::Deviation,
         channels: vec![measured.names[i].clone()],

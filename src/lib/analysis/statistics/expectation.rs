@@ -1,6 +1,6 @@
 //! What is predicted of the samples of a region.
 
-use super::check::{Expected, pair};
+use super::check::{Expected, pair, rounding};
 use crate::numerics::normal::MeanVariance;
 use crate::propagation::sampling::Sampling;
 use crate::propagation::{PixelMoments, Prediction};
@@ -104,6 +104,11 @@ impl Predicted {
 }
 
 impl Expectation {
+    /// Whether samples scatter, and by more than the rounding of single precision.
+    pub fn is_resolved(&self) -> bool {
+        self.std > rounding(self.mean)
+    }
+
     /// Of `count` independent samples.
     fn of(prediction: &Prediction, count: u64) -> Self {
         let n = count as f64;

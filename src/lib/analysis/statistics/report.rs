@@ -75,9 +75,7 @@ impl RegionReport {
         let not_finite = if left_out { self.not_finite.saturating_sub(saturated) } else { self.not_finite };
         Self { not_finite, saturated, leaves_saturated_out: left_out, ..self }
     }
-}
 
-impl RegionReport {
     /// The same with nothing predicted: what is left where pixels are left out by their values follows no formula.
     #[must_use]
     pub(super) fn without_predictions(self) -> Self {
@@ -132,4 +130,11 @@ pub struct ChannelReport {
     /// Standard error of the standard deviation: with a prediction s times its relative one, elsewhere s/√(2(n − 1)), that
     /// of independent normal samples; in a CFA plane from those of its classes.
     pub std_error: Option<f64>,
+}
+
+impl ChannelReport {
+    /// Takes out what hangs on how far samples hang together.
+    pub(super) fn forget_errors(&mut self) {
+        (self.z_mean, self.z_std, self.mean_error, self.std_error) = (None, None, None, None);
+    }
 }

@@ -4,7 +4,7 @@ use super::region::Region;
 use crate::error::Result;
 use crate::metadata::FrameHeader;
 use crate::propagation::saturation;
-use crate::stages::saturation::{FullLevels, MASK_LAYER, samples_tell};
+use crate::stages::saturation::{FullLevels, MASK_LAYER, Marked, samples_tell};
 use crate::stream::RowSource;
 
 /// What becomes of pixels that were made of saturated samples.
@@ -19,53 +19,79 @@ pub enum Saturated {
 
 /// The rows of a frame without its layer of marks, marked pixels as NaN where they are left out.
 pub(super) struct Watch<'a> {
-    source: &'a mut dyn RowSource,
+    source: Watched<'a>,
     header: FrameHeader,
-    /// Place of the layer among the channels of the source.
+    /// Place of the layer among the channels of the source; none where no pixel can be marked.
     layer: Option<usize>,
-    /// Channels of the source that are handed on: the first.
-    kept: usize,
-    /// Levels from which samples are full, where no layer says it.
-    levels: Option<FullLevels>,
     leaves_out: bool,
     regions: Vec<Region>,
     counts: Vec<u64>,
     rows_read: usize,
     buffer: Vec<f32>,
-    marks: Vec<f32>,
+}
+
+/// Rows as they come, or with the layer that their samples tell.
+enum Watched<'a> {
+    AsTheyCome(&'a mut dyn RowSource),
+    Marked(Marked<'a>),
+}
+
+impl<'a> Watched<'a> {
+    /// The rows of `source`, and the place of their layer of marks.
+    fn of(source: &'a mut dyn RowSource) -> (Self, Option<usize>) {
+        let header = source.header();
+        // What other programs call so is measured as any channel; ours comes last.
+        let is_ours = |layer: &usize| *layer > 0 && !header.metadata.history.is_empty();
+        let layer = header.geometry.channels.iter().position(|channel| channel == MASK_LAYER).filter(is_ours);
+        let levels = FullLevels::of(header).filter(|levels| saturation::is_possible(header, levels));
+        match (layer, levels) {
+            (None, Some(levels)) => {
+                let layer = header.geometry.channels.len();
+                (Self::Marked(Marked::new(source, levels)), Some(layer))
+            }
+            _ => (Self::AsTheyCome(source), layer),
+        }
+    }
+
+    fn rows(&self) -> &dyn RowSource {
+        match self {
+            Self::AsTheyCome(source) => *source,
+            Self::Marked(source) => source,
+        }
+    }
+
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        match self {
+            Self::AsTheyCome(source) => source.read(rows, samples),
+            Self::Marked(source) => source.read(rows, samples),
+        }
+    }
 }
 
 impl<'a> Watch<'a> {
     /// Watches `source`. Samples of photosites always count, as the records that they are, and so do the formulas that
     /// predict them.
     pub fn new(source: &'a mut dyn RowSource, saturated: Saturated, regions: &[Region]) -> Self {
-        let mut header = source.header().clone();
-        let layer = header.geometry.channels.iter().position(|channel| channel == MASK_LAYER);
-        // What other programs call so is measured as any channel; ours comes last.
-        let layer = layer.filter(|layer| *layer > 0 && !header.metadata.history.is_empty());
+        let (source, layer) = Watched::of(source);
+        let mut header = source.rows().header().clone();
+        let comes_with_layer = layer.is_some() && matches!(source, Watched::AsTheyCome(_));
         if let Some(layer) = layer {
             header.geometry.channels.truncate(layer);
-            if saturated == Saturated::Kept && header.leads_with_three_planes() {
+            if saturated == Saturated::Kept && comes_with_layer && header.leads_with_three_planes() {
                 // What uncertainty says of marked pixels is infinite, and would leave them out.
                 header.geometry.channels.truncate(3);
             }
         }
-        let kept = header.geometry.channels.len();
-        let levels =
-            FullLevels::of(&header).filter(|levels| layer.is_none() && saturation::is_possible(&header, levels));
-        let leaves_out = saturated == Saturated::LeftOut && (layer.is_some() || !samples_tell(&header));
+        let leaves_out = saturated == Saturated::LeftOut && (comes_with_layer || !samples_tell(&header));
         Self {
             source,
             header,
             layer,
-            kept,
-            levels,
             leaves_out,
             regions: regions.to_vec(),
             counts: vec![0; regions.len()],
             rows_read: 0,
             buffer: Vec::new(),
-            marks: Vec::new(),
         }
     }
 
@@ -74,44 +100,22 @@ impl<'a> Watch<'a> {
         (self.counts, self.leaves_out)
     }
 
-    /// Takes in one row of the source: marks, counts, hands on.
-    fn take(&mut self, row: &[f32], samples: &mut Vec<f32>) {
-        let width = self.header.geometry.width;
+    /// Takes in one row of samples and its marks: counts, and leaves out.
+    fn take(&mut self, marks: &[f32], samples: &mut [f32]) {
         let y = self.rows_read;
         self.rows_read += 1;
-        let start = samples.len();
-        self.marks.clear();
-        let found = match (self.layer, &self.levels) {
-            (Some(layer), _) => {
-                samples.extend_from_slice(&row[..self.kept * width]);
-                self.marks.extend_from_slice(&row[layer * width..][..width]);
-                self.marks.iter().any(|mark| *mark != 0.0)
-            }
-            (None, Some(levels)) => {
-                samples.extend_from_slice(row);
-                self.marks.resize(width, 0.0);
-                // Layers of uncertainty follow the samples.
-                let planes = row.chunks_exact(width).take(if self.header.leads_with_three_planes() { 3 } else { 1 });
-                planes.enumerate().map(|(channel, line)| levels.mark(y, channel, line, &mut self.marks)).sum::<u64>()
-                    > 0
-            }
-            (None, None) => {
-                samples.extend_from_slice(row);
-                false
-            }
-        };
-        if !found {
+        if marks.iter().all(|mark| *mark == 0.0) {
             return;
         }
         for (region, count) in self.regions.iter().zip(&mut self.counts) {
             if (region.y..region.y + region.height).contains(&y) {
-                let marks = &self.marks[region.x..region.x + region.width];
+                let marks = &marks[region.x..region.x + region.width];
                 *count += marks.iter().filter(|mark| **mark != 0.0).count() as u64;
             }
         }
         if self.leaves_out {
-            for line in samples[start..].chunks_exact_mut(width) {
-                for (sample, mark) in line.iter_mut().zip(&self.marks) {
+            for line in samples.chunks_exact_mut(marks.len()) {
+                for (sample, mark) in line.iter_mut().zip(marks) {
                     *sample = if *mark == 0.0 { *sample } else { f32::NAN };
                 }
             }
@@ -125,22 +129,24 @@ impl RowSource for Watch<'_> {
     }
 
     fn natural_rows(&self) -> usize {
-        self.source.natural_rows()
+        self.source.rows().natural_rows()
     }
 
     fn may_wait(&self) -> bool {
-        self.source.may_wait()
+        self.source.rows().may_wait()
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
-        if self.layer.is_none() && self.levels.is_none() {
-            return self.source.read(rows, samples);
-        }
+        let Some(layer) = self.layer else { return self.source.read(rows, samples) };
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
         self.source.read(rows, &mut buffer)?;
+        let geometry = &self.header.geometry;
+        let (width, kept) = (geometry.width, geometry.row_samples());
         for row in buffer.chunks_exact(buffer.len() / rows.max(1)) {
-            self.take(row, samples);
+            let start = samples.len();
+            samples.extend_from_slice(&row[..kept]);
+            self.take(&row[layer * width..][..width], &mut samples[start..]);
         }
         self.buffer = buffer;
         Ok(())

@@ -80,6 +80,9 @@ impl Layout {
         let (chunk_width, chunk_rows) = (size(grid.chunk_width)?, size(grid.chunk_rows)?);
         let (across, down) = (size(grid.across)?, size(grid.down)?);
         let mut notes = Vec::new();
+        if stored == SampleType::F64 {
+            notes.push("its samples of 64 bits are rounded to 32".into());
+        }
         // No sample depends on these, so damaged ones are not worth refusing the image.
         let origin = passed_over(origin(file, directory), "its place on the sensor", &mut notes)?;
         let software = passed_over(file.text(directory, Tag::Software), "its tag Software", &mut notes)?;

@@ -14,6 +14,7 @@ use half::f16;
 use rayon::prelude::*;
 use std::fs::File;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Decoded bytes that are held at least, where the caller asks for so many: enough work for some threads.
 const DECODED_BYTES: usize = 8 << 20;
@@ -112,10 +113,14 @@ impl TiffReader {
             let until = self.piece_range(self.held.end - 1).end.min(end);
             let (now, later) = rest.split_at_mut((until - row) * row_samples);
             let this = &*self;
+            let overflown = AtomicBool::new(false);
             now.par_chunks_mut(row_samples)
                 .with_min_len((PIECE_BYTES / size_of::<f32>() / row_samples).max(1))
                 .enumerate()
-                .for_each(|(index, samples)| this.convert_row(row + index, samples));
+                .for_each(|(index, samples)| this.convert_row(row + index, samples, &overflown));
+            if overflown.into_inner() {
+                return Err(self.file.problem("it has samples beyond 3.4e38, the largest of single precision"));
+            }
             (row, rest) = (until, later);
         }
         Ok(())
@@ -242,8 +247,8 @@ impl TiffReader {
         Ok(())
     }
 
-    /// Converts one row of the held pieces.
-    fn convert_row(&self, row: usize, samples: &mut [f32]) {
+    /// Converts one row of the held pieces; tells of finite samples that are not of single precision.
+    fn convert_row(&self, row: usize, samples: &mut [f32], overflown: &AtomicBool) {
         match self.layout.stored {
             SampleType::U8 => self.convert(row, samples, |[byte]: [u8; 1]| f32::from(byte)),
             SampleType::I8 => self.convert(row, samples, |bytes| f32::from(i8::from_ne_bytes(bytes))),
@@ -253,8 +258,15 @@ impl TiffReader {
             SampleType::I32 => self.convert(row, samples, |bytes| i32::from_ne_bytes(bytes) as f32),
             SampleType::F16 => self.convert(row, samples, |bytes| f16::from_ne_bytes(bytes).to_f32()),
             SampleType::F32 => self.convert(row, samples, f32::from_ne_bytes),
-            #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what is promised")]
-            SampleType::F64 => self.convert(row, samples, |bytes| f64::from_ne_bytes(bytes) as f32),
+            SampleType::F64 => self.convert(row, samples, |bytes| {
+                let value = f64::from_ne_bytes(bytes);
+                #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what is promised")]
+                let sample = value as f32;
+                if sample.is_infinite() && value.is_finite() {
+                    overflown.store(true, Ordering::Relaxed);
+                }
+                sample
+            }),
         }
         if self.layout.inverted {
             for sample in samples {

@@ -2,6 +2,9 @@
 
 use crate::chain::Uncertainty;
 
+/// Levels that a sweep may have besides 0.
+const LEVELS_E: std::ops::RangeInclusive<f64> = 1e-9..=f32::MAX as f64;
+
 /// Levels of the brightest class, in electrons.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sweep {
@@ -26,6 +29,13 @@ impl Sweep {
         let [start, end, count] = text.split(':').collect::<Vec<_>>().try_into().map_err(|_| wrong())?;
         let number = |text: &str| text.parse().ok().filter(|e: &f64| e.is_finite() && *e >= 0.0).ok_or_else(wrong);
         let (start_e, end_e) = (number(start)?, number(end)?);
+        if [start_e, end_e].iter().any(|e| *e != 0.0 && !LEVELS_E.contains(e)) {
+            return Err(format!(
+                "the levels of a sweep are 0, or {:e} to {:.1e} electrons, the most that a sample holds",
+                LEVELS_E.start(),
+                LEVELS_E.end()
+            ));
+        }
         let (count, is_logarithmic) = match (count.strip_suffix("log"), count.strip_suffix("lin")) {
             (Some(count), _) => (count, true),
             (_, Some(count)) => (count, false),
@@ -78,7 +88,7 @@ mod tests {
         assert_eq!((levels.len(), levels[0], levels[49]), (50, 10.0, 40_000.0));
         assert!((levels[1] / levels[0] - 4000.0_f64.powf(1.0 / 49.0)).abs() < 1e-12);
         assert_eq!(Sweep::parse("0:10:3").unwrap().levels().collect::<Vec<_>>(), [0.0, 5.0, 10.0]);
-        for wrong in ["10:40000", "0:10:3log", "a:b:c", "1:2:0log", "-1:2:3lin"] {
+        for wrong in ["10:40000", "0:10:3log", "a:b:c", "1:2:0log", "-1:2:3lin", "1e-300:1:3log", "1:1e39:3log"] {
             assert!(Sweep::parse(wrong).is_err(), "{wrong}");
         }
     }

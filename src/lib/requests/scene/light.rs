@@ -5,7 +5,6 @@ use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
 use crate::formats::spectral::SpectralChannels;
 use crate::numerics::planes::{WeightedPlane, weighted_sums};
-use crate::numerics::quadrature::Rule;
 use crate::stages::render::Rendering;
 use crate::stream::{Band, Outlet, RowSink, RowSource, fold, fold_into};
 use crate::units::Any;
@@ -113,23 +112,27 @@ pub(super) fn brightest(electrons: &[[f64; 3]]) -> usize {
 
 /// Electrons that can be.
 pub(super) fn checked(electrons: [f64; 3], name: &str) -> Result<[f64; 3]> {
-    if electrons.iter().all(|e| (0.0..f64::INFINITY).contains(e)) {
-        Ok(electrons)
-    } else {
-        Err(Error::format(name, "its radiance is negative or not finite, so that no electrons can be expected of it"))
+    if electrons.iter().any(|e| !(0.0..f64::INFINITY).contains(e)) {
+        return Err(Error::format(
+            name,
+            "its radiance is negative or not finite, so that no electrons can be expected of it",
+        ));
+    }
+    match electrons.into_iter().find(|e| *e > f64::from(f32::MAX)) {
+        Some(e) => Err(Error::format(name, format!("its radiance makes {e:.1e} electrons, more than a sample holds"))),
+        None => Ok(electrons),
     }
 }
 
-/// What a camera makes of radiances on one set of wavelengths, and the same at twice the step.
+/// What a camera makes of radiances on one set of wavelengths, by the sum that was asked for and by the exact integral.
 pub(super) struct Seen {
     pub(super) camera: Camera,
-    pub(super) coarse: Option<Camera>,
-    pub(super) rule: Rule,
+    pub(super) exact: Camera,
 }
 
 impl Seen {
     pub(super) fn quadrature_error(&self, radiance: &[f64]) -> Option<[f64; 3]> {
-        self.camera.quadrature_error(self.rule, self.coarse.as_ref()?, radiance)
+        self.camera.quadrature_error(&self.exact, radiance)
     }
 }
 

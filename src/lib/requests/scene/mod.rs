@@ -34,7 +34,7 @@ pub struct Uniform {
     pub exposure: Exposure,
     /// Signal electrons of R, G and B.
     pub electrons: [f64; 3],
-    /// Estimated relative error of them by the sum over wavelengths; none where no spectrum was summed or none is possible.
+    /// Relative error of them by the sum over wavelengths; none where no spectrum was summed or none is possible.
     pub quadrature_error: Option<[f64; 3]>,
     /// What came up.
     pub notes: Vec<Note>,
@@ -115,7 +115,6 @@ mod tests {
     use crate::formats::data::DEFAULT_SENSOR;
     use crate::numerics::quadrature::Rule;
     use crate::requests::options::{SignalLevel, Subject};
-    use crate::spectrum::WavelengthGrid;
 
     const TREE: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -135,7 +134,7 @@ mod tests {
         assert_eq!((scene.subject.sensor.as_str(), &scene.subject.input), (DEFAULT_SENSOR, &None));
         let exposure = scene.exposure.chosen().unwrap();
         assert_eq!(exposure, Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
-        assert_eq!((scene.wavelengths, scene.quadrature), (WavelengthGrid::default(), Rule::Rectangle));
+        assert_eq!((scene.wavelengths, scene.quadrature), (None, Rule::Rectangle));
         assert_eq!((scene.vignetting_focal_length_mm(), scene.focal_length_mm), (None, 50.0));
     }
 

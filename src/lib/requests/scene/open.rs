@@ -20,6 +20,12 @@ use crate::spectrum::{WavelengthGrid, chart_columns};
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 
+/// Share of a sensor's response beyond the summed wavelengths from which it is told.
+const TOLD_BEYOND: f64 = 1e-3;
+
+/// Error of a sum over wavelengths from which it is a warning.
+const TOLD_ERROR: f64 = 1e-2;
+
 /// A scene whose light is open and whose exposure is settled.
 pub(super) struct Prepared {
     pub(super) sensor: Sensor,
@@ -38,24 +44,50 @@ pub(super) struct Found {
 }
 
 /// The sums over wavelengths that turn radiance into electrons.
-struct Sums {
+struct Sums<'a> {
+    loaded: &'a LoadedSensor,
+    exposure: &'a Exposure,
+    grid: WavelengthGrid,
+    /// Whether a radiance whose samples are closer than the grid's is integrated between them instead.
+    follows: bool,
     weights: GridWeights,
-    /// Those at twice the step, where the rule fits them.
-    coarse: Option<GridWeights>,
-    rule: Rule,
 }
 
-impl Sums {
-    fn on(grid: &WavelengthGrid, loaded: &LoadedSensor, exposure: &Exposure) -> Result<Self> {
-        let (sensor, response) = (&loaded.sensor, loaded.response()?);
-        let weights = response.weights_on(sensor, exposure, grid)?;
-        let coarse = grid.doubled().and_then(|grid| response.weights_on(sensor, exposure, &grid).ok());
-        Ok(Self { weights, coarse, rule: grid.quadrature })
+impl<'a> Sums<'a> {
+    /// Those of a grid that was `chosen`, or of the default.
+    fn on(
+        chosen: Option<WavelengthGrid>,
+        quadrature: Rule,
+        loaded: &'a LoadedSensor,
+        exposure: &'a Exposure,
+    ) -> Result<Self> {
+        let grid = WavelengthGrid { quadrature, ..chosen.unwrap_or_default() };
+        let weights = loaded.response()?.weights_on(&loaded.sensor, exposure, &grid)?;
+        Ok(Self { loaded, exposure, grid, follows: chosen.is_none(), weights })
     }
 
     /// The camera for radiances at these wavelengths, those of `name`.
-    fn camera(&self, sampled_nm: &[f64], name: &str, notes: &mut Vec<Note>) -> Seen {
-        let (camera, uncovered) = self.weights.camera(sampled_nm);
+    fn camera(&self, sampled_nm: &[f64], name: &str, notes: &mut Vec<Note>) -> Result<Seen> {
+        let response = self.loaded.response()?;
+        let (of_sum, uncovered) = self.weights.camera(sampled_nm);
+        let exact = response.weights_between(&self.loaded.sensor, self.exposure, &self.grid, sampled_nm)?;
+        let exact = exact.camera(sampled_nm).0;
+        let is_followed = self.follows && self.grid.is_coarser_than(sampled_nm);
+        let WavelengthGrid { start_nm, end_nm, step_nm, .. } = self.grid;
+        if is_followed {
+            notes.push(Note::Remark(format!(
+                "{name}: its samples are closer than {step_nm} nm: it is integrated between them"
+            )));
+        }
+        let beyond = response.beyond(&self.grid);
+        if beyond > TOLD_BEYOND {
+            notes.push(Note::Warning(format!(
+                "{:.1} % of the response of the sensor {} lies beyond {start_nm} to {end_nm} nm, where nothing is summed; \
+                 --wavelengths sets other ends",
+                100.0 * beyond,
+                self.loaded.sensor.name
+            )));
+        }
         if uncovered > 1e-6 {
             notes.push(Note::Warning(format!(
                 "{name}: it covers {} to {} nm; {:.2} % of the sensor's response lies beyond, where its radiance is \
@@ -65,8 +97,7 @@ impl Sums {
                 100.0 * uncovered
             )));
         }
-        let coarse = self.coarse.as_ref().map(|weights| weights.camera(sampled_nm).0);
-        Seen { camera, coarse, rule: self.rule }
+        Ok(Seen { camera: if is_followed { exact.clone() } else { of_sum }, exact })
     }
 }
 
@@ -103,12 +134,7 @@ impl Scene {
             found.notes.push(Note::Remark(format!("exposure {} s", exposure.exposure_s)));
         }
         found.notes.extend(overfull(&light, loaded.sensor.readout.as_ref()));
-        if let Some([red, green, blue]) = found.metadata.quadrature_error {
-            found.notes.push(Note::Remark(format!(
-                "the sum over wavelengths is off by about {red:.1e} of R, {green:.1e} of G, {blue:.1e} of B, as twice the \
-                 step tells"
-            )));
-        }
+        found.notes.extend(found.metadata.quadrature_error.map(inexact));
         Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, found })
     }
 
@@ -119,8 +145,7 @@ impl Scene {
 
     /// Opens the radiance at an exposure.
     fn open_light(&self, loaded: &LoadedSensor, exposure: &Exposure, found: &mut Found) -> Result<Light> {
-        let grid = WavelengthGrid { quadrature: self.quadrature, ..self.wavelengths };
-        let sums = Sums::on(&grid, loaded, exposure)?;
+        let sums = Sums::on(self.wavelengths, self.quadrature, loaded, exposure)?;
         let GridWeights { left_out, wavelengths_nm, .. } = &sums.weights;
         if *left_out > 0 {
             let all = left_out + wavelengths_nm.len();
@@ -136,9 +161,9 @@ impl Scene {
     }
 
     /// The chosen spectrum of a table, or all of them as a chart.
-    fn light_of_table(&self, table: &SpectralTable, sums: &Sums, found: &mut Found) -> Result<Light> {
+    fn light_of_table(&self, table: &SpectralTable, sums: &Sums<'_>, found: &mut Found) -> Result<Light> {
         let name = table.name().to_owned();
-        let seen = sums.camera(&table.wavelength_nm, &name, &mut found.notes);
+        let seen = sums.camera(&table.wavelength_nm, &name, &mut found.notes)?;
         let given = self.spectrum.radiance_unit;
         let radiance_of = |index: usize| -> Result<Vec<f64>> {
             let (unit, _) = table.radiance_unit(index, given)?;
@@ -169,7 +194,7 @@ impl Scene {
     }
 
     /// The chosen pixel of a spectral image, or all of them.
-    fn light_of_image(&self, reader: FrameReader, sums: &Sums, found: &mut Found) -> Result<Light> {
+    fn light_of_image(&self, reader: FrameReader, sums: &Sums<'_>, found: &mut Found) -> Result<Light> {
         if self.spectrum.column.is_some() {
             return Err(Error::Usage("a spectral image has no columns; choose a pixel with --sample N".into()));
         }
@@ -177,7 +202,7 @@ impl Scene {
         let header = reader.header().clone();
         let spectral = SpectralChannels::of(&header, self.spectrum.radiance_unit)?;
         found.notes.extend(spectral.warning.clone().map(Note::Warning));
-        let seen = sums.camera(&spectral.wavelength_nm, &header.name, &mut found.notes);
+        let seen = sums.camera(&spectral.wavelength_nm, &header.name, &mut found.notes)?;
         let planes = seen.camera.planes(&spectral.channels, spectral.unit.in_w_per_cm2_sr_nm());
         let all = spectral.channels.len();
         if planes.len() < all {
@@ -229,6 +254,19 @@ fn overfull(light: &Light, readout: Option<&ReadOut>) -> Option<Note> {
             readout.full_well_e
         ))
     })
+}
+
+/// What the sum over wavelengths is off by, of R, G and B.
+fn inexact([red, green, blue]: [f64; 3]) -> Note {
+    let text = format!(
+        "the sum over wavelengths is off by {red:.1e} of R, {green:.1e} of G, {blue:.1e} of B from the integral between \
+         all samples"
+    );
+    if [red, green, blue].iter().any(|error| *error > TOLD_ERROR) {
+        Note::Warning(format!("{text}; a smaller step of --wavelengths, or its default, brings it closer"))
+    } else {
+        Note::Remark(text)
+    }
 }
 
 fn no_sample(name: &str, sample: usize, count: usize) -> Error {

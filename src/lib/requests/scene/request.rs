@@ -29,9 +29,9 @@ pub struct Scene {
     /// How strong the signal is.
     #[command(flatten)]
     pub level: SignalLevel,
-    /// Wavelengths to sum over, in nm
-    #[arg(long, value_name = "START:END:STEP", default_value_t, value_parser = values::wavelengths)]
-    pub wavelengths: WavelengthGrid,
+    /// Wavelengths to sum over, in nm; by default 360:830:1, or all of a spectrum's own between these where any are closer
+    #[arg(long, value_name = "START:END:STEP", value_parser = values::wavelengths)]
+    pub wavelengths: Option<WavelengthGrid>,
     /// Rule of summation
     #[arg(long, default_value = Rule::default().name(), value_parser = values::choice::<Rule>())]
     pub quadrature: Rule,
