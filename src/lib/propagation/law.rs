@@ -1,0 +1,174 @@
+//! The law of a photosite's charge, exactly: counts of light and dark, fixed patterns, full well, and what reads it.
+//!
+//! Given its two counts a photosite's charge is normal over the photosites of a frame, since the fixed patterns are; so its
+//! law is a sum over counts of normal laws ([`Node`]). Those that full well is far above are read in closed form; to those
+//! within its reach comes what full well takes from them, an integral over their charge ([`ends`](super::ends)); and to
+//! those whose sensitivities are cut off at zero what that adds ([`rectified`](super::rectified)).
+
+use super::counts::Charge;
+use super::ends::at_full_well;
+use super::reading::{ENDLESS, Moments, Reading};
+use super::rectified::corrections;
+use crate::frame::to_sample;
+use crate::metadata::AdcRecord;
+use crate::numerics::normal::MeanVariance;
+use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
+use crate::stages::noise::NoiseModel;
+
+/// The law of the charge of one class of photosites.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Law {
+    pub light: Charge,
+    pub dark: Charge,
+    pub full_well_e: f64,
+    pub read_noise_e: f64,
+}
+
+/// A normal law among those that make up the law of the charge, before full well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Node {
+    pub mean: f64,
+    pub std: f64,
+    pub weight: f64,
+}
+
+/// Spreads below this, in e⁻, are none.
+const LEAST_STD: f64 = 1e-6;
+
+impl Law {
+    pub fn of(model: &NoiseModel, expected_e: f64) -> Self {
+        let charge = |rate: f64, is_shot: bool, pattern: f64| {
+            let shot = is_shot.then_some(model.poisson);
+            // Samples are single precision, which ties of codes show where nothing is drawn.
+            let rate = if shot.is_none() { f64::from(to_sample(rate)) } else { rate };
+            Charge { rate: rate.max(0.0), shot, pattern: if rate > 0.0 { pattern } else { 0.0 } }
+        };
+        let mut light = charge(expected_e, model.signal_shot, model.prnu);
+        let mut dark = charge(model.dark_e, model.dark_shot, model.dcnu);
+        // The sum of two counts without patterns is a count.
+        if light.pattern <= 0.0 && dark.pattern <= 0.0 && light.shot == dark.shot {
+            light.rate += dark.rate;
+            dark.rate = 0.0;
+        }
+        let full_well_e = f64::from(to_sample(model.full_well_e));
+        Self { light, dark, full_well_e, read_noise_e: model.read_noise_e }
+    }
+
+    /// Whether full well is within reach of any photosite.
+    pub fn reaches_full_well(&self) -> bool {
+        self.light.most() + self.dark.most() >= self.full_well_e
+    }
+
+    /// Whether codes are the charge, a uniform error, and nothing else.
+    pub fn is_plain(&self, adc: &AdcRecord) -> bool {
+        let smoothing = self.read_noise_e.hypot(self.least_pattern_std());
+        let [low, high] = [self.light.least() + self.dark.least(), self.light.most() + self.dark.most()];
+        let reach = REACH * self.read_noise_e;
+        let top = f64::from(adc.top_code());
+        adc.adu_per_e * smoothing >= SMOOTH
+            && !self.light.is_rectified()
+            && !self.dark.is_rectified()
+            && high < self.full_well_e
+            && adc.electrons_at(0.0) < low - reach
+            && adc.electrons_at(top) > high + reach
+    }
+
+    fn least_pattern_std(&self) -> f64 {
+        self.light.least_pattern_std().hypot(self.dark.least_pattern_std())
+    }
+
+    /// The normal laws that make up that of the charge, as many as a sum over them needs that is smooth on the scale of
+    /// `noise_e` beside their own spread.
+    fn nodes(&self, noise_e: f64) -> Vec<Node> {
+        let is_light_wider = self.light.shot_std() >= self.dark.shot_std();
+        let (wide, narrow) = if is_light_wider { (&self.light, &self.dark) } else { (&self.dark, &self.light) };
+        let given = self.least_pattern_std().hypot(noise_e);
+        let mut by_step: Vec<(u32, Vec<_>)> = Vec::new();
+        let mut found = Vec::new();
+        for inner in narrow.counts(wide.shot_std().hypot(given)) {
+            let smoothing = wide.least_pattern_std().hypot(inner.spread).hypot(noise_e);
+            // Powers of √2, so that few sums over counts serve all.
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
+            let rung = (2.0 * smoothing.clamp(1.0, 1e15).log2()).floor() as u32;
+            if !by_step.iter().any(|(known, _)| *known == rung) {
+                let smoothing = if rung == 0 { smoothing.min(1.0) } else { (f64::from(rung) / 2.0).exp2() };
+                by_step.push((rung, wide.counts(smoothing)));
+            }
+            let outer = by_step.iter().find(|(known, _)| *known == rung).map(|(_, counts)| counts);
+            found.extend(outer.into_iter().flatten().map(|outer| {
+                let std = inner.spread.hypot(outer.spread);
+                Node {
+                    mean: inner.electrons + outer.electrons,
+                    std: if std < LEAST_STD { 0.0 } else { std },
+                    weight: inner.weight * outer.weight,
+                }
+            }));
+        }
+        found.retain(|node| node.weight > 1e-22);
+        found
+    }
+
+    /// Expected moments of a reading.
+    pub fn expect(&self, reading: &Reading) -> Moments {
+        let full = self.full_well_e;
+        // Where the highest code hides full well, charges may go on beyond it.
+        let is_full_hidden = full > reading.ends_e()[1];
+        let is_full_far = is_full_hidden || !self.reaches_full_well();
+        let mut sum = [0.0; 4];
+        let mut add = |weight: f64, moments: Moments| {
+            for (sum, moment) in sum.iter_mut().zip(moments) {
+                *sum += weight * moment;
+            }
+        };
+        let nodes = self.nodes(if is_full_far { reading.noise_e } else { 0.0 });
+        let mut near = Vec::new();
+        let at_full = if is_full_far { [0.0; 4] } else { reading.at(full, 0.0) };
+        for node in nodes {
+            let reach = REACH * node.std;
+            if is_full_far || node.mean + reach <= full {
+                add(node.weight, reading.at(node.mean, node.std * node.std));
+            } else if node.std <= 0.0 || node.mean - reach >= full {
+                add(node.weight, reading.at(node.mean.min(full), 0.0));
+            } else {
+                near.push(node);
+            }
+        }
+        if !near.is_empty() {
+            add(1.0, at_full_well(&near, full, reading, at_full));
+        }
+        add(1.0, corrections(self, reading, if is_full_far { f64::INFINITY } else { full }));
+        sum
+    }
+
+    /// Mean, variance and fourth cumulant of the electrons.
+    pub fn electrons(&self) -> (MeanVariance, f64) {
+        let about_e = (self.light.rate + self.dark.rate).min(self.full_well_e);
+        central(&self.expect(&Reading::electrons(self.read_noise_e, about_e)), about_e)
+    }
+
+    /// Mean, variance and fourth cumulant of the codes between such ends.
+    pub fn codes(&self, adc: &AdcRecord, ends: Rounding) -> (MeanVariance, f64) {
+        let about_e = (self.light.rate + self.dark.rate).min(self.full_well_e);
+        let reading = Reading::codes(*adc, ends, self.read_noise_e, about_e);
+        central(&self.expect(&reading), reading.center)
+    }
+
+    /// The same of codes without ends.
+    pub fn endless_codes(&self, adc: &AdcRecord) -> (MeanVariance, f64) {
+        self.codes(adc, ENDLESS)
+    }
+
+    /// The probability that charge and read noise exceed a level.
+    pub fn exceeds(&self, level_e: f64) -> f64 {
+        self.expect(&Reading::beyond(self.read_noise_e, level_e))[0].clamp(0.0, 1.0)
+    }
+}
+
+/// Mean, variance and fourth cumulant from the moments about a center.
+pub(super) fn central([m1, m2, m3, m4]: &Moments, center: f64) -> (MeanVariance, f64) {
+    let variance = (m2 - m1 * m1).max(0.0);
+    // What is left of a difference of squares that are equal to rounding is none.
+    let variance = if variance < 4.0 * f64::EPSILON * m2 { 0.0 } else { variance };
+    let fourth = m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4) - 3.0 * variance * variance;
+    (MeanVariance { mean: center + m1, variance }, if variance > 0.0 { fourth } else { 0.0 })
+}
