@@ -196,7 +196,11 @@ mod tests {
             let at = |edge: f64| (edge - mean) / sigma;
             let below = if k == low { f64::NEG_INFINITY } else { at(k as f64 - 0.5) };
             let above = if k == high { f64::INFINITY } else { at(k as f64 + 0.5) };
-            let p = if below > 0.0 { cumulative(-below) - cumulative(-above) } else { cumulative(above) - cumulative(below) };
+            let p = if below > 0.0 {
+                cumulative(-below) - cumulative(-above)
+            } else {
+                cumulative(above) - cumulative(below)
+            };
             for (j, moment) in moments.iter_mut().enumerate() {
                 *moment += p * (k as f64 - center).powi(j as i32 + 1);
             }
@@ -214,7 +218,12 @@ mod tests {
                 let (found, expected) = (byte.moments(mean, sigma, center), reference(byte, mean, sigma, center));
                 for j in 0..4 {
                     let scale = sigma.min(256.0).max(1.0).powi(j as i32 + 1);
-                    assert!((found[j] - expected[j]).abs() < 1e-10 * scale, "{sigma} {mean} {j}: {} {}", found[j], expected[j]);
+                    assert!(
+                        (found[j] - expected[j]).abs() < 1e-10 * scale,
+                        "{sigma} {mean} {j}: {} {}",
+                        found[j],
+                        expected[j]
+                    );
                 }
             }
         }

@@ -28,9 +28,12 @@ const CERTAIN: f64 = 1e15;
 /// Counts whose probability is below this share of the largest do not count.
 const NEGLIGIBLE: f64 = 1e-20;
 
-/// Steps to the standard deviation of what is summed: the error of the sum is below e^(−2π²·2²), and below e^(−2λ), 10⁻¹⁴, for
-/// the smallest rate λ of which every second count is left out.
-const STEPS_TO_SIGMA: f64 = 2.0;
+/// Steps to the standard deviation of what is summed, a product of normal laws: the error of the sum is below e^(−2π²·1.3²),
+/// 10⁻¹⁴.
+const STEPS_TO_SIGMA: f64 = 1.3;
+/// Steps to the standard deviation of a count: for the smallest rate λ of which every second count is left out, 16, the error is
+/// e^(−2λ).
+const STEPS_TO_SHOT: f64 = 2.0;
 
 impl Charge {
     /// Standard deviation of the count.
@@ -93,7 +96,8 @@ impl Charge {
 
     /// The product of two normal laws is narrower than either.
     fn step(&self, smoothing: f64) -> f64 {
-        1.0 / (1.0 / self.rate + 1.0 / (smoothing * smoothing)).sqrt() / STEPS_TO_SIGMA
+        let both = 1.0 / (1.0 / self.rate + 1.0 / (smoothing * smoothing)).sqrt();
+        (both / STEPS_TO_SIGMA).min(self.rate.sqrt() / STEPS_TO_SHOT)
     }
 
     fn poisson(&self, step: f64) -> Vec<Count> {

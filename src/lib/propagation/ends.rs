@@ -24,7 +24,7 @@ pub(super) struct Place {
 }
 
 /// Codes to a law's width from which rounding is a uniform error but for the ends.
-const MANY: f64 = 2.5;
+pub(super) const MANY: f64 = 2.5;
 /// Codes that are gone through one by one about an end of a wide law.
 const ABOUT_ENDS: f64 = 15.0;
 /// Width of the seam, in codes, as a standard deviation.
@@ -120,8 +120,9 @@ impl Stretch {
                 let distance = (edge - self.from) * self.direction;
                 ends.push(distance);
                 if blur > 0.0 {
-                    let layers = [2.0, 4.5, 9.0].into_iter().map(|sigmas| sigmas * blur).filter(|layer| *layer < 0.7 * code);
-                    ends.extend(layers.flat_map(|layer| [distance - layer, distance + layer]));
+                    // A step that is blurred but little has panels of its own.
+                    let layers = if blur < 0.1 * code { [3.0 * blur, 9.0 * blur] } else { [0.5 * code; 2] };
+                    ends.extend(layers.into_iter().flat_map(|layer| [distance - layer, distance + layer]));
                 }
                 edge += code;
             }
@@ -167,14 +168,16 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
         let share = cumulative(-node.mean / node.std);
         add(node.weight * share, difference(at_zero, at_full));
     }
-    for (nodes, direction, sign) in [(below, 1.0, -1.0), (above, -1.0, 1.0)] {
+    for (mut nodes, direction, sign) in [(below, 1.0, -1.0), (above, -1.0, 1.0)] {
         if nodes.is_empty() {
             continue;
         }
+        nodes.sort_by(|a, b| a.mean.total_cmp(&b.mean));
         let reach = |node: &Node| REACH * node.std - (node.mean - full).abs();
         let farthest = nodes.iter().map(reach).fold(0.0, f64::max);
         let stds = nodes.iter().map(|node| node.std);
         let is_narrow = |std: &f64| *std < MANY * code;
+        let widest = stds.clone().fold(0.0, f64::max);
         let stretch = Stretch {
             from: full,
             direction,
@@ -188,9 +191,13 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
                 let z = (place.electrons - node.mean) / node.std;
                 if z.abs() < REACH { node.weight * density(z) / node.std } else { 0.0 }
             };
-            let share: f64 = nodes.iter().map(at).sum();
+            let within = |mean: f64| nodes.partition_point(|node| node.mean < mean);
+            let reach = REACH * widest;
+            let reached = within(place.electrons - reach)..within(place.electrons + reach);
+            let share: f64 = nodes[reached].iter().map(at).sum();
             if share > 0.0 {
-                let moments = if place.is_smooth { open.smooth_at(place.electrons) } else { open.at(place.electrons, 0.0) };
+                let moments =
+                    if place.is_smooth { open.smooth_at(place.electrons) } else { open.at(place.electrons, 0.0) };
                 add(sign * share * place.weight, difference(moments, at_full));
             }
         }

@@ -7,11 +7,11 @@
 
 use super::counts::Charge;
 use super::ends::at_full_well;
+use super::moments::Prediction;
 use super::reading::{ENDLESS, Moments, Reading};
 use super::rectified::corrections;
 use crate::frame::to_sample;
 use crate::metadata::AdcRecord;
-use crate::numerics::normal::MeanVariance;
 use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
 use crate::stages::noise::NoiseModel;
 
@@ -34,6 +34,9 @@ pub(super) struct Node {
 
 /// Spreads below this, in e⁻, are none.
 const LEAST_STD: f64 = 1e-6;
+
+/// Weights below this do not count.
+const LEAST_WEIGHT: f64 = 1e-19;
 
 impl Law {
     pub fn of(model: &NoiseModel, expected_e: f64) -> Self {
@@ -62,15 +65,14 @@ impl Law {
     /// Whether codes are the charge, a uniform error, and nothing else.
     pub fn is_plain(&self, adc: &AdcRecord) -> bool {
         let smoothing = self.read_noise_e.hypot(self.least_pattern_std());
-        let [low, high] = [self.light.least() + self.dark.least(), self.light.most() + self.dark.most()];
-        let reach = REACH * self.read_noise_e;
+        let [low, high] = self.reach();
         let top = f64::from(adc.top_code());
         adc.adu_per_e * smoothing >= SMOOTH
             && !self.light.is_rectified()
             && !self.dark.is_rectified()
-            && high < self.full_well_e
-            && adc.electrons_at(0.0) < low - reach
-            && adc.electrons_at(top) > high + reach
+            && !self.reaches_full_well()
+            && adc.electrons_at(0.0) < low
+            && adc.electrons_at(top) > high
     }
 
     fn least_pattern_std(&self) -> f64 {
@@ -104,7 +106,7 @@ impl Law {
                 }
             }));
         }
-        found.retain(|node| node.weight > 1e-22);
+        found.retain(|node| node.weight > LEAST_WEIGHT);
         found
     }
 
@@ -140,35 +142,59 @@ impl Law {
         sum
     }
 
-    /// Mean, variance and fourth cumulant of the electrons.
-    pub fn electrons(&self) -> (MeanVariance, f64) {
-        let about_e = (self.light.rate + self.dark.rate).min(self.full_well_e);
-        central(&self.expect(&Reading::electrons(self.read_noise_e, about_e)), about_e)
+    /// A charge that all is expected about.
+    fn about_e(&self) -> f64 {
+        (self.light.rate + self.dark.rate).min(self.full_well_e)
     }
 
-    /// Mean, variance and fourth cumulant of the codes between such ends.
-    pub fn codes(&self, adc: &AdcRecord, ends: Rounding) -> (MeanVariance, f64) {
-        let about_e = (self.light.rate + self.dark.rate).min(self.full_well_e);
-        let reading = Reading::codes(*adc, ends, self.read_noise_e, about_e);
-        central(&self.expect(&reading), reading.center)
+    /// What is read of the electrons.
+    pub fn of_electrons(&self) -> Reading {
+        Reading::electrons(self.read_noise_e, self.about_e())
     }
 
-    /// The same of codes without ends.
-    pub fn endless_codes(&self, adc: &AdcRecord) -> (MeanVariance, f64) {
-        self.codes(adc, ENDLESS)
+    /// What is read of the codes between such ends.
+    pub fn of_codes(&self, adc: &AdcRecord, ends: Rounding) -> Reading {
+        Reading::codes(*adc, ends, self.read_noise_e, self.about_e())
     }
 
-    /// The probability that charge and read noise exceed a level.
-    pub fn exceeds(&self, level_e: f64) -> f64 {
-        self.expect(&Reading::beyond(self.read_noise_e, level_e))[0].clamp(0.0, 1.0)
+    /// What is predicted of a reading.
+    pub fn predict(&self, reading: &Reading) -> Prediction {
+        central(&self.expect(reading), reading.center)
+    }
+
+    /// The variance that codes without ends would have; none where the ends are out of reach.
+    pub fn endless_variance(&self, adc: &AdcRecord) -> Option<f64> {
+        let [low, high] = self.reach();
+        let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
+        let is_within = lower < low && upper > high.min(self.full_well_e + REACH * self.read_noise_e);
+        (!is_within).then(|| self.predict(&self.of_codes(adc, ENDLESS)).moments.variance)
+    }
+
+    /// The least and the largest charge with read noise, full well apart.
+    fn reach(&self) -> [f64; 2] {
+        let noise_e = REACH * self.read_noise_e;
+        [self.light.least() + self.dark.least() - noise_e, self.light.most() + self.dark.most() + noise_e]
+    }
+
+    /// The probability that charge and read noise together are no less than a level.
+    pub fn is_read_from(&self, level_e: f64) -> f64 {
+        // A level that a count reaches counts as reached, whatever its last bits.
+        let below = level_e - 1e-12 * level_e.abs().max(1.0);
+        self.expect(&Reading::beyond(self.read_noise_e, below))[0].clamp(0.0, 1.0)
+    }
+
+    /// The probability that the charge, before full well and read noise, is no less than a level.
+    pub fn reaches(&self, level_e: f64) -> f64 {
+        Self { read_noise_e: 0.0, full_well_e: f64::INFINITY, ..*self }.is_read_from(level_e)
     }
 }
 
-/// Mean, variance and fourth cumulant from the moments about a center.
-pub(super) fn central([m1, m2, m3, m4]: &Moments, center: f64) -> (MeanVariance, f64) {
-    let variance = (m2 - m1 * m1).max(0.0);
+/// What is predicted by the moments about a center.
+fn central([m1, m2, m3, m4]: &Moments, center: f64) -> Prediction {
+    let variance = m2 - m1 * m1;
     // What is left of a difference of squares that are equal to rounding is none.
     let variance = if variance < 4.0 * f64::EPSILON * m2 { 0.0 } else { variance };
+    let third = m3 - 3.0 * m1 * m2 + 2.0 * m1.powi(3);
     let fourth = m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4) - 3.0 * variance * variance;
-    (MeanVariance { mean: center + m1, variance }, if variance > 0.0 { fourth } else { 0.0 })
+    Prediction::of_cumulants(center + m1, variance, third, fourth)
 }

@@ -131,5 +131,5 @@ fn mixed(classes: &[Prediction; 3], counts: [u64; 3]) -> Option<Prediction> {
         })
         .sum();
     let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) - 3.0 } else { 0.0 };
-    Some(Prediction { moments: MeanVariance { mean, variance }, excess_kurtosis })
+    Some(Prediction { moments: MeanVariance { mean, variance }, third: 0.0, excess_kurtosis })
 }
