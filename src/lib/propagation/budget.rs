@@ -96,9 +96,8 @@ impl Photosite {
             Cause::Dcnu | Cause::ClippedPattern => 0.0,
             _ => light[cause as usize] + dark[cause as usize] / f64::from(self.dark_frames),
         });
-        let shared = self.shared(adc, expected_e);
-        let left = shared.light + shared.dark - 2.0 * shared.both - light[Cause::Prnu as usize];
-        let is_left = left.abs() > 1e-9 * shared.light;
+        let left = self.less_dark(adc, expected_e).moments.variance - budget.iter().sum::<f64>();
+        let is_left = left.abs() > 1e-9 * (light[Cause::Dcnu as usize] + light[Cause::Prnu as usize]);
         budget[Cause::ClippedPattern as usize] = if is_left { left } else { 0.0 };
         budget
     }

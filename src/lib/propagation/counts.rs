@@ -2,6 +2,7 @@
 
 use crate::metadata::PoissonKind;
 use crate::random::poisson::probability;
+use nalgebra::DMatrix;
 
 /// One of the two charges of a photosite: a count times a sensitivity max(0, 1 + σ z).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,12 +92,36 @@ impl Charge {
             }
             return normalized(found);
         }
-        self.poisson(self.step(smoothing).floor().max(1.0))
+        let step = self.step(smoothing).floor().max(1.0);
+        // Narrow beside what it is summed with: Gauss's quadrature for the law of the counts themselves.
+        if smoothing >= 3.0 * sigma && self.rate >= 8.0 { self.gauss() } else { self.poisson(step) }
+    }
+
+    /// Gauss and Charlier's nodes, exact for polynomials of degree 19: eigenvalues of the matrix of the polynomials' recurrence, with
+    /// λ + k on its diagonal and √(λ k) beside it.
+    fn gauss(&self) -> Vec<Count> {
+        const NODES: usize = 10;
+        let sigma = self.rate.sqrt();
+        // About the rate, so that nothing is lost of large ones.
+        let recurrence = DMatrix::from_fn(NODES, NODES, |i, j| match i.abs_diff(j) {
+            0 => i as f64,
+            1 => sigma * (i.max(j) as f64).sqrt(),
+            _ => 0.0,
+        });
+        let solved = recurrence.symmetric_eigen();
+        let count = |(index, offset): (usize, &f64)| {
+            let electrons = self.rate + offset;
+            let weight = solved.eigenvectors[(0, index)].powi(2);
+            Count { electrons, weight, spread: electrons * self.pattern }
+        };
+        let mut found: Vec<Count> = solved.eigenvalues.iter().enumerate().map(count).collect();
+        found.sort_by(|a, b| a.electrons.total_cmp(&b.electrons));
+        found
     }
 
     /// The product of two normal laws is narrower than either.
     fn step(&self, smoothing: f64) -> f64 {
-        let both = 1.0 / (1.0 / self.rate + 1.0 / (smoothing * smoothing)).sqrt();
+        let both = 1.0 / (1.0 / self.rate + 1.0 / (smoothing * smoothing).max(1e-12)).sqrt();
         (both / STEPS_TO_SIGMA).min(self.rate.sqrt() / STEPS_TO_SHOT)
     }
 

@@ -3,7 +3,7 @@
 //! With g the moments of a reading at a charge, N the normal law and F full well,
 //!
 //! E g(min(N, F)) = E g(N) + ∫_F^∞ φ(q) \[g(F) − g(q)] dq        where the mean is below F,
-//! E g(min(N, F)) = g(F) + ∫_0^F φ(q) \[g(q) − g(F)] dq + P(N < 0) \[g(0) − g(F)]        where it is above.
+//! E g(min(N, F)) = g(F) + ∫_f^F φ(q) \[g(q) − g(F)] dq + P(N < f) \[g(f) − g(F)]        where it is above, f its floor.
 //!
 //! The integrals are sums over panels that grow with the distance from F, since the laws that reach there are the wider the
 //! farther they reach. Codes that read noise leaves visible are gone through one by one as long as the law is narrow, and about F;
@@ -29,6 +29,8 @@ pub(super) const MANY: f64 = 2.5;
 const ABOUT_ENDS: f64 = 15.0;
 /// Width of the seam, in codes, as a standard deviation.
 const SEAM: f64 = 1.3;
+/// Places where laws are cut off below, beyond which they are not told apart.
+const MOST_BREAKS: usize = 300;
 /// Half of the seam, in codes.
 const HALF_SEAM: f64 = 8.0 * SEAM;
 
@@ -48,8 +50,8 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
-    /// Places and weights.
-    pub fn places(&self, reading: &Reading) -> Vec<Place> {
+    /// Places and weights; of integrands that break off at some charges, these are ends of panels.
+    pub fn places(&self, reading: &Reading, breaks: &[f64]) -> Vec<Place> {
         let Self { from, direction, extent, .. } = *self;
         let code = reading.visible_code_e();
         let at = |distance: f64| from + direction * distance;
@@ -62,6 +64,7 @@ impl Stretch {
             self.add_codes(&mut ends, fine + 2.0 * half_seam, code, reading);
         }
         self.add_rails(&mut ends, reading);
+        ends.extend(breaks.iter().map(|at| (at - from) * direction));
         ends.retain(|end| (0.0..=extent).contains(end));
         ends.sort_by(f64::total_cmp);
         let lower = reading.rails_e()[0];
@@ -162,18 +165,19 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
     for node in &below {
         add(node.weight, open.at(node.mean, node.std * node.std));
     }
-    let at_zero = open.at(0.0, 0.0);
     for node in &above {
         add(node.weight, at_full);
-        let share = cumulative(-node.mean / node.std);
-        add(node.weight * share, difference(at_zero, at_full));
+        if node.floor.is_finite() {
+            let share = cumulative((node.floor - node.mean) / node.std);
+            add(node.weight * share, difference(open.at(node.floor, 0.0), at_full));
+        }
     }
     for (mut nodes, direction, sign) in [(below, 1.0, -1.0), (above, -1.0, 1.0)] {
         if nodes.is_empty() {
             continue;
         }
         nodes.sort_by(|a, b| a.mean.total_cmp(&b.mean));
-        let reach = |node: &Node| REACH * node.std - (node.mean - full).abs();
+        let reach = |node: &Node| (REACH * node.std - (node.mean - full).abs()).min(full - node.floor);
         let farthest = nodes.iter().map(reach).fold(0.0, f64::max);
         let stds = nodes.iter().map(|node| node.std);
         let is_narrow = |std: &f64| *std < MANY * code;
@@ -181,15 +185,22 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
         let stretch = Stretch {
             from: full,
             direction,
-            extent: if direction < 0.0 { farthest.min(full) } else { farthest },
+            extent: farthest,
             narrowest: stds.clone().fold(f64::INFINITY, f64::min),
             widest_narrow: stds.filter(is_narrow).fold(0.0, f64::max),
             noise_e: reading.noise_e,
         };
-        for place in stretch.places(&open) {
+        let mut floors: Vec<f64> = nodes.iter().map(|node| node.floor).filter(|floor| floor.is_finite()).collect();
+        floors.sort_by(f64::total_cmp);
+        floors.dedup();
+        // So many are a step so small each that nothing is seen of them.
+        if floors.len() > MOST_BREAKS {
+            floors.clear();
+        }
+        for place in stretch.places(&open, &floors) {
             let at = |node: &Node| {
                 let z = (place.electrons - node.mean) / node.std;
-                if z.abs() < REACH { node.weight * density(z) / node.std } else { 0.0 }
+                if z.abs() < REACH && place.electrons > node.floor { node.weight * density(z) / node.std } else { 0.0 }
             };
             let within = |mean: f64| nodes.partition_point(|node| node.mean < mean);
             let reach = REACH * widest;

@@ -30,7 +30,13 @@ pub(super) struct Node {
     pub mean: f64,
     pub std: f64,
     pub weight: f64,
+    /// Where it is cut off below, for a mean of so many full wells that the law would otherwise reach far below zero; −∞ for
+    /// others.
+    pub floor: f64,
 }
+
+/// Full wells of a mean from which a normal law is cut off at its floor.
+pub(super) const MANY_WELLS: f64 = 2.0;
 
 /// Spreads below this, in e⁻, are none.
 const LEAST_STD: f64 = 1e-6;
@@ -75,6 +81,11 @@ impl Law {
             && adc.electrons_at(top) > high
     }
 
+    /// Whether laws of a charge are so far above full well that they are cut off at their floors.
+    fn has_floors(&self, charge: &Charge) -> bool {
+        self.light.rate + self.dark.rate + 9.5 * charge.shot_std() > MANY_WELLS * self.full_well_e
+    }
+
     fn least_pattern_std(&self) -> f64 {
         self.light.least_pattern_std().hypot(self.dark.least_pattern_std())
     }
@@ -85,10 +96,14 @@ impl Law {
         let is_light_wider = self.light.shot_std() >= self.dark.shot_std();
         let (wide, narrow) = if is_light_wider { (&self.light, &self.dark) } else { (&self.dark, &self.light) };
         let given = self.least_pattern_std().hypot(noise_e);
+        // Where laws are cut off at the count of the other charge, that is told apart to an electron.
+        let ends_at = |charge: &Charge, by: &Charge| by.is_rectified() && charge.pattern <= 0.0 && self.has_floors(by);
+        let [is_inner_told, is_outer_told] = [ends_at(narrow, wide), ends_at(wide, narrow)];
         let mut by_step: Vec<(u32, Vec<_>)> = Vec::new();
         let mut found = Vec::new();
-        for inner in narrow.counts(wide.shot_std().hypot(given)) {
-            let smoothing = wide.least_pattern_std().hypot(inner.spread).hypot(noise_e);
+        for inner in narrow.counts(if is_inner_told { noise_e } else { wide.shot_std().hypot(given) }) {
+            let spread = if is_outer_told { 0.0 } else { wide.least_pattern_std().hypot(inner.spread) };
+            let smoothing = spread.hypot(noise_e);
             // Powers of √2, so that few sums over counts serve all.
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
             let rung = (2.0 * smoothing.clamp(1.0, 1e15).log2()).floor() as u32;
@@ -99,11 +114,14 @@ impl Law {
             let outer = by_step.iter().find(|(known, _)| *known == rung).map(|(_, counts)| counts);
             found.extend(outer.into_iter().flatten().map(|outer| {
                 let std = inner.spread.hypot(outer.spread);
-                Node {
-                    mean: inner.electrons + outer.electrons,
-                    std: if std < LEAST_STD { 0.0 } else { std },
-                    weight: inner.weight * outer.weight,
-                }
+                let mean = inner.electrons + outer.electrons;
+                let floor = match (inner.spread > 0.0, outer.spread > 0.0) {
+                    _ if mean <= MANY_WELLS * self.full_well_e => f64::NEG_INFINITY,
+                    (true, false) => outer.electrons,
+                    (false, true) => inner.electrons,
+                    _ => 0.0,
+                };
+                Node { mean, floor, std: if std < LEAST_STD { 0.0 } else { std }, weight: inner.weight * outer.weight }
             }));
         }
         found.retain(|node| node.weight > LEAST_WEIGHT);
@@ -129,7 +147,7 @@ impl Law {
             let reach = REACH * node.std;
             if is_full_far || node.mean + reach <= full {
                 add(node.weight, reading.at(node.mean, node.std * node.std));
-            } else if node.std <= 0.0 || node.mean - reach >= full {
+            } else if node.std <= 0.0 || node.mean - reach >= full || node.floor >= full {
                 add(node.weight, reading.at(node.mean.min(full), 0.0));
             } else {
                 near.push(node);

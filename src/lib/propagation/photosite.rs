@@ -125,7 +125,7 @@ impl Photosite {
     /// v the variances of the means that each photosite has over exposures, of the one and of the other, and cov their
     /// covariance: light and dark frames share the pattern of the dark current, and everything else is drawn anew. Where
     /// nothing is clipped cov is λ² c₂, as is the v of dark frames.
-    fn less_dark(&self, adc: &AdcRecord, expected_e: f64) -> Prediction {
+    pub(super) fn less_dark(&self, adc: &AdcRecord, expected_e: f64) -> Prediction {
         let (light, dark) = (self.adu(adc, expected_e), self.adu(adc, 0.0));
         let n = f64::from(self.dark_frames);
         let shared = self.shared(adc, expected_e);

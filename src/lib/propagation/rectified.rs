@@ -5,7 +5,7 @@
 
 use super::counts::{Charge, Count};
 use super::ends::{MANY, Stretch, difference};
-use super::law::Law;
+use super::law::{Law, MANY_WELLS};
 use super::reading::{Moments, Reading};
 use crate::numerics::normal::density;
 use crate::numerics::rounding::{REACH, SMOOTH};
@@ -51,11 +51,12 @@ fn signed(charge: &Charge) -> Vec<Count> {
     let reading = Reading::electrons(0.0, 0.0);
     let mut found = Vec::new();
     let mut gone = 0.0;
-    for place in stretch.places(&reading) {
+    for place in stretch.places(&reading, &[]) {
         let weight = place.weight * density_at(&counts, place.electrons, f64::INFINITY);
         gone += weight;
         found.push(Count { electrons: place.electrons, weight: -weight, spread: 0.0 });
     }
+    found.retain(|node| node.weight.abs() > 1e-10);
     found.push(Count { electrons: 0.0, weight: gone, spread: 0.0 });
     found
 }
@@ -130,11 +131,13 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, full: f64) ->
     let code = reading.visible_code_e();
     // Shared places where no code is to be gone through; then the density is worked out once.
     let is_shared = others.len() > MANY_NODES || code.is_none();
+    // Laws of more wells are cut off at their floors.
+    let most = MANY_WELLS * full;
     let shared: Vec<(f64, f64)> = if is_shared {
         let blind = Stretch { noise_e: 0.0, ..base };
         let finest = reading.noise_e.max(if is_shared && code.is_some() { f64::INFINITY } else { 0.0 });
         let narrow = Stretch { narrowest: blind.narrowest.min(finest.max(1e-3)), ..blind };
-        let places = narrow.places(&Reading::electrons(0.0, 0.0));
+        let places = narrow.places(&Reading::electrons(0.0, 0.0), &[]);
         places
             .iter()
             .map(|place| (place.electrons, place.weight * density_at(&counts, place.electrons, full)))
@@ -163,8 +166,8 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, full: f64) ->
         let is_hidden = code.is_some_and(|code| noise_e > SMOOTH * code);
         let widest_narrow = if is_hidden { 0.0 } else { narrow };
         let stretch = Stretch { from: other.electrons, widest_narrow, noise_e, ..base };
-        for place in stretch.places(&blurred) {
-            let (below, room) = (place.electrons - other.electrons, full - other.electrons);
+        for place in stretch.places(&blurred, &[]) {
+            let (below, room) = (place.electrons - other.electrons, most - other.electrons);
             let share = match &table {
                 Some(table) if room >= most_e => table.at(below),
                 _ => density_at(&counts, below, room),
