@@ -110,9 +110,10 @@ impl Photosite {
             let unclipped: f64 = budget.iter().sum();
             let reading = law.of_electrons();
             let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
-            let clipped = Shared::of_one(&law, &reading) - patterns;
+            let whole = law.predict(&reading).moments.variance;
+            let clipped = Shared::of_one(&law, &reading).min(whole) - patterns;
             budget[Cause::ClippedPattern as usize] = clipped;
-            budget[Cause::FullWell as usize] = law.predict(&reading).moments.variance - unclipped - clipped;
+            budget[Cause::FullWell as usize] = whole - unclipped - clipped;
         }
         budget
     }
@@ -152,7 +153,7 @@ impl Photosite {
             budget[Cause::Quantization as usize] = endless - charge;
             if !law.is_plain(adc) {
                 let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
-                let clipped = self.shared(adc, expected_e).light - patterns;
+                let clipped = self.shared(adc, expected_e).light.min(whole) - patterns;
                 let further = clipped - budget[Cause::ClippedPattern as usize];
                 let is_told = further.abs() > 1e-9 * patterns;
                 budget[Cause::ClippedPattern as usize] += if is_told { further } else { 0.0 };

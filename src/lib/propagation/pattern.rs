@@ -24,7 +24,7 @@ pub(super) struct Shared {
 }
 
 /// Evaluations up to which counts are gone through one by one.
-const AFFORDABLE: usize = 60_000;
+const AFFORDABLE: usize = 6_000;
 
 impl Shared {
     /// Of two laws that share the pattern of the dark current.
