@@ -146,6 +146,9 @@ pub struct StagePrediction {
     pub unit: String,
     /// Names of the channels.
     pub channels: Vec<String>,
+    /// Why its numbers, which are those of the first order, are void; none where they hold.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub void: Option<&'static str>,
     /// Mean of each.
     pub mean: [f64; 3],
     /// The part of the mean that noise brings about because the stage is curved.
@@ -332,14 +335,14 @@ impl PredictorSettings {
         causes: &[Budget; 3],
     ) -> StagePrediction {
         let metadata = &head.metadata;
-        let (mean, covariance) = self.mean_and_covariance(prediction);
+        let (mean, covariance) = self.mean_and_covariance(prediction, metadata.quantity == QuantityKind::Lab);
         let second_order = match prediction {
             FramePrediction::Pixels(mixture) if self.camera.method == Method::SmoothHue => {
                 Some(rows(&mixture.covariance))
             }
             _ => None,
         };
-        let by_cause = self.by_cause(prediction, causes);
+        let by_cause = self.by_cause(prediction, causes, &covariance);
         let part = |fixed: bool| spread_of(&by_cause, fixed);
         let std = diagonal_std(&covariance);
         let black = match metadata.quantity {
@@ -372,6 +375,10 @@ impl PredictorSettings {
             stage,
             unit: metadata.unit.clone(),
             channels: (0..3).map(|index| head.channel_name(index).to_owned()).collect(),
+            void: match prediction {
+                FramePrediction::Pixels(mixture) => mixture.void,
+                FramePrediction::Planes(_) => None,
+            },
             mean,
             bias: match prediction {
                 FramePrediction::Pixels(mixture) if mixture.bias != [0.0; 3] => Some(mixture.bias),
@@ -392,8 +399,8 @@ impl PredictorSettings {
         }
     }
 
-    /// Mean and covariance of a pixel, to first order by the exact equations.
-    fn mean_and_covariance(&self, prediction: &FramePrediction) -> ([f64; 3], Matrix3<f64>) {
+    /// Mean and covariance of a pixel, by the exact equations to first order unless the stage is curved.
+    fn mean_and_covariance(&self, prediction: &FramePrediction, is_curved: bool) -> ([f64; 3], Matrix3<f64>) {
         match prediction {
             FramePrediction::Planes(classes) => {
                 let variances = classes.map(|class| class.moments.variance);
@@ -404,13 +411,19 @@ impl PredictorSettings {
             }
             FramePrediction::Pixels(mixture) => {
                 let variances = mixture.sites.map(|site| site.moments.variance);
-                (mixture.mean, gains::mean_pixel(&mixture.weights).covariance(variances))
+                let first_order = || gains::mean_pixel(&mixture.weights).covariance(variances);
+                (mixture.mean, if is_curved { mixture.covariance } else { first_order() })
             }
         }
     }
 
     /// Variance by cause; none for mixtures by the paper's equations, which do not keep causes apart.
-    fn by_cause(&self, prediction: &FramePrediction, causes: &[Budget; 3]) -> Vec<CauseVariance> {
+    fn by_cause(
+        &self,
+        prediction: &FramePrediction,
+        causes: &[Budget; 3],
+        covariance: &Matrix3<f64>,
+    ) -> Vec<CauseVariance> {
         let gains = match prediction {
             FramePrediction::Planes(_) => None,
             FramePrediction::Pixels(_) if self.equations == Equations::Paper => return Vec::new(),
@@ -423,7 +436,13 @@ impl PredictorSettings {
                 Some(gains) => gains.covariance(of_classes).diagonal().into(),
             }
         };
-        Cause::ALL.into_iter().map(|cause| CauseVariance { cause, variance: variance(cause) }).collect()
+        let mut found: Vec<CauseVariance> =
+            Cause::ALL.into_iter().map(|cause| CauseVariance { cause, variance: variance(cause) }).collect();
+        if let (Some(gains), FramePrediction::Pixels(mixture)) = (&gains, prediction) {
+            let first_order = gains.covariance(mixture.sites.map(|site| site.moments.variance));
+            found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| covariance[(i, i)] - first_order[(i, i)]);
+        }
+        found
     }
 
     fn phases(&self, prediction: &FramePrediction) -> Vec<PhaseCovariance> {

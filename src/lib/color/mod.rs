@@ -136,6 +136,9 @@ impl Local {
     }
 }
 
+/// The share of white below which L*a*b* is straight in XYZ: (6/29)³.
+pub const LAB_STRAIGHT_BELOW: f64 = 216.0 / 24_389.0;
+
 /// L*a*b* about a color.
 pub fn lab_about(xyz: [f64; 3], white: [f64; 3]) -> Local {
     const DELTA: f64 = 6.0 / 29.0;

@@ -121,69 +121,6 @@ impl NearlyNormal {
         let variance = 1.0 + z * z - 2.0 * second - mean * mean;
         MeanVariance { mean: limit + sigma * mean, variance: (self.variance * variance).max(0.0) }
     }
-
-    /// The fourth cumulant of the smaller of the variable and `limit`.
-    ///
-    /// The shortfall U = (limit − X)₊ has the moments E(Uᵏ) = ∫₀^∞ k uᵏ⁻¹ P(X < limit − u) du, by Simpson's rule in steps below
-    /// σ/10: a relative error of about 10⁻⁵, for the sampling error of a spread.
-    pub fn fourth_clipped_above(self, limit: f64) -> f64 {
-        let sigma = self.variance.max(0.0).sqrt();
-        let room = limit - self.mean;
-        if room >= 9.0 * sigma {
-            return self.fourth;
-        }
-        let deepest = (room + 9.0 * sigma).max(sigma);
-        let intervals = 200;
-        let step = deepest / f64::from(intervals);
-        let mut raw = [0.0; 5];
-        for i in 0..=intervals {
-            let u = step * f64::from(i);
-            let weight = if i == 0 || i == intervals { 1.0 } else { 2.0 + 2.0 * f64::from(i % 2) };
-            let below = 1.0 - self.exceeds(limit - u);
-            for k in 1..=4 {
-                raw[k as usize] += weight * step / 3.0 * f64::from(k) * u.powi(k - 1) * below;
-            }
-        }
-        fourth_cumulant(raw)
-    }
-}
-
-/// The fourth cumulant from the raw moments 1 to 4 about any point.
-fn fourth_cumulant([_, m1, m2, m3, m4]: [f64; 5]) -> f64 {
-    let variance = m2 - m1 * m1;
-    m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4) - 3.0 * variance * variance
-}
-
-/// Mean, variance and fourth cumulant of a variable rounded to the nearest whole number and clipped to `0..=top`, from its tail
-/// probability `exceeds(edge)`; its own mean and spread only say where to look.
-///
-/// With p_k = P(x > k + ½), the code is Σ p_k in the mean and its square Σ (2k + 1) p_k, k from 0 to top − 1, exact at
-/// every spread from 0 up and at both rails; likewise its third and fourth power. Sums run about the mean, over the
-/// codes that can occur.
-pub fn rounded(mean: f64, sigma: f64, top: u32, exceeds: impl Fn(f64) -> f64) -> (MeanVariance, f64) {
-    let top = i64::from(top);
-    // Codes beyond 9 σ have a probability below 10⁻¹⁸.
-    let reach = 9.0 * sigma + 1.0;
-    let code = |x: f64| -> i64 {
-        #[expect(clippy::cast_possible_truncation, reason = "clamped to the codes, at most 2³²")]
-        let code = x.clamp(0.0, top as f64) as i64;
-        code
-    };
-    let (lowest, highest) = (code((mean - reach).floor()), code((mean + reach).ceil()));
-    let center = code(mean.round());
-    let mut raw = [0.0; 5];
-    for k in lowest..highest {
-        // One step of the code from k to k + 1: below the center, what falls short of it counts.
-        let offset = (k - center) as f64;
-        let above = exceeds(k as f64 + 0.5);
-        let share = if k >= center { above } else { above - 1.0 };
-        raw[1] += share;
-        raw[2] += (2.0 * offset + 1.0) * share;
-        raw[3] += (3.0 * offset * (offset + 1.0) + 1.0) * share;
-        raw[4] += (2.0 * offset + 1.0) * (2.0 * offset * (offset + 1.0) + 1.0) * share;
-    }
-    let variance = (raw[2] - raw[1] * raw[1]).max(0.0);
-    (MeanVariance { mean: center as f64 + raw[1], variance }, fourth_cumulant(raw))
 }
 
 /// Expected length and standard deviation of the length of a normal vector of three components.
@@ -247,11 +184,6 @@ mod tests {
             .sum()
     }
 
-    fn round_normal(mean: f64, sigma: f64, top: u32) -> MeanVariance {
-        let variable = NearlyNormal::normal(mean, sigma * sigma);
-        rounded(mean, sigma, top, |edge| variable.exceeds(edge)).0
-    }
-
     /// Lengths of known law: half-normal √(2/π), Rayleigh √(π/2), Maxwell √(8/π); without spread the mean's own; far off
     /// the origin the mean's own and what spreads across it, m + (λ₂ + λ₃)/2m.
     #[test]
@@ -284,45 +216,8 @@ mod tests {
                 let square = expectation(variable, |x| (x.min(limit) - mean).powi(2));
                 // Trapezoid sum of a kinked function: error ~ (step σ)² / 12 ≈ 3·10⁻⁸.
                 assert!((clipped.mean - mean).abs() < 1e-7, "{limit} {} {mean}", clipped.mean);
-                let fourth = expectation(variable, |x| (x.min(limit) - mean).powi(4));
-                let cumulant = fourth - 3.0 * square * square;
-                let found = variable.fourth_clipped_above(limit);
-                assert!((found - cumulant).abs() < 1e-4 * fourth, "{limit} {found} {cumulant}");
                 assert!((clipped.variance - square).abs() < 1e-6, "{limit} {} {square}", clipped.variance);
             }
-        }
-    }
-
-    #[test]
-    fn rounding_adds_a_twelfth_once_the_spread_reaches_a_code() {
-        // The deviation falls as exp(−2π²σ²): 10⁻⁸ at σ = 1.
-        let rounded = round_normal(1753.3, 1.0, 4095);
-        assert!((rounded.mean - 1753.3).abs() < 1e-8);
-        assert!((rounded.variance - 1.0 - 1.0 / 12.0).abs() < 1e-7);
-    }
-
-    #[test]
-    fn rounding_without_spread_is_rounding() {
-        assert_eq!(round_normal(12.4, 0.0, 4095), MeanVariance { mean: 12.0, variance: 0.0 });
-        assert_eq!(round_normal(-3.0, 0.0, 255), MeanVariance { mean: 0.0, variance: 0.0 });
-        assert_eq!(round_normal(300.0, 0.0, 255), MeanVariance { mean: 255.0, variance: 0.0 });
-    }
-
-    #[test]
-    fn rounding_near_the_rails_agrees_with_the_sum_over_codes() {
-        for (mean, sigma) in [(0.2, 0.7), (-1.0, 3.0), (253.0, 4.0), (40.5, 0.1)] {
-            let variable = NearlyNormal::normal(mean, sigma * sigma);
-            let (rounded, cumulant) = rounded(mean, sigma, 255, |edge| variable.exceeds(edge));
-            let probability = |k: i32| -> f64 {
-                let below = if k == 0 { 1.0 } else { cumulative(-((f64::from(k) - 0.5 - mean) / sigma)) };
-                let above = if k == 255 { 0.0 } else { cumulative(-((f64::from(k) + 0.5 - mean) / sigma)) };
-                below - above
-            };
-            let m: f64 = (0..=255).map(|k| f64::from(k) * probability(k)).sum();
-            let v: f64 = (0..=255).map(|k| (f64::from(k) - m).powi(2) * probability(k)).sum();
-            let c: f64 = (0..=255).map(|k| (f64::from(k) - m).powi(4) * probability(k)).sum();
-            assert!((cumulant - (c - 3.0 * v * v)).abs() < 1e-8, "{mean} {sigma}");
-            assert!((rounded.mean - m).abs() < 1e-11 && (rounded.variance - v).abs() < 1e-10, "{mean} {sigma}");
         }
     }
 }

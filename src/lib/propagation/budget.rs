@@ -1,11 +1,11 @@
 //! The variance of a photosite, cause by cause.
 
 use super::charge::sensitivity;
+use super::law::Law;
 use super::moments::Equations;
+use super::pattern::Shared;
 use super::photosite::Photosite;
-use super::tail::Tail;
 use crate::metadata::AdcRecord;
-use crate::numerics::normal::{self, MeanVariance};
 use serde::Serialize;
 
 /// A cause of variance.
@@ -30,11 +30,15 @@ pub enum Cause {
     Quantization,
     /// The ends of the range of codes, which take from the variance.
     Rails,
+    /// What full well, rounding and the ends of the range take from the fixed patterns, or add to them.
+    ClippedPattern,
+    /// What is curved in a color takes from its variance, or adds to it.
+    Curvature,
 }
 
 impl Cause {
     /// All causes, in the order in which they act.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::SignalShot,
         Self::Prnu,
         Self::DarkShot,
@@ -44,6 +48,8 @@ impl Cause {
         Self::FullWell,
         Self::Quantization,
         Self::Rails,
+        Self::ClippedPattern,
+        Self::Curvature,
     ];
 
     /// The name in reports.
@@ -58,12 +64,14 @@ impl Cause {
             Self::FullWell => "full_well",
             Self::Quantization => "quantization",
             Self::Rails => "rails",
+            Self::ClippedPattern => "clipped_pattern",
+            Self::Curvature => "curvature",
         }
     }
 
     /// Whether it is the same in every exposure of one sensor.
     pub fn is_fixed_pattern(self) -> bool {
-        matches!(self, Self::Prnu | Self::Dcnu)
+        matches!(self, Self::Prnu | Self::Dcnu | Self::ClippedPattern)
     }
 }
 
@@ -74,21 +82,44 @@ impl Photosite {
     /// The variance of its samples by cause, in e² or ADU².
     pub fn budget(&self, expected_e: f64) -> Budget {
         match self.adc {
-            Some(adc) if self.dark_frames > 0 => {
-                let (light, dark) = (self.digitized_budget(&adc, expected_e), self.digitized_budget(&adc, 0.0));
-                // The pattern of the dark current is the same in light and dark frames.
-                Cause::ALL.map(|cause| match cause {
-                    Cause::Dcnu => 0.0,
-                    _ => light[cause as usize] + dark[cause as usize] / f64::from(self.dark_frames),
-                })
-            }
+            Some(adc) if self.dark_frames > 0 => self.less_dark_budget(&adc, expected_e),
             Some(adc) => self.digitized_budget(&adc, expected_e),
-            None => self.charge_budget(expected_e, self.electrons(expected_e).moments),
+            None => self.charge_budget(expected_e),
         }
     }
 
-    /// The variance of the charge and of its read noise, in e²; `whole` are their moments.
-    fn charge_budget(&self, expected_e: f64, whole: MeanVariance) -> Budget {
+    /// Less the mean of n dark frames: what is drawn anew in each adds, of dark frames an nth; of the pattern, which is the
+    /// same in all, stays what the two do not share.
+    fn less_dark_budget(&self, adc: &AdcRecord, expected_e: f64) -> Budget {
+        let (light, dark) = (self.digitized_budget(adc, expected_e), self.digitized_budget(adc, 0.0));
+        let mut budget = Cause::ALL.map(|cause| match cause {
+            Cause::Dcnu | Cause::ClippedPattern => 0.0,
+            _ => light[cause as usize] + dark[cause as usize] / f64::from(self.dark_frames),
+        });
+        let left = self.less_dark(adc, expected_e).moments.variance - budget.iter().sum::<f64>();
+        let is_left = left.abs() > 1e-9 * (light[Cause::Dcnu as usize] + light[Cause::Prnu as usize]);
+        budget[Cause::ClippedPattern as usize] = if is_left { left } else { 0.0 };
+        budget
+    }
+
+    /// The variance of the charge and of its read noise, in e².
+    fn charge_budget(&self, expected_e: f64) -> Budget {
+        let mut budget = self.unclipped_budget(expected_e);
+        let law = Law::of(&self.model, expected_e);
+        if self.equations == Equations::Exact && law.reaches_full_well() {
+            let unclipped: f64 = budget.iter().sum();
+            let reading = law.of_electrons();
+            let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
+            let whole = law.predict(&reading).moments.variance;
+            let clipped = Shared::of_one(&law, &reading).min(whole) - patterns;
+            budget[Cause::ClippedPattern as usize] = clipped;
+            budget[Cause::FullWell as usize] = whole - unclipped - clipped;
+        }
+        budget
+    }
+
+    /// The causes before anything is clipped.
+    fn unclipped_budget(&self, expected_e: f64) -> Budget {
         let model = &self.model;
         let exact = self.equations == Equations::Exact;
         let product = |rate: f64, shot: bool, sigma: f64| {
@@ -107,41 +138,32 @@ impl Photosite {
         set(Cause::Dcnu, dark[1]);
         set(Cause::ShotTimesPattern, light[2] + dark[2]);
         set(Cause::Read, model.read_noise_e.powi(2));
-        let unclipped: f64 = budget.iter().sum();
-        // Below rounding nothing is clipped.
-        let clipped = whole.variance - unclipped;
-        budget[Cause::FullWell as usize] = if exact && clipped.abs() > 1e-12 * unclipped { clipped } else { 0.0 };
         budget
     }
 
     /// The variance of the codes, in ADU².
     fn digitized_budget(&self, adc: &AdcRecord, expected_e: f64) -> Budget {
-        let slope = adc.adu_per_e;
-        let electrons = self.electrons(expected_e).moments;
-        let mut budget = self.charge_budget(expected_e, electrons).map(|variance| variance * slope * slope);
+        let square = adc.adu_per_e * adc.adu_per_e;
+        let mut budget = self.charge_budget(expected_e).map(|variance| variance * square);
         if self.equations == Equations::Exact {
+            let charge: f64 = budget.iter().sum();
+            let law = Law::of(&self.model, expected_e);
             let whole = self.adu(adc, expected_e).moments.variance;
-            let endless = self.endless_variance(adc, expected_e, electrons).unwrap_or(whole);
-            budget[Cause::Quantization as usize] = endless - electrons.variance * slope * slope;
-            budget[Cause::Rails as usize] = whole - endless;
+            let endless = law.endless_variance(adc).unwrap_or(whole);
+            budget[Cause::Quantization as usize] = endless - charge;
+            if !law.is_plain(adc) {
+                let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
+                let clipped = self.shared(adc, expected_e).light.min(whole) - patterns;
+                let further = clipped - budget[Cause::ClippedPattern as usize];
+                let is_told = further.abs() > 1e-9 * patterns;
+                budget[Cause::ClippedPattern as usize] += if is_told { further } else { 0.0 };
+                // What the ends and rounding do to patterns is none of what they do to the rest.
+                let own = if is_told { further } else { 0.0 };
+                let of_ends = if endless == whole { Cause::Quantization } else { Cause::Rails };
+                budget[of_ends as usize] -= own;
+            }
+            budget[Cause::Rails as usize] += whole - endless;
         }
         budget
-    }
-
-    /// The variance that codes without ends would have; none where the ends are out of reach.
-    fn endless_variance(&self, adc: &AdcRecord, expected_e: f64, electrons: MeanVariance) -> Option<f64> {
-        let mean = adc.bias_adu + adc.adu_per_e * electrons.mean;
-        let sigma = adc.adu_per_e * electrons.std();
-        if mean > 9.0 * sigma + 1.0 && mean + 9.0 * sigma + 1.0 < f64::from(adc.top_code()) {
-            return None;
-        }
-        let tail = Tail::of(&self.model, adc, expected_e);
-        // Moved up by whole codes until the lowest is far away, with as many more above.
-        let up = (9.0 * sigma + 2.0 - mean).max(0.0).ceil();
-        let top = mean + up + 9.0 * sigma + 2.0;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and `as` saturates")]
-        let top = top as u32;
-        let moved = normal::rounded(mean + up, sigma, top, |edge| tail.exceeds(adc.electrons_at(edge - up)));
-        Some(moved.0.variance)
     }
 }

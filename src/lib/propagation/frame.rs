@@ -3,11 +3,11 @@
 //! The way goes down once: from the head to the photosites that the frame was made of ([`Sites`]), from these to its
 //! pixels ([`PixelMoments`]).
 
+use super::curved;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
 use crate::camera::levels::BlackLevel;
-use crate::cfa::Class;
 use crate::color;
 use crate::error::Error;
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
@@ -93,7 +93,12 @@ pub type Predicted<T> = Result<T, Unpredictable>;
 /// # Ok::<(), cyanometer::error::Error>(())
 /// ```
 pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
-    Sites::of(frame, equations)?.frame(frame)
+    let prediction = Sites::of(frame, equations)?.frame(frame)?;
+    match &prediction {
+        FramePrediction::Pixels(pixels) => pixels.void.map_or(Ok(()), |why| Err(Unpredictable::Beyond(why)))?,
+        FramePrediction::Planes(_) => {}
+    }
+    Ok(prediction)
 }
 
 /// The quantity of the photosites that a frame was made of.
@@ -132,8 +137,7 @@ impl Sites {
         let photosite = Photosite::of_electrons(model, equations);
         let (photosite, moments) = match quantity_of_sites(frame) {
             QuantityKind::ExpectedElectrons => {
-                let certain = |mean| Prediction { moments: MeanVariance { mean, variance: 0.0 }, excess_kurtosis: 0.0 };
-                (photosite, expected_e.map(certain))
+                (photosite, expected_e.map(|mean| Prediction::of_cumulants(mean, 0.0, 0.0, 0.0)))
             }
             QuantityKind::Electrons => {
                 let classes = expected_e.map(|mean| photosite.moments(mean));
@@ -148,7 +152,7 @@ impl Sites {
         Ok(Self { photosite, expected_e, moments })
     }
 
-    /// Predicts a frame that was made of these photosites.
+    /// Predicts a frame that was made of these photosites; pixels say where their moments are void.
     ///
     /// # Errors
     ///
@@ -160,9 +164,8 @@ impl Sites {
         let method = Method::named(&record.method)
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
         let black = subtracted(record.black, record.black_deltas)?;
-        let third = self.photosite.third_cumulant(self.expected_e[Class::Green as usize]);
         let size = [frame.geometry.width, frame.geometry.height];
-        let camera = PixelMoments::demosaicked(record.cfa, black, method, self.moments, third, size, equations)
+        let camera = PixelMoments::demosaicked(record.cfa, black, method, self.moments, size, equations)
             .ok_or(Unpredictable::Beyond("the paper has no equations for its method of demosaicking"))?;
         let Some(record) = &metadata.color else {
             if metadata.quantity != quantity_of_sites(frame) {
@@ -185,15 +188,43 @@ impl Sites {
             QuantityKind::Xyz => xyz,
             QuantityKind::Xyy => {
                 let local = color::xyy_about(xyz.mean).ok_or(Unpredictable::Beyond("its mean has no chromaticity"))?;
-                xyz.curved(&local)
+                xyz.to_color(&local, |[x, y, z]| [x / (x + y + z), y / (x + y + z), y], |_, _| false, equations)
             }
             QuantityKind::Lab => {
                 let white = record.white.ok_or(Unpredictable::Missing("color.white"))?;
-                xyz.curved(&color::lab_about(xyz.mean, white))
+                // L*a*b* is straight in what is dark.
+                let is_straight = |i: usize, brightest: f64| brightest < color::LAB_STRAIGHT_BELOW * white[i];
+                let local = color::lab_about(xyz.mean, white);
+                xyz.to_color(&local, |xyz| color::lab_from_xyz(xyz, white), is_straight, equations)
             }
             _ => return Err(Unpredictable::Beyond("of colors only XYZ, xyY and L*a*b* are predicted")),
         };
         Ok(FramePrediction::Pixels(Box::new(pixels)))
+    }
+}
+
+impl PixelMoments {
+    /// XYZ in a space that is curved in them but where `is_straight` up to a brightest value of a channel; void where noise is too
+    /// large a share of the others.
+    fn to_color(
+        &self,
+        local: &color::Local,
+        value: impl Fn([f64; 3]) -> [f64; 3],
+        is_straight: impl Fn(usize, f64) -> bool,
+        equations: Equations,
+    ) -> Self {
+        if equations == Equations::Paper {
+            return self.linearized(local);
+        }
+        let is_quiet = |i: usize| {
+            let (mean, std) = (self.mean[i], self.covariance[(i, i)].max(0.0).sqrt());
+            is_straight(i, mean + 6.0 * std) || std <= curved::LARGEST_SHARE * mean
+        };
+        if (0..3).all(is_quiet) {
+            return self.curved(local, value);
+        }
+        let linearized = self.linearized(local);
+        Self { void: self.void.or(Some(curved::VOID)), ..linearized }
     }
 }
 

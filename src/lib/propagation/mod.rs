@@ -6,19 +6,25 @@
 
 pub mod budget;
 mod charge;
+mod counts;
 pub mod covariance;
+mod curved;
+mod ends;
 pub mod frame;
 pub mod gains;
+mod law;
 pub mod moments;
 pub mod paper;
+mod pattern;
 pub mod photosite;
 pub mod pixel_moments;
 pub mod pixels;
+mod reading;
 mod record;
+mod rectified;
 pub mod sampling;
 pub mod saturation;
 pub mod smooth_hue;
-mod tail;
 
 pub use frame::{FramePrediction, Unpredictable, of_frame};
 pub use moments::{Equations, Prediction};

@@ -31,6 +31,22 @@ serde_by_name!(Equations);
 pub struct Prediction {
     /// Mean and variance over the photosites of a frame; fixed patterns count as variance.
     pub moments: MeanVariance,
+    /// Third cumulant, for what is curved in the samples.
+    pub third: f64,
     /// Excess kurtosis, for the spread of a sample variance.
     pub excess_kurtosis: f64,
+}
+
+impl Prediction {
+    /// The prediction of a variable with these cumulants.
+    pub fn of_cumulants(mean: f64, variance: f64, third: f64, fourth: f64) -> Self {
+        let of_spread = |cumulant: f64| if variance > 0.0 { cumulant } else { 0.0 };
+        let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) } else { 0.0 };
+        Self { moments: MeanVariance { mean, variance }, third: of_spread(third), excess_kurtosis }
+    }
+
+    /// Fourth cumulant.
+    pub fn fourth(&self) -> f64 {
+        self.excess_kurtosis * self.moments.variance.powi(2)
+    }
 }

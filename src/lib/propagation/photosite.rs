@@ -1,10 +1,10 @@
 //! Moments of a photosite of one class: in electrons, in ADU, less dark frames.
 
 use super::charge::{charge, sensitivity};
+use super::law::Law;
 use super::moments::{Equations, Prediction};
-use super::tail::Tail;
+use super::pattern::Shared;
 use crate::metadata::AdcRecord;
-use crate::numerics::normal::{self, MeanVariance};
 use crate::stages::noise::NoiseModel;
 
 /// What a photosite's samples follow from, but for the light that reaches it.
@@ -67,11 +67,6 @@ impl Photosite {
         self.adc.map_or(1.0, |adc| adc.adu_per_e)
     }
 
-    /// Third cumulant of a sample, before anything clips or rounds.
-    pub fn third_cumulant(&self, expected_e: f64) -> f64 {
-        charge(&self.model, expected_e).third * self.slope().powi(3)
-    }
-
     /// Mean and variance of its samples over the photosites of a frame.
     pub fn moments(&self, expected_e: f64) -> Prediction {
         match self.adc {
@@ -91,56 +86,70 @@ impl Photosite {
                 let dark_shot = if model.dark_shot { model.dark_e } else { 0.0 };
                 let patterns = (model.dark_e * model.dcnu).powi(2) + (expected_e * model.prnu).powi(2);
                 let variance = dark_shot + shot + patterns + read;
-                Prediction { moments: MeanVariance { mean: model.dark_e + expected_e, variance }, excess_kurtosis: 0.0 }
+                Prediction::of_cumulants(model.dark_e + expected_e, variance, 0.0, 0.0)
             }
             Equations::Exact => {
+                let law = Law::of(model, expected_e);
+                if law.reaches_full_well() {
+                    return law.predict(&law.of_electrons());
+                }
                 let charge = charge(model, expected_e);
-                let clipped = charge.clipped_above(model.full_well_e);
-                let variance = clipped.variance + read;
-                let fourth = charge.fourth_clipped_above(model.full_well_e);
-                let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) } else { 0.0 };
-                Prediction { moments: MeanVariance { mean: clipped.mean, variance }, excess_kurtosis }
+                Prediction::of_cumulants(charge.mean, charge.variance + read, charge.third, charge.fourth)
             }
         }
     }
 
-    /// Exact: first and second moments of the rounded and clipped charge, from spread 0 up and at both rails. The paper
-    /// scales Eq. 11 by the slope and takes the converter's noise as nil.
+    /// Exact: the moments of the rounded and clipped charge ([`Law`]), or, where codes are the charge, a uniform error and
+    /// nothing else, with Sheppard's corrections, 1/12 to the variance and −1/120 to the fourth cumulant. The paper scales Eq. 11
+    /// by the slope and takes the converter's noise as nil.
     pub(super) fn adu(&self, adc: &AdcRecord, expected_e: f64) -> Prediction {
-        let before = self.electrons(expected_e);
-        let mean = adc.bias_adu + adc.adu_per_e * before.moments.mean;
-        if self.equations == Equations::Paper {
-            let moments = MeanVariance { mean, variance: before.moments.variance * adc.adu_per_e.powi(2) };
-            return Prediction { moments, ..before };
+        let law = Law::of(&self.model, expected_e);
+        let is_paper = self.equations == Equations::Paper;
+        if !is_paper && !law.is_plain(adc) {
+            return law.predict(&law.of_codes(adc, adc.codes()));
         }
-        let tail = Tail::of(&self.model, adc, expected_e);
-        let sigma = adc.adu_per_e * before.moments.std();
-        let (moments, fourth) = match &tail {
-            Tail::Whole(whole) if is_smooth(mean, sigma, adc) => {
-                let fourth = whole.fourth * adc.adu_per_e.powi(4) - 1.0 / 120.0;
-                (MeanVariance { mean, variance: sigma * sigma + 1.0 / 12.0 }, fourth)
-            }
-            _ => normal::rounded(mean, sigma, adc.top_code(), |edge| tail.exceeds(adc.electrons_at(edge))),
-        };
-        let excess_kurtosis = if moments.variance > 0.0 { fourth / moments.variance.powi(2) } else { 0.0 };
-        Prediction { moments, excess_kurtosis }
+        let (before, slope) = (self.electrons(expected_e), adc.adu_per_e);
+        let [of_variance, of_fourth] = if is_paper { [0.0; 2] } else { [1.0 / 12.0, -1.0 / 120.0] };
+        Prediction::of_cumulants(
+            adc.bias_adu + slope * before.moments.mean,
+            before.moments.variance * slope * slope + of_variance,
+            before.third * slope.powi(3),
+            before.fourth() * slope.powi(4) + of_fourth,
+        )
     }
 
     /// After the mean of n dark frames of the same sensor was subtracted:
     ///
-    /// Var(y − d̄) = \[Var y − v] + \[Var d − v]/n,  v = K² λ² c₂
+    /// Var(y − d̄) = \[Var y − v] + \[Var d − v]/n + v + v − 2 cov,
     ///
-    /// since light and dark frames share the pattern of the dark current, whose variance is v; everything else is drawn
-    /// anew. Rounding errors count as independent, which they are when noise covers a code.
-    fn less_dark(&self, adc: &AdcRecord, expected_e: f64) -> Prediction {
+    /// v the variances of the means that each photosite has over exposures, of the one and of the other, and cov their
+    /// covariance: light and dark frames share the pattern of the dark current, and everything else is drawn anew. Where
+    /// nothing is clipped cov is λ² c₂, as is the v of dark frames.
+    pub(super) fn less_dark(&self, adc: &AdcRecord, expected_e: f64) -> Prediction {
         let (light, dark) = (self.adu(adc, expected_e), self.adu(adc, 0.0));
-        let shared = self.dark_pattern() * adc.adu_per_e * adc.adu_per_e;
         let n = f64::from(self.dark_frames);
-        let variance = light.moments.variance - shared + (dark.moments.variance - shared) / n;
-        let fourth = |prediction: Prediction| prediction.excess_kurtosis * prediction.moments.variance.powi(2);
-        let excess_kurtosis =
-            if variance > 0.0 { (fourth(light) + fourth(dark) / n.powi(3)) / variance.powi(2) } else { 0.0 };
-        Prediction { moments: MeanVariance { mean: light.moments.mean - dark.moments.mean, variance }, excess_kurtosis }
+        let shared = self.shared(adc, expected_e);
+        let variance =
+            light.moments.variance + dark.moments.variance / n + shared.dark * (1.0 - 1.0 / n) - 2.0 * shared.both;
+        Prediction::of_cumulants(
+            light.moments.mean - dark.moments.mean,
+            variance.max(0.0),
+            light.third - dark.third / (n * n),
+            light.fourth() + dark.fourth() / n.powi(3),
+        )
+    }
+
+    /// What codes of light and of dark frames have of the pattern.
+    pub(super) fn shared(&self, adc: &AdcRecord, expected_e: f64) -> Shared {
+        let (law, of_dark) = (Law::of(&self.model, expected_e), Law::of(&self.model, 0.0));
+        if self.equations == Equations::Paper || (law.is_plain(adc) && of_dark.is_plain(adc)) {
+            let square = adc.adu_per_e * adc.adu_per_e;
+            let dark = self.dark_pattern() * square;
+            let light = self.pattern(self.model.prnu) * expected_e * expected_e * square;
+            return Shared { light: light + dark, dark, both: dark };
+        }
+        let [light, dark] = [law, of_dark].map(|law| law.of_codes(adc, adc.codes()));
+        Shared::of((&law, &light), (&of_dark, &dark))
     }
 
     /// Variance of the fixed pattern of the dark current, λ² c₂, in e².
@@ -157,20 +166,24 @@ impl Photosite {
     }
 }
 
-/// Whether rounding adds 1/12 to the variance and −1/120 to the fourth cumulant, Sheppard's corrections, and no more:
-/// what else it does is below e^(−2π²σ²), 4·10⁻¹⁴ at σ = 1.25 codes, away from both ends of the range by 9 σ.
-fn is_smooth(mean: f64, sigma: f64, adc: &AdcRecord) -> bool {
-    sigma >= 1.25 && mean > 9.0 * sigma && mean + 9.0 * sigma < f64::from(adc.top_code())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::metadata::PoissonKind;
-    use crate::numerics::normal::NearlyNormal;
+    use crate::numerics::normal::{self, MeanVariance, NearlyNormal};
     use crate::propagation::budget::Cause;
     use crate::propagation::charge::product;
-    use crate::propagation::tail::counts;
+
+    /// Probabilities of the counts of a Poisson variable.
+    fn counts(rate: f64) -> Vec<(f64, f64)> {
+        let mut found = vec![((-rate).exp(), 0.0)];
+        while let Some(&(probability, count)) =
+            found.last().filter(|(_, count)| *count < rate + 12.0 * rate.sqrt() + 40.0)
+        {
+            found.push((probability * rate / (count + 1.0), count + 1.0));
+        }
+        found
+    }
 
     fn electrons(model: &NoiseModel, expected_e: f64, equations: Equations) -> Prediction {
         Photosite::of_electrons(*model, equations).moments(expected_e)
@@ -249,24 +262,6 @@ mod tests {
         }
     }
 
-    /// Sheppard's corrections and the sum over codes are the same where the former are used.
-    #[test]
-    fn smooth_rounding_is_the_sum_over_codes() {
-        let model = NoiseModel { read_noise_e: 15.7, ..paper_model() };
-        for electrons_e in [0.0, 10.0, 400.0, 500.5, 3000.0, 30_000.0] {
-            let found = adu(&model, &ADC, electrons_e, Equations::Exact);
-            let charge = electrons(&model, electrons_e, Equations::Exact).moments;
-            let (mean, sigma) = (ADC.bias_adu + ADC.adu_per_e * charge.mean, ADC.adu_per_e * charge.std());
-            assert!(is_smooth(mean, sigma, &ADC), "{electrons_e}");
-            let tail = Tail::of(&model, &ADC, electrons_e);
-            let (sum, fourth) = normal::rounded(mean, sigma, 4095, |edge| tail.exceeds(ADC.electrons_at(edge)));
-            assert!((found.moments.mean - sum.mean).abs() < 1e-9, "{electrons_e}");
-            assert!((found.moments.variance - sum.variance).abs() < 1e-9 * sum.variance, "{electrons_e}");
-            let kurtosis = fourth / sum.variance.powi(2);
-            assert!((found.excess_kurtosis - kurtosis).abs() < 1e-6, "{} {kurtosis}", found.excess_kurtosis);
-        }
-    }
-
     /// Causes add up to the variance, whatever clips or rounds it.
     #[test]
     fn causes_add_up() {
@@ -314,7 +309,7 @@ mod tests {
             for i in 0..=4000 {
                 let z = -8.0 + step * f64::from(i);
                 let x = (1.0 + sigma * z).max(0.0);
-                for (p, count) in counts(rate, true) {
+                for (p, count) in counts(rate) {
                     for (k, sum) in raw.iter_mut().enumerate() {
                         *sum += step * normal::density(z) * p * (count * x).powi(i32::try_from(k).unwrap());
                     }
@@ -346,8 +341,7 @@ mod tests {
     fn few_electrons_are_counted_one_by_one() {
         let model = NoiseModel { dark_e: 0.0, prnu: 0.0, ..paper_model() };
         let found = adu(&model, &ADC, 5.0, Equations::Exact).moments;
-        let codes: Vec<(f64, f64)> =
-            counts(5.0, true).iter().map(|&(p, n)| (p, (1753.0 + 0.058824 * n).round())).collect();
+        let codes: Vec<(f64, f64)> = counts(5.0).iter().map(|&(p, n)| (p, (1753.0 + 0.058824 * n).round())).collect();
         let mean: f64 = codes.iter().map(|(p, code)| p * code).sum();
         let variance: f64 = codes.iter().map(|(p, code)| p * (code - mean).powi(2)).sum();
         assert!((found.mean - mean).abs() < 1e-9 && (found.variance - variance).abs() < 1e-9);

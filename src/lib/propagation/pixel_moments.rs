@@ -1,14 +1,15 @@
 //! Moments of pixels that are weighted sums of photosites: demosaicked, and what is made of them.
 
+use super::curved;
 use super::gains;
 use super::moments::{Equations, Prediction};
 use super::paper;
-use super::smooth_hue::{self, hues};
+use super::smooth_hue::{self, FirstOrder, hues};
 use crate::cfa::CfaPattern;
 use crate::color;
 use crate::numerics::normal::{self, MeanVariance};
 use crate::stages::demosaic::Method;
-use crate::stages::demosaic::stencil::PHASES;
+use crate::stages::demosaic::stencil::{PHASES, REACH};
 use crate::stages::demosaic::weights::{WeightTable, Weights};
 use nalgebra::{Matrix3, Vector3};
 
@@ -28,20 +29,21 @@ pub struct PixelMoments {
     pub from_camera: Matrix3<f64>,
     /// Moments of the photosites of R, G and B, in the unit that the weights act on.
     pub sites: [Prediction; 3],
+    /// Why these moments are void, where they are.
+    pub void: Option<&'static str>,
 }
 
 impl PixelMoments {
     /// What demosaicking makes of photosites, by the exact weights or by the paper's equations; none where the paper has
     /// none.
     ///
-    /// `third` is the third cumulant of the green photosites, `size` that of the frame. The hues that smooth hue transition
+    /// `size` is that of the frame. The hues that smooth hue transition
     /// divides by are those of the means above `black`, the level that was subtracted.
     pub(super) fn demosaicked(
         pattern: CfaPattern,
         black: f64,
         method: Method,
         sites: [Prediction; 3],
-        third: f64,
         size: [usize; 2],
         equations: Equations,
     ) -> Option<Self> {
@@ -49,14 +51,22 @@ impl PixelMoments {
         let weights = WeightTable::of(method, pattern).about(hues(mean));
         let variances = sites.map(|site| site.moments.variance);
         let mut bias = [0.0; 3];
+        let mut void = None;
         let covariance = match equations {
-            Equations::Exact => match smooth_hue::second_order(method, pattern, mean, variances, third) {
-                Some(second) => {
-                    bias = second.bias;
-                    second.covariance
+            Equations::Exact => {
+                let second = smooth_hue::second_order(method, pattern, mean, &sites);
+                let is_possible = second.as_ref().is_none_or(|second| is_covariance(&second.covariance));
+                if method == Method::SmoothHue && !(FirstOrder::of(mean, variances).holds && is_possible) {
+                    void = Some(smooth_hue::VOID);
                 }
-                None => gains::mean_pixel(&weights).covariance(variances),
-            },
+                match second.filter(|_| is_possible) {
+                    Some(second) => {
+                        bias = second.bias;
+                        second.covariance
+                    }
+                    None => gains::mean_pixel(&weights).covariance(variances),
+                }
+            }
             Equations::Paper => paper::demosaicked(method, variances, mean, Some(size))?,
         };
         Some(Self {
@@ -66,6 +76,7 @@ impl PixelMoments {
             weights,
             from_camera: Matrix3::identity(),
             sites,
+            void,
         })
     }
 
@@ -79,16 +90,46 @@ impl PixelMoments {
             weights: self.weights.through(matrix),
             from_camera: matrix * self.from_camera,
             sites: self.sites,
+            void: self.void,
         }
     }
 
-    /// The same pixels in a space that is not linear in these channels: covariance to first order, through the Jacobian
-    /// at the mean; the mean with its bias of second order.
+    /// The same pixels in a space that is not linear in these channels, `local` about their means without noise and `value` the
+    /// color of any: weights by the Jacobian, mean and covariance by [`curved::moments`](super::curved::moments).
     #[must_use]
-    pub(super) fn curved(&self, local: &color::Local) -> Self {
+    pub(super) fn curved(&self, local: &color::Local, value: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
+        let straight = self.through(&local.jacobian, 0.0);
+        let phases = self.phase_covariances();
+        let laws: [_; PHASES.len()] = std::array::from_fn(|phase| (phases[phase], self.third_cumulants(phase)));
+        let (mean, covariance) = curved::moments(self.mean, &laws, value);
+        Self { mean, bias: [0, 1, 2].map(|i| mean[i] - local.value[i]), covariance, ..straight }
+    }
+
+    /// The same to first order, with the bias of second order.
+    #[must_use]
+    pub(super) fn linearized(&self, local: &color::Local) -> Self {
         let straight = self.through(&local.jacobian, 0.0);
         let bias = local.bias(&self.covariance);
         Self { mean: [0, 1, 2].map(|i| local.value[i] + bias[i]), bias, ..straight }
+    }
+
+    /// Third joint cumulants of the channels of a pixel of one phase.
+    fn third_cumulants(&self, phase: usize) -> curved::Third {
+        let mut third = [[[0.0; 3]; 3]; 3];
+        for y in -REACH..=REACH {
+            for x in -REACH..=REACH {
+                let w = [0, 1, 2].map(|channel| self.weights.stencil(phase, channel).at([x, y]));
+                let of_site = self.sites[self.weights.class(phase, [x, y]) as usize].third;
+                for (a, plane) in third.iter_mut().enumerate() {
+                    for (b, row) in plane.iter_mut().enumerate() {
+                        for (c, cumulant) in row.iter_mut().enumerate() {
+                            *cumulant += of_site * w[a] * w[b] * w[c];
+                        }
+                    }
+                }
+            }
+        }
+        third
     }
 
     /// Covariance of a pixel of each phase of the filter array; what the second order adds counts for all alike.
@@ -120,4 +161,10 @@ impl PixelMoments {
         };
         gains.covariance(self.sites.map(|site| site.moments.variance))
     }
+}
+
+/// Whether no variance is below zero and no correlation beyond 1, but for rounding.
+fn is_covariance(matrix: &Matrix3<f64>) -> bool {
+    let allowance = 1e-9 * matrix.trace().abs();
+    matrix.symmetric_eigenvalues().iter().all(|value| *value >= -allowance)
 }

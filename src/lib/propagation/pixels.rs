@@ -4,6 +4,7 @@
 //! model their variances, and the weights of its phase (folded back at the edges) its covariance. What varies within the
 //! reach of the weights, three photosites, is taken as level.
 
+use super::charge;
 use super::covariance::{Covariance, PAIRS};
 use super::moments::Equations;
 use super::photosite::Photosite;
@@ -19,6 +20,7 @@ use crate::stages::demosaic::stencil::{Stencil, phase};
 use crate::stages::demosaic::weights::WeightTable;
 use crate::stages::noise::NoiseModel;
 use crate::units::QuantityKind;
+use rayon::prelude::*;
 
 /// Tells the covariance of the demosaicked R, G and B of a pixel from its place and level.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,11 +122,14 @@ const STEPS: usize = 1024;
 
 impl LevelVariance {
     fn new(photosite: &Photosite, largest: f64) -> Self {
-        let step = largest / STEPS as f64;
+        // Patterns that are cut off at zero take long to predict, and their variances are smooth.
+        let is_rectified = photosite.model.prnu.max(photosite.model.dcnu) > 0.2;
+        let steps = if is_rectified { STEPS / 8 } else { STEPS };
+        let step = largest / steps as f64;
         let slope = photosite.slope();
         let variance = |index: usize| {
             let expected_e = index as f64 * step / slope;
-            let charge = photosite.electrons(expected_e).moments.variance;
+            let charge = charge::charge(&photosite.model, expected_e).variance + photosite.model.read_noise_e.powi(2);
             // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
             if photosite.adc.is_some() && charge.sqrt() * slope < 0.5 {
                 charge * slope * slope + 1.0 / 12.0
@@ -132,15 +137,16 @@ impl LevelVariance {
                 photosite.moments(expected_e).moments.variance
             }
         };
-        Self { step, values: (0..=STEPS).map(variance).collect() }
+        Self { step, values: (0..=steps).into_par_iter().map(variance).collect() }
     }
 
     /// The variance at a level; below zero as at zero, beyond the last as there.
     fn at(&self, level: f64) -> f64 {
-        let place = (level / self.step).clamp(0.0, STEPS as f64);
+        let steps = self.values.len() - 1;
+        let place = (level / self.step).clamp(0.0, steps as f64);
         // A level that is not finite has a neighbor's variance, as its sample has no meaning; `min` and `max` drop NaN.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1024; NaN becomes 0")]
-        let index = (place as usize).min(STEPS - 1);
+        let index = (place as usize).min(steps - 1);
         let share = if place.is_nan() { 0.0 } else { place - index as f64 };
         self.values[index] + share * (self.values[index + 1] - self.values[index])
     }

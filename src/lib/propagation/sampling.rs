@@ -147,7 +147,7 @@ impl SamplingBasis {
         let law = |classes: &[usize], excess_kurtosis: f64| {
             let variance = |class| if classes.contains(&class) { 1.0 } else { 0.0 };
             let moments = |class| MeanVariance { mean: 0.0, variance: variance(class) };
-            let sites = [0, 1, 2].map(|class| Prediction { moments: moments(class), excess_kurtosis });
+            let sites = [0, 1, 2].map(|class| Prediction { moments: moments(class), third: 0.0, excess_kurtosis });
             Sampling::of(weights, &sites, place)
         };
         Self {
@@ -414,7 +414,11 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     fn sites(variances: [f64; 3], excess_kurtosis: f64) -> [Prediction; 3] {
-        variances.map(|variance| Prediction { moments: MeanVariance { mean: 0.0, variance }, excess_kurtosis })
+        variances.map(|variance| Prediction {
+            moments: MeanVariance { mean: 0.0, variance },
+            third: 0.0,
+            excess_kurtosis,
+        })
     }
 
     /// Sums of a dozen terms of one size in doubles: relative 10⁻¹².
@@ -422,6 +426,7 @@ mod tests {
     fn the_law_of_any_moments_follows_from_nine() {
         let sites = [(2.0, 0.3), (5.0, -0.2), (0.7, 1.1)].map(|(variance, excess_kurtosis)| Prediction {
             moments: MeanVariance { mean: 0.0, variance },
+            third: 0.0,
             excess_kurtosis,
         });
         let matrix = Matrix3::new(0.4, 0.3, 0.2, 0.1, 0.9, -0.1, 0.02, 0.1, 0.9);

@@ -1,9 +1,8 @@
 //! How much of a frame is saturated, by the law of its scene.
 
-use super::charge::charge;
 use super::frame::{FramePrediction, Sites, of_frame, quantity_of_sites};
+use super::law::Law;
 use super::moments::Equations;
-use super::tail::Tail;
 use crate::cfa::CfaPattern;
 use crate::metadata::{FrameHeader, Scene};
 use crate::names::Named;
@@ -42,13 +41,13 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
 pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
     let Sites { photosite, expected_e, .. } = Sites::of(frame, Equations::Exact).ok()?;
     let full_well_e = photosite.model.full_well_e;
-    let of_charge = |expected_e: f64| charge(&photosite.model, expected_e).exceeds(full_well_e);
+    let law = |expected_e| Law::of(&photosite.model, expected_e);
+    let of_charge = |expected_e: f64| law(expected_e).reaches(full_well_e);
     match (quantity_of_sites(frame), photosite.adc) {
         (QuantityKind::Electrons, _) => Some(expected_e.map(of_charge)),
         (QuantityKind::Adu, Some(adc)) => {
             let first_full_e = adc.electrons_at(adc.full_code(full_well_e) - 0.5);
-            let of_code = |expected_e| Tail::of(&photosite.model, &adc, expected_e).exceeds(first_full_e);
-            Some(expected_e.map(of_code).map(|share| share.clamp(0.0, 1.0)))
+            Some(expected_e.map(|expected_e| law(expected_e).is_read_from(first_full_e)))
         }
         _ => None,
     }

@@ -1,10 +1,11 @@
 //! Smooth hue transition beyond first order, and where nothing can be propagated.
 //!
 //! X̂ = ĝ₀ · mean of xᵢ/ĝᵢ divides by green, so its moments are those of a quotient. With greens ḡ(1 + u) the
-//! expectation of (1 + a)ᵖ/((1 + u)(1 + v)) is expanded to the fourth order in noise over signal, by the second and third
+//! expectation of (1 + a)ᵖ/((1 + u)(1 + v)) is expanded to the fourth order in noise over signal, by the second to fourth
 //! joint cumulants of a, u and v, which are sums over the weights of green.
 
 use super::gains;
+use super::moments::Prediction;
 use crate::cfa::{CfaPattern, Class};
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::{PHASES, Stencil};
@@ -34,6 +35,10 @@ pub struct FirstOrder {
 /// moments lean on ever rarer pixels and soon do not exist.
 pub const VOID_BELOW: f64 = 10.0;
 
+/// Why nothing is said below it.
+pub(super) const VOID: &str =
+    "green is less than ten times its noise; smooth hue transition divides by it, and no moments can be relied on";
+
 impl FirstOrder {
     /// Of the means above black and the variances of the photosites.
     pub fn of(mean: [f64; 3], variances: [f64; 3]) -> Self {
@@ -57,21 +62,21 @@ pub struct SecondOrder {
 /// The moments of smooth hue transition to second order; none for other methods, which are linear, and where
 /// propagation is void.
 ///
-/// `mean` is above black; `third` is the third cumulant of the green photosites.
+/// `mean` is above black; `sites` are the moments of the photosites, whose third and fourth cumulants count for green.
 pub fn second_order(
     method: Method,
     pattern: CfaPattern,
     mean: [f64; 3],
-    variances: [f64; 3],
-    third: f64,
+    sites: &[Prediction; 3],
 ) -> Option<SecondOrder> {
+    let variances = sites.map(|site| site.moments.variance);
     if method != Method::SmoothHue || !FirstOrder::of(mean, variances).holds {
         return None;
     }
     let weights = WeightTable::of(method, pattern).about(hues(mean));
     let moments = [0, 1, 2, 3].map(|phase| {
         let linear = gains::pixel(&weights, phase).covariance(variances);
-        of_phase(pattern, phase, mean, variances, third, linear)
+        of_phase(pattern, phase, mean, sites, linear)
     });
     let center = moments.iter().map(|(mean, _)| mean).sum::<Vector3<f64>>() / 4.0;
     let spread = |mean: &Vector3<f64>| (mean - center) * (mean - center).transpose();
@@ -85,11 +90,11 @@ fn of_phase(
     pattern: CfaPattern,
     phase: usize,
     mean: [f64; 3],
-    variances: [f64; 3],
-    third: f64,
+    sites: &[Prediction; 3],
     linear: Matrix3<f64>,
 ) -> (Vector3<f64>, Matrix3<f64>) {
     let green = Class::Green as usize;
+    let variances = sites.map(|site| site.moments.variance);
     let class = |offset: [isize; 2]| {
         let [x, y] = PHASES[phase];
         pattern.class((x + offset[0]) as i64, (y + offset[1]) as i64)
@@ -97,7 +102,8 @@ fn of_phase(
     let noise = GreenNoise {
         class: &class,
         second: variances[green] / mean[green].powi(2),
-        third: third / mean[green].powi(3),
+        third: sites[green].third / mean[green].powi(3),
+        fourth: sites[green].fourth() / mean[green].powi(4),
     };
     let chrominances = [Class::Red, Class::Blue].map(|class| (class, greens_of_hue(pattern, phase, class)));
     let (mut means, mut covariance) = (Vector3::from(mean), linear);
@@ -149,21 +155,27 @@ struct GreenNoise<'a, C> {
     second: f64,
     /// κ₃/ḡ³.
     third: f64,
+    /// κ₄/ḡ⁴.
+    fourth: f64,
 }
 
 impl<C: Fn([isize; 2]) -> Class> GreenNoise<'_, C> {
-    /// Joint cumulant of two or three sums of greens.
+    /// Joint cumulant of two to four sums of greens.
     fn cumulant(&self, forms: &[&Stencil]) -> f64 {
         let Some((first, rest)) = forms.split_first() else { return 0.0 };
         let greens = first.sites().filter(|(offset, _)| (self.class)(*offset) == Class::Green);
         let sum: f64 =
             greens.map(|(offset, weight)| rest.iter().fold(weight, |product, form| product * form.at(offset))).sum();
-        sum * if forms.len() == 2 { self.second } else { self.third }
+        sum * match forms.len() {
+            2 => self.second,
+            3 => self.third,
+            _ => self.fourth,
+        }
     }
 
     /// E (1 + a)ᵖ/((1 + u)(1 + v)) − 1, or without v, to fourth order:
     ///
-    /// ½ Σ fᵢⱼ κᵢⱼ + ⅙ Σ fᵢⱼₖ κᵢⱼₖ + ⅛ Σ fᵢⱼₖₗ κᵢⱼ κₖₗ
+    /// ½ Σ fᵢⱼ κᵢⱼ + ⅙ Σ fᵢⱼₖ κᵢⱼₖ + Σ fᵢⱼₖₗ (κᵢⱼ κₖₗ/8 + κᵢⱼₖₗ/24)
     ///
     /// with the derivatives f at the means, which are products of factorials.
     fn quotient(&self, power: u32, a: &Stencil, u: &Stencil, v: Option<&Stencil>) -> f64 {
@@ -186,7 +198,8 @@ impl<C: Fn([isize; 2]) -> Class> GreenNoise<'_, C> {
                 for k in 0..variables {
                     expected += derivative(&[i, j, k]) * self.cumulant(&[forms[i], forms[j], forms[k]]) / 6.0;
                     for l in 0..variables {
-                        expected += derivative(&[i, j, k, l]) * pair(i, j) * pair(k, l) / 8.0;
+                        let all = self.cumulant(&[forms[i], forms[j], forms[k], forms[l]]);
+                        expected += derivative(&[i, j, k, l]) * (pair(i, j) * pair(k, l) / 8.0 + all / 24.0);
                     }
                 }
             }
@@ -199,18 +212,22 @@ impl<C: Fn([isize; 2]) -> Class> GreenNoise<'_, C> {
 mod tests {
     use super::*;
 
+    fn sites(variances: [f64; 3]) -> [Prediction; 3] {
+        variances.map(|variance| Prediction::of_cumulants(0.0, variance, 0.0, 0.0))
+    }
+
     /// Where noise is small the second order is the first.
     #[test]
     fn quiet_greens_leave_the_first_order() {
         let mean = [0.5, 1.0, 2.0];
         let variances = [2e-10, 3e-10, 5e-10];
-        let second = second_order(Method::SmoothHue, CfaPattern::Grbg, mean, variances, 0.0).unwrap();
+        let second = second_order(Method::SmoothHue, CfaPattern::Grbg, mean, &sites(variances)).unwrap();
         let weights = WeightTable::new(Method::SmoothHue, CfaPattern::Grbg).about(super::hues(mean));
         let first = gains::mean_pixel(&weights).covariance(variances);
         assert!((second.covariance - first).abs().max() < 1e-8 * first.max(), "{} {first}", second.covariance);
         assert!(second.bias.iter().all(|bias| bias.abs() < 1e-9));
-        assert_eq!(second_order(Method::Bilinear, CfaPattern::Grbg, mean, variances, 0.0), None);
-        assert_eq!(second_order(Method::SmoothHue, CfaPattern::Grbg, mean, [1.0, 0.041, 1.0], 0.0), None);
+        assert_eq!(second_order(Method::Bilinear, CfaPattern::Grbg, mean, &sites(variances)), None);
+        assert_eq!(second_order(Method::SmoothHue, CfaPattern::Grbg, mean, &sites([1.0, 0.041, 1.0])), None);
     }
 
     /// A simulation in numpy, apart from all code here: 4 frames of 2000×2000 normal photosites, edges wrapped round. The
@@ -230,7 +247,7 @@ mod tests {
             81.484_104,
             253.894_613,
         );
-        let found = second_order(Method::SmoothHue, CfaPattern::Rggb, mean, variances, 0.0).unwrap();
+        let found = second_order(Method::SmoothHue, CfaPattern::Rggb, mean, &sites(variances)).unwrap();
         for (found, simulated) in found.covariance.iter().zip(simulated.iter()) {
             assert!((found / simulated - 1.0).abs() < 5.0 * 4e-4, "{found} {simulated}");
         }
@@ -251,13 +268,17 @@ mod tests {
         let class = |_: [isize; 2]| Class::Green;
         let (none, one) = (Stencil::zero(), Stencil::site([0, 0]));
         let (s, k) = (0.01, 0.001);
-        let normal = GreenNoise { class: &class, second: s, third: 0.0 };
+        let normal = GreenNoise { class: &class, second: s, third: 0.0, fourth: 0.0 };
         assert!((normal.quotient(1, &none, &one, None) - (s + 3.0 * s * s)).abs() < 1e-15);
         assert!((normal.quotient(1, &none, &one, Some(&one)) - (3.0 * s + 15.0 * s * s)).abs() < 1e-15);
         // (1 + u)/(1 + u) is 1 whatever u does.
         assert!(normal.quotient(1, &one, &one, None).abs() < 1e-15);
-        let skew = GreenNoise { class: &class, second: 0.0, third: k };
+        let skew = GreenNoise { class: &class, second: 0.0, third: k, fourth: 0.0 };
         assert!((skew.quotient(1, &none, &one, None) + k).abs() < 1e-15);
         assert!((skew.quotient(1, &none, &one, Some(&one)) + 4.0 * k).abs() < 1e-15);
+        // A fourth cumulant k adds k and 5k.
+        let heavy = GreenNoise { class: &class, second: 0.0, third: 0.0, fourth: k };
+        assert!((heavy.quotient(1, &none, &one, None) - k).abs() < 1e-15);
+        assert!((heavy.quotient(1, &none, &one, Some(&one)) - 5.0 * k).abs() < 1e-15);
     }
 }

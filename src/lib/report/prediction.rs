@@ -255,4 +255,7 @@ fn stage_text(stage: &StagePrediction, out: &mut String) {
         columns.push(std::iter::once(channel.clone()).chain(cells).collect());
     }
     table(&columns, out);
+    if let Some(why) = stage.void {
+        let _ = writeln!(out, "void: {why}");
+    }
 }

@@ -18,7 +18,8 @@ pub enum Subject {
     Variance,
     /// The correlation of two channels: Fisher's z.
     Correlation,
-    /// Mean and variance together of a channel of which hardly a sample should leave its code: Markov's inequality.
+    /// Mean and variance together of a channel of which hardly a sample should leave its code, or whose variance hangs on
+    /// few samples: Markov's inequality.
     Deviation,
 }
 
@@ -120,6 +121,8 @@ pub(super) struct Expected {
     /// Variance of a photosite in steps² of what it is counted in, e⁻ or ADU: where it is so small that nearly all
     /// samples are the same, sums of them are not normal.
     pub site_variances: [f64; 3],
+    /// Excess kurtosis of a photosite: where it is large, few of the samples make up the variance.
+    pub site_kurtosis: [f64; 3],
     /// How samples scatter.
     pub sampling: Sampling,
     /// Whether the channels are the classes of the photosites themselves.
@@ -136,16 +139,23 @@ const FEW: f64 = 12.0;
 /// Channels that are correlated more closely than this are functions of each other: nothing is left to chance.
 const TIED: f64 = 1.0 - 1e-9;
 
+/// Samples to a unit of excess kurtosis below which the variance hangs on too few of them to be like χ²: at 1000 its skewness is
+/// that of χ² to a few hundredths.
+const HEAVY: f64 = 1000.0;
+
 /// Tests the channels `0..count` and their correlations.
 pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     let sampling = &expected.sampling;
     let channels = measured.names.len();
     let least = expected.site_variances.iter().copied().fold(f64::INFINITY, f64::min);
+    let heaviest = expected.site_kurtosis.iter().copied().fold(0.0, f64::max);
     let is_rare = |i: usize| {
-        let of_sites = if expected.is_plane { expected.site_variances[i] } else { least };
+        let (variance, kurtosis) =
+            if expected.is_plane { (expected.site_variances[i], expected.site_kurtosis[i]) } else { (least, heaviest) };
+        let is_enough = sampling.count * variance >= RARE;
         // Where samples scatter by less than their rounding, neither mean nor variance follows a law that is known.
         let is_rounded = sampling.covariance[(i, i)].max(0.0).sqrt() <= rounding(expected.mean[i]);
-        sampling.count * of_sites < RARE || is_rounded
+        !is_enough || is_rounded || (kurtosis > 1.0 && sampling.count < HEAVY * kurtosis)
     };
     let mut found = Vec::new();
     for i in 0..channels {

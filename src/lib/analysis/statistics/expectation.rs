@@ -41,6 +41,7 @@ impl Predicted {
         let expected = Expected {
             mean: classes.map(|class| class.moments.mean),
             site_variances: classes.map(|class| class.moments.variance),
+            site_kurtosis: classes.map(|class| class.excess_kurtosis),
             sampling,
             is_plane: true,
         };
@@ -50,7 +51,8 @@ impl Predicted {
     /// Of mixed pixels that scatter as `sampling` says.
     pub fn of_pixels(mixture: &PixelMoments, sampling: Sampling) -> Self {
         let site_variances = mixture.sites.map(|site| site.moments.variance);
-        let expected = Expected { mean: mixture.mean, site_variances, sampling, is_plane: false };
+        let site_kurtosis = mixture.sites.map(|site| site.excess_kurtosis);
+        let expected = Expected { mean: mixture.mean, site_variances, site_kurtosis, sampling, is_plane: false };
         Self::of_three(&mixture.covariance, expected)
     }
 
@@ -79,6 +81,7 @@ impl Predicted {
         let expected = Expected {
             mean: [prediction.moments.mean; 3],
             site_variances: [prediction.moments.variance; 3],
+            site_kurtosis: [prediction.excess_kurtosis; 3],
             sampling: Sampling::independent(&[*prediction; 3], count as f64),
             is_plane: true,
         };
@@ -136,5 +139,5 @@ fn mixed(classes: &[Prediction; 3], counts: [u64; 3]) -> Option<Prediction> {
         })
         .sum();
     let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) - 3.0 } else { 0.0 };
-    Some(Prediction { moments: MeanVariance { mean, variance }, excess_kurtosis })
+    Some(Prediction { moments: MeanVariance { mean, variance }, third: 0.0, excess_kurtosis })
 }

@@ -48,8 +48,8 @@ fn by_series(count: f64, rate: f64) -> (f64, f64) {
     }
 }
 
-/// Probability of `count` at `rate`: exp(−δ(k) − k·(μ − ln(1+μ)))/√(2πk), μ = (λ − k)/k \[Loader2000].
-fn probability(count: f64, rate: f64) -> f64 {
+/// Probability of `count` at `rate` > 0: exp(−δ(k) − k·(μ − ln(1+μ)))/√(2πk), μ = (λ − k)/k \[Loader2000].
+pub fn probability(count: f64, rate: f64) -> f64 {
     if count == 0.0 {
         return libm::exp(-rate);
     }

@@ -9,7 +9,7 @@
 mod exact;
 mod table;
 
-pub use exact::{LARGEST_RATE, quantile, tails};
+pub use exact::{LARGEST_RATE, probability, quantile, tails};
 pub use table::Table;
 pub(super) use table::fill as fill_by_tables;
 

@@ -13,7 +13,7 @@ use crate::analysis::characterization::signals;
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::{CfaPattern, Class};
-use crate::chain::{CameraSetup, ChainPrediction, Predictor, PredictorSettings, Uncertainty};
+use crate::chain::{CameraSetup, ChainPrediction, ChainStage, Predictor, PredictorSettings, Uncertainty};
 use crate::color::Space;
 use crate::error::{Error, Result};
 use crate::formats::{data, spectral};
@@ -201,6 +201,11 @@ impl NoisePrediction {
                  to first order",
                 void.green_over_noise
             )));
+        }
+        let stages = found.budgets.scenes().into_iter().flat_map(|scene| &scene.stages);
+        let void = stages.filter(|stage| stage.stage == ChainStage::Lab).find_map(|stage| stage.void);
+        if let Some(why) = void {
+            found.notes.push(Note::Warning(format!("what is predicted of L*a*b* is void: {why}")));
         }
         Ok(found)
     }

@@ -1,0 +1,221 @@
+//! What full well makes of normal laws that it cuts.
+//!
+//! With g the moments of a reading at a charge, N the normal law and F full well,
+//!
+//! E g(min(N, F)) = E g(N) + ∫_F^∞ φ(q) \[g(F) − g(q)] dq        where the mean is below F,
+//! E g(min(N, F)) = g(F) + ∫_f^F φ(q) \[g(q) − g(F)] dq + P(N < f) \[g(f) − g(F)]        where it is above, f its floor.
+//!
+//! The integrals are sums over panels that grow with the distance from F, since the laws that reach there are the wider the
+//! farther they reach. Codes that read noise leaves visible are gone through one by one as long as the law is narrow, and about F;
+//! farther off they are many to the law's width, and rounding is a uniform error. From the one to the other leads a weight that
+//! is as smooth as a normal law, so that nothing is seen of the seam.
+
+use super::law::Node;
+use super::reading::{Moments, Reading};
+use crate::numerics::gauss::panel;
+use crate::numerics::normal::{cumulative, density};
+use crate::numerics::rounding::REACH;
+
+/// A place of an integral: charge, weight, and whether rounding is a uniform error there.
+pub(super) struct Place {
+    pub electrons: f64,
+    pub weight: f64,
+    pub is_smooth: bool,
+}
+
+/// Codes to a law's width from which rounding is a uniform error but for the ends.
+pub(super) const MANY: f64 = 2.5;
+/// Codes that are gone through one by one about an end of a wide law.
+const ABOUT_ENDS: f64 = 15.0;
+/// Width of the seam, in codes, as a standard deviation.
+const SEAM: f64 = 1.3;
+/// Places where laws are cut off below, beyond which they are not told apart.
+const MOST_BREAKS: usize = 300;
+/// Half of the seam, in codes.
+const HALF_SEAM: f64 = 8.0 * SEAM;
+
+/// Where an integral begins and how far it goes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    pub from: f64,
+    /// 1 or −1.
+    pub direction: f64,
+    pub extent: f64,
+    /// The narrowest law that is near the beginning.
+    pub narrowest: f64,
+    /// The widest of those that codes have to be gone through for wherever they reach; 0 where there is none.
+    pub widest_narrow: f64,
+    /// Noise that blurs the codes.
+    pub noise_e: f64,
+}
+
+impl Stretch {
+    /// Places and weights; of integrands that break off at some charges, these are ends of panels.
+    pub fn places(&self, reading: &Reading, breaks: &[f64]) -> Vec<Place> {
+        let Self { from, direction, extent, .. } = *self;
+        let code = reading.visible_code_e();
+        let at = |distance: f64| from + direction * distance;
+        let (fine, half_seam) = match code {
+            Some(code) => (self.fine(code, reading), HALF_SEAM * code),
+            None => (0.0, 0.0),
+        };
+        let mut ends = self.graded();
+        if let Some(code) = code {
+            self.add_codes(&mut ends, fine + 2.0 * half_seam, code, reading);
+        }
+        self.add_rails(&mut ends, reading);
+        ends.extend(breaks.iter().map(|at| (at - from) * direction));
+        ends.retain(|end| (0.0..=extent).contains(end));
+        ends.sort_by(f64::total_cmp);
+        let lower = reading.rails_e()[0];
+        // The share of a place that codes are gone through for.
+        let share = |distance: f64| -> f64 {
+            let Some(code) = code else { return 1.0 };
+            let near = |beyond: f64| cumulative((half_seam - beyond) / (SEAM * code));
+            let of_end = near(distance - fine);
+            let of_rail = near(at(distance) - lower - self.noise_e * REACH - ABOUT_ENDS * code);
+            let above = if reading.rails_e()[1] < at(distance) + self.noise_e * REACH + 2.0 * code { 1.0 } else { 0.0 };
+            1.0 - (1.0 - of_end) * (1.0 - of_rail) * (1.0 - above)
+        };
+        let mut places = Vec::new();
+        for pair in ends.windows(2).filter(|pair| pair[1] - pair[0] > 1e-13 * extent) {
+            for (distance, weight) in panel(pair[0], pair[1]) {
+                let share = share(distance);
+                let mut put = |weight: f64, is_smooth| {
+                    if weight > 0.0 {
+                        places.push(Place { electrons: at(distance), weight, is_smooth });
+                    }
+                };
+                put(weight * share, false);
+                put(weight * (1.0 - share), true);
+            }
+        }
+        places
+    }
+
+    /// How far codes are gone through.
+    fn fine(&self, code: f64, reading: &Reading) -> f64 {
+        let of_law = ABOUT_ENDS * code + 2.0 * REACH * self.widest_narrow;
+        let [lower, upper] = reading.rails_e().map(|rail| (rail - self.from).abs());
+        let nearest = lower.min(upper);
+        of_law + if nearest < (ABOUT_ENDS + HALF_SEAM) * code { nearest } else { 0.0 }
+    }
+
+    /// Ends of panels that grow with the distance.
+    fn graded(&self) -> Vec<f64> {
+        let mut ends = vec![0.0];
+        let mut distance = 0.0;
+        while distance < self.extent {
+            distance += (1.5 * self.narrowest).max(distance / 3.0).max(self.extent * 1e-9);
+            ends.push(distance.min(self.extent));
+        }
+        ends
+    }
+
+    /// Edges of codes, and of what blurs them, as far as codes are gone through and about the lower rail.
+    fn add_codes(&self, ends: &mut Vec<f64>, fine: f64, code: f64, reading: &Reading) {
+        let [lower, upper] = reading.rails_e();
+        let blur = self.noise_e;
+        let zone = (2.0 * HALF_SEAM + ABOUT_ENDS) * code + REACH * blur;
+        let mut add = |low: f64, high: f64| {
+            let mut edge = reading.edge_above(low.max(lower - code));
+            while edge < high.min(upper + code) {
+                let distance = (edge - self.from) * self.direction;
+                ends.push(distance);
+                if blur > 0.0 {
+                    // A step that is blurred but little has panels of its own.
+                    let layers = if blur < 0.1 * code { [3.0 * blur, 9.0 * blur] } else { [0.5 * code; 2] };
+                    ends.extend(layers.into_iter().flat_map(|layer| [distance - layer, distance + layer]));
+                }
+                edge += code;
+            }
+        };
+        let [near, far] = [self.from, self.from + self.direction * fine.min(self.extent)];
+        add(near.min(far) - code, near.max(far) + code);
+        let end = self.from + self.direction * self.extent;
+        if lower.is_finite() && self.from.min(end) < lower + zone {
+            add(self.from.min(end).max(lower - zone), self.from.max(end).min(lower + zone));
+        }
+    }
+
+    /// Rails, and what blurs them.
+    fn add_rails(&self, ends: &mut Vec<f64>, reading: &Reading) {
+        for rail in reading.rails_e().into_iter().filter(|rail| rail.is_finite()) {
+            let distance = (rail - self.from) * self.direction;
+            let blurs = (-6..=6).map(|step| distance + 1.5 * f64::from(step) * self.noise_e);
+            ends.extend(blurs.filter(|_| self.noise_e > 0.0));
+            ends.push(distance);
+        }
+    }
+}
+
+/// Σ over normal laws that full well cuts of what is read of them.
+pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full: Moments) -> Moments {
+    // Where the highest code is out of reach of full well it may as well not be.
+    let [_, upper] = reading.rails_e();
+    let code = reading.visible_code_e().unwrap_or(0.0);
+    let open = if upper > full + REACH * reading.noise_e + 2.0 * code { reading.without_highest() } else { *reading };
+    let (below, above): (Vec<Node>, Vec<Node>) = near.iter().partition(|node| node.mean <= full);
+    let mut sum = [0.0; 4];
+    let mut add = |weight: f64, moments: Moments| {
+        for (sum, moment) in sum.iter_mut().zip(moments) {
+            *sum += weight * moment;
+        }
+    };
+    for node in &below {
+        add(node.weight, open.at(node.mean, node.std * node.std));
+    }
+    for node in &above {
+        add(node.weight, at_full);
+        if node.floor.is_finite() {
+            let share = cumulative((node.floor - node.mean) / node.std);
+            add(node.weight * share, difference(open.at(node.floor, 0.0), at_full));
+        }
+    }
+    for (mut nodes, direction, sign) in [(below, 1.0, -1.0), (above, -1.0, 1.0)] {
+        if nodes.is_empty() {
+            continue;
+        }
+        nodes.sort_by(|a, b| a.mean.total_cmp(&b.mean));
+        let reach = |node: &Node| (REACH * node.std - (node.mean - full).abs()).min(full - node.floor);
+        let farthest = nodes.iter().map(reach).fold(0.0, f64::max);
+        let stds = nodes.iter().map(|node| node.std);
+        let is_narrow = |std: &f64| *std < MANY * code;
+        let widest = stds.clone().fold(0.0, f64::max);
+        let stretch = Stretch {
+            from: full,
+            direction,
+            extent: farthest,
+            narrowest: stds.clone().fold(f64::INFINITY, f64::min),
+            widest_narrow: stds.filter(is_narrow).fold(0.0, f64::max),
+            noise_e: reading.noise_e,
+        };
+        let mut floors: Vec<f64> = nodes.iter().map(|node| node.floor).filter(|floor| floor.is_finite()).collect();
+        floors.sort_by(f64::total_cmp);
+        floors.dedup();
+        // So many are a step so small each that nothing is seen of them.
+        if floors.len() > MOST_BREAKS {
+            floors.clear();
+        }
+        for place in stretch.places(&open, &floors) {
+            let at = |node: &Node| {
+                let z = (place.electrons - node.mean) / node.std;
+                if z.abs() < REACH && place.electrons > node.floor { node.weight * density(z) / node.std } else { 0.0 }
+            };
+            let within = |mean: f64| nodes.partition_point(|node| node.mean < mean);
+            let reach = REACH * widest;
+            let reached = within(place.electrons - reach)..within(place.electrons + reach);
+            let share: f64 = nodes[reached].iter().map(at).sum();
+            if share > 0.0 {
+                let moments =
+                    if place.is_smooth { open.smooth_at(place.electrons) } else { open.at(place.electrons, 0.0) };
+                add(sign * share * place.weight, difference(moments, at_full));
+            }
+        }
+    }
+    sum
+}
+
+pub(super) fn difference(a: Moments, b: Moments) -> Moments {
+    [0, 1, 2, 3].map(|j| a[j] - b[j])
+}

@@ -1,0 +1,218 @@
+//! The law of a photosite's charge, exactly: counts of light and dark, fixed patterns, full well, and what reads it.
+//!
+//! Given its two counts a photosite's charge is normal over the photosites of a frame, since the fixed patterns are; so its
+//! law is a sum over counts of normal laws ([`Node`]). Those that full well is far above are read in closed form; to those
+//! within its reach comes what full well takes from them, an integral over their charge ([`ends`](super::ends)); and to
+//! those whose sensitivities are cut off at zero what that adds ([`rectified`](super::rectified)).
+
+use super::counts::Charge;
+use super::ends::at_full_well;
+use super::moments::Prediction;
+use super::reading::{ENDLESS, Moments, Reading};
+use super::rectified::corrections;
+use crate::frame::to_sample;
+use crate::metadata::AdcRecord;
+use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
+use crate::stages::noise::NoiseModel;
+
+/// The law of the charge of one class of photosites.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Law {
+    pub light: Charge,
+    pub dark: Charge,
+    pub full_well_e: f64,
+    pub read_noise_e: f64,
+}
+
+/// A normal law among those that make up the law of the charge, before full well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Node {
+    pub mean: f64,
+    pub std: f64,
+    pub weight: f64,
+    /// Where it is cut off below, for a mean of so many full wells that the law would otherwise reach far below zero; −∞ for
+    /// others.
+    pub floor: f64,
+}
+
+/// Full wells of a mean from which a normal law is cut off at its floor.
+pub(super) const MANY_WELLS: f64 = 2.0;
+
+/// Spreads below this, in e⁻, are none.
+const LEAST_STD: f64 = 1e-6;
+
+/// Weights below this do not count.
+const LEAST_WEIGHT: f64 = 1e-19;
+
+impl Law {
+    pub fn of(model: &NoiseModel, expected_e: f64) -> Self {
+        let charge = |rate: f64, is_shot: bool, pattern: f64| {
+            let shot = is_shot.then_some(model.poisson);
+            // Samples are single precision, which ties of codes show where nothing is drawn.
+            let rate = if shot.is_none() { f64::from(to_sample(rate)) } else { rate };
+            Charge { rate: rate.max(0.0), shot, pattern: if rate > 0.0 { pattern } else { 0.0 } }
+        };
+        let mut light = charge(expected_e, model.signal_shot, model.prnu);
+        let mut dark = charge(model.dark_e, model.dark_shot, model.dcnu);
+        // The sum of two counts without patterns is a count.
+        if light.pattern <= 0.0 && dark.pattern <= 0.0 && light.shot == dark.shot {
+            light.rate += dark.rate;
+            dark.rate = 0.0;
+        }
+        let full_well_e = f64::from(to_sample(model.full_well_e));
+        Self { light, dark, full_well_e, read_noise_e: model.read_noise_e }
+    }
+
+    /// Whether full well is within reach of any photosite.
+    pub fn reaches_full_well(&self) -> bool {
+        self.light.most() + self.dark.most() >= self.full_well_e
+    }
+
+    /// Whether codes are the charge, a uniform error, and nothing else.
+    pub fn is_plain(&self, adc: &AdcRecord) -> bool {
+        let smoothing = self.read_noise_e.hypot(self.least_pattern_std());
+        let [low, high] = self.reach();
+        let top = f64::from(adc.top_code());
+        adc.adu_per_e * smoothing >= SMOOTH
+            && !self.light.is_rectified()
+            && !self.dark.is_rectified()
+            && !self.reaches_full_well()
+            && adc.electrons_at(0.0) < low
+            && adc.electrons_at(top) > high
+    }
+
+    /// Whether laws of a charge are so far above full well that they are cut off at their floors.
+    fn has_floors(&self, charge: &Charge) -> bool {
+        self.light.rate + self.dark.rate + 9.5 * charge.shot_std() > MANY_WELLS * self.full_well_e
+    }
+
+    fn least_pattern_std(&self) -> f64 {
+        self.light.least_pattern_std().hypot(self.dark.least_pattern_std())
+    }
+
+    /// The normal laws that make up that of the charge, as many as a sum over them needs that is smooth on the scale of
+    /// `noise_e` beside their own spread.
+    fn nodes(&self, noise_e: f64) -> Vec<Node> {
+        let is_light_wider = self.light.shot_std() >= self.dark.shot_std();
+        let (wide, narrow) = if is_light_wider { (&self.light, &self.dark) } else { (&self.dark, &self.light) };
+        let given = self.least_pattern_std().hypot(noise_e);
+        // Where laws are cut off at the count of the other charge, that is told apart to an electron.
+        let ends_at = |charge: &Charge, by: &Charge| by.is_rectified() && charge.pattern <= 0.0 && self.has_floors(by);
+        let [is_inner_told, is_outer_told] = [ends_at(narrow, wide), ends_at(wide, narrow)];
+        let mut by_step: Vec<(u32, Vec<_>)> = Vec::new();
+        let mut found = Vec::new();
+        for inner in narrow.counts(if is_inner_told { noise_e } else { wide.shot_std().hypot(given) }) {
+            let spread = if is_outer_told { 0.0 } else { wide.least_pattern_std().hypot(inner.spread) };
+            let smoothing = spread.hypot(noise_e);
+            // Powers of √2, so that few sums over counts serve all.
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
+            let rung = (2.0 * smoothing.clamp(1.0, 1e15).log2()).floor() as u32;
+            if !by_step.iter().any(|(known, _)| *known == rung) {
+                let smoothing = if rung == 0 { smoothing.min(1.0) } else { (f64::from(rung) / 2.0).exp2() };
+                by_step.push((rung, wide.counts(smoothing)));
+            }
+            let outer = by_step.iter().find(|(known, _)| *known == rung).map(|(_, counts)| counts);
+            found.extend(outer.into_iter().flatten().map(|outer| {
+                let std = inner.spread.hypot(outer.spread);
+                let mean = inner.electrons + outer.electrons;
+                let floor = match (inner.spread > 0.0, outer.spread > 0.0) {
+                    _ if mean <= MANY_WELLS * self.full_well_e => f64::NEG_INFINITY,
+                    (true, false) => outer.electrons,
+                    (false, true) => inner.electrons,
+                    _ => 0.0,
+                };
+                Node { mean, floor, std: if std < LEAST_STD { 0.0 } else { std }, weight: inner.weight * outer.weight }
+            }));
+        }
+        found.retain(|node| node.weight > LEAST_WEIGHT);
+        found
+    }
+
+    /// Expected moments of a reading.
+    pub fn expect(&self, reading: &Reading) -> Moments {
+        let full = self.full_well_e;
+        // Where the highest code hides full well, charges may go on beyond it.
+        let is_full_hidden = full > reading.ends_e()[1];
+        let is_full_far = is_full_hidden || !self.reaches_full_well();
+        let mut sum = [0.0; 4];
+        let mut add = |weight: f64, moments: Moments| {
+            for (sum, moment) in sum.iter_mut().zip(moments) {
+                *sum += weight * moment;
+            }
+        };
+        let nodes = self.nodes(if is_full_far { reading.noise_e } else { 0.0 });
+        let mut near = Vec::new();
+        let at_full = if is_full_far { [0.0; 4] } else { reading.at(full, 0.0) };
+        for node in nodes {
+            let reach = REACH * node.std;
+            if is_full_far || node.mean + reach <= full {
+                add(node.weight, reading.at(node.mean, node.std * node.std));
+            } else if node.std <= 0.0 || node.mean - reach >= full || node.floor >= full {
+                add(node.weight, reading.at(node.mean.min(full), 0.0));
+            } else {
+                near.push(node);
+            }
+        }
+        if !near.is_empty() {
+            add(1.0, at_full_well(&near, full, reading, at_full));
+        }
+        add(1.0, corrections(self, reading, if is_full_far { f64::INFINITY } else { full }));
+        sum
+    }
+
+    /// A charge that all is expected about.
+    fn about_e(&self) -> f64 {
+        (self.light.rate + self.dark.rate).min(self.full_well_e)
+    }
+
+    /// What is read of the electrons.
+    pub fn of_electrons(&self) -> Reading {
+        Reading::electrons(self.read_noise_e, self.about_e())
+    }
+
+    /// What is read of the codes between such ends.
+    pub fn of_codes(&self, adc: &AdcRecord, ends: Rounding) -> Reading {
+        Reading::codes(*adc, ends, self.read_noise_e, self.about_e())
+    }
+
+    /// What is predicted of a reading.
+    pub fn predict(&self, reading: &Reading) -> Prediction {
+        central(&self.expect(reading), reading.center)
+    }
+
+    /// The variance that codes without ends would have; none where the ends are out of reach.
+    pub fn endless_variance(&self, adc: &AdcRecord) -> Option<f64> {
+        let [low, high] = self.reach();
+        let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
+        let is_within = lower < low && upper > high.min(self.full_well_e + REACH * self.read_noise_e);
+        (!is_within).then(|| self.predict(&self.of_codes(adc, ENDLESS)).moments.variance)
+    }
+
+    /// The least and the largest charge with read noise, full well apart.
+    fn reach(&self) -> [f64; 2] {
+        let noise_e = REACH * self.read_noise_e;
+        [self.light.least() + self.dark.least() - noise_e, self.light.most() + self.dark.most() + noise_e]
+    }
+
+    /// The probability that charge and read noise together are no less than a level.
+    pub fn is_read_from(&self, level_e: f64) -> f64 {
+        // A level that a count reaches counts as reached, whatever its last bits.
+        let below = level_e - 1e-12 * level_e.abs().max(1.0);
+        self.expect(&Reading::beyond(self.read_noise_e, below))[0].clamp(0.0, 1.0)
+    }
+
+    /// The probability that the charge, before full well and read noise, is no less than a level.
+    pub fn reaches(&self, level_e: f64) -> f64 {
+        Self { read_noise_e: 0.0, full_well_e: f64::INFINITY, ..*self }.is_read_from(level_e)
+    }
+}
+
+/// What is predicted by the moments about a center.
+fn central([m1, m2, m3, m4]: &Moments, center: f64) -> Prediction {
+    let variance = m2 - m1 * m1;
+    // What is left of a difference of squares that are equal to rounding is none.
+    let variance = if variance < 4.0 * f64::EPSILON * m2 { 0.0 } else { variance };
+    let third = m3 - 3.0 * m1 * m2 + 2.0 * m1.powi(3);
+    let fourth = m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4) - 3.0 * variance * variance;
+    Prediction::of_cumulants(center + m1, variance, third, fourth)
+}

@@ -1,0 +1,146 @@
+//! What is asked of a photosite's charge: the moments of its electrons or codes, or the chance to be beyond a level.
+
+use crate::metadata::AdcRecord;
+use crate::numerics::normal::cumulative;
+use crate::numerics::rounding::{REACH, Rounding, SMOOTH, about};
+
+/// Moments 1 to 4 about the center of a reading.
+pub(super) type Moments = [f64; 4];
+
+/// What is asked of charge that meets its read noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Reading {
+    /// What is asked.
+    pub asked: Asked,
+    /// Read noise, rms e⁻.
+    pub noise_e: f64,
+    /// What moments are about.
+    pub center: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Asked {
+    /// Moments of the electrons.
+    Electrons,
+    /// Moments of the codes between these.
+    Codes(AdcRecord, Rounding),
+    /// The probability to be beyond a charge, as the first moment.
+    Beyond(f64),
+}
+
+impl AdcRecord {
+    /// The charge that a level stands for, in e⁻.
+    pub(super) fn electrons_at(&self, level_adu: f64) -> f64 {
+        (level_adu - self.bias_adu) / self.adu_per_e
+    }
+
+    /// The level of a charge, in ADU.
+    fn level_at(&self, electrons: f64) -> f64 {
+        self.bias_adu + self.adu_per_e * electrons
+    }
+
+    /// Its codes.
+    pub(super) fn codes(&self) -> Rounding {
+        Rounding { lowest: 0.0, highest: f64::from(self.top_code()) }
+    }
+}
+
+/// Codes without ends.
+pub(super) const ENDLESS: Rounding = Rounding { lowest: f64::NEG_INFINITY, highest: f64::INFINITY };
+
+impl Reading {
+    /// Electrons about a charge.
+    pub fn electrons(noise_e: f64, center: f64) -> Self {
+        Self { asked: Asked::Electrons, noise_e, center }
+    }
+
+    /// Codes between ends, about the code of a charge.
+    pub fn codes(adc: AdcRecord, ends: Rounding, noise_e: f64, about_e: f64) -> Self {
+        Self { asked: Asked::Codes(adc, ends), noise_e, center: ends.code(adc.level_at(about_e)) }
+    }
+
+    /// Whether a charge and read noise exceed a level.
+    pub fn beyond(noise_e: f64, level_e: f64) -> Self {
+        Self { asked: Asked::Beyond(level_e), noise_e, center: 0.0 }
+    }
+
+    /// The moments at a charge whose own variance is `variance`.
+    pub fn at(&self, electrons: f64, variance: f64) -> Moments {
+        let variance = variance + self.noise_e * self.noise_e;
+        match self.asked {
+            Asked::Electrons => about(electrons - self.center, variance, 0.0),
+            Asked::Codes(adc, ends) => {
+                ends.moments(adc.level_at(electrons), adc.adu_per_e * variance.sqrt(), self.center)
+            }
+            Asked::Beyond(level) => {
+                let share = if variance > 0.0 {
+                    cumulative((electrons - level) / variance.sqrt())
+                } else if electrons > level {
+                    1.0
+                } else {
+                    0.0
+                };
+                [share, 0.0, 0.0, 0.0]
+            }
+        }
+    }
+
+    /// The same where rounding is as good as a uniform error, and nothing ends.
+    pub fn smooth_at(&self, electrons: f64) -> Moments {
+        match self.asked {
+            Asked::Codes(adc, _) => {
+                let variance = (adc.adu_per_e * self.noise_e).powi(2) + 1.0 / 12.0;
+                about(adc.level_at(electrons) - self.center, variance, -1.0 / 120.0)
+            }
+            _ => self.at(electrons, 0.0),
+        }
+    }
+
+    /// Electrons to the width of a code; none where there is none, or read noise hides it.
+    pub fn visible_code_e(&self) -> Option<f64> {
+        match self.asked {
+            Asked::Codes(adc, _) if adc.adu_per_e * self.noise_e < SMOOTH => Some(1.0 / adc.adu_per_e),
+            _ => None,
+        }
+    }
+
+    /// The charges from the lowest to the highest end of what is told apart, read noise included.
+    pub fn ends_e(&self) -> [f64; 2] {
+        let reach = REACH * self.noise_e;
+        match self.asked {
+            Asked::Electrons => [f64::NEG_INFINITY, f64::INFINITY],
+            Asked::Codes(adc, ends) => {
+                [adc.electrons_at(ends.lowest - 0.5) - reach, adc.electrons_at(ends.highest + 0.5) + reach]
+            }
+            Asked::Beyond(level) => [level - reach, level + reach],
+        }
+    }
+
+    /// The same charges, less read noise: where moments no longer follow the charge.
+    pub fn rails_e(&self) -> [f64; 2] {
+        match self.asked {
+            Asked::Electrons => [f64::NEG_INFINITY, f64::INFINITY],
+            Asked::Codes(adc, ends) => [ends.lowest, ends.highest].map(|code| adc.electrons_at(code)),
+            Asked::Beyond(level) => [level; 2],
+        }
+    }
+
+    /// The first edge between two codes above a charge.
+    pub fn edge_above(&self, electrons: f64) -> f64 {
+        match self.asked {
+            Asked::Codes(adc, _) => adc.electrons_at((adc.level_at(electrons) + 0.5).floor() + 0.5),
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// The same without the highest code.
+    pub fn without_highest(&self) -> Self {
+        match self.asked {
+            Asked::Codes(adc, ends) => {
+                let ends = Rounding { highest: f64::INFINITY, ..ends };
+                Self { asked: Asked::Codes(adc, ends), ..*self }
+            }
+            _ => *self,
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! What comes to the law of a charge whose sensitivities are cut off at zero.
+//!
+//! A photosite of a count n whose sensitivity 1 + σ z would be negative holds nothing of it, rather than v = n (1 + σ z) < 0.
+//! With w all else that it holds, each moment gains ∫ f(v) \[g(w) − g(w + v)] dv, f the density of v.
+
+use super::counts::{Charge, Count};
+use super::ends::{MANY, Stretch, difference};
+use super::law::{Law, MANY_WELLS};
+use super::reading::{Moments, Reading};
+use crate::numerics::normal::density;
+use crate::numerics::rounding::{REACH, SMOOTH};
+
+/// Nodes of the other charge beyond which codes are not gone through for each.
+const MANY_NODES: usize = 400;
+
+/// Weights below this do not count.
+const LEAST_WEIGHT: f64 = 1e-14;
+
+/// All that rectification adds to a reading; `full` is full well where that is within reach.
+pub(super) fn corrections(law: &Law, reading: &Reading, full: f64) -> Moments {
+    let mut sum = [0.0; 4];
+    if law.light.is_rectified() {
+        add(&mut sum, 1.0, of_charge(&law.light, &plain(&law.dark, law, reading), reading, full));
+    }
+    if law.dark.is_rectified() {
+        let mut others = plain(&law.light, law, reading);
+        if law.light.is_rectified() {
+            others.extend(signed(&law.light));
+        }
+        add(&mut sum, 1.0, of_charge(&law.dark, &others, reading, full));
+    }
+    sum
+}
+
+fn add(sum: &mut Moments, weight: f64, moments: Moments) {
+    for (sum, moment) in sum.iter_mut().zip(moments) {
+        *sum += weight * moment;
+    }
+}
+
+/// The normal laws of the other charge.
+fn plain(other: &Charge, law: &Law, reading: &Reading) -> Vec<Count> {
+    let mut nodes = other.counts(law.read_noise_e.max(reading.noise_e).hypot(other.least_pattern_std()).max(1e-3));
+    nodes.retain(|node| node.weight > LEAST_WEIGHT);
+    nodes
+}
+
+/// What rectification does to a charge itself: charges below zero leave, and come back as none.
+fn signed(charge: &Charge) -> Vec<Count> {
+    let Some((counts, stretch)) = below_zero(charge) else { return Vec::new() };
+    let reading = Reading::electrons(0.0, 0.0);
+    let mut found = Vec::new();
+    let mut gone = 0.0;
+    for place in stretch.places(&reading, &[]) {
+        let weight = place.weight * density_at(&counts, place.electrons, f64::INFINITY);
+        gone += weight;
+        found.push(Count { electrons: place.electrons, weight: -weight, spread: 0.0 });
+    }
+    found.retain(|node| node.weight.abs() > 1e-10);
+    found.push(Count { electrons: 0.0, weight: gone, spread: 0.0 });
+    found
+}
+
+/// The counts of a charge, rising, and the stretch below zero that their sensitivities reach.
+fn below_zero(charge: &Charge) -> Option<(Vec<Count>, Stretch)> {
+    let mut counts = charge.counts(charge.least_pattern_std().max(1e-3));
+    counts.retain(|count| count.electrons > 0.0 && count.weight > LEAST_WEIGHT);
+    let (first, last) = (counts.first()?, counts.last()?);
+    let extent = REACH * last.spread - last.electrons;
+    let narrowest = first.spread;
+    let stretch = Stretch { from: 0.0, direction: -1.0, extent, narrowest, widest_narrow: 0.0, noise_e: 0.0 };
+    (extent > 0.0).then_some((counts, stretch))
+}
+
+/// Density of the charge at `electrons` < 0, of counts up to `most`.
+fn density_at(counts: &[Count], electrons: f64, most: f64) -> f64 {
+    let at = |count: &Count| {
+        let z = (electrons - count.electrons) / count.spread;
+        if z > -REACH { count.weight * density(z) / count.spread } else { 0.0 }
+    };
+    counts.iter().take_while(|count| count.electrons <= most).map(at).sum()
+}
+
+/// The density below zero, looked up: cubic between places that are even in ln(1 + |v|/a), a the narrowest spread.
+struct Table {
+    scale: f64,
+    step: f64,
+    values: Vec<[f64; 2]>,
+}
+
+impl Table {
+    const STEPS: usize = 1000;
+
+    fn new(stretch: &Stretch, counts: &[Count]) -> Self {
+        let scale = stretch.narrowest;
+        let step = (stretch.extent / scale).ln_1p() / Self::STEPS as f64;
+        let value = |index: usize| {
+            let below = scale * (index as f64 * step).exp_m1();
+            let (mut sum, mut slope) = (0.0, 0.0);
+            for count in counts {
+                let z = (-below - count.electrons) / count.spread;
+                if z > -REACH - 1.0 {
+                    let share = count.weight * density(z) / count.spread;
+                    sum += share;
+                    slope += share * z / count.spread;
+                }
+            }
+            // By the step: d|v| = (a + |v|) du.
+            [sum, slope * (scale + below) * step]
+        };
+        Self { scale, step, values: (0..=Self::STEPS).map(value).collect() }
+    }
+
+    fn at(&self, electrons: f64) -> f64 {
+        let place = (-electrons / self.scale).max(0.0).ln_1p() / self.step;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and bounded")]
+        let index = (place as usize).min(Self::STEPS - 1);
+        let t = place - index as f64;
+        if t > 1.0 + 1e-9 {
+            return 0.0;
+        }
+        let ([a, da], [b, db]) = (self.values[index], self.values[index + 1]);
+        let s = 1.0 - t;
+        a * s * s * (1.0 + 2.0 * t) + b * t * t * (1.0 + 2.0 * s) + t * s * (s * da - t * db)
+    }
+}
+
+fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, full: f64) -> Moments {
+    let mut sum = [0.0; 4];
+    let Some((counts, base)) = below_zero(charge) else { return sum };
+    let code = reading.visible_code_e();
+    // Shared places where no code is to be gone through; then the density is worked out once.
+    let is_shared = others.len() > MANY_NODES || code.is_none();
+    // Laws of more wells are cut off at their floors.
+    let most = MANY_WELLS * full;
+    let shared: Vec<(f64, f64)> = if is_shared {
+        let blind = Stretch { noise_e: 0.0, ..base };
+        let finest = reading.noise_e.max(if is_shared && code.is_some() { f64::INFINITY } else { 0.0 });
+        let narrow = Stretch { narrowest: blind.narrowest.min(finest.max(1e-3)), ..blind };
+        let places = narrow.places(&Reading::electrons(0.0, 0.0), &[]);
+        places
+            .iter()
+            .map(|place| (place.electrons, place.weight * density_at(&counts, place.electrons, full)))
+            .collect()
+    } else {
+        Vec::new()
+    };
+    // Codes are gone through as far as laws reach that are narrow.
+    let spreads = counts.iter().map(|count| count.spread);
+    let narrow = spreads.filter(|spread| *spread < MANY * code.unwrap_or(0.0)).fold(0.0, f64::max);
+    let most_e = counts.last().map_or(0.0, |last| last.electrons);
+    let table = (!is_shared && others.len() > 8).then(|| Table::new(&base, &counts));
+    for other in others {
+        let variance = other.spread * other.spread;
+        let still = reading.at(other.electrons.min(full), variance);
+        if is_shared {
+            for &(below, weight) in &shared {
+                let at = (other.electrons + below).min(full);
+                let moved = if code.is_some() { smooth(reading, at, variance) } else { reading.at(at, variance) };
+                add(&mut sum, other.weight * weight, difference(still, moved));
+            }
+            continue;
+        }
+        let noise_e = reading.noise_e.hypot(other.spread);
+        let blurred = Reading { noise_e, ..*reading };
+        let is_hidden = code.is_some_and(|code| noise_e > SMOOTH * code);
+        let widest_narrow = if is_hidden { 0.0 } else { narrow };
+        let stretch = Stretch { from: other.electrons, widest_narrow, noise_e, ..base };
+        for place in stretch.places(&blurred, &[]) {
+            let (below, room) = (place.electrons - other.electrons, most - other.electrons);
+            let share = match &table {
+                Some(table) if room >= most_e => table.at(below),
+                _ => density_at(&counts, below, room),
+            };
+            if share * place.weight * other.weight.abs() > LEAST_WEIGHT {
+                let at = place.electrons.min(full);
+                let moved = if place.is_smooth { blurred.smooth_at(at) } else { blurred.at(at, 0.0) };
+                add(&mut sum, other.weight * share * place.weight, difference(still, moved));
+            }
+        }
+    }
+    sum
+}
+
+/// Moments where codes are many to what blurs them together.
+fn smooth(reading: &Reading, electrons: f64, variance: f64) -> Moments {
+    Reading { noise_e: reading.noise_e.hypot(variance.sqrt()), ..*reading }.smooth_at(electrons)
+}
