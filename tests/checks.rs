@@ -314,7 +314,10 @@ fn charge_transfer_is_in_the_predicted_mean() {
                 let z_std = (channel.std.unwrap() / predicted - 1.0) * (2.0 * (n - 1.0)).sqrt();
                 assert!(z_mean.abs() < 5.0 && z_std.abs() < 5.0, "{channel:?}");
                 // As neighbors share charge, errors of independent samples are not given.
-                assert_eq!((channel.z_mean, channel.z_std, channel.mean_error, channel.std_error), (None, None, None, None));
+                assert_eq!(
+                    (channel.z_mean, channel.z_std, channel.mean_error, channel.std_error),
+                    (None, None, None, None)
+                );
                 // Without transfer's share of 1 − 2·10⁻⁴ the mean of 9000 e⁻ would be off by 1.8 e⁻, 3 standard errors.
             }
             let mut again = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
