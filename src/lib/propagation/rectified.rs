@@ -18,16 +18,18 @@ const LEAST_WEIGHT: f64 = 1e-14;
 
 /// All that rectification adds to a reading; `full` is full well where that is within reach.
 pub(super) fn corrections(law: &Law, reading: &Reading, full: f64) -> Moments {
+    // Laws of more wells are cut off at their floors.
+    let most = MANY_WELLS * law.full_well_e;
     let mut sum = [0.0; 4];
-    if law.light.is_rectified() {
-        add(&mut sum, 1.0, of_charge(&law.light, &plain(&law.dark, law, reading), reading, full));
+    if law.light.is_rectified(law.full_well_e) {
+        add(&mut sum, 1.0, of_charge(&law.light, &plain(&law.dark, law, reading), reading, [full, most]));
     }
-    if law.dark.is_rectified() {
+    if law.dark.is_rectified(law.full_well_e) {
         let mut others = plain(&law.light, law, reading);
-        if law.light.is_rectified() {
+        if law.light.is_rectified(law.full_well_e) {
             others.extend(signed(&law.light));
         }
-        add(&mut sum, 1.0, of_charge(&law.dark, &others, reading, full));
+        add(&mut sum, 1.0, of_charge(&law.dark, &others, reading, [full, most]));
     }
     sum
 }
@@ -125,14 +127,15 @@ impl Table {
     }
 }
 
-fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, full: f64) -> Moments {
+fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]: [f64; 2]) -> Moments {
     let mut sum = [0.0; 4];
     let Some((counts, base)) = below_zero(charge) else { return sum };
+    if counts.first().is_none_or(|first| first.electrons > most) {
+        return sum;
+    }
     let code = reading.visible_code_e();
     // Shared places where no code is to be gone through; then the density is worked out once.
     let is_shared = others.len() > MANY_NODES || code.is_none();
-    // Laws of more wells are cut off at their floors.
-    let most = MANY_WELLS * full;
     let shared: Vec<(f64, f64)> = if is_shared {
         let blind = Stretch { noise_e: 0.0, ..base };
         let finest = reading.noise_e.max(if is_shared && code.is_some() { f64::INFINITY } else { 0.0 });
