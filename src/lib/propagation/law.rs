@@ -9,7 +9,7 @@ use super::counts::Charge;
 use super::ends::at_full_well;
 use super::moments::Prediction;
 use super::reading::{ENDLESS, Moments, Reading};
-use super::rectified::corrections;
+use super::rectified::{corrections, signed_nodes};
 use crate::frame::to_sample;
 use crate::metadata::AdcRecord;
 use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
@@ -142,7 +142,10 @@ impl Law {
                 *sum += weight * moment;
             }
         };
-        let nodes = self.nodes(if is_full_far { reading.noise_e } else { 0.0 });
+        let mut nodes = self.nodes(if is_full_far { reading.noise_e } else { 0.0 });
+        if !is_full_far {
+            nodes.extend(signed_nodes(self, reading));
+        }
         let mut near = Vec::new();
         let at_full = if full.is_finite() { reading.at(full, 0.0) } else { [0.0; 4] };
         for node in nodes {
