@@ -78,6 +78,25 @@ impl Cause {
 /// Variances by cause, in the order of [`Cause::ALL`]; they add up to the whole variance.
 pub type Budget = [f64; Cause::ALL.len()];
 
+/// The share of a variance that is left of it below which its causes are told in proportion: their differences would be lost in
+/// rounding.
+const NEXT_TO_NOTHING: f64 = 1e-6;
+
+/// The causes of what full well leaves of a charge that is next to always full: patterns and shot noise share it as they would
+/// without full well.
+fn share_what_is_left(mut budget: Budget, fixed: f64, whole: f64) -> Budget {
+    let read = budget[Cause::Read as usize];
+    let shot = [Cause::SignalShot, Cause::DarkShot, Cause::ShotTimesPattern];
+    for (causes, left) in [(&[Cause::Prnu, Cause::Dcnu][..], fixed), (&shot[..], whole - fixed - read)] {
+        let sum: f64 = causes.iter().map(|cause| budget[*cause as usize]).sum();
+        for cause in causes.iter().filter(|_| sum > 0.0) {
+            budget[*cause as usize] *= (left / sum).max(0.0);
+        }
+    }
+    budget[Cause::FullWell as usize] = whole - budget.iter().sum::<f64>();
+    budget
+}
+
 impl Photosite {
     /// The variance of its samples by cause, in e² or ADU².
     pub fn budget(&self, expected_e: f64) -> Budget {
@@ -111,9 +130,12 @@ impl Photosite {
             let reading = law.of_electrons();
             let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
             let whole = law.predict(&reading).moments.variance;
-            let clipped = Shared::of_one(&law, &reading).min(whole) - patterns;
-            budget[Cause::ClippedPattern as usize] = clipped;
-            budget[Cause::FullWell as usize] = whole - unclipped - clipped;
+            let fixed = Shared::of_one(&law, &reading).min(whole);
+            if fixed < NEXT_TO_NOTHING * patterns || whole < NEXT_TO_NOTHING * unclipped {
+                return share_what_is_left(budget, fixed, whole);
+            }
+            budget[Cause::ClippedPattern as usize] = fixed - patterns;
+            budget[Cause::FullWell as usize] = whole - unclipped - (fixed - patterns);
         }
         budget
     }

@@ -46,9 +46,11 @@ impl Charge {
         self.shot.is_none() || self.rate <= 0.0 || self.rate > CERTAIN
     }
 
-    /// Whether sensitivities below zero, which count as zero, matter: one in 10⁶ photosites.
-    pub fn is_rectified(&self) -> bool {
-        self.pattern > 0.205 && self.rate > 0.0
+    /// Whether sensitivities below zero, which count as zero, matter: one in 10⁶ photosites, or any where the charge is so near
+    /// full well that few photosites hold less.
+    pub fn is_rectified(&self, full_well_e: f64) -> bool {
+        let least = if self.rate > 0.25 * full_well_e { 1.0 / 9.0 } else { 0.205 };
+        self.pattern > least && self.rate > 0.0
     }
 
     /// The smallest standard deviation of the fixed pattern among counts that matter.

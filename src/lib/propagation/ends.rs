@@ -47,6 +47,8 @@ pub(super) struct Stretch {
     pub widest_narrow: f64,
     /// Noise that blurs the codes.
     pub noise_e: f64,
+    /// The widest that a panel may be.
+    pub widest_panel: f64,
 }
 
 impl Stretch {
@@ -106,7 +108,8 @@ impl Stretch {
         let mut ends = vec![0.0];
         let mut distance = 0.0;
         while distance < self.extent {
-            distance += (1.5 * self.narrowest).max(distance / 3.0).max(self.extent * 1e-9);
+            let width = (1.5 * self.narrowest).max(distance / 3.0).max(self.extent * 1e-9);
+            distance += width.min(self.widest_panel.max(self.extent * 1e-3));
             ends.push(distance.min(self.extent));
         }
         ends
@@ -189,6 +192,7 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
             narrowest: stds.clone().fold(f64::INFINITY, f64::min),
             widest_narrow: stds.filter(is_narrow).fold(0.0, f64::max),
             noise_e: reading.noise_e,
+            widest_panel: f64::INFINITY,
         };
         let mut floors: Vec<f64> = nodes.iter().map(|node| node.floor).filter(|floor| floor.is_finite()).collect();
         floors.sort_by(f64::total_cmp);
@@ -206,7 +210,7 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
             let reach = REACH * widest;
             let reached = within(place.electrons - reach)..within(place.electrons + reach);
             let share: f64 = nodes[reached].iter().map(at).sum();
-            if share > 0.0 {
+            if share != 0.0 {
                 let moments =
                     if place.is_smooth { open.smooth_at(place.electrons) } else { open.at(place.electrons, 0.0) };
                 add(sign * share * place.weight, difference(moments, at_full));

@@ -9,7 +9,7 @@ use super::counts::Charge;
 use super::ends::at_full_well;
 use super::moments::Prediction;
 use super::reading::{ENDLESS, Moments, Reading};
-use super::rectified::corrections;
+use super::rectified::{corrections, signed_nodes};
 use crate::frame::to_sample;
 use crate::metadata::AdcRecord;
 use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
@@ -74,8 +74,8 @@ impl Law {
         let [low, high] = self.reach();
         let top = f64::from(adc.top_code());
         adc.adu_per_e * smoothing >= SMOOTH
-            && !self.light.is_rectified()
-            && !self.dark.is_rectified()
+            && !self.light.is_rectified(self.full_well_e)
+            && !self.dark.is_rectified(self.full_well_e)
             && !self.reaches_full_well()
             && adc.electrons_at(0.0) < low
             && adc.electrons_at(top) > high
@@ -97,7 +97,9 @@ impl Law {
         let (wide, narrow) = if is_light_wider { (&self.light, &self.dark) } else { (&self.dark, &self.light) };
         let given = self.least_pattern_std().hypot(noise_e);
         // Where laws are cut off at the count of the other charge, that is told apart to an electron.
-        let ends_at = |charge: &Charge, by: &Charge| by.is_rectified() && charge.pattern <= 0.0 && self.has_floors(by);
+        let ends_at = |charge: &Charge, by: &Charge| {
+            by.is_rectified(self.full_well_e) && charge.pattern <= 0.0 && self.has_floors(by)
+        };
         let [is_inner_told, is_outer_told] = [ends_at(narrow, wide), ends_at(wide, narrow)];
         let mut by_step: Vec<(u32, Vec<_>)> = Vec::new();
         let mut found = Vec::new();
@@ -140,12 +142,15 @@ impl Law {
                 *sum += weight * moment;
             }
         };
-        let nodes = self.nodes(if is_full_far { reading.noise_e } else { 0.0 });
+        let mut nodes = self.nodes(if is_full_far { reading.noise_e } else { 0.0 });
+        if !is_full_far {
+            nodes.extend(signed_nodes(self, reading));
+        }
         let mut near = Vec::new();
-        let at_full = if is_full_far { [0.0; 4] } else { reading.at(full, 0.0) };
+        let at_full = if full.is_finite() { reading.at(full, 0.0) } else { [0.0; 4] };
         for node in nodes {
             let reach = REACH * node.std;
-            if is_full_far || node.mean + reach <= full {
+            if node.floor == f64::NEG_INFINITY && (is_full_far || node.mean + reach <= full) {
                 add(node.weight, reading.at(node.mean, node.std * node.std));
             } else if node.std <= 0.0 || node.mean - reach >= full || node.floor >= full {
                 add(node.weight, reading.at(node.mean.min(full), 0.0));

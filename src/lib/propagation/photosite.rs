@@ -170,7 +170,7 @@ impl Photosite {
 mod tests {
     use super::*;
     use crate::metadata::PoissonKind;
-    use crate::numerics::normal::{self, MeanVariance, NearlyNormal};
+    use crate::numerics::normal::{self, NearlyNormal};
     use crate::propagation::budget::Cause;
     use crate::propagation::charge::product;
 

@@ -5,7 +5,7 @@
 
 use super::counts::{Charge, Count};
 use super::ends::{MANY, Stretch, difference};
-use super::law::{Law, MANY_WELLS};
+use super::law::{Law, MANY_WELLS, Node};
 use super::reading::{Moments, Reading};
 use crate::numerics::normal::density;
 use crate::numerics::rounding::{REACH, SMOOTH};
@@ -16,18 +16,60 @@ const MANY_NODES: usize = 400;
 /// Weights below this do not count.
 const LEAST_WEIGHT: f64 = 1e-14;
 
-/// All that rectification adds to a reading; `full` is full well where that is within reach.
-pub(super) fn corrections(law: &Law, reading: &Reading, full: f64) -> Moments {
-    let mut sum = [0.0; 4];
-    if law.light.is_rectified() {
-        add(&mut sum, 1.0, of_charge(&law.light, &plain(&law.dark, law, reading), reading, full));
+/// The same as normal laws, where full well is within reach and the other charge has a pattern, whose law full well cuts: charges
+/// below zero leave, and come back as none.
+pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
+    let most = MANY_WELLS * law.full_well_e;
+    let mut found = Vec::new();
+    for (charge, other) in [(&law.light, &law.dark), (&law.dark, &law.light)] {
+        let Some((counts, base)) = below_zero(charge).filter(|_| charge.is_rectified(law.full_well_e)) else {
+            continue;
+        };
+        let mut others = plain(other, law, reading);
+        others.retain(|other| other.spread > 0.0);
+        let Some(narrowest) = others.iter().map(|other| other.spread).min_by(f64::total_cmp) else { continue };
+        let stretch = Stretch { widest_panel: 2.5 * narrowest, ..base };
+        for place in stretch.places(&Reading::electrons(0.0, 0.0), &[]) {
+            for other in &others {
+                let share = density_at(&counts, place.electrons, most - other.electrons);
+                let weight = other.weight * place.weight * share;
+                if weight > LEAST_WEIGHT {
+                    let node = Node { mean: other.electrons, std: other.spread, weight, floor: f64::NEG_INFINITY };
+                    found.push(Node { mean: other.electrons + place.electrons, weight: -weight, ..node });
+                    found.push(node);
+                }
+            }
+        }
     }
-    if law.dark.is_rectified() {
-        let mut others = plain(&law.light, law, reading);
-        if law.light.is_rectified() {
+    // Those of one mean are one.
+    found.sort_by(|a, b| a.mean.total_cmp(&b.mean).then(a.std.total_cmp(&b.std)));
+    found.dedup_by(|next, kept| {
+        let is_same = next.mean == kept.mean && next.std == kept.std;
+        kept.weight += if is_same { next.weight } else { 0.0 };
+        is_same
+    });
+    found
+}
+
+/// All that rectification adds to a reading but for [`signed_nodes`]; `full` is full well where that is within reach.
+pub(super) fn corrections(law: &Law, reading: &Reading, full: f64) -> Moments {
+    // Laws of more wells are cut off at their floors.
+    let most = MANY_WELLS * law.full_well_e;
+    let mut sum = [0.0; 4];
+    let unsigned = |other: &Charge| {
+        let mut others = plain(other, law, reading);
+        others.retain(|other| other.spread <= 0.0 || full == f64::INFINITY);
+        others
+    };
+    if law.light.is_rectified(law.full_well_e) {
+        add(&mut sum, 1.0, of_charge(&law.light, &unsigned(&law.dark), reading, [full, most]));
+    }
+    if law.dark.is_rectified(law.full_well_e) {
+        let mut others = unsigned(&law.light);
+        if law.light.is_rectified(law.full_well_e) {
             others.extend(signed(&law.light));
         }
-        add(&mut sum, 1.0, of_charge(&law.dark, &others, reading, full));
+        add(&mut sum, 1.0, of_charge(&law.dark, &others, reading, [full, most]));
     }
     sum
 }
@@ -68,7 +110,15 @@ fn below_zero(charge: &Charge) -> Option<(Vec<Count>, Stretch)> {
     let (first, last) = (counts.first()?, counts.last()?);
     let extent = REACH * last.spread - last.electrons;
     let narrowest = first.spread;
-    let stretch = Stretch { from: 0.0, direction: -1.0, extent, narrowest, widest_narrow: 0.0, noise_e: 0.0 };
+    let stretch = Stretch {
+        from: 0.0,
+        direction: -1.0,
+        extent,
+        narrowest,
+        widest_narrow: 0.0,
+        noise_e: 0.0,
+        widest_panel: f64::INFINITY,
+    };
     (extent > 0.0).then_some((counts, stretch))
 }
 
@@ -125,14 +175,15 @@ impl Table {
     }
 }
 
-fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, full: f64) -> Moments {
+fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]: [f64; 2]) -> Moments {
     let mut sum = [0.0; 4];
     let Some((counts, base)) = below_zero(charge) else { return sum };
+    if counts.first().is_none_or(|first| first.electrons > most) {
+        return sum;
+    }
     let code = reading.visible_code_e();
     // Shared places where no code is to be gone through; then the density is worked out once.
     let is_shared = others.len() > MANY_NODES || code.is_none();
-    // Laws of more wells are cut off at their floors.
-    let most = MANY_WELLS * full;
     let shared: Vec<(f64, f64)> = if is_shared {
         let blind = Stretch { noise_e: 0.0, ..base };
         let finest = reading.noise_e.max(if is_shared && code.is_some() { f64::INFINITY } else { 0.0 });
@@ -140,7 +191,7 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, full: f64) ->
         let places = narrow.places(&Reading::electrons(0.0, 0.0), &[]);
         places
             .iter()
-            .map(|place| (place.electrons, place.weight * density_at(&counts, place.electrons, full)))
+            .map(|place| (place.electrons, place.weight * density_at(&counts, place.electrons, most)))
             .collect()
     } else {
         Vec::new()
