@@ -247,6 +247,22 @@ fn text_that_takes_parsers_long_is_refused_at_once() {
     }
 }
 
+/// Distances of all from all are kept: of 10⁴ spectra, 800 MB.
+#[test]
+fn a_library_is_too_large_to_choose_from() {
+    let shop = Workshop::new();
+    let bands = names(24, |i| format!("S0.{},000000nm", 360 + 20 * i));
+    let samples: Vec<f32> = (0..24 * 10_000).map(|i| 1.0 + (i * 7919 % 101) as f32).collect();
+    fs::write(
+        shop.path("library.exr"),
+        exr_row(&bands, &samples, &attribute("emissiveUnits", "string", b"W.m^-2.sr^-1.nm^-1")),
+    )
+    .unwrap();
+    let said = refused(&shop, "fit-matrix library.exr --train 20", "library.exr");
+    assert!(said.contains("10000 samples to choose from, and 8192 are the most"), "{said}");
+    assert!(bounded(&shop, "fit-matrix library.exr", "library.exr").status.success());
+}
+
 /// Metadata may say that one plane is XYZ.
 #[test]
 fn one_plane_of_xyz_is_no_picture() {

@@ -20,8 +20,8 @@ use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{Counts, MemoryFrame, RowSink, Stage};
-use cyanometer_fuzz::settle;
-use libfuzzer_sys::fuzz_target;
+use cyanometer_fuzz::{mutation, settle};
+use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 use std::path::Path;
 
 /// Stages in a row: the frames of every stage are seeds, so that two reach everything.
@@ -41,6 +41,19 @@ fuzz_target!(|bytes: &[u8]| {
     let scale = [1.0, 100.0, 3e4, 1e30][usize::from(first >> 4 & 3)];
     let samples = (0..80 * channels.len()).map(|i| (i * 7919 % 101) as f32 / 100.0 * scale).collect();
     follow(&MemoryFrame::new(FrameHeader { name: "in".into(), geometry, metadata }, samples), DEPTH);
+});
+
+fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
+    // The first byte is no part of the document.
+    let made = data.get(1..size).and_then(|text| std::str::from_utf8(text).ok()).filter(|_| seed % 8 != 0);
+    match made.and_then(|text| mutation::changed(text, seed)) {
+        Some(text) if text.len() < max_size => {
+            data[0] = data[0].wrapping_add((seed % 5 / 4) as u8);
+            data[1..=text.len()].copy_from_slice(text.as_bytes());
+            text.len() + 1
+        }
+        _ => fuzzer_mutate(data, size, max_size),
+    }
 });
 
 /// Looks at a frame in all ways, and has all stages that take it make theirs of it.

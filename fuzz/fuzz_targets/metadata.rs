@@ -2,7 +2,8 @@
 #![no_main]
 
 use cyanometer::formats::yaml::{parse_metadata, write_metadata};
-use libfuzzer_sys::fuzz_target;
+use cyanometer_fuzz::mutation;
+use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 
 fuzz_target!(|bytes: &[u8]| {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
@@ -11,4 +12,15 @@ fuzz_target!(|bytes: &[u8]| {
     let again = parse_metadata("written", &written).expect("what is written is read");
     let twice = write_metadata(&again).expect("what was written is written again");
     assert_eq!(written, twice);
+});
+
+fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
+    let text = std::str::from_utf8(&data[..size]).ok().filter(|_| seed % 2 == 0);
+    match text.and_then(|text| mutation::changed(text, seed)) {
+        Some(text) if text.len() <= max_size => {
+            data[..text.len()].copy_from_slice(text.as_bytes());
+            text.len()
+        }
+        _ => fuzzer_mutate(data, size, max_size),
+    }
 });

@@ -1,5 +1,7 @@
 //! What the targets share: bytes as files, and frames read to their end.
 
+pub mod mutation;
+
 use cyanometer::error::Result;
 use cyanometer::formats::format::SampleReader;
 use std::fs::File;

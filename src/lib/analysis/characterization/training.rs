@@ -9,6 +9,9 @@ use rayon::prelude::*;
 /// The name of the way in which [`spanning_subset`] chooses.
 pub const CHOSEN_BY: &str = "k-medoids, BUILD step, on spectra of unit length";
 
+/// So many candidates may be chosen from: what is kept and worked out goes by the square of their number, 512 MiB of these.
+const MOST_CANDIDATES: usize = 1 << 13;
+
 /// Chooses `count` of the `candidates` that stand for all: the BUILD step of k-medoids [Kaufman1990, ch. 2], on spectra
 /// scaled to unit length.
 ///
@@ -19,13 +22,20 @@ pub const CHOSEN_BY: &str = "k-medoids, BUILD step, on spectra of unit length";
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] where there are fewer candidates, [`Error::Data`] where there are fewer different ones.
+/// [`Error::Usage`] where there are fewer candidates or more than 8192, [`Error::Data`] where there are fewer different ones.
 pub fn spanning_subset(library: &SpectralLibrary, candidates: &[usize], count: usize) -> Result<Vec<usize>> {
     if count > candidates.len() {
         return Err(Error::Usage(format!(
             "the library has {} samples to train on, fewer than {count}",
             candidates.len()
         )));
+    }
+    if candidates.len() > MOST_CANDIDATES {
+        let problem = format!(
+            "the library has {} samples to choose from, and {MOST_CANDIDATES} are the most; list those to train on",
+            candidates.len()
+        );
+        return Err(Error::Usage(problem).change(&["train"]));
     }
     let units: Vec<Vec<f64>> = candidates
         .iter()
