@@ -96,6 +96,14 @@ impl Reading {
         }
     }
 
+    /// Whether no end is near what is read of a charge whose own variance is `variance`.
+    pub fn is_free_at(&self, electrons: f64, variance: f64) -> bool {
+        let reach = REACH * variance.sqrt();
+        let [lower, upper] = self.ends_e();
+        let code = self.visible_code_e().unwrap_or(0.0);
+        electrons - reach - code > lower && electrons + reach + code < upper
+    }
+
     /// Electrons to the width of a code; none where there is none, or read noise hides it.
     pub fn visible_code_e(&self) -> Option<f64> {
         match self.asked {

@@ -207,7 +207,8 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]:
         if is_shared {
             for &(below, weight) in &shared {
                 let at = (other.electrons + below).min(full);
-                let moved = if code.is_some() { smooth(reading, at, variance) } else { reading.at(at, variance) };
+                let is_free = code.is_some() && reading.is_free_at(at, variance);
+                let moved = if is_free { smooth(reading, at, variance) } else { reading.at(at, variance) };
                 add(&mut sum, other.weight * weight, difference(still, moved));
             }
             continue;

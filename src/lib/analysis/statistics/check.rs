@@ -129,6 +129,17 @@ pub(super) struct Expected {
     pub is_plane: bool,
 }
 
+impl Expected {
+    /// What rounding may take a sample of a channel off by: pixels that are made of several samples are rounded as the largest of
+    /// them is, by up to 30 · 2⁻²⁴ of it and more where a matrix follows.
+    fn rounding(&self, channel: usize) -> f64 {
+        if self.is_plane {
+            return rounding(self.mean[channel]);
+        }
+        8.0 * self.mean.iter().copied().map(rounding).fold(0.0, f64::max)
+    }
+}
+
 /// Fewer samples off their usual step than this make sums that are no normal deviates.
 const RARE: f64 = 25.0;
 
@@ -154,7 +165,7 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
             if expected.is_plane { (expected.site_variances[i], expected.site_kurtosis[i]) } else { (least, heaviest) };
         let is_enough = sampling.count * variance >= RARE;
         // Where samples scatter by less than their rounding, neither mean nor variance follows a law that is known.
-        let is_rounded = sampling.covariance[(i, i)].max(0.0).sqrt() <= rounding(expected.mean[i]);
+        let is_rounded = sampling.covariance[(i, i)].max(0.0).sqrt() <= expected.rounding(i);
         !is_enough || is_rounded || (kurtosis > 1.0 && sampling.count < HEAVY * kurtosis)
     };
     let mut found = Vec::new();
@@ -270,7 +281,7 @@ fn deviation(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
     let found = offset * offset + spread;
     let population =
         expected.sampling.covariance[(i, i)] * (n - 1.0).max(0.0) / n + expected.sampling.mean_covariance[(i, i)];
-    let p = if found <= population + rounding(expected.mean[i]).powi(2) { 1.0 } else { (population / found).min(1.0) };
+    let p = if found <= population + expected.rounding(i).powi(2) { 1.0 } else { (population / found).min(1.0) };
     Test {
         subject: Subject::Deviation,
         channels: vec![measured.names[i].clone()],
