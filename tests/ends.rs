@@ -6,6 +6,7 @@
 mod support;
 
 use cyanometer::analysis::statistics::{Saturated, measure};
+use cyanometer::frame::to_sample;
 use cyanometer::metadata::{AdcRecord, PoissonKind, Scene};
 use cyanometer::propagation::budget::Cause;
 use cyanometer::propagation::{Equations, Photosite, Prediction};
@@ -228,7 +229,7 @@ impl Dice {
             (0.0, strong)
         };
         let signal_shot = self.next() > 0.15;
-        let light_e = f64::from(light_e as f32);
+        let light_e = f64::from(to_sample(light_e));
         let model = NoiseModel { dark_e, dcnu, prnu, read_noise_e, full_well_e, signal_shot, ..QUIET };
         Case { model, adc: AdcRecord { bits, bias_adu, adu_per_e }, light_e }
     }
@@ -349,7 +350,7 @@ fn random_cameras_are_simulated_as_predicted() {
     let (mut means, mut variances) = (Vec::new(), Vec::new());
     for number in 0..80 {
         let case = dice.case();
-        let mut scene = expected(200, 100, |_, _, _| case.light_e as f32);
+        let mut scene = expected(200, 100, |_, _, _| to_sample(case.light_e));
         scene.header.metadata.scene = Some(Scene::uniform("test", [case.light_e; 3]));
         let mut sensor = scene.header.metadata.sensor.take().unwrap();
         let readout = sensor.readout.as_mut().unwrap();
