@@ -169,7 +169,13 @@ class Prediction(ProgramCase):
         jacobian = np.stack(
             [(lab(mean + d) - lab(mean - d)) / (2 * d.sum()) for d in np.diag(steps)], axis=1
         )
-        self.close(stages["lab"]["covariance"], jacobian @ xyz @ jacobian.T, 1e-6, "Lab")
+        first_order = jacobian @ xyz @ jacobian.T
+        curvature = next(cause["variance"] for cause in stages["lab"]["causes"] if cause["cause"] == "curvature")
+        without = np.diag(stages["lab"]["covariance"]) - curvature
+        self.close(without, np.diag(first_order), 1e-6, "Lab to first order")
+        # The second order: a cube root adds 4/3 of the square of noise over signal to its variance, less what skewness takes.
+        share = np.max(np.diag(xyz) / mean**2)
+        self.close(stages["lab"]["covariance"], first_order, 2 * share, "Lab")
         # The mean of noisy colors and their differences, by drawing a million, as many on each phase of the array: errors
         # of 10⁻³ of a deviation.
         of_phases = [np.asarray(phase["covariance"]) for phase in stages["demosaicked"]["phases"]]

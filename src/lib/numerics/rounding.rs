@@ -191,19 +191,16 @@ mod tests {
     /// The probabilities of the codes one by one.
     fn reference(rounding: Rounding, mean: f64, sigma: f64, center: f64) -> [f64; 4] {
         let mut moments = [0.0; 4];
-        let (low, high) = (rounding.lowest as i64, rounding.highest as i64);
-        for k in low..=high {
+        let mut code = rounding.lowest;
+        while code <= rounding.highest {
             let at = |edge: f64| (edge - mean) / sigma;
-            let below = if k == low { f64::NEG_INFINITY } else { at(k as f64 - 0.5) };
-            let above = if k == high { f64::INFINITY } else { at(k as f64 + 0.5) };
-            let p = if below > 0.0 {
-                cumulative(-below) - cumulative(-above)
-            } else {
-                cumulative(above) - cumulative(below)
-            };
-            for (j, moment) in moments.iter_mut().enumerate() {
-                *moment += p * (k as f64 - center).powi(j as i32 + 1);
+            let below = if code == rounding.lowest { f64::NEG_INFINITY } else { at(code - 0.5) };
+            let above = if code == rounding.highest { f64::INFINITY } else { at(code + 0.5) };
+            let p = partial_moments([below, above])[0];
+            for (power, moment) in (1..).zip(&mut moments) {
+                *moment += p * (code - center).powi(power);
             }
+            code += 1.0;
         }
         moments
     }
@@ -216,8 +213,8 @@ mod tests {
             for mean in [-30.0, -0.5, 0.2, 3.5, 12.49, 100.0, 127.3, 250.6, 255.5, 259.0, 400.0] {
                 let center = byte.code(mean);
                 let (found, expected) = (byte.moments(mean, sigma, center), reference(byte, mean, sigma, center));
-                for j in 0..4 {
-                    let scale = sigma.min(256.0).max(1.0).powi(j as i32 + 1);
+                for (j, power) in (0..4).zip(1..) {
+                    let scale = sigma.clamp(1.0, 256.0).powi(power);
                     assert!(
                         (found[j] - expected[j]).abs() < 1e-10 * scale,
                         "{sigma} {mean} {j}: {} {}",

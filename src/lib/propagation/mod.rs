@@ -13,6 +13,7 @@ mod ends;
 pub mod frame;
 pub mod gains;
 mod law;
+mod memory;
 pub mod moments;
 pub mod paper;
 mod pattern;

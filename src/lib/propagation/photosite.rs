@@ -169,6 +169,7 @@ impl Photosite {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::to_sample;
     use crate::metadata::PoissonKind;
     use crate::numerics::normal::{self, NearlyNormal};
     use crate::propagation::budget::Cause;
@@ -214,7 +215,9 @@ mod tests {
         for sigma in [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 1.6, 3.0, 10.0] {
             for base in [-1.0, 0.0, 2000.0, 4094.0] {
                 for twentieth in 0..20 {
-                    let mean = base + f64::from(twentieth) / 20.0;
+                    // Charges without shot noise are single precision, as samples are.
+                    let electrons_e = f64::from(to_sample((base + f64::from(twentieth) / 20.0 + 10.0) / slope));
+                    let mean = slope * electrons_e - 10.0;
                     let model = NoiseModel {
                         dark_e: 0.0,
                         dcnu: 0.0,
@@ -226,7 +229,7 @@ mod tests {
                         ..paper_model()
                     };
                     let adc = AdcRecord { bias_adu: -10.0, ..ADC };
-                    let found = adu(&model, &adc, (mean + 10.0) / slope, Equations::Exact).moments;
+                    let found = adu(&model, &adc, electrons_e, Equations::Exact).moments;
                     let (mut first, mut second) = (0.0, 0.0);
                     let steps = 9600;
                     let step = 24.0 / f64::from(steps);
