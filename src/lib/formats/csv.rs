@@ -369,7 +369,7 @@ mod tests {
             packed.write_all(&[b'#'; 1 << 20]).unwrap();
         }
         let packed = packed.finish().unwrap();
-        let most = packed.len() * 64 >> 20;
+        let most = (packed.len() * 64) >> 20;
         assert!((17..256).contains(&most));
         assert!(complaint(&packed).contains(&format!("more than {most} MiB; no table of its size does")));
     }

@@ -52,7 +52,7 @@ pub fn png_complaint(name: &str, error: ImageError) -> Error {
 mod tests {
     use super::*;
     use crate::formats::csv::SpectralTable;
-    use crate::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter};
+    use crate::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter, patch_table};
     use crate::formats::format::SampleReader;
     use crate::formats::yaml::parse_strict;
     use crate::frame::Geometry;
@@ -67,7 +67,10 @@ mod tests {
         let tags = ExrTags::default();
         let mut writer = ExrWriter::create(Vec::new(), "a.exr", &geometry, samples, compression, &tags).unwrap();
         writer.write(&[0.5; 24]).unwrap();
-        writer.finish().unwrap().0
+        let (bytes, table) = writer.finish().unwrap();
+        let mut file = io::Cursor::new(bytes);
+        patch_table(&mut file, "a.exr", &table.unwrap()).unwrap();
+        file.into_inner()
     }
 
     /// Where in the file the value of an attribute begins.

@@ -731,6 +731,8 @@ fn huge_promises_are_refused_before_memory_is_taken() {
     // Enough bytes for it, but too large a piece for memory.
     let mut made = gray(40_000, 40_000).with(259, &[8]).with(278, &[40_000]);
     made.chunks = vec![vec![0; 4 << 20]];
+    assert!(complaint(&made.bytes()).contains("40000 rows would become 3051 MiB at a time of a file of 4096 KiB"));
+    made.chunks = vec![vec![0; 48 << 20]];
     assert!(complaint(&made.bytes()).contains("compressed as one piece of 3051 MiB"));
     // Strips that share their bytes.
     let made = Made::gray(4, 2).with(257, &[400]).with(278, &[2]);
