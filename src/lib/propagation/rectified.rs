@@ -14,7 +14,12 @@ use crate::numerics::rounding::{REACH, SMOOTH};
 const MANY_NODES: usize = 400;
 
 /// Weights below this do not count.
-const LEAST_WEIGHT: f64 = 1e-14;
+const LEAST_WEIGHT: f64 = 1e-13;
+
+/// Whether full well cuts the law of a charge.
+fn is_cut(count: &Count, full_well_e: f64) -> bool {
+    count.spread > 0.0 && count.electrons + REACH * count.spread >= full_well_e
+}
 
 /// The same as normal laws, where full well is within reach and the other charge has a pattern, whose law full well cuts: charges
 /// below zero leave, and come back as none.
@@ -26,7 +31,7 @@ pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
             continue;
         };
         let mut others = plain(other, law, reading);
-        others.retain(|other| other.spread > 0.0);
+        others.retain(|other| is_cut(other, law.full_well_e));
         let Some(narrowest) = others.iter().map(|other| other.spread).min_by(f64::total_cmp) else { continue };
         let stretch = Stretch { widest_panel: 2.5 * narrowest, ..base };
         for place in stretch.places(&Reading::electrons(0.0, 0.0), &[]) {
@@ -58,7 +63,7 @@ pub(super) fn corrections(law: &Law, reading: &Reading, full: f64) -> Moments {
     let mut sum = [0.0; 4];
     let unsigned = |other: &Charge| {
         let mut others = plain(other, law, reading);
-        others.retain(|other| other.spread <= 0.0 || full == f64::INFINITY);
+        others.retain(|other| full == f64::INFINITY || !is_cut(other, full));
         others
     };
     if law.light.is_rectified(law.full_well_e) {
@@ -98,7 +103,7 @@ fn signed(charge: &Charge) -> Vec<Count> {
         gone += weight;
         found.push(Count { electrons: place.electrons, weight: -weight, spread: 0.0 });
     }
-    found.retain(|node| node.weight.abs() > 1e-10);
+    found.retain(|node| node.weight.abs() > 1e-9);
     found.push(Count { electrons: 0.0, weight: gone, spread: 0.0 });
     found
 }
