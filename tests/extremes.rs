@@ -645,6 +645,10 @@ fn cameras_drawn_at_random_are_as_predicted() {
             (alarms, judged, void, slowest)
         })
         .collect();
+    for (index, found) in outcomes.iter().enumerate().filter(|(_, found)| !found.0.is_empty() || found.3 > 0.5) {
+        let (setup, light) = any_camera(&mut Chance(index as u64));
+        eprintln!("@@ {:?} {:.2} s {:?} {:?} light {light:?} {:?}", found.0, found.3, setup.sensor.readout, setup.noise, setup.method);
+    }
     let alarms: Vec<&String> = outcomes.iter().flat_map(|(alarms, ..)| alarms).collect();
     let (judged, void) = outcomes.iter().fold((0, 0), |(judged, void), found| (judged + found.1, void + found.2));
     let slowest = outcomes.iter().map(|found| found.3).fold(0.0, f64::max);

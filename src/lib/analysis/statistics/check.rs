@@ -121,6 +121,8 @@ pub(super) struct Expected {
     /// Variance of a photosite in steps² of what it is counted in, e⁻ or ADU: where it is so small that nearly all
     /// samples are the same, sums of them are not normal.
     pub site_variances: [f64; 3],
+    /// Third cumulant of a photosite.
+    pub site_thirds: [f64; 3],
     /// Excess kurtosis of a photosite: where it is large, few of the samples make up the variance.
     pub site_kurtosis: [f64; 3],
     /// How samples scatter.
@@ -130,6 +132,27 @@ pub(super) struct Expected {
 }
 
 impl Expected {
+    /// Skewness of the mean of a channel: that of independent samples, κ₃⁄(σ³ √n); of pixels the largest that classes give, of
+    /// which a channel has a quarter at least.
+    fn mean_skewness(&self, channel: usize) -> f64 {
+        let of_class = |k: usize, count: f64| self.site_thirds[k] / self.site_variances[k].powf(1.5) / count.sqrt();
+        let count = self.sampling.count;
+        if self.is_plane {
+            return of_class(channel, count);
+        }
+        let skews = (0..3).map(|k| of_class(k, count / 4.0)).filter(|skewness| skewness.is_finite());
+        skews.fold(0.0, |most, skewness| if skewness.abs() > f64::abs(most) { skewness } else { most })
+    }
+
+    /// Skewness of a sample variance of independent samples, but for their sixth cumulant:
+    /// (12 κ₄ κ₂ + 4 κ₃² + 8 κ₂³)⁄n² over the 3⁄2 power of its variance \[Fisher1930].
+    fn variance_skewness(&self, channel: usize, scatter: f64) -> f64 {
+        let (second, third) = (self.site_variances[channel], self.site_thirds[channel]);
+        let fourth = self.site_kurtosis[channel] * second * second;
+        let cumulant = 12.0 * fourth * second + 4.0 * third * third + 8.0 * second.powi(3);
+        cumulant / self.sampling.count.powi(2) / scatter.powf(1.5)
+    }
+
     /// What rounding may take a sample of a channel off by: pixels that are made of several samples are rounded as the largest of
     /// them is, by up to 30 · 2⁻²⁴ of it and more where a matrix follows.
     fn rounding(&self, channel: usize) -> f64 {
@@ -175,7 +198,7 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
         } else {
             found.push(mean(measured, expected, i));
             if sampling.count > 1.0 {
-                found.push(variance(measured, sampling, i));
+                found.push(variance(measured, expected, i));
             }
         }
     }
@@ -201,6 +224,7 @@ pub(super) fn pair(channels: [usize; 2]) -> usize {
 fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
     let error = expected.sampling.mean_covariance[(i, i)].sqrt();
     let z = (measured.mean[i] - expected.mean[i]) / error;
+    let skewness = expected.mean_skewness(i);
     Test {
         subject: Subject::Mean,
         channels: vec![measured.names[i].clone()],
@@ -208,16 +232,21 @@ fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
         expected: expected.mean[i],
         z: Some(z),
         degrees_of_freedom: None,
-        p: significance::of_normal(z),
+        p: if expected.is_plane {
+            significance::of_skewed(z, skewness)
+        } else {
+            significance::of_skewed(z, skewness).max(significance::of_skewed(z, -skewness))
+        },
     }
 }
 
 /// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946]. Where ν is small, the
-/// probability is Chebyshev's bound, var s²/(s² − E s²)².
-fn variance(measured: &Measured<'_>, sampling: &Sampling, i: usize) -> Test {
-    let expected = sampling.covariance[(i, i)];
+/// probability is Chebyshev's bound, var s²/(s² − E s²)². Of independent samples the law has the skewness that their cumulants
+/// give; of normal ones that is χ² too.
+fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
+    let expected = law.sampling.covariance[(i, i)];
     let pair = pair([i, i]);
-    let scatter = sampling.spread[pair][pair];
+    let scatter = law.sampling.spread[pair][pair];
     let freedom = 2.0 * expected * expected / scatter;
     let found = measured.covariance[(i, i)];
     Test {
@@ -229,6 +258,8 @@ fn variance(measured: &Measured<'_>, sampling: &Sampling, i: usize) -> Test {
         degrees_of_freedom: Some(freedom),
         p: if freedom < FEW {
             (scatter / (found - expected).powi(2)).min(1.0)
+        } else if law.is_plane {
+            significance::of_skewed((found - expected) / scatter.sqrt(), law.variance_skewness(i, scatter))
         } else {
             significance::of_chi_square(freedom * found / expected, freedom)
         },

@@ -41,6 +41,7 @@ impl Predicted {
         let expected = Expected {
             mean: classes.map(|class| class.moments.mean),
             site_variances: classes.map(|class| class.moments.variance),
+            site_thirds: classes.map(|class| class.third),
             site_kurtosis: classes.map(|class| class.excess_kurtosis),
             sampling,
             is_plane: true,
@@ -52,7 +53,9 @@ impl Predicted {
     pub fn of_pixels(mixture: &PixelMoments, sampling: Sampling) -> Self {
         let site_variances = mixture.sites.map(|site| site.moments.variance);
         let site_kurtosis = mixture.sites.map(|site| site.excess_kurtosis);
-        let expected = Expected { mean: mixture.mean, site_variances, site_kurtosis, sampling, is_plane: false };
+        let site_thirds = mixture.sites.map(|site| site.third);
+        let mean = mixture.mean;
+        let expected = Expected { mean, site_variances, site_thirds, site_kurtosis, sampling, is_plane: false };
         Self::of_three(&mixture.covariance, expected)
     }
 
@@ -81,6 +84,7 @@ impl Predicted {
         let expected = Expected {
             mean: [prediction.moments.mean; 3],
             site_variances: [prediction.moments.variance; 3],
+            site_thirds: [prediction.third; 3],
             site_kurtosis: [prediction.excess_kurtosis; 3],
             sampling: Sampling::independent(&[*prediction; 3], count as f64),
             is_plane: true,
