@@ -10,7 +10,7 @@
 //! farther off they are many to the law's width, and rounding is a uniform error. From the one to the other leads a weight that
 //! is as smooth as a normal law, so that nothing is seen of the seam.
 
-use super::law::Node;
+use super::node::Node;
 use super::reading::{Moments, Reading};
 use crate::numerics::gauss::panel;
 use crate::numerics::normal::{cumulative, density};

@@ -9,35 +9,14 @@ use super::counts::Charge;
 use super::ends::at_full_well;
 use super::memory::Memory;
 use super::moments::Prediction;
+pub(super) use super::node::Law;
+use super::node::{MANY_WELLS, Node};
 use super::reading::{ENDLESS, Moments, Reading};
 use super::rectified::{corrections, signed_nodes};
 use crate::frame::to_sample;
 use crate::metadata::AdcRecord;
 use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
 use crate::stages::noise::NoiseModel;
-
-/// The law of the charge of one class of photosites.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Law {
-    pub light: Charge,
-    pub dark: Charge,
-    pub full_well_e: f64,
-    pub read_noise_e: f64,
-}
-
-/// A normal law among those that make up the law of the charge, before full well.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Node {
-    pub mean: f64,
-    pub std: f64,
-    pub weight: f64,
-    /// Where it is cut off below, for a mean of so many full wells that the law would otherwise reach far below zero; −∞ for
-    /// others.
-    pub floor: f64,
-}
-
-/// Full wells of a mean from which a normal law is cut off at its floor.
-pub(super) const MANY_WELLS: f64 = 2.0;
 
 /// Spreads below this, in e⁻, are none.
 const LEAST_STD: f64 = 1e-6;

@@ -15,6 +15,7 @@ pub mod gains;
 mod law;
 mod memory;
 pub mod moments;
+mod node;
 pub mod paper;
 mod pattern;
 pub mod photosite;

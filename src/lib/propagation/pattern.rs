@@ -5,8 +5,8 @@
 //! series, to about the cube of their skewness, and rounding, which many counts cover, is a uniform error.
 
 use super::counts::{Charge, Count};
-use super::law::Law;
 use super::memory::Memory;
+use super::node::Law;
 use super::reading::Reading;
 use crate::metadata::PoissonKind;
 use crate::numerics::gauss::panel;

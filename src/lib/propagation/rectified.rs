@@ -5,7 +5,7 @@
 
 use super::counts::{Charge, Count};
 use super::ends::{MANY, Stretch, difference};
-use super::law::{Law, MANY_WELLS, Node};
+use super::node::{Law, MANY_WELLS, Node};
 use super::reading::{Moments, Reading};
 use crate::numerics::normal::density;
 use crate::numerics::rounding::{REACH, SMOOTH};

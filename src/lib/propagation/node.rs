@@ -1,0 +1,26 @@
+//! What the law of a photosite's charge is made of.
+
+use super::counts::Charge;
+
+/// The law of the charge of one class of photosites.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Law {
+    pub light: Charge,
+    pub dark: Charge,
+    pub full_well_e: f64,
+    pub read_noise_e: f64,
+}
+
+/// A normal law among those that make up the law of the charge, before full well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Node {
+    pub mean: f64,
+    pub std: f64,
+    pub weight: f64,
+    /// Where it is cut off below, for a mean of so many full wells that the law would otherwise reach far below zero; −∞ for
+    /// others.
+    pub floor: f64,
+}
+
+/// Full wells of a mean from which a normal law is cut off at its floor.
+pub(super) const MANY_WELLS: f64 = 2.0;
