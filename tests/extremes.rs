@@ -647,7 +647,6 @@ fn cameras_drawn_at_random_are_as_predicted() {
         .collect();
     for (index, found) in outcomes.iter().enumerate().filter(|(_, found)| !found.0.is_empty() || found.3 > 0.5) {
         let (setup, light) = any_camera(&mut Chance(index as u64));
-        eprintln!("@@ {:?} {:.2} s {:?} {:?} light {light:?} {:?}", found.0, found.3, setup.sensor.readout, setup.noise, setup.method);
     }
     let alarms: Vec<&String> = outcomes.iter().flat_map(|(alarms, ..)| alarms).collect();
     let (judged, void) = outcomes.iter().fold((0, 0), |(judged, void), found| (judged + found.1, void + found.2));
@@ -672,7 +671,19 @@ fn one_camera() {
         let r = setup.sensor.readout.as_ref().unwrap();
         eprintln!(
             "== {index}: FW {:.4} bits {} slope {:.4e} bias {:.3} ron {:.3e} prnu {:.3e} dcnu {:.3e} dark/s {:.3e} T {:.1} t {:.3e} without {:?} {:?} light {:?}",
-            r.full_well_e, r.bits, r.adu_per_e, r.bias_adu, r.read_noise_e, r.prnu, r.dcnu, r.dark_current_e_per_s.unwrap(), r.temperature_k, setup.exposure.exposure_s, setup.noise.without, setup.method, light
+            r.full_well_e,
+            r.bits,
+            r.adu_per_e,
+            r.bias_adu,
+            r.read_noise_e,
+            r.prnu,
+            r.dcnu,
+            r.dark_current_e_per_s.unwrap(),
+            r.temperature_k,
+            setup.exposure.exposure_s,
+            setup.noise.without,
+            setup.method,
+            light
         );
         let expected = uniform_frame(setup.plane([24, 20], Scene::uniform("any", light)).unwrap(), light).unwrap();
         let stages = setup.stages(&expected.header).unwrap();
@@ -688,7 +699,9 @@ fn one_camera() {
                 Ok(report) => {
                     eprintln!("{stage}: {:?} {:.3} s", report.check.unwrap(), started.elapsed().as_secs_f64());
                     for t in &report.regions[0].tests {
-                        if t.p < 1e-3 { eprintln!("    {t:?}"); }
+                        if t.p < 1e-3 {
+                            eprintln!("    {t:?}");
+                        }
                     }
                 }
                 Err(e) => eprintln!("{stage}: {e}"),

@@ -81,6 +81,7 @@ impl Law {
             by.is_rectified(self.full_well_e) && charge.pattern <= 0.0 && self.has_floors(by)
         };
         let [is_inner_told, is_outer_told] = [ends_at(narrow, wide), ends_at(wide, narrow)];
+        let is_cut = |charge: &Charge| charge.is_rectified(self.full_well_e);
         let mut by_step: Vec<(u32, Vec<_>)> = Vec::new();
         let mut found = Vec::new();
         for inner in narrow.counts(if is_inner_told { noise_e } else { wide.shot_std().hypot(given) }) {
@@ -97,7 +98,8 @@ impl Law {
             found.extend(outer.into_iter().flatten().map(|outer| {
                 let std = inner.spread.hypot(outer.spread);
                 let mean = inner.electrons + outer.electrons;
-                let floor = match (inner.spread > 0.0, outer.spread > 0.0) {
+                // Below what the charge holds whose sensitivities are not cut off there is nothing.
+                let floor = match (is_cut(narrow), is_cut(wide)) {
                     _ if mean <= MANY_WELLS * self.full_well_e => f64::NEG_INFINITY,
                     (true, false) => outer.electrons,
                     (false, true) => inner.electrons,
@@ -118,6 +120,10 @@ impl Law {
 
     fn work_out(&self, reading: &Reading) -> Moments {
         let full = self.full_well_e;
+        let [least, most] = self.extent();
+        if least >= full || reading.is_one(least, most.min(full)) {
+            return reading.at(least.min(full), 0.0);
+        }
         // Where the highest code hides full well, charges may go on beyond it.
         let is_full_hidden = full > reading.ends_e()[1];
         let is_full_far = is_full_hidden || !self.reaches_full_well();
@@ -178,10 +184,15 @@ impl Law {
         (!is_within).then(|| self.predict(&self.of_codes(adc, ENDLESS)).moments.variance)
     }
 
-    /// The least and the largest charge with read noise, full well apart.
+    /// The least and the largest charge, full well apart.
+    fn extent(&self) -> [f64; 2] {
+        [self.light.least() + self.dark.least(), self.light.most() + self.dark.most()]
+    }
+
+    /// The same with read noise.
     fn reach(&self) -> [f64; 2] {
-        let noise_e = REACH * self.read_noise_e;
-        [self.light.least() + self.dark.least() - noise_e, self.light.most() + self.dark.most() + noise_e]
+        let (noise_e, [least, most]) = (REACH * self.read_noise_e, self.extent());
+        [least - noise_e, most + noise_e]
     }
 
     /// The probability that charge and read noise together are no less than a level.

@@ -96,6 +96,15 @@ impl Reading {
         }
     }
 
+    /// Whether all charges between two are read as one code, with their read noise.
+    pub fn is_one(&self, least: f64, most: f64) -> bool {
+        let reach = REACH * self.noise_e;
+        match self.asked {
+            Asked::Codes(adc, ends) => ends.code(adc.level_at(least - reach)) == ends.code(adc.level_at(most + reach)),
+            _ => false,
+        }
+    }
+
     /// Whether no end is near what is read of a charge whose own variance is `variance`.
     pub fn is_free_at(&self, electrons: f64, variance: f64) -> bool {
         let reach = REACH * variance.sqrt();

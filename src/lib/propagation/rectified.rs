@@ -4,14 +4,17 @@
 //! With w all else that it holds, each moment gains ∫ f(v) \[g(w) − g(w + v)] dv, f the density of v.
 
 use super::counts::{Charge, Count};
-use super::ends::{MANY, Stretch, difference};
+use super::ends::{MANY, Place, Stretch, difference};
 use super::node::{Law, MANY_WELLS, Node};
 use super::reading::{Moments, Reading};
-use crate::numerics::normal::density;
+use crate::numerics::normal::{MeanVariance, density};
 use crate::numerics::rounding::{REACH, SMOOTH};
 
 /// Nodes of the other charge beyond which codes are not gone through for each.
 const MANY_NODES: usize = 400;
+
+/// Edges of codes that are told apart below the other charge.
+const MOST_EDGES: u32 = 40;
 
 /// Weights below this do not count.
 const LEAST_WEIGHT: f64 = 1e-13;
@@ -90,6 +93,17 @@ fn plain(other: &Charge, law: &Law, reading: &Reading) -> Vec<Count> {
     let mut nodes = other.counts(law.read_noise_e.max(reading.noise_e).hypot(other.least_pattern_std()).max(1e-3));
     nodes.retain(|node| node.weight > LEAST_WEIGHT);
     nodes
+}
+
+impl MeanVariance {
+    /// Those of counts and their spreads.
+    fn of_counts(counts: &[Count]) -> Self {
+        let total: f64 = counts.iter().map(|count| count.weight).sum();
+        let mean_of = |f: &dyn Fn(&Count) -> f64| counts.iter().map(|c| c.weight * f(c)).sum::<f64>() / total;
+        let mean = mean_of(&|count| count.electrons);
+        let variance = mean_of(&|count| (count.electrons - mean).powi(2) + count.spread.powi(2));
+        Self { mean, variance: variance.max(0.0) }
+    }
 }
 
 /// What rectification does to a charge itself: charges below zero leave, and come back as none.
@@ -180,6 +194,19 @@ impl Table {
     }
 }
 
+/// Charges to take off at which what is read breaks off, as the other charge spreads them out: full well, the ends of the codes,
+/// and the edges of the codes next below.
+fn seams(reading: &Reading, other: &MeanVariance, full: f64) -> Vec<f64> {
+    let mut edges = vec![full];
+    edges.extend(reading.rails_e());
+    if let Some(code) = reading.visible_code_e() {
+        let first = reading.edge_above(other.mean);
+        edges.extend((0..MOST_EDGES).map(|below| first - code * f64::from(below)));
+    }
+    let of_edge = |edge: f64| (-6..=6).map(move |step| edge - other.mean + 1.5 * f64::from(step) * other.std());
+    edges.into_iter().filter(|edge| edge.is_finite()).flat_map(of_edge).collect()
+}
+
 fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]: [f64; 2]) -> Moments {
     let mut sum = [0.0; 4];
     let Some((counts, base)) = below_zero(charge) else { return sum };
@@ -189,15 +216,17 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]:
     let code = reading.visible_code_e();
     // Shared places where no code is to be gone through; then the density is worked out once.
     let is_shared = others.len() > MANY_NODES || code.is_none();
+    let spread_out = MeanVariance::of_counts(others);
+    // Codes that the other charge covers by many are a uniform error.
+    let is_many = code.is_some_and(|code| spread_out.std() > MANY * code);
     let shared: Vec<(f64, f64)> = if is_shared {
         let blind = Stretch { noise_e: 0.0, ..base };
         let finest = reading.noise_e.max(if is_shared && code.is_some() { f64::INFINITY } else { 0.0 });
         let narrow = Stretch { narrowest: blind.narrowest.min(finest.max(1e-3)), ..blind };
-        let places = narrow.places(&Reading::electrons(0.0, 0.0), &[]);
-        places
-            .iter()
-            .map(|place| (place.electrons, place.weight * density_at(&counts, place.electrons, most)))
-            .collect()
+        let places = narrow.places(&Reading::electrons(0.0, 0.0), &seams(reading, &spread_out, full));
+        let room = most - spread_out.mean;
+        let share = |place: &Place| (place.electrons, place.weight * density_at(&counts, place.electrons, room));
+        places.iter().map(share).collect()
     } else {
         Vec::new()
     };
@@ -212,7 +241,7 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]:
         if is_shared {
             for &(below, weight) in &shared {
                 let at = (other.electrons + below).min(full);
-                let is_free = code.is_some() && reading.is_free_at(at, variance);
+                let is_free = is_many && reading.is_free_at(at, variance);
                 let moved = if is_free { smooth(reading, at, variance) } else { reading.at(at, variance) };
                 add(&mut sum, other.weight * weight, difference(still, moved));
             }
