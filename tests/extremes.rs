@@ -611,7 +611,7 @@ fn any_camera(chance: &mut Chance) -> (CameraSetup, [f64; 3]) {
 /// What cannot be predicted is refused with the reason.
 #[test]
 fn cameras_drawn_at_random_are_as_predicted() {
-    let cameras: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(300, |count| count.parse().unwrap());
+    let cameras: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(1000, |count| count.parse().unwrap());
     let start = Instant::now();
     let level = 1e-3;
     let outcomes: Vec<(Vec<String>, u32, u32, f64)> = (0..cameras)
@@ -645,9 +645,6 @@ fn cameras_drawn_at_random_are_as_predicted() {
             (alarms, judged, void, slowest)
         })
         .collect();
-    for (index, found) in outcomes.iter().enumerate().filter(|(_, found)| !found.0.is_empty() || found.3 > 0.5) {
-        let (setup, light) = any_camera(&mut Chance(index as u64));
-    }
     let alarms: Vec<&String> = outcomes.iter().flat_map(|(alarms, ..)| alarms).collect();
     let (judged, void) = outcomes.iter().fold((0, 0), |(judged, void), found| (judged + found.1, void + found.2));
     let slowest = outcomes.iter().map(|found| found.3).fold(0.0, f64::max);
@@ -661,51 +658,4 @@ fn cameras_drawn_at_random_are_as_predicted() {
     told("predictions", &what, "no more alarms than the level", &found, None, start.elapsed().as_secs_f64());
     // A Poisson number of this mean is above mean + 4 σ + 3 in fewer than one case of 10⁴.
     assert!((alarms.len() as f64) <= expected + 4.0 * expected.sqrt() + 3.0, "{found}\n{alarms:#?}");
-}
-
-#[test]
-fn one_camera() {
-    let Ok(index) = std::env::var("CYANOMETER_CAMERA") else { return };
-    for index in index.split(',') {
-        let (setup, light) = any_camera(&mut Chance(index.parse().unwrap()));
-        let r = setup.sensor.readout.as_ref().unwrap();
-        eprintln!(
-            "== {index}: FW {:.4} bits {} slope {:.4e} bias {:.3} ron {:.3e} prnu {:.3e} dcnu {:.3e} dark/s {:.3e} T {:.1} t {:.3e} without {:?} {:?} light {:?}",
-            r.full_well_e,
-            r.bits,
-            r.adu_per_e,
-            r.bias_adu,
-            r.read_noise_e,
-            r.prnu,
-            r.dcnu,
-            r.dark_current_e_per_s.unwrap(),
-            r.temperature_k,
-            setup.exposure.exposure_s,
-            setup.noise.without,
-            setup.method,
-            light
-        );
-        let expected = uniform_frame(setup.plane([24, 20], Scene::uniform("any", light)).unwrap(), light).unwrap();
-        let stages = setup.stages(&expected.header).unwrap();
-        let charge = expected.through(&stages.add_noise).unwrap().0;
-        eprintln!("dark_e {}", charge.header.metadata.noise.as_ref().unwrap().dark_e);
-        let codes = charge.through(&stages.digitize).unwrap().0;
-        let camera = codes.through(&stages.demosaic).unwrap().0;
-        for (stage, frame) in [("electrons", charge), ("codes", codes), ("demosaicked", camera)] {
-            let mut source = MemoryFrame::new(frame.header, frame.samples);
-            let started = Instant::now();
-            let found = measure(&mut source, &[], Saturated::Kept, Equations::Exact, Some(1e-3));
-            match found {
-                Ok(report) => {
-                    eprintln!("{stage}: {:?} {:.3} s", report.check.unwrap(), started.elapsed().as_secs_f64());
-                    for t in &report.regions[0].tests {
-                        if t.p < 1e-3 {
-                            eprintln!("    {t:?}");
-                        }
-                    }
-                }
-                Err(e) => eprintln!("{stage}: {e}"),
-            }
-        }
-    }
 }

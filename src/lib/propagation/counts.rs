@@ -67,8 +67,10 @@ impl Charge {
     /// The same at the lower end.
     pub fn least(&self) -> f64 {
         let count = self.rate - 9.5 * self.shot_std();
-        let least = count * (1.0 - 9.0 * self.pattern);
-        if self.shot == Some(PoissonKind::Gaussian) { least.min(count) } else { least.max(0.0) }
+        match self.shot {
+            Some(PoissonKind::Gaussian) if count < 0.0 => count * (1.0 + 9.0 * self.pattern),
+            _ => count.max(0.0) * (1.0 - 9.0 * self.pattern).max(0.0),
+        }
     }
 
     /// Counts and weights that sums over a function of the count need which is as smooth as a normal law of the standard

@@ -17,6 +17,7 @@ use crate::frame::to_sample;
 use crate::metadata::AdcRecord;
 use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
 use crate::stages::noise::NoiseModel;
+use std::cmp::Ordering;
 
 /// Spreads below this, in e⁻, are none.
 const LEAST_STD: f64 = 1e-6;
@@ -81,7 +82,6 @@ impl Law {
             by.is_rectified(self.full_well_e) && charge.pattern <= 0.0 && self.has_floors(by)
         };
         let [is_inner_told, is_outer_told] = [ends_at(narrow, wide), ends_at(wide, narrow)];
-        let is_cut = |charge: &Charge| charge.is_rectified(self.full_well_e);
         let mut by_step: Vec<(u32, Vec<_>)> = Vec::new();
         let mut found = Vec::new();
         for inner in narrow.counts(if is_inner_told { noise_e } else { wide.shot_std().hypot(given) }) {
@@ -98,12 +98,12 @@ impl Law {
             found.extend(outer.into_iter().flatten().map(|outer| {
                 let std = inner.spread.hypot(outer.spread);
                 let mean = inner.electrons + outer.electrons;
-                // Below what the charge holds whose sensitivities are not cut off there is nothing.
-                let floor = match (is_cut(narrow), is_cut(wide)) {
+                // Below what the charge of the lesser pattern holds there is next to nothing.
+                let floor = match narrow.pattern.total_cmp(&wide.pattern) {
                     _ if mean <= MANY_WELLS * self.full_well_e => f64::NEG_INFINITY,
-                    (true, false) => outer.electrons,
-                    (false, true) => inner.electrons,
-                    _ => 0.0,
+                    Ordering::Greater => outer.electrons,
+                    Ordering::Less => inner.electrons,
+                    Ordering::Equal => 0.0,
                 };
                 Node { mean, floor, std: if std < LEAST_STD { 0.0 } else { std }, weight: inner.weight * outer.weight }
             }));

@@ -170,6 +170,9 @@ const RARE: f64 = 25.0;
 /// of any law.
 const FEW: f64 = 12.0;
 
+/// Excess kurtosis below which a law has hardly more than two values, and a sample variance is a function of the mean.
+const FLAT: f64 = -1.0;
+
 /// Channels that are correlated more closely than this are functions of each other: nothing is left to chance.
 const TIED: f64 = 1.0 - 1e-9;
 
@@ -240,9 +243,9 @@ fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
     }
 }
 
-/// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946]. Where ν is small, the
-/// probability is Chebyshev's bound, var s²/(s² − E s²)². Of independent samples the law has the skewness that their cumulants
-/// give; of normal ones that is χ² too.
+/// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946]. Where ν is small, or
+/// samples have two values, the probability is Chebyshev's bound, var s²/(s² − E s²)². Of independent samples with tails heavier than normal ones the law has
+/// the skewness that their cumulants give.
 fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
     let expected = law.sampling.covariance[(i, i)];
     let pair = pair([i, i]);
@@ -256,9 +259,9 @@ fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
         expected,
         z: Some((found - expected) / scatter.sqrt()),
         degrees_of_freedom: Some(freedom),
-        p: if freedom < FEW {
+        p: if freedom < FEW || (law.is_plane && law.site_kurtosis[i] < FLAT) {
             (scatter / (found - expected).powi(2)).min(1.0)
-        } else if law.is_plane {
+        } else if law.is_plane && law.site_kurtosis[i] > 0.0 {
             significance::of_skewed((found - expected) / scatter.sqrt(), law.variance_skewness(i, scatter))
         } else {
             significance::of_chi_square(freedom * found / expected, freedom)
