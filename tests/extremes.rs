@@ -258,7 +258,9 @@ fn moments_far_from_zero() {
         "mean 10⁹, σ 10⁻³",
         "single precision holds one value there: σ is 0, not noise of rounding",
         || {
-            let found = moments(&[(0..10_000_i16).map(|i| (1e9 + 1e-3 * f64::from(i % 3)) as f32).collect()]);
+            let found = moments(&[(0..10_000_i16)
+                .map(|i| cyanometer::frame::to_sample(1e9 + 1e-3 * f64::from(i % 3)))
+                .collect()]);
             (
                 format!("mean {}, variance {:?}", found.mean[0], found.covariance(0, 0)),
                 found.covariance(0, 0) == Some(0.0),

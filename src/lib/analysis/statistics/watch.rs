@@ -33,7 +33,7 @@ pub(super) struct Watch<'a> {
 /// Rows as they come, or with the layer that their samples tell.
 enum Watched<'a> {
     AsTheyCome(&'a mut dyn RowSource),
-    Marked(Marked<'a>),
+    Marked(Box<Marked<'a>>),
 }
 
 impl<'a> Watched<'a> {
@@ -47,7 +47,7 @@ impl<'a> Watched<'a> {
         match (layer, levels) {
             (None, Some(levels)) => {
                 let layer = header.geometry.channels.len();
-                (Self::Marked(Marked::new(source, levels)), Some(layer))
+                (Self::Marked(Box::new(Marked::new(source, levels))), Some(layer))
             }
             _ => (Self::AsTheyCome(source), layer),
         }
@@ -56,7 +56,7 @@ impl<'a> Watched<'a> {
     fn rows(&self) -> &dyn RowSource {
         match self {
             Self::AsTheyCome(source) => *source,
-            Self::Marked(source) => source,
+            Self::Marked(source) => source.as_ref(),
         }
     }
 
