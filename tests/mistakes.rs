@@ -21,7 +21,7 @@ const MISTAKES: [(&str, i32, &str); 78] = [
     (
         "render-radiance --electrons 1,2",
         BAD_USAGE,
-        "`1,2` is no value for --electrons <R,G,B>: give the electrons of R,G,B between commas, none below 0; see \
+        "`1,2` is no value for --electrons <R,G,B>: give the electrons of R,G,B between commas, none below 0 or above 3.4e38; see \
          `render-radiance --help`",
     ),
     (

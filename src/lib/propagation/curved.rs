@@ -10,6 +10,9 @@ pub(super) type Third = [[[f64; 3]; 3]; 3];
 /// What is left out goes with the fourth power of the share, times about 10: 10⁻³ of a variance at a tenth.
 pub(super) const LARGEST_SHARE: f64 = 0.1;
 
+/// Skewness along a principal axis beyond which the series is no density.
+const MOST_SKEWED: f64 = 1.0;
+
 /// Why nothing is said where noise is larger.
 pub(super) const VOID: &str =
     "the noise of X, Y or Z is more than a tenth of it, too much to be propagated to a color that is curved in it";
@@ -44,6 +47,9 @@ pub(super) fn moments(
         let along = axes.eigenvectors * Matrix3::from_diagonal(&lengths);
         let inverse = lengths.map(|length| if length > 0.0 { 1.0 / length } else { 0.0 });
         let skewness = rotated(third, &(Matrix3::from_diagonal(&inverse) * axes.eigenvectors.transpose()));
+        let most = skewness.iter().flatten().flatten().fold(0.0, |most: f64, cumulant| most.max(cumulant.abs()));
+        // A density that is skewed by more is none: what hardly ever leaves its value is as good as straight.
+        let skewness = if most <= MOST_SKEWED { skewness } else { Third::default() };
         for (x, of_x) in NODES {
             for (y, of_y) in NODES {
                 for (z, of_z) in NODES {
@@ -87,6 +93,16 @@ fn rotated(third: &Third, by: &Matrix3<f64>) -> Third {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What hardly ever leaves its value has a skewness in the tens; its variance is that of the straight function.
+    #[test]
+    fn no_variance_is_negative() {
+        let mut third = [[[0.0; 3]; 3]; 3];
+        third[1][1][1] = 30.0 * 1e-3_f64.powi(3);
+        let covariance = Matrix3::from_diagonal(&[1e-6; 3].into());
+        let (_, found) = moments([1.0, 2.0, 3.0], &[(covariance, third)], |[x, y, z]| [y * y, x, z]);
+        assert!((found[(0, 0)] / 16e-6 - 1.0).abs() < 1e-5 && found[(1, 1)] > 0.0, "{found}");
+    }
 
     /// A square of a skew variable: with variance s and third cumulant k about m, (m + d)² has the mean m² + s and the
     /// variance 4m²s + 4mk + 2s², but for the fourth cumulant.

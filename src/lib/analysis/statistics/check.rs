@@ -313,9 +313,9 @@ fn deviation(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
     let offset = measured.mean[i] - expected.mean[i];
     let spread = if n > 1.0 { measured.covariance[(i, i)] * (n - 1.0) / n } else { 0.0 };
     let found = offset * offset + spread;
-    let population =
+    let population: f64 =
         expected.sampling.covariance[(i, i)] * (n - 1.0).max(0.0) / n + expected.sampling.mean_covariance[(i, i)];
-    let p = if found <= population + expected.rounding(i).powi(2) { 1.0 } else { (population / found).min(1.0) };
+    let p = if found <= population + expected.rounding(i).powi(2) { 1.0 } else { (population / found).clamp(0.0, 1.0) };
     Test {
         subject: Subject::Deviation,
         channels: vec![measured.names[i].clone()],

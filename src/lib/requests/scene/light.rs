@@ -115,7 +115,7 @@ pub(super) fn checked(electrons: [f64; 3], name: &str) -> Result<[f64; 3]> {
     if electrons.iter().any(|e| !(0.0..f64::INFINITY).contains(e)) {
         return Err(Error::format(
             name,
-            "its radiance is negative or not finite, so that no electrons can be expected of it",
+            "its radiance is negative, not finite, or endless at this exposure: no electrons can be expected of it",
         ));
     }
     match electrons.into_iter().find(|e| *e > f64::from(f32::MAX)) {

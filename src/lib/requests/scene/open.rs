@@ -243,13 +243,16 @@ impl Scene {
 
 /// A warning of light that fills photosites; none of light that does not, or that is not known before it is read.
 fn overfull(light: &Light, readout: Option<&ReadOut>) -> Option<Note> {
-    let (Light::Uniform { electrons, .. }, Some(readout)) = (light, readout) else { return None };
+    let (Light::Uniform { electrons, source }, Some(readout)) = (light, readout) else { return None };
+    let remedy = match source.as_str() {
+        "--electrons" => "fewer of them keep",
+        _ => "a shorter exposure, or --expose-to 0.8 in place of --exposure, keeps",
+    };
     let full = Class::ALL.into_iter().zip(electrons).filter(|(_, e)| **e >= readout.full_well_e);
     let full: Vec<String> = full.map(|(class, e)| format!("{} expects {e:.0} e-", class.letter())).collect();
     (!full.is_empty()).then(|| {
         Note::Warning(format!(
-            "{}, but full well is {} e-: these samples will be saturated; a shorter exposure, or --expose-to 0.8, keeps \
-             them below",
+            "{}, but full well is {} e-: these samples will be saturated; {remedy} them below",
             full.join(", "),
             readout.full_well_e
         ))
