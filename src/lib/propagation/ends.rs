@@ -30,7 +30,7 @@ const ABOUT_ENDS: f64 = 15.0;
 /// Width of the seam, in codes, as a standard deviation.
 const SEAM: f64 = 1.3;
 /// Places where laws are cut off below, beyond which they are not told apart.
-const MOST_BREAKS: usize = 300;
+const MOST_BREAKS: usize = 1200;
 /// Half of the seam, in codes.
 const HALF_SEAM: f64 = 8.0 * SEAM;
 
@@ -158,7 +158,8 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
     let [_, upper] = reading.rails_e();
     let code = reading.visible_code_e().unwrap_or(0.0);
     let open = if upper > full + REACH * reading.noise_e + 2.0 * code { reading.without_highest() } else { *reading };
-    let (below, above): (Vec<Node>, Vec<Node>) = near.iter().partition(|node| node.mean <= full);
+    let (below, above): (Vec<Node>, Vec<Node>) =
+        near.iter().partition(|node| node.mean <= full && node.floor == f64::NEG_INFINITY);
     let mut sum = [0.0; 4];
     let mut add = |weight: f64, moments: Moments| {
         for (sum, moment) in sum.iter_mut().zip(moments) {
@@ -180,7 +181,7 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
             continue;
         }
         nodes.sort_by(|a, b| a.mean.total_cmp(&b.mean));
-        let reach = |node: &Node| (REACH * node.std - (node.mean - full).abs()).min(full - node.floor);
+        let reach = |node: &Node| (REACH * node.std + direction * (node.mean - full)).min(full - node.floor);
         let farthest = nodes.iter().map(reach).fold(0.0, f64::max);
         let stds = nodes.iter().map(|node| node.std);
         let is_narrow = |std: &f64| *std < MANY * code;

@@ -62,9 +62,9 @@ impl Law {
             && adc.electrons_at(top) > high
     }
 
-    /// Whether laws of a charge are so far above full well that they are cut off at their floors.
-    fn has_floors(&self, charge: &Charge) -> bool {
-        self.light.rate + self.dark.rate + 9.5 * charge.shot_std() > MANY_WELLS * self.full_well_e
+    /// Whether the charge is so far above full well that its laws are cut off at floors.
+    pub fn has_floors(&self) -> bool {
+        self.light.rate + self.dark.rate > MANY_WELLS * self.full_well_e
     }
 
     fn least_pattern_std(&self) -> f64 {
@@ -79,7 +79,7 @@ impl Law {
         let given = self.least_pattern_std().hypot(noise_e);
         // Where laws are cut off at the count of the other charge, that is told apart to an electron.
         let ends_at = |charge: &Charge, by: &Charge| {
-            by.is_rectified(self.full_well_e) && charge.pattern <= 0.0 && self.has_floors(by)
+            by.is_rectified(self.full_well_e) && charge.pattern <= 0.0 && self.has_floors()
         };
         let [is_inner_told, is_outer_told] = [ends_at(narrow, wide), ends_at(wide, narrow)];
         let mut by_step: Vec<(u32, Vec<_>)> = Vec::new();
@@ -100,7 +100,7 @@ impl Law {
                 let mean = inner.electrons + outer.electrons;
                 // Below what the charge of the lesser pattern holds there is next to nothing.
                 let floor = match narrow.pattern.total_cmp(&wide.pattern) {
-                    _ if mean <= MANY_WELLS * self.full_well_e => f64::NEG_INFINITY,
+                    _ if !self.has_floors() => f64::NEG_INFINITY,
                     Ordering::Greater => outer.electrons,
                     Ordering::Less => inner.electrons,
                     Ordering::Equal => 0.0,

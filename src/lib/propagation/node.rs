@@ -17,10 +17,10 @@ pub(super) struct Node {
     pub mean: f64,
     pub std: f64,
     pub weight: f64,
-    /// Where it is cut off below, for a mean of so many full wells that the law would otherwise reach far below zero; −∞ for
+    /// Where it is cut off below, for a charge of so many full wells that the law would otherwise reach far below zero; −∞ for
     /// others.
     pub floor: f64,
 }
 
-/// Full wells of a mean from which a normal law is cut off at its floor.
-pub(super) const MANY_WELLS: f64 = 2.0;
+/// Full wells of a charge from which its laws are cut off at floors, which leave out the pattern of what the floors are.
+pub(super) const MANY_WELLS: f64 = 30.0;

@@ -5,7 +5,7 @@
 
 use super::counts::{Charge, Count};
 use super::ends::{MANY, Place, Stretch, difference};
-use super::node::{Law, MANY_WELLS, Node};
+use super::node::{Law, Node};
 use super::reading::{Moments, Reading};
 use crate::numerics::normal::{MeanVariance, density};
 use crate::numerics::rounding::{REACH, SMOOTH};
@@ -27,8 +27,11 @@ fn is_cut(count: &Count, full_well_e: f64) -> bool {
 /// The same as normal laws, where full well is within reach and the other charge has a pattern, whose law full well cuts: charges
 /// below zero leave, and come back as none.
 pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
-    let most = MANY_WELLS * law.full_well_e;
     let mut found = Vec::new();
+    // Laws of more wells are cut off at their floors.
+    if law.has_floors() {
+        return found;
+    }
     for (charge, other) in [(&law.light, &law.dark), (&law.dark, &law.light)] {
         let Some((counts, base)) = below_zero(charge).filter(|_| charge.is_rectified(law.full_well_e)) else {
             continue;
@@ -39,7 +42,7 @@ pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
         let stretch = Stretch { widest_panel: 2.5 * narrowest, ..base };
         for place in stretch.places(&Reading::electrons(0.0, 0.0), &[]) {
             for other in &others {
-                let share = density_at(&counts, place.electrons, most - other.electrons);
+                let share = density_at(&counts, place.electrons);
                 let weight = other.weight * place.weight * share;
                 if weight > LEAST_WEIGHT {
                     let node = Node { mean: other.electrons, std: other.spread, weight, floor: f64::NEG_INFINITY };
@@ -61,23 +64,25 @@ pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
 
 /// All that rectification adds to a reading but for [`signed_nodes`]; `full` is full well where that is within reach.
 pub(super) fn corrections(law: &Law, reading: &Reading, full: f64) -> Moments {
-    // Laws of more wells are cut off at their floors.
-    let most = MANY_WELLS * law.full_well_e;
     let mut sum = [0.0; 4];
+    // Laws of more wells are cut off at their floors.
+    if law.has_floors() {
+        return sum;
+    }
     let unsigned = |other: &Charge| {
         let mut others = plain(other, law, reading);
         others.retain(|other| full == f64::INFINITY || !is_cut(other, full));
         others
     };
     if law.light.is_rectified(law.full_well_e) {
-        add(&mut sum, 1.0, of_charge(&law.light, &unsigned(&law.dark), reading, [full, most]));
+        add(&mut sum, 1.0, of_charge(&law.light, &unsigned(&law.dark), reading, full));
     }
     if law.dark.is_rectified(law.full_well_e) {
         let mut others = unsigned(&law.light);
         if law.light.is_rectified(law.full_well_e) {
             others.extend(signed(&law.light));
         }
-        add(&mut sum, 1.0, of_charge(&law.dark, &others, reading, [full, most]));
+        add(&mut sum, 1.0, of_charge(&law.dark, &others, reading, full));
     }
     sum
 }
@@ -113,7 +118,7 @@ fn signed(charge: &Charge) -> Vec<Count> {
     let mut found = Vec::new();
     let mut gone = 0.0;
     for place in stretch.places(&reading, &[]) {
-        let weight = place.weight * density_at(&counts, place.electrons, f64::INFINITY);
+        let weight = place.weight * density_at(&counts, place.electrons);
         gone += weight;
         found.push(Count { electrons: place.electrons, weight: -weight, spread: 0.0 });
     }
@@ -141,13 +146,13 @@ fn below_zero(charge: &Charge) -> Option<(Vec<Count>, Stretch)> {
     (extent > 0.0).then_some((counts, stretch))
 }
 
-/// Density of the charge at `electrons` < 0, of counts up to `most`.
-fn density_at(counts: &[Count], electrons: f64, most: f64) -> f64 {
+/// Density of the charge at `electrons` < 0.
+fn density_at(counts: &[Count], electrons: f64) -> f64 {
     let at = |count: &Count| {
         let z = (electrons - count.electrons) / count.spread;
         if z > -REACH { count.weight * density(z) / count.spread } else { 0.0 }
     };
-    counts.iter().take_while(|count| count.electrons <= most).map(at).sum()
+    counts.iter().map(at).sum()
 }
 
 /// The density below zero, looked up: cubic between places that are even in ln(1 + |v|/a), a the narrowest spread.
@@ -207,12 +212,9 @@ fn seams(reading: &Reading, other: &MeanVariance, full: f64) -> Vec<f64> {
     edges.into_iter().filter(|edge| edge.is_finite()).flat_map(of_edge).collect()
 }
 
-fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]: [f64; 2]) -> Moments {
+fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, full: f64) -> Moments {
     let mut sum = [0.0; 4];
     let Some((counts, base)) = below_zero(charge) else { return sum };
-    if counts.first().is_none_or(|first| first.electrons > most) {
-        return sum;
-    }
     let code = reading.visible_code_e();
     // Shared places where no code is to be gone through; then the density is worked out once.
     let is_shared = others.len() > MANY_NODES || code.is_none();
@@ -224,8 +226,7 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]:
         let finest = reading.noise_e.max(if is_shared && code.is_some() { f64::INFINITY } else { 0.0 });
         let narrow = Stretch { narrowest: blind.narrowest.min(finest.max(1e-3)), ..blind };
         let places = narrow.places(&Reading::electrons(0.0, 0.0), &seams(reading, &spread_out, full));
-        let room = most - spread_out.mean;
-        let share = |place: &Place| (place.electrons, place.weight * density_at(&counts, place.electrons, room));
+        let share = |place: &Place| (place.electrons, place.weight * density_at(&counts, place.electrons));
         places.iter().map(share).collect()
     } else {
         Vec::new()
@@ -233,7 +234,6 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]:
     // Codes are gone through as far as laws reach that are narrow.
     let spreads = counts.iter().map(|count| count.spread);
     let narrow = spreads.filter(|spread| *spread < MANY * code.unwrap_or(0.0)).fold(0.0, f64::max);
-    let most_e = counts.last().map_or(0.0, |last| last.electrons);
     let table = (!is_shared && others.len() > 8).then(|| Table::new(&base, &counts));
     for other in others {
         let variance = other.spread * other.spread;
@@ -253,10 +253,10 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, [full, most]:
         let widest_narrow = if is_hidden { 0.0 } else { narrow };
         let stretch = Stretch { from: other.electrons, widest_narrow, noise_e, ..base };
         for place in stretch.places(&blurred, &[]) {
-            let (below, room) = (place.electrons - other.electrons, most - other.electrons);
+            let below = place.electrons - other.electrons;
             let share = match &table {
-                Some(table) if room >= most_e => table.at(below),
-                _ => density_at(&counts, below, room),
+                Some(table) => table.at(below),
+                None => density_at(&counts, below),
             };
             if share * place.weight * other.weight.abs() > LEAST_WEIGHT {
                 let at = place.electrons.min(full);
