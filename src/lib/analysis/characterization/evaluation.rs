@@ -10,8 +10,8 @@ use crate::color::{Space, White, lab_from_xyz, matrix};
 use crate::error::{Error, Result};
 use crate::metadata::{FrameHeader, Scene};
 use crate::numerics::normal;
-use crate::propagation::frame::Predicted;
-use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
+use crate::propagation::frame::{Predicted, Sites};
+use crate::propagation::{Equations, FramePrediction, PixelMoments, Unpredictable};
 use crate::stages::darks::{DarkFrames, LessDarks};
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::{PHASES, phase};
@@ -432,9 +432,10 @@ fn moments(differences: &[Difference]) -> (Difference, Difference, Difference) {
     (moment(0), moment(1), moment(2))
 }
 
-/// What is predicted of a frame of demosaicked pixels, or of colors.
+/// What is predicted of a frame of demosaicked pixels, or of colors: where that is void, to first order, beside which the
+/// simulation stands.
 fn pixels_of(head: &FrameHeader) -> Predicted<Box<PixelMoments>> {
-    match propagation::of_frame(head, Equations::Exact)? {
+    match Sites::of(head, Equations::Exact)?.frame(head)? {
         FramePrediction::Pixels(pixels) => Ok(pixels),
         FramePrediction::Planes(_) => Err(Unpredictable::Missing("demosaic")),
     }
