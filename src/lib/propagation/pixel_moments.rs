@@ -95,7 +95,7 @@ impl PixelMoments {
     }
 
     /// The same pixels in a space that is not linear in these channels, `local` about their means without noise and `value` the
-    /// color of any: weights by the Jacobian, mean and covariance by [`curved::moments`](super::curved::moments).
+    /// color of any: weights by the Jacobian, mean and covariance by [`curved::moments`].
     #[must_use]
     pub(super) fn curved(&self, local: &color::Local, value: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
         let straight = self.through(&local.jacobian, 0.0);
