@@ -1,7 +1,21 @@
 //! Changes of documents that leave them documents: other values, keys that are missing. Changes of single bytes seldom get
 //! past the parser.
 
+use libfuzzer_sys::fuzzer_mutate;
 use serde_yaml::{Mapping, Value};
+
+/// Changes `data[..size]`, a document: every other time as one, otherwise, or where that is not possible, its bytes. Gives the
+/// new size.
+pub fn of_text(data: &mut [u8], size: usize, max_size: usize, seed: u32) -> usize {
+    let text = std::str::from_utf8(&data[..size]).ok().filter(|_| seed % 2 == 0);
+    match text.and_then(|text| changed(text, seed)) {
+        Some(text) if text.len() <= max_size => {
+            data[..text.len()].copy_from_slice(text.as_bytes());
+            text.len()
+        }
+        _ => fuzzer_mutate(data, size, max_size),
+    }
+}
 
 /// Numbers and words that are at an edge of something.
 const EDGES: [&str; 30] = [

@@ -244,8 +244,8 @@ fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
 }
 
 /// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946]. Where ν is small, or
-/// samples have two values, the probability is Chebyshev's bound, var s²/(s² − E s²)². Of independent samples with tails heavier than normal ones the law has
-/// the skewness that their cumulants give.
+/// samples have two values, the probability is Chebyshev's bound, var s²/(s² − E s²)². Of independent samples with tails
+/// heavier than normal ones the law has the skewness that their cumulants give.
 fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
     let expected = law.sampling.covariance[(i, i)];
     let pair = pair([i, i]);
