@@ -318,6 +318,21 @@ const SPECTRA: &[Advice] = &[
         &["render-radiance --dark --size 2x2 --exposure 0.033 -o out.exr"],
     ),
     advice(
+        "render-radiance --dark --size 2x2 --exposure 33ms -o out.exr",
+        "it looks like 0.033 s",
+        &["render-radiance --dark --size 2x2 --exposure 0.033 -o out.exr"],
+    ),
+    advice(
+        "render-radiance --dark --size 2x2 --f-number f/5.6 -o out.exr",
+        "it looks like 5.6",
+        &["render-radiance --dark --size 2x2 --f-number 5.6 -o out.exr"],
+    ),
+    advice(
+        "add-noise expected.exr --cte 99.999 -o out.exr",
+        "99.999 looks like per cent, which is 0.99999",
+        &["add-noise expected.exr --cte 0.99999 -o out.exr"],
+    ),
+    advice(
         "add-noise expected.exr --temperature 20 -o out.exr",
         "looks like degrees Celsius, which is 293.15 K",
         &["add-noise expected.exr --temperature 293.15 -o out.exr"],

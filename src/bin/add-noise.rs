@@ -26,13 +26,13 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Seed of the temporal noise
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Seed of the fixed patterns: another number, another sensor
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0)]
     sensor_seed: u64,
     /// Number of the exposure: another number, other temporal noise
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0)]
     frame: u32,
     #[command(flatten)]
     noise: options::NoiseChoice,
@@ -41,7 +41,7 @@ struct Arguments {
     poisson: PoissonKind,
     /// Charge transfer efficiency: the share of a packet that each move to the output takes along, above 0 and at most 1;
     /// by default transfer is left out
-    #[arg(long, value_name = "X", value_parser = values::fraction, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", value_parser = values::fraction)]
     cte: Option<f64>,
     #[command(flatten)]
     sensor: options::SensorChoice,

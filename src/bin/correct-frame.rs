@@ -26,13 +26,13 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Black level to remove: auto (from the metadata), none, or a number of ADU
-    #[arg(long, default_value = "none", value_name = "auto|none|N", value_parser = values::black, allow_negative_numbers = true)]
+    #[arg(long, default_value = "none", value_name = "auto|none|N", value_parser = values::black)]
     black: Black,
     /// Dark frame to subtract sample by sample; given more than once, the mean of all
     #[arg(long, value_name = "FILE", conflicts_with = "black")]
     dark: Vec<PathBuf>,
     /// Charge transfer efficiency to undo, above 0 and at most 1; the bias of the converter is left out of it
-    #[arg(long, value_name = "X", value_parser = values::fraction, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", value_parser = values::fraction)]
     cte: Option<f64>,
     #[command(flatten)]
     output: options::Output,

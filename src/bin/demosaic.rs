@@ -29,7 +29,7 @@ struct Arguments {
     #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>())]
     method: Method,
     /// Black level to remove: auto (from the metadata), none, or a number in the unit of the samples
-    #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = values::black, allow_negative_numbers = true)]
+    #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = values::black)]
     black: Black,
     /// Pattern of a plane that carries none, or another than it carries: rggb, bggr, grbg or gbrg
     #[arg(long, value_parser = values::pattern)]

@@ -23,13 +23,13 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Bits of the converter, 1 to 16; by default the sensor's
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N")]
     bits: Option<u32>,
     /// Bias in ADU; by default the sensor's
-    #[arg(long, value_name = "ADU", value_parser = values::number, allow_negative_numbers = true)]
+    #[arg(long, value_name = "ADU", value_parser = values::number)]
     bias: Option<f64>,
     /// Slope in ADU per electron; by default the sensor's
-    #[arg(long, value_name = "ADU_PER_E", value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "ADU_PER_E", value_parser = values::positive)]
     slope: Option<f64>,
     #[command(flatten)]
     sensor: options::SensorChoice,

@@ -33,7 +33,7 @@ struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=64))]
     zoom: usize,
     /// What is black and what is white: full, LOW,HIGH in the unit of the samples, or so many standard deviations about the mean of each plane, as in 4sigma
-    #[arg(long, default_value = "full", value_name = "full|LOW,HIGH|Nsigma", value_parser = range, allow_negative_numbers = true)]
+    #[arg(long, default_value = "full", value_name = "full|LOW,HIGH|Nsigma", value_parser = range)]
     range: Range,
     #[command(flatten)]
     general: cli::General,

@@ -25,7 +25,7 @@ use crate::requests::{self, Note};
 use crate::stages::darks::DarkFrames;
 use crate::stream::{Counts, RowSource, Stage};
 use crate::text::one_line;
-use clap::{CommandFactory, FromArgMatches};
+use clap::{ArgAction, CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
@@ -55,7 +55,11 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     memory::complain_as(program);
     signals::tidy_up_first();
     register::keep();
-    let command = A::command().name(program).bin_name(program);
+    // `-1` is a value, of which the option says what is wrong.
+    let command = A::command().name(program).bin_name(program).mut_args(|argument| match argument.get_action() {
+        ArgAction::Set | ArgAction::Append if !argument.is_positional() => argument.allow_negative_numbers(true),
+        _ => argument,
+    });
     let parsed = command.try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
     let arguments = match parsed {
         Ok(arguments) => arguments,
@@ -96,8 +100,9 @@ fn show(program: &str, text: &clap::Error) -> ExitCode {
 
 /// Writes one line to the standard error.
 fn complain(program: &str, text: &str) {
-    // Where the standard error is closed there is nobody to tell.
-    drop(writeln!(std::io::stderr(), "{program}: {}", one_line(text)));
+    // In one piece, so that the lines of several programs do not mix. Where the standard error is closed there is nobody to tell.
+    let line = format!("{program}: {}\n", one_line(text));
+    drop(std::io::stderr().write_all(line.as_bytes()));
 }
 
 impl Session {

@@ -1,6 +1,6 @@
 //! Tables of spectra as CSV, plain or gzipped.
 //!
-//! Lines that start with `#` are comments. Two layouts are read: a column of wavelengths and one column per curve, or one
+//! Lines that start with `#` are comments; commas, semicolons or tabs part the cells. Two layouts are read: a column of wavelengths and one column per curve, or one
 //! row per spectrum under a header of wavelengths. Units stand in the header, in a row of their own below it, or in
 //! comments; wavelengths without a unit are in nm.
 
@@ -8,7 +8,7 @@ use super::foreign::csv_complaint;
 use super::radiance_unit::{self, FileSays};
 use crate::error::{Error, Result};
 use crate::spectrum::{Curve, SHORTEST_NM, check_wavelengths};
-use crate::units::{RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
+use crate::units::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
 use csv::StringRecord;
 use flate2::read::GzDecoder;
 use ndarray::Array2;
@@ -103,8 +103,11 @@ impl SpectralTable {
         };
         let comments = Comments::of(&bytes);
         let headings = headings(&columns, units.as_ref(), by_rows.then_some(&first[0]));
-        let heading =
-            units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && unit_of_heading(cell).is_none());
+        let is_of_radiance = |cell: &str| {
+            let unknown = |stated: &Stated| matches!(stated, Stated::Other { kind: OtherUnit::Unknown, .. });
+            unit_of_heading(cell).is_some_and(|stated| !unknown(&stated))
+        };
+        let heading = units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && !is_of_radiance(cell));
         let unit = wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength);
         let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
         wavelength_nm.iter_mut().for_each(|wavelength: &mut f64| *wavelength = unit.nm(*wavelength));
@@ -275,7 +278,15 @@ impl Cells {
                     None if by_rows && column == 0 => 0.0,
                     None => {
                         let shown: String = text.chars().take(20).collect();
-                        return Err(refuse(format!("line {line}, column {}: `{shown}` is no number", column + 1)));
+                        let hint = if number(&text.replacen(',', ".", 1)).is_some() {
+                            "; write decimals with a point"
+                        } else {
+                            ""
+                        };
+                        return Err(refuse(format!(
+                            "line {line}, column {}: `{shown}` is no number{hint}",
+                            column + 1
+                        )));
                     }
                 });
             }
@@ -288,8 +299,9 @@ impl Cells {
 
 /// Refuses a table of too many cells, before any of them is told apart: each row is held as a whole.
 fn check_cells(name: &str, bytes: &[u8]) -> Result<()> {
-    let commas = bytes.iter().filter(|byte| **byte == b',').count();
-    if commas < MAX_CELLS {
+    let separator = separator(bytes);
+    let separators = bytes.iter().filter(|byte| **byte == separator).count();
+    if separators < MAX_CELLS {
         return Ok(());
     }
     Err(Error::format(name, format!("it has more than {MAX_CELLS} numbers; no table has")))
@@ -299,9 +311,17 @@ fn check_cells(name: &str, bytes: &[u8]) -> Result<()> {
 fn reader(bytes: &[u8], has_headers: bool) -> csv::Reader<&[u8]> {
     csv::ReaderBuilder::new()
         .comment(Some(b'#'))
+        .delimiter(separator(bytes))
         .has_headers(has_headers)
         .trim(csv::Trim::All)
         .from_reader(without_mark(bytes))
+}
+
+/// What parts the cells: the first of comma, semicolon and tab that the first line which is no comment has.
+fn separator(bytes: &[u8]) -> u8 {
+    let is_row = |line: &&[u8]| !line.starts_with(b"#") && !line.trim_ascii().is_empty();
+    let first = without_mark(bytes).split(|byte| *byte == b'\n').find(is_row).unwrap_or_default();
+    *b",;\t".iter().find(|separator| first.contains(separator)).unwrap_or(&b',')
 }
 
 /// Bytes without a byte order mark.
@@ -350,6 +370,15 @@ mod tests {
     }
 
     #[test]
+    fn cells_are_parted_by_commas_semicolons_or_tabs() {
+        let by_commas = SpectralTable::parse("a", b"# a; b\nnm,L (W/m2/sr/nm)\n400,1\n410,3\n").unwrap();
+        for separator in [";", "\t", "; "] {
+            let text = format!("\u{FEFF}# a, b\n\nnm{separator}L (W/m2/sr/nm)\n400{separator}1\n410{separator}3\n");
+            assert_eq!(SpectralTable::parse("a", text.as_bytes()).unwrap(), by_commas);
+        }
+    }
+
+    #[test]
     fn complaints_name_the_place() {
         let complaint = |text: &str| SpectralTable::parse("t.csv", text.as_bytes()).unwrap_err().to_string();
         assert_eq!(complaint("nm,L\n400,1\n410,x\n"), "t.csv: line 3, column 2: `x` is no number");
@@ -357,6 +386,8 @@ mod tests {
         assert!(complaint("nm,L\n400,nan\n").contains("`nan` is no number"));
         assert!(complaint("").contains("no rows"));
         assert!(complaint("nm,L\n400,1\n410\n").contains("not a CSV table"));
+        let decimal = "t.csv: line 2, column 2: `1,5` is no number; write decimals with a point";
+        assert_eq!(complaint("nm;L\n400;1,5\n"), decimal);
     }
 
     #[test]

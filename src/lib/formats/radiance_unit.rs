@@ -78,7 +78,7 @@ fn of_remarks(name: &str, remarks: &[Stated], given: Option<RadianceUnit>) -> Re
                 Stated::Other { text, kind } => Some(format!("`{text}`, {}", kind.in_words())),
             });
             let spoken_of = other.unwrap_or_default();
-            let problem = format!("its comments speak of {spoken_of}; if its values are spectral radiances");
+            let problem = format!("it does not say the unit of its values, and its comments speak of {spoken_of}");
             Err(Error::format(name, problem).give(&["radiance_unit"]))
         }
         (several, Some(given)) if several.contains(&given) => Ok(given),

@@ -86,7 +86,7 @@ pub struct ColorPair {
     #[arg(long, value_name = "d65|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
     pub white: Option<White>,
     /// Luminance of the white in cd/m2; by default that in the metadata of an image, or 100 for colors given as numbers
-    #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
     pub white_luminance: Option<f64>,
 }
 

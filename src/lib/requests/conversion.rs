@@ -28,16 +28,16 @@ pub struct Conversion {
     #[command(flatten)]
     pub white: WhiteChoice,
     /// Black level that is left in the frame, in ADU, for one whose metadata do not state it; 0 where it is off
-    #[arg(long, value_name = "N", value_parser = values::number, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = values::number)]
     pub black: Option<f64>,
     /// Exposure time in s, for a frame whose metadata do not state it
-    #[arg(id = "exposure", long, value_name = "S", value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(id = "exposure", long, value_name = "S", value_parser = values::seconds)]
     pub exposure_s: Option<f64>,
     /// Relative aperture, for a frame whose metadata do not state it
-    #[arg(long, value_name = "N", value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = values::f_number)]
     pub f_number: Option<f64>,
     /// Transmittance of the lens, 0 to 1, for a frame whose metadata do not state it
-    #[arg(long, value_name = "FRACTION", value_parser = values::fraction, allow_negative_numbers = true)]
+    #[arg(long, value_name = "FRACTION", value_parser = values::fraction)]
     pub lens_transmittance: Option<f64>,
 }
 

@@ -30,7 +30,7 @@ pub struct Input {
     /// Frame to read, EXR or TIFF; `-` or none for standard input
     pub input: Option<PathBuf>,
     /// Part of a multi-part EXR, or page of a TIFF, counted from 0
-    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0, value_name = "N")]
     pub part: usize,
     /// YAML file whose metadata replace those that come with the input
     #[arg(long, value_name = "FILE")]
@@ -127,10 +127,10 @@ pub struct Subject {
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
 pub struct Lens {
     /// Relative aperture
-    #[arg(long, value_name = "N", default_value_t = 8.0, value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 8.0, value_parser = values::f_number)]
     pub f_number: f64,
     /// Transmittance of the lens, 0 to 1
-    #[arg(long, value_name = "FRACTION", default_value_t = 1.0, value_parser = values::fraction, allow_negative_numbers = true)]
+    #[arg(long, value_name = "FRACTION", default_value_t = 1.0, value_parser = values::fraction)]
     pub lens_transmittance: f64,
 }
 
@@ -150,7 +150,7 @@ impl Lens {
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
 pub struct ExposureChoice {
     /// Exposure time in s
-    #[arg(id = "exposure", long, value_name = "S", default_value_t = 0.033, value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(id = "exposure", long, value_name = "S", default_value_t = 0.033, value_parser = values::seconds)]
     pub exposure_s: f64,
     /// The lens.
     #[command(flatten)]
@@ -172,7 +172,7 @@ impl ExposureChoice {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct SignalLevel {
     /// Choose the exposure time that puts the brightest class, on the axis, at this fraction of full well
-    #[arg(long, value_name = "FRACTION", value_parser = values::filling, allow_negative_numbers = true, conflicts_with_all = ["electrons", "dark", "exposure"])]
+    #[arg(long, value_name = "FRACTION", value_parser = values::filling, conflicts_with_all = ["electrons", "dark", "exposure"])]
     pub expose_to: Option<f64>,
     /// Expected electrons of R,G,B, given outright
     #[arg(long, value_name = "R,G,B", value_parser = values::electrons, allow_hyphen_values = true)]
@@ -199,7 +199,7 @@ pub struct SpectrumChoice {
     #[arg(long, value_name = "NAME", conflicts_with = "sample")]
     pub column: Option<String>,
     /// One spectrum of a library, counted from 0 (pixels row by row)
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N")]
     pub sample: Option<usize>,
 }
 
@@ -207,13 +207,13 @@ pub struct SpectrumChoice {
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
 pub struct SampleExposureChoice {
     /// Exposure time in s of every sample; with --expose-to, the aperture is chosen instead of the time
-    #[arg(id = "exposure", long, value_name = "S", value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(id = "exposure", long, value_name = "S", value_parser = values::seconds)]
     pub exposure_s: Option<f64>,
     /// The lens.
     #[command(flatten)]
     pub lens: Lens,
     /// Expose each sample so that its brightest class fills this fraction of full well; 0.75 where no --exposure is given
-    #[arg(long, value_name = "FRACTION", value_parser = values::fraction, allow_negative_numbers = true)]
+    #[arg(long, value_name = "FRACTION", value_parser = values::fraction)]
     pub expose_to: Option<f64>,
 }
 
@@ -247,7 +247,7 @@ pub struct NoiseChoice {
     #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = values::choice::<Source>())]
     pub without: Vec<Source>,
     /// Temperature of the sensor in K; by default the sensor's own
-    #[arg(id = "temperature", long, value_name = "K", value_parser = values::kelvin, allow_negative_numbers = true)]
+    #[arg(id = "temperature", long, value_name = "K", value_parser = values::kelvin)]
     pub temperature_k: Option<f64>,
 }
 
@@ -274,6 +274,6 @@ pub struct WhiteChoice {
     #[arg(long, default_value_t, value_name = "d65|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
     pub white: White,
     /// Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates
-    #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
     pub white_luminance: Option<f64>,
 }

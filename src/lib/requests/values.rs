@@ -102,6 +102,41 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
     number(text).ok().filter(|x| *x >= 0.0).ok_or_else(|| "give a number that is not below 0".into())
 }
 
+/// Reads a time in s.
+///
+/// # Errors
+///
+/// What is expected, in words; what a text that looks like a time says in s.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let hint = in_seconds(text).map_or(String::new(), |time| format!("; it looks like {time} s"));
+    positive(text).map_err(|_| format!("give a time in s, above 0{hint}"))
+}
+
+/// A time that is written with its unit, or as a fraction such as `1/30`, in s.
+fn in_seconds(text: &str) -> Option<f64> {
+    let text = text.trim().trim_end_matches("ec").to_ascii_lowercase();
+    let (amount, divisor) = [("ms", 1e3), ("us", 1e6), ("µs", 1e6), ("s", 1.0), ("", 1.0)]
+        .into_iter()
+        .find_map(|(unit, divisor)| Some((text.strip_suffix(unit)?.trim(), divisor)))?;
+    let amount = match amount.split_once('/') {
+        Some((above, below)) => positive(above.trim()).ok()? / positive(below.trim()).ok()?,
+        None => positive(amount).ok()?,
+    };
+    (amount > 0.0).then_some(amount / divisor)
+}
+
+/// Reads a relative aperture.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn f_number(text: &str) -> Result<f64, String> {
+    let lower = text.to_ascii_lowercase();
+    let number = lower.strip_prefix("f/").or_else(|| lower.strip_prefix('f')).and_then(|rest| positive(rest).ok());
+    let hint = number.map_or(String::new(), |n| format!("; it looks like {n}"));
+    positive(text).map_err(|_| format!("give a number above 0{hint}"))
+}
+
 /// Reads the size of a patch, `WIDTHxHEIGHT`, at least 2 pixels and at most 1024 on a side.
 ///
 /// # Errors
@@ -130,15 +165,21 @@ pub fn fraction(text: &str) -> Result<f64, String> {
 pub fn filling(text: &str) -> Result<f64, String> {
     match positive(text) {
         Ok(found) if per_cent(text).is_empty() => Ok(found),
-        Ok(_) => Err(format!("give a fraction of full well{}", per_cent(text))),
-        Err(problem) => Err(problem),
+        Ok(_) | Err(_) if !per_cent(text).is_empty() => Err(format!("give a fraction of full well{}", per_cent(text))),
+        other => other,
     }
 }
 
 /// What to say of a number that looks like per cent where a fraction is wanted; nothing of others.
 fn per_cent(text: &str) -> String {
-    let found = number(text).ok().filter(|x| (PER_CENT_FROM..=100.0).contains(x));
-    found.map_or(String::new(), |x| format!("; {x} looks like per cent, which is {}", x / 100.0))
+    let marked = text.trim().strip_suffix('%').and_then(|rest| positive(rest.trim()).ok());
+    let found = marked.or_else(|| number(text).ok().filter(|x| (PER_CENT_FROM..=100.0).contains(x)));
+    found.map_or(String::new(), |x| format!("; {text} looks like per cent, which is {}", hundredth(x)))
+}
+
+/// A hundredth, to twelve digits: 99.999 is 0.99999, not what binary fractions make of it.
+fn hundredth(x: f64) -> f64 {
+    format!("{:.11e}", x / 100.0).parse().unwrap_or(x / 100.0)
 }
 
 /// From here on a number looks like per cent; below, like a fraction that is too large.
@@ -273,6 +314,29 @@ mod tests {
         assert_eq!(read(choice::<Method>(), "nearest"), None);
         let some = || one_of(&[Space::Xyz, Space::Lab]);
         assert_eq!((read(some(), "lab"), read(some(), "srgb")), (Some(Space::Lab), None));
+    }
+
+    #[test]
+    fn what_looks_like_another_unit_is_said_in_ours() {
+        let of_time = |text: &str| seconds(text).unwrap_err();
+        assert_eq!(seconds("0.033"), Ok(0.033));
+        for (text, time) in
+            [("33ms", "0.033"), ("33 ms", "0.033"), ("1/50", "0.02"), ("2s", "2"), ("2 sec", "2"), ("50us", "0.00005")]
+        {
+            assert_eq!(of_time(text), format!("give a time in s, above 0; it looks like {time} s"));
+        }
+        for text in ["0", "-1", "fast", "1/0", "ms"] {
+            assert_eq!(of_time(text), "give a time in s, above 0");
+        }
+        assert_eq!(f_number("8"), Ok(8.0));
+        assert_eq!(f_number("f/5.6"), Err("give a number above 0; it looks like 5.6".into()));
+        let share = |text| fraction(text).unwrap_err();
+        assert_eq!(
+            share("99.999"),
+            "give a fraction above 0 and at most 1; 99.999 looks like per cent, which is 0.99999"
+        );
+        assert_eq!(share("75%"), "give a fraction above 0 and at most 1; 75% looks like per cent, which is 0.75");
+        assert_eq!(filling("75%"), Err("give a fraction of full well; 75% looks like per cent, which is 0.75".into()));
     }
 
     #[test]

@@ -249,17 +249,83 @@ pub fn units_in(text: &str) -> Vec<Stated> {
 }
 
 /// What the heading of a column says about the unit of its numbers; a name such as `irradiance` counts where there is no
-/// unit.
+/// unit, and what stands in brackets where it looks like one.
 pub fn unit_of_heading(heading: &str) -> Option<Stated> {
     let tokens = tokens(heading);
     let named = |kind| Some(Stated::Other { text: heading.to_owned(), kind });
-    units_among(&tokens).pop().map(|found| found.says).or_else(|| {
+    let in_words = || {
         tokens.iter().filter_map(Token::lower).find_map(|word| match (word.as_str(), base(&word)) {
             ("irradiance", _) => named(OtherUnit::Irradiance),
             (_, Some(Base::Photons)) => named(OtherUnit::Photons),
             _ => None,
         })
-    })
+    };
+    let bracketed = in_brackets(heading);
+    let in_brackets = || {
+        let text = bracketed.filter(|text| looks_like_a_unit(text))?;
+        Some(Stated::Other { text: text.to_owned(), kind: OtherUnit::Unknown })
+    };
+    let found = units_among(&tokens).pop().map(|found| found.says).map(|says| match (says, bracketed) {
+        // Part of a unit is none: `(W/m2/xy/nm)`.
+        (Stated::Other { kind: OtherUnit::Irradiance | OtherUnit::AllWavelengths, .. }, Some(text))
+            if self::tokens(text).iter().any(Token::is_strange) =>
+        {
+            Stated::Other { text: text.to_owned(), kind: OtherUnit::Unknown }
+        }
+        (says, _) => says,
+    });
+    found.or_else(in_words).or_else(in_brackets)
+}
+
+/// What stands in the last brackets of a heading.
+fn in_brackets(heading: &str) -> Option<&str> {
+    let [open, close] = [heading.find(['(', '[']), heading.rfind([')', ']'])].map(Option::unwrap_or_default);
+    heading.get(open + 1..close).map(str::trim).filter(|text| !text.is_empty())
+}
+
+/// Whether a text is the unit of something, known or not: it has powers or is divided, or is a unit or a scale that people
+/// name.
+fn looks_like_a_unit(text: &str) -> bool {
+    const NAMED: [&str; 32] = [
+        "cd",
+        "lm",
+        "lx",
+        "lux",
+        "nit",
+        "nits",
+        "flick",
+        "mw",
+        "gw",
+        "pw",
+        "w",
+        "j",
+        "erg",
+        "v",
+        "mv",
+        "uv",
+        "db",
+        "dn",
+        "adu",
+        "counts",
+        "count",
+        "cts",
+        "percent",
+        "rel",
+        "relative",
+        "normalized",
+        "normalised",
+        "arb",
+        "au",
+        "log",
+        "log10",
+        "ev",
+    ];
+    let tokens = tokens(text);
+    let has_numbers = tokens.iter().any(|token| matches!(token, Token::Number(_) | Token::End));
+    let is_power =
+        |token: &Token| !has_numbers && matches!(token, Token::Per | Token::Factor { exponent: Some(_), .. });
+    let is_named = |token: &Token| token.lower().is_some_and(|word| NAMED.contains(&word.as_str()));
+    text.contains('%') || text == "a.u." || tokens.iter().any(is_power) || tokens.first().is_some_and(is_named)
 }
 
 /// A piece of a text.
@@ -283,6 +349,11 @@ impl Token {
             Self::Factor { word, .. } => Some(word.to_ascii_lowercase()),
             _ => None,
         }
+    }
+
+    /// Whether it is a factor that is no unit here.
+    fn is_strange(&self) -> bool {
+        matches!(self, Self::Factor { word, .. } if base(word).is_none())
     }
 
     fn shown(&self) -> String {
@@ -386,7 +457,7 @@ fn base(word: &str) -> Option<Base> {
         "mm" | "millimeter" | "millimetre" => Base::Length(Length::Millimeter),
         "cm" | "centimeter" | "centimetre" => Base::Length(Length::Centimeter),
         "m" | "meter" | "metre" => Base::Length(Length::Meter),
-        "sr" | "steradian" => Base::SolidAngle,
+        "sr" | "str" | "ster" | "steradian" => Base::SolidAngle,
         "s" | "sec" | "second" => Base::Time,
         "hz" | "thz" => Base::Frequency,
         _ => return None,
@@ -513,11 +584,12 @@ mod tests {
     use super::*;
 
     /// Spellings, and what one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    const RADIANCES: [(&str, f64); 38] = [
+    const RADIANCES: [(&str, f64); 39] = [
         ("W cm-2 sr-1 nm-1", 1.0),
         ("W m-2 sr-1 nm-1", 1e-4),
         ("W.m^-2.sr^-1.nm^-1", 1e-4),
         ("W/(m2 sr nm)", 1e-4),
+        ("W/m2/str/nm", 1e-4),
         ("W/(m^2*sr*nm)", 1e-4),
         ("W/(m**2 sr nm)", 1e-4),
         ("W·m⁻²·sr⁻¹·nm⁻¹", 1e-4),
@@ -597,6 +669,15 @@ mod tests {
             ("radiance (1e-6 W cm-2 sr-1 nm-1)", Scaled),
             ("erg s-1 cm-2 sr-1 A-1", Unknown),
             ("W sr-1 nm-1", Unknown),
+            ("radiance (MW m-2 sr-1 nm-1)", Unknown),
+            ("radiance (MW/m2)", Unknown),
+            ("L (cd m-2)", Unknown),
+            ("L [cd/m2]", Unknown),
+            ("sky (%)", Unknown),
+            ("sky (counts)", Unknown),
+            ("sky [a.u.]", Unknown),
+            ("L (flick)", Unknown),
+            ("radiance (W/m2/xy/nm)", Unknown),
         ] {
             assert!(
                 matches!(unit_of_heading(text), Some(Stated::Other { kind: found, .. }) if found == kind),
@@ -605,8 +686,18 @@ mod tests {
             );
             assert_eq!(RadianceUnit::parse(text), None, "{text}");
         }
-        for text in ["radiance", "L", "W", "A", "sky (measured)", "MW m-2 sr-1 nm-1", "Y 1391.68 cd m-2", "a work of W"]
-        {
+        for text in [
+            "radiance",
+            "L",
+            "W",
+            "A",
+            "sky (measured)",
+            "MW m-2 sr-1 nm-1",
+            "Y 1391.68 cd m-2",
+            "a work of W",
+            "sky (az=90/el=45)",
+            "sky (90/45)",
+        ] {
             assert_eq!(unit_of_heading(text), None, "{text}");
         }
     }

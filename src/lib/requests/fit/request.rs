@@ -39,11 +39,11 @@ pub struct Fit {
     #[arg(long, default_value = "equal", value_name = "equal|relative|LIST", value_parser = weights)]
     pub weights: Weights,
     /// Ridge: share of each signal's own sum of squares that is added to it
-    #[arg(long, default_value_t = 0.0, value_name = "SHARE", value_parser = values::not_negative, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_name = "SHARE", value_parser = values::not_negative)]
     pub ridge: f64,
     /// Minimize squared Delta E*ab, with noise weighed in by WEIGHT: 1 for single pixels, 1/N for means of N; adds the
     /// trade-off curve
-    #[arg(long, value_name = "WEIGHT", value_parser = values::not_negative, allow_negative_numbers = true)]
+    #[arg(long, value_name = "WEIGHT", value_parser = values::not_negative)]
     pub noise_weight: Option<f64>,
     /// Labels of the samples: a column of a CSV table with one row a sample
     #[arg(long, value_name = "FILE:COLUMN", value_parser = labels)]
@@ -67,7 +67,7 @@ pub struct Fit {
     #[arg(long, default_value = "20x16", value_name = "WxH", value_parser = values::patch)]
     pub patch: [usize; 2],
     /// Subtract the mean of so many dark frames rather than the black level
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub dark_frames: u32,
     /// Seed of the noise
     #[arg(long, default_value_t = 0)]

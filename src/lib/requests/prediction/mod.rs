@@ -68,7 +68,7 @@ pub struct NoisePrediction {
     #[command(flatten)]
     pub white: WhiteChoice,
     /// Subtract the mean of so many dark frames rather than the black level
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100_000), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     pub dark_frames: u32,
     /// Patch whose mean is predicted, in pixels
     #[arg(long, value_name = "WxH", value_parser = values::size)]

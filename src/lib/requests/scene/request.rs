@@ -21,7 +21,7 @@ pub struct Scene {
     #[command(flatten)]
     pub exposure: ExposureChoice,
     /// Focal length in mm, for --vignetting
-    #[arg(id = "focal-length", long, value_name = "MM", default_value_t = 50.0, value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(id = "focal-length", long, value_name = "MM", default_value_t = 50.0, value_parser = values::positive)]
     pub focal_length_mm: f64,
     /// Darken the frame away from its center by the fourth power of the cosine
     #[arg(long)]
@@ -45,7 +45,7 @@ pub struct Scene {
     #[arg(long, value_name = "PATTERN", value_parser = values::pattern)]
     pub cfa: Option<CfaPattern>,
     /// Part of a multi-part EXR, counted from 0
-    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0, value_name = "N")]
     pub part: usize,
 }
 
