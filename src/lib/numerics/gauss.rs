@@ -28,6 +28,38 @@ static PANEL: LazyLock<[(f64, f64); NODES]> = LazyLock::new(|| {
     })
 });
 
+/// Weights of the barycentric formula for the polynomial through the places: (−1)ⁱ √((1 − xᵢ²) wᵢ).
+static BARYCENTRIC: LazyLock<[f64; NODES]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let (x, weight) = PANEL[i];
+        ((1.0 - x * x) * weight).sqrt() * if i % 2 == 0 { 1.0 } else { -1.0 }
+    })
+});
+
+/// The polynomial through `values` at the places of a [`panel`] from −1 to 1, at `x`.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::numerics::gauss::{interpolated, panel};
+///
+/// let mut values = [0.0; 12];
+/// values.iter_mut().zip(panel(-1.0, 1.0)).for_each(|(value, (x, _))| *value = x.exp());
+/// assert!((interpolated(&values, 0.3) - 0.3f64.exp()).abs() < 1e-13);
+/// ```
+pub fn interpolated(values: &[f64; NODES], x: f64) -> f64 {
+    let (mut above, mut below) = (0.0, 0.0);
+    for ((value, (place, _)), weight) in values.iter().zip(PANEL.iter()).zip(BARYCENTRIC.iter()) {
+        let distance = x - place;
+        if distance == 0.0 {
+            return *value;
+        }
+        above += weight / distance * value;
+        below += weight / distance;
+    }
+    above / below
+}
+
 /// Places and weights of a rule of 12 nodes from `low` to `high`, exact for polynomials of degree 23.
 ///
 /// # Examples

@@ -92,6 +92,23 @@ impl NearlyNormal {
         (cumulative(-z) + density(z) * series).clamp(0.0, 1.0)
     }
 
+    /// Expected amount by which the variable exceeds `limit`, 0 where it does not: the first tail integral of
+    /// [`Self::clipped_above`].
+    pub fn excess(self, limit: f64) -> f64 {
+        let sigma = self.variance.max(0.0).sqrt();
+        let z = (limit - self.mean) / sigma;
+        // Farther off nothing is left of a normal law, nor of its series.
+        if sigma <= 0.0 || z.abs() > 12.0 {
+            return (self.mean - limit).max(0.0);
+        }
+        let (skewness, kurtosis) = (self.third / sigma.powi(3), self.fourth / sigma.powi(4));
+        let (phi, square) = (density(z), z * z);
+        let series = skewness / 6.0 * z
+            + kurtosis / 24.0 * (square - 1.0)
+            + skewness * skewness / 72.0 * (square * (square - 6.0) + 3.0);
+        sigma * (phi - z * cumulative(-z) + phi * series)
+    }
+
     /// Mean and variance of the smaller of the variable and `limit`.
     ///
     /// With u = limit − x, the loss is E[(−u)₊] and E[(−u)₊²], tail integrals of [`Self::exceeds`] that the Edgeworth
@@ -216,6 +233,8 @@ mod tests {
                 let square = expectation(variable, |x| (x.min(limit) - mean).powi(2));
                 // Trapezoid sum of a kinked function: error ~ (step σ)² / 12 ≈ 3·10⁻⁸.
                 assert!((clipped.mean - mean).abs() < 1e-7, "{limit} {} {mean}", clipped.mean);
+                let excess = variable.excess(limit);
+                assert!((excess - (100.0 - clipped.mean)).abs() < 1e-12, "{limit} {excess}");
                 assert!((clipped.variance - square).abs() < 1e-6, "{limit} {} {square}", clipped.variance);
             }
         }

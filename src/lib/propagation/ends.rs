@@ -12,7 +12,7 @@
 
 use super::node::Node;
 use super::reading::{Moments, Reading};
-use crate::numerics::gauss::panel;
+use crate::numerics::gauss::{NODES, interpolated, panel};
 use crate::numerics::normal::{cumulative, density};
 use crate::numerics::rounding::REACH;
 
@@ -115,6 +115,18 @@ impl Stretch {
         ends
     }
 
+    /// Ends of panels on which a polynomial follows the laws that reach there: half as wide as a rule needs to sum them.
+    fn smooth_panels(&self, breaks: &[f64]) -> Vec<f64> {
+        let graded = self.graded();
+        let halves = graded.windows(2).map(|pair| f64::midpoint(pair[0], pair[1]));
+        let broken = breaks.iter().map(|at| (at - self.from) * self.direction);
+        let mut ends: Vec<f64> = graded.iter().copied().chain(halves).chain(broken).collect();
+        ends.retain(|end| (0.0..=self.extent).contains(end));
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        ends
+    }
+
     /// Edges of codes, and of what blurs them, as far as codes are gone through and about the lower rail.
     fn add_codes(&self, ends: &mut Vec<f64>, fine: f64, code: f64, reading: &Reading) {
         let [lower, upper] = reading.rails_e();
@@ -149,6 +161,80 @@ impl Stretch {
             ends.extend(blurs.filter(|_| self.noise_e > 0.0));
             ends.push(distance);
         }
+    }
+}
+
+/// A density that is dear to work out, between ends of panels on which it is smooth: on each the polynomial through it at the
+/// places of Gauss's rule, worked out when it is first asked for.
+struct Interpolant<F> {
+    ends: Vec<f64>,
+    values: Vec<Option<[f64; NODES]>>,
+    of: F,
+}
+
+impl<F: Fn(f64) -> f64> Interpolant<F> {
+    fn new(ends: Vec<f64>, of: F) -> Self {
+        let values = vec![None; ends.len().saturating_sub(1)];
+        Self { ends, values, of }
+    }
+
+    /// Places at which the density is worked out at most.
+    fn places(&self) -> usize {
+        self.values.len() * NODES
+    }
+
+    /// The density at a distance, by the barycentric formula; `charge_at` is the charge at a distance.
+    fn at(&mut self, distance: f64, charge_at: impl Fn(f64) -> f64) -> f64 {
+        let index = self.ends.partition_point(|end| *end <= distance).clamp(1, self.values.len()) - 1;
+        let (low, high) = (self.ends[index], self.ends[index + 1]);
+        let of = &self.of;
+        let values = self.values[index].get_or_insert_with(|| {
+            let mut values = [0.0; NODES];
+            values.iter_mut().zip(panel(low, high)).for_each(|(value, (place, _))| *value = of(charge_at(place)));
+            values
+        });
+        interpolated(values, (distance - f64::midpoint(low, high)) / (0.5 * (high - low)))
+    }
+}
+
+/// Laws that are cut off at floors and so wide that each is one polynomial from its floor to full well: sums of those whose
+/// floors are below a charge.
+struct Flat {
+    /// Ends of the stretch.
+    ends: [f64; 2],
+    /// Floors, rising, and the sums up to each.
+    sums: Vec<(f64, [f64; NODES])>,
+}
+
+impl Flat {
+    fn of(nodes: &[Node], full: f64, extent: f64, direction: f64) -> Option<Self> {
+        let is_flat = |node: &Node| node.floor.is_finite() && node.std > extent;
+        if direction > 0.0 || !nodes.iter().all(is_flat) {
+            return None;
+        }
+        let ends = [full - extent, full];
+        let mut nodes: Vec<&Node> = nodes.iter().collect();
+        nodes.sort_by(|a, b| a.floor.total_cmp(&b.floor));
+        let mut sums: Vec<(f64, [f64; NODES])> = Vec::new();
+        let mut sum = [0.0; NODES];
+        for node in nodes {
+            for (sum, (electrons, _)) in sum.iter_mut().zip(panel(ends[0], ends[1])) {
+                let z = (electrons - node.mean) / node.std;
+                *sum += if z.abs() < REACH { node.weight * density(z) / node.std } else { 0.0 };
+            }
+            match sums.last_mut() {
+                Some((floor, last)) if *floor == node.floor => *last = sum,
+                _ => sums.push((node.floor, sum)),
+            }
+        }
+        Some(Self { ends, sums })
+    }
+
+    fn at(&self, electrons: f64) -> f64 {
+        let below = self.sums.partition_point(|(floor, _)| *floor < electrons);
+        let [low, high] = self.ends;
+        let x = (electrons - f64::midpoint(low, high)) / (0.5 * (high - low));
+        below.checked_sub(1).map_or(0.0, |index| interpolated(&self.sums[index].1, x))
     }
 }
 
@@ -202,15 +288,25 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
         if floors.len() > MOST_BREAKS {
             floors.clear();
         }
-        for place in stretch.places(&open, &floors) {
+        let share_at = |electrons: f64| -> f64 {
             let at = |node: &Node| {
-                let z = (place.electrons - node.mean) / node.std;
-                if z.abs() < REACH && place.electrons > node.floor { node.weight * density(z) / node.std } else { 0.0 }
+                let z = (electrons - node.mean) / node.std;
+                if z.abs() < REACH && electrons > node.floor { node.weight * density(z) / node.std } else { 0.0 }
             };
             let within = |mean: f64| nodes.partition_point(|node| node.mean < mean);
             let reach = REACH * widest;
-            let reached = within(place.electrons - reach)..within(place.electrons + reach);
-            let share: f64 = nodes[reached].iter().map(at).sum();
+            nodes[within(electrons - reach)..within(electrons + reach)].iter().map(at).sum()
+        };
+        let flat = Flat::of(&nodes, full, farthest, direction);
+        let share_at = |electrons: f64| flat.as_ref().map_or_else(|| share_at(electrons), |flat| flat.at(electrons));
+        let places = stretch.places(&open, &floors);
+        let mut shares = Interpolant::new(stretch.smooth_panels(&floors), share_at);
+        // Codes may cut panels that one rule would do for into many.
+        let is_cut_fine = places.len() > 2 * shares.places();
+        for place in places {
+            let distance = (place.electrons - full) * direction;
+            let share =
+                if is_cut_fine { shares.at(distance, |d| full + direction * d) } else { share_at(place.electrons) };
             if share != 0.0 {
                 let moments =
                     if place.is_smooth { open.smooth_at(place.electrons) } else { open.at(place.electrons, 0.0) };

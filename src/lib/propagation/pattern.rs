@@ -10,7 +10,7 @@ use super::node::Law;
 use super::reading::Reading;
 use crate::metadata::PoissonKind;
 use crate::numerics::gauss::panel;
-use crate::numerics::normal::{NearlyNormal, density};
+use crate::numerics::normal::{NearlyNormal, cumulative, density};
 use crate::numerics::rounding::REACH;
 
 /// What light and dark frames have of the pattern.
@@ -39,26 +39,31 @@ impl Shared {
     fn work_out((light, light_reading): (&Law, &Reading), (dark, dark_reading): (&Law, &Reading)) -> Self {
         let (of_light, of_dark) = (Temporal::of(light, light_reading), Temporal::of(dark, dark_reading));
         let [xs, ys] = [&light.light, &light.dark].map(|charge| sensitivities(charge, light));
-        let mut sums = [0.0; 5];
-        let inner = of_light.evaluations(xs.len() * ys.len());
-        for &(y, of_y) in &ys {
-            let dark_mean = of_dark.mean(1.0, y, of_dark.evaluations(ys.len()) <= AFFORDABLE);
-            for &(x, of_x) in &xs {
-                let light_mean = of_light.mean(x, y, inner <= AFFORDABLE);
-                let weight = of_x * of_y;
-                let terms =
-                    [light_mean, light_mean * light_mean, dark_mean, dark_mean * dark_mean, light_mean * dark_mean];
-                for (sum, term) in sums.iter_mut().zip(terms) {
-                    *sum += weight * term;
-                }
+        let is_light_summed = of_light.evaluations(xs.len() * ys.len()) <= AFFORDABLE;
+        let is_dark_summed = of_dark.evaluations(ys.len()) <= AFFORDABLE;
+        let mut sums = Sums::default();
+        let mut add = |[x, y]: [(f64, f64); 2], dark_mean: f64| {
+            sums.add(x.1 * y.1, of_light.mean(x.0, y.0, is_light_summed), dark_mean);
+        };
+        let dark_mean = |y: f64| of_dark.mean(1.0, y, is_dark_summed);
+        if is_light_summed {
+            for &y in &ys {
+                let dark_mean = dark_mean(y.0);
+                xs.iter().for_each(|&x| add([x, y], dark_mean));
             }
+            return sums.shared();
         }
-        let [light_mean, light_square, dark_mean, dark_square, both] = sums;
-        Self {
-            light: (light_square - light_mean * light_mean).max(0.0),
-            dark: (dark_square - dark_mean * dark_mean).max(0.0),
-            both: both - light_mean * dark_mean,
+        let [along_light, along_dark] = [&light.light, &light.dark].map(Axis::of);
+        // Bends for the dark signal: of most photosites, of those without light, and of dark frames.
+        let mut bends = of_light.knees(along_dark, along_light, 1.0, along_light.spread());
+        bends.extend(of_light.knees(along_dark, along_light, 0.0, 0.0));
+        bends.extend(of_dark.knees(along_dark, along_light, 0.0, 0.0));
+        for y in along_dark.points(&bends) {
+            let dark_mean = dark_mean(y.0);
+            let bends = of_light.knees(along_light, along_dark, y.0, 0.0);
+            along_light.points(&bends).into_iter().for_each(|x| add([x, y], dark_mean));
         }
+        sums.shared()
     }
 
     /// The variance that the pattern gives to a reading of one law.
@@ -66,6 +71,98 @@ impl Shared {
         Self::of((law, reading), (law, reading)).light
     }
 }
+
+/// Weighted sums of the means of light and of dark frames, their squares, and their product.
+#[derive(Debug, Default)]
+struct Sums {
+    light: [f64; 2],
+    dark: [f64; 2],
+    both: f64,
+}
+
+impl Sums {
+    fn add(&mut self, weight: f64, light: f64, dark: f64) {
+        self.light[0] += weight * light;
+        self.light[1] += weight * light * light;
+        self.dark[0] += weight * dark;
+        self.dark[1] += weight * dark * dark;
+        self.both += weight * light * dark;
+    }
+
+    fn shared(&self) -> Shared {
+        let variance = |[mean, square]: [f64; 2]| (square - mean * mean).max(0.0);
+        let both = self.both - self.light[0] * self.dark[0];
+        Shared { light: variance(self.light), dark: variance(self.dark), both }
+    }
+}
+
+/// The sensitivities of the photosites to one charge, max(0, 1 + σ z).
+#[derive(Debug, Clone, Copy)]
+struct Axis {
+    rate: f64,
+    sigma: f64,
+    is_shot: bool,
+}
+
+/// Where the mean of a reading bends, in standard deviations of the sensitivity, and how wide the bend is.
+#[derive(Debug, Clone, Copy)]
+struct Knee {
+    z: f64,
+    width: f64,
+}
+
+impl Axis {
+    /// Widest panel, in standard deviations.
+    const WIDEST: f64 = 3.0;
+    /// Bends narrower than this are ends of panels.
+    const NARROWEST: f64 = 1e-7;
+
+    fn of(charge: &Charge) -> Self {
+        let rate = charge.rate.max(0.0);
+        Self { rate, sigma: if rate > 0.0 { charge.pattern } else { 0.0 }, is_shot: charge.shot.is_some() }
+    }
+
+    /// Standard deviation of what the charge is over photosites, in e⁻.
+    fn spread(&self) -> f64 {
+        self.rate * self.sigma
+    }
+
+    /// Sensitivities and their weights for a function that bends at `knees` and is smooth between: panels that grow with the
+    /// distance from each.
+    fn points(&self, knees: &[Knee]) -> Vec<(f64, f64)> {
+        if self.sigma <= 0.0 {
+            return vec![(1.0, 1.0)];
+        }
+        let lowest = (-1.0 / self.sigma).max(-REACH);
+        let mut ends = vec![lowest, REACH];
+        let mut end = -REACH;
+        while end < REACH {
+            ends.push(end);
+            end += Self::WIDEST;
+        }
+        for knee in knees {
+            ends.push(knee.z);
+            let mut distance = 3.0 * knee.width.max(Self::NARROWEST);
+            while distance < Self::WIDEST {
+                ends.extend([knee.z - distance, knee.z + distance]);
+                distance *= 2.5;
+            }
+        }
+        ends.retain(|end| (lowest..=REACH).contains(end));
+        ends.sort_by(f64::total_cmp);
+        ends.dedup_by(|next, kept| *next - *kept < 1e-9);
+        // Those below zero are zero.
+        let mut found = vec![(0.0, cumulative(lowest))];
+        for pair in ends.windows(2) {
+            found.extend(panel(pair[0], pair[1]).map(|(z, weight)| (1.0 + self.sigma * z, weight * density(z))));
+        }
+        found.retain(|(_, weight)| *weight > LEAST_WEIGHT);
+        found
+    }
+}
+
+/// Weights below this do not count.
+const LEAST_WEIGHT: f64 = 1e-17;
 
 /// Sensitivities and their weights, as many as the means over exposures need, which follow them the more steeply the less
 /// temporal noise there is.
@@ -90,7 +187,7 @@ fn sensitivities(charge: &Charge, law: &Law) -> Vec<(f64, f64)> {
         return found;
     }
     // Those below zero are zero.
-    let mut found = vec![(0.0, crate::numerics::normal::cumulative(lowest))];
+    let mut found = vec![(0.0, cumulative(lowest))];
     let panels = ((REACH - lowest) / (3.0 * scale)).ceil();
     let width = (REACH - lowest) / panels;
     let mut low = lowest;
@@ -137,6 +234,27 @@ impl<'a> Temporal<'a> {
         sensitivities.saturating_mul(self.light.len()).saturating_mul(self.dark.len())
     }
 
+    /// Where means bend along one axis, at a sensitivity of the other: at full well and at the ends of the codes. The other
+    /// charge may spread out by `spread_e`, which widens the bends.
+    fn knees(&self, axis: Axis, across: Axis, other: f64, spread_e: f64) -> Vec<Knee> {
+        if axis.sigma <= 0.0 {
+            return Vec::new();
+        }
+        let elsewhere = other * across.rate;
+        let noise_e = self.law.read_noise_e;
+        let [lower, upper] = self.reading.rails_e();
+        let levels = [(self.law.full_well_e, 0.0), (lower, noise_e), (upper, noise_e)];
+        let knee = |(level, noise_e): (f64, f64)| {
+            let own = (level - elsewhere).max(0.0);
+            let shot = |axis: Axis, variance: f64| if axis.is_shot { variance } else { 0.0 };
+            let of_shot = shot(axis, own * own / axis.rate) + shot(across, elsewhere * other);
+            let z = ((level - elsewhere) / axis.rate - 1.0) / axis.sigma;
+            Knee { z, width: (of_shot + noise_e * noise_e + spread_e * spread_e).sqrt() / axis.spread() }
+        };
+        let is_near = |knee: &Knee| knee.z.abs() < REACH * (1.0 + knee.width) + 1.0;
+        levels.into_iter().filter(|(level, _)| level.is_finite()).map(knee).filter(is_near).collect()
+    }
+
     fn mean(&self, x: f64, y: f64, is_affordable: bool) -> f64 {
         if is_affordable { self.sum(x, y) } else { self.edgeworth(x, y) }
     }
@@ -172,9 +290,7 @@ impl<'a> Temporal<'a> {
         let [lower, upper] = self.reading.rails_e();
         let noise = NearlyNormal::normal(0.0, self.law.read_noise_e.powi(2));
         let (read, is_full) = if upper <= full { (charge.plus(noise), false) } else { (charge, full.is_finite()) };
-        let above = |variable: NearlyNormal, limit: f64| {
-            if limit.is_finite() { variable.mean - variable.clipped_above(limit).mean } else { 0.0 }
-        };
+        let above = |variable: NearlyNormal, limit: f64| if limit.is_finite() { variable.excess(limit) } else { 0.0 };
         let mut mean = read.mean - above(read, if is_full { full } else { upper });
         let whole = charge.plus(noise);
         let mirrored = NearlyNormal { mean: -whole.mean, third: -whole.third, ..whole };

@@ -64,6 +64,16 @@ impl Reading {
         Self { asked: Asked::Beyond(level_e), noise_e, center: 0.0 }
     }
 
+    /// Whether nothing that is told apart has an end.
+    pub fn is_endless(&self) -> bool {
+        self.rails_e() == [f64::NEG_INFINITY, f64::INFINITY]
+    }
+
+    /// Whether what is asked is to be beyond a level that no charge up to `most` reaches.
+    pub fn is_never_beyond(&self, most: f64) -> bool {
+        matches!(self.asked, Asked::Beyond(level) if most + REACH * self.noise_e < level)
+    }
+
     /// The moments at a charge whose own variance is `variance`.
     pub fn at(&self, electrons: f64, variance: f64) -> Moments {
         let variance = variance + self.noise_e * self.noise_e;

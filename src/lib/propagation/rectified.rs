@@ -41,9 +41,9 @@ pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
         let Some(narrowest) = others.iter().map(|other| other.spread).min_by(f64::total_cmp) else { continue };
         let stretch = Stretch { widest_panel: 2.5 * narrowest, ..base };
         for place in stretch.places(&Reading::electrons(0.0, 0.0), &[]) {
+            let share = place.weight * density_at(&counts, place.electrons);
             for other in &others {
-                let share = density_at(&counts, place.electrons);
-                let weight = other.weight * place.weight * share;
+                let weight = other.weight * share;
                 if weight > LEAST_WEIGHT {
                     let node = Node { mean: other.electrons, std: other.spread, weight, floor: f64::NEG_INFINITY };
                     found.push(Node { mean: other.electrons + place.electrons, weight: -weight, ..node });
@@ -69,22 +69,31 @@ pub(super) fn corrections(law: &Law, reading: &Reading, full: f64) -> Moments {
     if law.has_floors() {
         return sum;
     }
-    let unsigned = |other: &Charge| {
-        let mut others = plain(other, law, reading);
-        others.retain(|other| full == f64::INFINITY || !is_cut(other, full));
-        others
+    let others = |other: &Charge, signed: Vec<Count>| {
+        let mut each = plain(other, law, reading);
+        each.retain(|other| full == f64::INFINITY || !is_cut(other, full));
+        each.extend_from_slice(&signed);
+        let is_uncut = full == f64::INFINITY || other.most() < full;
+        let few = is_uncut.then(|| other.counts(f64::INFINITY).into_iter().chain(signed).collect());
+        Others { each, few }
     };
-    if law.light.is_rectified(law.full_well_e) {
-        add(&mut sum, 1.0, of_charge(&law.light, &unsigned(&law.dark), reading, full));
+    let is_out_of_reach = |other: &Charge| reading.is_never_beyond(other.most());
+    if law.light.is_rectified(law.full_well_e) && !is_out_of_reach(&law.dark) {
+        add(&mut sum, 1.0, of_charge(&law.light, &others(&law.dark, Vec::new()), reading, full));
     }
-    if law.dark.is_rectified(law.full_well_e) {
-        let mut others = unsigned(&law.light);
-        if law.light.is_rectified(law.full_well_e) {
-            others.extend(signed(&law.light));
-        }
-        add(&mut sum, 1.0, of_charge(&law.dark, &others, reading, full));
+    if law.dark.is_rectified(law.full_well_e) && !is_out_of_reach(&law.light) {
+        let signed = if law.light.is_rectified(law.full_well_e) { signed(&law.light) } else { Vec::new() };
+        add(&mut sum, 1.0, of_charge(&law.dark, &others(&law.light, signed), reading, full));
     }
     sum
+}
+
+/// The normal laws of the other charge.
+struct Others {
+    /// As many as are told apart.
+    each: Vec<Count>,
+    /// As many as the mean of a polynomial takes; none where full well cuts them.
+    few: Option<Vec<Count>>,
 }
 
 fn add(sum: &mut Moments, weight: f64, moments: Moments) {
@@ -212,9 +221,10 @@ fn seams(reading: &Reading, other: &MeanVariance, full: f64) -> Vec<f64> {
     edges.into_iter().filter(|edge| edge.is_finite()).flat_map(of_edge).collect()
 }
 
-fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, full: f64) -> Moments {
+fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> Moments {
     let mut sum = [0.0; 4];
     let Some((counts, base)) = below_zero(charge) else { return sum };
+    let Others { each: others, few } = others;
     let code = reading.visible_code_e();
     // Shared places where no code is to be gone through; then the density is worked out once.
     let is_shared = others.len() > MANY_NODES || code.is_none();
@@ -235,18 +245,26 @@ fn of_charge(charge: &Charge, others: &[Count], reading: &Reading, full: f64) ->
     let spreads = counts.iter().map(|count| count.spread);
     let narrow = spreads.filter(|spread| *spread < MANY * code.unwrap_or(0.0)).fold(0.0, f64::max);
     let table = (!is_shared && others.len() > 8).then(|| Table::new(&base, &counts));
-    for other in others {
-        let variance = other.spread * other.spread;
-        let still = reading.at(other.electrons.min(full), variance);
-        if is_shared {
+    if is_shared {
+        let gone: f64 = shared.iter().map(|(_, weight)| weight).sum();
+        for other in others {
+            add(&mut sum, other.weight * gone, reading.at(other.electrons.min(full), other.spread.powi(2)));
+        }
+        // What is moved is a polynomial where codes are many, or none, and nothing ends.
+        let is_polynomial = reading.is_endless() && (is_many || code.is_none());
+        for other in few.as_ref().filter(|_| is_polynomial).unwrap_or(others) {
+            let variance = other.spread * other.spread;
             for &(below, weight) in &shared {
                 let at = (other.electrons + below).min(full);
                 let is_free = is_many && reading.is_free_at(at, variance);
                 let moved = if is_free { smooth(reading, at, variance) } else { reading.at(at, variance) };
-                add(&mut sum, other.weight * weight, difference(still, moved));
+                add(&mut sum, -other.weight * weight, moved);
             }
-            continue;
         }
+        return sum;
+    }
+    for other in others {
+        let still = reading.at(other.electrons.min(full), other.spread * other.spread);
         let noise_e = reading.noise_e.hypot(other.spread);
         let blurred = Reading { noise_e, ..*reading };
         let is_hidden = code.is_some_and(|code| noise_e > SMOOTH * code);
