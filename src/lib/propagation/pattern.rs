@@ -299,3 +299,55 @@ impl<'a> Temporal<'a> {
         if is_full { offset + self.rounding_at_full * charge.exceeds(full) } else { offset }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::noise::NoiseModel;
+
+    /// Of dark current that fills three of four wells, and none in one: what is left of the variance beside the pattern is the
+    /// mean variance of a photosite over exposures, which a fine sum over sensitivities gives by itself.
+    #[test]
+    fn what_is_temporal_is_the_mean_variance_of_photosites() {
+        for (light_e, dark_e, dcnu, full_well_e, read_noise_e) in [
+            (9.9356, 168_124.0, 1.5752, 8021.84, 0.985_78),
+            (8.1751, 340_076.0, 1.2045, 3491.55, 0.0),
+            (2000.0, 900.0, 0.4, 3000.0, 4.0),
+        ] {
+            let model = NoiseModel {
+                dark_e,
+                dcnu,
+                prnu: 0.0,
+                read_noise_e,
+                full_well_e,
+                dark_shot: true,
+                signal_shot: true,
+                poisson: PoissonKind::Exact,
+            };
+            let law = Law::of(&model, light_e);
+            let reading = law.of_electrons();
+            let temporal = law.predict(&reading).moments.variance - Shared::of_one(&law, &reading);
+            let of_photosite = |sensitivity: f64| {
+                let skew = light_e + sensitivity.powi(3) * dark_e;
+                let charge = NearlyNormal {
+                    mean: light_e + sensitivity * dark_e,
+                    variance: light_e + sensitivity.powi(2) * dark_e,
+                    third: skew,
+                    fourth: skew,
+                };
+                charge.clipped_above(full_well_e).variance
+            };
+            let (step, lowest) = (2e-6, -1.0 / dcnu);
+            let mut expected = read_noise_e.powi(2) + cumulative(lowest) * light_e;
+            // Above the well of most photosites nothing is left to vary.
+            let above = ((2.0 * full_well_e / dark_e).min(4.0) - 1.0) / dcnu;
+            let mut z = lowest + 0.5 * step;
+            while z < above {
+                expected += step * density(z) * of_photosite(1.0 + dcnu * z);
+                z += step;
+            }
+            // A difference of variances a million times as large, each good to 10⁻¹⁰.
+            assert!((temporal / expected - 1.0).abs() < 1e-3, "{temporal} {expected}");
+        }
+    }
+}
