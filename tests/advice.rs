@@ -143,16 +143,16 @@ const ORDER: &[Advice] = &[
         &["demosaic plane.exr -o d.exr", "to-xyz d.exr --matrix matrix.yaml -o out.exr"],
     ),
     advice(
-        "correct-frame noisy.exr --cte 0.9 -o out.exr",
+        "correct-frame noisy.exr --black auto -o out.exr",
         "run `digitize` first",
-        &["digitize noisy.exr -o c.exr", "correct-frame c.exr --cte 0.9999 -o out.exr"],
+        &["digitize noisy.exr -o c.exr", "correct-frame c.exr --black auto -o out.exr"],
     ),
     advice(
         "correct-frame codes.exr -o out.exr",
         "give --black, --dark or --cte",
         &[
             "correct-frame codes.exr --black auto -o out.exr",
-            "correct-frame codes.exr --cte 0.9999 -o out.exr",
+            "correct-frame codes.exr --metadata silent.yaml --black 1757 --cte 0.9999 -o out.exr",
             "correct-frame codes.exr --dark dark.exr -o out.exr",
         ],
     ),
@@ -330,7 +330,7 @@ const SPECTRA: &[Advice] = &[
     advice(
         "add-noise expected.exr --cte 99.999 -o out.exr",
         "99.999 looks like per cent, which is 0.99999",
-        &["add-noise expected.exr --cte 0.99999 -o out.exr"],
+        &["add-noise expected.exr --cte 0.99999 --quiet -o out.exr"],
     ),
     advice(
         "add-noise expected.exr --temperature 20 -o out.exr",

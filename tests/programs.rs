@@ -75,7 +75,7 @@ fn named_output_is_the_standard_output_byte_for_byte() {
         ("add-noise --seed 3", "expected.exr"),
         ("digitize", "noisy.exr"),
         ("mosaic", "noisy.exr"),
-        ("correct-frame --black auto --cte 0.999", "plane.exr"),
+        ("correct-frame --quiet --black auto --cte 0.999", "plane.exr"),
         ("demosaic --method shti", "plane.exr"),
         ("to-xyz --matrix matrix.yaml --space srgb", "rgb.exr"),
         ("measure", "noisy.exr"),

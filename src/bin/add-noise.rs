@@ -26,13 +26,13 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     /// Seed of the temporal noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>)]
     seed: u64,
     /// Seed of the fixed patterns: another number, another sensor
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>)]
     sensor_seed: u64,
     /// Number of the exposure: another number, other temporal noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = values::whole::<u32>)]
     frame: u32,
     #[command(flatten)]
     noise: options::NoiseChoice,

@@ -5,11 +5,11 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::register::check_inputs;
-use cyanometer::requests::{options, values};
+use cyanometer::requests::{self, options, values};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
 use cyanometer::stages::darks::DarkFrames;
-use cyanometer::stream::RowSource;
+use cyanometer::stream::{RowSource, Stage};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -55,6 +55,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let stack = darks.as_ref().map(DarkFrames::stack);
     let mut stage = CorrectFrame::new(reader.header(), &settings, stack)?;
     session.sign(stage.header_mut());
+    session.tell(requests::of_levels(stage.header()).as_slice());
     for warning in stage.warnings() {
         session.warn(warning);
     }

@@ -6,11 +6,12 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::names::Named;
-use cyanometer::requests::{options, values};
+use cyanometer::propagation::pixels::dim_green_below;
+use cyanometer::requests::{self, options, values};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
-use cyanometer::stream::RowSource;
+use cyanometer::stream::{RowSource, Stage};
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -55,9 +56,11 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
     session.sign(stage.header_mut());
+    session.tell(requests::of_levels(stage.header()).as_slice());
     if arguments.sigma {
         session.drive(reader, &WithSigma::of_demosaicking(stage)?, &arguments.output)?;
     } else {
+        dim_green_below(stage.header()).into_iter().for_each(|level| stage.count_greens_below(level));
         session.drive(reader, &stage, &arguments.output)?;
     }
     Ok(())

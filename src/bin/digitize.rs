@@ -52,6 +52,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     propagation::note(stage.header_mut(), Equations::Exact);
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());
+    session.tell(requests::of_slope(stage.header()).as_slice());
     session.drive(reader, &stage, &arguments.output)?;
     Ok(())
 }

@@ -291,7 +291,13 @@ fn head_of(input: &mut File, name: &str) -> Result<Vec<u8>> {
 /// The readers of what a file begins as.
 fn readers_of(head: &[u8], name: &str) -> Result<Readers> {
     table::by_head(head, name)?.ok_or_else(|| {
-        let hint = if is_text(head) { "; it looks like text (a spectrum goes into `render-radiance`)" } else { "" };
+        let hint = if head.len() < 8 {
+            format!("; it has {} bytes and no more", head.len())
+        } else if is_text(head) {
+            "; it looks like text (a spectrum goes into `render-radiance`)".into()
+        } else {
+            String::new()
+        };
         Error::format(name, format!("it is neither {} file{hint}", table::names_of_read()))
     })
 }

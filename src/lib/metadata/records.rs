@@ -287,6 +287,9 @@ pub struct SamplesRecord {
     /// Hues that could not be formed because green was zero; bilinear values stand in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub undefined_hue: Option<u64>,
+    /// Pixels whose green, by which smooth hue transition divides, is less than ten times its noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dim_green: Option<u64>,
     /// Colors outside sRGB, clipped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub out_of_gamut: Option<u64>,

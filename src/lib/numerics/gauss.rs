@@ -45,7 +45,8 @@ static BARYCENTRIC: LazyLock<[f64; NODES]> = LazyLock::new(|| {
 ///
 /// let mut values = [0.0; 12];
 /// values.iter_mut().zip(panel(-1.0, 1.0)).for_each(|(value, (x, _))| *value = x.exp());
-/// assert!((interpolated(&values, 0.3) - 0.3f64.exp()).abs() < 1e-13);
+/// // The polynomial through e^x is off by less than e 2⁻¹¹/12!.
+/// assert!((interpolated(&values, 0.3) - 0.3f64.exp()).abs() < 3e-12);
 /// ```
 pub fn interpolated(values: &[f64; NODES], x: f64) -> f64 {
     let (mut above, mut below) = (0.0, 0.0);

@@ -169,32 +169,8 @@ impl PixelNoise {
         })?;
         let method = Method::named(&record.method)
             .ok_or_else(|| frame.refuse(format!("it was demosaicked by `{}`, a method unknown here", record.method)))?;
-        let transferred = metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
-        if transferred || metadata.correction.is_some_and(|correction| correction.cte.is_some()) {
-            return Err(frame.refuse(
-                "its charge was transferred, and what that does to noise differs from place to place; no standard \
-                 deviations can be told",
-            ));
-        }
-        let readout = frame.readout()?;
-        let noise = match &metadata.noise {
-            Some(noise) => noise.clone(),
-            None => whole_noise(frame)?,
-        };
-        let model = NoiseModel::of(frame, &noise)?;
-        let dark_frames = metadata.correction.map_or(0, |correction| correction.dark_frames);
-        let photosite = Photosite::of_electrons(model, Equations::Exact);
-        let (photosite, black) = match metadata.quantity {
-            QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
-                (photosite, metadata.dark_signal_e.unwrap_or(0.0))
-            }
-            _ => {
-                let adc = metadata.adc.unwrap_or_else(|| AdcRecord::of_readout(readout));
-                let codes = photosite.digitized(adc).less_dark_frames(dark_frames);
-                (codes, frame.uniform_black_adu()?)
-            }
-        };
-        let largest = readout.full_well_e * photosite.slope();
+        let (photosite, black) = photosite_of(frame)?;
+        let largest = photosite.model.full_well_e * photosite.slope();
         let table = WeightTable::of(method, record.cfa);
         let columns = Places::new(frame.geometry.width, method.reach());
         let rows = Places::new(frame.geometry.height, method.reach());
@@ -230,6 +206,54 @@ impl PixelNoise {
         });
         (gains.covariance(variances, Some(hues)), first_order.holds)
     }
+}
+
+/// The photosites that a demosaicked frame was made of, and what no light reads in it, in the unit of its samples.
+fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
+    let metadata = &frame.metadata;
+    let transferred = metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
+    if transferred || metadata.correction.is_some_and(|correction| correction.cte.is_some()) {
+        return Err(frame.refuse(
+            "its charge was transferred, and what that does to noise differs from place to place; no standard \
+             deviations can be told",
+        ));
+    }
+    let readout = frame.readout()?;
+    let noise = match &metadata.noise {
+        Some(noise) => noise.clone(),
+        None => whole_noise(frame)?,
+    };
+    let model = NoiseModel::of(frame, &noise)?;
+    let dark_frames = metadata.correction.map_or(0, |correction| correction.dark_frames);
+    let photosite = Photosite::of_electrons(model, Equations::Exact);
+    let found = match metadata.quantity {
+        QuantityKind::Electrons | QuantityKind::ExpectedElectrons => (photosite, metadata.dark_signal_e.unwrap_or(0.0)),
+        _ => {
+            let adc = metadata.adc.unwrap_or_else(|| AdcRecord::of_readout(readout));
+            let codes = photosite.digitized(adc).less_dark_frames(dark_frames);
+            (codes, frame.uniform_black_adu()?)
+        }
+    };
+    Ok(found)
+}
+
+/// The level above black below which the green of a frame demosaicked by smooth hue transition is less than
+/// [`smooth_hue::VOID_BELOW`] times its noise; none for other methods, and where the noise is not known.
+pub fn dim_green_below(frame: &FrameHeader) -> Option<f64> {
+    let record = frame.metadata.demosaic.as_ref()?;
+    if Method::named(&record.method) != Some(Method::SmoothHue) {
+        return None;
+    }
+    let (photosite, black) = photosite_of(frame).ok()?;
+    let slope = photosite.slope();
+    let mut level = 0.0;
+    // Rises to where a level is so many times its noise; the noise rises as its root.
+    for _ in 0..40 {
+        let charge = charge::charge(&photosite.model, level / slope).variance + photosite.model.read_noise_e.powi(2);
+        let rounding = if photosite.adc.is_some() { 1.0 / 12.0 } else { 0.0 };
+        level = smooth_hue::VOID_BELOW * (charge * slope * slope + rounding).sqrt() / 2.0;
+    }
+    Some(black + level).filter(|level| level.is_finite())
 }
 
 /// Everything that the sensor's noise is made of, for a frame whose metadata do not say what was drawn.

@@ -72,14 +72,32 @@ pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
     remarks.chain(doubts.map(Note::Warning)).chain(of_levels(header)).collect()
 }
 
-/// A warning of a black level that leaves no room for light.
+/// A warning of levels that leave no room for light.
 pub fn of_levels(frame: &FrameHeader) -> Option<Note> {
     let metadata = &frame.metadata;
     let (black, white) = (metadata.uniform_black_adu()?, metadata.white_level_adu?.largest());
-    (black >= white).then(|| {
+    let problem = if black >= white {
+        format!("its black level, {black} ADU, is not below its white level, {white} ADU: no sample tells of light")
+    } else if white <= 0.0 {
+        format!("what is subtracted exceeds its white level by {} ADU: no sample is above 0", -white)
+    } else {
+        return None;
+    };
+    Some(Note::Warning(format!("{}: {problem}", frame.name)))
+}
+
+/// A warning of a converter whose slope looks like its inverse, electrons per ADU: full well is far from the range of codes,
+/// and would be near it.
+pub fn of_slope(frame: &FrameHeader) -> Option<Note> {
+    let (adc, readout) = (frame.metadata.adc?, frame.metadata.sensor.as_ref()?.readout.as_ref()?);
+    let range_e = f64::from(adc.top_code()) / readout.full_well_e;
+    let is_near = |slope: f64| (0.25..4.0).contains(&(slope / range_e));
+    let (slope, inverse) = (adc.adu_per_e, adc.adu_per_e.recip());
+    (!(0.05..20.0).contains(&(slope / range_e)) && is_near(inverse)).then(|| {
         Note::Warning(format!(
-            "{}: its black level, {black} ADU, is not below its white level, {white} ADU: no sample tells of light",
-            frame.name
+            "a slope of {slope} ADU per electron puts full well at {:.4} of the largest code; it looks like electrons per \
+             ADU, whose inverse is {inverse:.4}",
+            slope / range_e
         ))
     })
 }

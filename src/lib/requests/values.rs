@@ -9,6 +9,7 @@ use crate::stages::black::Black;
 use crate::units::{self, RadianceUnit};
 use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
+use std::str::FromStr;
 
 /// A parser for a value by one of its names.
 pub fn choice<T: Named>() -> impl TypedValueParser<Value = T> {
@@ -82,6 +83,29 @@ pub fn electrons(text: &str) -> Result<[f64; 3], String> {
 /// What is expected, in words.
 pub fn number(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "give a number".into())
+}
+
+/// Reads a whole number that is not below zero: a seed, or the number of an exposure.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn whole<T: FromStr + Bounded>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| format!("give a whole number from 0 to {}", T::LARGEST))
+}
+
+/// Whole numbers and the largest of them.
+pub trait Bounded {
+    /// The largest.
+    const LARGEST: u64;
+}
+
+impl Bounded for u64 {
+    const LARGEST: u64 = u64::MAX;
+}
+
+impl Bounded for u32 {
+    const LARGEST: u64 = u32::MAX as u64;
 }
 
 /// Reads a number above zero.

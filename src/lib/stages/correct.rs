@@ -58,6 +58,14 @@ impl CorrectFrame {
             warnings.extend(darks.taken_on_trust(input));
             warnings.extend_from_slice(darks.warnings());
         }
+        let known_cte = input.metadata.noise.as_ref().map(|noise| noise.cte.unwrap_or(1.0));
+        if let Some((undone, simulated)) = cte.zip(known_cte).filter(|(undone, simulated)| undone != simulated) {
+            let truth = match simulated {
+                1.0 => "its charge was not transferred".to_owned(),
+                efficiency => format!("its charge was transferred with an efficiency of {efficiency}"),
+            };
+            warnings.push(format!("{}: {truth}, as its metadata say; {undone} is undone all the same", input.name));
+        }
         let known_black = input.black_levels()?;
         let levels = match black {
             Black::None if darks.is_none() && cte.is_none() => {

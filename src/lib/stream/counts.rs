@@ -17,6 +17,8 @@ pub struct Counts {
     pub negative: u64,
     /// Demosaicked values without a green to divide by, or beyond the range of samples.
     pub undefined_hue: u64,
+    /// Pixels whose green, by which smooth hue transition divides, is less than ten times its noise.
+    pub dim_green: u64,
     /// Colors outside sRGB.
     pub out_of_gamut: u64,
     /// Pixels whose noise cannot be propagated.
@@ -37,6 +39,7 @@ impl Counts {
             not_finite: self.not_finite + other.not_finite,
             negative: self.negative + other.negative,
             undefined_hue: self.undefined_hue + other.undefined_hue,
+            dim_green: self.dim_green + other.dim_green,
             out_of_gamut: self.out_of_gamut + other.out_of_gamut,
             propagation_void: self.propagation_void + other.propagation_void,
             saturated_samples: self.saturated_samples + other.saturated_samples,
@@ -55,6 +58,7 @@ impl Counts {
             not_finite: some(self.not_finite),
             negative: some(self.negative),
             undefined_hue: some(self.undefined_hue),
+            dim_green: some(self.dim_green),
             out_of_gamut: some(self.out_of_gamut),
             propagation_void: some(self.propagation_void),
             saturated: some(self.saturated_samples + self.saturated_pixels),
@@ -80,6 +84,11 @@ impl Counts {
             (
                 self.undefined_hue,
                 "values had no green to divide by, or lay beyond the range of samples; bilinear ones stand in",
+            ),
+            (
+                self.dim_green,
+                "pixels have a green of less than ten times its noise, by which smooth hue transition divides: their red and \
+                 blue are biased; other methods do not divide",
             ),
             (self.out_of_gamut, "colors lie outside sRGB and were clipped"),
             (

@@ -20,7 +20,7 @@ pub use method::Method;
 use crate::camera::levels::BlackLevels;
 use crate::cfa::{CfaPattern, Class};
 use crate::error::Result;
-use crate::frame::{Rows, Window, mirror};
+use crate::frame::{Rows, Window, mirror, to_sample};
 use crate::metadata::{DemosaicRecord, FrameHeader};
 use crate::numerics::vectors::{self, Instructions};
 use crate::stages::black::{Black, black_left, white_left};
@@ -60,6 +60,8 @@ pub struct Demosaic {
     pattern: CfaPattern,
     method: Method,
     black: BlackLevels,
+    /// Greens below this, above black, are counted.
+    dim_green: Option<f32>,
 }
 
 impl Demosaic {
@@ -135,12 +137,17 @@ impl Demosaic {
         }
         let geometry = input.geometry.with_channels(&["R", "G", "B"]);
         let header = FrameHeader { geometry, metadata: made, name: input.name.clone() };
-        Ok(Self { header, pattern: cfa, method, black })
+        Ok(Self { header, pattern: cfa, method, black, dim_green: None })
     }
 
     /// The head of the demosaicked frame, to add to.
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
+    }
+
+    /// Counts the pixels whose green is below a level above black, in the unit of the samples.
+    pub fn count_greens_below(&mut self, level: f64) {
+        self.dim_green = Some(to_sample(level));
     }
 
     /// What [`Stage::apply`] does, on one set of instructions; the bits are the same on all of them.
@@ -152,7 +159,7 @@ impl Demosaic {
     /// means of, and fills the row.
     fn interpolate(&self, instructions: Instructions, input: &Window<'_>, mut output: Rows<'_>) -> Counts {
         let (reach, rows) = (self.reach().cast_signed(), output.range());
-        let mut mended = 0;
+        let [mut mended, mut dim] = [0; 2];
         let mut cfa = Ring::new();
         // Hues or differences, and green beside hues.
         let [mut derived, mut greens] = [Ring::new(), Ring::new()];
@@ -179,13 +186,16 @@ impl Demosaic {
                 let [own, other] = if classes[parity] == Class::Red { [red, blue] } else { [blue, red] };
                 let planes = [&mut *own, &mut *green, &mut *other];
                 if self.fill(instructions, [&cfa, &greens, &derived], y, masks(parity, strip.len()), planes) {
-                    mended += mend(cfa.about(y), parity, [own, green, other]);
+                    mended += mend(cfa.about(y), parity, [&mut *own, &mut *green, &mut *other]);
+                }
+                if let Some(level) = self.dim_green {
+                    dim += green.iter().filter(|green| **green < level).count() as u64;
                 }
             }
         }
         // Bilinear values are no stand-ins for themselves.
         let undefined_hue = if self.method == Method::Bilinear { 0 } else { mended };
-        Counts { undefined_hue, ..Counts::default() }
+        Counts { undefined_hue, dim_green: dim, ..Counts::default() }
     }
 
     /// Derives the row `y`, of which the photosites around it are loaded.
@@ -261,7 +271,7 @@ impl Stage for Demosaic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::{Geometry, to_sample};
+    use crate::frame::Geometry;
     use crate::metadata::Metadata;
     use crate::stream::MemoryFrame;
 
