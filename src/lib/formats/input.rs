@@ -2,8 +2,8 @@
 
 use super::digest::SamplesDigest;
 use super::files::{STDIN_NAME, named, open_named, read_file, sidecar_path, spool};
-use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, U16_FULL_SCALE};
-use super::{pipe, register, table, tiff, yaml};
+use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Streaming, U16_FULL_SCALE};
+use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
@@ -19,8 +19,10 @@ use std::path::{Path, PathBuf};
 pub struct InputOptions {
     /// The file; none or `-` for the standard input.
     pub path: Option<PathBuf>,
-    /// Part of a multi-part EXR, page of a TIFF.
+    /// Part of a multi-part EXR, page of a TIFF, HDU of a FITS.
     pub part: usize,
+    /// How the samples lie in a file without a header; none where the file says what it is.
+    pub raw: Option<headerless::Layout>,
     /// A file whose metadata count before all others.
     pub metadata: Option<PathBuf>,
     /// Whether channels besides R, G, B or Y are kept.
@@ -101,10 +103,10 @@ impl FrameReader {
     /// As [`Self::open`].
     pub fn open_file(input: File, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let about = input.metadata().map_err(|e| Error::disk(name, "read", e))?;
-        let reader = if about.is_file() {
-            open_seekable(input, name, options.part)?
-        } else {
-            open_unseekable(input, name, options.part)?
+        let reader = match options.raw {
+            Some(layout) => headerless::open(input, name, options.part, layout)?,
+            None if about.is_file() => open_seekable(input, name, options.part)?,
+            None => open_unseekable(input, name, options.part)?,
         };
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
         let (metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
@@ -260,7 +262,8 @@ fn open_seekable(mut input: File, name: &str, part: usize) -> Opened {
 fn open_unseekable(mut input: File, name: &str, part: usize) -> Opened {
     let head = head_of(&mut input, name)?;
     let readers = readers_of(&head, name)?;
-    if let Some(stream) = readers.stream.filter(|stream| (stream.is_streamable)(&head)) {
+    let is_streamed = |stream: &Streaming| (stream.is_streamable)(&head) && !(stream.has_parts && part != 0);
+    if let Some(stream) = readers.stream.filter(is_streamed) {
         if part != 0 {
             return Err(Error::Usage(format!("{name}: it has no part {part}; it has a single one")));
         }

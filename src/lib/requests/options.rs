@@ -7,6 +7,7 @@ use crate::camera::optics::Exposure;
 use crate::color::White;
 use crate::error::Result;
 use crate::formats::data;
+use crate::formats::headerless::Layout;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::formats::pipe;
@@ -27,11 +28,14 @@ pub(super) fn defaults<R: Args>(words: &[OsString]) -> R {
 /// A frame to read.
 #[derive(Debug, Clone, Args)]
 pub struct Input {
-    /// Frame to read, EXR or TIFF; `-` or none for standard input
+    /// Frame to read, EXR, TIFF, PNG or FITS; `-` or none for standard input
     pub input: Option<PathBuf>,
-    /// Part of a multi-part EXR, or page of a TIFF, counted from 0
+    /// Part of a multi-part EXR or FITS, or page of a TIFF, counted from 0
     #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
     pub part: usize,
+    /// Read a file without a header: rows of u8, u16le, u16be or f32le, behind OFFSET bytes if given
+    #[arg(long, value_name = "WxH:TYPE[:OFFSET]", value_parser = str::parse::<Layout>)]
+    pub raw: Option<Layout>,
     /// YAML file whose metadata replace those that come with the input
     #[arg(long, value_name = "FILE")]
     pub metadata: Option<PathBuf>,
@@ -45,7 +49,8 @@ impl Input {
 
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
-        InputOptions { path: self.input.clone(), part: self.part, metadata: self.metadata.clone(), all_channels: false }
+        let Self { input, part, raw, metadata } = self.clone();
+        InputOptions { path: input, part, raw, metadata, all_channels: false }
     }
 }
 

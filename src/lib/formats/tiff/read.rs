@@ -9,7 +9,7 @@ use super::layout::Layout;
 use crate::error::Result;
 use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
 use crate::frame::Geometry;
-use crate::metadata::Metadata;
+use crate::metadata::{METADATA_BEGIN, Metadata};
 use half::f16;
 use rayon::prelude::*;
 use std::fs::File;
@@ -34,9 +34,6 @@ pub const FORMAT: FrameFormat = FrameFormat {
         stream: None,
     }),
 };
-
-/// What our metadata begin with; other programs put their own words into tag 270.
-const METADATA_BEGIN: &str = "schema: cyanometer/";
 
 /// Reads rows of one image of a TIFF file.
 ///
