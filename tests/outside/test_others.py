@@ -103,11 +103,9 @@ class Tiff(Others):
             self.assertIn(line, text)
 
     def test_exif(self):
-        exif = Image.Exif()
-        directory = exif.get_ifd(0x8769)
-        directory[33434] = TiffImagePlugin.IFDRational(1, 8)
-        directory[33437] = TiffImagePlugin.IFDRational(4, 1)
-        Image.fromarray(self.codes()).save(self.directory / "exif.tif", exif=exif)
+        tags = TiffImagePlugin.ImageFileDirectory_v2()
+        tags[34665] = {33434: TiffImagePlugin.IFDRational(1, 8), 33437: TiffImagePlugin.IFDRational(4, 1)}
+        Image.fromarray(self.codes()).save(self.directory / "exif.tif", tiffinfo=tags)
         self.run_program([*BI, "exif.tif", "--black", "0", "--pattern", "rggb", "-o", "rgb.exr"])
         text = (self.directory / "rgb.exr.yaml").read_text()
         self.assertIn("exposure_s: 0.125", text)
@@ -143,7 +141,8 @@ class Png(Others):
     def test_openimageio(self):
         for names in ("Y", "RGB", "RGBA"):
             planes = {name: self.codes(most=65536) for name in names}
-            write_planes(self.path("in.png"), planes, "u16", png__filter=-1)
+            # Colors that are not premultiplied are stored as they are.
+            write_planes(self.path("in.png"), planes, "u16", oiio__UnassociatedAlpha=1)
             self.check("in.png", planes)
 
     def test_what_is_said_of_encoded_samples(self):
