@@ -5,7 +5,7 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::register::check_inputs;
-use cyanometer::requests::{options, values};
+use cyanometer::requests::{described, options, values};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
 use cyanometer::stages::darks::DarkFrames;
@@ -25,6 +25,8 @@ static MEMORY: cli::Memory = cli::Memory;
 struct Arguments {
     #[command(flatten)]
     input: options::Input,
+    #[command(flatten)]
+    described: described::Described,
     /// Black level to remove: auto (from the metadata), none, or a number of ADU
     #[arg(long, default_value = "none", value_name = "auto|none|N", value_parser = values::black, allow_negative_numbers = true)]
     black: Black,
@@ -48,7 +50,8 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let darks = arguments.dark.iter().map(PathBuf::as_path);
     check_inputs(darks.map(Some).chain([arguments.input.input.as_deref()]))?;
-    let reader = FrameReader::open(&arguments.input.options())?;
+    let mut reader = FrameReader::open(&arguments.input.options())?;
+    arguments.described.apply(reader.header_mut())?;
     let open = |path: &PathBuf| FrameReader::open(&InputOptions { path: Some(path.clone()), ..Default::default() });
     let darks = DarkFrames::of(arguments.dark.iter().map(open).collect::<Result<_>>()?)?;
     let settings = CorrectionSettings { black: arguments.black, cte: arguments.cte };

@@ -6,7 +6,7 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::names::Named;
-use cyanometer::requests::{options, values};
+use cyanometer::requests::{described, options, values};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
@@ -25,6 +25,8 @@ static MEMORY: cli::Memory = cli::Memory;
 struct Arguments {
     #[command(flatten)]
     input: options::Input,
+    #[command(flatten)]
+    described: described::Described,
     /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
     #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>())]
     method: Method,
@@ -52,6 +54,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = FrameReader::open(&arguments.input.options())?;
+    arguments.described.apply(reader.header_mut())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
     session.sign(stage.header_mut());

@@ -284,5 +284,70 @@ class Bare(Others):
         self.same_planes(self.frame([*BI, "in.raw", "--raw", "37x23:u16le"]), wanted)
 
 
+class Described(Others):
+    """Frames that the command line describes."""
+
+    CROP = ["--crop", "5,3,8,6"]
+
+    def cut(self, planes):
+        return {name: samples[3:9, 5:13] for name, samples in planes.items()}
+
+    def test_a_crop_keeps_class_and_noise(self):
+        electrons = self.run_program(["render-radiance", "--electrons", "1000,2000,3000", "--size", "21x14"])
+        (self.directory / "electrons.exr").write_bytes(electrons)
+        noise = ["add-noise", "--seed", "5"]
+        whole = self.planes(self.run_program(noise, electrons))
+        for stdin, words in ((electrons, []), (b"", ["electrons.exr"])):
+            cropped = self.run_program([*noise, *words, *self.CROP], stdin)
+            self.same_planes(self.planes(cropped), self.cut(whole))
+            chain = (["digitize"], ["mosaic", "--pattern", "grbg"])
+            later = self.run_pipe(noise, *chain, stdin=electrons)
+            self.same_planes(self.frame(*chain, stdin=cropped), self.cut(self.planes(later)))
+        # What is cropped after demosaicking, and what before, are the same where no edge is near.
+        plane = self.run_pipe(noise, ["digitize"], ["mosaic"], stdin=electrons)
+        black = ["--method", "bi", "--black", "0"]
+        before = self.frame(["demosaic", *black, *self.CROP], stdin=plane)
+        after = self.cut(self.frame(["demosaic", *black], stdin=plane))
+        inside = lambda planes: {name: samples[1:-1, 1:-1] for name, samples in planes.items()}
+        self.same_planes(inside(before), inside(after))
+
+    def test_a_crop_of_every_format(self):
+        codes = self.codes()
+        Image.fromarray(codes).save(self.directory / "in.png")
+        tifffile.imwrite(self.directory / "in.tif", codes, rowsperstrip=5)
+        fits.PrimaryHDU(codes).writeto(self.directory / "in.fits")
+        codes.astype("<u2").tofile(self.directory / "in.raw")
+        part = codes[3:9, 5:13]
+        for name, options in (("in.png", []), ("in.tif", []), ("in.fits", []), ("in.raw", ["--raw", "37x23:u16le"])):
+            found = self.read(name, [*options, *self.CROP])["Y"]
+            self.assertEqual((found["min"], found["max"]), (part.min(), part.max()), name)
+            self.refused(["measure", name, *options, "--crop", "30,3,8,6"], "within the frame of 37x23", status=BAD_USAGE)
+
+    def test_a_channel_is_a_plane(self):
+        planes = {name: self.codes() for name in ("R", "G", "B", "A")}
+        write_planes(self.path("in.tif"), planes, "u16")
+        for name, samples in planes.items():
+            self.check_plane("in.tif", samples, ["--channel", name])
+        self.refused(["measure", "in.tif", "--channel", "Z"], "it has R, G, B, A", "--channel", status=BAD_USAGE)
+
+    def test_levels_array_and_exposure(self):
+        codes = np.minimum(self.codes(), 4000)
+        Image.fromarray(codes).save(self.directory / "in.png")
+        words = ["in.png", "--white", "4000", "--exposure", "0.5", "--f-number", "4"]
+        self.run_program(["demosaic", *words, "--cfa", "gbrg", "--black", "64", "--method", "bi", "-o", "rgb.exr"])
+        wanted = self.frame([*BI, "in.png", "--pattern", "gbrg", "--black", "64"])
+        found = self.planes((self.directory / "rgb.exr").read_bytes())
+        self.same_planes({name: found[name] for name in "RGB"}, wanted)
+        text = (self.directory / "rgb.exr.yaml").read_text()
+        for line in ("white_level_adu: 3936.0", "exposure_s: 0.5", "f_number: 4.0", "cfa: gbrg", "quantity: adu"):
+            self.assertIn(line, text)
+        done = self.attempt(["measure", *words, "--cfa", "gbrg", "--black", "64", "-v"])
+        self.assertEqual(done.returncode, 0, done.stderr)
+        saturated = int(np.count_nonzero(codes >= 4000))
+        self.assertIn(f"{saturated} samples are saturated", done.stderr.decode())
+        self.assertIn("a CFA plane of ADU", done.stderr.decode())
+        self.refused(["measure", "in.png", "--exposure", "0.5"], "give --f-number", status=BAD_USAGE)
+
+
 if __name__ == "__main__":
     unittest.main()

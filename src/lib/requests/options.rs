@@ -3,6 +3,7 @@
 use super::notes::Note;
 use super::values;
 use crate::analysis::characterization::evaluation::{Filling, SampleExposure};
+use crate::analysis::statistics::Region;
 use crate::camera::optics::Exposure;
 use crate::color::White;
 use crate::error::Result;
@@ -39,6 +40,12 @@ pub struct Input {
     /// YAML file whose metadata replace those that come with the input
     #[arg(long, value_name = "FILE")]
     pub metadata: Option<PathBuf>,
+    /// Take one channel alone, by its name, as a single plane
+    #[arg(long, value_name = "NAME")]
+    pub channel: Option<String>,
+    /// Take a rectangle X,Y,W,H in pixels alone; its photosites keep class, levels and noise
+    #[arg(long, value_name = "X,Y,W,H", value_parser = values::region, allow_hyphen_values = true)]
+    pub crop: Option<Region>,
 }
 
 impl Input {
@@ -49,8 +56,8 @@ impl Input {
 
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
-        let Self { input, part, raw, metadata } = self.clone();
-        InputOptions { path: input, part, raw, metadata, all_channels: false }
+        let Self { input, part, raw, metadata, channel, crop } = self.clone();
+        InputOptions { path: input, part, raw, metadata, all_channels: false, channel, crop }
     }
 }
 
