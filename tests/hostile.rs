@@ -7,6 +7,7 @@ mod support;
 
 use cyanometer::error::Result;
 use cyanometer::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter};
+use cyanometer::formats::fits::FitsReader;
 use cyanometer::formats::format::SampleReader;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::frame::Geometry;
@@ -456,6 +457,55 @@ fn damaged_files_and_pipes_are_taken_or_refused_alike() {
         }
         assert!(both[1] > both[0] / 20, "hardly any change was met: {both:?}");
     }
+}
+
+/// The same of FITS, of one plane and of three, from the top and from the bottom; and of PNG, which are taken as files alone.
+#[test]
+fn damaged_frames_of_others_are_taken_or_refused_alike() {
+    let stream = |bytes: &[u8]| -> Result<Vec<f32>> {
+        let mut reader = FitsReader::stream(Box::new(Cursor::new(bytes.to_vec())), "in")?;
+        let (height, mut samples) = (reader.geometry().height, Vec::new());
+        for _ in 0..height {
+            reader.read(1, &mut samples)?;
+        }
+        Ok(samples)
+    };
+    let bits = |read: Result<Vec<f32>>| read.map(|s| s.into_iter().map(f32::to_bits).collect::<Vec<_>>());
+    let three = fits_begin(16, 3, 4, "NAXIS3  = 3");
+    for (mut whole, samples) in [
+        (fits_begin(16, 3, 4, "ROWORDER= 'TOP-DOWN'"), 2 * 12),
+        (fits_begin(-32, 3, 4, "ROWORDER= 'BOTTOM-UP'"), 4 * 12),
+        (fits_begin(8, 3, 4, "BSCALE  = 1.5E0 / of 1"), 12),
+        ([&three[..169], b"3", &three[170..]].concat(), 2 * 36),
+    ] {
+        let cards = whole.chunks(80).position(|card| card.starts_with(b"END")).unwrap() + 1;
+        whole.extend((0..samples).map(|byte| u8::try_from(byte * 7 % 251).unwrap()));
+        whole.resize(whole.len().next_multiple_of(2880), 0);
+        assert_eq!(bits(read_file(&whole)).unwrap(), bits(stream(&whole)).unwrap());
+        let mut refused = 0;
+        // The first nine bytes tell what it is.
+        for place in (9..80 * cards).chain(2880..2880 + samples) {
+            for change in [0x01, 0x02, 0x10, 0x80, 0xFF] {
+                let mut bytes = whole.clone();
+                bytes[place] ^= change;
+                match (bits(read_file(&bytes)), bits(stream(&bytes))) {
+                    (Ok(file), Ok(pipe)) => assert_eq!(file, pipe, "{place} {change}"),
+                    (Err(_), Err(_)) => refused += 1,
+                    (file, pipe) => panic!("byte {place} ^ {change}: {:?} {:?}", file.err(), pipe.err()),
+                }
+            }
+        }
+        assert!(refused > 20, "hardly any change was met: {refused}");
+    }
+    let whole = png_of_zeros(9, 9);
+    assert!(read_file(&whole).is_ok());
+    let refused = (8..whole.len()).flat_map(|place| [0x01, 0x80, 0xFF].map(|change| (place, change)));
+    let refused = refused.filter(|(place, change)| {
+        let mut bytes = whole.clone();
+        bytes[*place] ^= change;
+        read_file(&bytes).is_err()
+    });
+    assert!(refused.count() > 60);
 }
 
 /// Stacks that no system gives: no thread can be started, as where the number of processes is limited.

@@ -4,9 +4,8 @@ use clap::Parser;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::input::FrameReader;
 use cyanometer::names::Named;
-use cyanometer::requests::{described, options, values};
+use cyanometer::requests::{described::Described, options, values};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
@@ -26,7 +25,7 @@ struct Arguments {
     #[command(flatten)]
     input: options::Input,
     #[command(flatten)]
-    described: described::Described,
+    described: Described,
     /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
     #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>())]
     method: Method,
@@ -53,8 +52,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let mut reader = FrameReader::open(&arguments.input.options())?;
-    arguments.described.apply(reader.header_mut())?;
+    let mut reader = arguments.described.open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
     session.sign(stage.header_mut());

@@ -274,6 +274,15 @@ class Bare(Others):
                 self.check_plane("in.raw", samples, ["--raw", f"37x23:{name}{where}"])
         self.refused(["measure", "in.raw", "--raw", "37x22:f32le"], "it has 3504 bytes, but 37x22:f32le takes 3256")
 
+    def test_dark_frames(self):
+        light, dark = self.codes(), self.codes(most=100)
+        light.tofile(self.directory / "light.raw")
+        dark.tofile(self.directory / "dark.raw")
+        words = ["correct-frame", "light.raw", "--raw", "37x23:u16le", "--dark", "dark.raw"]
+        difference = light.astype(np.float32) - dark
+        self.same_planes(self.frame(words), {"Y": difference})
+        self.same_planes(self.frame([*words, "--crop", "5,3,8,6"]), {"Y": difference[3:9, 5:13]})
+
     def test_a_sidecar_counts(self):
         codes = self.codes()
         codes.astype("<u2").tofile(self.directory / "in.raw")

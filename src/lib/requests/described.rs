@@ -4,6 +4,7 @@ use super::values;
 use crate::camera::optics::Exposure;
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
+use crate::formats::input::{FrameReader, InputOptions};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::units::QuantityKind;
 use clap::Args;
@@ -25,15 +26,29 @@ pub struct Described {
     pub f_number: Option<f64>,
 }
 
-/// Black level of a frame, for programs that do nothing else with it.
+/// All that, and the black level, for programs whose `--black` is nothing else.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
-pub struct DescribedBlack {
+pub struct DescribedWithBlack {
+    /// All but the black level.
+    #[command(flatten)]
+    pub described: Described,
     /// Black level: the code of no light, 0 where it is off
     #[arg(id = "black", long, value_name = "N", value_parser = values::number, allow_negative_numbers = true)]
     pub black_level_adu: Option<f64>,
 }
 
 impl Described {
+    /// Opens a frame, as it is described.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`FrameReader::open`] and [`Self::apply`].
+    pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
+        let mut reader = FrameReader::open(options)?;
+        self.apply(reader.header_mut())?;
+        Ok(reader)
+    }
+
     /// Puts what is said into the metadata of a frame. One of unknown quantity whose array or levels are said is one of ADU.
     ///
     /// # Errors
@@ -73,13 +88,25 @@ impl Described {
     }
 }
 
-impl DescribedBlack {
-    /// Puts what is said into the metadata of a frame, as [`Described::apply`].
+impl DescribedWithBlack {
+    /// Opens a frame, as it is described.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] for what is not ADU.
+    /// Those of [`FrameReader::open`] and [`Self::apply`].
+    pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
+        let mut reader = FrameReader::open(options)?;
+        self.apply(reader.header_mut())?;
+        Ok(reader)
+    }
+
+    /// Puts what is said into the metadata of a frame.
+    ///
+    /// # Errors
+    ///
+    /// As [`Described::apply`]; [`Error::Usage`] for a black level of what is not ADU.
     pub fn apply(&self, frame: &mut FrameHeader) -> Result<()> {
+        self.described.apply(frame)?;
         if let Some(black) = self.black_level_adu {
             check_codes(frame, "black")?;
             frame.metadata.set_black_adu(Some(black.into()));
@@ -127,8 +154,7 @@ mod tests {
             exposure_s: Some(0.5),
             f_number: Some(4.0),
         };
-        said.apply(&mut plane).unwrap();
-        DescribedBlack { black_level_adu: Some(64.0) }.apply(&mut plane).unwrap();
+        DescribedWithBlack { described: said, black_level_adu: Some(64.0) }.apply(&mut plane).unwrap();
         let metadata = &plane.metadata;
         assert_eq!((metadata.quantity, metadata.unit.as_str()), (QuantityKind::Adu, QuantityKind::Adu.unit()));
         assert_eq!((metadata.cfa, metadata.white_level_adu), (said.cfa, Some(4095.0.into())));
@@ -157,7 +183,9 @@ mod tests {
         let white = Described { white_level_adu: Some(1.0), ..Described::default() };
         let complaint = "in: it holds three planes of electrons, which have no level of codes; leave out ";
         assert_eq!(said(white, &mut three), format!("{complaint}`white`"));
-        let black = DescribedBlack { black_level_adu: Some(1.0) }.apply(&mut three).unwrap_err();
+        let black = DescribedWithBlack { black_level_adu: Some(1.0), ..DescribedWithBlack::default() }
+            .apply(&mut three)
+            .unwrap_err();
         assert_eq!(black.to_string(), format!("{complaint}`black`"));
     }
 }

@@ -17,7 +17,7 @@ use crate::stages::noise::NoiseSettings;
 use crate::units::{RadianceUnit, kelvin};
 use clap::{Args, Command};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A request as its options have it where `words` alone are given: what is declared as default is the default everywhere.
 pub(super) fn defaults<R: Args>(words: &[OsString]) -> R {
@@ -58,6 +58,17 @@ impl Input {
     pub fn options(&self) -> InputOptions {
         let Self { input, part, raw, metadata, channel, crop } = self.clone();
         InputOptions { path: input, part, raw, metadata, all_channels: false, channel, crop }
+    }
+
+    /// The same with all channels.
+    pub fn options_for_all(&self) -> InputOptions {
+        InputOptions { all_channels: true, ..self.options() }
+    }
+
+    /// Another frame of the same camera, of which the same part of the sensor is read; its metadata are its own.
+    pub fn beside(&self, path: &Path) -> InputOptions {
+        let Self { raw, channel, crop, .. } = self.clone();
+        InputOptions { path: Some(path.to_owned()), raw, channel, crop, ..InputOptions::default() }
     }
 }
 

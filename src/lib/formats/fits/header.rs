@@ -179,25 +179,22 @@ impl Array {
     /// [`Error::Format`] where one is missing or impossible.
     pub fn of(header: &Header, name: &str) -> Result<Self> {
         let damaged = |key: &str| Error::format(name, format!("it is damaged: its header has no valid {key}"));
-        let whole = |key: &str, least: f64| {
-            let number = header.number(key).filter(|number| number.fract() == 0.0);
-            number.filter(|number| (least..=MOST).contains(number)).ok_or_else(|| damaged(key))
-        };
+        let whole = |key: &str| header.number(key).and_then(whole).ok_or_else(|| damaged(key));
+        let size = |key: &str| u64::try_from(whole(key)?).map_err(|_| damaged(key));
         if header.text("XTENSION").is_none() && !header.is_true("SIMPLE") {
             return Err(Error::format(name, "it says itself that it departs from the standard (SIMPLE is not T)"));
         }
-        let bitpix = whole("BITPIX", -64.0)? as i64;
+        let bitpix = whole("BITPIX")?;
         if ![8, 16, 32, 64, -32, -64].contains(&bitpix) {
             return Err(damaged("BITPIX"));
         }
-        let count = whole("NAXIS", 0.0)? as u64;
+        let count = size("NAXIS")?;
         if count > 999 {
             return Err(damaged("NAXIS"));
         }
-        let axes =
-            (1..=count).map(|axis| Ok(whole(&format!("NAXIS{axis}"), 0.0)? as u64)).collect::<Result<Vec<_>>>()?;
-        let optional = |key: &str, missing: f64| header.number(key).map_or(Ok(missing), |_| whole(key, 0.0));
-        let (before, groups) = (optional("PCOUNT", 0.0)? as u64, optional("GCOUNT", 1.0)? as u64);
+        let axes = (1..=count).map(|axis| size(&format!("NAXIS{axis}"))).collect::<Result<Vec<_>>>()?;
+        let optional = |key: &str, missing: u64| header.number(key).map_or(Ok(missing), |_| size(key));
+        let (before, groups) = (optional("PCOUNT", 0)?, optional("GCOUNT", 1)?);
         if header.is_true("GROUPS") {
             return Err(Error::format(name, "it holds random groups, not an image"));
         }
@@ -231,5 +228,10 @@ impl Array {
     }
 }
 
-/// The largest whole number up to which doubles hold all.
-const MOST: f64 = 9_007_199_254_740_992.0;
+/// A number that is whole, among those that doubles hold all of.
+pub(super) fn whole(number: f64) -> Option<i64> {
+    /// 2⁵³.
+    const MOST: f64 = 9_007_199_254_740_992.0;
+    #[expect(clippy::cast_possible_truncation, reason = "whole, and no larger than 2⁵³")]
+    (number.fract() == 0.0 && number.abs() <= MOST).then_some(number as i64)
+}

@@ -1,6 +1,6 @@
 //! What keywords tell of the camera. Those of filter arrays are no part of the standard; programs agree on most of them.
 
-use super::header::Header;
+use super::header::{Header, whole};
 use crate::camera::optics::Exposure;
 use crate::cfa::FilterArray;
 use crate::metadata::Metadata;
@@ -68,11 +68,8 @@ fn filters(header: &Header, channels: usize, notes: &mut Vec<String>) -> Option<
         notes.push("its filter array (BAYERPAT) is passed over: its photosites were binned".into());
         return None;
     }
-    let offset = |key: &str| {
-        let offset = header.number(key).unwrap_or(0.0);
-        // Beyond any sensor an offset is damage, and so is a part of a photosite.
-        (offset.fract() == 0.0 && offset.abs() < 1e6).then_some(offset as i64)
-    };
+    // Beyond any sensor an offset is damage, and so is a part of a photosite.
+    let offset = |key: &str| whole(header.number(key).unwrap_or(0.0)).filter(|offset| offset.abs() < 1_000_000);
     let side = match letters.len() {
         4 => 2,
         36 => 6,
