@@ -476,7 +476,7 @@ fn damaged_frames_of_others_are_taken_or_refused_alike() {
         (fits_begin(16, 3, 4, "ROWORDER= 'TOP-DOWN'"), 2 * 12),
         (fits_begin(-32, 3, 4, "ROWORDER= 'BOTTOM-UP'"), 4 * 12),
         (fits_begin(8, 3, 4, "BSCALE  = 1.5E0 / of 1"), 12),
-        ([&three[..169], b"3", &three[170..]].concat(), 2 * 36),
+        ([&three[..170], b"3", &three[171..]].concat(), 2 * 36),
     ] {
         let cards = whole.chunks(80).position(|card| card.starts_with(b"END")).unwrap() + 1;
         whole.extend((0..samples).map(|byte| u8::try_from(byte * 7 % 251).unwrap()));
