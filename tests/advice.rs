@@ -54,8 +54,11 @@ const MISSING: &[Advice] = &[
     ),
     advice(
         "demosaic plane.exr --metadata plane.yaml --sensor kaf-5101ce --sigma -o out.exr",
-        ALL_ELSE,
-        &["demosaic plane.exr --metadata exposed.yaml --sensor kaf-5101ce --sigma -o out.exr"],
+        "no `exposure`; give --exposure S and --f-number N",
+        &[
+            "demosaic plane.exr --metadata plane.yaml --sensor kaf-5101ce --sigma --exposure 0.033 --f-number 8 -o out.exr",
+            "demosaic plane.exr --metadata exposed.yaml --sensor kaf-5101ce --sigma -o out.exr",
+        ],
     ),
     advice(
         "correct-frame plane.exr --metadata silent.yaml --black auto -o out.exr",

@@ -87,7 +87,8 @@ const TEXTS: [&str; 9] = [
     "render-radiance IN --size 8x6 -o OUT",
 ];
 
-/// Damage in what is not looked at: tags of color filter arrays, and that of DNG, without which such a file is a plain TIFF.
+/// Damage in what no sample depends on, tags of color filter arrays, which is told; and in that of DNG, without which such a file
+/// is a plain TIFF.
 const UNREAD: [&str; 2] = ["self__cfa_", "self__no_version"];
 
 /// A line and the file that it is for.

@@ -7,6 +7,7 @@ mod support;
 
 use cyanometer::error::Result;
 use cyanometer::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter};
+use cyanometer::formats::fits::FitsReader;
 use cyanometer::formats::format::SampleReader;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::frame::Geometry;
@@ -14,7 +15,7 @@ use cyanometer::stream::RowSource;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use std::fs::{self, File, OpenOptions};
-use std::io::{Cursor, Seek, Write};
+use std::io::{Cursor, Read, Seek, Write};
 use std::process::Output;
 use support::TREE;
 use support::bounds::{Bounded, memory_for};
@@ -175,6 +176,85 @@ fn what_a_header_declares_takes_no_memory() {
         fs::write(shop.path("wide.exr"), wide).unwrap();
         drop(refused(&shop, "measure wide.exr", "wide.exr"));
     }
+}
+
+/// A header of FITS that declares an array.
+fn fits_begin(bitpix: i32, width: u64, height: u64, more: &str) -> Vec<u8> {
+    let cards = [
+        "SIMPLE  =                    T".to_owned(),
+        format!("BITPIX  = {bitpix}"),
+        "NAXIS   = 2".to_owned(),
+        format!("NAXIS1  = {width}"),
+        format!("NAXIS2  = {height}"),
+        more.to_owned(),
+        "END".to_owned(),
+    ];
+    let text: String = cards.iter().map(|card| format!("{card:<80}")).collect();
+    format!("{text:<2880}").into_bytes()
+}
+
+/// FITS, PNG and files without a header say that they are large.
+#[test]
+fn frames_of_others_take_no_memory_that_is_declared() {
+    let shop = Workshop::new();
+    let largest = i32::MAX as u64;
+    for (name, order) in [("up.fits", "ROWORDER= 'BOTTOM-UP'"), ("down.fits", "ROWORDER= 'TOP-DOWN'")] {
+        for (width, height) in [(largest, largest), (largest, 1), (1, largest)] {
+            let bytes = [fits_begin(-64, width, height, order), vec![0; 8000]].concat();
+            fs::write(shop.path(name), bytes).unwrap();
+            cut_short(&shop, name, "");
+        }
+    }
+    fs::write(shop.path("few.raw"), [0; 8000]).unwrap();
+    for layout in ["2147483647x2147483647:f32le", "2147483647x1:u8", "1x2147483647:u16be", "1x1:u8:9999999999999999999"]
+    {
+        cut_short(&shop, "few.raw", &format!(" --raw {layout}"));
+    }
+    // Headers of many cards, none of them of any use but one.
+    let cards: String = (0..400_000).map(|i| format!("{:<80}", format!("KEY{i:05}= {i}"))).collect();
+    let mut long = fits_begin(8, 2, 1, "");
+    long.truncate(5 * 80);
+    long.extend(cards.into_bytes());
+    long.extend(format!("{:<80}", "END").into_bytes());
+    long.resize(long.len().next_multiple_of(2880), b' ');
+    long.extend([1, 2]);
+    fs::write(shop.path("long.fits"), long).unwrap();
+    assert!(bounded(&shop, "measure long.fits", "long.fits").status.success());
+    // A row of 1 GiB in a PNG of 1 MB, and one that cannot be there.
+    for (width, packed) in [(1_u32 << 30, 1 << 30), (1 << 30, 1000)] {
+        fs::write(shop.path("wide.png"), png_of_zeros(width, packed)).unwrap();
+        drop(refused(&shop, "measure wide.png", "wide.png"));
+    }
+}
+
+/// Has a file refused that is shorter than it says, whole and down a pipe.
+#[track_caller]
+fn cut_short(shop: &Workshop, file: &str, options: &str) {
+    for line in ["measure", "mosaic --pattern rggb -o out.exr", "demosaic --pattern rggb --black 0 -o out.exr"] {
+        drop(refused(shop, &format!("{line} {file}{options}"), file));
+        let path = shop.path(file);
+        let memory = memory_for(fs::metadata(&path).unwrap().len());
+        let line = format!("{line}{options}");
+        let run = Bounded { shop, line: &line, piped: Some(&path), memory }.run();
+        assert!(!run.unwrap_or_else(|what| panic!("{what}")).status.success(), "{line} is taken");
+    }
+}
+
+/// A PNG of one row of gray bytes that declares so many, of which `packed` zeros are there.
+fn png_of_zeros(width: u32, packed: usize) -> Vec<u8> {
+    let chunk = |name: &[u8; 4], data: &[u8]| {
+        let mut sum = flate2::Crc::new();
+        sum.update(name);
+        sum.update(data);
+        let length = u32::try_from(data.len()).unwrap().to_be_bytes();
+        [&length[..], name, data, &sum.sum().to_be_bytes()].concat()
+    };
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
+    std::io::copy(&mut std::io::repeat(0).take(packed as u64 + 1), &mut encoder).unwrap();
+    let data = encoder.finish().unwrap();
+    let header = [&width.to_be_bytes()[..], &1_u32.to_be_bytes(), &[8, 0, 0, 0, 0]].concat();
+    let parts = [chunk(b"IHDR", &header), chunk(b"IDAT", &data), chunk(b"IEND", &[])];
+    [&b"\x89PNG\r\n\x1A\n"[..], &parts.concat()].concat()
 }
 
 /// What deflate makes of nothing: a thousand times as much.
@@ -377,6 +457,55 @@ fn damaged_files_and_pipes_are_taken_or_refused_alike() {
         }
         assert!(both[1] > both[0] / 20, "hardly any change was met: {both:?}");
     }
+}
+
+/// The same of FITS, of one plane and of three, from the top and from the bottom; and of PNG, which are taken as files alone.
+#[test]
+fn damaged_frames_of_others_are_taken_or_refused_alike() {
+    let stream = |bytes: &[u8]| -> Result<Vec<f32>> {
+        let mut reader = FitsReader::stream(Box::new(Cursor::new(bytes.to_vec())), "in")?;
+        let (height, mut samples) = (reader.geometry().height, Vec::new());
+        for _ in 0..height {
+            reader.read(1, &mut samples)?;
+        }
+        Ok(samples)
+    };
+    let bits = |read: Result<Vec<f32>>| read.map(|s| s.into_iter().map(f32::to_bits).collect::<Vec<_>>());
+    let three = fits_begin(16, 3, 4, "NAXIS3  = 3");
+    for (mut whole, samples) in [
+        (fits_begin(16, 3, 4, "ROWORDER= 'TOP-DOWN'"), 2 * 12),
+        (fits_begin(-32, 3, 4, "ROWORDER= 'BOTTOM-UP'"), 4 * 12),
+        (fits_begin(8, 3, 4, "BSCALE  = 1.5E0 / of 1"), 12),
+        ([&three[..170], b"3", &three[171..]].concat(), 2 * 36),
+    ] {
+        let cards = whole.chunks(80).position(|card| card.starts_with(b"END")).unwrap() + 1;
+        whole.extend((0..samples).map(|byte| u8::try_from(byte * 7 % 251).unwrap()));
+        whole.resize(whole.len().next_multiple_of(2880), 0);
+        assert_eq!(bits(read_file(&whole)).unwrap(), bits(stream(&whole)).unwrap());
+        let mut refused = 0;
+        // The first nine bytes tell what it is.
+        for place in (9..80 * cards).chain(2880..2880 + samples) {
+            for change in [0x01, 0x02, 0x10, 0x80, 0xFF] {
+                let mut bytes = whole.clone();
+                bytes[place] ^= change;
+                match (bits(read_file(&bytes)), bits(stream(&bytes))) {
+                    (Ok(file), Ok(pipe)) => assert_eq!(file, pipe, "{place} {change}"),
+                    (Err(_), Err(_)) => refused += 1,
+                    (file, pipe) => panic!("byte {place} ^ {change}: {:?} {:?}", file.err(), pipe.err()),
+                }
+            }
+        }
+        assert!(refused > 20, "hardly any change was met: {refused}");
+    }
+    let whole = png_of_zeros(9, 9);
+    assert!(read_file(&whole).is_ok());
+    let refused = (8..whole.len()).flat_map(|place| [0x01, 0x80, 0xFF].map(|change| (place, change)));
+    let refused = refused.filter(|(place, change)| {
+        let mut bytes = whole.clone();
+        bytes[*place] ^= change;
+        read_file(&bytes).is_err()
+    });
+    assert!(refused.count() > 60);
 }
 
 /// Stacks that no system gives: no thread can be started, as where the number of processes is limited.

@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 78] = [
+const MISTAKES: [(&str, i32, &str); 83] = [
     ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
@@ -64,9 +64,31 @@ const MISTAKES: [(&str, i32, &str); 78] = [
     (
         "add-noise matrix.yaml",
         BAD_DATA,
-        "matrix.yaml: it is neither an EXR nor a TIFF file; it looks like text (a spectrum goes into \
+        "matrix.yaml: it is neither an EXR nor a PNG nor a FITS nor a TIFF file; it looks like text (a spectrum goes into \
          `render-radiance`)",
     ),
+    (
+        "add-noise matrix.yaml --raw 4x3:u16",
+        BAD_USAGE,
+        "`4x3:u16` is no value for --raw <WxH:TYPE[:OFFSET]>: a file without a header is described as WIDTHxHEIGHT:TYPE or \
+         WIDTHxHEIGHT:TYPE:OFFSET, the type one of u8, u16le, u16be, f32le; see `add-noise --help`",
+    ),
+    (
+        "measure codes.exr --crop 1,1,0,1",
+        BAD_USAGE,
+        "codes.exr: region 1,1,0,1 does not lie within the frame of 8x6; give another --crop",
+    ),
+    (
+        "measure codes.exr --channel Y",
+        BAD_USAGE,
+        "codes.exr: there is no channel `Y`; it has R, G, B; give another --channel",
+    ),
+    (
+        "measure noisy.exr --white 4095",
+        BAD_USAGE,
+        "noisy.exr: it holds three planes of electrons, which have no level of codes; leave out --white",
+    ),
+    ("measure --raw 4x3:u16le", BAD_DATA, "standard input: it has 0 bytes, but 4x3:u16le takes 24; give another --raw"),
     (
         "add-noise expected.exr --cte 1.1",
         BAD_USAGE,

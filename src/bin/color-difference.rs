@@ -17,7 +17,7 @@ static MEMORY: cli::Memory = cli::Memory;
 
 /// Compare two images or colors by the CIE 1976, 1994 and 2000 formulas
 ///
-/// Each of A and B is an image of XYZ, xyY or L*a*b* (EXR or TIFF, `-` for standard input), or a color: three numbers
+/// Each of A and B is an image of XYZ, xyY or L*a*b* (EXR, TIFF, PNG or FITS, `-` for standard input), or a color: three numbers
 /// between commas. Numbers are XYZ, or L*a*b* with --space lab. The name of a file that exists is a file. A is the
 /// reference: the 1994 formula is not symmetric.
 #[derive(Parser)]

@@ -3,9 +3,9 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::register::check_inputs;
-use cyanometer::requests::{self, options, values};
+use cyanometer::requests::{self, described::Described, options, values};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
 use cyanometer::stages::darks::DarkFrames;
@@ -25,10 +25,13 @@ static MEMORY: cli::Memory = cli::Memory;
 struct Arguments {
     #[command(flatten)]
     input: options::Input,
+    #[command(flatten)]
+    described: Described,
     /// Black level to remove: auto (from the metadata), none, or a number of ADU
     #[arg(long, default_value = "none", value_name = "auto|none|N", value_parser = values::black)]
     black: Black,
-    /// Dark frame to subtract sample by sample; given more than once, the mean of all
+    /// Dark frame to subtract sample by sample, read with the --raw, --channel and --crop of the input; given more than once,
+    /// the mean of all
     #[arg(long, value_name = "FILE", conflicts_with = "black")]
     dark: Vec<PathBuf>,
     /// Charge transfer efficiency to undo, above 0 and at most 1; the bias of the converter is left out of it
@@ -48,8 +51,8 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let darks = arguments.dark.iter().map(PathBuf::as_path);
     check_inputs(darks.map(Some).chain([arguments.input.input.as_deref()]))?;
-    let reader = FrameReader::open(&arguments.input.options())?;
-    let open = |path: &PathBuf| FrameReader::open(&InputOptions { path: Some(path.clone()), ..Default::default() });
+    let reader = arguments.described.open(&arguments.input.options())?;
+    let open = |path: &PathBuf| FrameReader::open(&arguments.input.beside(path));
     let darks = DarkFrames::of(arguments.dark.iter().map(open).collect::<Result<_>>()?)?;
     let settings = CorrectionSettings { black: arguments.black, cte: arguments.cte };
     let stack = darks.as_ref().map(DarkFrames::stack);

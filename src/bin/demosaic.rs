@@ -4,10 +4,9 @@ use clap::Parser;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::input::FrameReader;
 use cyanometer::names::Named;
 use cyanometer::propagation::pixels::dim_green_below;
-use cyanometer::requests::{self, options, values};
+use cyanometer::requests::{self, described::Described, options, values};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
@@ -26,6 +25,8 @@ static MEMORY: cli::Memory = cli::Memory;
 struct Arguments {
     #[command(flatten)]
     input: options::Input,
+    #[command(flatten)]
+    described: Described,
     /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
     #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>())]
     method: Method,
@@ -52,7 +53,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let mut reader = FrameReader::open(&arguments.input.options())?;
+    let mut reader = arguments.described.open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
     session.sign(stage.header_mut());

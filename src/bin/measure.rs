@@ -4,11 +4,11 @@ use clap::Parser;
 use cyanometer::analysis::statistics::{Region, Saturated, measure, patches};
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::{input::FrameReader, input::InputOptions, output, register};
+use cyanometer::formats::{output, register};
 use cyanometer::names::Named;
 use cyanometer::propagation::Equations;
 use cyanometer::report::{self, ReportFormat};
-use cyanometer::requests::{self, options, values};
+use cyanometer::requests::{self, described::DescribedWithBlack, options, values};
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -27,6 +27,8 @@ static MEMORY: cli::Memory = cli::Memory;
 struct Arguments {
     #[command(flatten)]
     input: options::Input,
+    #[command(flatten)]
+    described: DescribedWithBlack,
     /// Rectangle X,Y,W,H in pixels; may be given more than once; by default the whole frame
     #[arg(long, value_name = "X,Y,W,H", value_parser = values::region, allow_hyphen_values = true)]
     region: Vec<Region>,
@@ -62,9 +64,8 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let options = InputOptions { all_channels: true, ..arguments.input.options() };
     register::announce(&[arguments.output.as_deref()])?;
-    let mut reader = FrameReader::open(&options)?;
+    let mut reader = arguments.described.open(&arguments.input.options_for_all())?;
     session.report_reader(&reader);
     let level = arguments.check.then_some(arguments.level);
     let saturated = if arguments.keep_saturated { Saturated::Kept } else { Saturated::LeftOut };

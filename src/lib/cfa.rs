@@ -248,6 +248,28 @@ impl FilterArray {
     }
 }
 
+impl FilterArray {
+    /// The array whose period of `columns` and `rows` sites, in letters row by row, begins at the photosite `first` of the
+    /// sensor.
+    ///
+    /// # Errors
+    ///
+    /// What is expected, in words, as of [`FilterArray::from_str`].
+    pub fn beginning_at(first: [i64; 2], columns: usize, rows: usize, letters: &str) -> Result<Self, String> {
+        let mut corner = String::with_capacity(letters.len());
+        let place = |at: usize, first: i64, period: usize| {
+            usize::try_from((at as i64 - first).rem_euclid(period as i64)).unwrap_or_default()
+        };
+        if letters.len() == columns.saturating_mul(rows) && letters.is_ascii() {
+            for (y, x) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))) {
+                let site = place(y, first[1], rows) * columns + place(x, first[0], columns);
+                corner.extend(letters.get(site..=site));
+            }
+        }
+        format!("{columns}x{rows}:{corner}").parse()
+    }
+}
+
 impl From<CfaPattern> for FilterArray {
     fn from(pattern: CfaPattern) -> Self {
         Self::Bayer(pattern)
@@ -368,6 +390,19 @@ mod tests {
         assert_eq!(read(X_TRANS).in_words(), "an X-Trans filter array");
         assert_eq!(read("4x4:GGBBGGBBRRGGRRGG").in_words(), "a quad Bayer filter array");
         assert_eq!(read("2x4:RGGBGRBG").in_words(), "a filter array of 2x4 sites");
+    }
+
+    #[test]
+    fn a_period_may_begin_anywhere() {
+        let at = |first| FilterArray::beginning_at(first, 2, 2, "RGGB").unwrap().to_string();
+        assert_eq!([at([0, 0]), at([1, 0]), at([0, -1]), at([3, 5])], ["rggb", "grbg", "gbrg", "bggr"]);
+        let period = FilterArray::beginning_at([4, 1], 6, 6, &X_TRANS[4..]).unwrap();
+        let corner: FilterArray = X_TRANS.parse().unwrap();
+        assert!((0..36).all(|i| period.class(i % 6 + 4, i / 6 + 1) == corner.class(i % 6, i / 6)));
+        for (columns, rows, letters) in [(2, 2, "RGG"), (0, 0, ""), (9, 1, "RRRRRRRRR"), (2, 1, "RX"), (2, 1, "\u{dc}")]
+        {
+            assert!(FilterArray::beginning_at([1, 1], columns, rows, letters).is_err());
+        }
     }
 
     #[test]

@@ -8,6 +8,9 @@ import subprocess
 import unittest
 
 import numpy as np
+import tifffile
+from astropy.io import fits
+from PIL import Image
 
 from programs import BINARIES, TIMEOUT_S, ProgramCase, read_planes, sample_data, write_planes
 
@@ -112,12 +115,40 @@ class Input(Errors):
                 self.write("cut.tif", data[:length])
                 self.refused(["mosaic", "cut.tif", "-o", "out.tif"], BAD_DATA, "cut.tif")
 
+    def others(self):
+        """Frames of other programs, of 16x12 codes."""
+        chance = np.random.default_rng(78)
+        codes = chance.integers(0, 4096, (12, 16)).astype(np.uint16)
+        Image.fromarray(codes).save(self.directory / "whole.png")
+        Image.fromarray((codes >> 4).astype(np.uint8)).convert("RGB").save(self.directory / "whole8.png")
+        image = fits.PrimaryHDU(codes)
+        image.header["BAYERPAT"] = "RGGB"
+        image.writeto(self.directory / "whole.fits", overwrite=True)
+        part = fits.ImageHDU(np.stack([codes] * 3).astype(np.float32))
+        fits.HDUList([fits.PrimaryHDU(), part]).writeto(self.directory / "whole3.fits", overwrite=True)
+        array = [(33421, "H", 2, (2, 2), True), (33422, "B", 4, b"\0\1\1\2", True)]
+        tifffile.imwrite(self.directory / "whole.tif", codes, photometric="cfa", extratags=array, metadata=None)
+        return {path.name: path.read_bytes() for path in sorted(self.directory.glob("whole*"))}
+
+    def test_truncated_frames_of_others(self):
+        for name, data in self.others().items():
+            suffix = name.rpartition(".")[2]
+            options = ["--part", "1"] if name == "whole3.fits" else []
+            # Behind the samples of a FITS stand bytes that fill the last block, behind those of a PNG its end.
+            end = {"fits": len(data) - 2880, "png": len(data) - 40, "tif": len(data) - 30}[suffix]
+            for length in (3, 9, 40, len(data) // 2, end):
+                self.write(f"cut.{suffix}", data[:length])
+                for program in ("mosaic", "measure"):
+                    self.refused([program, f"cut.{suffix}", *options], BAD_DATA, f"cut.{suffix}")
+                    self.refused([program, *options], BAD_DATA, "standard input", stdin=data[:length])
+
     def test_flipped_bytes_never_crash(self):
         chance = np.random.default_rng(77)
         files = {
             "a.exr": self.run_program(["add-noise", "--compression", "piz"], self.electrons),
             "b.exr": self.run_program(["add-noise", "--compression", "zip"], self.electrons),
             "c.tif": self.run_program(["add-noise", "--format", "tiff", "--compression", "lzw"], self.electrons),
+            **self.others(),
         }
         for name, data in files.items():
             for _ in range(40):
@@ -125,7 +156,8 @@ class Input(Errors):
                 for place in chance.integers(0, len(data), 3):
                     spoiled[place] = chance.integers(0, 256)
                 self.write(name, bytes(spoiled))
-                done = self.attempt(["mosaic", name])
+                program = "measure" if name.startswith("whole") else "mosaic"
+                done = self.attempt([program, name])
                 self.assertIn(done.returncode, (0, 1), f"{name}: {done.stderr!r}")
                 self.assertNotIn(b"panicked", done.stderr)
 

@@ -48,6 +48,20 @@ pub fn png_complaint(name: &str, error: ImageError) -> Error {
     }
 }
 
+/// What the crate `png` complains of while it reads.
+pub fn png_damage(name: &str, error: png::DecodingError) -> Error {
+    use png::DecodingError::{Format, IoError, LimitsExceeded, Parameter};
+    match error {
+        IoError(source) => Error::disk(name, "read", source),
+        Format(what) => {
+            let what = what.to_string();
+            Error::format(name, format!("it is damaged: {}", what.trim().trim_end_matches('.')))
+        }
+        LimitsExceeded => Error::format(name, "its texts or its color profile take more than 16 MiB; remove them"),
+        Parameter(what) => Error::format(name, format!("it cannot be read: {what}")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,5 +173,34 @@ mod tests {
         let written = PngEncoder::new(small.as_mut_slice()).write_image(&[0], 1, 1, ExtendedColorType::L8);
         let complaint = png_complaint("a.png", written.unwrap_err()).to_string();
         assert_eq!(complaint, "a.png: cannot write: failed to write whole buffer");
+    }
+
+    #[test]
+    fn a_damaged_png_is_told_from_one_that_was_cut_short() {
+        let mut whole = Vec::new();
+        let codes: Vec<u8> = (0..=255).collect();
+        PngEncoder::new(&mut whole).write_image(&codes, 16, 16, ExtendedColorType::L8).unwrap();
+        let refused = |bytes: &[u8]| {
+            let decoder = png::Decoder::new_with_limits(io::Cursor::new(bytes), png::Limits { bytes: 1000 });
+            let read = decoder.read_info().and_then(|mut reader| reader.next_frame(&mut [0; 256]));
+            png_damage("a.png", read.unwrap_err()).to_string()
+        };
+        let cut_short = "a.png: the file ends before its last row; it was cut short";
+        assert_eq!(refused(&whole[..20]), cut_short);
+        assert_eq!(refused(&whole[..80]), cut_short);
+        let with = |place: usize, byte: u8| {
+            let mut changed = whole.clone();
+            changed[place] = byte;
+            refused(&changed)
+        };
+        assert!(with(19, 17).starts_with("a.png: it is damaged: CRC error: expected 0x"));
+        let samples = whole.windows(4).position(|bytes| bytes == b"IDAT").unwrap() + 4;
+        let damaged = with(samples, 0xFF);
+        assert!(damaged.starts_with("a.png: it is damaged: Corrupt deflate stream. "), "{damaged}");
+        // A text before the samples that says that it is longer than it may be.
+        let place = samples - 8;
+        let text = [&5000_u32.to_be_bytes()[..], b"tEXtComment\0", &[b'x'; 6000]].concat();
+        let long = [&whole[..place], &text, &whole[place..]].concat();
+        assert!(refused(&long).ends_with("take more than 16 MiB; remove them"));
     }
 }

@@ -147,8 +147,10 @@ pub struct Readers {
 /// How a file is read that comes down a pipe.
 #[derive(Debug, Clone, Copy)]
 pub struct Streaming {
-    /// Whether a file that begins so is one that needs no seek; it has a single part then.
+    /// Whether a file that begins so is one that needs no seek, or settles itself how much of one it needs.
     pub is_streamable: fn(&[u8]) -> bool,
+    /// Whether such a file may have parts besides the first, which need a seek.
+    pub has_parts: bool,
     /// Opens it; the name is for messages.
     pub open: fn(Box<dyn Read + Send>, &str) -> Opened,
 }

@@ -2,8 +2,9 @@
 
 use super::digest::SamplesDigest;
 use super::files::{STDIN_NAME, named, open_named, read_file, sidecar_path, spool};
-use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, U16_FULL_SCALE};
-use super::{pipe, register, table, tiff, yaml};
+use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Streaming, U16_FULL_SCALE};
+use super::{headerless, pipe, register, table, tiff, yaml};
+use crate::analysis::statistics::Region;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
@@ -19,12 +20,18 @@ use std::path::{Path, PathBuf};
 pub struct InputOptions {
     /// The file; none or `-` for the standard input.
     pub path: Option<PathBuf>,
-    /// Part of a multi-part EXR, page of a TIFF.
+    /// Part of a multi-part EXR, page of a TIFF, HDU of a FITS.
     pub part: usize,
+    /// How the samples lie in a file without a header; none where the file says what it is.
+    pub raw: Option<headerless::Layout>,
     /// A file whose metadata count before all others.
     pub metadata: Option<PathBuf>,
     /// Whether channels besides R, G, B or Y are kept.
     pub all_channels: bool,
+    /// The channel that is taken alone, as a single plane; none for those of the frame.
+    pub channel: Option<String>,
+    /// The rectangle that is taken alone; none for all of the frame. Its photosites keep their places on the sensor.
+    pub crop: Option<Region>,
 }
 
 /// A frame that is being read.
@@ -71,6 +78,11 @@ pub struct FrameReader {
     keeps_mask: bool,
     /// Pixels that the layer has marked so far, where stages do not see it.
     marked: u64,
+    /// The first channel that is kept; the others follow it.
+    first_channel: usize,
+    /// Column and row of the stored frame that are kept first.
+    corner: [usize; 2],
+    has_begun: bool,
 }
 
 /// A digest to compare with once all samples are in.
@@ -101,16 +113,22 @@ impl FrameReader {
     /// As [`Self::open`].
     pub fn open_file(input: File, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let about = input.metadata().map_err(|e| Error::disk(name, "read", e))?;
-        let reader = if about.is_file() {
-            open_seekable(input, name, options.part)?
-        } else {
-            open_unseekable(input, name, options.part)?
+        let reader = match options.raw {
+            Some(layout) => headerless::open(input, name, options.part, layout)?,
+            None if about.is_file() => open_seekable(input, name, options.part)?,
+            None => open_unseekable(input, name, options.part)?,
         };
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
         let (metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
         let stored = reader.geometry();
-        let geometry = keep_planes(stored, options.all_channels, metadata.quantity);
-        let left_out = &stored.channels[geometry.channels.len()..];
+        let (first_channel, geometry) = match &options.channel {
+            Some(channel) => take_channel(stored, channel, name)?,
+            None => (0, keep_planes(stored, options.all_channels, metadata.quantity)),
+        };
+        let left_out = match &options.channel {
+            Some(_) => &[][..],
+            None => &stored.channels[geometry.channels.len()..],
+        };
         // Only what our programs made marks what they mean by it.
         let is_ours = !metadata.history.is_empty();
         let mask = left_out.iter().position(|channel| channel == MASK_LAYER).map(|at| geometry.channels.len() + at);
@@ -126,12 +144,14 @@ impl FrameReader {
         });
         let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
-        let header = FrameHeader { name: name.into(), geometry, metadata };
+        let mut header = FrameHeader { name: name.into(), geometry, metadata };
+        let corner = options.crop.map_or(Ok([0, 0]), |crop| cut(&mut header, crop))?;
         Ok(Self {
             reader,
             header,
             rows_read: 0,
-            check,
+            // A digest is one of all samples.
+            check: check.filter(|_| options.crop.is_none()),
             mismatch: None,
             buffer: Vec::new(),
             divisor,
@@ -139,6 +159,9 @@ impl FrameReader {
             mask,
             keeps_mask: false,
             marked: 0,
+            first_channel,
+            corner,
+            has_begun: false,
         })
     }
 
@@ -181,6 +204,19 @@ impl FrameReader {
         self.mismatch.as_deref()
     }
 
+    /// Reads rows above those that are kept.
+    fn pass_over(&mut self, rows: usize, buffer: &mut Vec<f32>) -> Result<()> {
+        let step = self.reader.geometry().step_rows(self.reader.natural_rows()).max(1);
+        let mut left = rows;
+        while left > 0 {
+            buffer.clear();
+            self.reader.read(step.min(left), buffer)?;
+            left -= step.min(left);
+        }
+        buffer.clear();
+        Ok(())
+    }
+
     /// Compares the digest once the last row is in.
     fn check_digest(&mut self) {
         if self.rows_read < self.header.geometry.height {
@@ -211,12 +247,17 @@ impl RowSource for FrameReader {
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
-        let whole = self.reader.geometry().row_samples();
+        let mut buffer = std::mem::take(&mut self.buffer);
+        if !self.has_begun {
+            self.has_begun = true;
+            self.pass_over(self.corner[1], &mut buffer)?;
+        }
+        let stored = self.reader.geometry();
+        let (whole, stored_width) = (stored.row_samples(), stored.width);
         let mask = self.mask.filter(|_| self.keeps_mask);
         let width = self.header.geometry.width;
-        let kept = self.header.geometry.row_samples() - mask.map_or(0, |_| width);
-        let mut buffer = std::mem::take(&mut self.buffer);
-        let direct = kept == whole;
+        let kept = self.header.geometry.channels.len() - usize::from(mask.is_some());
+        let direct = kept * width == whole;
         let start = if direct { samples.len() } else { 0 };
         let into: &mut Vec<f32> = if direct { samples } else { &mut buffer };
         into.truncate(start);
@@ -229,12 +270,14 @@ impl RowSource for FrameReader {
         }
         if !direct {
             for row in buffer.chunks_exact(whole) {
-                samples.extend_from_slice(&row[..kept]);
+                let plane = |channel: usize| &row[channel * stored_width + self.corner[0]..][..width];
+                for channel in self.first_channel..self.first_channel + kept {
+                    samples.extend_from_slice(plane(channel));
+                }
                 if let Some(mask) = mask {
-                    samples.extend_from_slice(&row[mask * width..][..width]);
+                    samples.extend_from_slice(plane(mask));
                 } else if let Some(mask) = self.mask {
-                    let marks = &row[mask * width..][..width];
-                    self.marked += marks.iter().filter(|mark| **mark != 0.0).count() as u64;
+                    self.marked += plane(mask).iter().filter(|mark| **mark != 0.0).count() as u64;
                 }
             }
         }
@@ -260,7 +303,8 @@ fn open_seekable(mut input: File, name: &str, part: usize) -> Opened {
 fn open_unseekable(mut input: File, name: &str, part: usize) -> Opened {
     let head = head_of(&mut input, name)?;
     let readers = readers_of(&head, name)?;
-    if let Some(stream) = readers.stream.filter(|stream| (stream.is_streamable)(&head)) {
+    let is_streamed = |stream: &Streaming| (stream.is_streamable)(&head) && !(stream.has_parts && part != 0);
+    if let Some(stream) = readers.stream.filter(is_streamed) {
         if part != 0 {
             return Err(Error::Usage(format!("{name}: it has no part {part}; it has a single one")));
         }
@@ -339,6 +383,41 @@ fn find_metadata(
     Ok((reader.own_tags().clone(), None))
 }
 
+/// One channel alone, as the plane Y, and its place among those that are stored.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where there is no such channel.
+fn take_channel(stored: &Geometry, channel: &str, name: &str) -> Result<(usize, Geometry)> {
+    let Some(place) = stored.channels.iter().position(|known| known == channel) else {
+        let mut some = stored.channels.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
+        if stored.channels.len() > 8 {
+            some += ", …";
+        }
+        let problem = format!("{name}: there is no channel `{channel}`; it has {some}");
+        return Err(Error::Usage(problem).change(&["channel"]));
+    };
+    Ok((place, stored.with_channels(&["Y"])))
+}
+
+/// Cuts a frame down to a rectangle, and gives the column and row that come first.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where it does not lie within the frame.
+fn cut(header: &mut FrameHeader, crop: Region) -> Result<[usize; 2]> {
+    crop.check(header).map_err(|error| error.change(&["crop"]))?;
+    let geometry = &mut header.geometry;
+    for (first, by) in geometry.origin.iter_mut().zip([crop.x, crop.y]) {
+        let moved = i32::try_from(by).ok().and_then(|by| first.checked_add(by));
+        *first = moved.ok_or_else(|| Error::format(&header.name, "it lies too far from the sensor's corner"))?;
+    }
+    (geometry.width, geometry.height) = (crop.width, crop.height);
+    // The counts of a sidecar are those of the whole frame.
+    header.metadata.samples = None;
+    Ok([crop.x, crop.y])
+}
+
 /// The channels that stages work on: the first three where they are R, G, B; Y alone; otherwise all.
 fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry {
     let mut kept = stored.clone();
@@ -352,4 +431,92 @@ fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry
         }
     }
     kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::output::{FrameWriter, OutputOptions};
+    use crate::stream::{Counts, RowSink};
+
+    const CROP: Region = Region { x: 2, y: 3, width: 4, height: 2 };
+
+    /// An EXR of 7x6 pixels, each sample of another value, at a place of the sensor.
+    fn written(directory: &Path, channels: &[&str], metadata: &Metadata) -> PathBuf {
+        let path = directory.join("in.exr");
+        let geometry = Geometry { origin: [10, -5], ..Geometry::new(7, 6, channels) };
+        let header = FrameHeader { name: "in".into(), geometry, metadata: metadata.clone() };
+        let options = OutputOptions { path: Some(path.clone()), ..OutputOptions::default() };
+        let mut writer = FrameWriter::create(&options, &header).unwrap();
+        for y in 0_u8..6 {
+            let row: Vec<f32> = (0_u8..7 * u8::try_from(channels.len()).unwrap())
+                .map(|at| f32::from(y) * 100.0 + f32::from(at / 7) * 10.0 + f32::from(at % 7))
+                .collect();
+            writer.write(&row).unwrap();
+        }
+        writer.finish(Counts::default()).unwrap();
+        path
+    }
+
+    fn read(options: &InputOptions) -> Result<(FrameReader, Vec<f32>)> {
+        let mut reader = FrameReader::open(options)?;
+        let mut samples = Vec::new();
+        for _ in 0..reader.header().geometry.height {
+            reader.read(1, &mut samples)?;
+        }
+        Ok((reader, samples))
+    }
+
+    #[test]
+    fn a_crop_is_a_part_of_the_frame_that_keeps_its_place() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = Some(written(directory.path(), &["R", "G", "B"], &Metadata::new(QuantityKind::Adu)));
+        let options = InputOptions { path, crop: Some(CROP), ..InputOptions::default() };
+        let (reader, samples) = read(&options).unwrap();
+        let geometry = Geometry { origin: [12, -2], ..Geometry::new(4, 2, &["R", "G", "B"]) };
+        assert_eq!(reader.header().geometry, geometry);
+        assert_eq!(samples[..8], [302.0, 303.0, 304.0, 305.0, 312.0, 313.0, 314.0, 315.0]);
+        assert_eq!((samples.len(), samples[23]), (24, 425.0));
+        assert_eq!((reader.mismatch(), &reader.header().metadata.samples), (None, &None));
+        for (x, width) in [(4, 4), (0, 0), (usize::MAX, 1)] {
+            let options = InputOptions { crop: Some(Region { x, width, ..CROP }), ..options.clone() };
+            let complaint = FrameReader::open(&options).err().unwrap().to_string();
+            assert!(complaint.ends_with("does not lie within the frame of 7x6; give another `crop`"), "{complaint}");
+        }
+    }
+
+    #[test]
+    fn a_channel_is_taken_alone() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = Some(written(directory.path(), &["R", "G", "B"], &Metadata::new(QuantityKind::Adu)));
+        let channel = Some("G".to_owned());
+        let options = InputOptions { path, channel, ..InputOptions::default() };
+        let (reader, samples) = read(&options).unwrap();
+        assert_eq!(reader.header().geometry.channels, ["Y"]);
+        assert_eq!((samples.len(), samples[0], samples[41], reader.mismatch()), (42, 10.0, 516.0, None));
+        let (_, samples) = read(&InputOptions { crop: Some(CROP), ..options.clone() }).unwrap();
+        assert_eq!(samples, [312.0, 313.0, 314.0, 315.0, 412.0, 413.0, 414.0, 415.0]);
+        let none = InputOptions { channel: Some("Z".into()), ..options };
+        let complaint = FrameReader::open(&none).err().unwrap().to_string();
+        assert!(complaint.ends_with("there is no channel `Z`; it has R, G, B; give another `channel`"), "{complaint}");
+    }
+
+    #[test]
+    fn marks_of_a_crop_are_those_within() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.history.push(crate::metadata::HistoryEntry {
+            program: "test".into(),
+            version: "1".into(),
+            arguments: Vec::new(),
+        });
+        let path = Some(written(directory.path(), &["R", "G", "B", MASK_LAYER], &metadata));
+        let options = InputOptions { path, crop: Some(CROP), ..InputOptions::default() };
+        assert_eq!(read(&options).unwrap().0.marked(), 8);
+        let mut reader = FrameReader::open(&options).unwrap();
+        reader.keep_mask();
+        let mut samples = Vec::new();
+        reader.read(2, &mut samples).unwrap();
+        assert_eq!((samples.len(), samples[12], samples[31]), (32, 332.0, 435.0));
+    }
 }

@@ -46,23 +46,11 @@ pub const ORF: FrameFormat =
 pub const RW2: FrameFormat = raw("a Panasonic RW2", |head| head.starts_with(b"IIU\0"));
 /// Fujifilm's raw format.
 pub const RAF: FrameFormat = raw("a Fujifilm RAF", |head| head.starts_with(b"FUJIFILMCCD-RAW"));
-/// Portable Network Graphics.
-pub const PNG: FrameFormat = FrameFormat {
-    name: "a PNG",
-    sign: Sign::Bytes(|head| head.starts_with(b"\x89PNG\r\n\x1A\n")),
-    reading: Reading::NotYet("convert it first, for example with `oiiotool in.png -o out.tif`"),
-};
 /// JPEG pictures.
 pub const JPEG: FrameFormat = FrameFormat {
     name: "a JPEG",
     sign: Sign::Bytes(|head| head.starts_with(&[0xFF, 0xD8, 0xFF])),
     reading: Reading::NotYet("convert it first, for example with `oiiotool in.jpg -o out.tif`"),
-};
-/// The Flexible Image Transport System of astronomy.
-pub const FITS: FrameFormat = FrameFormat {
-    name: "a FITS file",
-    sign: Sign::Bytes(|head| head.starts_with(b"SIMPLE  =")),
-    reading: Reading::NotYet("store its samples as a TIFF of 16-bit integers or of floats first"),
 };
 
 const DNG_VERSION: Tag = Tag::Unknown(50706);

@@ -21,6 +21,9 @@ use serde_yaml::Mapping;
 /// The schema that metadata names.
 pub const METADATA_SCHEMA: &str = "cyanometer/1";
 
+/// What metadata in a text of a file begin with; other programs put their own words there.
+pub const METADATA_BEGIN: &str = "schema: cyanometer/";
+
 /// Metadata of a frame, as YAML stores it. Keys that this version does not know are kept in `unknown`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Metadata {

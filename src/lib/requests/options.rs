@@ -3,10 +3,12 @@
 use super::notes::Note;
 use super::values;
 use crate::analysis::characterization::evaluation::{Filling, SampleExposure};
+use crate::analysis::statistics::Region;
 use crate::camera::optics::Exposure;
 use crate::color::White;
 use crate::error::Result;
 use crate::formats::data;
+use crate::formats::headerless::Layout;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::formats::pipe;
@@ -15,7 +17,7 @@ use crate::stages::noise::NoiseSettings;
 use crate::units::{RadianceUnit, kelvin};
 use clap::{Args, Command};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A request as its options have it where `words` alone are given: what is declared as default is the default everywhere.
 pub(super) fn defaults<R: Args>(words: &[OsString]) -> R {
@@ -27,14 +29,23 @@ pub(super) fn defaults<R: Args>(words: &[OsString]) -> R {
 /// A frame to read.
 #[derive(Debug, Clone, Args)]
 pub struct Input {
-    /// Frame to read, EXR or TIFF; `-` or none for standard input
+    /// Frame to read, EXR, TIFF, PNG or FITS; `-` or none for standard input
     pub input: Option<PathBuf>,
-    /// Part of a multi-part EXR, or page of a TIFF, counted from 0
+    /// Part of a multi-part EXR or FITS, or page of a TIFF, counted from 0
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub part: usize,
+    /// Read a file without a header: rows of u8, u16le, u16be or f32le, behind OFFSET bytes if given
+    #[arg(long, value_name = "WxH:TYPE[:OFFSET]", value_parser = str::parse::<Layout>)]
+    pub raw: Option<Layout>,
     /// YAML file whose metadata replace those that come with the input
     #[arg(long, value_name = "FILE")]
     pub metadata: Option<PathBuf>,
+    /// Take one channel alone, by its name, as a single plane
+    #[arg(long, value_name = "NAME")]
+    pub channel: Option<String>,
+    /// Take a rectangle X,Y,W,H in pixels alone; its photosites keep class, levels and noise
+    #[arg(long, value_name = "X,Y,W,H", value_parser = values::region, allow_hyphen_values = true)]
+    pub crop: Option<Region>,
 }
 
 impl Input {
@@ -45,7 +56,19 @@ impl Input {
 
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
-        InputOptions { path: self.input.clone(), part: self.part, metadata: self.metadata.clone(), all_channels: false }
+        let Self { input, part, raw, metadata, channel, crop } = self.clone();
+        InputOptions { path: input, part, raw, metadata, all_channels: false, channel, crop }
+    }
+
+    /// The same with all channels.
+    pub fn options_for_all(&self) -> InputOptions {
+        InputOptions { all_channels: true, ..self.options() }
+    }
+
+    /// Another frame of the same camera, of which the same part of the sensor is read; its metadata are its own.
+    pub fn beside(&self, path: &Path) -> InputOptions {
+        let Self { raw, channel, crop, .. } = self.clone();
+        InputOptions { path: Some(path.to_owned()), raw, channel, crop, ..InputOptions::default() }
     }
 }
 

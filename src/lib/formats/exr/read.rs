@@ -32,7 +32,11 @@ pub const FORMAT: FrameFormat = FrameFormat {
     sign: Sign::Bytes(|head| head.starts_with(&magic_number::BYTES)),
     reading: Reading::Rows(Readers {
         open: |file, name, part| Ok(Box::new(ExrReader::open(file, name, part)?)),
-        stream: Some(Streaming { is_streamable, open: |input, name| Ok(Box::new(ExrReader::stream(input, name)?)) }),
+        stream: Some(Streaming {
+            is_streamable,
+            has_parts: false,
+            open: |input, name| Ok(Box::new(ExrReader::stream(input, name)?)),
+        }),
     }),
 };
 

@@ -188,6 +188,16 @@ impl TiffFile {
         directory.entries.entry(tag).or_insert(entry);
     }
 
+    /// The directory that a tag points to, such as that of Exif; none where the tag is missing.
+    ///
+    /// # Errors
+    ///
+    /// When the file is damaged there.
+    pub fn below(&mut self, directory: &Directory, tag: Tag) -> Result<Option<Directory>> {
+        let Some(offset) = self.one(directory, tag)? else { return Ok(None) };
+        Ok(Some(self.directory_at(offset, true)?.0))
+    }
+
     /// The bytes of a tag's first `at_most` values, and their type.
     fn value(&mut self, entry: &Entry, tag: Tag, at_most: u64) -> Result<(u16, usize, Vec<u8>)> {
         let size = type_bytes(entry.kind);

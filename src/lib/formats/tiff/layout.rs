@@ -12,7 +12,7 @@ use tiff::tags::{CompressionMethod, PhotometricInterpretation, Tag};
 /// XPosition and YPosition, in units of the resolution: where the image lies on its page.
 const POSITION: [Tag; 2] = [Tag::Unknown(286), Tag::Unknown(287)];
 /// Photometric interpretation of a plane behind a color filter array (TIFF/EP, DNG).
-const PHOTOMETRIC_CFA: u64 = 32803;
+pub(super) const PHOTOMETRIC_CFA: u64 = 32803;
 /// Photometric interpretation of the planes of a demosaicked raw (DNG).
 const PHOTOMETRIC_LINEAR_RAW: u64 = 34892;
 
@@ -110,7 +110,7 @@ impl Layout {
 }
 
 /// What was found, or, where the file is damaged there, nothing but a note.
-fn passed_over<T: Default>(found: Result<T>, what: &str, notes: &mut Vec<String>) -> Result<T> {
+pub(super) fn passed_over<T: Default>(found: Result<T>, what: &str, notes: &mut Vec<String>) -> Result<T> {
     match found {
         Err(Error::Format { problem, .. }) => {
             notes.push(format!("{what} is passed over: {problem}"));

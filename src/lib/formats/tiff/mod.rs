@@ -5,6 +5,7 @@
 //! depth, does not open photometric 32803 (CFA), and decodes a strip whole, be it a gigabyte that is not even compressed; and
 //! its encoder has no floating-point predictor. Both work on one thread.
 
+mod capture;
 mod chunk;
 mod directory;
 mod grid;

@@ -2,14 +2,14 @@
 
 #[cfg(test)]
 use super::TiffTags;
+use super::capture;
 use super::chunk::{Compression, Trouble};
 use super::directory::{TiffFile, begins_so};
 use super::layout::Layout;
 use crate::error::Result;
 use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
 use crate::frame::Geometry;
-use crate::metadata::Metadata;
-use crate::units::QuantityKind;
+use crate::metadata::{METADATA_BEGIN, Metadata};
 use half::f16;
 use rayon::prelude::*;
 use std::fs::File;
@@ -34,9 +34,6 @@ pub const FORMAT: FrameFormat = FrameFormat {
         stream: None,
     }),
 };
-
-/// What our metadata begin with; other programs put their own words into tag 270.
-const METADATA_BEGIN: &str = "schema: cyanometer/";
 
 /// Reads rows of one image of a TIFF file.
 ///
@@ -70,14 +67,14 @@ impl TiffReader {
     pub fn open(file: File, name: &str, page: usize) -> Result<Self> {
         let mut file = TiffFile::open(file, name)?;
         let directory = file.directory(page)?;
-        let layout = Layout::read(&mut file, &directory)?;
+        let mut layout = Layout::read(&mut file, &directory)?;
         let piece_rows = if layout.compression == Compression::None {
             let row_bytes = layout.chunk_row_bytes() * layout.across * layout.planes();
             layout.chunk_rows.min((PIECE_BYTES / row_bytes).max(1))
         } else {
             layout.chunk_rows
         };
-        let own_tags = Metadata::new(QuantityKind::Unspecified);
+        let own_tags = capture::read(&mut file, &directory, &mut layout)?;
         Ok(Self { file, layout, own_tags, next_row: 0, piece_rows, decoded: Vec::new(), held: 0..0 })
     }
 

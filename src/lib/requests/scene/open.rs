@@ -153,7 +153,7 @@ impl Scene {
             found.metadata.leave_out("render-radiance", what, "no class responds there");
         }
         let path = self.subject.input.clone();
-        let options = InputOptions { path, part: self.part, metadata: None, all_channels: true };
+        let options = InputOptions { path, part: self.part, all_channels: true, ..InputOptions::default() };
         match spectral::open(&options)? {
             Radiances::Table(table) => self.light_of_table(&table, &sums, found),
             Radiances::Image(reader) => self.light_of_image(*reader, &sums, found),

@@ -1,0 +1,139 @@
+//! What keywords tell of the camera. Those of filter arrays are no part of the standard; programs agree on most of them.
+
+use super::header::{Header, whole};
+use crate::camera::optics::Exposure;
+use crate::cfa::FilterArray;
+use crate::metadata::Metadata;
+use crate::units::QuantityKind;
+
+/// Microseconds in a second.
+const US_PER_S: f64 = 1e6;
+
+/// What a header tells.
+#[derive(Debug)]
+pub(super) struct Told {
+    pub metadata: Metadata,
+    /// The first row of the array is the lowest of the picture.
+    pub is_bottom_up: bool,
+    /// What was passed over, and why.
+    pub notes: Vec<String>,
+}
+
+/// Reads the keywords of an image of `channels` planes of integers or floats.
+///
+/// `BAYERPAT` (or `COLORTYP`) is the pattern of the picture from its top left corner, `XBAYROFF` and `YBAYROFF` columns and
+/// rows of the pattern before the first; `ROWORDER` says whether the first row of the array is the top one or the lowest. A
+/// file that has none is taken to begin with its top row, as cameras write it. A single plane of integers behind filters is one
+/// of ADU.
+pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
+    let mut notes = Vec::new();
+    let is_bottom_up = match header.text("ROWORDER").map(str::to_ascii_uppercase).as_deref() {
+        Some("TOP-DOWN") => false,
+        Some("BOTTOM-UP") => true,
+        other => {
+            let what =
+                other.map_or("it has no ROWORDER".to_owned(), |other| format!("its ROWORDER `{other}` is not known"));
+            notes.push(format!("{what}; its first row is taken as the top one"));
+            false
+        }
+    };
+    let cfa = filters(header, channels, &mut notes);
+    let is_code = |unit: &str| ["adu", "dn", "count", "counts"].iter().any(|name| unit.eq_ignore_ascii_case(name));
+    let is_adu = match header.text("BUNIT") {
+        Some(unit) if is_code(unit) => true,
+        Some(unit) => {
+            notes.push(format!("its unit `{unit}` (BUNIT) is passed over"));
+            false
+        }
+        None => cfa.is_some() && is_integer,
+    };
+    let mut metadata = Metadata::new(if is_adu { QuantityKind::Adu } else { QuantityKind::Unspecified });
+    metadata.cfa = cfa;
+    metadata.exposure = exposure(header, &mut notes);
+    pass_over(header, &mut notes);
+    Told { metadata, is_bottom_up, notes }
+}
+
+/// The filter array of a single plane.
+fn filters(header: &Header, channels: usize, notes: &mut Vec<String>) -> Option<FilterArray> {
+    let letters = header.text("BAYERPAT").or_else(|| header.text("COLORTYP"))?.to_ascii_uppercase();
+    if ["MONO", "NONE", "RGB", "COLOR"].contains(&letters.as_str()) {
+        return None;
+    }
+    if channels != 1 {
+        notes.push(format!("its filter array (BAYERPAT) is passed over: it has {channels} planes, not one"));
+        return None;
+    }
+    if ["XBINNING", "YBINNING"].iter().any(|key| header.number(key).is_some_and(|binning| binning > 1.0)) {
+        notes.push("its filter array (BAYERPAT) is passed over: its photosites were binned".into());
+        return None;
+    }
+    // Beyond any sensor an offset is damage, and so is a part of a photosite.
+    let offset = |key: &str| whole(header.number(key).unwrap_or(0.0)).filter(|offset| offset.abs() < 1_000_000);
+    let side = match letters.len() {
+        4 => 2,
+        36 => 6,
+        _ => 0,
+    };
+    let array = offset("XBAYROFF").zip(offset("YBAYROFF")).and_then(|(x, y)| {
+        // The first photosite has column x and row y of the pattern.
+        FilterArray::beginning_at([-x, -y], side, side, &letters).ok()
+    });
+    if array.is_none() {
+        notes.push(format!(
+            "its filter array `{letters}` (BAYERPAT, XBAYROFF, YBAYROFF) is passed over: it is not known"
+        ));
+    }
+    array
+}
+
+/// Exposure time and f-number, which count together; the transmittance of the lens, which no keyword has, is 1.
+fn exposure(header: &Header, notes: &mut Vec<String>) -> Option<Exposure> {
+    let seconds = header.number("EXPTIME").or_else(|| header.number("EXPOSURE"));
+    let exposure_s = seconds.or_else(|| Some(header.number("EXPOINUS")? / US_PER_S));
+    let ratio = || Some(header.number("FOCALLEN")? / header.number("APTDIA").filter(|diameter| *diameter > 0.0)?);
+    let f_number = ratio().filter(|number| *number > 0.0).or_else(|| header.number("FOCRATIO"));
+    match (exposure_s, f_number) {
+        (Some(exposure_s), Some(f_number)) => {
+            match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
+                Ok(exposure) => return Some(exposure),
+                Err(error) => notes.push(format!("its exposure is passed over: {error}")),
+            }
+        }
+        (Some(exposure_s), None) => notes.push(format!(
+            "its exposure time of {exposure_s} s is passed over: it has no f-number (FOCALLEN and APTDIA, or FOCRATIO)"
+        )),
+        (None, Some(f_number)) => {
+            notes.push(format!("its f-number of {f_number} is passed over: it has no exposure time (EXPTIME)"));
+        }
+        (None, None) => {}
+    }
+    None
+}
+
+/// Notes what a user may want to write into metadata or a sensor file, and what has no agreed meaning.
+fn pass_over(header: &Header, notes: &mut Vec<String>) {
+    let mut found = Vec::new();
+    if let Some(camera) = header.text("INSTRUME") {
+        found.push(format!("camera {camera}"));
+    }
+    if let Some(celsius) = header.number("CCD-TEMP") {
+        found.push(format!("sensor at {celsius} degrees Celsius (CCD-TEMP)"));
+    }
+    if let Some(gain) = header.number("EGAIN").filter(|gain| *gain > 0.0) {
+        found.push(format!("{gain} e-/ADU (EGAIN), which is an `adu_per_e` of {}", 1.0 / gain));
+    }
+    if let Some(gain) = header.number("GAIN") {
+        found.push(format!("GAIN {gain} in units of the camera"));
+    }
+    if !found.is_empty() {
+        notes.push(format!("its header tells what is not used here: {}", found.join(", ")));
+    }
+    for key in ["PEDESTAL", "OFFSET", "BLKLEVEL"] {
+        if let Some(level) = header.number(key).filter(|level| *level != 0.0) {
+            notes.push(format!(
+                "its {key} of {level} is not taken as the black level: programs disagree on its sign and scale"
+            ));
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! FITS: images of astronomy, as sky cameras store them \[FITS4].
+//!
+//! A file is a chain of parts (HDUs): a header of cards and an array, each in blocks of 2880 bytes.
+
+mod header;
+mod keywords;
+mod read;
+#[cfg(test)]
+mod tests;
+
+pub use read::{FORMAT, FitsReader};

@@ -1,0 +1,363 @@
+//! Reading rows of an image.
+
+use super::header::{Array, Header, Kind};
+use super::keywords::{self, Told};
+use crate::error::{Error, Result};
+use crate::formats::files::spool;
+use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign, Streaming};
+use crate::frame::{Geometry, to_sample};
+use crate::metadata::Metadata;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::os::unix::fs::FileExt;
+
+/// FITS, the Flexible Image Transport System.
+pub const FORMAT: FrameFormat = FrameFormat {
+    name: "a FITS",
+    sign: Sign::Bytes(begins_so),
+    reading: Reading::Rows(Readers {
+        open: |file, name, part| Ok(Box::new(FitsReader::open(file, name, part)?)),
+        stream: Some(Streaming {
+            is_streamable: begins_so,
+            has_parts: true,
+            open: |input, name| Ok(Box::new(FitsReader::stream(input, name)?)),
+        }),
+    }),
+};
+
+fn begins_so(head: &[u8]) -> bool {
+    head.starts_with(b"SIMPLE  =")
+}
+
+/// Bytes that are read together where rows come in order.
+const READ_BYTES: usize = 1 << 18;
+
+/// Reads the rows of one image, the top one first, whichever the file begins with.
+///
+/// A plane is `Y`, three are `R`, `G`, `B`, others `C0`, `C1` … The values are those of the standard, `BZERO` + `BSCALE` ·
+/// stored; a sample that is `BLANK` is NaN. Doubles and integers beyond 2²⁴ are rounded to `f32`.
+pub struct FitsReader {
+    name: String,
+    source: Source,
+    form: Form,
+    geometry: Geometry,
+    told: Told,
+    next_row: usize,
+    /// One row of one plane, as stored.
+    stored: Vec<u8>,
+}
+
+/// Where rows come from.
+enum Source {
+    /// One row after another, perhaps from another program.
+    InOrder(Box<dyn Read + Send>, bool),
+    /// From a file that holds the array from this byte on.
+    Anywhere(File, u64),
+}
+
+/// How samples are stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Form {
+    stored: SampleType,
+    scale: f64,
+    zero: f64,
+    blank: Option<f64>,
+}
+
+impl FitsReader {
+    /// Opens a part (HDU) of a file, counted from 0, that stands at its start.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where there is no such part; [`Error::Format`] for what is damaged or no image; [`Error::Disk`].
+    pub fn open(mut file: File, name: &str, part: usize) -> Result<Self> {
+        let failed = |e| Error::disk(name, "read", e);
+        let mut place = file.stream_position().map_err(failed)?;
+        for number in 0..=part {
+            let Some((header, array)) = part_at(&mut file, place, name)? else {
+                return Err(Error::Usage(format!("{name}: there is no part {part}; its last one is {}", number - 1)));
+            };
+            let data = place + header.bytes;
+            if number < part {
+                place = data + array.padded_bytes();
+                continue;
+            }
+            if !array.is_image() {
+                // What is damaged further on is no matter here.
+                let after = next_image(&mut file, data + array.padded_bytes(), part + 1, name).unwrap_or(None);
+                return Err(no_image(name, part, &array.kind, after));
+            }
+            return Self::placed(name, &header, &array, file, data);
+        }
+        Err(Error::cut_short(name))
+    }
+
+    /// Opens the first part of a stream. Where rows do not come in order it is first copied to a temporary file.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`].
+    pub fn stream(mut input: Box<dyn Read + Send>, name: &str) -> Result<Self> {
+        let header = Header::read(&mut input, name)?.ok_or_else(|| Error::format(name, "it is empty"))?;
+        let array = Array::of(&header, name)?;
+        if !array.is_image() {
+            let next = if array.bytes == 0 { Header::read(&mut input, name).unwrap_or(None) } else { None };
+            let next = next.and_then(|header| Array::of(&header, name).ok());
+            return Err(no_image(name, 0, &array.kind, next.map(|array| (1, array))));
+        }
+        let (form, geometry, told) = described(name, &header, &array)?;
+        if geometry.channels.len() == 1 && !told.is_bottom_up {
+            let source = Source::InOrder(Box::new(BufReader::with_capacity(READ_BYTES, input)), true);
+            return Ok(Self { name: name.into(), source, form, geometry, told, next_row: 0, stored: Vec::new() });
+        }
+        let spooled = spool(&mut input, name)?;
+        Self::placed(name, &header, &array, spooled, 0)
+    }
+
+    /// The image whose array begins at the byte `data` of a file.
+    fn placed(name: &str, header: &Header, array: &Array, mut file: File, data: u64) -> Result<Self> {
+        let failed = |e| Error::disk(name, "read", e);
+        let (form, geometry, told) = described(name, header, array)?;
+        let length = file.seek(SeekFrom::End(0)).map_err(failed)?;
+        if data.checked_add(array.bytes).is_none_or(|end| end > length) {
+            return Err(Error::cut_short(name));
+        }
+        let source = if geometry.channels.len() == 1 && !told.is_bottom_up {
+            file.seek(SeekFrom::Start(data)).map_err(failed)?;
+            Source::InOrder(Box::new(BufReader::with_capacity(READ_BYTES, file)), false)
+        } else {
+            Source::Anywhere(file, data)
+        };
+        Ok(Self { name: name.into(), source, form, geometry, told, next_row: 0, stored: Vec::new() })
+    }
+
+    /// Brings one row of one plane, as stored.
+    fn fetch(&mut self, row: usize, channel: usize) -> Result<()> {
+        let Geometry { width, height, .. } = self.geometry;
+        let bytes = width as u64 * self.form.stored.bytes() as u64;
+        match &mut self.source {
+            Source::InOrder(input, _) => {
+                self.stored.clear();
+                let read = input.by_ref().take(bytes).read_to_end(&mut self.stored);
+                read.map_err(|e| Error::disk(&self.name, "read", e))?;
+                if (self.stored.len() as u64) < bytes {
+                    return Err(Error::cut_short(&self.name));
+                }
+            }
+            Source::Anywhere(file, data) => {
+                let row = if self.told.is_bottom_up { height - 1 - row } else { row };
+                self.stored.resize(width * self.form.stored.bytes(), 0);
+                let place = *data + (channel as u64 * height as u64 + row as u64) * bytes;
+                file.read_exact_at(&mut self.stored, place).map_err(|e| Error::disk(&self.name, "read", e))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The header that begins at a place of the file, and what it says; none behind the last.
+fn part_at(file: &mut File, place: u64, name: &str) -> Result<Option<(Header, Array)>> {
+    file.seek(SeekFrom::Start(place)).map_err(|e| Error::disk(name, "read", e))?;
+    let Some(header) = Header::read(&mut BufReader::new(file), name)? else { return Ok(None) };
+    let array = Array::of(&header, name)?;
+    Ok(Some((header, array)))
+}
+
+/// The next part that is an image, or would be one if it were not compressed, among those from a place on.
+fn next_image(file: &mut File, mut place: u64, from: usize, name: &str) -> Result<Option<(usize, Array)>> {
+    /// Parts that are looked at.
+    const MOST: usize = 100;
+    for number in from..from.saturating_add(MOST) {
+        let Some((header, array)) = part_at(file, place, name)? else { return Ok(None) };
+        if array.is_image() || array.kind == Kind::Tiles {
+            return Ok(Some((number, array)));
+        }
+        place += header.bytes + array.padded_bytes();
+    }
+    Ok(None)
+}
+
+/// The complaint about a part that holds no image, with what to do instead.
+fn no_image(name: &str, part: usize, kind: &Kind, after: Option<(usize, Array)>) -> Error {
+    const UNPACK: &str = "unpack it first, for example with `funpack`";
+    let problem = match kind {
+        Kind::Tiles => {
+            return Error::format(name, format!("its part {part} is an image in compressed tiles (ZIMAGE); {UNPACK}"));
+        }
+        Kind::Other(other) => format!("its part {part} is a {other}, not an image"),
+        Kind::Array => format!("its part {part} holds no image"),
+    };
+    match after {
+        Some((number, Array { kind: Kind::Tiles, .. })) => {
+            Error::format(name, format!("{problem}, and part {number} one in compressed tiles (ZIMAGE); {UNPACK}"))
+        }
+        Some((number, array)) if array.is_image() => {
+            Error::format(name, format!("{problem}, but part {number} does")).give(&["part"])
+        }
+        _ => Error::format(name, problem),
+    }
+}
+
+/// How samples are stored, the size of the frame, and what else the header tells.
+fn described(name: &str, header: &Header, array: &Array) -> Result<(Form, Geometry, Told)> {
+    let form = Form::of(name, header, array.bitpix)?;
+    let geometry = geometry(name, &array.axes)?;
+    let mut told = keywords::read(header, geometry.channels.len(), array.bitpix > 0 && !form.is_scaled());
+    told.notes.extend(form.notes());
+    Ok((form, geometry, told))
+}
+
+/// Columns, rows and planes.
+fn geometry(name: &str, axes: &[u64]) -> Result<Geometry> {
+    let side = |at: usize| {
+        let side = axes.get(at).copied().unwrap_or(1);
+        usize::try_from(side).ok().filter(|side| (1..=i32::MAX as usize).contains(side))
+    };
+    let (Some(width), Some(height), Some(planes)) = (side(0), side(1), side(2)) else {
+        return Err(Error::format(name, "it is damaged: its header declares a size beyond any"));
+    };
+    if planes > usize::from(u16::MAX) || axes.iter().skip(3).any(|axis| *axis != 1) {
+        let size: Vec<String> = axes.iter().map(u64::to_string).collect();
+        let size = size.join("x");
+        return Err(Error::format(name, format!("its array of {size} is no image of up to {} planes", u16::MAX)));
+    }
+    let channels = match planes {
+        1 => vec!["Y".to_owned()],
+        3 => ["R", "G", "B"].map(str::to_owned).to_vec(),
+        _ => (0..planes).map(|plane| format!("C{plane}")).collect(),
+    };
+    Ok(Geometry { width, height, origin: [0, 0], channels })
+}
+
+impl Form {
+    /// Reads the keywords of samples.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for integers of 64 bits.
+    fn of(name: &str, header: &Header, bitpix: i64) -> Result<Self> {
+        let (scale, zero) = (header.number("BSCALE").unwrap_or(1.0), header.number("BZERO").unwrap_or(0.0));
+        let stored = match (bitpix, scale == 1.0, zero) {
+            (8, true, -128.0) => SampleType::I8,
+            (8, ..) => SampleType::U8,
+            (16, true, 32_768.0) => SampleType::U16,
+            (16, ..) => SampleType::I16,
+            (32, true, 2_147_483_648.0) => SampleType::U32,
+            (32, ..) => SampleType::I32,
+            (-32, ..) => SampleType::F32,
+            (-64, ..) => SampleType::F64,
+            _ => {
+                let problem = "its integers of 64 bits are not supported; store it as 32-bit integers or floats first";
+                return Err(Error::format(name, problem));
+            }
+        };
+        let blank = header.number("BLANK").filter(|_| bitpix > 0);
+        Ok(Self { stored, scale, zero, blank })
+    }
+
+    /// Whether values are others than those that a program stored as integers or floats of this kind.
+    fn is_scaled(&self) -> bool {
+        let shift = match self.stored {
+            SampleType::I8 => -128.0,
+            SampleType::U16 => 32_768.0,
+            SampleType::U32 => 2_147_483_648.0,
+            _ => 0.0,
+        };
+        (self.scale, self.zero) != (1.0, shift)
+    }
+
+    /// What a user should know of it.
+    fn notes(&self) -> Vec<String> {
+        let Self { scale, zero, .. } = self;
+        let scaled = || format!("its samples are {zero} + {scale} times what is stored (BZERO, BSCALE)");
+        let blank = self.blank.map(|blank| format!("samples stored as {blank} (BLANK) are undefined: they are NaN"));
+        let rounded = || "its samples of 64 bits are rounded to 32".to_owned();
+        let is_double = self.stored == SampleType::F64;
+        self.is_scaled().then(scaled).into_iter().chain(blank).chain(is_double.then(rounded)).collect()
+    }
+
+    /// Appends the values of stored samples.
+    fn append(&self, stored: &[u8], samples: &mut Vec<f32>) -> std::result::Result<(), Overflow> {
+        match self.stored {
+            SampleType::U8 | SampleType::I8 => self.values(stored, samples, |[byte]: [u8; 1]| byte.into()),
+            SampleType::U16 | SampleType::I16 => self.values(stored, samples, |bytes| i16::from_be_bytes(bytes).into()),
+            SampleType::U32 | SampleType::I32 => self.values(stored, samples, |bytes| i32::from_be_bytes(bytes).into()),
+            SampleType::F64 => self.values(stored, samples, f64::from_be_bytes),
+            _ => self.values(stored, samples, |bytes| f32::from_be_bytes(bytes).into()),
+        }
+    }
+
+    /// value = BZERO + BSCALE · stored        \[FITS4, Eq. 3]
+    fn values<const BYTES: usize>(
+        &self,
+        stored: &[u8],
+        samples: &mut Vec<f32>,
+        number: impl Fn([u8; BYTES]) -> f64,
+    ) -> std::result::Result<(), Overflow> {
+        let start = samples.len();
+        let mut overflows = false;
+        samples.extend(stored.as_chunks::<BYTES>().0.iter().map(|bytes| {
+            let number = number(*bytes);
+            if self.blank == Some(number) {
+                return f32::NAN;
+            }
+            let value = if self.is_plain() { number } else { self.zero + self.scale * number };
+            let sample = to_sample(value);
+            overflows |= value.is_finite() && !sample.is_finite();
+            sample
+        }));
+        debug_assert!(samples.len() - start == stored.len() / BYTES);
+        if overflows { Err(Overflow) } else { Ok(()) }
+    }
+
+    /// Whether values are the stored ones, of which NaN and infinities stay what they are.
+    fn is_plain(&self) -> bool {
+        (self.scale, self.zero) == (1.0, 0.0)
+    }
+}
+
+/// A finite value beyond single precision.
+struct Overflow;
+
+impl SampleReader for FitsReader {
+    fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    fn stored_as(&self) -> Option<SampleType> {
+        Some(self.form.stored)
+    }
+
+    fn natural_rows(&self) -> usize {
+        1
+    }
+
+    fn may_wait(&self) -> bool {
+        matches!(self.source, Source::InOrder(_, true))
+    }
+
+    fn embedded(&self) -> Option<&str> {
+        None
+    }
+
+    fn own_tags(&self) -> &Metadata {
+        &self.told.metadata
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.told.notes
+    }
+
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        for row in self.next_row..self.next_row + rows {
+            for channel in 0..self.geometry.channels.len() {
+                self.fetch(row, channel)?;
+                self.form.append(&self.stored, samples).map_err(|Overflow| {
+                    Error::format(&self.name, "it has samples beyond 3.4e38, the largest of single precision")
+                })?;
+            }
+        }
+        self.next_row += rows;
+        Ok(())
+    }
+}

@@ -1,0 +1,311 @@
+//! Headers put together by hand; the files of other programs are those of tests/outside.
+
+use super::header::{Header, Value};
+use super::keywords;
+use super::read::FitsReader;
+use crate::error::Result;
+use crate::formats::format::SampleReader;
+use crate::units::QuantityKind;
+use std::fs::File;
+use std::io::{Cursor, Seek, Write};
+
+/// A card: keyword, and value as it is written.
+fn card(keyword: &str, value: &str) -> String {
+    format!("{:<80}", format!("{keyword:<8}= {value}"))
+}
+
+/// Cards up to the end of a block.
+fn header(cards: &[(&str, &str)]) -> Vec<u8> {
+    let mut text: String = cards.iter().map(|(keyword, value)| card(keyword, value)).collect();
+    text += &format!("{:<80}", "END");
+    let mut bytes = text.into_bytes();
+    bytes.resize(bytes.len().next_multiple_of(2880), b' ');
+    bytes
+}
+
+/// A part of 16-bit integers of three columns and two rows in planes.
+fn part(first: (&str, &str), axes: &[&str], more: &[(&str, &str)], samples: &[i16]) -> Vec<u8> {
+    let count = axes.len().to_string();
+    let keys: Vec<String> = (1..=axes.len()).map(|axis| format!("NAXIS{axis}")).collect();
+    let sizes = keys.iter().map(String::as_str).zip(axes.iter().copied());
+    let cards: Vec<(&str, &str)> =
+        [first, ("BITPIX", "16"), ("NAXIS", &count)].into_iter().chain(sizes).chain(more.iter().copied()).collect();
+    let mut bytes = header(&cards);
+    bytes.extend(samples.iter().flat_map(|sample| sample.to_be_bytes()));
+    bytes.resize(bytes.len().next_multiple_of(2880), 0);
+    bytes
+}
+
+fn plane(more: &[(&str, &str)]) -> Vec<u8> {
+    part(("SIMPLE", "T"), &["3", "2"], more, &[1, 2, 3, -4, 5, 6])
+}
+
+fn file(bytes: &[u8]) -> File {
+    let mut file = tempfile::tempfile().unwrap();
+    file.write_all(bytes).unwrap();
+    file.rewind().unwrap();
+    file
+}
+
+/// What both ways read, or of what both complain.
+fn both(bytes: &[u8]) -> Result<(FitsReader, Vec<f32>)> {
+    let read = |opened: Result<FitsReader>| -> Result<(FitsReader, Vec<f32>)> {
+        let mut reader = opened?;
+        let mut samples = Vec::new();
+        for _ in 0..reader.geometry().height {
+            reader.read(1, &mut samples)?;
+        }
+        Ok((reader, samples))
+    };
+    let streamed = read(FitsReader::stream(Box::new(Cursor::new(bytes.to_vec())), "in.fits"));
+    let placed = read(FitsReader::open(file(bytes), "in.fits", 0));
+    match (placed, streamed) {
+        (Ok(placed), Ok(streamed)) => {
+            assert_eq!(placed.0.geometry(), streamed.0.geometry());
+            assert_eq!(placed.0.notes(), streamed.0.notes());
+            let bits = |samples: &[f32]| samples.iter().map(|sample| sample.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&placed.1), bits(&streamed.1));
+            Ok(placed)
+        }
+        (Err(placed), Err(streamed)) => {
+            assert_eq!(placed.to_string(), streamed.to_string());
+            Err(placed)
+        }
+        (Ok(_), Err(error)) | (Err(error), Ok(_)) => panic!("one way alone complains: {error}"),
+    }
+}
+
+fn complaint(bytes: &[u8]) -> String {
+    both(bytes).map(drop).unwrap_err().to_string()
+}
+
+#[test]
+fn rows_come_from_the_top() {
+    let (reader, samples) = both(&plane(&[("ROWORDER", "'TOP-DOWN'")])).unwrap();
+    assert_eq!(reader.geometry().channels, ["Y"]);
+    assert_eq!((samples, reader.notes()), (vec![1.0, 2.0, 3.0, -4.0, 5.0, 6.0], &[][..]));
+    let (reader, samples) = both(&plane(&[("ROWORDER", "'BOTTOM-UP'")])).unwrap();
+    assert_eq!((samples, reader.notes()), (vec![-4.0, 5.0, 6.0, 1.0, 2.0, 3.0], &[][..]));
+    let (reader, samples) = both(&plane(&[])).unwrap();
+    assert_eq!(samples[0], 1.0);
+    assert_eq!(reader.notes(), ["it has no ROWORDER; its first row is taken as the top one"]);
+    assert!(
+        both(&plane(&[("ROWORDER", "'LEFT'")])).unwrap().0.notes()[0].starts_with("its ROWORDER `LEFT` is not known")
+    );
+}
+
+#[test]
+fn planes_are_channels() {
+    let samples: Vec<i16> = (0..18).collect();
+    let top_down = [("ROWORDER", "'TOP-DOWN'")];
+    let (reader, read) = both(&part(("SIMPLE", "T"), &["3", "2", "3"], &top_down, &samples)).unwrap();
+    assert_eq!(reader.geometry().channels, ["R", "G", "B"]);
+    let wanted: [u8; 18] = [0, 1, 2, 6, 7, 8, 12, 13, 14, 3, 4, 5, 9, 10, 11, 15, 16, 17];
+    assert_eq!(read, wanted.map(f32::from));
+    let (reader, _) = both(&part(("SIMPLE", "T"), &["3", "2", "2", "1"], &top_down, &samples)).unwrap();
+    assert_eq!(reader.geometry().channels, ["C0", "C1"]);
+    assert_eq!(
+        complaint(&part(("SIMPLE", "T"), &["3", "1", "2", "3"], &top_down, &samples)),
+        "in.fits: its array of 3x1x2x3 is no image of up to 65535 planes"
+    );
+}
+
+#[test]
+fn values_are_those_of_the_standard() {
+    let (reader, samples) = both(&plane(&[("BZERO", "32768.0"), ("BSCALE", "1.0D0")])).unwrap();
+    assert_eq!(reader.stored_as().unwrap().name(), "u16");
+    assert_eq!(samples, [32769.0, 32770.0, 32771.0, 32764.0, 32773.0, 32774.0]);
+    let (reader, samples) = both(&plane(&[("BZERO", "100"), ("BSCALE", ".5"), ("BLANK", "-4")])).unwrap();
+    assert_eq!(samples[..3], [100.5, 101.0, 101.5]);
+    assert!(samples[3].is_nan());
+    assert_eq!(
+        reader.notes()[1..],
+        [
+            "its samples are 100 + 0.5 times what is stored (BZERO, BSCALE)",
+            "samples stored as -4 (BLANK) are undefined: they are NaN"
+        ]
+    );
+    let of = |bitpix: &str, bytes: &[u8]| {
+        let axes = [("NAXIS", "2"), ("NAXIS1", "2"), ("NAXIS2", "1"), ("ROWORDER", "'TOP-DOWN'")];
+        let cards: Vec<_> = [("SIMPLE", "T"), ("BITPIX", bitpix)].into_iter().chain(axes).collect();
+        both(&[&header(&cards), bytes].concat()).map(|(reader, samples)| (reader.notes().concat(), samples))
+    };
+    assert_eq!(of("8", &[0, 255]).unwrap().1, [0.0, 255.0]);
+    assert_eq!(of("32", &[0, 0, 1, 0, 255, 255, 255, 255]).unwrap().1, [256.0, -1.0]);
+    let floats = [1.5_f32, f32::INFINITY].map(f32::to_be_bytes).concat();
+    assert_eq!(of("-32", &floats).unwrap().1, [1.5, f32::INFINITY]);
+    let doubles = |values: [f64; 2]| of("-64", &values.map(f64::to_be_bytes).concat());
+    let (notes, samples) = doubles([1e-3, f64::NEG_INFINITY]).unwrap();
+    assert_eq!((notes.as_str(), samples), ("its samples of 64 bits are rounded to 32", vec![1e-3, f32::NEG_INFINITY]));
+    let complaint = doubles([1e40, 0.0]).unwrap_err().to_string();
+    assert_eq!(complaint, "in.fits: it has samples beyond 3.4e38, the largest of single precision");
+    assert!(of("64", &[0; 16]).unwrap_err().to_string().contains("integers of 64 bits are not supported"));
+}
+
+#[test]
+fn parts_are_chosen() {
+    let empty = || part(("SIMPLE", "T"), &[], &[], &[]);
+    let image = || part(("XTENSION", "'IMAGE   '"), &["3", "2"], &[("PCOUNT", "0"), ("GCOUNT", "1")], &[7; 6]);
+    let tiles = part(("XTENSION", "'BINTABLE'"), &["3", "2"], &[("ZIMAGE", "T")], &[7; 6]);
+    let table = part(("XTENSION", "'BINTABLE'"), &["3", "2"], &[("PCOUNT", "3000")], &[7; 3006]);
+    let of = |parts: &[Vec<u8>], number: usize| {
+        let mut reader = FitsReader::open(file(&parts.concat()), "in.fits", number)?;
+        let mut samples = Vec::new();
+        reader.read(2, &mut samples)?;
+        Ok::<_, crate::error::Error>(samples)
+    };
+    let said = |parts: &[Vec<u8>], number: usize| of(parts, number).unwrap_err().to_string();
+    let parts = [empty(), table.clone(), image()];
+    assert_eq!(of(&parts, 2).unwrap(), [7.0; 6]);
+    assert_eq!(said(&parts, 0), "in.fits: its part 0 holds no image, but part 2 does; give `part`");
+    assert_eq!(said(&parts, 1), "in.fits: its part 1 is a BINTABLE, not an image, but part 2 does; give `part`");
+    assert_eq!(said(&parts, 3), "in.fits: there is no part 3; its last one is 2");
+    assert_eq!(
+        complaint(&[empty(), image()].concat()),
+        "in.fits: its part 0 holds no image, but part 1 does; give `part`"
+    );
+    let unpack = "unpack it first, for example with `funpack`";
+    assert_eq!(
+        complaint(&[empty(), tiles.clone()].concat()),
+        format!("in.fits: its part 0 holds no image, and part 1 one in compressed tiles (ZIMAGE); {unpack}")
+    );
+    assert_eq!(
+        said(&[empty(), tiles], 1),
+        format!("in.fits: its part 1 is an image in compressed tiles (ZIMAGE); {unpack}")
+    );
+    assert_eq!(complaint(&empty()), "in.fits: its part 0 holds no image");
+}
+
+#[test]
+fn damage_is_told() {
+    let whole = plane(&[("ROWORDER", "'TOP-DOWN'")]);
+    let cut_short = "in.fits: the file ends before its last row; it was cut short";
+    assert_eq!(complaint(&whole[..2880 + 11]), cut_short);
+    assert_eq!(complaint(&whole[..2880]), cut_short);
+    assert_eq!(complaint(&whole[..300]), "in.fits: the file ends within a header; it was cut short");
+    // What fills the last block may be missing.
+    assert!(both(&whole[..2880 + 12]).is_ok());
+    let with = |key: &str, value: &str| {
+        let mut cards =
+            vec![("SIMPLE", "T"), ("BITPIX", "16"), ("NAXIS", "2"), ("NAXIS1", "3"), ("NAXIS2", "2"), ("GROUPS", "F")];
+        cards.iter_mut().filter(|(name, _)| *name == key).for_each(|(_, old)| *old = value);
+        complaint(&[header(&cards), vec![0; 2880]].concat())
+    };
+    for (key, value, wanted) in [
+        ("SIMPLE", "F", "it says itself that it departs from the standard (SIMPLE is not T)"),
+        ("BITPIX", "12", "it is damaged: its header has no valid BITPIX"),
+        ("BITPIX", "16.5", "it is damaged: its header has no valid BITPIX"),
+        ("NAXIS", "1000", "it is damaged: its header has no valid NAXIS"),
+        ("NAXIS", "3", "it is damaged: its header has no valid NAXIS3"),
+        ("NAXIS1", "-3", "it is damaged: its header has no valid NAXIS1"),
+        ("NAXIS1", "4e15", "it is damaged: its header declares a size beyond any"),
+        ("NAXIS1", "'x'", "it is damaged: its header has no valid NAXIS1"),
+        ("NAXIS2", "0", "its part 0 holds no image"),
+        ("GROUPS", "T", "it holds random groups, not an image"),
+    ] {
+        assert_eq!(with(key, value), format!("in.fits: {wanted}"), "{key} = {value}");
+    }
+    let mut no_text = whole.clone();
+    no_text[100] = 0xFF;
+    assert_eq!(complaint(&no_text), "in.fits: it is damaged: its header is no text");
+    let endless = [&whole[..80], &[b' '; 2800]].concat();
+    assert_eq!(complaint(&endless), "in.fits: the file ends within a header; it was cut short");
+    // A row that is declared and not there takes no memory.
+    let wide =
+        [header(&[("SIMPLE", "T"), ("BITPIX", "-64"), ("NAXIS", "2"), ("NAXIS1", "2147483647"), ("NAXIS2", "9")])];
+    assert_eq!(complaint(&wide.concat()), cut_short);
+}
+
+fn text(value: &str) -> Value {
+    Value::Text(value.into())
+}
+
+#[test]
+fn patterns_are_those_of_the_picture() {
+    let of = |letters: &str, x: f64, y: f64| {
+        let cards = [("BAYERPAT", text(letters)), ("XBAYROFF", Value::Number(x)), ("YBAYROFF", Value::Number(y))];
+        let told = keywords::read(&Header::of(&cards), 1, true);
+        assert_eq!(
+            told.metadata.quantity,
+            if told.metadata.cfa.is_some() { QuantityKind::Adu } else { Default::default() }
+        );
+        told.metadata.cfa.map(|array| array.to_string())
+    };
+    assert_eq!(of("RGGB", 0.0, 0.0).unwrap(), "rggb");
+    assert_eq!(of("rggb ", 1.0, 0.0).unwrap(), "grbg");
+    assert_eq!(of("RGGB", 0.0, 1.0).unwrap(), "gbrg");
+    assert_eq!(of("RGGB", 1.0, -1.0).unwrap(), "bggr");
+    let x_trans = "GBGGRGRGRBGBGBGGRGGRGGBGBGBRGRGRGGBG";
+    assert_eq!(of(x_trans, 0.0, 0.0).unwrap(), format!("6x6:{x_trans}"));
+    for unknown in ["TRUE", "RGGX", "RGB", "MONO", "RGG"] {
+        assert_eq!(of(unknown, 0.0, 0.0), None);
+    }
+    assert_eq!(of("RGGB", 0.5, 0.0), None);
+    let told = keywords::read(&Header::of(&[("COLORTYP", text("GRBG"))]), 3, true);
+    assert_eq!(told.metadata.cfa, None);
+    assert!(told.notes[1].contains("it has 3 planes, not one"));
+    let binned = [("BAYERPAT", text("RGGB")), ("XBINNING", Value::Number(2.0))];
+    assert!(keywords::read(&Header::of(&binned), 1, true).notes[1].contains("were binned"));
+}
+
+#[test]
+fn keywords_of_the_camera_are_used_or_told() {
+    let number = Value::Number;
+    let told = |cards: &[(&str, Value)]| {
+        let told = keywords::read(&Header::of(&[cards, &[("ROWORDER", text("TOP-DOWN"))]].concat()), 1, true);
+        (told.metadata, told.notes.join("; "))
+    };
+    let lens = [("FOCALLEN", number(400.0)), ("APTDIA", number(100.0))];
+    for time in [("EXPTIME", number(0.5)), ("EXPOSURE", number(0.5)), ("EXPOINUS", number(5e5))] {
+        let (metadata, notes) = told(&[&lens[..], &[time]].concat());
+        let exposure = metadata.exposure.unwrap();
+        assert_eq!((exposure.exposure_s, exposure.f_number, exposure.lens_transmittance), (0.5, 4.0, 1.0));
+        assert_eq!(notes, "");
+    }
+    let (metadata, notes) = told(&[("EXPTIME", text("2.5"))]);
+    assert_eq!(metadata.exposure, None);
+    assert!(notes.starts_with("its exposure time of 2.5 s is passed over: it has no f-number"));
+    assert!(told(&lens).1.starts_with("its f-number of 4 is passed over: it has no exposure time"));
+    let (metadata, notes) = told(&[("EXPTIME", number(0.0)), ("FOCRATIO", number(4.0))]);
+    assert_eq!(metadata.exposure, None);
+    assert!(notes.starts_with("its exposure is passed over: an exposure of 0 s is impossible"));
+    let (metadata, notes) = told(&[
+        ("INSTRUME", text("ASI533MC")),
+        ("CCD-TEMP", number(-10.0)),
+        ("EGAIN", number(0.5)),
+        ("GAIN", number(100.0)),
+        ("PEDESTAL", number(-100.0)),
+    ]);
+    assert_eq!((metadata.black_level_adu, metadata.quantity), (None, QuantityKind::Unspecified));
+    assert_eq!(
+        notes,
+        "its header tells what is not used here: camera ASI533MC, sensor at -10 degrees Celsius (CCD-TEMP), 0.5 e-/ADU \
+         (EGAIN), which is an `adu_per_e` of 2, GAIN 100 in units of the camera; its PEDESTAL of -100 is not taken as the \
+         black level: programs disagree on its sign and scale"
+    );
+    assert_eq!(told(&[("BUNIT", text("ADU"))]).0.quantity, QuantityKind::Adu);
+    let (metadata, notes) = told(&[("BUNIT", text("Jy/beam")), ("BAYERPAT", text("RGGB"))]);
+    assert_eq!(
+        (metadata.quantity, notes.as_str()),
+        (QuantityKind::Unspecified, "its unit `Jy/beam` (BUNIT) is passed over")
+    );
+}
+
+#[test]
+fn values_of_cards() {
+    let cards = header(&[
+        ("SIMPLE", "                   T / conforms"),
+        ("INSTRUME", "'O''Brien / Sons  ' / a camera"),
+        ("EXPTIME", "1.5D-3/s"),
+        ("GAIN", "(1, 2)"),
+        ("EGAIN", ""),
+        ("BAYERPAT", "'RGGB"),
+        ("GAIN", "3"),
+    ]);
+    let header = Header::read(&mut Cursor::new(cards), "in.fits").unwrap().unwrap();
+    assert!(header.is_true("SIMPLE"));
+    assert_eq!(header.text("INSTRUME"), Some("O'Brien / Sons"));
+    assert_eq!(header.number("EXPTIME"), Some(1.5e-3));
+    // The first of two counts, though it is of no use.
+    assert_eq!((header.number("GAIN"), header.number("EGAIN"), header.text("BAYERPAT")), (None, None, None));
+}

@@ -1,0 +1,341 @@
+//! PNG: rows of 8 or 16-bit samples of the pictures that programs store their codes in \[PNG2025].
+
+use super::foreign::png_damage;
+use super::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use crate::error::{Error, Result};
+use crate::frame::Geometry;
+use crate::metadata::{METADATA_BEGIN, Metadata};
+use crate::units::QuantityKind;
+use png::{BitDepth, ColorType, Info, Limits};
+use std::fs::File;
+use std::io::{BufReader, Seek, SeekFrom};
+
+/// Portable Network Graphics.
+pub const FORMAT: FrameFormat = FrameFormat {
+    name: "a PNG",
+    sign: Sign::Bytes(|head| head.starts_with(b"\x89PNG\r\n\x1A\n")),
+    reading: Reading::Rows(Readers {
+        open: |file, name, part| Ok(Box::new(PngReader::open(file, name, part)?)),
+        stream: None,
+    }),
+};
+
+/// What texts and color profiles may take.
+const TEXT_BYTES: usize = 16 << 20;
+/// What metadata in a compressed text may take.
+const METADATA_BYTES: usize = 1 << 20;
+/// What a row may take however small the file is; if more, then so many times what the file has.
+const SMALL_BYTES: u64 = 64 << 20;
+const MOST_EXPANSION: u64 = 64;
+/// How many bytes one byte of Deflate can become at most: a match of 258 in two bits.
+const DEFLATE_EXPANSION: u64 = 1032;
+
+const CONVERT: &str = "convert it first, for example with `oiiotool in.png -o out.tif`";
+
+/// Reads the rows of a PNG.
+///
+/// Channels are `Y`; `Y`, `A`; `R`, `G`, `B`; with `A`. Samples are those stored: a transfer function is not undone, alpha
+/// is not divided by. Memory is a few rows, and texts of up to 16 MiB.
+pub struct PngReader {
+    name: String,
+    reader: png::Reader<BufReader<File>>,
+    geometry: Geometry,
+    stored: SampleType,
+    embedded: Option<String>,
+    own_tags: Metadata,
+    notes: Vec<String>,
+}
+
+impl PngReader {
+    /// Opens a file, which has a single part.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for another part; [`Error::Format`] for what is damaged or of a kind that is not read.
+    pub fn open(mut file: File, name: &str, part: usize) -> Result<Self> {
+        if part != 0 {
+            return Err(Error::Usage(format!("{name}: it has no part {part}; it has a single one")));
+        }
+        let failed = |e| Error::disk(name, "read", e);
+        let start = file.stream_position().map_err(failed)?;
+        let length = file.seek(SeekFrom::End(0)).map_err(failed)?.saturating_sub(start);
+        file.seek(SeekFrom::Start(start)).map_err(failed)?;
+        let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), Limits { bytes: TEXT_BYTES });
+        let damage = |error| png_damage(name, error);
+        let header = decoder.read_header_info().map_err(damage)?;
+        let refuse = |problem: String| Error::format(name, problem);
+        let (channels, stored) = kind(header).map_err(refuse)?;
+        let size = [header.width, header.height].map(u64::from);
+        check_size(size, channels.len() as u64 * stored.bytes() as u64, length).map_err(refuse)?;
+        let [width, height] = size.map(|side| usize::try_from(side).unwrap_or(usize::MAX));
+        let reader = decoder.read_info().map_err(damage)?;
+        Ok(Self {
+            name: name.into(),
+            geometry: Geometry::new(width, height, channels),
+            stored,
+            embedded: embedded(reader.info()),
+            own_tags: Metadata::new(QuantityKind::Unspecified),
+            notes: notes(reader.info()),
+            reader,
+        })
+    }
+}
+
+/// Channels and samples; or why such a picture is not read.
+fn kind(info: &Info<'_>) -> std::result::Result<(&'static [&'static str], SampleType), String> {
+    if info.interlaced {
+        return Err(format!("it is interlaced (Adam7), so that its rows do not come in order; {CONVERT}"));
+    }
+    let channels: &[&str] = match info.color_type {
+        ColorType::Grayscale => &["Y"],
+        ColorType::GrayscaleAlpha => &["Y", "A"],
+        ColorType::Rgb => &["R", "G", "B"],
+        ColorType::Rgba => &["R", "G", "B", "A"],
+        ColorType::Indexed => return Err(format!("its colors are those of a palette, which is not read; {CONVERT}")),
+    };
+    match info.bit_depth {
+        BitDepth::Eight => Ok((channels, SampleType::U8)),
+        BitDepth::Sixteen => Ok((channels, SampleType::U16)),
+        packed => Err(format!("its samples have {} bits, which are not unpacked; {CONVERT}", packed as u8)),
+    }
+}
+
+/// Refuses what a file of so many bytes cannot hold, and rows that take too much memory.
+fn check_size([width, height]: [u64; 2], pixel_bytes: u64, length: u64) -> std::result::Result<(), String> {
+    let row_bytes = width.saturating_mul(pixel_bytes);
+    if row_bytes.saturating_mul(height) > length.saturating_mul(DEFLATE_EXPANSION) {
+        return Err(format!("it is too short for {width}x{height} pixels; it was cut short or damaged"));
+    }
+    if row_bytes > SMALL_BYTES.max(length.saturating_mul(MOST_EXPANSION)) {
+        return Err(format!("each of its rows takes {} MiB; cut it into narrower ones", row_bytes >> 20));
+    }
+    Ok(())
+}
+
+/// The project's metadata among the texts that stand before the samples.
+fn embedded(info: &Info<'_>) -> Option<String> {
+    let plain = info.uncompressed_latin1_text.iter().map(|chunk| Some(chunk.text.clone()));
+    let packed = info.compressed_latin1_text.iter().map(|chunk| {
+        let mut chunk = chunk.clone();
+        chunk.decompress_text_with_limit(METADATA_BYTES).ok()?;
+        chunk.get_text().ok()
+    });
+    let international = info.utf8_text.iter().map(|chunk| {
+        let mut chunk = chunk.clone();
+        chunk.decompress_text_with_limit(METADATA_BYTES).ok()?;
+        chunk.get_text().ok()
+    });
+    plain.chain(packed).chain(international).flatten().find(|text| text.starts_with(METADATA_BEGIN))
+}
+
+/// What the chunks say that no sample is changed by.
+fn notes(info: &Info<'_>) -> Vec<String> {
+    let mut notes = Vec::new();
+    let encoded = match (info.srgb, info.gama_chunk) {
+        (Some(_), _) => Some("sRGB".to_owned()),
+        // The chunk holds the exponent of the encoding: 1 is linear.
+        (None, Some(gamma)) if (gamma.into_value() - 1.0).abs() > 1e-4 => {
+            Some(format!("the exponent {} (gAMA)", gamma.into_value()))
+        }
+        _ => None,
+    };
+    if let Some(encoded) = encoded {
+        notes.push(format!("its samples are encoded by {encoded}; they are taken as stored, not made linear"));
+    }
+    if info.icc_profile.is_some() {
+        notes.push("its color profile (iCCP) is passed over; samples are taken as stored".into());
+    }
+    if info.coding_independent_code_points.is_some() {
+        notes.push("its color space (cICP) is passed over; samples are taken as stored".into());
+    }
+    if let Some(bits) = info.sbit.as_deref() {
+        let bits: Vec<String> = bits.iter().map(u8::to_string).collect();
+        notes
+            .push(format!("its samples were scaled up from {} bits (sBIT); they are taken as stored", bits.join(", ")));
+    }
+    if info.trns.is_some() {
+        notes.push("the color that it calls transparent (tRNS) is taken as any other".into());
+    }
+    if info.animation_control.is_some() {
+        notes.push("it is animated; its first picture is read".into());
+    }
+    notes
+}
+
+impl SampleReader for PngReader {
+    fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    fn stored_as(&self) -> Option<SampleType> {
+        Some(self.stored)
+    }
+
+    fn natural_rows(&self) -> usize {
+        1
+    }
+
+    fn embedded(&self) -> Option<&str> {
+        self.embedded.as_deref()
+    }
+
+    fn own_tags(&self) -> &Metadata {
+        &self.own_tags
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        let channels = self.geometry.channels.len();
+        for _ in 0..rows {
+            let row = self.reader.next_row().map_err(|error| png_damage(&self.name, error))?;
+            let Some(row) = row else { return Err(Error::cut_short(&self.name)) };
+            for channel in 0..channels {
+                match self.stored {
+                    SampleType::U8 => {
+                        samples.extend(row.data()[channel..].iter().step_by(channels).map(|byte| f32::from(*byte)));
+                    }
+                    _ => {
+                        let (stored, _) = row.data().as_chunks::<2>();
+                        let stored = stored[channel..].iter().step_by(channels);
+                        samples.extend(stored.map(|bytes| f32::from(u16::from_be_bytes(*bytes))));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use png::{Encoder, ScaledFloat};
+    use std::io::Write;
+
+    fn encoded(
+        color: ColorType,
+        depth: BitDepth,
+        data: &[u8],
+        set: impl Fn(&mut Encoder<'_, &mut Vec<u8>>),
+    ) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let bits = color.samples() * depth as usize;
+        let height = 2;
+        let width = data.len() / height * 8 / bits;
+        let mut encoder = Encoder::new(&mut bytes, u32::try_from(width).unwrap(), 2);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        set(&mut encoder);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(data).unwrap();
+        writer.finish().unwrap();
+        bytes
+    }
+
+    fn opened(bytes: &[u8], part: usize) -> Result<PngReader> {
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(bytes).unwrap();
+        file.rewind().unwrap();
+        PngReader::open(file, "in.png", part)
+    }
+
+    fn complaint(bytes: &[u8]) -> String {
+        let read = opened(bytes, 0).and_then(|mut reader| reader.read(2, &mut Vec::new()));
+        read.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn rows_come_channel_by_channel() {
+        let data: Vec<u8> = (0..48).collect();
+        for (color, names) in [
+            (ColorType::Grayscale, &["Y"][..]),
+            (ColorType::GrayscaleAlpha, &["Y", "A"]),
+            (ColorType::Rgb, &["R", "G", "B"]),
+            (ColorType::Rgba, &["R", "G", "B", "A"]),
+        ] {
+            for (depth, stored) in [(BitDepth::Eight, "u8"), (BitDepth::Sixteen, "u16")] {
+                let mut reader = opened(&encoded(color, depth, &data, |_| {}), 0).unwrap();
+                let geometry = reader.geometry().clone();
+                assert_eq!(geometry.channels, names);
+                assert_eq!(reader.stored_as().unwrap().name(), stored);
+                assert_eq!(reader.own_tags().quantity, QuantityKind::Unspecified);
+                assert!(reader.notes().is_empty() && reader.embedded().is_none());
+                let mut samples = Vec::new();
+                reader.read(1, &mut samples).unwrap();
+                reader.read(1, &mut samples).unwrap();
+                let bytes = usize::from(depth == BitDepth::Sixteen) + 1;
+                let at = |y: usize, channel: usize, x: usize| {
+                    let first = ((y * geometry.width + x) * names.len() + channel) * bytes;
+                    data[first..first + bytes].iter().fold(0.0, |value, byte| value * 256.0 + f32::from(*byte))
+                };
+                let mut wanted = Vec::new();
+                for (y, channel) in (0..2).flat_map(|y| (0..names.len()).map(move |channel| (y, channel))) {
+                    wanted.extend((0..geometry.width).map(|x| at(y, channel, x)));
+                }
+                assert_eq!(samples, wanted, "{names:?} {stored}");
+            }
+        }
+    }
+
+    #[test]
+    fn chunks_are_told_and_ours_are_found() {
+        let gray = |set: &dyn Fn(&mut Encoder<'_, &mut Vec<u8>>)| {
+            opened(&encoded(ColorType::Grayscale, BitDepth::Eight, &[7; 4], set), 0).unwrap()
+        };
+        let notes = |set: &dyn Fn(&mut Encoder<'_, &mut Vec<u8>>)| gray(set).notes().concat();
+        assert_eq!(
+            notes(&|encoder| encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual)),
+            "its samples are encoded by sRGB; they are taken as stored, not made linear"
+        );
+        assert_eq!(
+            notes(&|encoder| encoder.set_source_gamma(ScaledFloat::new(0.5))),
+            "its samples are encoded by the exponent 0.5 (gAMA); they are taken as stored, not made linear"
+        );
+        assert_eq!(notes(&|encoder| encoder.set_source_gamma(ScaledFloat::new(1.0))), "");
+        assert!(notes(&|encoder| encoder.set_trns(vec![0, 7])).contains("(tRNS)"));
+        let ours = "schema: cyanometer/1\nquantity: adu\n";
+        for kind in 0..3 {
+            let reader = gray(&|encoder| {
+                encoder.add_text_chunk("Comment".into(), "made by hand".into()).unwrap();
+                let (keyword, text) = ("Description".into(), ours.into());
+                let added = match kind {
+                    0 => encoder.add_text_chunk(keyword, text),
+                    1 => encoder.add_ztxt_chunk(keyword, text),
+                    _ => encoder.add_itxt_chunk(keyword, text),
+                };
+                added.unwrap();
+            });
+            assert_eq!(reader.embedded(), Some(ours));
+        }
+    }
+
+    #[test]
+    fn what_is_not_read_is_refused_by_name() {
+        assert_eq!(
+            complaint(&encoded(ColorType::Grayscale, BitDepth::Four, &[7; 4], |_| {})),
+            format!("in.png: its samples have 4 bits, which are not unpacked; {CONVERT}")
+        );
+        let palette =
+            encoded(ColorType::Indexed, BitDepth::Eight, &[0; 4], |encoder| encoder.set_palette(vec![1, 2, 3]));
+        assert!(complaint(&palette).contains("those of a palette"));
+        let whole = encoded(ColorType::Grayscale, BitDepth::Eight, &[7; 4], |_| {});
+        assert_eq!(opened(&whole, 1).err().unwrap().to_string(), "in.png: it has no part 1; it has a single one");
+        let interlaced = with_header(&whole, 28, &[1]);
+        assert!(complaint(&interlaced).contains("it is interlaced (Adam7)"));
+        let high = with_header(&whole, 20, &1_000_000_u32.to_be_bytes());
+        assert!(complaint(&high).contains("too short for 2x1000000 pixels"));
+    }
+
+    /// The same with other bytes in the header, whose checksum is made good.
+    fn with_header(whole: &[u8], place: usize, bytes: &[u8]) -> Vec<u8> {
+        let mut changed = whole.to_vec();
+        changed[place..place + bytes.len()].copy_from_slice(bytes);
+        let mut sum = flate2::Crc::new();
+        sum.update(&changed[12..29]);
+        changed[29..33].copy_from_slice(&sum.sum().to_be_bytes());
+        changed
+    }
+}
