@@ -2,14 +2,14 @@
 
 use super::format::{FrameFormat, Readers, Reading, Sign};
 use super::tiff::{self, TiffFile};
-use super::{exr, unread};
+use super::{dng, exr, unread};
 use crate::error::{Error, Result};
 use std::fs::File;
 
 /// All formats that are known. Of those that share their first bytes the narrower comes first, TIFF last.
 pub const FORMATS: &[FrameFormat] = &[
     exr::FORMAT,
-    unread::DNG,
+    dng::FORMAT,
     unread::NEF,
     unread::ARW,
     unread::PEF,

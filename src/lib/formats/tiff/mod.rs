@@ -15,7 +15,9 @@ mod tags;
 mod tests;
 mod write;
 
+pub(in crate::formats) use chunk::Predictor;
 pub use directory::{Directory, TiffFile, begins_so};
+pub(in crate::formats) use read::METADATA_BEGIN;
 pub use read::{FORMAT, TiffReader};
 pub use tags::{ExtraTag, TagValue};
 pub use write::{TiffSettings, TiffWriter};

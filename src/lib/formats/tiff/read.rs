@@ -36,7 +36,7 @@ pub const FORMAT: FrameFormat = FrameFormat {
 };
 
 /// What our metadata begin with; other programs put their own words into tag 270.
-const METADATA_BEGIN: &str = "schema: cyanometer/";
+pub(in crate::formats) const METADATA_BEGIN: &str = "schema: cyanometer/";
 
 /// Reads rows of one image of a TIFF file.
 ///
