@@ -27,7 +27,7 @@ pub(super) fn defaults<R: Args>(words: &[OsString]) -> R {
 /// A frame to read.
 #[derive(Debug, Clone, Args)]
 pub struct Input {
-    /// Frame to read, EXR or TIFF; `-` or none for standard input
+    /// Frame to read, EXR, TIFF or DNG; `-` or none for standard input
     pub input: Option<PathBuf>,
     /// Part of a multi-part EXR, or page of a TIFF, counted from 0
     #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
