@@ -44,7 +44,7 @@ const KNOWN: [(&str, &str); 23] = [
     ("digitize darkness.exr -o dark.exr", "blake3:af44f4185dc2b38a"),
     ("correct-frame codes.exr --dark dark.exr -o corrected.exr", "blake3:f8dd1dfab827f191"),
     ("correct-frame codes.exr --cte 0.9999 -o restored.exr", "blake3:63f777cd493035fd"),
-    ("import-raw raw.dng --crop full -o raw.exr", "blake3:0000000000000000"),
+    ("import-raw raw.dng --crop full -o raw.exr", "blake3:12c0d74bee5b4e8a"),
     ("demosaic codes.exr --method eci --sigma -o sigma.exr", PREDICTED),
     ("to-xyz sigma.exr --matrix matrix.yaml --sigma -o sigma-xyz.exr", PREDICTED),
 ];

@@ -39,7 +39,7 @@ impl Levels {
         let highest = black.sites().into_iter().fold(f64::NEG_INFINITY, f64::max);
         if highest >= white {
             return Err(file.problem(format!(
-                "its BlackLevel, {highest}, is no less than its WhiteLevel, {white}; give both in a file of metadata beside it, or correct the tags"
+                "its BlackLevel, {highest}, is no less than its WhiteLevel, {white}; correct its tags"
             )));
         }
         Ok(Self {

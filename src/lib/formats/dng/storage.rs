@@ -1,6 +1,7 @@
 //! How the samples of a raw image are stored, and where its strips or tiles lie.
 
 use super::image::RawImage;
+use super::tags;
 use crate::error::Result;
 use crate::formats::format::SampleType;
 use crate::formats::tiff::{Directory, Predictor, TiffFile};
@@ -96,6 +97,16 @@ impl Storage {
         let directory = image.directory();
         if file.one(directory, Tag::FillOrder)?.unwrap_or(1) != 1 {
             return Err(file.problem("bits in reversed order (FillOrder 2) are not supported"));
+        }
+        // Rows and columns that are not stored in their own order.
+        for tag in [tags::SUB_TILE_BLOCK, tags::ROW_INTERLEAVE, tags::COLUMN_INTERLEAVE] {
+            let factors = tag.numbers(file, directory, 2)?.unwrap_or_default();
+            if factors.iter().any(|factor| *factor != 1.0) {
+                return Err(file.problem(format!(
+                    "its samples are stored in another order than that of the sensor ({}), which is not supported; convert it to DNG 1.5 or before",
+                    tag.1
+                )));
+            }
         }
         let sample = sample(file, directory)?;
         let compression = compression(file, image, sample)?;

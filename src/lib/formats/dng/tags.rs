@@ -28,6 +28,9 @@ pub(super) const WHITE_LEVEL: DngTag = DngTag(50717, "WhiteLevel");
 pub(super) const DEFAULT_CROP_ORIGIN: DngTag = DngTag(50719, "DefaultCropOrigin");
 pub(super) const DEFAULT_CROP_SIZE: DngTag = DngTag(50720, "DefaultCropSize");
 pub(super) const AS_SHOT_NEUTRAL: DngTag = DngTag(50728, "AsShotNeutral");
+pub(super) const SUB_TILE_BLOCK: DngTag = DngTag(50974, "SubTileBlockSize");
+pub(super) const ROW_INTERLEAVE: DngTag = DngTag(50975, "RowInterleaveFactor");
+pub(super) const COLUMN_INTERLEAVE: DngTag = DngTag(52547, "ColumnInterleaveFactor");
 pub(super) const ACTIVE_AREA: DngTag = DngTag(50829, "ActiveArea");
 pub(super) const OPCODES: [DngTag; 2] = [DngTag(51008, "OpcodeList1"), DngTag(51009, "OpcodeList2")];
 
