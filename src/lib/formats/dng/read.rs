@@ -118,14 +118,14 @@ impl DngReader {
         (DECODED_BYTES / size_of::<f32>() / self.row_samples()).clamp(1, self.storage.chunk_rows)
     }
 
-    /// Decodes the next rows: whole rows of chunks up to `end`, as far as they are held at a time, or a piece of one.
-    fn decode(&mut self, end: usize) -> Result<()> {
+    /// Decodes the next rows, whatever number is asked for: as many rows of chunks as are held at a time, or a piece of one.
+    fn decode(&mut self) -> Result<()> {
         let chunk_rows = self.storage.chunk_rows;
         let stored_end = self.area.top + self.area.height;
         let first = self.held.end;
         let (down, within) = (first / chunk_rows, first % chunk_rows);
         let fitting = DECODED_BYTES / size_of::<f32>() / self.row_samples() / chunk_rows;
-        let many = if within == 0 { (end - first).div_ceil(chunk_rows).min(fitting) } else { 0 };
+        let many = if within == 0 { (stored_end - first).div_ceil(chunk_rows).min(fitting) } else { 0 };
         let (last_down, rows) =
             if many > 0 { (down + many, chunk_rows) } else { (down + 1, self.rows_at_once().min(chunk_rows - within)) };
         let mut chunks = std::mem::take(&mut self.open);
@@ -241,8 +241,9 @@ impl SampleReader for DngReader {
         Some(if self.table.is_some() { SampleType::U16 } else { self.storage.sample.stored_as() })
     }
 
+    /// Any: rows that were decoded together are held until they are asked for.
     fn natural_rows(&self) -> usize {
-        self.rows_at_once()
+        1
     }
 
     fn embedded(&self) -> Option<&str> {
@@ -264,7 +265,7 @@ impl SampleReader for DngReader {
         let (mut rest, end) = (&mut samples[start..], self.next_row + rows);
         while self.next_row < end {
             if !self.held.contains(&self.next_row) {
-                self.decode(end)?;
+                self.decode()?;
                 continue;
             }
             let count = self.held.end.min(end) - self.next_row;
