@@ -53,7 +53,7 @@ fn corpus() -> Vec<Entry> {
 }
 
 /// Lines for a frame: `IN` is the file, or `-` where it comes down a pipe; `OUT` is the output.
-const FRAMES: [&str; 19] = [
+const FRAMES: [&str; 18] = [
     "measure IN --output-format json",
     "measure --patches=8x8 IN --output-format json",
     "measure --metadata codes.exr.yaml IN",
@@ -69,11 +69,14 @@ const FRAMES: [&str; 19] = [
     "to-xyz --metadata rgb.exr.yaml --matrix matrix.yaml IN -o OUT",
     "color-difference IN xyz.exr",
     "color-difference --metadata xyz.exr.yaml IN xyz.exr",
-    "import-raw IN --crop full -o OUT",
     "render-radiance IN --size 8x6 -o OUT",
     "predict-noise IN",
     "fit-matrix IN -o OUT",
 ];
+
+/// Lines for raw files, besides those for frames.
+const RAWS: [&str; 3] =
+    ["import-raw IN -o OUT", "import-raw IN --crop full -o OUT", "import-raw IN --crop default -o OUT"];
 
 /// Lines for text: sensors, matrices, metadata, tables.
 const TEXTS: [&str; 9] = [
@@ -88,9 +91,9 @@ const TEXTS: [&str; 9] = [
     "render-radiance IN --size 8x6 -o OUT",
 ];
 
-/// What the manifest calls damage and is none here: a filter array of 3x3 sites, which no camera has but metadata describe, and
-/// no tag of DNG, without which such a file is a plain TIFF.
-const UNREAD: [&str; 2] = ["self__cfa_3x3", "self__no_version"];
+/// What the manifest calls damage and is none here: in a TIFF tags of filter arrays, which are not looked at; in a DNG an array
+/// of 3x3 sites, which no camera has but metadata describe, and no tag of DNG, without which it is a plain TIFF.
+const UNREAD: [&str; 3] = ["tiff/damaged/self__cfa_", "self__cfa_3x3", "self__no_version"];
 
 /// A line and the file that it is for.
 struct Case<'a> {
@@ -195,6 +198,12 @@ fn check_all(cases: &[Case<'_>]) {
 fn frames_of_others_give_a_result_or_a_line() {
     let entries = corpus();
     check_all(&cases(&entries, &["exr", "tiff", "dng"], &FRAMES));
+}
+
+#[test]
+fn raws_of_others_give_a_result_or_a_line() {
+    let entries = corpus();
+    check_all(&cases(&entries, &["dng"], &RAWS));
 }
 
 #[test]

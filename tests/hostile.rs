@@ -440,7 +440,11 @@ fn large_raws_in_small_files_stream() {
         ("short.dng", dng([8000, 4000], 16, 7, &jpeg, &[]), "strip 0 holds fewer bytes than its size needs"),
         ("bomb.dng", dng([1 << 20, 1 << 20], 16, 8, &zeros(1 << 20), &[]), "strip 0 holds fewer bytes than its size"),
         ("size.dng", dng([u32::MAX, 4], 16, 8, &zeros(1 << 20), &[]), "gives the raw image no size that a sensor has"),
-        ("cut.dng", dng([8000, 4000], 16, 8, &[zeros(7000 * 4000), vec![0; 9999]].concat(), &[]), "strip 0 ends before its last row"),
+        (
+            "cut.dng",
+            dng([8000, 4000], 16, 8, &[zeros(7000 * 4000), vec![0; 9999]].concat(), &[]),
+            "strip 0 ends before its last row",
+        ),
     ] {
         fs::write(shop.path(file), bytes).unwrap();
         let said = refused(&shop, &format!("measure {file}"), file);

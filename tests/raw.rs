@@ -83,10 +83,18 @@ fn mistakes_with_raws_are_told() {
     fs::write(shop.path("a.cr2"), b"II*\0\x10\0\0\0CR\x02\0\0\0\0\0").unwrap();
     shop.run("mosaic codes.exr -o plane.tiff", &[]);
     for (line, status, wanted) in [
-        ("import-raw codes.exr -o out.exr", BAD_DATA, "codes.exr: it is no raw file of a camera; the other programs read"),
+        (
+            "import-raw codes.exr -o out.exr",
+            BAD_DATA,
+            "codes.exr: it is no raw file of a camera; the other programs read",
+        ),
         ("import-raw plane.tiff -o out.exr", BAD_DATA, "plane.tiff: it is no raw file of a camera; the other programs"),
         ("import-raw short.dng -o out.exr", BAD_DATA, "short.dng: the table of tags lies beyond the end of the file"),
-        ("import-raw xl.dng -o out.exr", BAD_DATA, "xl.dng: its raw image is JPEG XL, which is not supported; convert it"),
+        (
+            "import-raw xl.dng -o out.exr",
+            BAD_DATA,
+            "xl.dng: its raw image is JPEG XL, which is not supported; convert it",
+        ),
         ("import-raw a.cr2 -o out.exr", BAD_DATA, "a.cr2: it is a Canon CR2, which is not read yet; write its codes"),
         ("import-raw matrix.yaml -o out.exr", BAD_DATA, "matrix.yaml: it is neither an EXR nor a DNG nor a TIFF file"),
         ("import-raw raw.dng --crop all -o out.exr", BAD_USAGE, "`all` is no value for --crop <PART>"),
@@ -96,7 +104,10 @@ fn mistakes_with_raws_are_told() {
     ] {
         let output = shop.attempt(line, &[]);
         let said = String::from_utf8_lossy(&output.stderr);
-        assert!(said.starts_with(&format!("import-raw: {wanted}")) || said.starts_with(&format!("measure: {wanted}")), "{said}");
+        assert!(
+            said.starts_with(&format!("import-raw: {wanted}")) || said.starts_with(&format!("measure: {wanted}")),
+            "{said}"
+        );
         assert_eq!((output.status.code(), said.lines().count()), (Some(status), 1), "{line}: {said}");
         assert!(!shop.path("out.exr").exists(), "{line}");
     }

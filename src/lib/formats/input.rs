@@ -135,12 +135,7 @@ impl FrameReader {
     }
 
     /// A frame of what a reader gives.
-    fn of(
-        reader: Box<dyn SampleReader>,
-        name: &str,
-        path: Option<&Path>,
-        options: &InputOptions,
-    ) -> Result<Self> {
+    fn of(reader: Box<dyn SampleReader>, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
         let (metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
         let stored = reader.geometry();

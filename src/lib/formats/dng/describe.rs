@@ -113,7 +113,9 @@ fn filters(file: &mut TiffFile, image: &RawImage, active: Rectangle) -> Result<F
             let code = codes[y * columns + x];
             let letter = usize::try_from(code).ok().and_then(|code| LETTERS.get(code));
             let Some(letter) = letter.filter(|_| planes.contains(&code)) else {
-                return Err(file.problem(format!("it is damaged; its CFAPattern has a filter {code} that it does not name")));
+                return Err(
+                    file.problem(format!("it is damaged; its CFAPattern has a filter {code} that it does not name"))
+                );
             };
             letters.push(char::from(*letter));
         }

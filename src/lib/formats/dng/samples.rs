@@ -23,10 +23,22 @@ pub(super) struct ChunkRows {
 #[derive(Debug)]
 enum Source {
     /// The bytes of the rows that are asked for.
-    Plain { bytes: Vec<u8>, read: usize },
-    Deflate { bytes: Vec<u8>, inflater: Box<Decompress>, predictor: Predictor, step: usize },
+    Plain {
+        bytes: Vec<u8>,
+        read: usize,
+    },
+    Deflate {
+        bytes: Vec<u8>,
+        inflater: Box<Decompress>,
+        predictor: Predictor,
+        step: usize,
+    },
     /// The stream, and how many samples of its row are given already: its rows need not be those of the tile.
-    Ljpeg { rows: Box<LjpegRows>, held: Vec<u16>, given: usize },
+    Ljpeg {
+        rows: Box<LjpegRows>,
+        held: Vec<u16>,
+        given: usize,
+    },
 }
 
 impl ChunkRows {

@@ -17,7 +17,9 @@ pub(super) enum Compression {
     /// Before it, differences are taken from the sample so many before.
     Deflate(Predictor, usize),
     /// Where the flag is set, 16 bits follow the size 16 too, as before version 1.1 of DNG.
-    LosslessJpeg { largest_has_bits: bool },
+    LosslessJpeg {
+        largest_has_bits: bool,
+    },
 }
 
 /// How a sample is stored.
@@ -160,11 +162,8 @@ impl Storage {
             return Err(file.cut_short("the list of strips or tiles"));
         }
         let of_tiles = self.tiled && directory.has(Tag::TileOffsets);
-        let (offsets, counts) = if of_tiles {
-            (Tag::TileOffsets, Tag::TileByteCounts)
-        } else {
-            (Tag::StripOffsets, Tag::StripByteCounts)
-        };
+        let (offsets, counts) =
+            if of_tiles { (Tag::TileOffsets, Tag::TileByteCounts) } else { (Tag::StripOffsets, Tag::StripByteCounts) };
         let mut list = |tag: Tag| -> Result<Vec<u64>> {
             let list = file.unsigned(directory, tag, needed)?.unwrap_or_default();
             if (list.len() as u64) < needed {

@@ -1,5 +1,7 @@
 //! Small files that the tests make, and those of a camera where they are at hand.
 
+#![expect(clippy::cast_possible_truncation, reason = "tests, with values chosen to fit")]
+
 use super::{DngReader, RawArea};
 use crate::camera::levels::{BlackLevel, WhiteLevel};
 use crate::cfa::FilterArray;
@@ -79,9 +81,8 @@ impl Image {
         for top in (0..height).step_by(down) {
             for left in (0..width).step_by(across) {
                 let rows = (top..top + down).map(|y| y.min(height - 1));
-                let tile: Vec<u16> = rows
-                    .flat_map(|y| (left..left + across).map(move |x| all[y * width + x.min(width - 1)]))
-                    .collect();
+                let tile: Vec<u16> =
+                    rows.flat_map(|y| (left..left + across).map(move |x| all[y * width + x.min(width - 1)])).collect();
                 let stored = store(&self, &tile, across);
                 self.chunks.push(stored);
             }
@@ -138,7 +139,9 @@ impl Image {
                 bytes = number(place as f64, LONG, big_endian);
             }
             bytes.resize(4, 0);
-            table.extend([number(f64::from(*tag), SHORT, big_endian), number(f64::from(*kind), SHORT, big_endian)].concat());
+            table.extend(
+                [number(f64::from(*tag), SHORT, big_endian), number(f64::from(*kind), SHORT, big_endian)].concat(),
+            );
             table.extend([number(count as f64, LONG, big_endian), bytes].concat());
         }
         let place = u32::try_from(out.len()).unwrap();
@@ -242,11 +245,8 @@ fn any_part_is_read_in_any_steps() {
         as_jpeg.clone().tiles(&wanted, [16, 16], jpeg(two)),
     ] {
         let file = stored.file(&[]);
-        let parts = [
-            (RawArea::Active, [7, 3, 31, 26]),
-            (RawArea::Full, [0, 0, 40, 30]),
-            (RawArea::Default, [9, 4, 20, 10]),
-        ];
+        let parts =
+            [(RawArea::Active, [7, 3, 31, 26]), (RawArea::Full, [0, 0, 40, 30]), (RawArea::Default, [9, 4, 20, 10])];
         for (part, [left, top, width, height]) in parts {
             let rows = (top..top + height).flat_map(|y| wanted[y * 40 + left..][..width].to_vec());
             let rows: Vec<f32> = rows.map(f32::from).collect();
@@ -313,9 +313,9 @@ fn floats_are_read_with_and_without_differences() {
         let bytes: Vec<Vec<u8>> = wanted.iter().map(|value| float_bytes(*value, bits)).collect();
         for big_endian in [false, true] {
             let image = Image { big_endian, ..image.clone() };
-            let ordered = bytes.iter().map(|bytes| {
-                if big_endian { bytes.clone() } else { bytes.iter().rev().copied().collect::<Vec<u8>>() }
-            });
+            let ordered = bytes
+                .iter()
+                .map(|bytes| if big_endian { bytes.clone() } else { bytes.iter().rev().copied().collect::<Vec<u8>>() });
             let plain: Vec<u8> = ordered.flatten().collect();
             let strip = |chunk: Vec<u8>, compression: f64, predictor: f64| {
                 let image = image.clone().with(259, SHORT, &[compression]).with(317, SHORT, &[predictor]);
@@ -416,10 +416,14 @@ fn the_largest_image_of_full_size_is_the_raw_one() {
         preview.clone(),
     ];
     let reader = open(&first.file(&below), RawArea::Active).unwrap();
-    assert_eq!(reader.notes(), [String::from("its exposure of 0.03333333333333333 s is passed over: it does not tell the f-number")]);
+    assert_eq!(
+        reader.notes(),
+        [String::from("its exposure of 0.03333333333333333 s is passed over: it does not tell the f-number")]
+    );
     assert_eq!(read(reader, 5).unwrap(), floats(&large));
 
-    let complaint = |first: &Image, below: &[Image]| open(&first.file(below), RawArea::Active).err().unwrap().to_string();
+    let complaint =
+        |first: &Image, below: &[Image]| open(&first.file(below), RawArea::Active).err().unwrap().to_string();
     assert!(complaint(&preview, &[]).starts_with("a.dng: it is a DNG without a raw image"));
     let planes = Image::new(16, 12, 16).with(262, SHORT, &[34892.0]).with(277, SHORT, &[3.0]);
     assert!(complaint(&preview, &[planes]).starts_with("a.dng: it is a DNG whose planes are demosaicked (LinearRaw)"));
@@ -462,32 +466,56 @@ fn what_cannot_be_read_is_refused_by_name() {
         (image.clone().with(52547, LONG, &[2.0]), "in another order than that of the sensor (ColumnInterleaveFactor)"),
         (image.clone().without(258), "lacks BitsPerSample"),
         (image.clone().with(277, SHORT, &[2.0]), "its raw image has 2 samples at a photosite"),
-        (image.clone().with(259, SHORT, &[8.0]).with(317, SHORT, &[2.0]), "has predictor 2, which does not exist for integers of 12 bits"),
+        (
+            image.clone().with(259, SHORT, &[8.0]).with(317, SHORT, &[2.0]),
+            "has predictor 2, which does not exist for integers of 12 bits",
+        ),
         (image.clone().with(50711, SHORT, &[2.0]), "staggered rows or columns (CFALayout 2)"),
         (image.clone().without(33421), "lacks CFARepeatPatternDim"),
-        (image.clone().with(33421, SHORT, &[4.0, 4.0]), "its CFAPattern has 4 filters, and CFARepeatPatternDim asks for 4x4"),
+        (
+            image.clone().with(33421, SHORT, &[4.0, 4.0]),
+            "its CFAPattern has 4 filters, and CFARepeatPatternDim asks for 4x4",
+        ),
         (image.clone().with(33421, SHORT, &[65535.0, 65535.0]), "CFARepeatPatternDim asks for 65535x65535"),
         (image.clone().with(33421, SHORT, &[9.0, 2.0]).with(33422, BYTE, &[0.0; 18]), "a period of 2x9 sites"),
         (image.clone().with(33422, BYTE, &[0.0, 1.0, 1.0, 7.0]), "its CFAPattern has a filter 7"),
         (image.clone().with(50706, BYTE, &[99.0, 0.0, 0.0, 0.0]), "it asks for a reader of version 99.0 of DNG"),
-        (image.clone().with(50829, LONG, &[0.0, 0.0, 7.0, 8.0]), "its ActiveArea, rows 0 to 7 and columns 0 to 8, does not lie"),
+        (
+            image.clone().with(50829, LONG, &[0.0, 0.0, 7.0, 8.0]),
+            "its ActiveArea, rows 0 to 7 and columns 0 to 8, does not lie",
+        ),
         (image.clone().with(50829, LONG, &[4.0, 0.0, 3.0, 8.0]), "its ActiveArea"),
         (image.clone().with(50829, LONG, &[0.0, 0.0, 6.0]), "its tag ActiveArea has 3 of 4 numbers"),
         (image.clone().with(50714, SHORT, &[4095.0]), "its BlackLevel, 4095, is no less than its WhiteLevel, 4095"),
         (image.clone().with(50714, RATIO, &[1.0, 0.0]), "its tag BlackLevel has a number that is divided by zero"),
         (image.clone().with(50714, RATIO, &[0.0, 0.0]), "its tag BlackLevel has a number that is 0/0"),
         (image.clone().with(50713, SHORT, &[0.0, 2.0]), "its BlackLevelRepeatDim is 0x2"),
-        (image.clone().with(50713, SHORT, &[2.0, 2.0]).with(50714, SHORT, &[1.0]), "its BlackLevel has 1 numbers, and BlackLevelRepeatDim asks for 4"),
-        (image.clone().with(50713, SHORT, &[1.0, 3.0]).with(50714, SHORT, &[1.0, 2.0, 1.0]), "its black level differs by 1x3 sites"),
-        (image.clone().with(50716, SIGNED_RATIO, &[1.0, 1.0]), "its BlackLevelDeltaV has 1 numbers, and the active area has 6 rows"),
-        (image.clone().with(50715, SIGNED_RATIO, &[1.0; 18]), "its BlackLevelDeltaH has more numbers, and the active area has 8 columns"),
+        (
+            image.clone().with(50713, SHORT, &[2.0, 2.0]).with(50714, SHORT, &[1.0]),
+            "its BlackLevel has 1 numbers, and BlackLevelRepeatDim asks for 4",
+        ),
+        (
+            image.clone().with(50713, SHORT, &[1.0, 3.0]).with(50714, SHORT, &[1.0, 2.0, 1.0]),
+            "its black level differs by 1x3 sites",
+        ),
+        (
+            image.clone().with(50716, SIGNED_RATIO, &[1.0, 1.0]),
+            "its BlackLevelDeltaV has 1 numbers, and the active area has 6 rows",
+        ),
+        (
+            image.clone().with(50715, SIGNED_RATIO, &[1.0; 18]),
+            "its BlackLevelDeltaH has more numbers, and the active area has 8 columns",
+        ),
         (image.clone().with(50717, RATIO, &[0.0, 0.0]), "its tag WhiteLevel"),
         (image.clone().with(50720, RATIO, &[8.0, 0.0, 6.0, 1.0]), "its tag DefaultCropSize has a number"),
         (image.clone().with(50728, RATIO, &[1.0, 0.0, 1.0, 1.0, 1.0, 1.0]), "its tag AsShotNeutral has a number"),
         (image.clone().with(50712, LONG, &[70000.0]), "its LinearizationTable has values of more than 16 bits"),
         (image.clone().with(256, LONG, &[4_294_967_295.0]), "gives the raw image no size"),
         (image.clone().with(256, LONG, &[0.0]), "gives the raw image no size"),
-        (image.clone().with(257, LONG, &[7.0]).with(278, LONG, &[7.0]), "strip 0 holds fewer bytes than its size needs"),
+        (
+            image.clone().with(257, LONG, &[7.0]).with(278, LONG, &[7.0]),
+            "strip 0 holds fewer bytes than its size needs",
+        ),
         (image.clone().with(278, LONG, &[0.0]), "its strips have no rows (RowsPerStrip 0)"),
         (image.clone().with(278, LONG, &[3.0]), "its tag StripOffsets lists 1 of 2 strips"),
         (image.clone().with(322, LONG, &[4.0]), "its tag TileLength is 0"),
@@ -495,7 +523,10 @@ fn what_cannot_be_read_is_refused_by_name() {
         (jpeg(lossy), "strip 0 is a JPEG that loses something"),
         (jpeg(whole[..whole.len() - 9].to_vec()), "strip 0 ends before its last row"),
         (jpeg(encode(&samples(40, 12, 1), 8, &Encoding::default())), "its JPEG has 40 samples, and its size needs 48"),
-        (Image { chunks: vec![vec![9; 99]], ..image.clone().with(259, SHORT, &[8.0]) }, "its compressed data make no sense"),
+        (
+            Image { chunks: vec![vec![9; 99]], ..image.clone().with(259, SHORT, &[8.0]) },
+            "its compressed data make no sense",
+        ),
     ] {
         let said = refused(&image);
         assert!(said.starts_with("a.dng: ") && said.contains(wanted) && !said.contains('\n'), "{said}, not {wanted}");

@@ -1,5 +1,7 @@
 //! A plain encoder, for the tests, and what the decoder makes of its streams.
 
+#![expect(clippy::cast_possible_truncation, reason = "tests, with values chosen to fit")]
+
 use super::LjpegRows;
 
 /// What a stream is made with.
@@ -148,14 +150,14 @@ fn decode(stream: Vec<u8>) -> Result<Vec<u16>, String> {
 fn every_predictor_gives_back_what_was_encoded() {
     for predictor in 1..=7 {
         for components in 1..=4 {
-            for (precision, point_transform, restart_rows) in [(16, 0, 0), (14, 0, 3), (12, 2, 1), (8, 0, 2), (2, 0, 0)] {
+            for (precision, point_transform, restart_rows) in [(16, 0, 0), (14, 0, 3), (12, 2, 1), (8, 0, 2), (2, 0, 0)]
+            {
                 let row = 12 * components;
                 let low = !((1u16 << point_transform) - 1);
                 let seed = u64::from(predictor) * 100 + components as u64;
                 let wanted: Vec<u16> = samples(row * 11, precision, seed).iter().map(|s| s & low).collect();
                 for long_codes in [[false, false], [false, true], [true, true]] {
-                    let with =
-                        Encoding { precision, components, predictor, point_transform, restart_rows, long_codes };
+                    let with = Encoding { precision, components, predictor, point_transform, restart_rows, long_codes };
                     let stream = encode(&wanted, row, &with);
                     assert_eq!(decode(stream).as_deref(), Ok(&wanted[..]), "{with:?}");
                 }
