@@ -43,7 +43,7 @@ fn each_part_comes_with_its_place_and_levels() {
             let rows = (top..top + height).flat_map(|y| whole[y * 12 + left..][..width].to_vec());
             assert_eq!(samples, rows.collect::<Vec<_>>(), "{part} {file}");
             assert_eq!((geometry.width, geometry.height), (width, height));
-            assert_eq!(geometry.origin, [left as i32, top as i32]);
+            assert_eq!(geometry.origin.map(|place| usize::try_from(place).unwrap()), [left, top]);
         }
         let sidecar = String::from_utf8(shop.bytes("out.tiff.yaml")).unwrap();
         // The pattern and the levels at the sensor's corner: those of the active area, an odd number of columns further on.
