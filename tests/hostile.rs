@@ -19,6 +19,7 @@ use std::io::{Cursor, Read, Seek, Write};
 use std::process::Output;
 use support::TREE;
 use support::bounds::{Bounded, memory_for};
+use support::dng::{dng, gray_jpeg};
 use support::workshop::{BAD_DATA, Workshop};
 
 /// Runs a line on a file within bounds that go with its size.
@@ -540,5 +541,42 @@ fn where_there_is_no_memory_it_is_said_in_a_line() {
         assert!(said.starts_with(&format!("{program}: the system gives no more memory; ")), "{line}: {said}");
         assert_eq!((said.lines().count(), done.status.code()), (1, Some(BAD_DATA)), "{line}: {said}");
         assert_eq!(shop.files(), files, "{line}");
+    }
+}
+
+/// A strip that covers the image is decoded a few rows at a time: small files of large and of wide images, all of whose samples
+/// are there, and such that say so alone.
+#[test]
+fn large_raws_in_small_files_stream() {
+    let shop = Workshop::new();
+    let zeros = |samples: usize| {
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
+        encoder.write_all(&vec![0; 2 * samples]).unwrap();
+        encoder.finish().unwrap()
+    };
+    for (file, bytes) in [
+        ("deflated.dng", dng([8000, 4000], 16, 8, &zeros(8000 * 4000), &[])),
+        ("wide.dng", dng([1 << 20, 30], 16, 8, &zeros(30 << 20), &[])),
+        ("jpeg.dng", dng([8000, 4000], 16, 7, &gray_jpeg([8000, 4000]), &[])),
+    ] {
+        fs::write(shop.path(file), bytes).unwrap();
+        let done = bounded(&shop, &format!("measure {file}"), file);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    }
+    let mut jpeg = gray_jpeg([8000, 4000]);
+    jpeg.truncate(500_000);
+    for (file, bytes, wanted) in [
+        ("short.dng", dng([8000, 4000], 16, 7, &jpeg, &[]), "strip 0 holds fewer bytes than its size needs"),
+        ("bomb.dng", dng([1 << 20, 1 << 20], 16, 8, &zeros(1 << 20), &[]), "strip 0 holds fewer bytes than its size"),
+        ("size.dng", dng([u32::MAX, 4], 16, 8, &zeros(1 << 20), &[]), "gives the raw image no size that a sensor has"),
+        (
+            "cut.dng",
+            dng([8000, 4000], 16, 8, &[zeros(7000 * 4000), vec![0; 9999]].concat(), &[]),
+            "strip 0 ends before its last row",
+        ),
+    ] {
+        fs::write(shop.path(file), bytes).unwrap();
+        let said = refused(&shop, &format!("measure {file}"), file);
+        assert!(said.starts_with(&format!("measure: {file}: ")) && said.contains(wanted), "{said}");
     }
 }

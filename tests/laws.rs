@@ -16,6 +16,7 @@ use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
 use cyanometer::stages::darks::{DarkFrames, DarkStack, LessDarks};
 use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::import::Import;
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings, rectified_mean, rectified_mean_square};
 use cyanometer::stages::render::Rendering;
@@ -123,6 +124,7 @@ fn for_every_stage(width: usize, height: usize, check: &mut dyn FnMut(&MemoryFra
     check(&electrons, AnyStage::Digitize(digitize.clone()));
     let codes = through(&electrons, &digitize);
     let cfa = through(&codes, &Mosaic::new(&codes.header, Some(CfaPattern::Gbrg)).unwrap());
+    check(&cfa, AnyStage::Import(Import::new(&cfa.header).unwrap()));
     for method in Method::ALL {
         let stage = Demosaic::new(&cfa.header, method, Black::Auto, None).unwrap();
         check(&cfa, AnyStage::Demosaic(stage));
@@ -148,6 +150,7 @@ fn for_every_stage(width: usize, height: usize, check: &mut dyn FnMut(&MemoryFra
 /// A stage of any kind.
 enum AnyStage {
     Noise(AddNoise),
+    Import(Import),
     Mosaic(Mosaic),
     Digitize(Digitize),
     Correct(CorrectFrame),
@@ -162,6 +165,7 @@ impl AnyStage {
             Self::Noise(_) if made.noise.as_ref().unwrap().cte.is_some() => "add-noise --cte".into(),
             Self::Noise(_) => "add-noise".into(),
             Self::Correct(_) => "correct-frame".into(),
+            Self::Import(_) => "import-raw".into(),
             Self::Mosaic(_) => "mosaic".into(),
             Self::Digitize(_) => "digitize".into(),
             Self::Demosaic(_) => format!("demosaic {}", made.demosaic.as_ref().unwrap().method),
@@ -172,6 +176,7 @@ impl AnyStage {
     fn header(&self) -> &FrameHeader {
         match self {
             Self::Noise(stage) => stage.header(),
+            Self::Import(stage) => stage.header(),
             Self::Mosaic(stage) => stage.header(),
             Self::Digitize(stage) => stage.header(),
             Self::Correct(stage) => stage.header(),
@@ -186,6 +191,7 @@ macro_rules! with_stage {
     ($any:expr, $stage:ident => $body:expr) => {
         match $any {
             AnyStage::Noise($stage) => $body,
+            AnyStage::Import($stage) => $body,
             AnyStage::Mosaic($stage) => $body,
             AnyStage::Digitize($stage) => $body,
             AnyStage::Correct($stage) => $body,
@@ -935,6 +941,7 @@ fn metadata_pass_every_stage_and_yaml() {
     let cfa = through(&codes, &Mosaic::new(&codes.header, None).unwrap());
     check(&cfa.header);
     check(correction(&cfa.header, Black::Auto, Some(0.999)).header());
+    check(Import::new(&cfa.header).unwrap().header());
     let settings = NoiseSettings { cte: Some(0.99), ..settings };
     check(AddNoise::new(&first.header, &settings).unwrap().header());
     for method in Method::ALL {
@@ -945,5 +952,5 @@ fn metadata_pass_every_stage_and_yaml() {
             check(&through(&rgb, &stage).header);
         }
     }
-    assert_eq!(seen.len(), 6 + Method::ALL.len() * 5);
+    assert_eq!(seen.len(), 7 + Method::ALL.len() * 5);
 }

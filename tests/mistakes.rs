@@ -64,7 +64,7 @@ const MISTAKES: [(&str, i32, &str); 83] = [
     (
         "add-noise matrix.yaml",
         BAD_DATA,
-        "matrix.yaml: it is neither an EXR nor a PNG nor a FITS nor a TIFF file; it looks like text (a spectrum goes into \
+        "matrix.yaml: it is neither an EXR nor a DNG nor a PNG nor a FITS nor a TIFF file; it looks like text (a spectrum goes into \
          `render-radiance`)",
     ),
     (

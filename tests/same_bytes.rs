@@ -7,6 +7,7 @@ mod support;
 
 use std::fs::{self, File};
 use std::process::{Output, Stdio};
+use support::dng::dng;
 use support::workshop::Workshop;
 
 const MATRIX: &str = "\
@@ -19,7 +20,7 @@ xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, 
 
 /// Command lines, each on what those before it made, and the samples that they make: those of x86-64 with SSE2, AVX2 and
 /// AVX-512, and of aarch64. A change here is a change of samples, which the changelog says first.
-const KNOWN: [(&str, &str); 22] = [
+const KNOWN: [(&str, &str); 23] = [
     ("render-radiance SAMPLES/skies/sky912.exr --patch 6x5 --cfa grbg -o rates.exr", "blake3:2db94414f43002d2"),
     ("add-noise rates.exr --seed 7 -o noisy.exr", "blake3:c1b8bd99fd9601f5"),
     ("add-noise rates.exr --seed 7 --cte 0.9999 -o moved.exr", "blake3:867567a35a058ca9"),
@@ -43,6 +44,7 @@ const KNOWN: [(&str, &str); 22] = [
     ("digitize darkness.exr -o dark.exr", "blake3:af44f4185dc2b38a"),
     ("correct-frame codes.exr --dark dark.exr -o corrected.exr", "blake3:f8dd1dfab827f191"),
     ("correct-frame codes.exr --cte 0.9999 -o restored.exr", "blake3:63f777cd493035fd"),
+    ("import-raw raw.dng --crop full -o raw.exr", "blake3:12c0d74bee5b4e8a"),
     ("demosaic codes.exr --method eci --sigma -o sigma.exr", PREDICTED),
     ("to-xyz sigma.exr --matrix matrix.yaml --sigma -o sigma-xyz.exr", PREDICTED),
 ];
@@ -67,6 +69,8 @@ fn made(shop: &Workshop, line: &str, (threads, vectors, locale): (usize, &str, &
 fn samples_are_the_known_ones() {
     let shop = Workshop::new();
     fs::write(shop.path("matrix.yaml"), MATRIX).unwrap();
+    let strip: Vec<u8> = (0..60_u16 * 50).flat_map(|i| (i.wrapping_mul(i) % 4001).to_be_bytes()).collect();
+    fs::write(shop.path("raw.dng"), dng([60, 50], 16, 1, &strip, &[])).unwrap();
     let mut others = Vec::new();
     for (line, digest) in KNOWN {
         let name = line.split("-o ").nth(1).unwrap();
@@ -86,6 +90,8 @@ fn samples_are_the_known_ones() {
 fn no_circumstance_changes_a_byte() {
     let shop = Workshop::new();
     fs::write(shop.path("matrix.yaml"), MATRIX).unwrap();
+    let strip: Vec<u8> = (0..60_u16 * 50).flat_map(|i| (i.wrapping_mul(i) % 4001).to_be_bytes()).collect();
+    fs::write(shop.path("raw.dng"), dng([60, 50], 16, 1, &strip, &[])).unwrap();
     for (line, _) in KNOWN {
         let (words, name) = line.split_once(" -o ").unwrap();
         made(&shop, line, CIRCUMSTANCES[0], Stdio::null());

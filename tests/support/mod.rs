@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 pub mod bounds;
+pub mod dng;
 pub mod workshop;
 
 use cyanometer::camera::optics::Exposure;

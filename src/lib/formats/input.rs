@@ -1,6 +1,7 @@
 //! Opens frames of any format, from files and pipes, with the metadata that belongs to them.
 
 use super::digest::SamplesDigest;
+use super::dng::{DngReader, RawArea};
 use super::files::{STDIN_NAME, named, open_named, read_file, sidecar_path, spool};
 use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Streaming, U16_FULL_SCALE};
 use super::{headerless, pipe, register, table, tiff, yaml};
@@ -112,12 +113,41 @@ impl FrameReader {
     ///
     /// As [`Self::open`].
     pub fn open_file(input: File, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
-        let about = input.metadata().map_err(|e| Error::disk(name, "read", e))?;
         let reader = match options.raw {
             Some(layout) => headerless::open(input, name, options.part, layout)?,
-            None if about.is_file() => open_seekable(input, name, options.part)?,
+            None if is_file(&input, name)? => open_seekable(input, name, options.part)?,
             None => open_unseekable(input, name, options.part)?,
         };
+        Self::of(reader, name, path, options)
+    }
+
+    /// Opens a part of the raw image in a camera's file.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`]; [`Error::Format`] for files that are no raws.
+    pub fn open_raw(options: &InputOptions, part: RawArea) -> Result<Self> {
+        let path = named(options.path.as_deref());
+        register::check_inputs(options.metadata.as_deref().map(Some).into_iter().chain([path]))?;
+        let (mut input, name) = open_named(path)?;
+        if !is_file(&input, &name)? {
+            input = spool(&mut input, &name)?;
+        }
+        let head = head_of(&mut input, &name)?;
+        // Those that are not read are refused here by name.
+        let readers = readers_of(&head, &name)?;
+        let is_raw = tiff::begins_so(&head) && table::by_tags(&input, &name)?.is_some();
+        if !is_raw {
+            // A damaged file may be a raw all the same.
+            input.rewind().map_err(|e| Error::disk(&name, "read", e))?;
+            (readers.open)(input, &name, 0)?;
+            return Err(Error::format(&name, "it is no raw file of a camera; the other programs read it as it is"));
+        }
+        Self::of(Box::new(DngReader::open(input, &name, part)?), &name, path, options)
+    }
+
+    /// A frame of what a reader gives.
+    fn of(reader: Box<dyn SampleReader>, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
         let (metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
         let stored = reader.geometry();
@@ -286,6 +316,11 @@ impl RowSource for FrameReader {
         self.check_digest();
         Ok(())
     }
+}
+
+/// Whether an open file is one that can seek, and no pipe.
+fn is_file(input: &File, name: &str) -> Result<bool> {
+    Ok(input.metadata().map_err(|e| Error::disk(name, "read", e))?.is_file())
 }
 
 /// Opens a file that can seek with the reader of its format.

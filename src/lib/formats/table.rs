@@ -2,14 +2,14 @@
 
 use super::format::{FrameFormat, Readers, Reading, Sign};
 use super::tiff::{self, TiffFile};
-use super::{exr, fits, png, unread};
+use super::{dng, exr, fits, png, unread};
 use crate::error::{Error, Result};
 use std::fs::File;
 
 /// All formats that are known. Of those that share their first bytes the narrower comes first, TIFF last.
 pub const FORMATS: &[FrameFormat] = &[
     exr::FORMAT,
-    unread::DNG,
+    dng::FORMAT,
     unread::NEF,
     unread::ARW,
     unread::PEF,
@@ -74,7 +74,7 @@ fn readers(format: &FrameFormat, name: &str) -> Result<Readers> {
     }
 }
 
-/// The names of the formats that are read: `an EXR nor a PNG nor a FITS nor a TIFF`.
+/// The names of the formats that are read: `an EXR nor a DNG nor a PNG nor a FITS nor a TIFF`.
 pub fn names_of_read() -> String {
     let is_read = |format: &&FrameFormat| matches!(format.reading, Reading::Rows(_));
     FORMATS.iter().filter(is_read).map(|format| format.name).collect::<Vec<_>>().join(" nor ")
@@ -83,6 +83,7 @@ pub fn names_of_read() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cfa::FilterArray;
     use crate::formats::input::{FrameReader, InputOptions};
     use crate::formats::tiff::{ExtraTag, TagValue, TiffCompression, TiffSamples, TiffSettings, TiffTags, TiffWriter};
     use crate::frame::Geometry;
@@ -92,9 +93,6 @@ mod tests {
 
     const RAW: &str = "which is not read yet; write its codes as a TIFF first, for example with `unprocessed_raw -T` of \
                        LibRaw, and name that file";
-
-    const OF_DNG: &str =
-        "; of DNG that are demosaicked or hold floats, which that program refuses, take what they were made of";
 
     /// Opens bytes as a file or as what comes down a pipe, which holds them.
     fn open(bytes: &[u8], piped: bool) -> Result<FrameReader> {
@@ -158,15 +156,17 @@ mod tests {
         let below = (330, TagValue::Longs(vec![8]));
         let dng = (50_706, TagValue::Bytes(vec![1, 4, 0, 0]));
         for (tags, name) in [
-            (vec![dng.clone()], "a DNG"),
-            (vec![make("NIKON CORPORATION"), dng], "a DNG"),
             (vec![make("NIKON CORPORATION"), reduced.clone(), below.clone()], "a Nikon NEF"),
             (vec![make("SONY"), reduced.clone(), below.clone()], "a Sony ARW"),
             (vec![make("SEIKO EPSON CORP."), reduced.clone(), below.clone()], "a camera's raw file"),
         ] {
-            let more = if name == "a DNG" { OF_DNG } else { "" };
-            assert_eq!(complaint(&tiff(&tags)), format!("in: it is {name}, {RAW}{more}"));
+            assert_eq!(complaint(&tiff(&tags)), format!("in: it is {name}, {RAW}"));
         }
+        // Those that are read are not taken for what their makers' own are.
+        let said = complaint(&tiff(&[make("NIKON CORPORATION"), dng.clone(), reduced.clone()]));
+        assert!(said.starts_with("in: it is a DNG without a raw image"), "{said}");
+        let plane = open(&tiff(&[make("NIKON CORPORATION"), dng]), true).unwrap();
+        assert_eq!(plane.header().metadata.cfa, Some(FilterArray::Monochrome));
         let mut pef = tiff(&[make("PENTAX Corporation")]);
         let compression = pef.windows(8).position(|entry| entry == [3, 1, 3, 0, 1, 0, 0, 0]).unwrap() + 8;
         pef[compression..compression + 2].copy_from_slice(&[0xFF, 0xFF]);
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn what_is_no_frame_is_told_so() {
-        let refused = "in: it is neither an EXR nor a PNG nor a FITS nor a TIFF file";
+        let refused = "in: it is neither an EXR nor a DNG nor a PNG nor a FITS nor a TIFF file";
         let text = "; it looks like text (a spectrum goes into `render-radiance`)";
         assert_eq!(complaint(&[0; 64]), refused);
         assert_eq!(complaint("# Größen\n".as_bytes()), format!("{refused}{text}"));

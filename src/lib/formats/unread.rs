@@ -12,15 +12,6 @@ use tiff::tags::Tag;
 const RAW: Reading = Reading::NotYet(
     "write its codes as a TIFF first, for example with `unprocessed_raw -T` of LibRaw, and name that file",
 );
-/// That program takes of DNG those alone that hold the integers of a plane.
-const RAW_DNG: Reading = Reading::NotYet(
-    "write its codes as a TIFF first, for example with `unprocessed_raw -T` of LibRaw, and name that file; of DNG that \
-     are demosaicked or hold floats, which that program refuses, take what they were made of",
-);
-
-/// Adobe's raw format, which also cameras write.
-pub const DNG: FrameFormat =
-    FrameFormat { name: "a DNG", sign: Sign::Tags(|_, directory| Ok(directory.has(DNG_VERSION))), reading: RAW_DNG };
 /// Nikon's raw format.
 pub const NEF: FrameFormat = tagged("a Nikon NEF", |file, directory| is_raw_of(file, directory, &["NIKON"]));
 /// Sony's raw format.
@@ -53,7 +44,6 @@ pub const JPEG: FrameFormat = FrameFormat {
     reading: Reading::NotYet("convert it first, for example with `oiiotool in.jpg -o out.tif`"),
 };
 
-const DNG_VERSION: Tag = Tag::Unknown(50706);
 /// Compressions of their own: Sony's, Nikon's and Pentax's.
 const OWN_COMPRESSIONS: [u64; 3] = [32_767, 34_713, 65_535];
 

@@ -29,7 +29,7 @@ pub(super) fn defaults<R: Args>(words: &[OsString]) -> R {
 /// A frame to read.
 #[derive(Debug, Clone, Args)]
 pub struct Input {
-    /// Frame to read, EXR, TIFF, PNG or FITS; `-` or none for standard input
+    /// Frame to read, EXR, TIFF, DNG, PNG or FITS; `-` or none for standard input
     pub input: Option<PathBuf>,
     /// Part of a multi-part EXR or FITS, or page of a TIFF, counted from 0
     #[arg(long, default_value_t = 0, value_name = "N")]

@@ -134,7 +134,7 @@ fn decode_packbits(stored: &[u8], decoded: &mut [u8]) -> usize {
 
 /// What was done to each row before compression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Predictor {
+pub(in crate::formats) enum Predictor {
     None,
     /// Each sample is stored as the difference, as an integer, from the one of its channel before it.
     Horizontal,
@@ -144,11 +144,13 @@ pub(super) enum Predictor {
 }
 
 impl Predictor {
-    /// Brings decoded rows into the machine's byte order and adds the differences up again.
+    /// Brings decoded rows into the machine's byte order and adds the differences up again, which are those from the sample
+    /// `channels` before.
     pub fn undo(self, rows: &mut [u8], row_bytes: usize, channels: usize, sample_bytes: usize, big_endian: bool) {
         if self != Self::FloatingPoint && big_endian != cfg!(target_endian = "big") {
             match sample_bytes {
                 2 => swap::<2>(rows),
+                3 => swap::<3>(rows),
                 4 => swap::<4>(rows),
                 8 => swap::<8>(rows),
                 _ => {}
@@ -181,6 +183,7 @@ impl Predictor {
                     add_up::<1, u8>(&mut planes, channels, u8::from_ne_bytes, u8::wrapping_add, u8::to_ne_bytes);
                     match sample_bytes {
                         2 => from_planes::<2>(&planes, row),
+                        3 => from_planes::<3>(&planes, row),
                         4 => from_planes::<4>(&planes, row),
                         _ => from_planes::<8>(&planes, row),
                     }

@@ -140,6 +140,25 @@ impl TiffFile {
         }
     }
 
+    /// Bytes in the file.
+    pub fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Whether numbers have their highest byte first.
+    pub fn big_endian(&self) -> bool {
+        self.big_endian
+    }
+
+    /// Reads the directory at `offset`, which a tag of another names.
+    ///
+    /// # Errors
+    ///
+    /// When there is none.
+    pub fn directory_below(&mut self, offset: u64) -> Result<Directory> {
+        Ok(self.directory_at(offset, true)?.0)
+    }
+
     /// Reads the directory at `offset` (only its link to the next one unless `wanted`), and gives that link.
     fn directory_at(&mut self, offset: u64, wanted: bool) -> Result<(Directory, u64)> {
         let (count_bytes, entry_bytes, offset_bytes) = if self.big_tiff { (8, 20, 8) } else { (2, 12, 4) };

@@ -16,6 +16,7 @@ mod tags;
 mod tests;
 mod write;
 
+pub(in crate::formats) use chunk::Predictor;
 pub use directory::{Directory, TiffFile, begins_so};
 pub use read::{FORMAT, TiffReader};
 pub use tags::{ExtraTag, TagValue};

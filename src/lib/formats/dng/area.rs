@@ -1,0 +1,98 @@
+//! Parts of the stored image: the photosites that see light, and what converters show.
+
+use super::image::RawImage;
+use super::tags;
+use crate::error::Result;
+use crate::formats::tiff::TiffFile;
+use crate::names::Named;
+
+/// Which part of a raw image is read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum RawArea {
+    /// The photosites that see light (`ActiveArea`).
+    #[default]
+    Active,
+    /// All that is stored, with what is masked.
+    Full,
+    /// What converters show by default (`DefaultCropOrigin`, `DefaultCropSize`).
+    Default,
+}
+
+impl Named for RawArea {
+    const ALL: &'static [Self] = &[Self::Active, Self::Full, Self::Default];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Active => "active",
+            Self::Full => "full",
+            Self::Default => "default",
+        }
+    }
+}
+
+/// A rectangle of the stored image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Rectangle {
+    pub left: usize,
+    pub top: usize,
+    pub width: usize,
+    pub height: usize,
+}
+
+impl Rectangle {
+    /// The whole of a size.
+    pub fn whole([width, height]: [usize; 2]) -> Self {
+        Self { left: 0, top: 0, width, height }
+    }
+
+    /// In words: `1734x1156 from column 152, row 26`.
+    pub fn in_words(self) -> String {
+        format!("{}x{} from column {}, row {}", self.width, self.height, self.left, self.top)
+    }
+}
+
+/// The active area \[DNG2023, ActiveArea]; all that is stored where there is none.
+///
+/// # Errors
+///
+/// When it is not in the stored image.
+pub(super) fn active(file: &mut TiffFile, image: &RawImage) -> Result<Rectangle> {
+    let Some([top, left, bottom, right]) = tags::ACTIVE_AREA.whole::<4>(file, image.directory())? else {
+        return Ok(Rectangle::whole(image.size));
+    };
+    let [width, height] = image.size;
+    if top < bottom && bottom <= height && left < right && right <= width {
+        return Ok(Rectangle { left, top, width: right - left, height: bottom - top });
+    }
+    Err(file.problem(format!(
+        "it is damaged; its ActiveArea, rows {top} to {bottom} and columns {left} to {right}, does not lie in the {width}x{height} samples that are stored"
+    )))
+}
+
+/// The default crop, as far as it is one of whole photosites in the active area; that area where there is none. Else why it
+/// is none, in words.
+///
+/// # Errors
+///
+/// When its tags are damaged.
+pub(super) fn default_crop(
+    file: &mut TiffFile,
+    image: &RawImage,
+    active: Rectangle,
+) -> Result<std::result::Result<Rectangle, String>> {
+    let origin = tags::DEFAULT_CROP_ORIGIN.exactly::<2>(file, image.directory())?.unwrap_or([0.0; 2]);
+    let size = tags::DEFAULT_CROP_SIZE.exactly::<2>(file, image.directory())?;
+    let size = size.unwrap_or([active.width as f64, active.height as f64]);
+    let [left, top, width, height] = [origin[0], origin[1], size[0], size[1]];
+    let shown = format!("its default crop, {width}x{height} from {left},{top} of the active area,");
+    if [left, top, width, height].iter().any(|side| side.fract() != 0.0) {
+        return Ok(Err(format!("{shown} does not begin and end at a photosite")));
+    }
+    let fits = |from: f64, side: f64, most: usize| from >= 0.0 && side >= 1.0 && from + side <= most as f64;
+    if !(fits(left, width, active.width) && fits(top, height, active.height)) {
+        return Ok(Err(format!("{shown} does not lie in that area, which has {}x{}", active.width, active.height)));
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and within the image")]
+    let [left, top, width, height] = [left, top, width, height].map(|side| side as usize);
+    Ok(Ok(Rectangle { left: active.left + left, top: active.top + top, width, height }))
+}

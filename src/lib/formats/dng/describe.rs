@@ -1,0 +1,182 @@
+//! What a DNG's tags tell about its frame, in the project's terms.
+
+use super::area::{self, Rectangle};
+use super::image::RawImage;
+use super::levels::Levels;
+use super::tags;
+use crate::camera::optics::Exposure;
+use crate::cfa::FilterArray;
+use crate::error::{Error, Result};
+use crate::formats::tiff::{Directory, TiffFile};
+use crate::metadata::Metadata;
+use crate::units::QuantityKind;
+use tiff::tags::Tag;
+
+/// Letters of the filters by their number \[DNG2023, CFAPlaneColor].
+const LETTERS: &[u8; 7] = b"RGBCMYW";
+
+/// What is known of the frame, with notes on what is passed over.
+///
+/// # Errors
+///
+/// When tags are damaged, or tell of an array that cannot be described.
+pub(super) fn describe(
+    file: &mut TiffFile,
+    image: &RawImage,
+    active: Rectangle,
+    levels: &Levels,
+    notes: &mut Vec<String>,
+) -> Result<Metadata> {
+    // No sample depends on it, but a file that is damaged here may be so elsewhere.
+    tags::AS_SHOT_NEUTRAL.numbers(file, &image.first, 4)?;
+    let mut metadata = Metadata::new(QuantityKind::Adu);
+    metadata.cfa = Some(if image.is_monochrome { FilterArray::Monochrome } else { filters(file, image, active)? });
+    metadata.black_level_adu = Some(levels.black);
+    metadata.black_by_row.clone_from(&levels.black_by_row);
+    metadata.black_by_column.clone_from(&levels.black_by_column);
+    metadata.white_level_adu = Some(levels.white.into());
+    metadata.exposure = match exposure(file, &image.first, notes) {
+        // No sample depends on it.
+        Err(Error::Format { problem, .. }) => {
+            notes.push(format!("its exposure is passed over: {problem}"));
+            None
+        }
+        found => found?,
+    };
+    if levels.table.is_some() {
+        notes.push("samples are made linear by its LinearizationTable".into());
+    }
+    if tags::ORIENTATION.one(file, &image.first)?.is_some_and(|orientation| orientation > 1) {
+        notes.push("its Orientation is passed over: rows and columns stay those of the sensor".into());
+    }
+    for tag in tags::OPCODES.into_iter().filter(|tag| tag.is_in(image.directory())) {
+        notes.push(format!("its {}, corrections that converters make, is not applied", tag.1));
+    }
+    Ok(metadata)
+}
+
+/// The notes on the part of the image that is read.
+///
+/// # Errors
+///
+/// When the tags of the default crop are damaged.
+pub(super) fn note_area(
+    file: &mut TiffFile,
+    image: &RawImage,
+    active: Rectangle,
+    read: Rectangle,
+    notes: &mut Vec<String>,
+) -> Result<()> {
+    let [width, height] = image.size;
+    if read != Rectangle::whole(image.size) {
+        notes.push(format!("of {width}x{height} stored samples, {} are read", read.in_words()));
+    } else if active != read {
+        notes.push(format!("its active area is {}; what lies outside is read too", active.in_words()));
+    }
+    match area::default_crop(file, image, active)? {
+        Ok(crop) if crop != active && crop != read => {
+            notes.push(format!("its default crop, {}, is not applied", crop.in_words()));
+        }
+        Ok(_) => {}
+        Err(problem) => notes.push(format!("{problem}; it is passed over")),
+    }
+    Ok(())
+}
+
+/// The filter array at the sensor's corner; the file has that at the corner of the active area \[DNG2023, CFAPattern].
+fn filters(file: &mut TiffFile, image: &RawImage, active: Rectangle) -> Result<FilterArray> {
+    let directory = image.directory();
+    let layout = tags::CFA_LAYOUT.one(file, directory)?.unwrap_or(1);
+    if layout != 1 {
+        return Err(file.problem(format!(
+            "its photosites stand in staggered rows or columns (CFALayout {layout}), which is not supported"
+        )));
+    }
+    let Some([rows, columns]) = tags::CFA_REPEAT.whole::<2>(file, directory)? else {
+        return Err(file.problem("it is damaged; it lacks CFARepeatPatternDim, the size of its filter array"));
+    };
+    // The periods that can be described; others are refused when the letters are read.
+    let count = rows.saturating_mul(columns).min(1 << 16);
+    let codes = tags::CFA_PATTERN.unsigned(file, directory, count as u64)?.unwrap_or_default();
+    if codes.is_empty() || codes.len() < count {
+        return Err(file.problem(format!(
+            "it is damaged; its CFAPattern has {} filters, and CFARepeatPatternDim asks for {rows}x{columns}",
+            codes.len()
+        )));
+    }
+    let planes = tags::CFA_PLANE_COLOR.unsigned(file, directory, 16)?.unwrap_or_else(|| vec![0, 1, 2]);
+    let mut letters = String::with_capacity(count);
+    for y in 0..rows {
+        for x in 0..columns {
+            // The site at the sensor's corner lies so many before that of the active area.
+            let [x, y] = [(x + shift(active.left, columns)) % columns, (y + shift(active.top, rows)) % rows];
+            let code = codes[y * columns + x];
+            let letter = usize::try_from(code).ok().and_then(|code| LETTERS.get(code));
+            let Some(letter) = letter.filter(|_| planes.contains(&code)) else {
+                return Err(
+                    file.problem(format!("it is damaged; its CFAPattern has a filter {code} that it does not name"))
+                );
+            };
+            letters.push(char::from(*letter));
+        }
+        if letters.len() > 64 {
+            break;
+        }
+    }
+    format!("{columns}x{rows}:{letters}").parse().map_err(|_| {
+        file.problem(format!(
+            "its filter array has a period of {columns}x{rows} sites (CFARepeatPatternDim); up to 8x8 are supported"
+        ))
+    })
+}
+
+/// How far the site at the corner of the sensor lies behind that of the area, modulo the period.
+fn shift(first: usize, period: usize) -> usize {
+    (period - first % period) % period
+}
+
+/// Exposure time and f-number, where both are known.
+fn exposure(file: &mut TiffFile, first: &Directory, notes: &mut Vec<String>) -> Result<Option<Exposure>> {
+    let below = match tags::EXIF.one(file, first)? {
+        Some(offset) => Some(file.directory_below(offset as u64)?),
+        None => None,
+    };
+    let directories = || std::iter::once(first).chain(&below);
+    // Lenses without contacts leave zeros.
+    let mut number = |tag: tags::DngTag| -> Result<Option<f64>> {
+        let Some(directory) = directories().find(|directory| tag.is_in(directory)) else { return Ok(None) };
+        Ok(file.ratio(directory, tag.tag())?.filter(|number| *number > 0.0))
+    };
+    let (time, aperture) = (number(tags::EXPOSURE_TIME)?, number(tags::F_NUMBER)?);
+    let (exposure_s, f_number) = match (time, aperture) {
+        (Some(time), Some(aperture)) => (time, aperture),
+        (None, None) => return Ok(None),
+        (Some(time), None) => {
+            notes.push(format!("its exposure of {time} s is passed over: it does not tell the f-number"));
+            return Ok(None);
+        }
+        (None, Some(aperture)) => {
+            notes.push(format!("its f-number {aperture} is passed over: it does not tell the exposure time"));
+            return Ok(None);
+        }
+    };
+    match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
+        Ok(exposure) => {
+            notes.push("its lens is taken to lose no light: a DNG does not tell the transmittance".into());
+            Ok(Some(exposure))
+        }
+        Err(problem) => {
+            notes.push(format!("its exposure is passed over: {problem}"));
+            Ok(None)
+        }
+    }
+}
+
+/// The text of the first directory's ImageDescription.
+///
+/// # Errors
+///
+/// When it is damaged.
+pub(super) fn description(file: &mut TiffFile, first: &Directory) -> Result<Option<String>> {
+    file.text(first, Tag::ImageDescription)
+}

@@ -1,0 +1,125 @@
+//! Black and white levels, and the table that makes samples linear.
+//!
+//! A DNG counts sites, rows and columns from the corner of its active area, the project from the sensor's.
+
+use super::area::Rectangle;
+use super::image::RawImage;
+use super::storage::Sample;
+use super::tags::{self, DngTag};
+use crate::camera::levels::BlackLevel;
+use crate::error::Result;
+use crate::formats::tiff::TiffFile;
+
+/// Most sites beside or below each other after which black levels repeat; those of filter arrays have at most 8.
+const MOST_SITES: usize = 64;
+
+/// The levels of a raw image, on the scale of its samples behind the table.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Levels {
+    pub black: BlackLevel,
+    /// What rows and columns of the sensor add; empty where none adds anything.
+    pub black_by_row: Vec<f64>,
+    pub black_by_column: Vec<f64>,
+    pub white: f64,
+    /// Linear values of stored ones.
+    pub table: Option<Vec<f32>>,
+}
+
+impl Levels {
+    /// Reads and checks the levels \[DNG2023, ch. 5, Mapping Raw Values to Linear Reference Values].
+    ///
+    /// # Errors
+    ///
+    /// When a table of them has the wrong length, numbers are none, the black level is no less than the white level, or black
+    /// differs by more than the 2×2 sites of a filter array.
+    pub fn read(file: &mut TiffFile, image: &RawImage, active: Rectangle, sample: Sample) -> Result<Self> {
+        let [width, height] = image.size;
+        let white = tags::WHITE_LEVEL.exactly::<1>(file, image.directory())?.map_or(sample.largest(), |[white]| white);
+        let black = black(file, image, active)?;
+        let highest = black.sites().into_iter().fold(f64::NEG_INFINITY, f64::max);
+        if highest >= white {
+            return Err(file.problem(format!(
+                "its BlackLevel, {highest}, is no less than its WhiteLevel, {white}; correct its tags"
+            )));
+        }
+        Ok(Self {
+            black,
+            black_by_row: deltas(file, image, tags::BLACK_DELTA_V, "rows", [active.top, active.height, height])?,
+            black_by_column: deltas(file, image, tags::BLACK_DELTA_H, "columns", [active.left, active.width, width])?,
+            white,
+            table: table(file, image, sample)?,
+        })
+    }
+}
+
+/// The black level by the sites at the sensor's corner.
+fn black(file: &mut TiffFile, image: &RawImage, active: Rectangle) -> Result<BlackLevel> {
+    let directory = image.directory();
+    let [rows, columns] = tags::BLACK_REPEAT.whole::<2>(file, directory)?.unwrap_or([1, 1]);
+    if ![rows, columns].iter().all(|side| (1..=MOST_SITES).contains(side)) {
+        return Err(file.problem(format!(
+            "it is damaged; its BlackLevelRepeatDim is {rows}x{columns}, and levels repeat after 1 to {MOST_SITES} sites"
+        )));
+    }
+    let count = rows * columns;
+    let levels = tags::BLACK_LEVEL.numbers(file, directory, count as u64)?.unwrap_or_else(|| vec![0.0; count]);
+    if levels.len() < count {
+        return Err(file.problem(format!(
+            "it is damaged; its BlackLevel has {} numbers, and BlackLevelRepeatDim asks for {count}",
+            levels.len()
+        )));
+    }
+    let level = |x: usize, y: usize| levels[y % rows * columns + x % columns];
+    // An odd period and two sites meet again after twice the period.
+    let differs = (0..2 * rows).any(|y| (0..2 * columns).any(|x| level(x, y) != level(x % 2, y % 2)));
+    if differs {
+        return Err(file.problem(format!(
+            "its black level differs by {rows}x{columns} sites (BlackLevelRepeatDim); levels of 2x2 sites are supported"
+        )));
+    }
+    let site = |x: usize, y: usize| level((x + active.left) % 2, (y + active.top) % 2);
+    let sites = BlackLevel::Sites([site(0, 0), site(1, 0), site(0, 1), site(1, 1)]);
+    Ok(sites.uniform().map_or(sites, BlackLevel::Uniform))
+}
+
+/// What rows or columns add to the black level, from the sensor's corner on: nothing outside the active area, which has
+/// `count` of `all`, from `first` on.
+fn deltas(
+    file: &mut TiffFile,
+    image: &RawImage,
+    tag: DngTag,
+    what: &str,
+    [first, count, all]: [usize; 3],
+) -> Result<Vec<f64>> {
+    let found = tag.numbers(file, image.directory(), count as u64 + 1)?.unwrap_or_default();
+    if found.iter().all(|delta| *delta == 0.0) {
+        return Ok(Vec::new());
+    }
+    if found.len() != count {
+        let number = if found.len() > count { "more".to_owned() } else { found.len().to_string() };
+        let name = tag.1;
+        return Err(file.problem(format!(
+            "it is damaged; its {name} has {number} numbers, and the active area has {count} {what}"
+        )));
+    }
+    let mut deltas = vec![0.0; all];
+    deltas[first..first + count].copy_from_slice(&found);
+    Ok(deltas)
+}
+
+/// The linear values of stored ones; those beyond the end of the table have its last.
+fn table(file: &mut TiffFile, image: &RawImage, sample: Sample) -> Result<Option<Vec<f32>>> {
+    /// Stored values that there can be.
+    const VALUES: u64 = 1 << 16;
+    let tag = tags::LINEARIZATION_TABLE;
+    let Some(values) = tag.unsigned(file, image.directory(), VALUES)? else { return Ok(None) };
+    if values.is_empty() {
+        return Err(file.problem("it is damaged; its LinearizationTable is empty"));
+    }
+    if matches!(sample, Sample::Float { .. }) {
+        return Err(file.problem("it is damaged; a LinearizationTable is for integers, and its samples are floats"));
+    }
+    let values = values.into_iter().map(|value| u16::try_from(value).map(f32::from));
+    let values: std::result::Result<Vec<f32>, _> = values.collect();
+    values.map(Some).map_err(|_| file.problem("it is damaged; its LinearizationTable has values of more than 16 bits"))
+}

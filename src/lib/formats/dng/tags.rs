@@ -1,0 +1,120 @@
+//! Tags of DNG by their names, and their numbers checked.
+
+use crate::error::{Error, Result};
+use crate::formats::tiff::{Directory, TiffFile};
+use tiff::tags::Tag;
+
+/// A tag and what the specification calls it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DngTag(u16, pub &'static str);
+
+pub(super) const ORIENTATION: DngTag = DngTag(274, "Orientation");
+pub(super) const SUB_IFDS: DngTag = DngTag(330, "SubIFDs");
+pub(super) const CFA_REPEAT: DngTag = DngTag(33421, "CFARepeatPatternDim");
+pub(super) const CFA_PATTERN: DngTag = DngTag(33422, "CFAPattern");
+pub(super) const EXPOSURE_TIME: DngTag = DngTag(33434, "ExposureTime");
+pub(super) const F_NUMBER: DngTag = DngTag(33437, "FNumber");
+pub(super) const EXIF: DngTag = DngTag(34665, "Exif IFD");
+pub(super) const DNG_VERSION: DngTag = DngTag(50706, "DNGVersion");
+pub(super) const DNG_BACKWARD_VERSION: DngTag = DngTag(50707, "DNGBackwardVersion");
+pub(super) const CFA_PLANE_COLOR: DngTag = DngTag(50710, "CFAPlaneColor");
+pub(super) const CFA_LAYOUT: DngTag = DngTag(50711, "CFALayout");
+pub(super) const LINEARIZATION_TABLE: DngTag = DngTag(50712, "LinearizationTable");
+pub(super) const BLACK_REPEAT: DngTag = DngTag(50713, "BlackLevelRepeatDim");
+pub(super) const BLACK_LEVEL: DngTag = DngTag(50714, "BlackLevel");
+pub(super) const BLACK_DELTA_H: DngTag = DngTag(50715, "BlackLevelDeltaH");
+pub(super) const BLACK_DELTA_V: DngTag = DngTag(50716, "BlackLevelDeltaV");
+pub(super) const WHITE_LEVEL: DngTag = DngTag(50717, "WhiteLevel");
+pub(super) const DEFAULT_CROP_ORIGIN: DngTag = DngTag(50719, "DefaultCropOrigin");
+pub(super) const DEFAULT_CROP_SIZE: DngTag = DngTag(50720, "DefaultCropSize");
+pub(super) const AS_SHOT_NEUTRAL: DngTag = DngTag(50728, "AsShotNeutral");
+pub(super) const SUB_TILE_BLOCK: DngTag = DngTag(50974, "SubTileBlockSize");
+pub(super) const ROW_INTERLEAVE: DngTag = DngTag(50975, "RowInterleaveFactor");
+pub(super) const COLUMN_INTERLEAVE: DngTag = DngTag(52547, "ColumnInterleaveFactor");
+pub(super) const ACTIVE_AREA: DngTag = DngTag(50829, "ActiveArea");
+pub(super) const OPCODES: [DngTag; 2] = [DngTag(51008, "OpcodeList1"), DngTag(51009, "OpcodeList2")];
+
+impl DngTag {
+    pub fn tag(self) -> Tag {
+        Tag::from_u16_exhaustive(self.0)
+    }
+
+    /// Whether the tag is there.
+    pub fn is_in(self, directory: &Directory) -> bool {
+        directory.has(self.tag())
+    }
+
+    /// Complaints about the tag by its name.
+    fn by_name(self, error: Error) -> Error {
+        match error {
+            Error::Format { file, problem } => {
+                let problem = problem.replace(&format!("{:?}", self.tag()), self.1);
+                Error::Format { file, problem }
+            }
+            other => other,
+        }
+    }
+
+    /// Its numbers; none where it is missing.
+    ///
+    /// # Errors
+    ///
+    /// When they lie outside the file, are none, or are not finite: ratios whose divisor is zero.
+    pub fn numbers(self, file: &mut TiffFile, directory: &Directory, at_most: u64) -> Result<Option<Vec<f64>>> {
+        let found = file.numbers(directory, self.tag(), at_most).map_err(|error| self.by_name(error))?;
+        let Some(numbers) = found else { return Ok(None) };
+        if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
+            let what = if number.is_nan() { "0/0" } else { "divided by zero" };
+            return Err(file.problem(format!("it is damaged; its tag {} has a number that is {what}", self.1)));
+        }
+        if numbers.is_empty() {
+            return Err(file.problem(format!("it is damaged; its tag {} has no value", self.1)));
+        }
+        Ok(Some(numbers))
+    }
+
+    /// So many numbers.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::numbers`]; when there are fewer.
+    pub fn exactly<const N: usize>(self, file: &mut TiffFile, directory: &Directory) -> Result<Option<[f64; N]>> {
+        let Some(numbers) = self.numbers(file, directory, N as u64)? else { return Ok(None) };
+        let count = numbers.len();
+        <[f64; N]>::try_from(numbers)
+            .map(Some)
+            .map_err(|_| file.problem(format!("it is damaged; its tag {} has {count} of {N} numbers", self.1)))
+    }
+
+    /// So many whole numbers that are not negative.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::exactly`]; when one is no such number.
+    pub fn whole<const N: usize>(self, file: &mut TiffFile, directory: &Directory) -> Result<Option<[usize; N]>> {
+        let Some(numbers) = self.exactly::<N>(file, directory)? else { return Ok(None) };
+        if let Some(number) = numbers.iter().find(|number| number.fract() != 0.0 || !(0.0..4.3e9).contains(*number)) {
+            return Err(file.problem(format!("it is damaged; its tag {} has {number}, no whole number", self.1)));
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and of 32 bits")]
+        Ok(Some(numbers.map(|number| number as usize)))
+    }
+
+    /// One whole number.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::whole`].
+    pub fn one(self, file: &mut TiffFile, directory: &Directory) -> Result<Option<usize>> {
+        Ok(self.whole::<1>(file, directory)?.map(|[number]| number))
+    }
+
+    /// All of its unsigned numbers or bytes.
+    ///
+    /// # Errors
+    ///
+    /// When they lie outside the file or are not of such a type.
+    pub fn unsigned(self, file: &mut TiffFile, directory: &Directory, at_most: u64) -> Result<Option<Vec<u64>>> {
+        file.unsigned(directory, self.tag(), at_most).map_err(|error| self.by_name(error))
+    }
+}

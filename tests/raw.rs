@@ -1,0 +1,155 @@
+//! Raw files of cameras through the programs: `import-raw`, and the others on the raw itself.
+//!
+//! The frames of a camera are no part of this tree: the tests look for `shared/data/raw` beside it, and say where they are
+//! skipped.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::stream::MemoryFrame;
+use std::fs;
+use std::path::{Path, PathBuf};
+use support::TREE;
+use support::dng::dng;
+use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
+
+/// A DNG of 12x10 samples of 16 bits, whose active area begins at column 3, row 2.
+fn small() -> Vec<u8> {
+    let strip: Vec<u8> = (0..120_u16).flat_map(|i| (300 + i * i % 977).to_le_bytes()).collect();
+    let more: [(u16, &[u32]); 6] = [
+        (50713, &[2, 2]),
+        (50714, &[64, 65, 66, 67]),
+        (50717, &[4000]),
+        (50719, &[1, 1]),
+        (50720, &[6, 4]),
+        (50829, &[2, 3, 10, 12]),
+    ];
+    dng([12, 10], 16, 1, &strip, &more)
+}
+
+#[test]
+fn each_part_comes_with_its_place_and_levels() {
+    let shop = Workshop::new();
+    fs::write(shop.path("raw.dng"), small()).unwrap();
+    let whole: Vec<f32> = (0..120_u16).map(|i| f32::from(300 + i * i % 977)).collect();
+    for (part, [left, top, width, height]) in
+        [("active", [3, 2, 9, 8]), ("full", [0, 0, 12, 10]), ("default", [4, 3, 6, 4])]
+    {
+        for file in ["out.tiff", "out.exr"] {
+            shop.run(&format!("import-raw raw.dng --crop {part} -o {file}"), &[]);
+            let MemoryFrame { samples, header, .. } = shop.frame(file);
+            let geometry = header.geometry;
+            let rows = (top..top + height).flat_map(|y| whole[y * 12 + left..][..width].to_vec());
+            assert_eq!(samples, rows.collect::<Vec<_>>(), "{part} {file}");
+            assert_eq!((geometry.width, geometry.height), (width, height));
+            assert_eq!(geometry.origin.map(|place| usize::try_from(place).unwrap()), [left, top]);
+        }
+        let sidecar = String::from_utf8(shop.bytes("out.tiff.yaml")).unwrap();
+        // The pattern and the levels at the sensor's corner: those of the active area, an odd number of columns further on.
+        for line in ["quantity: adu", "cfa: grbg", "white_level_adu: 4000", "program: import-raw"] {
+            assert!(sidecar.contains(line), "{line} is not in\n{sidecar}");
+        }
+        let levels: Vec<&str> = sidecar.split("black_level_adu:").nth(1).unwrap().lines().take(5).collect();
+        let levels: String = levels.concat().chars().filter(|c| c.is_ascii_digit() || *c == '.').collect();
+        assert!(levels.replace(".0", "").starts_with("65646766"), "{sidecar}");
+    }
+}
+
+/// What is made of the raw itself is what is made of the import.
+#[test]
+fn programs_read_the_raw_as_its_import() {
+    let shop = Workshop::new();
+    fs::write(shop.path("raw.dng"), small()).unwrap();
+    shop.run("import-raw raw.dng -o plane.tiff", &[]);
+    for name in ["raw.dng", "plane.tiff"] {
+        shop.run(&format!("demosaic {name} --method mhc --black auto -o {name}.exr"), &[]);
+    }
+    assert_eq!(shop.read("raw.dng.exr").0, shop.read("plane.tiff.exr").0);
+    let piped = shop.run("import-raw", &small());
+    fs::write(shop.path("piped.exr"), piped).unwrap();
+    assert_eq!(shop.read("piped.exr").0, shop.read("plane.tiff").0);
+    let verbose = shop.attempt("measure raw.dng -v", &[]);
+    let said = String::from_utf8_lossy(&verbose.stderr);
+    assert!(said.contains("measure: raw.dng: of 12x10 stored samples, 9x8 from column 3, row 2 are read"), "{said}");
+}
+
+#[test]
+fn mistakes_with_raws_are_told() {
+    let shop = Workshop::with_frames();
+    fs::write(shop.path("raw.dng"), small()).unwrap();
+    fs::write(shop.path("short.dng"), &small()[..150]).unwrap();
+    fs::write(shop.path("xl.dng"), dng([4, 2], 16, 52546, &[0; 16], &[])).unwrap();
+    fs::write(shop.path("a.cr2"), b"II*\0\x10\0\0\0CR\x02\0\0\0\0\0").unwrap();
+    shop.run("mosaic codes.exr -o plane.tiff", &[]);
+    for (line, status, wanted) in [
+        (
+            "import-raw codes.exr -o out.exr",
+            BAD_DATA,
+            "codes.exr: it is no raw file of a camera; the other programs read",
+        ),
+        ("import-raw plane.tiff -o out.exr", BAD_DATA, "plane.tiff: it is no raw file of a camera; the other programs"),
+        ("import-raw short.dng -o out.exr", BAD_DATA, "short.dng: the table of tags lies beyond the end of the file"),
+        (
+            "import-raw xl.dng -o out.exr",
+            BAD_DATA,
+            "xl.dng: its raw image is JPEG XL, which is not supported; convert it",
+        ),
+        ("import-raw a.cr2 -o out.exr", BAD_DATA, "a.cr2: it is a Canon CR2, which is not read yet; write its codes"),
+        ("import-raw matrix.yaml -o out.exr", BAD_DATA, "matrix.yaml: it is neither an EXR nor a DNG nor a TIFF file"),
+        ("import-raw raw.dng --crop all -o out.exr", BAD_USAGE, "`all` is no value for --crop <PART>"),
+        ("import-raw raw.dng -o raw.dng", BAD_USAGE, "raw.dng: "),
+        ("import-raw raw.dng --metadata xyz.exr.yaml -o out.exr", BAD_DATA, "raw.dng: its metadata say that it holds"),
+        ("measure raw.dng --part 1", BAD_USAGE, "raw.dng: it has no part 1; of a DNG the raw image is part 0"),
+    ] {
+        let output = shop.attempt(line, &[]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            said.starts_with(&format!("import-raw: {wanted}")) || said.starts_with(&format!("measure: {wanted}")),
+            "{said}"
+        );
+        assert_eq!((output.status.code(), said.lines().count()), (Some(status), 1), "{line}: {said}");
+        assert!(!shop.path("out.exr").exists(), "{line}");
+    }
+}
+
+/// A file of a camera; none, and a word about it, where it is not at hand.
+fn of_camera(name: &str) -> Option<PathBuf> {
+    let beside = Path::new(TREE).ancestors().skip(1).map(|above| above.join("shared/data/raw").join(name));
+    let found = beside.into_iter().find(|path| path.is_file());
+    if found.is_none() {
+        eprintln!("skipped: there is no shared/data/raw/{name} beside the tree");
+    }
+    found
+}
+
+/// A frame of a Canon Kiss X4, stored packed and as lossless JPEG: a color chart beside a masked border.
+#[test]
+fn a_cameras_frame_is_imported_and_demosaicked() {
+    let names = ["colorchart_kissx4_ml_uncompressed14.dng", "colorchart_kissx4_ml_ljpeg.dng"];
+    let [Some(packed), Some(jpeg)] = names.map(of_camera) else { return };
+    let shop = Workshop::new();
+    for (path, name) in [(&packed, "packed"), (&jpeg, "jpeg")] {
+        for part in ["active", "full", "default"] {
+            shop.attempt(&format!("import-raw {} --crop {part} -o {name}-{part}.tiff", path.display()), &[]);
+        }
+    }
+    for (part, size, origin) in
+        [("active", [1734, 1156], [152, 26]), ("full", [1888, 1182], [0, 0]), ("default", [1734, 1156], [152, 26])]
+    {
+        let [packed, jpeg] = ["packed", "jpeg"].map(|name| shop.frame(&format!("{name}-{part}.tiff")));
+        assert!(packed.samples == jpeg.samples, "{part}");
+        let geometry = packed.header.geometry;
+        assert_eq!(([geometry.width, geometry.height], geometry.origin), (size, origin), "{part}");
+    }
+    shop.attempt("demosaic jpeg-active.tiff --method mhc --black auto -o rgb.exr", &[]);
+    let MemoryFrame { samples: rgb, header, .. } = shop.frame("rgb.exr");
+    let geometry = header.geometry;
+    // The chart is brighter than black, and green the most: it was taken by daylight.
+    let mean = |class: usize| {
+        let rows = rgb.chunks(geometry.row_samples()).map(|row| &row[class * geometry.width..][..geometry.width]);
+        rows.flatten().map(|sample| f64::from(*sample)).sum::<f64>() / (geometry.width * geometry.height) as f64
+    };
+    let [red, green, blue] = [0, 1, 2].map(mean);
+    assert!(green > red && green > blue && red.min(blue) > 100.0, "{red} {green} {blue}");
+}

@@ -1,0 +1,53 @@
+//! Small DNGs: one strip behind R G / G B.
+
+#![allow(dead_code, reason = "each file of tests takes what it needs")]
+
+/// The bytes of a DNG with one strip of so many bits a sample, stored with a compression, and tags of its own: numbers of 32
+/// bits each.
+pub fn dng(size: [u32; 2], bits: u32, compression: u32, strip: &[u8], more: &[(u16, &[u32])]) -> Vec<u8> {
+    let [width, height] = size;
+    let mut tags: Vec<(u16, u16, Vec<u32>)> = vec![
+        (256, 4, vec![width]),
+        (257, 4, vec![height]),
+        (258, 4, vec![bits]),
+        (259, 4, vec![compression]),
+        (262, 4, vec![32803]),
+        (273, 4, vec![8]),
+        (277, 4, vec![1]),
+        (278, 4, vec![height]),
+        (279, 4, vec![u32::try_from(strip.len()).unwrap()]),
+        (33421, 4, vec![2, 2]),
+        (33422, 4, vec![0, 1, 1, 2]),
+        (50706, 4, vec![1, 4, 0, 0]),
+    ];
+    tags.extend(more.iter().map(|(tag, values)| (*tag, 4, values.to_vec())));
+    tags.sort();
+    let mut out = [b"II*\0\0\0\0\0", strip].concat();
+    let mut table = u16::try_from(tags.len()).unwrap().to_le_bytes().to_vec();
+    for (tag, kind, values) in tags {
+        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        table.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
+        table.extend(u32::try_from(values.len()).unwrap().to_le_bytes());
+        if bytes.len() > 4 {
+            table.extend(u32::try_from(out.len()).unwrap().to_le_bytes());
+            out.extend(bytes);
+        } else {
+            table.extend(bytes);
+        }
+    }
+    let place = u32::try_from(out.len()).unwrap().to_le_bytes();
+    out[4..8].copy_from_slice(&place);
+    [out, table, vec![0; 4]].concat()
+}
+
+/// A lossless JPEG of samples of 16 bits that are all 32768: one bit for each.
+pub fn gray_jpeg([width, height]: [u16; 2]) -> Vec<u8> {
+    let [[high, low], [wide, narrow]] = [height, width].map(u16::to_be_bytes);
+    let mut stream = vec![0xFF, 0xD8, 0xFF, 0xC4, 0, 20, 0, 1];
+    stream.extend([0; 16]);
+    stream.extend([0xFF, 0xC3, 0, 11, 16, high, low, wide, narrow, 1, 0, 0x11, 0]);
+    stream.extend([0xFF, 0xDA, 0, 8, 1, 0, 0, 1, 0, 0]);
+    stream.resize(stream.len() + (usize::from(width) * usize::from(height)).div_ceil(8), 0);
+    stream.extend([0xFF, 0xD9]);
+    stream
+}
