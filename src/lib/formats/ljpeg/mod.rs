@@ -1,7 +1,7 @@
 //! Lossless JPEG as raw files hold it: process 14 of \[T81], SOF3, by Huffman codes; row by row.
 //!
 //! Any number of components up to four, all in one scan and none subsampled; 2 to 16 bits; predictors 1 to 7; a point
-//! transform; restart intervals. The crates at hand decode one component alone and the image as a whole.
+//! transform; restart intervals. The crate `jpeg-decoder` knows images of one, three or four components, and decodes them as a whole.
 
 mod entropy;
 mod header;
