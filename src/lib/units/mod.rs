@@ -4,8 +4,11 @@
 //! cd m⁻². Every conversion stands here; a bare power of ten elsewhere is a defect.
 
 mod spectral;
+mod spelling;
+mod wavelength;
 
-pub use spectral::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
+pub use spectral::{OtherUnit, RadianceUnit, Stated, unit_of_heading, units_in};
+pub use wavelength::WavelengthUnit;
 
 use serde::{Deserialize, Serialize};
 use std::fmt;

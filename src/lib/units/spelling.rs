@@ -1,0 +1,193 @@
+//! Units as people write them, taken to pieces: every spelling of powers and products to one.
+
+/// A unit of power in which radiance is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Power {
+    Kilowatt,
+    Watt,
+    Milliwatt,
+    Microwatt,
+    Nanowatt,
+}
+
+impl Power {
+    pub(super) fn symbol(self) -> &'static str {
+        match self {
+            Self::Kilowatt => "kW",
+            Self::Watt => "W",
+            Self::Milliwatt => "mW",
+            Self::Microwatt => "uW",
+            Self::Nanowatt => "nW",
+        }
+    }
+
+    pub(super) fn in_w(self) -> f64 {
+        match self {
+            Self::Kilowatt => 1e3,
+            Self::Watt => 1.0,
+            Self::Milliwatt => 1e-3,
+            Self::Microwatt => 1e-6,
+            Self::Nanowatt => 1e-9,
+        }
+    }
+}
+
+/// A unit of length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Length {
+    Nanometer,
+    Micrometer,
+    Angstrom,
+    Millimeter,
+    Centimeter,
+    Meter,
+}
+
+impl Length {
+    pub(super) fn symbol(self) -> &'static str {
+        match self {
+            Self::Nanometer => "nm",
+            Self::Micrometer => "um",
+            Self::Angstrom => "angstrom",
+            Self::Millimeter => "mm",
+            Self::Centimeter => "cm",
+            Self::Meter => "m",
+        }
+    }
+}
+
+/// A piece of a text.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Token {
+    /// Letters, perhaps with a power.
+    Factor { word: String, exponent: Option<i32> },
+    /// A slash, or `per`.
+    Per,
+    /// `square`, of the next factor.
+    Square,
+    /// A number.
+    Number(String),
+    /// What ends a unit.
+    End,
+}
+
+impl Token {
+    pub(super) fn lower(&self) -> Option<String> {
+        match self {
+            Self::Factor { word, .. } => Some(word.to_ascii_lowercase()),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a factor that is no unit here.
+    pub(super) fn is_strange(&self) -> bool {
+        matches!(self, Self::Factor { word, .. } if base(word).is_none())
+    }
+
+    pub(super) fn shown(&self) -> String {
+        match self {
+            Self::Factor { word, exponent: None } => word.clone(),
+            Self::Factor { word, exponent: Some(exponent) } => format!("{word}{exponent}"),
+            Self::Per => "/".into(),
+            Self::Square => "square".into(),
+            Self::Number(number) => number.clone(),
+            Self::End => String::new(),
+        }
+    }
+}
+
+/// Takes a text to pieces, every spelling of powers and products to one.
+pub(super) fn tokens(text: &str) -> Vec<Token> {
+    let mut plain = String::with_capacity(text.len());
+    for character in text.replace("**", "").chars() {
+        match character {
+            'µ' | 'μ' => plain.push('u'),
+            'Å' | '\u{212B}' => plain.push_str("angstrom"),
+            '⁻' | '−' | '–' => plain.push('-'),
+            '⁰' | '¹' | '²' | '³' | '⁴' | '⁵' | '⁶' | '⁷' | '⁸' | '⁹' => {
+                let digit = "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|digit| digit == character).unwrap_or_default();
+                plain.push_str(&digit.to_string());
+            }
+            '^' | '{' | '}' | '$' => {}
+            '*' | '·' | '⋅' | '×' | '•' | '.' | '_' | '(' | ')' | '[' | ']' | '"' => plain.push(' '),
+            '/' => plain.push_str(" / "),
+            ':' | ';' | ',' | '=' | '<' | '>' => plain.push_str(" | "),
+            other => plain.push(other),
+        }
+    }
+    plain.split_whitespace().flat_map(pieces).collect()
+}
+
+/// The pieces of a word: a hyphen before a letter parts factors, before a digit it is the sign of a power.
+fn pieces(word: &str) -> Vec<Token> {
+    let mut parts = vec![String::new()];
+    let mut characters = word.chars().peekable();
+    while let Some(character) = characters.next() {
+        if character == '-' && characters.peek().is_none_or(|next| !next.is_ascii_digit()) {
+            parts.push(String::new());
+        } else if let Some(part) = parts.last_mut() {
+            part.push(character);
+        }
+    }
+    parts.iter().filter(|part| !part.is_empty()).map(|part| piece(part)).collect()
+}
+
+fn piece(text: &str) -> Token {
+    let letters = text.find(|c: char| !c.is_alphabetic()).unwrap_or(text.len());
+    let (word, power) = text.split_at(letters);
+    match (word.to_ascii_lowercase().as_str(), power) {
+        ("", "/") => Token::Per,
+        ("per", "") => Token::Per,
+        ("square" | "sq", "") => Token::Square,
+        ("", number) if number.starts_with(|c: char| c.is_ascii_digit() || "+-".contains(c)) => {
+            Token::Number(number.to_owned())
+        }
+        ("", _) => Token::End,
+        (_, "") => Token::Factor { word: word.to_owned(), exponent: None },
+        (_, power) => match power.parse() {
+            Ok(exponent) => Token::Factor { word: word.to_owned(), exponent: Some(exponent) },
+            Err(_) => Token::End,
+        },
+    }
+}
+
+/// What a factor of a unit measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Base {
+    Power(Power),
+    Photons,
+    /// J, erg: of a radiance with a time, or of none.
+    Energy,
+    Length(Length),
+    SolidAngle,
+    Time,
+    Frequency,
+}
+
+pub(super) fn base(word: &str) -> Option<Base> {
+    let lower = word.to_ascii_lowercase();
+    let singular = if lower.len() > 3 { lower.strip_suffix('s').unwrap_or(&lower) } else { &lower };
+    Some(match singular {
+        // A megawatt is none of radiance, and may be a milliwatt.
+        "mw" if word.starts_with('M') => return None,
+        "kw" | "kilowatt" => Base::Power(Power::Kilowatt),
+        "w" | "watt" => Base::Power(Power::Watt),
+        "mw" | "milliwatt" => Base::Power(Power::Milliwatt),
+        "uw" | "microwatt" => Base::Power(Power::Microwatt),
+        "nw" | "nanowatt" => Base::Power(Power::Nanowatt),
+        "ph" | "photon" | "quanta" | "quantum" | "mol" | "mmol" | "umol" | "nmol" | "mole" | "micromole"
+        | "einstein" => Base::Photons,
+        "j" | "joule" | "erg" => Base::Energy,
+        "nm" | "nanometer" | "nanometre" => Base::Length(Length::Nanometer),
+        "um" | "micron" | "micrometer" | "micrometre" => Base::Length(Length::Micrometer),
+        "angstrom" | "ang" => Base::Length(Length::Angstrom),
+        "a" if word == "A" => Base::Length(Length::Angstrom),
+        "mm" | "millimeter" | "millimetre" => Base::Length(Length::Millimeter),
+        "cm" | "centimeter" | "centimetre" => Base::Length(Length::Centimeter),
+        "m" | "meter" | "metre" => Base::Length(Length::Meter),
+        "sr" | "str" | "ster" | "steradian" => Base::SolidAngle,
+        "s" | "sec" | "second" => Base::Time,
+        "hz" | "thz" => Base::Frequency,
+        _ => return None,
+    })
+}
