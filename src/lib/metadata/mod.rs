@@ -157,6 +157,11 @@ impl Metadata {
         level.filter(|_| is_level(&self.black_by_row) && is_level(&self.black_by_column))
     }
 
+    /// Whether charge transfer was simulated, which mixes neighbors.
+    pub fn is_transferred(&self) -> bool {
+        self.noise.as_ref().is_some_and(|noise| noise.cte.is_some())
+    }
+
     /// What is possible, but may not be meant: a warning each.
     pub fn doubts(&self) -> Vec<String> {
         let black = self.black_level_adu.map(|level| level.sites().into_iter().fold(f64::NEG_INFINITY, f64::max));

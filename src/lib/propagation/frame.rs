@@ -250,7 +250,7 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
         let left = transferred(frame, &codes, above_bias, 1.0 / 12.0)?;
         return Ok((codes, left.map(|code| shifted(code, bias_adu))));
     };
-    if correction.cte.is_some() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+    if correction.cte.is_some() || metadata.is_transferred() {
         return Err(Unpredictable::Beyond(
             "what charge transfer and its undoing do to noise differs from place to place",
         ));

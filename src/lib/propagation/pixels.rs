@@ -211,8 +211,7 @@ impl PixelNoise {
 /// The photosites that a demosaicked frame was made of, and what no light reads in it, in the unit of its samples.
 fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
     let metadata = &frame.metadata;
-    let transferred = metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
-    if transferred || metadata.correction.is_some_and(|correction| correction.cte.is_some()) {
+    if metadata.is_transferred() || metadata.correction.is_some_and(|correction| correction.cte.is_some()) {
         return Err(frame.refuse(
             "its charge was transferred, and what that does to noise differs from place to place; no standard \
              deviations can be told",

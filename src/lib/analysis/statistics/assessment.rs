@@ -80,7 +80,7 @@ impl<'a> Assessment<'a> {
         let mut classes: Vec<ChannelReport> =
             self.classes.iter().zip(black.classes).flat_map(|(group, black)| reports(group, black)).collect();
         let mut mean_std = self.channels.predicted.mean_std.clone();
-        if metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+        if metadata.is_transferred() {
             // Charge transfer mixes neighbors: no sampling error is that of independent samples.
             channels.iter_mut().chain(&mut classes).for_each(ChannelReport::forget_errors);
             mean_std = None;

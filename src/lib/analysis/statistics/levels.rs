@@ -120,8 +120,8 @@ impl Rails {
     fn of(frame: &FrameHeader) -> Self {
         let metadata = &frame.metadata;
         // What transfer or its undoing has mixed lies at no rail any more; nor does a code less a dark frame's.
-        let transferred = metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
-        if metadata.correction.is_some() || (transferred && metadata.quantity == QuantityKind::Electrons) {
+        if metadata.correction.is_some() || (metadata.is_transferred() && metadata.quantity == QuantityKind::Electrons)
+        {
             return Self::All(Limits::NONE);
         }
         let codes = |white: f64| Limits { low: 0.0, high: to_sample(white) };

@@ -46,7 +46,7 @@ pub fn measure(
     }
     let tallies = tallies(&mut watch, regions, &levels)?;
     let (counts, left_out) = watch.seen();
-    if level.is_some() && frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()) {
+    if level.is_some() && frame.metadata.is_transferred() {
         return Err(Error::Data(format!(
             "{}: nothing can be checked: charge transfer mixes neighbors, differently from place to place",
             frame.name

@@ -228,8 +228,7 @@ impl Laws {
 
 /// Whether the frame was rendered and nothing was done to it that leaves a patch without a level of its own.
 fn is_rendered(frame: &FrameHeader) -> bool {
-    let transferred = frame.metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some());
-    frame.metadata.scene.is_some() && !transferred
+    frame.metadata.scene.is_some() && !frame.metadata.is_transferred()
 }
 
 /// What is predicted of a uniform scene whose means are those of a tally.
