@@ -75,6 +75,12 @@ pub fn of_frame(frame: &FrameHeader, size: Option<[usize; 2]>) -> Result<Vec<Pat
         let problem = format!("it has {count} patches of {width}x{height}; {most} are measured at a time at most");
         return Err(usage(problem).change(&["patches"]));
     }
+    if count == 0 {
+        return Err(usage(format!(
+            "no patch of {width}x{height} lies whole within the frame of {}x{}",
+            geometry.width, geometry.height
+        )));
+    }
     let columns_of_patches: Vec<(usize, usize)> = across.collect();
     let mut patches = Vec::new();
     for (row, y) in down {
@@ -84,12 +90,6 @@ pub fn of_frame(frame: &FrameHeader, size: Option<[usize; 2]>) -> Result<Vec<Pat
             let sample = columns.and_then(|columns| row.checked_mul(columns)?.checked_add(column));
             patches.push(Patch { at: [column, row], sample, interior });
         }
-    }
-    if patches.is_empty() {
-        return Err(usage(format!(
-            "no patch of {width}x{height} lies whole within the frame of {}x{}",
-            geometry.width, geometry.height
-        )));
     }
     Ok(patches)
 }
