@@ -2,6 +2,7 @@
 
 use super::atomic::{AtomicFile, Target};
 use super::digest::SamplesDigest;
+use super::dng::{self, DngWriter};
 use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMARIES};
 use super::format::U16_FULL_SCALE;
 use super::places::{STDOUT_NAME, named, sidecar_path};
@@ -27,15 +28,18 @@ pub enum Format {
     Exr,
     /// TIFF.
     Tiff,
+    /// DNG, of planes of codes.
+    Dng,
 }
 
 impl Named for Format {
-    const ALL: &'static [Self] = &[Self::Exr, Self::Tiff];
+    const ALL: &'static [Self] = &[Self::Exr, Self::Tiff, Self::Dng];
 
     fn name(self) -> &'static str {
         match self {
             Self::Exr => "exr",
             Self::Tiff => "tiff",
+            Self::Dng => "dng",
         }
     }
 }
@@ -55,7 +59,7 @@ pub enum CompressionKind {
     Piz,
     /// Lempel-Ziv-Welch (TIFF).
     Lzw,
-    /// Deflate (TIFF).
+    /// Deflate (TIFF, and DNG of floats).
     Deflate,
 }
 
@@ -88,7 +92,7 @@ pub enum SampleKind {
     F32,
     /// 16-bit float (EXR).
     F16,
-    /// 16-bit unsigned (TIFF).
+    /// 16-bit unsigned (TIFF, DNG).
     U16,
 }
 
@@ -122,6 +126,7 @@ pub struct OutputOptions {
 enum Encoding {
     Exr(ExrSamples, ExrCompression),
     Tiff(TiffSamples, TiffCompression),
+    Dng(TiffSamples, TiffCompression),
 }
 
 impl OutputOptions {
@@ -146,13 +151,19 @@ impl OutputOptions {
             }
             Format::Tiff => {
                 let default = if fits_u16 { SampleKind::U16 } else { SampleKind::F32 };
-                let samples = tiff_samples(self.samples.unwrap_or(default), fits_u16, quantity)?;
+                let samples = tiff_samples("TIFF", self.samples.unwrap_or(default), fits_u16, quantity)?;
                 Ok(Encoding::Tiff(samples, tiff_compression(compression)?))
+            }
+            Format::Dng => {
+                let place = named(self.path.as_deref()).map(|path| path.display().to_string());
+                dng::check_frame(header, &place.unwrap_or_else(|| STDOUT_NAME.into()))?;
+                let default = if fits_u16 { SampleKind::U16 } else { SampleKind::F32 };
+                let samples = tiff_samples("DNG", self.samples.unwrap_or(default), fits_u16, quantity)?;
+                Ok(Encoding::Dng(samples, dng_compression(compression, samples)?))
             }
         }
     }
 
-    /// The format, by the file's extension where none is given.
     /// Whether the file has names for layers beside the samples.
     ///
     /// # Errors
@@ -162,6 +173,7 @@ impl OutputOptions {
         Ok(self.format()? == Format::Exr)
     }
 
+    /// The format, by the file's extension where none is given.
     fn format(&self) -> Result<Format> {
         let path = named(self.path.as_deref());
         let extension = path.and_then(Path::extension).map(|end| end.to_string_lossy().to_ascii_lowercase());
@@ -169,8 +181,9 @@ impl OutputOptions {
             (Some(format), _) => Ok(format),
             (None, Some("exr") | None) => Ok(Format::Exr),
             (None, Some("tif" | "tiff")) => Ok(Format::Tiff),
+            (None, Some("dng")) => Ok(Format::Dng),
             (None, Some(end)) => Err(Error::Usage(format!(
-                "{}: `.{end}` names no format that is written here; end the name in .exr or .tiff, or give --format",
+                "{}: `.{end}` names no format that is written here; end the name in .exr, .tiff or .dng, or give --format",
                 path.unwrap_or(Path::new("-")).display()
             ))),
         }
@@ -198,12 +211,12 @@ fn exr_compression(compression: CompressionKind) -> Result<ExrCompression> {
     }
 }
 
-fn tiff_samples(samples: SampleKind, fits_u16: bool, quantity: QuantityKind) -> Result<TiffSamples> {
+fn tiff_samples(format: &str, samples: SampleKind, fits_u16: bool, quantity: QuantityKind) -> Result<TiffSamples> {
     match samples {
         SampleKind::F32 => Ok(TiffSamples::F32),
         SampleKind::U16 if fits_u16 => Ok(TiffSamples::U16),
         SampleKind::U16 => Err(Error::Usage(format!("u16 would round or clip {quantity}; write f32"))),
-        SampleKind::F16 => Err(Error::Usage("TIFF stores u16 or f32 here; for f16 write an EXR".into())),
+        SampleKind::F16 => Err(Error::Usage(format!("{format} stores u16 or f32 here; for f16 write an EXR"))),
     }
 }
 
@@ -213,6 +226,19 @@ fn tiff_compression(compression: CompressionKind) -> Result<TiffCompression> {
         CompressionKind::Lzw => Ok(TiffCompression::Lzw),
         CompressionKind::Deflate => Ok(TiffCompression::Deflate),
         _ => Err(compression.refused("TIFF", "none, lzw or deflate")),
+    }
+}
+
+/// Codes have no compression that all readers of raw files know; floats have Deflate.
+fn dng_compression(compression: CompressionKind, samples: TiffSamples) -> Result<TiffCompression> {
+    match (compression, samples) {
+        (CompressionKind::None, _) => Ok(TiffCompression::None),
+        (CompressionKind::Deflate, TiffSamples::F32) => Ok(TiffCompression::Deflate),
+        (_, TiffSamples::F32) => Err(compression.refused("DNG of floats", "none or deflate")),
+        (_, TiffSamples::U16) => Err(Error::Usage(format!(
+            "DNG of 16-bit codes is not compressed by {}; leave it uncompressed, or write 32-bit floats (f32) and deflate",
+            compression.name()
+        ))),
     }
 }
 
@@ -255,6 +281,7 @@ pub struct FrameWriter {
 enum Encoder {
     Exr(Box<ExrWriter<Target>>),
     Tiff(Box<TiffWriter<Target>>),
+    Dng(Box<DngWriter<Target>>),
 }
 
 impl FrameWriter {
@@ -271,19 +298,24 @@ impl FrameWriter {
         let name = target.name().to_owned();
         let sidecar = target.named_file().map(|path| AtomicFile::create(&sidecar_path(path))).transpose()?;
         let record = sidecar.map(|sidecar| (SamplesDigest::new(), sidecar));
-        let description = Some(yaml::write_metadata(&header.metadata)?);
-        let software = Some(format!("cyanometer {}", env!("CARGO_PKG_VERSION")));
+        let description = yaml::write_metadata(&header.metadata)?;
+        let software = format!("cyanometer {}", env!("CARGO_PKG_VERSION"));
         let geometry = &header.geometry;
         let encoder = match encoding {
             Encoding::Exr(samples, compression) => {
-                let tags = ExrTags { metadata: description, software, ..native_tags(header) };
+                let (metadata, software) = (Some(description), Some(software));
+                let tags = ExrTags { metadata, software, ..native_tags(header) };
                 Encoder::Exr(Box::new(ExrWriter::create(target, &name, geometry, samples, compression, &tags)?))
             }
             Encoding::Tiff(samples, compression) => {
                 let scale = u16_scale(header.metadata.quantity, samples);
-                let tags = TiffTags { description, software };
+                let tags = TiffTags { description: Some(description), software: Some(software) };
                 let settings = TiffSettings { samples, scale, compression, tags, extra: Vec::new() };
                 Encoder::Tiff(Box::new(TiffWriter::create(target, &name, geometry, settings)?))
+            }
+            Encoding::Dng(samples, compression) => {
+                let texts = [description, software];
+                Encoder::Dng(Box::new(DngWriter::create(target, &name, header, samples, compression, texts)?))
             }
         };
         Ok(Self { encoder, header: header.clone(), name, record, encoding, stored: Vec::new() })
@@ -310,6 +342,7 @@ impl FrameWriter {
                 did_not_fit = clamped;
                 target
             }
+            Encoder::Dng(writer) => writer.finish()?,
         };
         target.flush().map_err(|e| Error::disk(&self.name, "write", e))?;
         let sidecar = match self.record {
@@ -375,7 +408,9 @@ impl RowSink for FrameWriter {
             // The digest is that of the samples as a reader will get them.
             let scale = match self.encoding {
                 Encoding::Exr(ExrSamples::F16, _) => None,
-                Encoding::Tiff(TiffSamples::U16, _) => Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16)),
+                Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) => {
+                    Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16))
+                }
                 _ => {
                     digest.update_rows(samples, &self.header.geometry);
                     return self.encode(samples);
@@ -399,6 +434,7 @@ impl FrameWriter {
         match &mut self.encoder {
             Encoder::Exr(writer) => writer.write(samples),
             Encoder::Tiff(writer) => writer.write_rows(samples),
+            Encoder::Dng(writer) => writer.write_rows(samples),
         }
     }
 }

@@ -8,6 +8,7 @@
 mod capture;
 mod chunk;
 mod directory;
+mod first;
 mod grid;
 mod layout;
 mod read;
@@ -18,6 +19,7 @@ mod write;
 
 pub(in crate::formats) use chunk::Predictor;
 pub use directory::{Directory, TiffFile, begins_so};
+pub(in crate::formats) use first::FirstImage;
 pub use read::{FORMAT, TiffReader};
 pub use tags::{ExtraTag, TagValue};
 pub use write::{TiffSettings, TiffWriter};
