@@ -136,7 +136,7 @@ const MISTAKES: [(&str, i32, &str); 83] = [
     (
         "digitize noisy.exr -o codes.png",
         BAD_USAGE,
-        "codes.png: `.png` names no format that is written here; end the name in .exr or .tiff, or give --format",
+        "codes.png: `.png` names no format that is written here; end the name in .exr, .tiff or .dng, or give --format",
     ),
     ("mosaic plane.exr", BAD_DATA, "plane.exr: it is a CFA plane already, rggb"),
     (
