@@ -267,7 +267,9 @@ fn what_is_no_raw_is_refused() {
     assert!(complaint(&outside).ends_with("begins at column -1, row 3 of the sensor; write an EXR"));
     let mut dark = good.clone();
     dark.metadata.black_level_adu = Some(4095.0.into());
-    assert!(complaint(&dark).contains("black level of this frame, 4095 ADU, is no less than its white level, 4095 ADU"));
+    assert!(
+        complaint(&dark).contains("black level of this frame, 4095 ADU, is no less than its white level, 4095 ADU")
+    );
 }
 
 #[test]

@@ -10,6 +10,7 @@ mod chunk;
 mod directory;
 mod first;
 mod grid;
+mod interleave;
 mod layout;
 mod read;
 mod tags;
