@@ -40,7 +40,8 @@ mod tests {
     use crate::metadata::PoissonKind;
     use crate::propagation::{Equations, Photosite};
 
-    /// The exact moments of codes, at three signals that no end of the range is near.
+    /// The exact moments of codes, at three signals that no end of the range is near. Patterns that are cut off at zero have
+    /// theirs by quadrature, good to 10⁻⁷ here; the others are formulas.
     #[test]
     fn it_is_the_exact_variance_less_the_pattern() {
         let adc = AdcRecord { bits: 16, bias_adu: 800.0, adu_per_e: 0.8 };
@@ -58,13 +59,18 @@ mod tests {
             let line = LinearNoise::of(&model, &adc);
             let photosite = Photosite::of_electrons(model, Equations::Exact).digitized(adc);
             let dark = photosite.moments(0.0).moments;
-            assert!((dark.variance - line.offset_adu2).abs() < 1e-9 * dark.variance, "{} {line:?}", dark.variance);
+            let tolerance = if prnu > 0.1 || dcnu > 0.1 { 1e-7 } else { 1e-12 };
+            assert!((dark.variance / line.offset_adu2 - 1.0).abs() < tolerance, "{} {line:?}", dark.variance);
             for expected_e in [100.0, 2000.0, 20_000.0] {
                 let found = photosite.moments(expected_e).moments;
                 let signal = found.mean - dark.mean;
                 let (mean, pattern, ..) = sensitivity(prnu);
                 let variance = line.slope_adu * signal + line.offset_adu2 + pattern * (signal / mean).powi(2);
-                assert!((found.variance / variance - 1.0).abs() < 1e-9, "{expected_e}: {} {variance}", found.variance);
+                assert!(
+                    (found.variance / variance - 1.0).abs() < tolerance,
+                    "{expected_e}: {} {variance}",
+                    found.variance
+                );
             }
         }
     }

@@ -5,7 +5,7 @@
 /// that; NaN and what is below zero, 0.
 fn nearest(value: f64, most: u32) -> [u32; 2] {
     let limit = f64::from(most);
-    if !(value > 0.0) {
+    if value.is_nan() || value <= 0.0 {
         return [0, 1];
     }
     if value >= limit {
