@@ -1,7 +1,5 @@
 //! What is written is read again, to the bit, and its tags say what they should.
 
-#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "tests, with values chosen to fit")]
-
 use super::tags::{self, DngTag};
 use super::{DngReader, DngWriter, RawArea, check_frame};
 use crate::camera::levels::{BlackLevel, WhiteLevel};
