@@ -199,7 +199,7 @@ const OUTPUTS: &[Advice] = &[
     advice("preview noisy.exr -o out.jpg", "end the name in .png", &["preview noisy.exr -o out.png"]),
     advice(
         "digitize noisy.exr -o out.png",
-        "end the name in .exr or .tiff, or give --format",
+        "end the name in .exr, .tiff or .dng, or give --format",
         &[
             "digitize noisy.exr -o out.exr",
             "digitize noisy.exr -o out.tiff",

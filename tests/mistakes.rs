@@ -10,7 +10,34 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 83] = [
+const MISTAKES: [(&str, i32, &str); 88] = [
+    (
+        "digitize noisy.exr -o x.dng",
+        BAD_DATA,
+        "x.dng: a DNG holds codes behind a filter array, one plane of ADU, and this frame is three planes of ADU; run `mosaic` first",
+    ),
+    (
+        "add-noise expected.exr -o x.dng",
+        BAD_DATA,
+        "x.dng: a DNG holds codes behind a filter array, one plane of ADU, and this frame is three planes of electrons; run `mosaic` \
+         and `digitize` first",
+    ),
+    (
+        "demosaic plane.exr --format dng",
+        BAD_USAGE,
+        "standard output: a DNG holds codes behind a filter array, one plane of ADU, and this frame is three demosaicked planes of \
+         ADU; write an EXR or a TIFF",
+    ),
+    (
+        "mosaic codes.exr --compression lzw -o x.dng",
+        BAD_USAGE,
+        "DNG of 16-bit codes is not compressed by lzw; leave it uncompressed, or write 32-bit floats (f32) and deflate",
+    ),
+    (
+        "correct-frame plane.exr --black auto --compression zip -o x.dng",
+        BAD_USAGE,
+        "DNG of floats is not compressed by zip; it is one of none or deflate",
+    ),
     ("render-radiance missing.csv", BAD_DATA, "missing.csv: cannot open: no such file or directory"),
     (
         "render-radiance --dark --size 8",
@@ -136,7 +163,7 @@ const MISTAKES: [(&str, i32, &str); 83] = [
     (
         "digitize noisy.exr -o codes.png",
         BAD_USAGE,
-        "codes.png: `.png` names no format that is written here; end the name in .exr or .tiff, or give --format",
+        "codes.png: `.png` names no format that is written here; end the name in .exr, .tiff or .dng, or give --format",
     ),
     ("mosaic plane.exr", BAD_DATA, "plane.exr: it is a CFA plane already, rggb"),
     (

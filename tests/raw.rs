@@ -74,6 +74,45 @@ fn programs_read_the_raw_as_its_import() {
     assert!(said.contains("measure: raw.dng: of 12x10 stored samples, 9x8 from column 3, row 2 are read"), "{said}");
 }
 
+/// What is written as a DNG is what is written as an EXR: samples, place and metadata, without the sidecar too.
+#[test]
+fn frames_come_back_from_a_dng() {
+    let shop = Workshop::new();
+    shop.run("render-radiance SAMPLES/skies/sky912.exr --patch 3x3 --expose-to 0.8 --cfa gbrg -o rates.exr", &[]);
+    shop.run("add-noise rates.exr --seed 7 -o noisy.exr", &[]);
+    for (line, options) in [
+        ("digitize noisy.exr", ""),
+        ("digitize noisy.exr --crop 3,1,29,17", ""),
+        ("correct-frame codes.exr --black auto", ""),
+        ("correct-frame codes.exr --black auto", " --compression deflate"),
+        ("import-raw codes.dng", ""),
+    ] {
+        if line.contains("codes") {
+            shop.run("digitize noisy.exr -o codes.exr", &[]);
+            shop.run("digitize noisy.exr -o codes.dng", &[]);
+        }
+        shop.run(&format!("{line} -o out.exr"), &[]);
+        shop.run(&format!("{line}{options} -o out.dng"), &[]);
+        let [exr, with_sidecar] = ["out.exr", "out.dng"].map(|name| shop.frame(name));
+        fs::rename(shop.path("out.dng"), shop.path("alone.dng")).unwrap();
+        let piped = shop.run(&format!("{line}{options} --format dng"), &[]);
+        assert!(piped == shop.bytes("alone.dng"), "{line}: file and pipe differ");
+        let alone = shop.frame("alone.dng");
+        let bits = |frame: &MemoryFrame| frame.samples.iter().map(|sample| sample.to_bits()).collect::<Vec<_>>();
+        for frame in [&with_sidecar, &alone] {
+            assert!(bits(frame) == bits(&exr), "{line}{options}");
+            assert_eq!(frame.header.geometry, exr.header.geometry);
+            let mut expected = exr.header.metadata.clone();
+            expected.samples.clone_from(&frame.header.metadata.samples);
+            assert_eq!(frame.header.metadata, expected, "{line}{options}");
+        }
+        for name in ["out.exr", "alone.dng"] {
+            shop.run(&format!("demosaic {name} --method mhc -o {name}.rgb.exr"), &[]);
+        }
+        assert_eq!(shop.read("out.exr.rgb.exr").0, shop.read("alone.dng.rgb.exr").0, "{line}{options}");
+    }
+}
+
 #[test]
 fn mistakes_with_raws_are_told() {
     let shop = Workshop::with_frames();
@@ -99,7 +138,7 @@ fn mistakes_with_raws_are_told() {
         (
             "import-raw matrix.yaml -o out.exr",
             BAD_DATA,
-            "matrix.yaml: it is neither an EXR nor a DNG nor a PNG nor a FITS nor a TIFF",
+            "matrix.yaml: it is neither an EXR nor a DNG nor a PNG nor a FITS nor a TIFF file",
         ),
         ("import-raw raw.dng --crop all -o out.exr", BAD_USAGE, "`all` is no value for --crop <PART>"),
         ("import-raw raw.dng -o raw.dng", BAD_USAGE, "raw.dng: "),

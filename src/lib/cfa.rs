@@ -219,6 +219,24 @@ impl FilterArray {
         }
     }
 
+    /// Columns and rows after which it repeats itself.
+    pub fn period(self) -> [usize; 2] {
+        match self {
+            Self::Bayer(_) => [2, 2],
+            Self::Monochrome => [1, 1],
+            Self::Other(period) => [period.columns, period.rows],
+        }
+    }
+
+    /// The letter of the filter before the photosite in column `x` and row `y` of the sensor; none of a monochrome sensor.
+    pub fn filter(self, x: i64, y: i64) -> Option<char> {
+        match self {
+            Self::Bayer(pattern) => pattern.class(x, y).letter().chars().next(),
+            Self::Monochrome => None,
+            Self::Other(period) => Some(period.letter(x, y).into()),
+        }
+    }
+
     /// The letters of its filters, each once; none of a monochrome sensor.
     pub fn filters(self) -> Vec<char> {
         match self {

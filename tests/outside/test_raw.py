@@ -7,13 +7,15 @@ CYANOMETER_CORPUS names another corpus. Where they are missing the tests say tha
 import itertools
 import os
 import pathlib
+import re
 import struct
 import unittest
 
 import numpy as np
 import rawpy
+import tifffile
 
-from programs import ROOT, ProgramCase, read_spec
+from programs import ROOT, SAMPLE_DATA, ProgramCase, read_spec
 
 BYTE, SHORT, LONG, RATIO = 1, 3, 4, 5
 FORMATS = {BYTE: "B", SHORT: "H", LONG: "I", RATIO: "I"}
@@ -232,6 +234,118 @@ class Raw(ProgramCase):
         more = {50712: (SHORT, table), 50714: (SHORT, [16]), 50717: (LONG, [4000])}
         write_dng(path, scene(8), 8, more=more)
         self.same_as_libraw(path)
+
+
+class Written(ProgramCase):
+    """What LibRaw and tifffile make of a DNG that is written here."""
+
+    XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+
+    def frame(self, pattern, crop="0,0,64,48"):
+        """Codes of a sky behind a pattern, from a place on the sensor, as EXR and as DNG."""
+        sky = SAMPLE_DATA / "skies/sky912.exr"
+        self.run_program(["render-radiance", sky, "--patch", "9x9", "--cfa", pattern, "-o", "rates.exr"])
+        self.run_program(["add-noise", "rates.exr", "--seed", "7", "-o", "noisy.exr"])
+        self.run_program(["digitize", "noisy.exr", "--crop", crop, "-o", "codes.exr"])
+        self.run_program(["digitize", "noisy.exr", "--crop", crop, "-o", "codes.dng"])
+        return self.planes((self.directory / "codes.exr").read_bytes())["Y"]
+
+    def tags(self, name):
+        """Tags of the first directory and of the raw image, by number."""
+        with tifffile.TiffFile(self.path(name)) as file:
+            first = file.pages[0]
+            raw = first.pages[0]
+            return [{tag.code: tag.value for tag in page.tags} for page in (first, raw)], raw.asarray(), first.asarray()
+
+    def test_codes_pattern_and_levels(self):
+        for pattern, corner in itertools.product(("rggb", "bggr", "grbg", "gbrg"), ((0, 0), (1, 0), (0, 1), (3, 5))):
+            with self.subTest(pattern=pattern, corner=corner):
+                codes = self.frame(pattern, f"{corner[0]},{corner[1]},63,41")
+                letters = np.array(list(pattern)).reshape(2, 2)
+                letters = np.roll(letters, (-corner[1], -corner[0]), (0, 1))
+                with rawpy.imread(self.path("codes.dng")) as raw:
+                    np.testing.assert_array_equal(raw.raw_image, codes)
+                    names = np.frombuffer(raw.color_desc, np.uint8)[raw.raw_pattern].tobytes().decode().lower()
+                    self.assertEqual(names, "".join(letters.ravel()))
+                    black = float(self.key("codes.dng", "black_level_adu"))
+                    # LibRaw cuts the fraction off.
+                    np.testing.assert_array_equal(raw.black_level_per_channel, [int(black)] * 4)
+                    self.assertEqual(raw.white_level, float(self.key("codes.dng", "white_level_adu")))
+                    self.assertEqual(raw.extract_thumb().data.shape, (20, 31, 3))
+
+    def key(self, name, key):
+        lines = (self.directory / f"{name}.yaml").read_text(encoding="utf-8").splitlines()
+        return next(line.split(":")[1].strip() for line in lines if line.startswith(f"{key}:"))
+
+    def test_colors(self):
+        self.frame("rggb")
+        (first, _), _, _ = self.tags("codes.dng")
+        matrix = np.array(first[50721], float).reshape(9, 2)
+        camera_from_xyz = (matrix[:, 0] / matrix[:, 1]).reshape(3, 3)
+        neutral = np.array(first[50728], float).reshape(3, 2)
+        neutral = neutral[:, 0] / neutral[:, 1]
+        white = np.array([0.3127 / 0.3290, 1, (1 - 0.3127 - 0.3290) / 0.3290])
+        np.testing.assert_allclose(camera_from_xyz @ white, neutral, atol=1e-8)
+        self.assertAlmostEqual(neutral.max(), 1, places=9)
+        text = (SAMPLE_DATA / "sensors/kaf-5101ce.yaml").read_text(encoding="utf-8").split("xyz_from_camera:")[1]
+        numbers = re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", text)[:9]
+        product = camera_from_xyz @ np.array(numbers, float).reshape(3, 3)
+        np.testing.assert_allclose(product / product[0, 0], np.eye(3), atol=1e-7)
+        with rawpy.imread(self.path("codes.dng")) as raw:
+            np.testing.assert_allclose(raw.camera_whitebalance[:3] * neutral / neutral.max(), 1, rtol=1e-6)
+            # LibRaw's own white of D65 has other last digits.
+            np.testing.assert_allclose(raw.daylight_whitebalance[:3] * neutral, 1, rtol=1e-3)
+            # Camera to sRGB, white to white.
+            srgb = np.linalg.inv(camera_from_xyz @ np.linalg.inv(self.XYZ_TO_SRGB))
+            expected = srgb * (camera_from_xyz @ white)
+            np.testing.assert_allclose(raw.color_matrix[:, :3], expected, atol=2e-3)
+
+    def test_tags(self):
+        codes = self.frame("grbg")
+        (first, raw), samples, picture = self.tags("codes.dng")
+        np.testing.assert_array_equal(samples, codes)
+        self.assertEqual(max(picture.shape), 32)
+        self.assertEqual(bytes(first[50706]), bytes([1, 4, 0, 0]))
+        self.assertEqual(bytes(first[50707]), bytes([1, 1, 0, 0]))
+        self.assertEqual((first[50708], first[50778], first[274]), ("kaf-5101ce", 21, 1))
+        self.assertTrue(first[270].startswith("schema: cyanometer/1"))
+        self.assertEqual(tuple(raw[50829]), (0, 0, 48, 64))
+        above, below = raw[50714][:2]
+        self.assertAlmostEqual(above / below, float(self.key("codes.dng", "black_level_adu")), places=6)
+        self.assertEqual(len(raw[51041]), 6)
+
+    def test_the_noise_profile_is_the_noise_of_frames(self):
+        """Two exposures of flat scenes: half the variance of their difference is the temporal one, which the profile has but for
+        the pattern of the dark current."""
+        for electrons in (0, 3000, 20000):
+            scene = ["--electrons", f"{electrons},{electrons},{electrons}"]
+            self.run_program(["render-radiance", *scene, "--size", "300x200", "--cfa", "rggb", "-o", "rates.exr"])
+            frames = []
+            for number in (0, 1):
+                without = ["--without", "dcnu,prnu"]
+                self.run_program(["add-noise", "rates.exr", "--frame", number, *without, "-o", "noisy.exr"])
+                self.run_program(["digitize", "noisy.exr", "-o", "codes.dng"])
+                (_, raw), samples, _ = self.tags("codes.dng")
+                frames.append(samples.astype(float))
+            black, white = raw[50714][0] / raw[50714][1], raw[50717]
+            slope, offset = raw[51041][:2]
+            x = (np.mean(frames) - black) / (white - black)
+            found = np.var(frames[0] - frames[1]) / 2 / (white - black) ** 2
+            # The relative standard deviation of a variance of n samples is √(2/n): five of them.
+            self.assertAlmostEqual(found / (slope * x + offset), 1, delta=5 * np.sqrt(2 / samples.size))
+
+    def test_floats(self):
+        self.frame("rggb")
+        self.run_program(["correct-frame", "codes.exr", "--black", "auto", "-o", "signed.exr"])
+        signed = self.planes((self.directory / "signed.exr").read_bytes())["Y"]
+        self.assertLess(signed.min(), signed.max())
+        for compression in ("none", "deflate"):
+            self.run_program(["correct-frame", "codes.exr", "--black", "auto", "--compression", compression, "-o", "signed.dng"])
+            if compression == "none":
+                np.testing.assert_array_equal(self.tags("signed.dng")[1], signed)
+            with rawpy.imread(self.path("signed.dng")) as raw:
+                # LibRaw makes integers of floats: scaled, and nothing below zero.
+                self.assertGreater(np.corrcoef(raw.raw_image.ravel(), np.maximum(signed, 0).ravel())[0, 1], 0.9999)
 
 
 if __name__ == "__main__":

@@ -175,6 +175,21 @@ impl BlackLevels {
         self.level
     }
 
+    /// The levels of the 2×2 sites at the frame's corner, row by row, without what rows and columns add.
+    pub fn sites(&self) -> [f64; 4] {
+        self.sites
+    }
+
+    /// What each row of the frame adds; empty where no row adds anything.
+    pub fn by_row(&self) -> &[f64] {
+        &self.by_row
+    }
+
+    /// What each column of the frame adds; empty where no column adds anything.
+    pub fn by_column(&self) -> &[f64] {
+        &self.by_column
+    }
+
     /// Whether any row or column adds to it.
     pub fn has_deltas(&self) -> bool {
         !(self.by_row.is_empty() && self.by_column.is_empty())

@@ -23,6 +23,7 @@ pub mod radiance_unit;
 pub mod register;
 pub mod spectral;
 pub mod standard;
+mod storing;
 pub mod table;
 pub mod tiff;
 pub mod unread;

@@ -2,219 +2,26 @@
 
 use super::atomic::{AtomicFile, Target};
 use super::digest::SamplesDigest;
+use super::dng::DngWriter;
 use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMARIES};
 use super::format::U16_FULL_SCALE;
 use super::places::{STDOUT_NAME, named, sidecar_path};
 use super::standard::open_stdout;
-use super::tiff::{TiffCompression, TiffSamples, TiffSettings, TiffTags, TiffWriter};
+use super::storing::Encoding;
+use super::tiff::{TiffSamples, TiffSettings, TiffTags, TiffWriter};
 use super::yaml;
 use crate::color;
 use crate::error::{Error, Result};
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
-use crate::names::Named;
 use crate::stream::{Counts, RowSink};
 use crate::text::visible;
 use crate::units::QuantityKind;
 use half::f16;
 use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// A file format for frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// OpenEXR.
-    Exr,
-    /// TIFF.
-    Tiff,
-}
-
-impl Named for Format {
-    const ALL: &'static [Self] = &[Self::Exr, Self::Tiff];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Exr => "exr",
-            Self::Tiff => "tiff",
-        }
-    }
-}
-
-/// How blocks are compressed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CompressionKind {
-    /// Not at all.
-    None,
-    /// Run lengths (EXR).
-    Rle,
-    /// Deflate by row (EXR).
-    Zips,
-    /// Deflate by 16 rows (EXR).
-    Zip,
-    /// Wavelets (EXR).
-    Piz,
-    /// Lempel-Ziv-Welch (TIFF).
-    Lzw,
-    /// Deflate (TIFF).
-    Deflate,
-}
-
-impl Named for CompressionKind {
-    const ALL: &'static [Self] = &[Self::None, Self::Rle, Self::Zips, Self::Zip, Self::Piz, Self::Lzw, Self::Deflate];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Rle => "rle",
-            Self::Zips => "zips",
-            Self::Zip => "zip",
-            Self::Piz => "piz",
-            Self::Lzw => "lzw",
-            Self::Deflate => "deflate",
-        }
-    }
-}
-
-impl CompressionKind {
-    fn refused(self, format: &str, choices: &str) -> Error {
-        Error::Usage(format!("{format} is not compressed by {}; it is one of {choices}", self.name()))
-    }
-}
-
-/// How samples are stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SampleKind {
-    /// 32-bit float.
-    F32,
-    /// 16-bit float (EXR).
-    F16,
-    /// 16-bit unsigned (TIFF).
-    U16,
-}
-
-impl Named for SampleKind {
-    const ALL: &'static [Self] = &[Self::F32, Self::F16, Self::U16];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::F32 => "f32",
-            Self::F16 => "f16",
-            Self::U16 => "u16",
-        }
-    }
-}
-
-/// Where and how a frame is written.
-#[derive(Debug, Clone, Default)]
-pub struct OutputOptions {
-    /// The file; none or `-` for the standard output.
-    pub path: Option<PathBuf>,
-    /// The format; by the file's extension where none is given, EXR without one.
-    pub format: Option<Format>,
-    /// Compression; none by default.
-    pub compression: Option<CompressionKind>,
-    /// Sample type; by quantity where none is given.
-    pub samples: Option<SampleKind>,
-}
-
-/// How a frame is encoded, once all options are settled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Encoding {
-    Exr(ExrSamples, ExrCompression),
-    Tiff(TiffSamples, TiffCompression),
-}
-
-impl OutputOptions {
-    fn encoding(&self, header: &FrameHeader) -> Result<Encoding> {
-        let format = self.format()?;
-        let quantity = header.metadata.quantity;
-        if format == Format::Tiff && header.geometry.channels.iter().any(|name| name.contains('.')) {
-            return Err(Error::Usage("a TIFF has no names for the layers of standard deviations; write an EXR".into()));
-        }
-        if format == Format::Tiff && quantity == QuantityKind::ColorDifference {
-            return Err(Error::Usage(
-                "a TIFF has no names for the channels of a map of differences; write an EXR".into(),
-            ));
-        }
-        let changed = header.metadata.demosaic.is_some() || header.metadata.correction.is_some();
-        let fits_u16 = quantity == QuantityKind::Adu && !changed || quantity == QuantityKind::Srgb;
-        let compression = self.compression.unwrap_or(CompressionKind::None);
-        match format {
-            Format::Exr => {
-                let samples = exr_samples(self.samples.unwrap_or(SampleKind::F32))?;
-                Ok(Encoding::Exr(samples, exr_compression(compression)?))
-            }
-            Format::Tiff => {
-                let default = if fits_u16 { SampleKind::U16 } else { SampleKind::F32 };
-                let samples = tiff_samples(self.samples.unwrap_or(default), fits_u16, quantity)?;
-                Ok(Encoding::Tiff(samples, tiff_compression(compression)?))
-            }
-        }
-    }
-
-    /// The format, by the file's extension where none is given.
-    /// Whether the file has names for layers beside the samples.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Usage`] where nothing says which format it is.
-    pub fn holds_layers(&self) -> Result<bool> {
-        Ok(self.format()? == Format::Exr)
-    }
-
-    fn format(&self) -> Result<Format> {
-        let path = named(self.path.as_deref());
-        let extension = path.and_then(Path::extension).map(|end| end.to_string_lossy().to_ascii_lowercase());
-        match (self.format, extension.as_deref()) {
-            (Some(format), _) => Ok(format),
-            (None, Some("exr") | None) => Ok(Format::Exr),
-            (None, Some("tif" | "tiff")) => Ok(Format::Tiff),
-            (None, Some(end)) => Err(Error::Usage(format!(
-                "{}: `.{end}` names no format that is written here; end the name in .exr or .tiff, or give --format",
-                path.unwrap_or(Path::new("-")).display()
-            ))),
-        }
-    }
-}
-
-fn exr_samples(samples: SampleKind) -> Result<ExrSamples> {
-    match samples {
-        SampleKind::F32 => Ok(ExrSamples::F32),
-        SampleKind::F16 => Ok(ExrSamples::F16),
-        SampleKind::U16 => Err(Error::Usage("EXR stores f32 or f16; for u16 write a TIFF".into())),
-    }
-}
-
-fn exr_compression(compression: CompressionKind) -> Result<ExrCompression> {
-    match compression {
-        CompressionKind::None => Ok(ExrCompression::None),
-        CompressionKind::Rle => Ok(ExrCompression::Rle),
-        CompressionKind::Zips => Ok(ExrCompression::Zips),
-        CompressionKind::Zip => Ok(ExrCompression::Zip),
-        CompressionKind::Piz => Ok(ExrCompression::Piz),
-        CompressionKind::Lzw | CompressionKind::Deflate => {
-            Err(compression.refused("EXR", "none, rle, zips, zip or piz"))
-        }
-    }
-}
-
-fn tiff_samples(samples: SampleKind, fits_u16: bool, quantity: QuantityKind) -> Result<TiffSamples> {
-    match samples {
-        SampleKind::F32 => Ok(TiffSamples::F32),
-        SampleKind::U16 if fits_u16 => Ok(TiffSamples::U16),
-        SampleKind::U16 => Err(Error::Usage(format!("u16 would round or clip {quantity}; write f32"))),
-        SampleKind::F16 => Err(Error::Usage("TIFF stores u16 or f32 here; for f16 write an EXR".into())),
-    }
-}
-
-fn tiff_compression(compression: CompressionKind) -> Result<TiffCompression> {
-    match compression {
-        CompressionKind::None => Ok(TiffCompression::None),
-        CompressionKind::Lzw => Ok(TiffCompression::Lzw),
-        CompressionKind::Deflate => Ok(TiffCompression::Deflate),
-        _ => Err(compression.refused("TIFF", "none, lzw or deflate")),
-    }
-}
+pub use super::storing::{CompressionKind, Format, OutputOptions, SampleKind};
 
 /// A frame that is being written.
 ///
@@ -255,6 +62,7 @@ pub struct FrameWriter {
 enum Encoder {
     Exr(Box<ExrWriter<Target>>),
     Tiff(Box<TiffWriter<Target>>),
+    Dng(Box<DngWriter<Target>>),
 }
 
 impl FrameWriter {
@@ -271,19 +79,24 @@ impl FrameWriter {
         let name = target.name().to_owned();
         let sidecar = target.named_file().map(|path| AtomicFile::create(&sidecar_path(path))).transpose()?;
         let record = sidecar.map(|sidecar| (SamplesDigest::new(), sidecar));
-        let description = Some(yaml::write_metadata(&header.metadata)?);
-        let software = Some(format!("cyanometer {}", env!("CARGO_PKG_VERSION")));
+        let description = yaml::write_metadata(&header.metadata)?;
+        let software = format!("cyanometer {}", env!("CARGO_PKG_VERSION"));
         let geometry = &header.geometry;
         let encoder = match encoding {
             Encoding::Exr(samples, compression) => {
-                let tags = ExrTags { metadata: description, software, ..native_tags(header) };
+                let (metadata, software) = (Some(description), Some(software));
+                let tags = ExrTags { metadata, software, ..native_tags(header) };
                 Encoder::Exr(Box::new(ExrWriter::create(target, &name, geometry, samples, compression, &tags)?))
             }
             Encoding::Tiff(samples, compression) => {
                 let scale = u16_scale(header.metadata.quantity, samples);
-                let tags = TiffTags { description, software };
+                let tags = TiffTags { description: Some(description), software: Some(software) };
                 let settings = TiffSettings { samples, scale, compression, tags, extra: Vec::new() };
                 Encoder::Tiff(Box::new(TiffWriter::create(target, &name, geometry, settings)?))
+            }
+            Encoding::Dng(samples, compression) => {
+                let texts = [description, software];
+                Encoder::Dng(Box::new(DngWriter::create(target, &name, header, samples, compression, texts)?))
             }
         };
         Ok(Self { encoder, header: header.clone(), name, record, encoding, stored: Vec::new() })
@@ -310,6 +123,7 @@ impl FrameWriter {
                 did_not_fit = clamped;
                 target
             }
+            Encoder::Dng(writer) => writer.finish()?,
         };
         target.flush().map_err(|e| Error::disk(&self.name, "write", e))?;
         let sidecar = match self.record {
@@ -375,7 +189,9 @@ impl RowSink for FrameWriter {
             // The digest is that of the samples as a reader will get them.
             let scale = match self.encoding {
                 Encoding::Exr(ExrSamples::F16, _) => None,
-                Encoding::Tiff(TiffSamples::U16, _) => Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16)),
+                Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) => {
+                    Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16))
+                }
                 _ => {
                     digest.update_rows(samples, &self.header.geometry);
                     return self.encode(samples);
@@ -399,6 +215,7 @@ impl FrameWriter {
         match &mut self.encoder {
             Encoder::Exr(writer) => writer.write(samples),
             Encoder::Tiff(writer) => writer.write_rows(samples),
+            Encoder::Dng(writer) => writer.write_rows(samples),
         }
     }
 }

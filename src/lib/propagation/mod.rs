@@ -13,6 +13,7 @@ mod ends;
 pub mod frame;
 pub mod gains;
 mod law;
+pub mod linear;
 mod memory;
 pub mod moments;
 mod node;

@@ -101,13 +101,15 @@ pub struct Output {
     /// File to write, with a sidecar FILE.yaml; `-` or none for standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Format; by default that of the file's extension, or EXR
+    /// Format; by default that of the file's extension, or EXR; DNG for one plane of ADU alone
     #[arg(long, value_parser = values::choice::<Format>())]
     pub format: Option<Format>,
-    /// Compression, without loss: rle, zips, zip, piz for EXR; lzw, deflate for TIFF; none by default
+    /// Compression, without loss: rle, zips, zip, piz for EXR; lzw, deflate for TIFF; deflate for DNG of floats; none
+    /// by default
     #[arg(long, value_parser = values::choice::<CompressionKind>())]
     pub compression: Option<CompressionKind>,
-    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF; by default f32, and u16 for codes in TIFF
+    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF and DNG; by default f32, and u16 for codes in TIFF and
+    /// DNG
     #[arg(long, value_name = "TYPE", value_parser = values::choice::<SampleKind>())]
     pub sample_type: Option<SampleKind>,
 }

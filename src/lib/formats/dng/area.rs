@@ -45,6 +45,11 @@ impl Rectangle {
         Self { left: 0, top: 0, width, height }
     }
 
+    /// The same so many columns and rows further on.
+    pub fn moved(self, [columns, rows]: [usize; 2]) -> Self {
+        Self { left: self.left + columns, top: self.top + rows, ..self }
+    }
+
     /// In words: `1734x1156 from column 152, row 26`.
     pub fn in_words(self) -> String {
         format!("{}x{} from column {}, row {}", self.width, self.height, self.left, self.top)

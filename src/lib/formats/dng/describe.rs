@@ -13,7 +13,7 @@ use crate::units::QuantityKind;
 use tiff::tags::Tag;
 
 /// Letters of the filters by their number \[DNG2023, CFAPlaneColor].
-const LETTERS: &[u8; 7] = b"RGBCMYW";
+pub(super) const LETTERS: &[u8; 7] = b"RGBCMYW";
 
 /// What is known of the frame, with notes on what is passed over.
 ///

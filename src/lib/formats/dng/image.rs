@@ -3,14 +3,15 @@
 use super::tags::{self, DngTag};
 use crate::error::Result;
 use crate::formats::tiff::{Directory, TiffFile};
+use crate::metadata::METADATA_BEGIN;
 use tiff::tags::Tag;
 
 /// Photometric interpretation of a plane behind a color filter array.
-const CFA: u64 = 32803;
+pub(super) const CFA: u16 = 32803;
 /// That of demosaicked planes, or of one plane without a filter array.
-const LINEAR_RAW: u64 = 34892;
+pub(super) const LINEAR_RAW: u16 = 34892;
 /// That of gray.
-const BLACK_IS_ZERO: u64 = 1;
+const BLACK_IS_ZERO: u16 = 1;
 /// Directories that a raw file may have below its first: images of any size, masks, depth.
 const MOST_DIRECTORIES: u64 = 64;
 /// Most photosites beside or below each other; a sensor has no more.
@@ -77,6 +78,25 @@ impl RawImage {
         }
     }
 
+    /// Columns and rows of the sensor before the stored image: none, but in files that are written here, whose description
+    /// says so.
+    ///
+    /// # Errors
+    ///
+    /// When such a file says what no sensor has.
+    pub fn place(&self, file: &mut TiffFile, description: Option<&str>) -> Result<[usize; 2]> {
+        if !description.is_some_and(|text| text.starts_with(METADATA_BEGIN)) {
+            return Ok([0, 0]);
+        }
+        let mut along = |tag: DngTag| match tag.one(file, self.directory())? {
+            Some(place) if place > MOST_PHOTOSITES => {
+                Err(file.problem(format!("it is damaged; its {} is {place}, and no sensor is so large", tag.1)))
+            }
+            place => Ok(place.unwrap_or(0)),
+        };
+        Ok([along(tags::X_POSITION)?, along(tags::Y_POSITION)?])
+    }
+
     /// The directory of the raw image.
     pub fn directory(&self) -> &Directory {
         self.below.as_ref().unwrap_or(&self.first)
@@ -89,7 +109,8 @@ impl Kind {
             return Ok(Self::Other);
         }
         let planes = file.one(directory, Tag::SamplesPerPixel)?.unwrap_or(1);
-        let is_monochrome = match (file.one(directory, Tag::PhotometricInterpretation)?, planes) {
+        let photometric = file.one(directory, Tag::PhotometricInterpretation)?;
+        let is_monochrome = match (photometric.and_then(|number| u16::try_from(number).ok()), planes) {
             (Some(CFA), 1) => false,
             (Some(LINEAR_RAW | BLACK_IS_ZERO), 1) => true,
             (Some(LINEAR_RAW), _) => return Ok(Self::Demosaicked),

@@ -26,14 +26,20 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// Reads and checks the levels \[DNG2023, ch. 5, Mapping Raw Values to Linear Reference Values].
+    /// Reads and checks the levels of an image whose active area lies at its place on the sensor, of which the image reaches so
+    /// many columns and rows \[DNG2023, ch. 5, Mapping Raw Values to Linear Reference Values].
     ///
     /// # Errors
     ///
     /// When a table of them has the wrong length, numbers are none, the black level is no less than the white level, or black
     /// differs by more than the 2×2 sites of a filter array.
-    pub fn read(file: &mut TiffFile, image: &RawImage, active: Rectangle, sample: Sample) -> Result<Self> {
-        let [width, height] = image.size;
+    pub fn read(
+        file: &mut TiffFile,
+        image: &RawImage,
+        active: Rectangle,
+        reach: [usize; 2],
+        sample: Sample,
+    ) -> Result<Self> {
         let white = tags::WHITE_LEVEL.exactly::<1>(file, image.directory())?.map_or(sample.largest(), |[white]| white);
         let black = black(file, image, active)?;
         let highest = black.sites().into_iter().fold(f64::NEG_INFINITY, f64::max);
@@ -44,8 +50,14 @@ impl Levels {
         }
         Ok(Self {
             black,
-            black_by_row: deltas(file, image, tags::BLACK_DELTA_V, "rows", [active.top, active.height, height])?,
-            black_by_column: deltas(file, image, tags::BLACK_DELTA_H, "columns", [active.left, active.width, width])?,
+            black_by_row: deltas(file, image, tags::BLACK_DELTA_V, "rows", [active.top, active.height, reach[1]])?,
+            black_by_column: deltas(
+                file,
+                image,
+                tags::BLACK_DELTA_H,
+                "columns",
+                [active.left, active.width, reach[0]],
+            )?,
             white,
             table: table(file, image, sample)?,
         })

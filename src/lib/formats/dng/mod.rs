@@ -2,18 +2,27 @@
 //!
 //! A DNG is a TIFF whose raw image lies in its first directory or right below it. Directories are read by
 //! [`super::tiff`]; what is a raw image, its levels and its samples are read here. Levels, filter array and origin are
-//! those of the project: counted from the sensor's corner, which is that of the stored image.
+//! those of the project: counted from the sensor's corner, which is that of the stored image; files that are written here say
+//! where on the sensor that image lies (XPosition, YPosition).
 
 mod area;
+mod color;
 mod describe;
 mod image;
 mod levels;
+mod preview;
+mod ratio;
 mod read;
 mod samples;
 mod storage;
 mod tags;
+mod tell;
 #[cfg(test)]
 mod tests;
+mod write;
+#[cfg(test)]
+mod written;
 
 pub use area::RawArea;
 pub use read::{DngReader, FORMAT};
+pub use write::{DngWriter, check_frame};

@@ -83,12 +83,16 @@ impl DngReader {
             RawArea::Default => area::default_crop(&mut file, &image, active)?.map_err(|why| file.problem(why))?,
         };
         let storage = Storage::read(&mut file, &image)?;
-        let levels = Levels::read(&mut file, &image, active, storage.sample)?;
+        let description = describe::description(&mut file, &image.first)?;
+        let place = image.place(&mut file, description.as_deref())?;
+        // Pattern and levels are those at the sensor's corner.
+        let on_sensor = active.moved(place);
+        let reach = [0, 1].map(|k| image.size[k] + place[k]);
+        let levels = Levels::read(&mut file, &image, on_sensor, reach, storage.sample)?;
         let mut notes = Vec::new();
         describe::note_area(&mut file, &image, active, area, &mut notes)?;
-        let own_tags = describe::describe(&mut file, &image, active, &levels, &mut notes)?;
-        let description = describe::description(&mut file, &image.first)?;
-        let origin = [area.left, area.top].map(|place| i32::try_from(place).unwrap_or(i32::MAX));
+        let own_tags = describe::describe(&mut file, &image, on_sensor, &levels, &mut notes)?;
+        let origin = [area.left + place[0], area.top + place[1]].map(|place| i32::try_from(place).unwrap_or(i32::MAX));
         let geometry = Geometry { origin, ..Geometry::new(area.width, area.height, &["Y"]) };
         // Decoding begins with the row of chunks that the area begins in.
         let begin = area.top / storage.chunk_rows * storage.chunk_rows;

@@ -1,7 +1,7 @@
 //! Tags of DNG by their names, and their numbers checked.
 
 use crate::error::{Error, Result};
-use crate::formats::tiff::{Directory, TiffFile};
+use crate::formats::tiff::{Directory, ExtraTag, TagValue, TiffFile};
 use tiff::tags::Tag;
 
 /// A tag and what the specification calls it.
@@ -9,6 +9,8 @@ use tiff::tags::Tag;
 pub(super) struct DngTag(u16, pub &'static str);
 
 pub(super) const ORIENTATION: DngTag = DngTag(274, "Orientation");
+pub(super) const X_POSITION: DngTag = DngTag(286, "XPosition");
+pub(super) const Y_POSITION: DngTag = DngTag(287, "YPosition");
 pub(super) const SUB_IFDS: DngTag = DngTag(330, "SubIFDs");
 pub(super) const CFA_REPEAT: DngTag = DngTag(33421, "CFARepeatPatternDim");
 pub(super) const CFA_PATTERN: DngTag = DngTag(33422, "CFAPattern");
@@ -34,7 +36,23 @@ pub(super) const COLUMN_INTERLEAVE: DngTag = DngTag(52547, "ColumnInterleaveFact
 pub(super) const ACTIVE_AREA: DngTag = DngTag(50829, "ActiveArea");
 pub(super) const OPCODES: [DngTag; 2] = [DngTag(51008, "OpcodeList1"), DngTag(51009, "OpcodeList2")];
 
+// Those that are written only.
+pub(super) const NEW_SUBFILE_TYPE: DngTag = DngTag(254, "NewSubfileType");
+pub(super) const MAKE: DngTag = DngTag(271, "Make");
+pub(super) const MODEL: DngTag = DngTag(272, "Model");
+pub(super) const UNIQUE_CAMERA_MODEL: DngTag = DngTag(50708, "UniqueCameraModel");
+pub(super) const DEFAULT_SCALE: DngTag = DngTag(50718, "DefaultScale");
+pub(super) const COLOR_MATRIX_1: DngTag = DngTag(50721, "ColorMatrix1");
+pub(super) const CALIBRATION_ILLUMINANT_1: DngTag = DngTag(50778, "CalibrationIlluminant1");
+pub(super) const PREVIEW_COLOR_SPACE: DngTag = DngTag(50970, "PreviewColorSpace");
+pub(super) const NOISE_PROFILE: DngTag = DngTag(51041, "NoiseProfile");
+
 impl DngTag {
+    /// The tag with a value, to be written.
+    pub fn with(self, value: TagValue) -> ExtraTag {
+        ExtraTag { number: self.0, value }
+    }
+
     pub fn tag(self) -> Tag {
         Tag::from_u16_exhaustive(self.0)
     }

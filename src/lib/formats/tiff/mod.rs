@@ -8,7 +8,9 @@
 mod capture;
 mod chunk;
 mod directory;
+mod first;
 mod grid;
+mod interleave;
 mod layout;
 mod read;
 mod tags;
@@ -18,6 +20,7 @@ mod write;
 
 pub(in crate::formats) use chunk::Predictor;
 pub use directory::{Directory, TiffFile, begins_so};
+pub(in crate::formats) use first::FirstImage;
 pub use read::{FORMAT, TiffReader};
 pub use tags::{ExtraTag, TagValue};
 pub use write::{TiffSettings, TiffWriter};

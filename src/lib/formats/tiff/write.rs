@@ -1,6 +1,8 @@
 //! Writing rows.
 
 use super::chunk::{self, Predictor};
+use super::first::FirstImage;
+use super::interleave::{interleave, interleave_u16};
 use super::tags::{self, ExtraTag, Field};
 use super::{TiffCompression, TiffSamples, TiffTags};
 use crate::error::{Error, Result};
@@ -53,6 +55,8 @@ pub struct TiffWriter<W: Write + Seek> {
     /// Offset and bytes of the strips written.
     strips: Vec<(u64, u64)>,
     unfit: u64,
+    /// The photometric interpretation, where it is not that of gray or RGB.
+    photometric: Option<u16>,
 }
 
 impl<W: Write + Seek> TiffWriter<W> {
@@ -107,6 +111,7 @@ impl<W: Write + Seek> TiffWriter<W> {
             collected: Vec::new(),
             strips: Vec::new(),
             unfit: 0,
+            photometric: None,
         };
         // The offset of the directory follows in the end.
         if writer.big {
@@ -115,6 +120,16 @@ impl<W: Write + Seek> TiffWriter<W> {
             writer.put(b"II\x2a\0\0\0\0\0")?;
         }
         Ok(writer)
+    }
+
+    /// Says what one plane is, where it is not gray: a number of PhotometricInterpretation.
+    pub(in crate::formats) fn set_photometric(&mut self, number: u16) {
+        self.photometric = Some(number);
+    }
+
+    /// Whether the file is a BigTIFF.
+    pub(in crate::formats) fn is_big(&self) -> bool {
+        self.big
     }
 
     /// Takes the next rows, laid out `[row][channel][column]`, as many as there are in `samples`.
@@ -154,6 +169,37 @@ impl<W: Write + Seek> TiffWriter<W> {
     ///
     /// When rows are missing, or the disk refuses.
     pub fn finish(mut self) -> Result<(W, u64)> {
+        self.write_rest()?;
+        let fields = self.fields();
+        let directory = self.put_directory(fields)?;
+        self.begin_with(directory)?;
+        Ok((self.output, self.unfit))
+    }
+
+    /// Writes what is left, with a small picture before it: the file begins with the directory of `first`, below which the
+    /// frame lies (SubIFDs). Gives back what [`Self::finish`] does.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::finish`].
+    pub(in crate::formats) fn finish_below(mut self, first: &FirstImage) -> Result<(W, u64)> {
+        self.write_rest()?;
+        let fields = self.fields();
+        let below = self.put_directory(fields)?;
+        self.align()?;
+        let pixels = self.position;
+        self.put(&first.rgb)?;
+        let mut fields = first.fields(&self.name)?;
+        fields.push(self.offsets(Tag::StripOffsets, std::iter::once(pixels)));
+        fields.push(self.offsets(Tag::SubIfd, std::iter::once(below)));
+        fields.sort_by_key(|field| field.tag.to_u16());
+        let directory = self.put_directory(fields)?;
+        self.begin_with(directory)?;
+        Ok((self.output, self.unfit))
+    }
+
+    /// Writes the rows that are left.
+    fn write_rest(&mut self) -> Result<()> {
         if self.rows != self.geometry.height {
             let (rows, height) = (self.rows, self.geometry.height);
             return Err(Error::format(
@@ -161,10 +207,7 @@ impl<W: Write + Seek> TiffWriter<W> {
                 format!("only {rows} of {height} rows were written; the file is not complete"),
             ));
         }
-        self.write_strips()?;
-        self.write_directory()?;
-        self.output.flush().map_err(|source| Error::disk(&self.name, "write", source))?;
-        Ok((self.output, self.unfit))
+        self.write_strips()
     }
 
     fn row_bytes(&self) -> usize {
@@ -238,11 +281,10 @@ impl<W: Write + Seek> TiffWriter<W> {
         Ok(())
     }
 
-    /// Writes the directory at the end and its offset into the header.
-    fn write_directory(&mut self) -> Result<()> {
+    /// Writes a directory at the end, of fields in the order of their tags; gives its offset.
+    fn put_directory(&mut self, fields: Vec<Field>) -> Result<u64> {
         // What does not fit into an entry stands before the directory.
         let mut entries: Vec<u8> = Vec::new();
-        let fields = self.fields();
         let count = fields.len() as u64;
         for Field { tag, kind, count, mut bytes } in fields {
             entries.extend(tag.to_u16().to_le_bytes());
@@ -272,6 +314,11 @@ impl<W: Write + Seek> TiffWriter<W> {
         if !self.big && self.position > u64::from(u32::MAX) {
             return Err(Error::format(&self.name, "the file came out larger than 4 GiB; write it without compression"));
         }
+        Ok(directory)
+    }
+
+    /// Writes the offset of the first directory into the header.
+    fn begin_with(&mut self, directory: u64) -> Result<()> {
         let mut offset = Vec::new();
         self.append_offset(&mut offset, directory);
         self.output
@@ -316,7 +363,8 @@ impl<W: Write + Seek> TiffWriter<W> {
             TiffCompression::Lzw => CompressionMethod::LZW,
             TiffCompression::Deflate => CompressionMethod::Deflate,
         };
-        let (photometric, colors) = if channels < 3 { (1, 1) } else { (2, 3) };
+        let (usual, colors) = if channels < 3 { (1, 1) } else { (2, 3) };
+        let photometric = self.photometric.unwrap_or(usual);
         let mut fields = vec![
             long(Tag::ImageWidth, self.geometry.width),
             long(Tag::ImageLength, self.geometry.height),
@@ -398,64 +446,4 @@ pub(super) fn needs_big_tiff(geometry: &Geometry, settings: &TiffSettings, extra
     let extra_bytes: usize = extra.iter().map(|field| field.bytes.len() + 13).sum();
     let directory = 4096 + 16 * strips + 6 * geometry.channels.len() as u128 + text_bytes as u128 + extra_bytes as u128;
     worst + directory > u128::from(u32::MAX)
-}
-
-/// Interleaves the channels of a row.
-fn interleave<const BYTES: usize>(
-    samples: &[f32],
-    row: &mut [u8],
-    channels: usize,
-    bytes: impl Fn(f32) -> [u8; BYTES] + Copy,
-) {
-    match channels {
-        1 => interleave_known::<1, BYTES>(samples, row, bytes),
-        3 => interleave_known::<3, BYTES>(samples, row, bytes),
-        4 => interleave_known::<4, BYTES>(samples, row, bytes),
-        _ => {
-            let (places, _) = row.as_chunks_mut::<BYTES>();
-            for (channel, line) in samples.chunks_exact(samples.len() / channels).enumerate() {
-                for (place, sample) in places[channel..].iter_mut().step_by(channels).zip(line) {
-                    *place = bytes(*sample);
-                }
-            }
-        }
-    }
-}
-
-/// Interleaves a number of channels that the compiler knows.
-fn interleave_known<const CHANNELS: usize, const BYTES: usize>(
-    samples: &[f32],
-    row: &mut [u8],
-    bytes: impl Fn(f32) -> [u8; BYTES],
-) {
-    let (places, _) = row.as_chunks_mut::<BYTES>();
-    let (pixels, _) = places.as_chunks_mut::<CHANNELS>();
-    for (channel, line) in samples.chunks_exact(pixels.len()).enumerate() {
-        for (pixel, sample) in pixels.iter_mut().zip(line) {
-            pixel[channel] = bytes(*sample);
-        }
-    }
-}
-
-/// Interleaves a row as 16-bit integers, and counts the samples that do not fit.
-fn interleave_u16(samples: &[f32], row: &mut [u8], channels: usize, scale: f32) -> u64 {
-    let unfit: u32 =
-        samples.iter().map(|sample| u32::from(!(0..=i32::from(u16::MAX)).contains(&rounded(sample * scale)))).sum();
-    interleave(samples, row, channels, |sample| {
-        let fitting = rounded(sample * scale).clamp(0, i32::from(u16::MAX));
-        let [low, high, ..] = fitting.to_le_bytes();
-        [low, high]
-    });
-    unfit.into()
-}
-
-/// The nearest integer, ties to even, for values from −1 to 65536; what is beyond becomes the nearer of these, and NaN
-/// becomes −1.
-fn rounded(value: f32) -> i32 {
-    // 1.5·2²³: at this size a float's last bit is worth 1, so adding it rounds, and the integer stands in the lowest
-    // bits. The compiler makes vectors of this, unlike of `round_ties_even`.
-    const SHIFT: f32 = 12_582_912.0;
-    #[expect(clippy::manual_clamp, reason = "`clamp` lets NaN pass, and here it must not")]
-    let shifted = value.max(-1.0).min(65536.0) + SHIFT;
-    shifted.to_bits().wrapping_sub(SHIFT.to_bits()).cast_signed()
 }

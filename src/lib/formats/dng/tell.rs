@@ -1,0 +1,210 @@
+//! What the tags of a DNG tell of a frame of ours.
+
+use super::color::CameraColor;
+use super::describe::LETTERS;
+use super::image::{CFA, LINEAR_RAW};
+use super::preview::Preview;
+use super::ratio::{ratio, signed};
+use super::tags;
+use crate::camera::levels::{BlackLevels, WhiteLevel};
+use crate::cfa::FilterArray;
+use crate::error::{Error, Result};
+use crate::formats::tiff::{ExtraTag, TagValue, TiffSamples};
+use crate::metadata::{FrameHeader, Metadata};
+use crate::propagation::linear::LinearNoise;
+use crate::stages::noise::NoiseModel;
+
+/// The version that is written, and the oldest that readers of integers and of floats must know.
+const VERSION: [u8; 4] = [1, 4, 0, 0];
+/// Readers of integers need nothing later.
+const BACKWARD_OF_INTEGERS: [u8; 4] = [1, 1, 0, 0];
+/// Floats came with this.
+const BACKWARD_OF_FLOATS: [u8; 4] = [1, 4, 0, 0];
+/// D65 among the light sources of Exif.
+const D65: u16 = 21;
+/// sRGB among the color spaces of previews.
+const SRGB: u32 = 2;
+/// What cameras are called whose sensor has no name, and who made them.
+const NAMELESS: &str = "cyanometer";
+
+/// The tags of a frame.
+#[derive(Debug)]
+pub(super) struct Told {
+    /// Those of the raw image.
+    pub raw: Vec<ExtraTag>,
+    /// Those of the first directory, which holds the picture.
+    pub first: Vec<ExtraTag>,
+    /// What the plane is.
+    pub photometric: u16,
+    /// The picture, without rows yet.
+    pub preview: Preview,
+}
+
+impl Told {
+    /// The tags of a frame that [`super::check_frame`] took, whose file the user calls `name`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingKey`] for floats without a white level; [`Error::Format`] where the black level reaches the white
+    /// level, or is not known for all rows and columns.
+    pub fn of(header: &FrameHeader, name: &str, samples: TiffSamples) -> Result<Self> {
+        let FrameHeader { geometry, metadata, .. } = header;
+        let cfa = metadata.cfa.ok_or_else(|| header.missing("cfa"))?;
+        let black = header.black_levels()?;
+        let highest =
+            black.as_ref().map_or(0.0, |black| black.largest([geometry.width, geometry.height], |_, _| None)[0]);
+        let white = white(header, samples)?;
+        if f64::from(white) <= highest {
+            return Err(Error::format(
+                name,
+                format!(
+                    "a DNG has codes from black to white, and the black level of this frame, {highest} ADU, is no less than its white level, {white} ADU; write a TIFF"
+                ),
+            ));
+        }
+        let range = f64::from(white) - highest;
+        let color = metadata.sensor.as_ref().and_then(|sensor| sensor.xyz_from_camera);
+        let color = color.and_then(|matrix| CameraColor::of(&matrix)).filter(|_| cfa.has_three_classes());
+
+        let mut raw = places(header, cfa);
+        raw.extend(black.iter().flat_map(|black| black_levels(black, geometry.width)));
+        if metadata.white_level_adu.is_some() {
+            raw.push(tags::WHITE_LEVEL.with(TagValue::Longs(vec![white])));
+        }
+        raw.extend(noise_profile(header, cfa, range));
+        Ok(Self {
+            raw,
+            first: of_file(metadata, samples, color.as_ref()),
+            photometric: if cfa == FilterArray::Monochrome { LINEAR_RAW } else { CFA },
+            preview: Preview::new(geometry, cfa, black, range, color),
+        })
+    }
+}
+
+/// The largest code, rounded down: the tag holds whole numbers, and a saturated sample shall be so. Of classes that differ the
+/// largest, so that no sample is clipped. Integers need none: it is the largest that 16 bits hold \[DNG2023, WhiteLevel].
+fn white(header: &FrameHeader, samples: TiffSamples) -> Result<u32> {
+    match (header.metadata.white_level_adu.map(WhiteLevel::largest), samples) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "what does not fit becomes the nearer end"
+        )]
+        (Some(white), _) => Ok(white.floor() as u32),
+        (None, TiffSamples::U16) => Ok(u16::MAX.into()),
+        (None, TiffSamples::F32) => Err(header.missing("white_level_adu")),
+    }
+}
+
+/// The filter array, and which samples are shown: all.
+fn places(header: &FrameHeader, cfa: FilterArray) -> Vec<ExtraTag> {
+    let geometry = &header.geometry;
+    let [width, height] = [geometry.width, geometry.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+    let mut found = vec![
+        tags::NEW_SUBFILE_TYPE.with(TagValue::Longs(vec![0])),
+        tags::DEFAULT_SCALE.with(TagValue::Ratios(vec![[1, 1]; 2])),
+        tags::DEFAULT_CROP_ORIGIN.with(TagValue::Longs(vec![0, 0])),
+        tags::DEFAULT_CROP_SIZE.with(TagValue::Longs(vec![width, height])),
+        tags::ACTIVE_AREA.with(TagValue::Longs(vec![0, 0, height, width])),
+    ];
+    if cfa != FilterArray::Monochrome {
+        let [columns, rows] = cfa.period();
+        let [left, top] = geometry.origin.map(i64::from);
+        let sites = (0..rows as i64).flat_map(|y| (0..columns as i64).map(move |x| [x, y]));
+        let pattern = sites.filter_map(|[x, y]| cfa.filter(left + x, top + y)).map(code).collect();
+        let dimensions = [rows, columns].map(|side| u16::try_from(side).unwrap_or(u16::MAX));
+        found.extend([
+            tags::CFA_REPEAT.with(TagValue::Shorts(dimensions.to_vec())),
+            tags::CFA_PATTERN.with(TagValue::Bytes(pattern)),
+            tags::CFA_PLANE_COLOR.with(TagValue::Bytes(cfa.filters().into_iter().map(code).collect())),
+            tags::CFA_LAYOUT.with(TagValue::Shorts(vec![1])),
+        ]);
+    }
+    found
+}
+
+/// The number of a filter.
+fn code(filter: char) -> u8 {
+    let place = LETTERS.iter().position(|letter| char::from(*letter) == filter);
+    place.and_then(|place| u8::try_from(place).ok()).unwrap_or(u8::MAX)
+}
+
+/// The black level by site, and what rows and columns add. The tag holds nothing below zero: there, columns take it.
+fn black_levels(black: &BlackLevels, width: usize) -> Vec<ExtraTag> {
+    let sites = black.sites();
+    let below = sites.into_iter().fold(0.0, f64::min);
+    let (dimensions, count) =
+        if sites.iter().all(|site| *site == sites[0]) { (vec![1; 2], 1) } else { (vec![2; 2], 4) };
+    let levels = sites[..count].iter().map(|site| ratio(site - below)).collect();
+    let mut found =
+        vec![tags::BLACK_REPEAT.with(TagValue::Shorts(dimensions)), tags::BLACK_LEVEL.with(TagValue::Ratios(levels))];
+    let deltas =
+        |deltas: &[f64], plus: f64| TagValue::SignedRatios(deltas.iter().map(|delta| signed(delta + plus)).collect());
+    let columns = black.by_column();
+    if !columns.is_empty() {
+        found.push(tags::BLACK_DELTA_H.with(deltas(columns, below)));
+    } else if below < 0.0 {
+        found.push(tags::BLACK_DELTA_H.with(deltas(&vec![0.0; width], below)));
+    }
+    if !black.by_row().is_empty() {
+        found.push(tags::BLACK_DELTA_V.with(deltas(black.by_row(), 0.0)));
+    }
+    found
+}
+
+/// Variance over the signal x from 0 at black to 1 at white, S x + O for each class \[DNG2023, NoiseProfile], where the metadata
+/// know all that it follows from.
+fn noise_profile(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<ExtraTag> {
+    let metadata = &header.metadata;
+    let (record, adc) = (metadata.noise.as_ref()?, metadata.adc?);
+    // Charge that moved makes neighbors alike, and dark frames bring noise of their own.
+    let is_plain = metadata.correction.is_none_or(|record| record.dark_frames == 0 && record.cte.is_none());
+    if record.cte.is_some() || !is_plain {
+        return None;
+    }
+    let line = LinearNoise::of(&NoiseModel::of(header, record).ok()?, &adc);
+    let planes = cfa.filters().len().max(1);
+    let profile = [line.slope_adu / range, line.offset_adu2 / (range * range)];
+    Some(tags::NOISE_PROFILE.with(TagValue::Doubles(profile.repeat(planes))))
+}
+
+/// What holds for the whole file: version, camera, colors, exposure.
+fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor>) -> Vec<ExtraTag> {
+    let backward = if samples == TiffSamples::U16 { BACKWARD_OF_INTEGERS } else { BACKWARD_OF_FLOATS };
+    let model = camera_name(metadata);
+    let mut found = vec![
+        tags::DNG_VERSION.with(TagValue::Bytes(VERSION.to_vec())),
+        tags::DNG_BACKWARD_VERSION.with(TagValue::Bytes(backward.to_vec())),
+        tags::UNIQUE_CAMERA_MODEL.with(TagValue::Text(model.clone())),
+        tags::MAKE.with(TagValue::Text(NAMELESS.into())),
+        tags::MODEL.with(TagValue::Text(model)),
+        tags::ORIENTATION.with(TagValue::Shorts(vec![1])),
+        tags::PREVIEW_COLOR_SPACE.with(TagValue::Longs(vec![SRGB])),
+    ];
+    if let Some(color) = color {
+        let matrix = color.camera_from_xyz.as_flattened().iter().map(|element| signed(*element)).collect();
+        found.extend([
+            tags::CALIBRATION_ILLUMINANT_1.with(TagValue::Shorts(vec![D65])),
+            tags::COLOR_MATRIX_1.with(TagValue::SignedRatios(matrix)),
+            tags::AS_SHOT_NEUTRAL.with(TagValue::Ratios(color.neutral.map(ratio).to_vec())),
+        ]);
+    }
+    if let Some(exposure) = metadata.exposure {
+        let settings = [(tags::EXPOSURE_TIME, exposure.exposure_s), (tags::F_NUMBER, exposure.f_number)];
+        let ratios = settings.map(|(tag, value)| (tag, ratio(value)));
+        found.extend(
+            ratios
+                .into_iter()
+                .filter(|(_, [above, _])| *above > 0)
+                .map(|(tag, ratio)| tag.with(TagValue::Ratios(vec![ratio]))),
+        );
+    }
+    found
+}
+
+/// The name of the sensor, in the letters that the tags allow.
+fn camera_name(metadata: &Metadata) -> String {
+    let name = metadata.sensor.as_ref().map_or(NAMELESS, |sensor| sensor.name.trim());
+    let ascii: String = name.chars().map(|c| if c == ' ' || c.is_ascii_graphic() { c } else { '_' }).collect();
+    if ascii.is_empty() { NAMELESS.into() } else { ascii }
+}

@@ -1,0 +1,237 @@
+//! How frames are stored: what options choose, and what goes together.
+
+use super::dng;
+use super::exr::{ExrCompression, ExrSamples};
+use super::places::{STDOUT_NAME, named};
+use super::tiff::{TiffCompression, TiffSamples};
+use crate::error::{Error, Result};
+use crate::metadata::FrameHeader;
+use crate::names::Named;
+use crate::units::QuantityKind;
+use std::path::{Path, PathBuf};
+
+/// A file format for frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// OpenEXR.
+    Exr,
+    /// TIFF.
+    Tiff,
+    /// DNG, of planes of codes.
+    Dng,
+}
+
+impl Named for Format {
+    const ALL: &'static [Self] = &[Self::Exr, Self::Tiff, Self::Dng];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Exr => "exr",
+            Self::Tiff => "tiff",
+            Self::Dng => "dng",
+        }
+    }
+}
+
+/// How blocks are compressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CompressionKind {
+    /// Not at all.
+    None,
+    /// Run lengths (EXR).
+    Rle,
+    /// Deflate by row (EXR).
+    Zips,
+    /// Deflate by 16 rows (EXR).
+    Zip,
+    /// Wavelets (EXR).
+    Piz,
+    /// Lempel-Ziv-Welch (TIFF).
+    Lzw,
+    /// Deflate (TIFF, and DNG of floats).
+    Deflate,
+}
+
+impl Named for CompressionKind {
+    const ALL: &'static [Self] = &[Self::None, Self::Rle, Self::Zips, Self::Zip, Self::Piz, Self::Lzw, Self::Deflate];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Rle => "rle",
+            Self::Zips => "zips",
+            Self::Zip => "zip",
+            Self::Piz => "piz",
+            Self::Lzw => "lzw",
+            Self::Deflate => "deflate",
+        }
+    }
+}
+
+impl CompressionKind {
+    fn refused(self, format: &str, choices: &str) -> Error {
+        Error::Usage(format!("{format} is not compressed by {}; it is one of {choices}", self.name()))
+    }
+}
+
+/// How samples are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SampleKind {
+    /// 32-bit float.
+    F32,
+    /// 16-bit float (EXR).
+    F16,
+    /// 16-bit unsigned (TIFF, DNG).
+    U16,
+}
+
+impl Named for SampleKind {
+    const ALL: &'static [Self] = &[Self::F32, Self::F16, Self::U16];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F16 => "f16",
+            Self::U16 => "u16",
+        }
+    }
+}
+
+/// Where and how a frame is written.
+#[derive(Debug, Clone, Default)]
+pub struct OutputOptions {
+    /// The file; none or `-` for the standard output.
+    pub path: Option<PathBuf>,
+    /// The format; by the file's extension where none is given, EXR without one.
+    pub format: Option<Format>,
+    /// Compression; none by default.
+    pub compression: Option<CompressionKind>,
+    /// Sample type; by quantity where none is given.
+    pub samples: Option<SampleKind>,
+}
+
+/// How a frame is encoded, once all options are settled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Encoding {
+    Exr(ExrSamples, ExrCompression),
+    Tiff(TiffSamples, TiffCompression),
+    Dng(TiffSamples, TiffCompression),
+}
+
+impl OutputOptions {
+    /// How a frame is encoded.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where options do not go together, or the format cannot hold the frame, as [`dng::check_frame`] says of a DNG.
+    pub(super) fn encoding(&self, header: &FrameHeader) -> Result<Encoding> {
+        let format = self.format()?;
+        let quantity = header.metadata.quantity;
+        if format == Format::Tiff && header.geometry.channels.iter().any(|name| name.contains('.')) {
+            return Err(Error::Usage("a TIFF has no names for the layers of standard deviations; write an EXR".into()));
+        }
+        if format == Format::Tiff && quantity == QuantityKind::ColorDifference {
+            return Err(Error::Usage(
+                "a TIFF has no names for the channels of a map of differences; write an EXR".into(),
+            ));
+        }
+        let changed = header.metadata.demosaic.is_some() || header.metadata.correction.is_some();
+        let fits_u16 = quantity == QuantityKind::Adu && !changed || quantity == QuantityKind::Srgb;
+        let compression = self.compression.unwrap_or(CompressionKind::None);
+        match format {
+            Format::Exr => {
+                let samples = exr_samples(self.samples.unwrap_or(SampleKind::F32))?;
+                Ok(Encoding::Exr(samples, exr_compression(compression)?))
+            }
+            Format::Tiff => {
+                let default = if fits_u16 { SampleKind::U16 } else { SampleKind::F32 };
+                let samples = tiff_samples("TIFF", self.samples.unwrap_or(default), fits_u16, quantity)?;
+                Ok(Encoding::Tiff(samples, tiff_compression(compression)?))
+            }
+            Format::Dng => {
+                let place = named(self.path.as_deref()).map(|path| path.display().to_string());
+                dng::check_frame(header, &place.unwrap_or_else(|| STDOUT_NAME.into()))?;
+                let default = if fits_u16 { SampleKind::U16 } else { SampleKind::F32 };
+                let samples = tiff_samples("DNG", self.samples.unwrap_or(default), fits_u16, quantity)?;
+                Ok(Encoding::Dng(samples, dng_compression(compression, samples)?))
+            }
+        }
+    }
+
+    /// Whether the file has names for layers beside the samples.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where nothing says which format it is.
+    pub fn holds_layers(&self) -> Result<bool> {
+        Ok(self.format()? == Format::Exr)
+    }
+
+    /// The format, by the file's extension where none is given.
+    fn format(&self) -> Result<Format> {
+        let path = named(self.path.as_deref());
+        let extension = path.and_then(Path::extension).map(|end| end.to_string_lossy().to_ascii_lowercase());
+        match (self.format, extension.as_deref()) {
+            (Some(format), _) => Ok(format),
+            (None, Some("exr") | None) => Ok(Format::Exr),
+            (None, Some("tif" | "tiff")) => Ok(Format::Tiff),
+            (None, Some("dng")) => Ok(Format::Dng),
+            (None, Some(end)) => Err(Error::Usage(format!(
+                "{}: `.{end}` names no format that is written here; end the name in .exr, .tiff or .dng, or give --format",
+                path.unwrap_or(Path::new("-")).display()
+            ))),
+        }
+    }
+}
+
+fn exr_samples(samples: SampleKind) -> Result<ExrSamples> {
+    match samples {
+        SampleKind::F32 => Ok(ExrSamples::F32),
+        SampleKind::F16 => Ok(ExrSamples::F16),
+        SampleKind::U16 => Err(Error::Usage("EXR stores f32 or f16; for u16 write a TIFF".into())),
+    }
+}
+
+fn exr_compression(compression: CompressionKind) -> Result<ExrCompression> {
+    match compression {
+        CompressionKind::None => Ok(ExrCompression::None),
+        CompressionKind::Rle => Ok(ExrCompression::Rle),
+        CompressionKind::Zips => Ok(ExrCompression::Zips),
+        CompressionKind::Zip => Ok(ExrCompression::Zip),
+        CompressionKind::Piz => Ok(ExrCompression::Piz),
+        CompressionKind::Lzw | CompressionKind::Deflate => {
+            Err(compression.refused("EXR", "none, rle, zips, zip or piz"))
+        }
+    }
+}
+
+fn tiff_samples(format: &str, samples: SampleKind, fits_u16: bool, quantity: QuantityKind) -> Result<TiffSamples> {
+    match samples {
+        SampleKind::F32 => Ok(TiffSamples::F32),
+        SampleKind::U16 if fits_u16 => Ok(TiffSamples::U16),
+        SampleKind::U16 => Err(Error::Usage(format!("u16 would round or clip {quantity}; write f32"))),
+        SampleKind::F16 => Err(Error::Usage(format!("{format} stores u16 or f32 here; for f16 write an EXR"))),
+    }
+}
+
+fn tiff_compression(compression: CompressionKind) -> Result<TiffCompression> {
+    match compression {
+        CompressionKind::None => Ok(TiffCompression::None),
+        CompressionKind::Lzw => Ok(TiffCompression::Lzw),
+        CompressionKind::Deflate => Ok(TiffCompression::Deflate),
+        _ => Err(compression.refused("TIFF", "none, lzw or deflate")),
+    }
+}
+
+/// Codes have no compression that all readers of raw files know; floats have Deflate.
+fn dng_compression(compression: CompressionKind, samples: TiffSamples) -> Result<TiffCompression> {
+    match (compression, samples) {
+        (CompressionKind::None, _) => Ok(TiffCompression::None),
+        (CompressionKind::Deflate, TiffSamples::F32) => Ok(TiffCompression::Deflate),
+        (_, TiffSamples::F32) => Err(compression.refused("DNG of floats", "none or deflate")),
+        (_, TiffSamples::U16) => Err(Error::Usage(format!(
+            "DNG of 16-bit codes is not compressed by {}; leave it uncompressed, or write 32-bit floats (f32) and deflate",
+            compression.name()
+        ))),
+    }
+}
