@@ -56,6 +56,7 @@ fn demosaicked(plane: &MemoryFrame, method: Method) -> MemoryFrame {
 
 fn coloring(camera: &FrameHeader, space: Space) -> WithSigma<ToXyz> {
     let settings = ColorSettings {
+        is_relative: false,
         xyz_from_camera: sensor().xyz_from_camera.unwrap(),
         method: None,
         residual: None,

@@ -82,6 +82,7 @@ impl Conversion {
             notes.push(Note::Warning(text));
         }
         let settings = ColorSettings {
+            is_relative: matrix.is_relative(),
             xyz_from_camera: matrix.xyz_from_camera,
             residual: matrix.residual(),
             method: matrix.method,

@@ -21,6 +21,10 @@ pub const MATRIX_SCHEMA: &str = "cyanometer-matrix/1";
 /// The unit of the elements of a matrix.
 pub const MATRIX_UNIT: &str = "cd m-2 per (ADU s-1 sr-1)";
 
+/// The unit of the elements of a matrix for relative XYZ: signals are shares of white level less black level, and Y = 1
+/// is the white by which the first class reaches its white level.
+pub const RELATIVE_MATRIX_UNIT: &str = "relative XYZ per (white level - black level)";
+
 /// A matrix file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraMatrix {
@@ -38,7 +42,8 @@ pub struct CameraMatrix {
     /// Unit of the elements.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// Rows X, Y, Z; columns R, G, B: XYZ from ADU above black, per s sr of exposure.
+    /// Rows X, Y, Z; columns R, G, B: XYZ from ADU above black, per s sr of exposure or, for relative XYZ, per share of white
+    /// level less black level.
     pub xyz_from_camera: [[f64; 3]; 3],
     /// Condition number of the training signals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -64,6 +69,11 @@ pub struct CameraMatrix {
 }
 
 impl CameraMatrix {
+    /// Whether it gives relative XYZ.
+    pub fn is_relative(&self) -> bool {
+        self.unit.as_deref() == Some(RELATIVE_MATRIX_UNIT)
+    }
+
     /// How far it is off on what it was fitted on.
     pub fn residual(&self) -> Option<MatrixResidual> {
         let Training { library, relative_rms, .. } = self.training.as_ref()?;
@@ -142,8 +152,8 @@ impl CameraMatrix {
         if self.schema != MATRIX_SCHEMA {
             return Err(format!("its schema is `{}`, not `{MATRIX_SCHEMA}`", self.schema));
         }
-        if let Some(unit) = self.unit.as_ref().filter(|unit| *unit != MATRIX_UNIT) {
-            return Err(format!("its unit is `{unit}`, but only `{MATRIX_UNIT}` is understood"));
+        if let Some(unit) = self.unit.as_ref().filter(|unit| ![MATRIX_UNIT, RELATIVE_MATRIX_UNIT].contains(&unit.as_str())) {
+            return Err(format!("its unit is `{unit}`; understood are `{MATRIX_UNIT}` and `{RELATIVE_MATRIX_UNIT}`"));
         }
         if crate::color::matrix(&self.xyz_from_camera).try_inverse().is_none() {
             return Err("its `xyz_from_camera` is singular: three signals would not give three stimuli".into());

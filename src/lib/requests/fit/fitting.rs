@@ -145,6 +145,7 @@ impl Fitting<'_> {
             method: self.fit.demosaic,
             pattern: None,
             color: ColorSettings {
+                is_relative: false,
                 xyz_from_camera,
                 method: None,
                 residual: None,

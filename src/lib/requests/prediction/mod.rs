@@ -324,6 +324,7 @@ impl NoisePrediction {
             notes.push(Note::Warning(text));
         }
         Ok(Some(ColorSettings {
+            is_relative: matrix.is_relative(),
             xyz_from_camera: matrix.xyz_from_camera,
             residual: matrix.residual(),
             method: matrix.method,
