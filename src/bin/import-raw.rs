@@ -2,12 +2,16 @@
 
 use clap::Parser;
 use cyanometer::cli;
-use cyanometer::error::Result;
+use cyanometer::error::{Error, Result};
 use cyanometer::formats::dng::RawArea;
 use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::formats::output::write_text;
 use cyanometer::formats::pipe;
+use cyanometer::formats::places::{same_place, sidecar_path};
+use cyanometer::formats::register::announce;
 use cyanometer::names::Named;
-use cyanometer::requests::{options, values};
+use cyanometer::report;
+use cyanometer::requests::{self, options, values};
 use cyanometer::stages::import::Import;
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
@@ -19,7 +23,10 @@ static MEMORY: cli::Memory = cli::Memory;
 /// Make a frame of a camera's raw file: its codes as they are, with filter array, levels and exposure
 ///
 /// All programs read the raw files that this one reads; here a part is chosen, and what the file tells is kept beside the
-/// codes in our terms. The frame begins at its place on the sensor, whose corner is that of the stored image.
+/// codes in our terms. The frame begins at its place on the sensor, whose corner is that of the stored image. Where the file has
+/// color matrices, that for its own light goes along, for relative XYZ under the scene's own white: ColorMatrix,
+/// CameraCalibration and AnalogBalance for AsShotNeutral or AsShotWhiteXY. Nothing is adapted to D50, so that ForwardMatrix does
+/// not count, nor does BaselineExposure.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -28,6 +35,9 @@ struct Arguments {
     /// Which photosites: active, those that see light; full, all that are stored; default, those that converters show
     #[arg(long, value_name = "PART", default_value = RawArea::Active.name(), value_parser = values::choice::<RawArea>())]
     crop: RawArea,
+    /// Matrix file to write, the camera's own for relative XYZ, for `to-xyz --matrix`
+    #[arg(long, value_name = "FILE")]
+    write_matrix: Option<PathBuf>,
     /// YAML file whose metadata replace those that come with the file
     #[arg(long, value_name = "FILE")]
     metadata: Option<PathBuf>,
@@ -46,11 +56,24 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let Arguments { raw, metadata, .. } = arguments;
+    let Arguments { raw, metadata, output, write_matrix, .. } = arguments;
+    let frame = output.output.as_deref();
+    let sidecar = frame.map(sidecar_path);
+    if let Some(path) = write_matrix
+        && [frame, sidecar.as_deref()].iter().any(|other| same_place(Some(path), *other))
+    {
+        return Err(Error::Usage("the matrix and the frame have the same place; name a file for each".into()));
+    }
+    announce(&[frame, write_matrix.as_deref()])?;
     let options = InputOptions { path: raw.clone(), metadata: metadata.clone(), ..InputOptions::default() };
     let reader = FrameReader::open_raw(&options, arguments.crop)?;
+    let matrix =
+        write_matrix.as_ref().map(|path| requests::relative_matrix(reader.header()).map(|m| (path, m))).transpose()?;
     let mut stage = Import::new(reader.header())?;
     session.sign(stage.header_mut());
-    session.drive(reader, &stage, &arguments.output)?;
-    Ok(())
+    session.drive(reader, &stage, output)?;
+    match matrix {
+        Some((path, matrix)) => write_text(Some(path), &report::characterization::matrix(&matrix)?),
+        None => Ok(()),
+    }
 }

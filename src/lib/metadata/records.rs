@@ -173,6 +173,18 @@ pub struct DemosaicRecord {
     pub black_deltas: bool,
 }
 
+/// A camera's matrix for relative XYZ.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RelativeMatrix {
+    /// Rows X, Y, Z; columns R, G, B: XYZ from shares of white level less black level. The white by which the first class
+    /// reaches its white level has Y = 1.
+    pub xyz_from_camera: [[f64; 3]; 3],
+    /// Chromaticity of that white, the light of the exposure.
+    pub white_xy: [f64; 2],
+    /// Where it comes from.
+    pub method: String,
+}
+
 /// How colors were computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ColorRecord {

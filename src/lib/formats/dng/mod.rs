@@ -5,6 +5,7 @@
 //! those of the project: counted from the sensor's corner, which is that of the stored image.
 
 mod area;
+mod color;
 mod describe;
 mod image;
 mod levels;

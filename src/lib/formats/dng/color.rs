@@ -1,0 +1,160 @@
+//! The matrix of a DNG for relative XYZ \[DNG2023, ch. 6].
+
+use super::image::RawImage;
+use super::tags::{self, DngTag};
+use crate::color;
+use crate::color::calibration::{Calibration, Illuminated, Light};
+use crate::error::{Error, Result};
+use crate::formats::data::load_observer;
+use crate::formats::tiff::TiffFile;
+use crate::metadata::RelativeMatrix;
+use nalgebra::Matrix3;
+
+/// Numbers of illuminants (Exif, LightSource) and their temperatures, K, as Adobe's DNG SDK has them: of fluorescent lamps
+/// the middle of their range.
+const ILLUMINANTS: [(usize, f64); 20] = [
+    (1, 5500.0),
+    (2, 4150.0),
+    (3, 2850.0),
+    (4, 5500.0),
+    (9, 5500.0),
+    (10, 6500.0),
+    (11, 7500.0),
+    (12, 6400.0),
+    (13, 5050.0),
+    (14, 4150.0),
+    (15, 3525.0),
+    (16, 2925.0),
+    (17, 2850.0),
+    (18, 5500.0),
+    (19, 6500.0),
+    (20, 5500.0),
+    (21, 6500.0),
+    (22, 7500.0),
+    (23, 5000.0),
+    (24, 3200.0),
+];
+
+/// The matrix for the light of the exposure, under the scene's own white; none where the file has none. Notes tell why one
+/// that is there is passed over, and what of it does not count.
+///
+/// ColorMatrix counts, not ForwardMatrix, whose XYZ are adapted to D50.
+///
+/// # Errors
+///
+/// Those of the disk alone: no sample depends on it.
+pub(super) fn relative_matrix(
+    file: &mut TiffFile,
+    image: &RawImage,
+    notes: &mut Vec<String>,
+) -> Result<Option<RelativeMatrix>> {
+    if image.is_monochrome || !tags::COLOR_MATRICES[0].is_in(&image.first) {
+        return Ok(None);
+    }
+    let found = match found(file, image) {
+        Err(Error::Format { problem, .. }) => Err(problem),
+        other => other?,
+    };
+    match found {
+        Ok(found) => {
+            note_exposure(file, image, notes)?;
+            Ok(Some(found))
+        }
+        Err(why) => {
+            notes.push(format!("its color matrix is passed over: {why}"));
+            Ok(None)
+        }
+    }
+}
+
+/// The matrix, or why it is passed over.
+fn found(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<RelativeMatrix, String>> {
+    let planes = tags::CFA_PLANE_COLOR.unsigned(file, image.directory(), 16)?;
+    if planes.is_some_and(|planes| planes != [0, 1, 2]) {
+        return Ok(Err("its classes are others than R, G and B (CFAPlaneColor)".into()));
+    }
+    let light = match light(file, image)? {
+        Ok(light) => light,
+        Err(why) => return Ok(Err(why)),
+    };
+    let calibration = match calibration(file, image)? {
+        Ok(calibration) => calibration,
+        Err(why) => return Ok(Err(why)),
+    };
+    let name = if calibration.second.is_some() { "ColorMatrix1 and ColorMatrix2" } else { "ColorMatrix1" };
+    let observer = load_observer()?;
+    Ok(calibration.mapped(&observer, light).map(|mapped| RelativeMatrix {
+        xyz_from_camera: color::rows_of(&mapped.xyz_from_camera),
+        white_xy: mapped.white_xy,
+        method: format!("{name} of the DNG, for the white of the exposure, not adapted"),
+    }))
+}
+
+/// The light of the exposure.
+fn light(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Light, String>> {
+    if let Some(neutral) = tags::AS_SHOT_NEUTRAL.exactly::<3>(file, &image.first)? {
+        return Ok(Ok(Light::Neutral(neutral)));
+    }
+    let white = tags::AS_SHOT_WHITE_XY.exactly::<2>(file, &image.first)?;
+    Ok(white
+        .map(Light::White)
+        .ok_or_else(|| "nothing tells the white of the exposure (AsShotNeutral or AsShotWhiteXY)".to_owned()))
+}
+
+/// The matrices for one illuminant or two.
+fn calibration(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Calibration, String>> {
+    let first = &image.first;
+    if tags::COLOR_MATRIX_3.is_in(first) {
+        return Ok(Err("it has one for a third illuminant (ColorMatrix3), which is not supported".into()));
+    }
+    let mut matrix = |tag: DngTag| -> Result<Option<Matrix3<f64>>> {
+        Ok(tag.exactly::<9>(file, first)?.map(|elements| Matrix3::from_row_slice(&elements)))
+    };
+    let [one, two] = tags::COLOR_MATRICES;
+    let matrices = [matrix(one)?, matrix(two)?];
+    let [calibration_1, calibration_2] = tags::CAMERA_CALIBRATIONS;
+    let calibrations = [matrix(calibration_1)?, matrix(calibration_2)?];
+    let signature =
+        |file: &mut TiffFile, tag: DngTag| -> Result<String> { Ok(file.text(first, tag.tag())?.unwrap_or_default()) };
+    // Those of the camera count where the profile was made for them.
+    let [of_camera, of_profile] = tags::CALIBRATION_SIGNATURES;
+    let counts = signature(file, of_camera)? == signature(file, of_profile)?;
+    let mut set = |index: usize, color_matrix: Matrix3<f64>| -> Result<Illuminated> {
+        let known = tags::CALIBRATION_ILLUMINANTS[index].one(file, first)?.and_then(temperature_k);
+        let camera_calibration = calibrations[index].filter(|_| counts).unwrap_or_else(Matrix3::identity);
+        Ok(Illuminated { temperature_k: known.unwrap_or(0.0), color_matrix, camera_calibration })
+    };
+    let Some(one) = matrices[0].map(|matrix| set(0, matrix)).transpose()? else {
+        return Ok(Err("ColorMatrix1 is missing".into()));
+    };
+    let two = matrices[1].map(|matrix| set(1, matrix)).transpose()?;
+    if let Some(two) = &two
+        && (one.temperature_k == 0.0 || two.temperature_k == 0.0)
+    {
+        return Ok(Err(
+            "the temperature of an illuminant is not known (CalibrationIlluminant1, CalibrationIlluminant2)".into(),
+        ));
+    }
+    let analog_balance = tags::ANALOG_BALANCE.exactly::<3>(file, first)?.unwrap_or([1.0; 3]);
+    if !analog_balance.iter().all(|gain| *gain > 0.0) {
+        return Ok(Err("AnalogBalance has a number that is not above 0".into()));
+    }
+    Ok(Ok(Calibration { first: one, second: two, analog_balance }))
+}
+
+/// Temperature of an illuminant by its number; none of those that have none.
+fn temperature_k(number: usize) -> Option<f64> {
+    ILLUMINANTS.into_iter().find(|(known, _)| *known == number).map(|(_, kelvin)| kelvin)
+}
+
+/// Notes what a converter would brighten its picture by.
+fn note_exposure(file: &mut TiffFile, image: &RawImage, notes: &mut Vec<String>) -> Result<()> {
+    let brighter = match tags::BASELINE_EXPOSURE.exactly::<1>(file, &image.first) {
+        Err(Error::Format { .. }) => None,
+        other => other?,
+    };
+    if let Some([stops]) = brighter.filter(|[stops]| *stops != 0.0) {
+        notes.push(format!("its BaselineExposure of {stops} EV, a hint for pictures, is not applied"));
+    }
+    Ok(())
+}
