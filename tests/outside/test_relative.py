@@ -161,6 +161,35 @@ class Relative(ProgramCase):
         np.testing.assert_allclose(white, [0.38, 0.38], rtol=1e-15)
         np.testing.assert_allclose(found, expected, atol=2e-6)
 
+    def test_what_is_passed_over_is_told(self):
+        path = self.directory / "a.dng"
+        both = {50722: signed(WARM), 50778: (SHORT, [21])}
+        for more, words in (
+            ({50728: None}, "nothing tells the white of the exposure"),
+            ({52531: signed(WARM)}, "a third illuminant (ColorMatrix3)"),
+            ({**both, 50779: (SHORT, [0])}, "the temperature of an illuminant is not known"),
+            (both, "the temperature of an illuminant is not known"),
+            ({50710: (1, [2, 1, 0])}, "its classes are others than R, G and B"),
+            ({50728: ratios([0.0, 1.0, 1.0])}, "AsShotNeutral has a number that is not above 0"),
+            ({50721: signed(np.ones((3, 3)))}, "singular"),
+            ({50721: signed(COLD[:2])}, "its tag ColorMatrix1 has 6 of 9 numbers"),
+            ({50727: ratios([1.0, 0.0, 1.0])}, "AnalogBalance has a number that is not above 0"),
+        ):
+            with self.subTest(words):
+                write_dng(path, scene(12), 12, more=more)
+                self.run_program(["import-raw", path, "-o", "a.exr"])
+                done = self.attempt(["import-raw", path, "-o", "a.exr", "-v"])
+                told = done.stderr.decode()
+                self.assertIn("its color matrix is passed over: ", told)
+                self.assertIn(words, told)
+                self.assertNotIn("relative_matrix", (self.directory / "a.exr.yaml").read_text(encoding="utf-8"))
+                refused = self.attempt(["import-raw", path, "-o", "b.exr", "--write-matrix", "b.yaml"])
+                self.assertEqual(refused.returncode, 1)
+                self.assertIn("a.dng: it tells no matrix", refused.stderr.decode())
+        write_dng(path, scene(12), 12, more={50730: (SIGNED, struct.pack("<2i", 1, 4))})
+        done = self.attempt(["import-raw", path, "-o", "a.exr", "-v"])
+        self.assertIn("its BaselineExposure of 0.25 EV, a hint for pictures, is not applied", done.stderr.decode())
+
     def test_temperatures_here_are_the_published_ones(self):
         for xy, kelvin in (((0.31272, 0.32903), 6504), ((0.44758, 0.40745), 2856), ((0.34567, 0.35851), 5003)):
             self.assertLess(abs(kelvin_of(np.array(xy)) - kelvin), 1.5)

@@ -148,7 +148,7 @@ mod tests {
             color_matrix,
             camera_calibration: Matrix3::identity(),
         };
-        // Shape and size of those of a camera of 2009, [DNG SDK] style: D65 and A.
+        // Of the size of a camera's, for A and D65.
         let warm = Matrix3::new(0.7, -0.1, -0.05, -0.45, 1.25, 0.22, -0.07, 0.17, 0.55);
         let cold = Matrix3::new(0.6, -0.05, -0.08, -0.5, 1.3, 0.2, -0.1, 0.2, 0.65);
         Calibration { first: set(2850.0, warm), second: Some(set(6500.0, cold)), analog_balance: [1.0; 3] }

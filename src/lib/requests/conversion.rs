@@ -116,15 +116,20 @@ impl Conversion {
             let text = format!("{shown} was fitted for the sensor {of_matrix}, but the frame comes from {of_frame}");
             notes.push(Note::Warning(text));
         }
-        match self.white.white {
-            White::Absolute([_, luminance, _]) if matrix.is_relative() && luminance > BRIGHT_WHITE => {
-                notes.push(Note::Warning(format!(
-                    "the white has Y = {luminance}, but XYZ are relative: Y = 1 is the white by which the camera saturates"
-                )));
-            }
-            _ => {}
-        }
+        notes.extend(doubt_of_white(self.white.white, matrix));
         notes
+    }
+}
+
+/// A warning of a white that is too bright to be meant on the scale of relative XYZ.
+pub(super) fn doubt_of_white(white: White, matrix: &CameraMatrix) -> Option<Note> {
+    match white {
+        White::Absolute([_, luminance, _]) if matrix.is_relative() && luminance > BRIGHT_WHITE => {
+            Some(Note::Warning(format!(
+                "the white has Y = {luminance}, but XYZ are relative: Y = 1 is the white by which the camera saturates"
+            )))
+        }
+        _ => None,
     }
 }
 

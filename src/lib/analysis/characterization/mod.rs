@@ -83,7 +83,8 @@ impl CameraMatrix {
 
     /// That of a sensor's description.
     pub fn of_sensor(sensor: String, xyz_from_camera: [[f64; 3]; 3]) -> Self {
-        Self { sensor: Some(sensor), ..Self::bare(MATRIX_UNIT, xyz_from_camera) }
+        let method = Some("xyz_from_camera of the sensor".into());
+        Self { sensor: Some(sensor), method, ..Self::bare(MATRIX_UNIT, xyz_from_camera) }
     }
 
     /// A matrix of which no more is known.
