@@ -2,16 +2,13 @@
 
 use clap::Parser;
 use cyanometer::cli;
-use cyanometer::error::{Error, Result};
+use cyanometer::error::Result;
 use cyanometer::formats::dng::RawArea;
 use cyanometer::formats::input::{FrameReader, InputOptions};
-use cyanometer::formats::output::write_text;
 use cyanometer::formats::pipe;
-use cyanometer::formats::places::{same_place, sidecar_path};
-use cyanometer::formats::register::announce;
 use cyanometer::names::Named;
-use cyanometer::report;
-use cyanometer::requests::{self, options, values};
+use cyanometer::report::RawMatrixOutput;
+use cyanometer::requests::{options, values};
 use cyanometer::stages::import::Import;
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
@@ -35,9 +32,8 @@ struct Arguments {
     /// Which photosites: active, those that see light; full, all that are stored; default, those that converters show
     #[arg(long, value_name = "PART", default_value = RawArea::Active.name(), value_parser = values::choice::<RawArea>())]
     crop: RawArea,
-    /// Matrix file to write, the camera's own for relative XYZ, for `to-xyz --matrix`
-    #[arg(long, value_name = "FILE")]
-    write_matrix: Option<PathBuf>,
+    #[command(flatten)]
+    write_matrix: RawMatrixOutput,
     /// YAML file whose metadata replace those that come with the file
     #[arg(long, value_name = "FILE")]
     metadata: Option<PathBuf>,
@@ -57,23 +53,12 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { raw, metadata, output, write_matrix, .. } = arguments;
-    let frame = output.output.as_deref();
-    let sidecar = frame.map(sidecar_path);
-    if let Some(path) = write_matrix
-        && [frame, sidecar.as_deref()].iter().any(|other| same_place(Some(path), *other))
-    {
-        return Err(Error::Usage("the matrix and the frame have the same place; name a file for each".into()));
-    }
-    announce(&[frame, write_matrix.as_deref()])?;
+    write_matrix.announce(output.output.as_deref())?;
     let options = InputOptions { path: raw.clone(), metadata: metadata.clone(), ..InputOptions::default() };
     let reader = FrameReader::open_raw(&options, arguments.crop)?;
-    let matrix =
-        write_matrix.as_ref().map(|path| requests::relative_matrix(reader.header()).map(|m| (path, m))).transpose()?;
+    let matrix = write_matrix.of(reader.header())?;
     let mut stage = Import::new(reader.header())?;
     session.sign(stage.header_mut());
     session.drive(reader, &stage, output)?;
-    match matrix {
-        Some((path, matrix)) => write_text(Some(path), &report::characterization::matrix(&matrix)?),
-        None => Ok(()),
-    }
+    write_matrix.write(matrix.as_deref())
 }

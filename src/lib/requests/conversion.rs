@@ -157,17 +157,3 @@ fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
         }
     }
 }
-
-/// The matrix of a raw file, to be written as a matrix file.
-///
-/// # Errors
-///
-/// [`Error::Format`] where it has none.
-pub fn relative_matrix(raw: &FrameHeader) -> Result<CameraMatrix> {
-    raw.metadata.relative_matrix.as_ref().map(CameraMatrix::relative).ok_or_else(|| {
-        raw.refuse(
-            "it tells no matrix: that takes ColorMatrix1 and AsShotNeutral or AsShotWhiteXY (-v tells what is passed over); \
-             leave out --write-matrix",
-        )
-    })
-}

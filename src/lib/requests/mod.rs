@@ -28,7 +28,7 @@ mod notes;
 mod scene;
 
 pub use comparison::ColorPair;
-pub use conversion::{Conversion, relative_matrix};
+pub use conversion::Conversion;
 pub use fit::Fit;
 pub use notes::{Note, of_levels, of_marks, of_reader, of_slope, of_statistics};
 pub use options::SignalLevel;
