@@ -314,8 +314,9 @@ fn both(range_adu: [f64; 3], exposure_s_sr: f64) -> [ColorSettings; 2] {
 /// What is predicted from the head alone, and the electrons that a patch's mean tells.
 #[test]
 fn relative_xyz_are_predicted_as_absolute_ones_are() {
-    let electrons = [5000.0, 9000.0, 12_000.0];
-    let mut scene = expected(8, 8, |_, _, class| electrons[class as usize] as f32);
+    let electrons = [5000.0_f32, 9000.0, 12_000.0];
+    let mut scene = expected(8, 8, |_, _, class| electrons[class as usize]);
+    let electrons = electrons.map(f64::from);
     scene.header.metadata.scene = Some(Scene::uniform("test", electrons));
     let first = plane(&scene, 1);
     let camera = demosaicking(&first, Method::Bilinear).header().clone();
@@ -328,11 +329,11 @@ fn relative_xyz_are_predicted_as_absolute_ones_are() {
             let Ok(FramePrediction::Pixels(pixels)) = of_frame(&header, Equations::Exact) else { panic!("{space:?}") };
             (expected_electrons(&header, pixels.mean).unwrap(), pixels)
         });
-        for i in 0..3 {
+        for (i, electrons) in electrons.into_iter().enumerate() {
             let [a, b] = found.each_ref().map(|(_, pixels)| pixels.mean[i]);
             assert!((a / b - 1.0).abs() < 1e-9, "{space:?}: {a} {b}");
             // Means of curved spaces have a bias of second order.
-            assert!((found[0].0[i] / electrons[i] - 1.0).abs() < 0.01, "{space:?}: {:?}", found[0].0);
+            assert!((found[0].0[i] / electrons - 1.0).abs() < 0.01, "{space:?}: {:?}", found[0].0);
             assert!((found[0].0[i] / found[1].0[i] - 1.0).abs() < 1e-9);
             for j in 0..3 {
                 let [a, b] = found.each_ref().map(|(_, pixels)| pixels.covariance[(i, j)]);
