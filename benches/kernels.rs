@@ -135,6 +135,7 @@ fn kernels(criterion: &mut Criterion) -> Result<()> {
         ("to-xyz, srgb", Space::Srgb),
     ] {
         let settings = ColorSettings {
+            is_relative: false,
             xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
             method: None,
             residual: None,

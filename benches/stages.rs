@@ -62,6 +62,7 @@ fn stages(criterion: &mut Criterion) {
     let Some(rgb) = rgb else { return };
     for (name, space) in [("to-xyz", Space::Xyz), ("to-xyz, lab", Space::Lab), ("to-xyz, srgb", Space::Srgb)] {
         let settings = ColorSettings {
+            is_relative: false,
             xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
             method: None,
             residual: None,
@@ -118,6 +119,7 @@ fn evaluations(criterion: &mut Criterion) {
             method,
             pattern: None,
             color: ColorSettings {
+                is_relative: false,
                 xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]],
                 method: None,
                 residual: None,

@@ -19,6 +19,7 @@ const XYZ_FROM_CAMERA: [[f64; 3]; 3] = [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-
 /// Predicts a uniform scene that gives the photosites of R, G and B so many electrons, demosaicked by a method.
 pub fn predict(method: Method, electrons: [f64; 3]) -> Result<ChainPrediction> {
     let color = ColorSettings {
+        is_relative: false,
         xyz_from_camera: XYZ_FROM_CAMERA,
         method: None,
         residual: None,

@@ -47,6 +47,7 @@ fn demosaicked(codes: &MemoryFrame, method: Method) -> MemoryFrame {
 
 fn colored(camera: &MemoryFrame, space: Space) -> MemoryFrame {
     let settings = ColorSettings {
+        is_relative: false,
         xyz_from_camera: sensor().xyz_from_camera.unwrap(),
         method: None,
         residual: None,

@@ -227,6 +227,7 @@ fn evaluated(sensor: &Sensor, found: &Signals, method: Method, seed: u64) -> Vec
         method,
         pattern: None,
         color: ColorSettings {
+            is_relative: false,
             xyz_from_camera,
             method: None,
             residual: None,

@@ -66,6 +66,7 @@ fn correction(header: &FrameHeader, black: Black, cte: Option<f64>) -> CorrectFr
 
 fn color_settings(space: Space) -> ColorSettings {
     ColorSettings {
+        is_relative: false,
         xyz_from_camera: [[0.9, 0.4, 0.3], [0.3, 0.9, 0.1], [0.05, -0.1, 1.4]],
         method: None,
         residual: None,

@@ -190,6 +190,7 @@ fn levels_by_site_that_no_word_is_left_for_are_refused() {
 
 fn to_color(space: Space) -> ColorSettings {
     ColorSettings {
+        is_relative: false,
         xyz_from_camera: sensor().xyz_from_camera.unwrap(),
         method: None,
         residual: None,

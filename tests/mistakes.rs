@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 88] = [
+const MISTAKES: [(&str, i32, &str); 91] = [
     (
         "digitize noisy.exr -o x.dng",
         BAD_DATA,
@@ -184,7 +184,27 @@ const MISTAKES: [(&str, i32, &str); 88] = [
     ),
     ("demosaic rgb.exr", BAD_DATA, "rgb.exr: it holds three demosaicked planes of ADU; demosaicking is done once"),
     ("demosaic plane.exr -o no/where.exr", BAD_DATA, "no/where.exr: there is no directory `no`; make it first"),
-    ("to-xyz rgb.exr", BAD_USAGE, "--matrix <FILE> is missing; see `to-xyz --help`"),
+    (
+        "to-xyz rgb.exr --matrix relative.yaml --white-luminance 100",
+        BAD_USAGE,
+        "rgb.exr: the matrix gives relative XYZ, in which the white has Y = 1 and no luminance in cd/m2; leave out --white-luminance",
+    ),
+    (
+        "to-xyz rgb.exr --matrix unit.yaml",
+        BAD_DATA,
+        "unit.yaml: its unit is `nits`; understood are `cd m-2 per (ADU s-1 sr-1)` and `relative XYZ per (white level - black \
+         level)`",
+    ),
+    (
+        "color-difference relative.exr xyz.exr",
+        BAD_DATA,
+        "xyz.exr: its colors are absolute, those of relative.exr relative; make both with matrices of one unit",
+    ),
+    (
+        "color-difference relative.exr 0.2,0.2,0.2 --white-luminance 100",
+        BAD_DATA,
+        "relative.exr: its XYZ are relative: the white has Y = 1 and no luminance in cd/m2; leave out --white-luminance",
+    ),
     (
         "to-xyz plane.exr --matrix matrix.yaml",
         BAD_DATA,
@@ -368,6 +388,12 @@ const MISTAKES: [(&str, i32, &str); 88] = [
 #[test]
 fn mistakes_are_answered_in_one_line() {
     let shop = Workshop::with_frames();
+    let matrix = |unit: &str| {
+        format!("schema: cyanometer-matrix/1\nunit: {unit}\nxyz_from_camera: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n")
+    };
+    fs::write(shop.path("relative.yaml"), matrix("relative XYZ per (white level - black level)")).unwrap();
+    fs::write(shop.path("unit.yaml"), matrix("nits")).unwrap();
+    shop.run("to-xyz rgb.exr --matrix relative.yaml -o relative.exr", &[]);
     let files = shop.files();
     for (line, status, complaint) in MISTAKES {
         let output = shop.attempt(line, &[]);

@@ -11,7 +11,7 @@ use cyanometer::stream::MemoryFrame;
 use std::fs;
 use std::path::{Path, PathBuf};
 use support::TREE;
-use support::dng::dng;
+use support::dng::{dng, dng_with_ratios};
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// A DNG of 12x10 samples of 16 bits, whose active area begins at column 3, row 2.
@@ -156,6 +156,62 @@ fn mistakes_with_raws_are_told() {
     }
 }
 
+/// Ratios as numbers of 32 bits.
+fn ratios(numbers: &[u32]) -> Vec<u32> {
+    numbers.iter().flat_map(|number| [*number, 10_000]).collect()
+}
+
+/// The matrix of the raw goes along to XYZ, or into a file; without one the programs say so.
+#[test]
+fn a_raw_brings_its_matrix_along() {
+    let shop = Workshop::new();
+    let strip: Vec<u8> = (0..120_u16).flat_map(|i| (300 + i * i % 977).to_le_bytes()).collect();
+    let matrix = ratios(&[6000, 0, 0, 0, 10_000, 0, 0, 0, 7000]);
+    let neutral = ratios(&[5000, 10_000, 6000]);
+    // The tags of these numbers are ratios where there are twice as many.
+    let colors: [(u16, &[u32]); 3] = [(50714, &[64]), (50721, &matrix), (50728, &neutral)];
+    fs::write(shop.path("colors.dng"), dng_with_ratios([12, 10], &strip, &colors)).unwrap();
+    fs::write(shop.path("raw.dng"), small()).unwrap();
+    shop.run("import-raw colors.dng -o plane.exr --write-matrix m.yaml", &[]);
+    shop.run("demosaic colors.dng --method bi -o rgb.exr", &[]);
+    shop.run("to-xyz rgb.exr -o own.exr", &[]);
+    shop.run("to-xyz rgb.exr --matrix m.yaml -o file.exr", &[]);
+    let [own, file] = ["own.exr", "file.exr"].map(|name| shop.frame(name));
+    assert_eq!(own.samples, file.samples);
+    assert_eq!(own.header.metadata.unit, "relative");
+    // (CM)⁻¹ of the neutral: X : Y : Z = 5/6 : 1 : 6/7. Its largest signal is that of green, for which CM has 1.
+    let found = own.header.metadata.relative_matrix.unwrap();
+    let diagonal = [0, 1, 2].map(|i| found.xyz_from_camera[i][i]);
+    let wanted = [1.0 / 0.6, 1.0, 1.0 / 0.7];
+    assert!((0..3).all(|i| (diagonal[i] - wanted[i]).abs() < 1e-12), "{diagonal:?}");
+    let sum = 5.0 / 6.0 + 1.0 + 6.0 / 7.0;
+    assert!((found.white_xy[0] - 5.0 / 6.0 / sum).abs() < 1e-12 && (found.white_xy[1] - 1.0 / sum).abs() < 1e-12);
+    shop.run("demosaic raw.dng --method bi --black auto -o none.exr", &[]);
+    for (line, status, wanted) in [
+        (
+            "to-xyz none.exr -o x.exr",
+            BAD_USAGE,
+            "to-xyz: none.exr: neither its sensor nor its raw file tells a matrix; give --matrix\n",
+        ),
+        (
+            "import-raw raw.dng -o x.exr --write-matrix x.yaml",
+            BAD_DATA,
+            "import-raw: raw.dng: it tells no matrix: that takes ColorMatrix1 and AsShotNeutral or AsShotWhiteXY (-v tells what is \
+             passed over); leave out --write-matrix\n",
+        ),
+        (
+            "import-raw colors.dng -o x.exr --write-matrix x.exr.yaml",
+            BAD_USAGE,
+            "import-raw: the matrix and the frame have the same place; name a file for each\n",
+        ),
+    ] {
+        let output = shop.attempt(line, &[]);
+        assert_eq!(String::from_utf8_lossy(&output.stderr), wanted);
+        assert_eq!(output.status.code(), Some(status), "{line}");
+        assert!(!shop.path("x.exr").exists() && !shop.path("x.yaml").exists(), "{line}");
+    }
+}
+
 /// A file of a camera; none, and a word about it, where it is not at hand.
 fn of_camera(name: &str) -> Option<PathBuf> {
     let beside = Path::new(TREE).ancestors().skip(1).map(|above| above.join("shared/data/raw").join(name));
@@ -195,4 +251,32 @@ fn a_cameras_frame_is_imported_and_demosaicked() {
     };
     let [red, green, blue] = [0, 1, 2].map(mean);
     assert!(green > red && green > blue && red.min(blue) > 100.0, "{red} {green} {blue}");
+}
+
+/// The chart by the camera's own matrix: its grays are in a line with one another, its patches on their side of them.
+#[test]
+fn a_charts_colors_follow_from_the_cameras_own_matrix() {
+    let Some(chart) = of_camera("colorchart_kissx4_ml_uncompressed14.dng") else { return };
+    let shop = Workshop::new();
+    shop.run(&format!("demosaic {} --method bi -o rgb.exr", chart.display()), &[]);
+    shop.run("to-xyz rgb.exr --space xyy -o xyy.exr", &[]);
+    let MemoryFrame { samples, header, .. } = shop.frame("xyy.exr");
+    assert_eq!(header.metadata.unit, "1, 1, relative");
+    let (width, row) = (header.geometry.width, header.geometry.row_samples());
+    let mean = |[x, y]: [usize; 2]| {
+        [0, 1, 2].map(|channel| {
+            let rows = samples[y * row..(y + 40) * row].chunks(row);
+            let sum: f64 = rows.flat_map(|row| &row[channel * width + x..][..40]).map(|v| f64::from(*v)).sum();
+            sum / 1600.0
+        })
+    };
+    // Corners of squares within patches; rows and columns as the chart shows them.
+    let [white, gray, dark] = [[680, 910], [900, 910], [1120, 910]].map(mean);
+    assert!(white[2] > 1.5 * gray[2] && gray[2] > 2.0 * dark[2], "{white:?} {gray:?} {dark:?}");
+    assert!((white[0] - gray[0]).abs() < 0.01 && (white[1] - gray[1]).abs() < 0.01, "{white:?} {gray:?}");
+    let [blue, green, red, yellow] = [[685, 810], [795, 810], [905, 810], [1015, 810]].map(mean);
+    assert!(blue[0] < white[0] - 0.05 && blue[1] < white[1] - 0.05, "{blue:?} {white:?}");
+    assert!(green[1] > white[1] + 0.05, "{green:?} {white:?}");
+    assert!(red[0] > white[0] + 0.1, "{red:?} {white:?}");
+    assert!(yellow[0] > white[0] + 0.03 && yellow[1] > white[1] + 0.03 && yellow[2] > red[2], "{yellow:?} {white:?}");
 }

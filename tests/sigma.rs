@@ -4,14 +4,15 @@
 
 mod support;
 
+use cyanometer::analysis::statistics::patches::expected_electrons;
+use cyanometer::camera::levels::WhiteLevel;
 use cyanometer::cfa::{CfaPattern, Class};
 use cyanometer::color::{Space, White};
 use cyanometer::error::Error;
 use cyanometer::frame::mirror;
-use cyanometer::metadata::FrameHeader;
-use cyanometer::propagation::Equations;
-use cyanometer::propagation::Photosite;
+use cyanometer::metadata::{FrameHeader, Scene};
 use cyanometer::propagation::pixels::PixelNoise;
+use cyanometer::propagation::{Equations, FramePrediction, Photosite, of_frame};
 use cyanometer::sigma::{COVARIANCE_LAYER, WithSigma};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
@@ -56,6 +57,7 @@ fn demosaicked(plane: &MemoryFrame, method: Method) -> MemoryFrame {
 
 fn coloring(camera: &FrameHeader, space: Space) -> WithSigma<ToXyz> {
     let settings = ColorSettings {
+        is_relative: false,
         xyz_from_camera: sensor().xyz_from_camera.unwrap(),
         method: None,
         residual: None,
@@ -245,4 +247,98 @@ fn a_frame_without_noise_record_has_its_sensors_noise() {
     real.header.metadata.noise = None;
     let (known, guessed) = (demosaicked(&plane, Method::Malvar), demosaicked(&real, Method::Malvar));
     assert_eq!(known.samples, guessed.samples);
+}
+
+/// A relative matrix M diag(white − black)/H makes of each sample what M makes, standard deviations and covariances
+/// included: doubles round to 10⁻¹⁶, and the floats that they end in by one last digit, 1.2·10⁻⁷, at most.
+#[test]
+fn relative_xyz_scale_as_absolute_ones_do() {
+    let mut camera = {
+        let first = plane(&scene(), 1);
+        through(&first, &demosaicking(&first, Method::Bilinear))
+    };
+    let exposure = camera.header.metadata.exposure.unwrap();
+    for white in [4095.0.into(), WhiteLevel::Classes([3000.0, 4000.0, 3500.0])] {
+        camera.header.metadata.white_level_adu = Some(white);
+        let black = camera.header.uniform_black_adu().unwrap();
+        let [relative, absolute] = both(white.less([black; 3]).classes(), exposure.exposure_s_sr());
+        for space in [Space::Xyz, Space::Xyy, Space::Lab] {
+            let made = [&relative, &absolute].map(|settings| {
+                let stage = ToXyz::new(&camera.header, &ColorSettings { space, ..settings.clone() }).unwrap();
+                through(&camera, &WithSigma::of_conversion(stage, &camera.header).unwrap())
+            });
+            for (a, b) in made[0].samples.iter().zip(&made[1].samples) {
+                assert!((a - b).abs() <= 1.2e-7 * b.abs() + 1e-10, "{space:?}: {a} {b}");
+            }
+            let units = made.map(|frame| frame.header.metadata.unit);
+            let wanted = match space {
+                Space::Xyz => ["relative", "cd m-2"],
+                Space::Xyy => ["1, 1, relative", "1, 1, cd m-2"],
+                _ => ["1", "1"],
+            };
+            assert_eq!(units, wanted);
+        }
+    }
+    // No exposure is asked for, but a white level is.
+    let header = &mut camera.header;
+    let [relative, absolute] = both([4000.0; 3], exposure.exposure_s_sr());
+    header.metadata.exposure = None;
+    assert!(ToXyz::new(header, &relative).is_ok());
+    assert!(matches!(ToXyz::new(header, &absolute), Err(Error::MissingKey { key: "exposure", .. })));
+    for (white, wanted) in
+        [(None, "no `white_level_adu`"), (Some(WhiteLevel::Uniform(-1.0)), "is not above its black level")]
+    {
+        header.metadata.white_level_adu = white;
+        let complaint = ToXyz::new(header, &relative).unwrap_err().to_string();
+        assert!(complaint.contains(wanted), "{complaint}");
+    }
+}
+
+/// The sensor's matrix, and what gives the same numbers as a relative one.
+fn both(range_adu: [f64; 3], exposure_s_sr: f64) -> [ColorSettings; 2] {
+    let absolute = ColorSettings {
+        is_relative: false,
+        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
+        method: None,
+        residual: None,
+        space: Space::Xyz,
+        white: White::Absolute([3000.0, 3000.0, 4000.0]),
+        white_luminance: None,
+    };
+    let scaled = |row: [f64; 3]| [0, 1, 2].map(|j| row[j] * range_adu[j] / exposure_s_sr);
+    let relative =
+        ColorSettings { is_relative: true, xyz_from_camera: absolute.xyz_from_camera.map(scaled), ..absolute.clone() };
+    [relative, absolute]
+}
+
+/// What is predicted from the head alone, and the electrons that a patch's mean tells.
+#[test]
+fn relative_xyz_are_predicted_as_absolute_ones_are() {
+    let electrons = [5000.0_f32, 9000.0, 12_000.0];
+    let mut scene = expected(8, 8, |_, _, class| electrons[class as usize]);
+    let electrons = electrons.map(f64::from);
+    scene.header.metadata.scene = Some(Scene::uniform("test", electrons));
+    let first = plane(&scene, 1);
+    let camera = demosaicking(&first, Method::Bilinear).header().clone();
+    let black = camera.uniform_black_adu().unwrap();
+    let range = camera.metadata.white_level_adu.unwrap().less([black; 3]).classes();
+    let exposure_s_sr = camera.metadata.exposure.unwrap().exposure_s_sr();
+    for space in [Space::Xyz, Space::Xyy, Space::Lab] {
+        let found = both(range, exposure_s_sr).map(|settings| {
+            let header = ToXyz::new(&camera, &ColorSettings { space, ..settings }).unwrap().header().clone();
+            let Ok(FramePrediction::Pixels(pixels)) = of_frame(&header, Equations::Exact) else { panic!("{space:?}") };
+            (expected_electrons(&header, pixels.mean).unwrap(), pixels)
+        });
+        for (i, electrons) in electrons.into_iter().enumerate() {
+            let [a, b] = found.each_ref().map(|(_, pixels)| pixels.mean[i]);
+            assert!((a / b - 1.0).abs() < 1e-9, "{space:?}: {a} {b}");
+            // Means of curved spaces have a bias of second order.
+            assert!((found[0].0[i] / electrons - 1.0).abs() < 0.01, "{space:?}: {:?}", found[0].0);
+            assert!((found[0].0[i] / found[1].0[i] - 1.0).abs() < 1e-9);
+            for j in 0..3 {
+                let [a, b] = found.each_ref().map(|(_, pixels)| pixels.covariance[(i, j)]);
+                assert!((a - b).abs() < 1e-9 * found[1].1.covariance.norm(), "{space:?}: {a} {b}");
+            }
+        }
+    }
 }

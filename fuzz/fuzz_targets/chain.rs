@@ -91,6 +91,7 @@ fn follow(frame: &MemoryFrame, depth: usize) {
     }
     for space in [Space::Xyz, Space::Xyy, Space::Lab, Space::Srgb] {
         let settings = ColorSettings {
+            is_relative: false,
             xyz_from_camera: [[0.9, 0.4, 0.3], [0.3, 0.9, 0.1], [0.05, -0.1, 1.4]],
             method: None,
             residual: None,

@@ -16,8 +16,9 @@ static MEMORY: cli::Memory = cli::Memory;
 
 /// Turn demosaicked ADU into CIE XYZ, xyY, L*a*b* or a viewable sRGB picture
 ///
-/// XYZ is absolute, Y in cd/m2. L*a*b* and sRGB refer to a white; by default that of D65, as bright as makes the camera
-/// saturate.
+/// XYZ is absolute, Y in cd/m2, or, by a matrix that says so, relative: Y = 1 for the white by which the first class reaches
+/// its white level, whatever the exposure. L*a*b* and sRGB refer to a white; by default that of D65, as bright as makes the
+/// camera saturate.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -45,7 +46,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
     announce(&[output.output.as_deref()])?;
-    check_inputs([arguments.input.input.as_deref(), Some(&*conversion.matrix)])?;
+    check_inputs([arguments.input.input.as_deref(), conversion.matrix.as_deref()])?;
     let matrix = conversion.load_matrix()?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);

@@ -43,7 +43,15 @@ pub fn sensor() -> Result<LoadedSensor> {
 
 /// What turns sensor RGB into a space by a matrix, white D65.
 pub fn color_settings(xyz_from_camera: Matrix, space: Space) -> ColorSettings {
-    ColorSettings { xyz_from_camera, method: None, residual: None, space, white: White::D65, white_luminance: None }
+    ColorSettings {
+        xyz_from_camera,
+        is_relative: false,
+        method: None,
+        residual: None,
+        space,
+        white: White::D65,
+        white_luminance: None,
+    }
 }
 
 /// A library as camera and observer see it.

@@ -79,7 +79,7 @@ def lossless_jpeg(samples, precision, predictor=1, components=1, restart_rows=0)
 
 
 def write_dng(path, samples, bits, compression=1, store=None, tile=None, rows=None, order="<", more=()):
-    """Writes a DNG with one directory, in strips or tiles."""
+    """Writes a DNG with one directory, in strips or tiles; a tag that is None is left out."""
     height, width = samples.shape
     store = store or (lambda part: packed(part, bits, order))
     if tile:
@@ -119,6 +119,7 @@ def write_dng(path, samples, bits, compression=1, store=None, tile=None, rows=No
         **shape,
         **dict(more),
     }
+    tags = {tag: value for tag, value in tags.items() if value is not None}
     table = struct.pack(order + "H", len(tags))
     for tag, (kind, values) in sorted(tags.items()):
         value = values if isinstance(values, bytes) else struct.pack(order + FORMATS[kind] * len(values), *values)

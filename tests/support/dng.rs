@@ -5,6 +5,23 @@
 /// The bytes of a DNG with one strip of so many bits a sample, stored with a compression, and tags of its own: numbers of 32
 /// bits each.
 pub fn dng(size: [u32; 2], bits: u32, compression: u32, strip: &[u8], more: &[(u16, &[u32])]) -> Vec<u8> {
+    written(size, bits, compression, strip, more, &[])
+}
+
+/// The same of samples of 16 bits, where the tags of colors are ratios: numerators and divisors.
+pub fn dng_with_ratios(size: [u32; 2], strip: &[u8], more: &[(u16, &[u32])]) -> Vec<u8> {
+    written(size, 16, 1, strip, more, &[(50721, 10), (50722, 10), (50727, 5), (50728, 5)])
+}
+
+fn written(
+    size: [u32; 2],
+    bits: u32,
+    compression: u32,
+    strip: &[u8],
+    more: &[(u16, &[u32])],
+    ratios: &[(u16, u16)],
+) -> Vec<u8> {
+    let kind_of = |tag: u16| ratios.iter().find(|(of, _)| *of == tag).map_or(4, |(_, kind)| *kind);
     let [width, height] = size;
     let mut tags: Vec<(u16, u16, Vec<u32>)> = vec![
         (256, 4, vec![width]),
@@ -20,14 +37,15 @@ pub fn dng(size: [u32; 2], bits: u32, compression: u32, strip: &[u8], more: &[(u
         (33422, 4, vec![0, 1, 1, 2]),
         (50706, 4, vec![1, 4, 0, 0]),
     ];
-    tags.extend(more.iter().map(|(tag, values)| (*tag, 4, values.to_vec())));
+    tags.extend(more.iter().map(|(tag, values)| (*tag, kind_of(*tag), values.to_vec())));
     tags.sort();
     let mut out = [b"II*\0\0\0\0\0", strip].concat();
     let mut table = u16::try_from(tags.len()).unwrap().to_le_bytes().to_vec();
     for (tag, kind, values) in tags {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         table.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
-        table.extend(u32::try_from(values.len()).unwrap().to_le_bytes());
+        let count = if kind == 4 { values.len() } else { values.len() / 2 };
+        table.extend(u32::try_from(count).unwrap().to_le_bytes());
         if bytes.len() > 4 {
             table.extend(u32::try_from(out.len()).unwrap().to_le_bytes());
             out.extend(bytes);

@@ -3,10 +3,11 @@
 use crate::metadata::HistoryEntry;
 
 /// Options that say where and how the output is stored, or how the program talks: the samples do not depend on them.
-const NOT_RECORDED: [(&str, bool); 10] = [
+const NOT_RECORDED: [(&str, bool); 11] = [
     ("--output", true),
     ("--output-format", true),
     ("--map", true),
+    ("--write-matrix", true),
     ("--format", true),
     ("--compression", true),
     ("--sample-type", true),

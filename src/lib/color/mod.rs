@@ -1,7 +1,9 @@
 //! Color: CIE XYZ, xyY, L*a*b* and a viewable sRGB; differences; loci. Knows no camera.
 
+pub mod calibration;
 pub mod difference;
 pub mod locus;
+pub mod temperature;
 
 use crate::names::Named;
 use nalgebra::{Matrix3, Vector3};

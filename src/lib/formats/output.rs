@@ -16,7 +16,7 @@ use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
 use crate::stream::{Counts, RowSink};
 use crate::text::visible;
-use crate::units::QuantityKind;
+use crate::units::{QuantityKind, RELATIVE_UNIT};
 use half::f16;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -159,8 +159,8 @@ fn native_tags(header: &FrameHeader) -> ExrTags {
     ExrTags {
         exposure_s: metadata.exposure.map(|e| e.exposure_s),
         f_number: metadata.exposure.map(|e| e.f_number),
-        // Absolute XYZ: (1, 1, 1) has Y = 1 cd m⁻².
-        white_luminance: (metadata.quantity == QuantityKind::Xyz).then_some(1.0),
+        // Absolute XYZ: (1, 1, 1) has Y = 1 cd m⁻². Of relative ones no luminance is known.
+        white_luminance: (metadata.quantity == QuantityKind::Xyz && metadata.unit != RELATIVE_UNIT).then_some(1.0),
         primaries,
         ..ExrTags::default()
     }

@@ -4,7 +4,7 @@ mod records;
 
 pub use records::{
     AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
-    NoiseRecord, PoissonKind, PredictedRecord, SamplesRecord, Scene,
+    NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
 };
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
@@ -60,6 +60,9 @@ pub struct Metadata {
     /// Exposure time and lens.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
+    /// The camera's own matrix for relative XYZ, as its raw file has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_matrix: Option<RelativeMatrix>,
     /// What the camera looked at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<Scene>,
@@ -121,6 +124,7 @@ impl Metadata {
             white_level_adu: None,
             sensor: None,
             exposure: None,
+            relative_matrix: None,
             scene: None,
             quadrature_error: None,
             noise: None,
@@ -148,6 +152,11 @@ impl Metadata {
             samples: None,
             ..self.clone()
         }
+    }
+
+    /// Whether its colors are on the scale of relative XYZ.
+    pub fn is_relative(&self) -> bool {
+        self.color.as_ref().is_some_and(ColorRecord::is_relative)
     }
 
     /// The black level in ADU; none where none is known, or where it differs among photosites.

@@ -1,10 +1,13 @@
 //! Records of what was done to a frame, one for each program that later ones must know of.
 
 use crate::camera::levels::BlackLevel;
+use crate::camera::optics::Exposure;
 use crate::camera::readout::ReadOut;
 use crate::cfa::CfaPattern;
+use crate::color;
 use crate::names::{Named, serde_by_name};
 use crate::random::Source;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// What the camera looked at.
@@ -170,23 +173,58 @@ pub struct DemosaicRecord {
     pub black_deltas: bool,
 }
 
+/// A camera's matrix for relative XYZ.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RelativeMatrix {
+    /// Rows X, Y, Z; columns R, G, B: XYZ from shares of white level less black level. The white by which the first class
+    /// reaches its white level has Y = 1.
+    pub xyz_from_camera: [[f64; 3]; 3],
+    /// Chromaticity of that white, the light of the exposure.
+    pub white_xy: [f64; 2],
+    /// Where it comes from.
+    pub method: String,
+}
+
 /// How colors were computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ColorRecord {
-    /// The matrix, XYZ per black-free ADU per s sr.
+    /// The matrix, XYZ per black-free ADU per s sr; where XYZ are relative, per share of [`Self::range_adu`].
     pub xyz_from_camera: [[f64; 3]; 3],
+    /// White level less black level of R, G and B, by which signals were divided in place of the exposure; absent where XYZ
+    /// are absolute.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range_adu: Option<[f64; 3]>,
     /// What it was fitted by.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
     /// Black level that was left in the camera's signals and subtracted first, ADU.
     #[serde(default)]
     pub black_adu: f64,
-    /// XYZ of the white that Lab and sRGB refer to, absolute.
+    /// XYZ of the white that Lab and sRGB refer to, on the scale of the frame's XYZ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub white: Option<[f64; 3]>,
     /// How far the matrix is off without noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix_residual: Option<MatrixResidual>,
+}
+
+impl ColorRecord {
+    /// Whether XYZ are relative: Y = 1 for the white by which the first class reaches its white level.
+    pub fn is_relative(&self) -> bool {
+        self.range_adu.is_some()
+    }
+
+    /// XYZ from ADU above black.
+    ///
+    /// M / H, H the exposure in s sr; where XYZ are relative M diag(1 / (white − black)). None without exposure where one is
+    /// needed.
+    pub fn xyz_from_adu(&self, exposure: Option<Exposure>) -> Option<Matrix3<f64>> {
+        let xyz_from_camera = color::matrix(&self.xyz_from_camera);
+        match self.range_adu {
+            Some(range) => Some(xyz_from_camera * Matrix3::from_diagonal(&Vector3::from(range.map(f64::recip)))),
+            None => Some(xyz_from_camera / exposure?.exposure_s_sr()),
+        }
+    }
 }
 
 /// How far a matrix is off on the spectra that it was judged by, without noise.

@@ -173,8 +173,7 @@ impl Sites {
             }
             return Ok(FramePrediction::Pixels(Box::new(camera)));
         };
-        let exposure = metadata.exposure.ok_or(Unpredictable::Missing("exposure"))?;
-        let xyz_from_adu = color::matrix(&record.xyz_from_camera) / exposure.exposure_s_sr();
+        let xyz_from_adu = record.xyz_from_adu(metadata.exposure).ok_or(Unpredictable::Missing("exposure"))?;
         let xyz = match equations {
             Equations::Paper if method != Method::EffectiveColor => {
                 // Eq. 19 of [HP2005] takes the channels as independent; Eq. 20 keeps the correlations, for ECI.

@@ -73,7 +73,7 @@ fn frame_or_color() -> impl TypedValueParser<Value = FrameOrColor> {
 /// What is compared, and under which white.
 #[derive(Debug, Clone, Args)]
 pub struct ColorPair {
-    /// Reference: an image, or a color as X,Y,Z or L,a,b
+    /// Reference: an image, or a color as X,Y,Z or L,a,b; X,Y,Z beside an image of relative XYZ are relative too
     #[arg(value_parser = frame_or_color(), allow_hyphen_values = true)]
     pub a: FrameOrColor,
     /// What is compared with it: an image, or a color as X,Y,Z or L,a,b
@@ -82,7 +82,8 @@ pub struct ColorPair {
     /// What colors given as numbers are, and what images without metadata hold; by default xyz
     #[arg(long, value_parser = values::one_of(&[Space::Xyz, Space::Lab]))]
     pub space: Option<Space>,
-    /// White of XYZ and xyY: d65, e, or its absolute X,Y,Z; by default that in the metadata of an image, or d65
+    /// White of XYZ and xyY: d65, e, or its X,Y,Z on their scale, absolute or relative; by default that in the metadata of an
+    /// image, or d65
     #[arg(long, value_name = "d65|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
     pub white: Option<White>,
     /// Luminance of the white in cd/m2; by default that in the metadata of an image, or 100 for colors given as numbers

@@ -295,7 +295,7 @@ impl NoiseChoice {
 /// The white that colors refer to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct WhiteChoice {
-    /// White of L*a*b*: d65, e, or its absolute X,Y,Z in cd/m2
+    /// White of L*a*b*: d65, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative by a matrix that says so
     #[arg(long, default_value_t, value_name = "d65|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
     pub white: White,
     /// Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates

@@ -1,8 +1,7 @@
 //! From demosaicked ADU to CIE XYZ and on to xyY, L*a*b* and a viewable sRGB.
 
 use crate::color::{
-    D65_XY, Space, White, lab_from_xyz, linear_srgb_from_xyz, matrix, rows_of, srgb_encode, xyy_from_xyz,
-    xyz_of_chromaticity,
+    D65_XY, Space, White, lab_from_xyz, linear_srgb_from_xyz, rows_of, srgb_encode, xyy_from_xyz, xyz_of_chromaticity,
 };
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
@@ -15,8 +14,10 @@ use nalgebra::{Matrix3, Vector3};
 /// What a user may set of the conversion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColorSettings {
-    /// The matrix, XYZ from black-free ADU per s sr.
+    /// The matrix, XYZ from black-free ADU per s sr; where it is relative, per share of white level less black level.
     pub xyz_from_camera: [[f64; 3]; 3],
+    /// Whether it gives relative XYZ, and no exposure is needed.
+    pub is_relative: bool,
     /// How it was fitted, for the record.
     pub method: Option<String>,
     /// How far it is off without noise, for the record.
@@ -26,13 +27,16 @@ pub struct ColorSettings {
     /// The white of L*a*b* and sRGB.
     pub white: White,
     /// Luminance of a white that is given by its chromaticity, cd m⁻²; that at which the camera saturates where none is
-    /// given.
+    /// given. Of relative XYZ it is 1, and none can be given.
     pub white_luminance: Option<f64>,
 }
 
 /// Turns demosaicked ADU into colors.
 ///
 /// x = M ρ / H        ρ: ADU above black; H = t π T / (4N² + 1)        [HP2005, Eq. 18, per exposure]
+///
+/// By a relative matrix x = M ρ / (white level − black level), class by class, and Y = 1 is the white by which the first
+/// class reaches its white level.
 ///
 /// # Examples
 ///
@@ -54,6 +58,7 @@ pub struct ColorSettings {
 ///
 /// let settings = ColorSettings {
 ///     xyz_from_camera: [[2e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 4e-3]],
+///     is_relative: false,
 ///     method: None,
 ///     residual: None,
 ///     space: Space::Xyz,
@@ -71,7 +76,7 @@ pub struct ColorSettings {
 pub struct ToXyz {
     header: FrameHeader,
     space: Space,
-    /// XYZ from ADU above black, exposure included.
+    /// XYZ from ADU above black, the exposure or the range of codes included.
     xyz_from_adu: Matrix3<f64>,
     black: f64,
     white: [f64; 3],
@@ -83,36 +88,30 @@ impl ToXyz {
     ///
     /// # Errors
     ///
-    /// [`Error::Order`] unless the frame holds three planes of ADU; [`Error::MissingKey`] without exposure or black level;
-    /// [`Error::Usage`] for an impossible white; [`Error::Format`] where the black level
-    /// differs among photosites.
+    /// [`Error::Order`] unless the frame holds three planes of ADU; [`Error::MissingKey`] without black level, or without
+    /// exposure where the matrix needs one; [`Error::Usage`] for an impossible white; [`Error::Format`] where the black level
+    /// differs among photosites, and without white level above black where the matrix is relative.
     pub fn new(input: &FrameHeader, settings: &ColorSettings) -> Result<Self> {
         check_camera(input)?;
-        let exposure = input.exposure()?;
+        if !settings.is_relative {
+            input.exposure()?;
+        }
         let black = input.uniform_black_adu()?;
-        let xyz_from_adu = matrix(&settings.xyz_from_camera) / exposure.exposure_s_sr();
+        let range_adu = settings.is_relative.then(|| range(input, black)).transpose()?;
+        let mut record = ColorRecord {
+            xyz_from_camera: settings.xyz_from_camera,
+            range_adu,
+            method: settings.method.clone(),
+            black_adu: black,
+            white: None,
+            matrix_residual: settings.residual.clone(),
+        };
+        let scaled = record.xyz_from_adu(input.metadata.exposure);
+        let xyz_from_adu = scaled.ok_or_else(|| input.missing("exposure"))?;
         let needs_white = matches!(settings.space, Space::Lab | Space::Srgb);
-        let mut known_white = true;
-        let white = match settings.white {
-            White::Absolute(white) => white,
-            White::D65 | White::EqualEnergy => {
-                let xy = if settings.white == White::D65 { D65_XY } else { [1.0 / 3.0, 1.0 / 3.0] };
-                let at_saturation = || -> Option<f64> {
-                    let range = input.metadata.white_level_adu?.less([black; 3]).classes();
-                    Some((xyz_from_adu * Vector3::from(range)).y)
-                };
-                let luminance = match settings.white_luminance.or_else(at_saturation) {
-                    Some(luminance) => luminance,
-                    None if needs_white => {
-                        return Err(input.missing("white_level_adu"));
-                    }
-                    None => {
-                        known_white = false;
-                        1.0
-                    }
-                };
-                xyz_of_chromaticity(xy, luminance)
-            }
+        record.white = reference_white(input, settings, &xyz_from_adu, black)?;
+        let Some(white) = record.white.or_else(|| (!needs_white).then(|| white_of(settings.white, 1.0))) else {
+            return Err(input.missing("white_level_adu"));
         };
         if needs_white && !white.iter().all(|&value| value > 0.0 && value.is_finite()) {
             return Err(Error::Usage(format!(
@@ -129,13 +128,10 @@ impl ToXyz {
         let mut metadata = input.metadata.becoming(quantity);
         metadata.set_black_adu(None);
         metadata.white_level_adu = None;
-        metadata.color = Some(ColorRecord {
-            xyz_from_camera: settings.xyz_from_camera,
-            method: settings.method.clone(),
-            black_adu: black,
-            white: known_white.then_some(white),
-            matrix_residual: settings.residual.clone(),
-        });
+        metadata.color = Some(record);
+        if settings.is_relative {
+            metadata.unit = quantity.relative_unit().into();
+        }
         let geometry = input.geometry.with_channels(&channels);
         let srgb_from_xyz = if needs_white { linear_srgb_from_xyz(white) } else { Matrix3::identity() };
         let header = FrameHeader { name: input.name.clone(), geometry, metadata };
@@ -152,7 +148,7 @@ impl ToXyz {
         self.white
     }
 
-    /// XYZ from ADU above black, the exposure included.
+    /// XYZ from ADU above black, the exposure or the range of codes included.
     pub fn xyz_from_adu(&self) -> &Matrix3<f64> {
         &self.xyz_from_adu
     }
@@ -207,6 +203,59 @@ impl ToXyz {
         }
         counts
     }
+}
+
+/// XYZ of a white of this chromaticity at a luminance, or as it is given.
+fn white_of(white: White, luminance: f64) -> [f64; 3] {
+    match white {
+        White::Absolute(white) => white,
+        White::D65 => xyz_of_chromaticity(D65_XY, luminance),
+        White::EqualEnergy => xyz_of_chromaticity([1.0 / 3.0, 1.0 / 3.0], luminance),
+    }
+}
+
+/// XYZ of the white that colors refer to; none where its luminance is that at which the camera saturates, and the white
+/// level is unknown.
+fn reference_white(
+    input: &FrameHeader,
+    settings: &ColorSettings,
+    xyz_from_adu: &Matrix3<f64>,
+    black: f64,
+) -> Result<Option<[f64; 3]>> {
+    if settings.is_relative && settings.white_luminance.is_some() {
+        let problem = "the matrix gives relative XYZ, in which the white has Y = 1 and no luminance in cd/m2";
+        return Err(Error::Usage(format!("{}: {problem}", input.name)).leave_out(&["white_luminance"]));
+    }
+    if let White::Absolute(white) = settings.white {
+        return Ok(Some(white));
+    }
+    if settings.is_relative {
+        return Ok(Some(white_of(settings.white, 1.0)));
+    }
+    let at_saturation = || -> Option<f64> {
+        let range = input.metadata.white_level_adu?.less([black; 3]).classes();
+        Some((xyz_from_adu * Vector3::from(range)).y)
+    };
+    let luminance = settings.white_luminance.or_else(at_saturation);
+    Ok(luminance.map(|luminance| white_of(settings.white, luminance)))
+}
+
+/// White level less black level of R, G and B.
+fn range(input: &FrameHeader, black: f64) -> Result<[f64; 3]> {
+    let Some(white) = input.metadata.white_level_adu else {
+        return Err(input.refuse(
+            "the metadata has no `white_level_adu`, in which relative XYZ are counted; add it to its metadata, or take a \
+             matrix for absolute XYZ",
+        ));
+    };
+    let range = white.less([black; 3]).classes();
+    if range.iter().all(|range| *range > 0.0 && range.is_finite()) {
+        return Ok(range);
+    }
+    Err(input.refuse(format!(
+        "its white level, {}, is not above its black level, {black}; relative XYZ are counted between them",
+        white.classes().map(|level| level.to_string()).join(", ")
+    )))
 }
 
 /// Makes sure that a frame holds the three planes of a camera's codes.

@@ -82,7 +82,19 @@ impl QuantityKind {
             Self::Lab | Self::Srgb | Self::ColorDifference => "1",
         }
     }
+
+    /// The unit of colors that follow from relative XYZ; [`Self::unit`] of those that have no luminance.
+    pub fn relative_unit(self) -> &'static str {
+        match self {
+            Self::Xyz => RELATIVE_UNIT,
+            Self::Xyy => "1, 1, relative",
+            other => other.unit(),
+        }
+    }
 }
+
+/// Unit of relative XYZ: Y = 1 for the white by which the first class of a camera reaches its white level.
+pub const RELATIVE_UNIT: &str = "relative";
 
 impl fmt::Display for QuantityKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -10,7 +10,7 @@ use crate::camera::response::SpectralResponse;
 use crate::camera::sensor::Sensor;
 use crate::color::difference::DifferenceReport;
 use crate::error::{Error, Result};
-use crate::metadata::MatrixResidual;
+use crate::metadata::{MatrixResidual, RelativeMatrix};
 use crate::spectrum::{Observer, SpectralLibrary, WavelengthGrid, fold};
 use crate::units::{CM2_PER_M2, LUMINOUS_EFFICACY_LM_PER_W};
 use nalgebra::DMatrix;
@@ -20,6 +20,10 @@ use serde::{Deserialize, Serialize};
 pub const MATRIX_SCHEMA: &str = "cyanometer-matrix/1";
 /// The unit of the elements of a matrix.
 pub const MATRIX_UNIT: &str = "cd m-2 per (ADU s-1 sr-1)";
+
+/// The unit of the elements of a matrix for relative XYZ: signals are shares of white level less black level, and Y = 1
+/// is the white by which the first class reaches its white level.
+pub const RELATIVE_MATRIX_UNIT: &str = "relative XYZ per (white level - black level)";
 
 /// A matrix file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,8 +42,12 @@ pub struct CameraMatrix {
     /// Unit of the elements.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// Rows X, Y, Z; columns R, G, B: XYZ from ADU above black, per s sr of exposure.
+    /// Rows X, Y, Z; columns R, G, B: XYZ from ADU above black, per s sr of exposure or, for relative XYZ, per share of white
+    /// level less black level.
     pub xyz_from_camera: [[f64; 3]; 3],
+    /// Chromaticity of the white that has Y = 1, of a matrix for relative XYZ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub white_xy: Option<[f64; 2]>,
     /// Condition number of the training signals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<f64>,
@@ -64,6 +72,46 @@ pub struct CameraMatrix {
 }
 
 impl CameraMatrix {
+    /// That of a raw file, for relative XYZ.
+    pub fn relative(matrix: &RelativeMatrix) -> Self {
+        Self {
+            method: Some(matrix.method.clone()),
+            white_xy: Some(matrix.white_xy),
+            ..Self::bare(RELATIVE_MATRIX_UNIT, matrix.xyz_from_camera)
+        }
+    }
+
+    /// That of a sensor's description.
+    pub fn of_sensor(sensor: String, xyz_from_camera: [[f64; 3]; 3]) -> Self {
+        let method = Some("xyz_from_camera of the sensor".into());
+        Self { sensor: Some(sensor), method, ..Self::bare(MATRIX_UNIT, xyz_from_camera) }
+    }
+
+    /// A matrix of which no more is known.
+    fn bare(unit: &str, xyz_from_camera: [[f64; 3]; 3]) -> Self {
+        Self {
+            schema: MATRIX_SCHEMA.into(),
+            sensor: None,
+            filter: None,
+            method: None,
+            unit: Some(unit.into()),
+            xyz_from_camera,
+            white_xy: None,
+            condition: None,
+            rank: None,
+            training: None,
+            uncertainty: None,
+            performance: None,
+            observer: None,
+            wavelengths: None,
+        }
+    }
+
+    /// Whether it gives relative XYZ.
+    pub fn is_relative(&self) -> bool {
+        self.unit.as_deref() == Some(RELATIVE_MATRIX_UNIT)
+    }
+
     /// How far it is off on what it was fitted on.
     pub fn residual(&self) -> Option<MatrixResidual> {
         let Training { library, relative_rms, .. } = self.training.as_ref()?;
@@ -142,8 +190,10 @@ impl CameraMatrix {
         if self.schema != MATRIX_SCHEMA {
             return Err(format!("its schema is `{}`, not `{MATRIX_SCHEMA}`", self.schema));
         }
-        if let Some(unit) = self.unit.as_ref().filter(|unit| *unit != MATRIX_UNIT) {
-            return Err(format!("its unit is `{unit}`, but only `{MATRIX_UNIT}` is understood"));
+        if let Some(unit) =
+            self.unit.as_ref().filter(|unit| ![MATRIX_UNIT, RELATIVE_MATRIX_UNIT].contains(&unit.as_str()))
+        {
+            return Err(format!("its unit is `{unit}`; understood are `{MATRIX_UNIT}` and `{RELATIVE_MATRIX_UNIT}`"));
         }
         if crate::color::matrix(&self.xyz_from_camera).try_inverse().is_none() {
             return Err("its `xyz_from_camera` is singular: three signals would not give three stimuli".into());

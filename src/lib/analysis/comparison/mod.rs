@@ -283,6 +283,7 @@ mod tests {
     fn frame(quantity: QuantityKind, white: Option<[f64; 3]>, channels: &[&str]) -> MemoryFrame {
         let mut metadata = Metadata::new(quantity);
         metadata.color = white.map(|white| ColorRecord {
+            range_adu: None,
             xyz_from_camera: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             method: None,
             black_adu: 0.0,

@@ -68,6 +68,33 @@ fn in_words([x, y, z]: [f64; 3]) -> String {
     format!("XYZ {x:.6} {y:.6} {z:.6}")
 }
 
+/// Refuses relative XYZ beside absolute ones, and a luminance of their white. Two of L\*a\*b\* are beyond scales.
+fn check_scales(headers: [Option<&FrameHeader>; 2], spaces: [Space; 2], settings: &ComparisonSettings) -> Result<()> {
+    let is_relative = |header: &FrameHeader| header.metadata.is_relative();
+    if spaces == [Space::Lab; 2] {
+        return Ok(());
+    }
+    let known = headers.map(|header| header.filter(|header| header.metadata.quantity != QuantityKind::Unspecified));
+    if let [Some(first), Some(second)] = known
+        && is_relative(first) != is_relative(second)
+    {
+        let scale = |header| if is_relative(header) { "relative" } else { "absolute" };
+        return Err(second.refuse(format!(
+            "its colors are {}, those of {} {}; make both with matrices of one unit",
+            scale(second),
+            first.name,
+            scale(first)
+        )));
+    }
+    match headers.into_iter().flatten().find(|header| is_relative(header)) {
+        Some(frame) if settings.white_luminance.is_some() => {
+            let problem = "its XYZ are relative: the white has Y = 1 and no luminance in cd/m2";
+            Err(frame.refuse(problem).leave_out(&["white_luminance"]))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The white that XYZ and xyY are seen under; none where both are L\*a\*b\*.
 ///
 /// It is the one asked for, else that of a frame of L\*a\*b\*, else that which the reference or the other records, else D65. Where
@@ -77,6 +104,7 @@ pub(super) fn white(
     spaces: [Space; 2],
     settings: &ComparisonSettings,
 ) -> Result<Option<[f64; 3]>> {
+    check_scales(headers, spaces, settings)?;
     let recorded = [0, 1].map(|i| {
         let header: &FrameHeader = headers[i]?;
         Some((header, header.metadata.color.as_ref()?.white?))

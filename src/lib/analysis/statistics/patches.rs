@@ -263,9 +263,8 @@ pub fn expected_electrons(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 
     let metadata = &frame.metadata;
     let camera_signals = |xyz: [f64; 3]| -> Option<[f64; 3]> {
         let record = metadata.color.as_ref()?;
-        let camera_from_xyz =
-            color::matrix(&record.xyz_from_camera).try_inverse()? * metadata.exposure?.exposure_s_sr();
-        Some((camera_from_xyz * Vector3::from(xyz) / metadata.adc?.adu_per_e).into())
+        let adu_from_xyz = record.xyz_from_adu(metadata.exposure)?.try_inverse()?;
+        Some((adu_from_xyz * Vector3::from(xyz) / metadata.adc?.adu_per_e).into())
     };
     let [first, second, third] = means;
     let electrons = match metadata.quantity {
@@ -399,6 +398,7 @@ mod tests {
         let white = [950.0, 1000.0, 1080.0];
         frame.metadata.exposure = Some(exposure);
         frame.metadata.color = Some(ColorRecord {
+            range_adu: None,
             xyz_from_camera,
             method: None,
             black_adu: 7.0,

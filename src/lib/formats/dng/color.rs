@@ -1,63 +1,160 @@
-//! The colors of a camera as a DNG tells them.
+//! The matrix of a DNG for relative XYZ \[DNG2023, ch. 6].
 
-use crate::color::{D65_XY, linear_srgb_from_xyz, matrix, rows_of, xyz_of_chromaticity};
-use nalgebra::Vector3;
+use super::image::RawImage;
+use super::tags::{self, DngTag};
+use crate::color;
+use crate::color::calibration::{Calibration, Illuminated, Light};
+use crate::error::{Error, Result};
+use crate::formats::data::load_observer;
+use crate::formats::tiff::TiffFile;
+use crate::metadata::RelativeMatrix;
+use nalgebra::Matrix3;
 
-/// What leads from XYZ to the signals of a camera, and from these to a picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CameraColor {
-    /// Signals of R, G and B from XYZ, scaled so that the largest of the signals of D65 with Y = 1 is 1 \[DNG2023,
-    /// ColorMatrix1].
-    pub camera_from_xyz: [[f64; 3]; 3],
-    /// The signals of D65, the largest 1.
-    pub neutral: [f64; 3],
-    /// Linear sRGB from signals; the neutral is white.
-    pub srgb_from_camera: [[f64; 3]; 3],
-}
+/// Numbers of illuminants (Exif, LightSource) and their temperatures, K, as Adobe's DNG SDK has them: of fluorescent lamps
+/// the middle of their range.
+const ILLUMINANTS: [(usize, f64); 20] = [
+    (1, 5500.0),
+    (2, 4150.0),
+    (3, 2850.0),
+    (4, 5500.0),
+    (9, 5500.0),
+    (10, 6500.0),
+    (11, 7500.0),
+    (12, 6400.0),
+    (13, 5050.0),
+    (14, 4150.0),
+    (15, 3525.0),
+    (16, 2925.0),
+    (17, 2850.0),
+    (18, 5500.0),
+    (19, 6500.0),
+    (20, 5500.0),
+    (21, 6500.0),
+    (22, 7500.0),
+    (23, 5000.0),
+    (24, 3200.0),
+];
 
-impl CameraColor {
-    /// Those of a matrix of any scale; none where it has no inverse, or daylight no signal in a class.
-    pub fn of(xyz_from_camera: &[[f64; 3]; 3]) -> Option<Self> {
-        let white = xyz_of_chromaticity(D65_XY, 1.0);
-        let inverse = matrix(xyz_from_camera).try_inverse()?;
-        let signals = inverse * Vector3::from(white);
-        let largest = signals.max();
-        if !signals.iter().all(|signal| *signal > 0.0 && signal.is_finite()) {
-            return None;
+/// The matrix for the light of the exposure, under the scene's own white; none where the file has none. Notes tell why one
+/// that is there is passed over, and what of it does not count.
+///
+/// ColorMatrix counts, not ForwardMatrix, whose XYZ are adapted to D50.
+///
+/// # Errors
+///
+/// Those of the disk alone: no sample depends on it.
+pub(super) fn relative_matrix(
+    file: &mut TiffFile,
+    image: &RawImage,
+    notes: &mut Vec<String>,
+) -> Result<Option<RelativeMatrix>> {
+    if image.is_monochrome || !tags::COLOR_MATRICES[0].is_in(&image.first) {
+        return Ok(None);
+    }
+    let found = match found(file, image) {
+        Err(Error::Format { problem, .. }) => Err(problem),
+        other => other?,
+    };
+    match found {
+        Ok(found) => {
+            note_exposure(file, image, notes)?;
+            Ok(Some(found))
         }
-        let camera_from_xyz = inverse / largest;
-        let srgb_from_camera = linear_srgb_from_xyz(white) * matrix(xyz_from_camera) * largest;
-        Some(Self {
-            camera_from_xyz: rows_of(&camera_from_xyz),
-            neutral: (signals / largest).into(),
-            srgb_from_camera: rows_of(&srgb_from_camera),
-        })
+        Err(why) => {
+            notes.push(format!("its color matrix is passed over: {why}"));
+            Ok(None)
+        }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn daylight_is_neutral_and_white() {
-        let xyz_from_camera = [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]];
-        let color = CameraColor::of(&xyz_from_camera).unwrap();
-        let white = Vector3::from(xyz_of_chromaticity(D65_XY, 1.0));
-        let neutral = Vector3::from(color.neutral);
-        assert!(
-            (matrix(&color.camera_from_xyz) * white - neutral).amax() < 1e-12 && (neutral.max() - 1.0).abs() < 1e-15
-        );
-        // The matrix of sRGB has four decimals.
-        assert!((matrix(&color.srgb_from_camera) * neutral).add_scalar(-1.0).amax() < 2e-4);
-        let scaled = CameraColor::of(&xyz_from_camera.map(|row| row.map(|x| 7.0 * x))).unwrap();
-        assert!((Vector3::from(scaled.neutral) - neutral).amax() < 1e-12);
+/// The matrix, or why it is passed over.
+fn found(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<RelativeMatrix, String>> {
+    let planes = tags::CFA_PLANE_COLOR.unsigned(file, image.directory(), 16)?;
+    if planes.is_some_and(|planes| planes != [0, 1, 2]) {
+        return Ok(Err("its classes are others than R, G and B (CFAPlaneColor)".into()));
     }
+    let light = match light(file, image)? {
+        Ok(light) => light,
+        Err(why) => return Ok(Err(why)),
+    };
+    let calibration = match calibration(file, image)? {
+        Ok(calibration) => calibration,
+        Err(why) => return Ok(Err(why)),
+    };
+    let name = if calibration.second.is_some() { "ColorMatrix1 and ColorMatrix2" } else { "ColorMatrix1" };
+    let observer = load_observer()?;
+    Ok(calibration.mapped(&observer, light).map(|mapped| RelativeMatrix {
+        xyz_from_camera: color::rows_of(&mapped.xyz_from_camera),
+        white_xy: mapped.white_xy,
+        method: format!("{name} of the DNG, for the white of the exposure, not adapted"),
+    }))
+}
 
-    #[test]
-    fn what_tells_no_colors_is_left_out() {
-        assert_eq!(CameraColor::of(&[[1.0; 3]; 3]), None);
-        assert_eq!(CameraColor::of(&[[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), None);
-        assert_eq!(CameraColor::of(&[[f64::NAN; 3]; 3]), None);
+/// The light of the exposure.
+fn light(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Light, String>> {
+    if let Some(neutral) = tags::AS_SHOT_NEUTRAL.exactly::<3>(file, &image.first)? {
+        return Ok(Ok(Light::Neutral(neutral)));
     }
+    let white = tags::AS_SHOT_WHITE_XY.exactly::<2>(file, &image.first)?;
+    Ok(white
+        .map(Light::White)
+        .ok_or_else(|| "nothing tells the white of the exposure (AsShotNeutral or AsShotWhiteXY)".to_owned()))
+}
+
+/// The matrices for one illuminant or two.
+fn calibration(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Calibration, String>> {
+    let first = &image.first;
+    if tags::COLOR_MATRIX_3.is_in(first) {
+        return Ok(Err("it has one for a third illuminant (ColorMatrix3), which is not supported".into()));
+    }
+    let mut matrix = |tag: DngTag| -> Result<Option<Matrix3<f64>>> {
+        Ok(tag.exactly::<9>(file, first)?.map(|elements| Matrix3::from_row_slice(&elements)))
+    };
+    let [one, two] = tags::COLOR_MATRICES;
+    let matrices = [matrix(one)?, matrix(two)?];
+    let [calibration_1, calibration_2] = tags::CAMERA_CALIBRATIONS;
+    let calibrations = [matrix(calibration_1)?, matrix(calibration_2)?];
+    let signature =
+        |file: &mut TiffFile, tag: DngTag| -> Result<String> { Ok(file.text(first, tag.tag())?.unwrap_or_default()) };
+    // Those of the camera count where the profile was made for them.
+    let [of_camera, of_profile] = tags::CALIBRATION_SIGNATURES;
+    let counts = signature(file, of_camera)? == signature(file, of_profile)?;
+    let mut set = |index: usize, color_matrix: Matrix3<f64>| -> Result<Illuminated> {
+        let known = tags::CALIBRATION_ILLUMINANTS[index].one(file, first)?.and_then(temperature_k);
+        let camera_calibration = calibrations[index].filter(|_| counts).unwrap_or_else(Matrix3::identity);
+        Ok(Illuminated { temperature_k: known.unwrap_or(0.0), color_matrix, camera_calibration })
+    };
+    let Some(one) = matrices[0].map(|matrix| set(0, matrix)).transpose()? else {
+        return Ok(Err("ColorMatrix1 is missing".into()));
+    };
+    let two = matrices[1].map(|matrix| set(1, matrix)).transpose()?;
+    if let Some(two) = &two
+        && (one.temperature_k == 0.0 || two.temperature_k == 0.0)
+    {
+        return Ok(Err(
+            "the temperature of an illuminant is not known (CalibrationIlluminant1, CalibrationIlluminant2)".into(),
+        ));
+    }
+    let analog_balance = tags::ANALOG_BALANCE.exactly::<3>(file, first)?.unwrap_or([1.0; 3]);
+    if !analog_balance.iter().all(|gain| *gain > 0.0) {
+        return Ok(Err("AnalogBalance has a number that is not above 0".into()));
+    }
+    Ok(Ok(Calibration { first: one, second: two, analog_balance }))
+}
+
+/// Temperature of an illuminant by its number; none of those that have none.
+fn temperature_k(number: usize) -> Option<f64> {
+    ILLUMINANTS.into_iter().find(|(known, _)| *known == number).map(|(_, kelvin)| kelvin)
+}
+
+/// Notes what a converter would brighten its picture by.
+fn note_exposure(file: &mut TiffFile, image: &RawImage, notes: &mut Vec<String>) -> Result<()> {
+    let brighter = match tags::BASELINE_EXPOSURE.exactly::<1>(file, &image.first) {
+        Err(Error::Format { .. }) => None,
+        other => other?,
+    };
+    if let Some([stops]) = brighter.filter(|[stops]| *stops != 0.0) {
+        notes.push(format!("its BaselineExposure of {stops} EV, a hint for pictures, is not applied"));
+    }
+    Ok(())
 }

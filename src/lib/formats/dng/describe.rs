@@ -1,6 +1,7 @@
 //! What a DNG's tags tell about its frame, in the project's terms.
 
 use super::area::{self, Rectangle};
+use super::color;
 use super::image::RawImage;
 use super::levels::Levels;
 use super::tags;
@@ -43,6 +44,7 @@ pub(super) fn describe(
         }
         found => found?,
     };
+    metadata.relative_matrix = color::relative_matrix(file, image, notes)?;
     if levels.table.is_some() {
         notes.push("samples are made linear by its LinearizationTable".into());
     }

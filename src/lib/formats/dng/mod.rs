@@ -14,6 +14,7 @@ mod preview;
 mod ratio;
 mod read;
 mod samples;
+mod signals;
 mod storage;
 mod tags;
 mod tell;

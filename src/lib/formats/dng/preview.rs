@@ -1,6 +1,6 @@
 //! A small picture of a raw image, made while its rows pass by.
 
-use super::color::CameraColor;
+use super::signals::CameraColor;
 use crate::camera::levels::BlackLevels;
 use crate::cfa::{Class, FilterArray};
 use crate::color::srgb_encode;

@@ -29,7 +29,19 @@ pub(super) const BLACK_DELTA_V: DngTag = DngTag(50716, "BlackLevelDeltaV");
 pub(super) const WHITE_LEVEL: DngTag = DngTag(50717, "WhiteLevel");
 pub(super) const DEFAULT_CROP_ORIGIN: DngTag = DngTag(50719, "DefaultCropOrigin");
 pub(super) const DEFAULT_CROP_SIZE: DngTag = DngTag(50720, "DefaultCropSize");
+pub(super) const COLOR_MATRICES: [DngTag; 2] = [DngTag(50721, "ColorMatrix1"), DngTag(50722, "ColorMatrix2")];
+pub(super) const COLOR_MATRIX_3: DngTag = DngTag(52531, "ColorMatrix3");
+pub(super) const CAMERA_CALIBRATIONS: [DngTag; 2] =
+    [DngTag(50723, "CameraCalibration1"), DngTag(50724, "CameraCalibration2")];
+pub(super) const ANALOG_BALANCE: DngTag = DngTag(50727, "AnalogBalance");
 pub(super) const AS_SHOT_NEUTRAL: DngTag = DngTag(50728, "AsShotNeutral");
+pub(super) const AS_SHOT_WHITE_XY: DngTag = DngTag(50729, "AsShotWhiteXY");
+pub(super) const BASELINE_EXPOSURE: DngTag = DngTag(50730, "BaselineExposure");
+pub(super) const CALIBRATION_ILLUMINANTS: [DngTag; 2] =
+    [DngTag(50778, "CalibrationIlluminant1"), DngTag(50779, "CalibrationIlluminant2")];
+/// Of the camera, of the profile.
+pub(super) const CALIBRATION_SIGNATURES: [DngTag; 2] =
+    [DngTag(50931, "CameraCalibrationSignature"), DngTag(50932, "ProfileCalibrationSignature")];
 pub(super) const SUB_TILE_BLOCK: DngTag = DngTag(50974, "SubTileBlockSize");
 pub(super) const ROW_INTERLEAVE: DngTag = DngTag(50975, "RowInterleaveFactor");
 pub(super) const COLUMN_INTERLEAVE: DngTag = DngTag(52547, "ColumnInterleaveFactor");

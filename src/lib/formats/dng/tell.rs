@@ -1,10 +1,10 @@
 //! What the tags of a DNG tell of a frame of ours.
 
-use super::color::CameraColor;
 use super::describe::LETTERS;
 use super::image::{CFA, LINEAR_RAW};
 use super::preview::Preview;
 use super::ratio::{ratio, signed};
+use super::signals::CameraColor;
 use super::tags;
 use crate::camera::levels::{BlackLevels, WhiteLevel};
 use crate::cfa::FilterArray;

@@ -81,6 +81,7 @@ impl Fitting<'_> {
             method: Some(self.fit.regression.name().into()),
             unit: Some(MATRIX_UNIT.into()),
             xyz_from_camera: fitted.xyz_from_camera,
+            white_xy: None,
             // None where a ridge stands in for signals that are missing.
             condition: Some(fitted.condition).filter(|condition| condition.is_finite()),
             rank: Some(fitted.rank),
@@ -145,6 +146,7 @@ impl Fitting<'_> {
             method: self.fit.demosaic,
             pattern: None,
             color: ColorSettings {
+                is_relative: false,
                 xyz_from_camera,
                 method: None,
                 residual: None,

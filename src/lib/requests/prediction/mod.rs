@@ -4,6 +4,7 @@ mod sweep;
 
 pub use sweep::Sweep;
 
+use super::conversion::doubt_of_white;
 use super::notes::Note;
 use super::options::{ExposureChoice, NoiseChoice, SignalLevel, SpectrumChoice, Subject, WhiteChoice, defaults};
 use super::scene::{Scene, Uniform};
@@ -323,7 +324,9 @@ impl NoisePrediction {
             let text = format!("{} was fitted for the sensor {of_matrix}, not {}", path.display(), sensor.name);
             notes.push(Note::Warning(text));
         }
+        notes.extend(doubt_of_white(self.white.white, &matrix));
         Ok(Some(ColorSettings {
+            is_relative: matrix.is_relative(),
             xyz_from_camera: matrix.xyz_from_camera,
             residual: matrix.residual(),
             method: matrix.method,

@@ -1,0 +1,198 @@
+//! From a camera's signals to XYZ by the matrices of its makers, as a DNG has them \[DNG2023, ch. 6, Mapping Camera Color
+//! Space to CIE XYZ Space].
+
+use super::temperature::correlated;
+use super::xyz_of_chromaticity;
+use crate::spectrum::Observer;
+use nalgebra::{Matrix3, Vector3};
+
+/// Chromaticity of D50, where the search for a white begins.
+const D50_XY: [f64; 2] = [0.3457, 0.3585];
+
+/// Steps of that search, and where it ends, as Adobe's own program has them.
+const MOST_STEPS: usize = 30;
+const NEAR: f64 = 1e-7;
+
+/// The matrices for one illuminant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Illuminated {
+    /// Temperature of the illuminant, K; 0 where there is only one.
+    pub temperature_k: f64,
+    /// Reference camera from XYZ, CM.
+    pub color_matrix: Matrix3<f64>,
+    /// This camera from the reference camera, CC.
+    pub camera_calibration: Matrix3<f64>,
+}
+
+/// What is known of the light of an exposure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Light {
+    /// Signals of R, G and B of what is white, in any unit.
+    Neutral([f64; 3]),
+    /// Its chromaticity.
+    White([f64; 2]),
+}
+
+/// A camera's matrices for one illuminant or two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Calibration {
+    /// That of the one or of the first illuminant.
+    pub first: Illuminated,
+    /// That of the second.
+    pub second: Option<Illuminated>,
+    /// Gains before the converter, AB.
+    pub analog_balance: [f64; 3],
+}
+
+/// A matrix for a white.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mapped {
+    /// XYZ from signals, shares of white level less black level. The white whose largest signal is 1 has Y = 1.
+    pub xyz_from_camera: Matrix3<f64>,
+    /// Chromaticity of the white.
+    pub white_xy: [f64; 2],
+}
+
+impl Calibration {
+    /// The matrix for a light. XYZ are those of the scene under its own light: nothing adapts them to D50.
+    ///
+    /// XYZ = (AB · CC · CM)⁻¹ · camera, times the largest signal of the white of Y = 1
+    ///
+    /// # Errors
+    ///
+    /// What is wrong, in words: matrices that cannot be inverted, or a light that is none.
+    pub fn mapped(&self, observer: &Observer, light: Light) -> Result<Mapped, String> {
+        let white_xy = match light {
+            Light::White(xy) => checked(xy)?,
+            Light::Neutral(neutral) => self.white_of(observer, neutral)?,
+        };
+        let camera_from_xyz = self.camera_from_xyz(observer, white_xy);
+        let white = camera_from_xyz * Vector3::from(xyz_of_chromaticity(white_xy, 1.0));
+        let largest = white.max();
+        if !(white.min() > 0.0 && largest.is_finite()) {
+            return Err(format!("under the white {} they give a signal that is not above 0", in_words(white_xy)));
+        }
+        Ok(Mapped { xyz_from_camera: inverse(&camera_from_xyz)? * largest, white_xy })
+    }
+
+    /// Camera from XYZ for a white, AB · CC · CM: CM and CC are linear in the reciprocal of its correlated color temperature
+    /// between those of the illuminants, and constant beyond.
+    pub fn camera_from_xyz(&self, observer: &Observer, white_xy: [f64; 2]) -> Matrix3<f64> {
+        let share = self.share_of_first(observer, white_xy);
+        let mixed = |of: fn(&Illuminated) -> Matrix3<f64>| match &self.second {
+            Some(second) => of(&self.first) * share + of(second) * (1.0 - share),
+            None => of(&self.first),
+        };
+        let analog_balance = Matrix3::from_diagonal(&Vector3::from(self.analog_balance));
+        analog_balance * mixed(|set| set.camera_calibration) * mixed(|set| set.color_matrix)
+    }
+
+    fn share_of_first(&self, observer: &Observer, white_xy: [f64; 2]) -> f64 {
+        let Some(second) = &self.second else { return 1.0 };
+        let reciprocals = [self.first.temperature_k, second.temperature_k].map(f64::recip);
+        if reciprocals[0] == reciprocals[1] {
+            return 1.0;
+        }
+        let at = correlated(observer, white_xy).temperature_k.recip();
+        ((at - reciprocals[1]) / (reciprocals[0] - reciprocals[1])).clamp(0.0, 1.0)
+    }
+
+    /// The chromaticity whose signals are in proportion to `neutral`: the matrix depends on it, so that it is guessed, from D50
+    /// on, until it stays. Where it goes to and fro the last two are averaged.
+    fn white_of(&self, observer: &Observer, neutral: [f64; 3]) -> Result<[f64; 2], String> {
+        if !neutral.iter().all(|signal| *signal > 0.0 && signal.is_finite()) {
+            return Err("AsShotNeutral has a number that is not above 0".into());
+        }
+        let mut last = D50_XY;
+        for _ in 0..MOST_STEPS {
+            let xyz = inverse(&self.camera_from_xyz(observer, last))? * Vector3::from(neutral);
+            let next = checked([xyz.x / xyz.sum(), xyz.y / xyz.sum()])?;
+            if (next[0] - last[0]).abs() + (next[1] - last[1]).abs() < NEAR {
+                return Ok(next);
+            }
+            last = if self.second.is_some() { next } else { return Ok(next) };
+        }
+        let before = last;
+        let xyz = inverse(&self.camera_from_xyz(observer, last))? * Vector3::from(neutral);
+        checked([0, 1].map(|i| 0.5 * (before[i] + xyz[i] / xyz.sum())))
+    }
+}
+
+fn in_words([x, y]: [f64; 2]) -> String {
+    format!("x {x:.4}, y {y:.4}")
+}
+
+/// A chromaticity that light can have, roughly.
+fn checked(xy: [f64; 2]) -> Result<[f64; 2], String> {
+    let [x, y] = xy;
+    if x > 0.0 && y > 0.0 && x + y < 1.0 {
+        Ok(xy)
+    } else {
+        Err(format!("the white of the exposure, {}, is no light", in_words(xy)))
+    }
+}
+
+fn inverse(matrix: &Matrix3<f64>) -> Result<Matrix3<f64>, String> {
+    matrix.try_inverse().ok_or_else(|| "they are singular: three signals would not give three stimuli".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::D65_XY;
+    use crate::formats::data::load_observer;
+
+    fn two() -> Calibration {
+        let set = |temperature_k, color_matrix| Illuminated {
+            temperature_k,
+            color_matrix,
+            camera_calibration: Matrix3::identity(),
+        };
+        // Of the size of a camera's, for A and D65.
+        let warm = Matrix3::new(0.7, -0.1, -0.05, -0.45, 1.25, 0.22, -0.07, 0.17, 0.55);
+        let cold = Matrix3::new(0.6, -0.05, -0.08, -0.5, 1.3, 0.2, -0.1, 0.2, 0.65);
+        Calibration { first: set(2850.0, warm), second: Some(set(6500.0, cold)), analog_balance: [1.0; 3] }
+    }
+
+    /// A neutral made of a white leads back to it, and the matrix takes the neutral of largest signal 1 to Y = 1; the
+    /// search ends within 10⁻⁷, each step being a few times nearer.
+    #[test]
+    fn a_neutral_leads_back_to_its_white() {
+        let observer = load_observer().unwrap();
+        let calibration = Calibration { analog_balance: [1.0, 0.8, 1.3], ..two() };
+        for white in [D50_XY, D65_XY, [0.40, 0.39], [0.46, 0.41], [0.28, 0.29]] {
+            let signals =
+                calibration.camera_from_xyz(&observer, white) * Vector3::from(xyz_of_chromaticity(white, 3.7));
+            let mapped = calibration.mapped(&observer, Light::Neutral(signals.into())).unwrap();
+            assert!((0..2).all(|i| (mapped.white_xy[i] - white[i]).abs() < 1e-6), "{mapped:?}, not {white:?}");
+            let known = calibration.mapped(&observer, Light::White(white)).unwrap();
+            let xyz = known.xyz_from_camera * (signals / signals.max());
+            let expected = Vector3::from(xyz_of_chromaticity(white, 1.0));
+            assert!((xyz - expected).norm() < 1e-12, "{xyz} {expected}");
+        }
+    }
+
+    #[test]
+    fn beyond_the_illuminants_their_own_matrices_count_and_between_them_mireds() {
+        let (observer, calibration) = (load_observer().unwrap(), two());
+        let body = |temperature_k| crate::color::locus::planckian(&observer, temperature_k);
+        let at = |temperature_k| calibration.camera_from_xyz(&observer, body(temperature_k));
+        let second = calibration.second.unwrap().color_matrix;
+        assert_eq!(at(2000.0), calibration.first.color_matrix);
+        assert_eq!(at(9000.0), second);
+        let middle = 2.0 / (1.0 / 2850.0 + 1.0 / 6500.0);
+        let expected = (calibration.first.color_matrix + second) * 0.5;
+        assert!((at(middle) - expected).norm() < 1e-4);
+    }
+
+    #[test]
+    fn what_is_no_light_or_no_matrix_is_told() {
+        let observer = load_observer().unwrap();
+        let told = |calibration: Calibration, light| calibration.mapped(&observer, light).unwrap_err();
+        assert!(told(two(), Light::Neutral([0.0, 1.0, 1.0])).contains("AsShotNeutral"));
+        assert!(told(two(), Light::White([0.9, 0.2])).contains("is no light"));
+        let flat = Illuminated { color_matrix: Matrix3::repeat(1.0), ..two().first };
+        let singular = Calibration { first: flat, second: None, ..two() };
+        assert!(told(singular, Light::White(D65_XY)).contains("singular"));
+    }
+}
