@@ -78,6 +78,7 @@ fn named_output_is_the_standard_output_byte_for_byte() {
         ("correct-frame --quiet --black auto --cte 0.999", "plane.exr"),
         ("demosaic --method shti", "plane.exr"),
         ("to-xyz --matrix matrix.yaml --space srgb", "rgb.exr"),
+        ("to-xyz", "rgb.exr"),
         ("measure", "noisy.exr"),
         ("measure --output-format json", "noisy.exr"),
     ]

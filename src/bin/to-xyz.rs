@@ -46,7 +46,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
     announce(&[output.output.as_deref()])?;
-    check_inputs([arguments.input.input.as_deref(), conversion.matrix.as_deref()])?;
+    check_inputs(conversion.matrix.as_deref().map(Some).into_iter().chain([arguments.input.input.as_deref()]))?;
     let matrix = conversion.load_matrix()?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
