@@ -127,8 +127,8 @@ pub enum FilterArray {
 /// Most columns, and most rows, after which a described array repeats itself.
 const MAX_PERIOD: usize = 8;
 
-/// Letters of filters: red, green, blue, cyan, magenta, yellow, white.
-const FILTERS: &str = "RGBCMYW";
+/// Letters of filters, in the order of their numbers in CFAPattern \[TIFF/EP]: red, green, blue, cyan, magenta, yellow, white.
+pub const FILTERS: &str = "RGBCMYW";
 
 /// The period of an array that is no Bayer pattern, at the sensor's corner; the smallest that there is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -81,12 +81,26 @@ pub fn read_table(input: impl Read, name: &str) -> Result<Vec<u8>> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+    use std::io::Write;
 
     #[test]
     fn what_never_ends_is_not_read_for_ever() {
         let complaint = read_file(Path::new("/dev/zero")).unwrap_err().to_string();
         assert!(complaint.contains("longer than 256 MiB"), "{complaint}");
+    }
+
+    /// Bytes as a file that stands at its start, or as what comes down a pipe, which holds them.
+    pub(in crate::formats) fn of_bytes(bytes: &[u8], piped: bool) -> File {
+        if piped {
+            let (output, mut input) = io::pipe().unwrap();
+            input.write_all(bytes).unwrap();
+            return File::from(std::os::fd::OwnedFd::from(output));
+        }
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(bytes).unwrap();
+        file.rewind().unwrap();
+        file
     }
 }

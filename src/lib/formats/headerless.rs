@@ -236,8 +236,7 @@ impl SampleReader for HeaderlessReader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::Write;
-    use std::os::fd::OwnedFd;
+    use crate::formats::files::tests::of_bytes;
 
     fn layout(text: &str) -> Layout {
         text.parse().unwrap()
@@ -246,16 +245,7 @@ mod tests {
     /// What a file and a pipe of these bytes give.
     fn read(bytes: &[u8], text: &str) -> [Result<Vec<f32>>; 2] {
         [false, true].map(|piped| {
-            let input = if piped {
-                let (output, mut input) = std::io::pipe().unwrap();
-                input.write_all(bytes).unwrap();
-                File::from(OwnedFd::from(output))
-            } else {
-                let mut file = tempfile::tempfile().unwrap();
-                file.write_all(bytes).unwrap();
-                file.rewind().unwrap();
-                file
-            };
+            let input = of_bytes(bytes, piped);
             let mut reader = open(input, "in.raw", 0, layout(text))?;
             let mut samples = Vec::new();
             for _ in 0..reader.geometry().height {

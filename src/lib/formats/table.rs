@@ -84,28 +84,19 @@ pub fn names_of_read() -> String {
 mod tests {
     use super::*;
     use crate::cfa::FilterArray;
+    use crate::formats::files::tests::of_bytes;
     use crate::formats::input::{FrameReader, InputOptions};
     use crate::formats::tiff::{ExtraTag, TagValue, TiffCompression, TiffSamples, TiffSettings, TiffTags, TiffWriter};
     use crate::frame::Geometry;
     use crate::stream::RowSource;
-    use std::io::{Cursor, Write};
-    use std::os::fd::OwnedFd;
+    use std::io::Cursor;
 
     const RAW: &str = "which is not read yet; write its codes as a TIFF first, for example with `unprocessed_raw -T` of \
                        LibRaw, and name that file";
 
     /// Opens bytes as a file or as what comes down a pipe, which holds them.
     fn open(bytes: &[u8], piped: bool) -> Result<FrameReader> {
-        let input = if piped {
-            let (output, mut input) = std::io::pipe().unwrap();
-            input.write_all(bytes).unwrap();
-            File::from(OwnedFd::from(output))
-        } else {
-            let mut file = tempfile::tempfile().unwrap();
-            file.write_all(bytes).unwrap();
-            std::io::Seek::rewind(&mut file).unwrap();
-            file
-        };
+        let input = of_bytes(bytes, piped);
         FrameReader::open_file(input, "in", None, &InputOptions::default())
     }
 

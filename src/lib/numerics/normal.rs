@@ -102,11 +102,7 @@ impl NearlyNormal {
             return (self.mean - limit).max(0.0);
         }
         let (skewness, kurtosis) = (self.third / sigma.powi(3), self.fourth / sigma.powi(4));
-        let (phi, square) = (density(z), z * z);
-        let series = skewness / 6.0 * z
-            + kurtosis / 24.0 * (square - 1.0)
-            + skewness * skewness / 72.0 * (square * (square - 6.0) + 3.0);
-        sigma * (phi - z * cumulative(-z) + phi * series)
+        sigma * first_tail(z, [density(z), cumulative(-z)], skewness, kurtosis)
     }
 
     /// Mean and variance of the smaller of the variable and `limit`.
@@ -124,12 +120,8 @@ impl NearlyNormal {
         }
         let (skewness, kurtosis) = (self.third / sigma.powi(3), self.fourth / sigma.powi(4));
         let (phi, tail) = (density(z), cumulative(-z));
-        // ∫ He_n φ from z upward is He_{n−1}(z) φ(z).
-        let he4 = z.powi(4) - 6.0 * z * z + 3.0;
         let he3 = z * (z * z - 3.0);
-        let he2 = z * z - 1.0;
-        // First tail integral I₁ = ∫_z^∞ P(X > t) dt = E[(X − z)₊], in units of σ.
-        let first = phi - z * tail + phi * (skewness / 6.0 * z + kurtosis / 24.0 * he2 + skewness.powi(2) / 72.0 * he4);
+        let first = first_tail(z, [phi, tail], skewness, kurtosis);
         // Second, I₂ = ∫_z^∞ (t − z) P(X > t) dt = ½ E[(X − z)₊²].
         let second = 0.5 * ((1.0 + z * z) * tail - z * phi)
             + phi * (skewness / 6.0 + kurtosis / 24.0 * z + skewness.powi(2) / 72.0 * he3);
@@ -138,6 +130,15 @@ impl NearlyNormal {
         let variance = 1.0 + z * z - 2.0 * second - mean * mean;
         MeanVariance { mean: limit + sigma * mean, variance: (self.variance * variance).max(0.0) }
     }
+}
+
+/// The first tail integral I₁ = ∫_z^∞ P(X > t) dt = E[(X − z)₊] of Edgeworth's series, in units of σ; φ(z) and 1 − Φ(z) are
+/// given.
+fn first_tail(z: f64, [phi, tail]: [f64; 2], skewness: f64, kurtosis: f64) -> f64 {
+    // ∫ He_n φ from z upward is He_{n−1}(z) φ(z).
+    let he4 = z.powi(4) - 6.0 * z * z + 3.0;
+    let he2 = z * z - 1.0;
+    phi - z * tail + phi * (skewness / 6.0 * z + kurtosis / 24.0 * he2 + skewness.powi(2) / 72.0 * he4)
 }
 
 /// Expected length and standard deviation of the length of a normal vector of three components.

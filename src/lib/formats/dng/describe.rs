@@ -6,15 +6,12 @@ use super::image::RawImage;
 use super::levels::Levels;
 use super::tags;
 use crate::camera::optics::Exposure;
-use crate::cfa::FilterArray;
+use crate::cfa::{FILTERS, FilterArray};
 use crate::error::{Error, Result};
 use crate::formats::tiff::{Directory, TiffFile};
 use crate::metadata::Metadata;
 use crate::units::QuantityKind;
 use tiff::tags::Tag;
-
-/// Letters of the filters by their number \[DNG2023, CFAPlaneColor].
-pub(super) const LETTERS: &[u8; 7] = b"RGBCMYW";
 
 /// What is known of the frame, with notes on what is passed over.
 ///
@@ -108,33 +105,21 @@ fn filters(file: &mut TiffFile, image: &RawImage, active: Rectangle) -> Result<F
     }
     let planes = tags::CFA_PLANE_COLOR.unsigned(file, directory, 16)?.unwrap_or_else(|| vec![0, 1, 2]);
     let mut letters = String::with_capacity(count);
-    for y in 0..rows {
-        for x in 0..columns {
-            // The site at the sensor's corner lies so many before that of the active area.
-            let [x, y] = [(x + shift(active.left, columns)) % columns, (y + shift(active.top, rows)) % rows];
-            let code = codes[y * columns + x];
-            let letter = usize::try_from(code).ok().and_then(|code| LETTERS.get(code));
-            let Some(letter) = letter.filter(|_| planes.contains(&code)) else {
-                return Err(
-                    file.problem(format!("it is damaged; its CFAPattern has a filter {code} that it does not name"))
-                );
-            };
-            letters.push(char::from(*letter));
-        }
-        if letters.len() > 64 {
-            break;
-        }
+    for code in &codes[..count] {
+        let letter = usize::try_from(*code).ok().and_then(|code| FILTERS.chars().nth(code));
+        let Some(letter) = letter.filter(|_| planes.contains(code)) else {
+            return Err(
+                file.problem(format!("it is damaged; its CFAPattern has a filter {code} that it does not name"))
+            );
+        };
+        letters.push(letter);
     }
-    format!("{columns}x{rows}:{letters}").parse().map_err(|_| {
+    let first = [active.left, active.top].map(|place| place as i64);
+    FilterArray::beginning_at(first, columns, rows, &letters).map_err(|_| {
         file.problem(format!(
             "its filter array has a period of {columns}x{rows} sites (CFARepeatPatternDim); up to 8x8 are supported"
         ))
     })
-}
-
-/// How far the site at the corner of the sensor lies behind that of the area, modulo the period.
-fn shift(first: usize, period: usize) -> usize {
-    (period - first % period) % period
 }
 
 /// Exposure time and f-number, where both are known.

@@ -1,13 +1,12 @@
 //! What the tags of a DNG tell of a frame of ours.
 
-use super::describe::LETTERS;
 use super::image::{CFA, LINEAR_RAW};
 use super::preview::Preview;
 use super::ratio::{ratio, signed};
 use super::signals::CameraColor;
 use super::tags;
 use crate::camera::levels::{BlackLevels, WhiteLevel};
-use crate::cfa::FilterArray;
+use crate::cfa::{FILTERS, FilterArray};
 use crate::error::{Error, Result};
 use crate::formats::tiff::{ExtraTag, TagValue, TiffSamples};
 use crate::metadata::{FrameHeader, Metadata};
@@ -125,7 +124,7 @@ fn places(header: &FrameHeader, cfa: FilterArray) -> Vec<ExtraTag> {
 
 /// The number of a filter.
 fn code(filter: char) -> u8 {
-    let place = LETTERS.iter().position(|letter| char::from(*letter) == filter);
+    let place = FILTERS.chars().position(|letter| letter == filter);
     place.and_then(|place| u8::try_from(place).ok()).unwrap_or(u8::MAX)
 }
 

@@ -6,7 +6,7 @@ use super::directory::{Directory, TiffFile};
 use super::layout::{Layout, PHOTOMETRIC_CFA, passed_over};
 use crate::camera::levels::{BlackLevel, WhiteLevel};
 use crate::camera::optics::Exposure;
-use crate::cfa::FilterArray;
+use crate::cfa::{FILTERS, FilterArray};
 use crate::error::Result;
 use crate::formats::format::SampleType;
 use crate::metadata::Metadata;
@@ -31,9 +31,6 @@ const BLACK_DELTAS: [Tag; 2] = [Tag::Unknown(50715), Tag::Unknown(50716)];
 const WHITE_LEVEL: Tag = Tag::Unknown(50717);
 /// ActiveArea: top, left, bottom, right; the pattern and the levels begin at its corner.
 const ACTIVE_AREA: Tag = Tag::Unknown(50829);
-
-/// Letters of the filters 0, 1, 2 … of CFAPattern \[TIFF/EP]: red, green, blue, cyan, magenta, yellow, white.
-const FILTERS: &[u8] = b"RGBCMYW";
 
 /// Most sites of a period that is read.
 const MOST_SITES: u64 = 64;
@@ -122,9 +119,10 @@ fn filters(file: &mut TiffFile, directory: &Directory, first: [i64; 2]) -> Resul
         return Err(file.problem("its tags do not say which filters stand where"));
     };
     let side = |at: usize| size.get(at).and_then(|side| usize::try_from(*side).ok()).unwrap_or(0);
-    let letter =
-        |code: f64| (0_u8..).zip(FILTERS).find(|(number, _)| f64::from(*number) == code).map(|(_, letter)| *letter);
-    let Some(letters) = pattern.iter().map(|code| letter(*code).map(char::from)).collect::<Option<String>>() else {
+    let letter = |code: f64| {
+        (0_u8..).zip(FILTERS.chars()).find(|(number, _)| f64::from(*number) == code).map(|(_, letter)| letter)
+    };
+    let Some(letters) = pattern.iter().map(|code| letter(*code)).collect::<Option<String>>() else {
         return Err(file.problem("it has filters of a kind that is not known"));
     };
     let (rows, columns) = (side(0), side(1));
@@ -236,7 +234,7 @@ mod tests {
     fn other_arrays_are_described_or_passed_over() {
         let x_trans: Vec<u8> = "GBGGRGRGRBGBGBGGRGGRGGBGBGBRGRGRGGBG"
             .bytes()
-            .filter_map(|letter| FILTERS.iter().position(|filter| *filter == letter))
+            .filter_map(|letter| FILTERS.bytes().position(|filter| filter == letter))
             .map(|code| u8::try_from(code).unwrap())
             .collect();
         let (metadata, notes) = told(&plane(), TiffSamples::U16, &pattern(6, 6, &x_trans));

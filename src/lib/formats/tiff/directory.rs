@@ -214,7 +214,7 @@ impl TiffFile {
     /// When the file is damaged there.
     pub fn below(&mut self, directory: &Directory, tag: Tag) -> Result<Option<Directory>> {
         let Some(offset) = self.one(directory, tag)? else { return Ok(None) };
-        Ok(Some(self.directory_at(offset, true)?.0))
+        self.directory_below(offset).map(Some)
     }
 
     /// The bytes of a tag's first `at_most` values, and their type.
