@@ -80,8 +80,11 @@ const MISSING: &[Advice] = &[
     ),
     advice(
         "add-noise expected.exr --metadata expected.yaml --sensor kaf-5101ce -o out.exr",
-        ALL_ELSE,
-        &["add-noise expected.exr --metadata rendered.yaml --sensor kaf-5101ce -o out.exr"],
+        "no `exposure`; give --exposure S and --f-number N",
+        &[
+            "add-noise expected.exr --metadata expected.yaml --sensor kaf-5101ce --exposure 0.033 --f-number 8 -o out.exr",
+            "add-noise expected.exr --metadata rendered.yaml --sensor kaf-5101ce -o out.exr",
+        ],
     ),
     advice(
         "digitize noisy.exr --metadata electrons.yaml -o out.exr",

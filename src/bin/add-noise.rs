@@ -3,11 +3,10 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::input::FrameReader;
 use cyanometer::metadata::PoissonKind;
 use cyanometer::names::Named;
 use cyanometer::propagation::{self, Equations};
-use cyanometer::requests::{options, values};
+use cyanometer::requests::{described::DescribedInput, options, values};
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
@@ -24,7 +23,7 @@ static MEMORY: cli::Memory = cli::Memory;
 #[command(version)]
 struct Arguments {
     #[command(flatten)]
-    input: options::Input,
+    input: DescribedInput,
     /// Seed of the temporal noise
     #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>)]
     seed: u64,
@@ -52,12 +51,12 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| arguments.general.between(&arguments.input, &arguments.output);
+    let general = |arguments: &Arguments| arguments.general.between(&arguments.input.frame, &arguments.output);
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let mut reader = FrameReader::open(&arguments.input.options())?;
+    let mut reader = arguments.input.open()?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     session.tell(arguments.noise.doubt().as_slice());
     let settings = NoiseSettings {

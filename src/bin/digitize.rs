@@ -3,9 +3,8 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::input::FrameReader;
 use cyanometer::propagation::{self, Equations};
-use cyanometer::requests::{self, options, values};
+use cyanometer::requests::{self, described::DescribedInput, options, values};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stream::{RowSource, Stage};
 use std::process::ExitCode;
@@ -21,7 +20,7 @@ static MEMORY: cli::Memory = cli::Memory;
 #[command(version)]
 struct Arguments {
     #[command(flatten)]
-    input: options::Input,
+    input: DescribedInput,
     /// Bits of the converter, 1 to 16; by default the sensor's
     #[arg(long, value_name = "N")]
     bits: Option<u32>,
@@ -40,12 +39,12 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| arguments.general.between(&arguments.input, &arguments.output);
+    let general = |arguments: &Arguments| arguments.general.between(&arguments.input.frame, &arguments.output);
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let mut reader = FrameReader::open(&arguments.input.options())?;
+    let mut reader = arguments.input.open()?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let settings = AdcSettings { bits: arguments.bits, bias_adu: arguments.bias, adu_per_e: arguments.slope };
     let mut stage = Digitize::new(reader.header(), &settings)?;

@@ -8,7 +8,7 @@ use cyanometer::formats::{output, register};
 use cyanometer::names::Named;
 use cyanometer::propagation::Equations;
 use cyanometer::report::{self, ReportFormat};
-use cyanometer::requests::{self, described::DescribedWithBlack, options, values};
+use cyanometer::requests::{self, described::DescribedInput, values};
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -26,9 +26,7 @@ static MEMORY: cli::Memory = cli::Memory;
 #[command(version)]
 struct Arguments {
     #[command(flatten)]
-    input: options::Input,
-    #[command(flatten)]
-    described: DescribedWithBlack,
+    input: DescribedInput,
     /// Rectangle X,Y,W,H in pixels; may be given more than once; by default the whole frame
     #[arg(long, value_name = "X,Y,W,H", value_parser = values::region, allow_hyphen_values = true)]
     region: Vec<Region>,
@@ -59,13 +57,13 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| arguments.general.clone().in_pipeline(arguments.input.is_pipe());
+    let general = |arguments: &Arguments| arguments.general.clone().in_pipeline(arguments.input.frame.is_pipe());
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     register::announce(&[arguments.output.as_deref()])?;
-    let mut reader = arguments.described.open(&arguments.input.options_for_all())?;
+    let mut reader = arguments.input.open_all()?;
     session.report_reader(&reader);
     let level = arguments.check.then_some(arguments.level);
     let saturated = if arguments.keep_saturated { Saturated::Kept } else { Saturated::LeftOut };

@@ -4,8 +4,7 @@ use clap::Parser;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::input::FrameReader;
-use cyanometer::requests::{options, values};
+use cyanometer::requests::{described::DescribedInput, options, values};
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
@@ -21,7 +20,7 @@ static MEMORY: cli::Memory = cli::Memory;
 #[command(version)]
 struct Arguments {
     #[command(flatten)]
-    input: options::Input,
+    input: DescribedInput,
     /// Pattern at the sensor's corner: rggb, bggr, grbg or gbrg; by default the sensor's, or rggb
     #[arg(long, value_parser = values::pattern)]
     pattern: Option<CfaPattern>,
@@ -32,12 +31,12 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| arguments.general.between(&arguments.input, &arguments.output);
+    let general = |arguments: &Arguments| arguments.general.between(&arguments.input.frame, &arguments.output);
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let reader = FrameReader::open(&arguments.input.options())?;
+    let reader = arguments.input.open()?;
     let mut stage = Mosaic::new(reader.header(), arguments.pattern)?;
     session.sign(stage.header_mut());
     session.drive(reader, &stage, &arguments.output)?;

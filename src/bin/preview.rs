@@ -4,10 +4,9 @@ use clap::Parser;
 use cyanometer::analysis::statistics::Region;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::picture::{PictureSettings, Range, write_png};
 use cyanometer::formats::register::announce;
-use cyanometer::requests::{self, options, values};
+use cyanometer::requests::{self, described::DescribedInput, values};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -22,7 +21,7 @@ static MEMORY: cli::Memory = cli::Memory;
 #[command(version)]
 struct Arguments {
     #[command(flatten)]
-    input: options::Input,
+    input: DescribedInput,
     /// PNG file to write; `-` for standard output
     #[arg(short, long, value_name = "FILE.png", value_parser = values::png_file())]
     output: PathBuf,
@@ -52,13 +51,13 @@ fn range(text: &str) -> std::result::Result<Range, String> {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| arguments.general.clone().in_pipeline(arguments.input.is_pipe());
+    let general = |arguments: &Arguments| arguments.general.clone().in_pipeline(arguments.input.frame.is_pipe());
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     announce(&[Some(&arguments.output)])?;
-    let mut reader = FrameReader::open(&arguments.input.options())?;
+    let mut reader = arguments.input.open()?;
     session.report_reader(&reader);
     let settings = PictureSettings { region: arguments.region, zoom: arguments.zoom, range: arguments.range };
     write_png(&mut reader, &settings, &arguments.output)?;

@@ -18,14 +18,14 @@ use crate::formats::output::FrameWriter;
 use crate::formats::places::STDOUT_NAME;
 use crate::formats::{register, standard};
 use crate::masking::Masking;
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, METADATA_TEMPLATE};
 use crate::numerics::vectors::Instructions;
 use crate::requests::options::Output;
 use crate::requests::{self, Note};
 use crate::stages::darks::DarkFrames;
 use crate::stream::{Counts, RowSource, Stage};
 use crate::text::one_line;
-use clap::{ArgAction, CommandFactory, FromArgMatches};
+use clap::{ArgAction, Command, CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
@@ -60,10 +60,13 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         ArgAction::Set | ArgAction::Append if !argument.is_positional() => argument.allow_negative_numbers(true),
         _ => argument,
     });
+    if asks_for_template(&command) {
+        return show(program, || std::io::stdout().write_all(METADATA_TEMPLATE.as_bytes()));
+    }
     let parsed = command.try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
     let arguments = match parsed {
         Ok(arguments) => arguments,
-        Err(error) if !error.use_stderr() => return show(program, &error),
+        Err(error) if !error.use_stderr() => return show(program, || error.print()),
         Err(error) => {
             complain(program, &usage::one_line(program, &error));
             return ExitCode::from(2);
@@ -83,10 +86,17 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     }
 }
 
-/// Writes help or version; a closed pipe is no error.
-fn show(program: &str, text: &clap::Error) -> ExitCode {
+/// Whether a template of metadata is wanted, whatever else the program would need.
+fn asks_for_template(command: &Command) -> bool {
+    let option = command.get_arguments().find(|argument| argument.get_id() == "metadata_template");
+    let long = option.and_then(|option| option.get_long()).map(|long| format!("--{long}"));
+    long.is_some_and(|long| std::env::args_os().skip(1).take_while(|word| word != "--").any(|word| *word == *long))
+}
+
+/// Writes what was asked for instead of a frame, as help; a closed pipe is no error.
+fn show(program: &str, print: impl FnOnce() -> std::io::Result<()>) -> ExitCode {
     let printed = standard::open_stdout().and_then(|_| {
-        let printed = text.print().and_then(|()| std::io::stdout().flush());
+        let printed = print().and_then(|()| std::io::stdout().flush());
         printed.map_err(|e| Error::disk(STDOUT_NAME, "write", e))
     });
     match printed {

@@ -291,6 +291,31 @@ mod tests {
     }
 
     #[test]
+    fn the_template_of_metadata_holds_as_it_is_and_with_all_its_examples() {
+        use crate::metadata::METADATA_TEMPLATE;
+        let metadata = parse_metadata("template", METADATA_TEMPLATE).unwrap();
+        assert_eq!(metadata, Metadata { unit: String::new(), ..Metadata::new(QuantityKind::Adu) });
+        // Examples are what has a key behind `# `, and what is indented below one.
+        let is_example = |line: &str| {
+            let key = line.trim_start().split(':').next().unwrap_or_default();
+            line.starts_with("  ")
+                || line.contains(": ") && key.chars().all(|c| c.is_ascii_lowercase() || c == '_')
+                || line == "sensor:"
+                || line == "relative_matrix:"
+        };
+        let used = METADATA_TEMPLATE.lines().map(|line| match line.strip_prefix("# ") {
+            Some(example) if is_example(example) => format!("{example}\n"),
+            _ => format!("{line}\n"),
+        });
+        let all = parse_metadata("template", &used.collect::<String>()).unwrap();
+        assert!(all.unknown.is_empty(), "{:?}", all.unknown);
+        let sensor = all.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref()).unwrap();
+        assert_eq!(sensor.check(), Ok(()));
+        let given = serde_yaml::to_value(&all).unwrap().as_mapping().unwrap().len();
+        assert_eq!(given, 14, "a key of the template is not read");
+    }
+
+    #[test]
     fn a_misspelled_key_is_answered_with_the_right_one() {
         let complaint = |text: &str| parse_strict::<Small>("s.yaml", text.as_bytes()).unwrap_err().to_string();
         assert_eq!(

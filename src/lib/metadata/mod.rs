@@ -21,6 +21,9 @@ use serde_yaml::Mapping;
 /// The schema that metadata names.
 pub const METADATA_SCHEMA: &str = "cyanometer/1";
 
+/// Metadata to begin with, for people: all keys that describe a frame, each explained.
+pub const METADATA_TEMPLATE: &str = include_str!("template.yaml");
+
 /// What metadata in a text of a file begin with; other programs put their own words there.
 pub const METADATA_BEGIN: &str = "schema: cyanometer/";
 

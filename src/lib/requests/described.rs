@@ -1,5 +1,6 @@
-//! What a user says of a frame; it counts before what comes with the frame.
+//! What a user says of a frame that does not say it itself.
 
+use super::options::Input;
 use super::values;
 use crate::camera::optics::Exposure;
 use crate::cfa::FilterArray;
@@ -9,7 +10,10 @@ use crate::metadata::{FrameHeader, Metadata};
 use crate::units::QuantityKind;
 use clap::Args;
 
-/// Filter array, white level and exposure of a frame.
+/// Exposures that differ by no more than this are the same, written with other digits.
+const SAME_EXPOSURE: f64 = 1e-6;
+
+/// Filter array, white level and exposure of a frame that does not say.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct Described {
     /// Filter array of a single plane: rggb, bggr, grbg, gbrg, monochrome, or its period as 4x4:RRGGRRGGGGBBGGBB
@@ -37,6 +41,37 @@ pub struct DescribedWithBlack {
     pub black_level_adu: Option<f64>,
 }
 
+/// A frame to read, and what a user says of it.
+#[derive(Debug, Clone, Args)]
+pub struct DescribedInput {
+    /// The frame.
+    #[command(flatten)]
+    pub frame: Input,
+    /// What is said of it.
+    #[command(flatten)]
+    pub described: DescribedWithBlack,
+}
+
+impl DescribedInput {
+    /// Opens the frame, as it is described; channels besides R, G, B or Y are left out.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`DescribedWithBlack::open`].
+    pub fn open(&self) -> Result<FrameReader> {
+        self.described.open(&self.frame.options())
+    }
+
+    /// The same with all channels.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`DescribedWithBlack::open`].
+    pub fn open_all(&self) -> Result<FrameReader> {
+        self.described.open(&self.frame.options_for_all())
+    }
+}
+
 impl Described {
     /// Opens a frame, as it is described.
     ///
@@ -53,25 +88,35 @@ impl Described {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] for an array of a frame that has several planes, for levels of what is not ADU, for an exposure time
-    /// or an f-number without the other, and for impossible ones.
+    /// [`Error::Usage`] where the metadata say another thing, for an array of a frame that has several planes, for levels of
+    /// what is not ADU, for an exposure time or an f-number without the other, and for impossible ones.
     pub fn apply(&self, frame: &mut FrameHeader) -> Result<()> {
         if let Some(cfa) = self.cfa {
             if frame.geometry.channels.len() != 1 {
                 let problem = format!("{}: it holds {}; a filter array stands before one", frame.name, frame.holds());
                 return Err(Error::Usage(problem).leave_out(&["cfa"]));
             }
+            let known = frame.metadata.cfa.filter(|known| *known != cfa);
+            agree(frame, "filter array", known.map(|known| known.to_string()), &["cfa"])?;
             frame.metadata.cfa = Some(cfa);
             as_codes(&mut frame.metadata);
         }
         if let Some(white) = self.white_level_adu {
-            check_codes(frame, "white")?;
+            check_codes(frame, &["white"])?;
+            let known = frame.metadata.white_level_adu.filter(|known| *known != white.into());
+            agree(frame, "white level", known.map(|known| in_words(&known.classes())), &["white"])?;
             frame.metadata.white_level_adu = Some(white.into());
         }
         let known = frame.metadata.exposure;
+        let other = |said: Option<f64>, known: Option<f64>| {
+            let differs = |known: &f64| said.is_some_and(|said| (said / known - 1.0).abs() > SAME_EXPOSURE);
+            known.filter(differs).map(|known| known.to_string())
+        };
+        let [time, f_number] = [known.map(|known| known.exposure_s), known.map(|known| known.f_number)];
+        agree(frame, "exposure time in s", other(self.exposure_s, time), &["exposure"])?;
+        agree(frame, "f-number", other(self.f_number, f_number), &["f_number"])?;
         let said = self.exposure_s.is_some() || self.f_number.is_some();
-        let exposure_s = self.exposure_s.or(known.map(|exposure| exposure.exposure_s));
-        let f_number = self.f_number.or(known.map(|exposure| exposure.f_number));
+        let [exposure_s, f_number] = [time.or(self.exposure_s), f_number.or(self.f_number)];
         let lens_transmittance = known.map_or(1.0, |exposure| exposure.lens_transmittance);
         match exposure_s.zip(f_number) {
             Some((exposure_s, f_number)) if said => {
@@ -104,11 +149,13 @@ impl DescribedWithBlack {
     ///
     /// # Errors
     ///
-    /// As [`Described::apply`]; [`Error::Usage`] for a black level of what is not ADU.
+    /// As [`Described::apply`], with the black level of what is not ADU or has another.
     pub fn apply(&self, frame: &mut FrameHeader) -> Result<()> {
         self.described.apply(frame)?;
         if let Some(black) = self.black_level_adu {
-            check_codes(frame, "black")?;
+            check_codes(frame, &["black"])?;
+            let known = frame.black_levels()?.filter(|known| known.uniform() != Some(black));
+            agree(frame, "black level", known.map(|known| in_words(&known.level().sites())), &["black"])?;
             frame.metadata.set_black_adu(Some(black.into()));
         }
         Ok(())
@@ -123,19 +170,34 @@ fn as_codes(metadata: &mut Metadata) {
     }
 }
 
-/// Makes sure that a frame is one of ADU, of which a level is said.
-fn check_codes(frame: &mut FrameHeader, option: &'static str) -> Result<()> {
+/// Makes sure that a frame is one of ADU, of which a level is said by `option`.
+fn check_codes(frame: &mut FrameHeader, option: &'static [&'static str]) -> Result<()> {
     as_codes(&mut frame.metadata);
     if frame.metadata.quantity == QuantityKind::Adu {
         return Ok(());
     }
     let problem = format!("{}: it holds {}, which have no level of codes", frame.name, frame.holds());
-    Err(Error::Usage(problem).leave_out(if option == "white" { &["white"] } else { &["black"] }))
+    Err(Error::Usage(problem).leave_out(option))
+}
+
+/// Makes sure that the metadata of a frame do not say another thing, `other`, than `option` does.
+fn agree(frame: &FrameHeader, what: &str, other: Option<String>, option: &'static [&'static str]) -> Result<()> {
+    let Some(other) = other else { return Ok(()) };
+    let problem = format!("{}: the {what} is {other} by its metadata, which --metadata FILE can replace", frame.name);
+    Err(Error::Usage(problem).leave_out(option))
+}
+
+/// Levels in words: one where all are the same.
+fn in_words(levels: &[f64]) -> String {
+    let is_one = levels.iter().all(|level| level == &levels[0]);
+    let shown: Vec<String> = levels.iter().take(if is_one { 1 } else { levels.len() }).map(f64::to_string).collect();
+    shown.join(",")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::levels::BlackLevel;
     use crate::frame::Geometry;
 
     fn frame(quantity: QuantityKind, channels: &[&str]) -> FrameHeader {
@@ -159,10 +221,34 @@ mod tests {
         assert_eq!((metadata.quantity, metadata.unit.as_str()), (QuantityKind::Adu, QuantityKind::Adu.unit()));
         assert_eq!((metadata.cfa, metadata.white_level_adu), (said.cfa, Some(4095.0.into())));
         assert_eq!(metadata.black_level_adu, Some(64.0.into()));
-        // One of the two replaces what is known.
-        Described { f_number: Some(8.0), ..Described::default() }.apply(&mut plane).unwrap();
-        let exposure = Exposure { exposure_s: 0.5, f_number: 8.0, lens_transmittance: 1.0 };
-        assert_eq!(plane.metadata.exposure, Some(exposure));
+        let exposure = Exposure { exposure_s: 0.5, f_number: 4.0, lens_transmittance: 1.0 };
+        assert_eq!(metadata.exposure, Some(exposure));
+        // What the frame says already may be said again.
+        let before = plane.clone();
+        DescribedWithBlack { described: said, black_level_adu: Some(64.0) }.apply(&mut plane).unwrap();
+        assert_eq!(plane, before);
+    }
+
+    #[test]
+    fn what_contradicts_the_metadata_is_refused() {
+        let mut known = frame(QuantityKind::Adu, &["Y"]);
+        known.metadata.cfa = Some("rggb".parse().unwrap());
+        known.metadata.white_level_adu = Some(4095.0.into());
+        known.metadata.black_level_adu = Some(BlackLevel::Sites([1.0, 2.0, 3.0, 4.0]));
+        known.metadata.exposure = Some(Exposure { exposure_s: 0.5, f_number: 4.0, lens_transmittance: 1.0 });
+        let none = Described::default();
+        let cases = [
+            (Described { cfa: Some("bggr".parse().unwrap()), ..none }, None, "filter array is rggb", "cfa"),
+            (Described { white_level_adu: Some(1.0), ..none }, None, "white level is 4095", "white"),
+            (none, Some(1.0), "black level is 1,2,3,4", "black"),
+            (Described { exposure_s: Some(0.6), ..none }, None, "exposure time in s is 0.5", "exposure"),
+            (Described { f_number: Some(8.0), ..none }, None, "f-number is 4", "f_number"),
+        ];
+        for (described, black_level_adu, said, option) in cases {
+            let error = DescribedWithBlack { described, black_level_adu }.apply(&mut known.clone()).unwrap_err();
+            let rest = "by its metadata, which --metadata FILE can replace";
+            assert_eq!(error.to_string(), format!("in: the {said} {rest}; leave out `{option}`"));
+        }
     }
 
     #[test]

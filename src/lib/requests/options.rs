@@ -40,6 +40,9 @@ pub struct Input {
     /// YAML file whose metadata replace those that come with the input
     #[arg(long, value_name = "FILE")]
     pub metadata: Option<PathBuf>,
+    /// Print YAML to begin such a file with, each key explained
+    #[arg(long)]
+    pub metadata_template: bool,
     /// Take one channel alone, by its name, as a single plane
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
@@ -56,7 +59,7 @@ impl Input {
 
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
-        let Self { input, part, raw, metadata, channel, crop } = self.clone();
+        let Self { input, part, raw, metadata, channel, crop, .. } = self.clone();
         InputOptions { path: input, part, raw, metadata, all_channels: false, channel, crop }
     }
 
