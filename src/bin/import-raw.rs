@@ -5,6 +5,7 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::dng::RawArea;
 use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::formats::makers::{self, Worker};
 use cyanometer::formats::pipe;
 use cyanometer::names::Named;
 use cyanometer::report::RawMatrixOutput;
@@ -44,6 +45,9 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
+    if let Some(done) = makers::serve() {
+        return done;
+    }
     let general = |arguments: &Arguments| {
         let pipeline = pipe::is_input(arguments.raw.as_deref()) || arguments.output.is_pipe();
         arguments.general.clone().in_pipeline(pipeline)
@@ -55,7 +59,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { raw, metadata, output, write_matrix, .. } = arguments;
     write_matrix.announce(output.output.as_deref())?;
     let options = InputOptions { path: raw.clone(), metadata: metadata.clone(), ..InputOptions::default() };
-    let reader = FrameReader::open_raw(&options, arguments.crop)?;
+    let reader = FrameReader::open_raw(&options, arguments.crop, Worker::this_program())?;
     let matrix = write_matrix.of(reader.header())?;
     let mut stage = Import::new(reader.header())?;
     session.sign(stage.header_mut());

@@ -128,6 +128,8 @@ pub enum Sign {
 pub enum Reading {
     /// Their samples are read.
     Rows(Readers),
+    /// A maker's own raw format: `import-raw` alone reads them ([`super::makers`]).
+    MakersRaw,
     /// They are not read yet: what a user can do instead.
     NotYet(&'static str),
 }

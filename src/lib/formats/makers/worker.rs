@@ -1,0 +1,247 @@
+//! The child as its parent sees it: started, listened to, waited for, and ended whatever happens.
+
+use super::wire::{Answer, Head, MOST_ANSWER_BYTES};
+use super::{INSTEAD, SERVE};
+use crate::error::{Error, Result};
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::signal::Signal;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::os::fd::AsFd;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+/// Memory of a child besides what its file takes: code, tables, stacks.
+const OWN_BYTES: u64 = 256 << 20;
+/// For each byte of its file a child may take so many more, for a few copies of samples that are stored in a fraction of one.
+const BYTES_PER_BYTE: u64 = 64;
+/// No child may take more.
+const MOST_BYTES: u64 = 16 << 30;
+/// Processor time of a child besides what its file takes, s.
+const OWN_SECONDS: u64 = 6;
+/// Bytes of a file that a child may take another second for.
+const BYTES_PER_SECOND: u64 = 1 << 20;
+/// A busy machine may take so many times the processor time.
+const PATIENCE: u32 = 4;
+/// Exit status of a child that the system gave no more memory.
+const NO_MEMORY: i32 = 1;
+/// How long a child that has closed its output may take to end.
+const FAREWELL: Duration = Duration::from_secs(2);
+
+/// What decodes the makers' raw files: this program itself, started once more. Only a program whose `main` begins with
+/// [`super::serve`] may have one.
+#[derive(Debug, Clone, Copy)]
+pub struct Worker(());
+
+impl Worker {
+    /// The program that is running.
+    pub fn this_program() -> Self {
+        Self(())
+    }
+
+    /// Starts a child on a file, of which messages have the name and what it is, and waits for its answer.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for what is not decoded, [`Error::Disk`] where no child is started.
+    pub(super) fn start(self, mut file: File, name: &str, kind: &str) -> Result<(Head, Running)> {
+        if !cfg!(feature = "makers-raw") {
+            let build = "build `import-raw` with the feature `makers-raw` (cargo build --features makers-raw)";
+            return Err(Error::format(
+                name,
+                format!("it is {kind}, and this build reads DNG alone; {build}, or {INSTEAD}"),
+            ));
+        }
+        let failed = |e| Error::disk(name, "read", e);
+        let bytes = file.seek(SeekFrom::End(0)).map_err(failed)?;
+        file.rewind().map_err(failed)?;
+        let limits = Limits::of_file(bytes);
+        let command = Self::command(limits).map_err(|e| Error::disk(name, "start a process that decodes it", e))?;
+        let mut running = Running::start(command, file, name, limits)?;
+        let head = running.head(kind)?;
+        Ok((head, running))
+    }
+
+    /// The command that starts this program as a child. What the environment says does not reach it.
+    fn command(limits: Limits) -> io::Result<Command> {
+        // The file of the program may have been replaced since it was started.
+        let program: std::path::PathBuf =
+            if cfg!(target_os = "linux") { "/proc/self/exe".into() } else { std::env::current_exe()? };
+        let mut command = Command::new(program);
+        let threads = rayon::current_num_threads();
+        let numbers = [limits.memory_bytes, limits.processor_s, threads as u64, std::process::id().into()];
+        command.arg(SERVE).args(numbers.map(|number| number.to_string())).env_clear().current_dir("/");
+        command.arg0(env!("CARGO_PKG_NAME"));
+        Ok(command)
+    }
+}
+
+/// What a child may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Limits {
+    /// Address space.
+    memory_bytes: u64,
+    /// Seconds of all its threads.
+    processor_s: u64,
+    /// How long it may keep silent.
+    silence: Duration,
+}
+
+impl Limits {
+    /// Those for a file of so many bytes.
+    fn of_file(bytes: u64) -> Self {
+        let processor_s = OWN_SECONDS + bytes / BYTES_PER_SECOND;
+        Self {
+            memory_bytes: bytes.saturating_mul(BYTES_PER_BYTE).saturating_add(OWN_BYTES).min(MOST_BYTES),
+            processor_s,
+            silence: Duration::from_secs(processor_s).saturating_mul(PATIENCE),
+        }
+    }
+}
+
+/// A child that is at work, or has just ended. One that is dropped is killed and waited for.
+#[derive(Debug)]
+pub(super) struct Running {
+    child: Child,
+    output: ChildStdout,
+    name: String,
+    limits: Limits,
+}
+
+/// Why nothing more comes.
+enum Silence {
+    /// The output is closed.
+    Closed,
+    /// Nothing came for too long.
+    TooLong,
+    /// Reading failed.
+    Failed(io::Error),
+}
+
+impl Running {
+    /// Starts a command on a file that stands at its start.
+    fn start(mut command: Command, file: File, name: &str, limits: Limits) -> Result<Self> {
+        command.stdin(Stdio::from(file)).stdout(Stdio::piped()).stderr(Stdio::null());
+        let failed = |e| Error::disk(name, "start a process that decodes it", e);
+        let mut child = command.spawn().map_err(failed)?;
+        let output = child.stdout.take().ok_or_else(|| failed(io::ErrorKind::BrokenPipe.into()))?;
+        Ok(Self { child, output, name: name.into(), limits })
+    }
+
+    /// Its answer about a file of a kind.
+    fn head(&mut self, kind: &str) -> Result<Head> {
+        let mut length = [0; 4];
+        self.fill(&mut length)?;
+        let length = u32::from_le_bytes(length);
+        if length > MOST_ANSWER_BYTES {
+            return Err(self.nonsense());
+        }
+        let mut text = vec![0; length as usize];
+        self.fill(&mut text)?;
+        let problem = match serde_json::from_slice(&text) {
+            Ok(Answer::Image(head)) => return Ok(*head),
+            Ok(Answer::Refused(why)) => format!("it is {kind} that cannot be decoded ({why}); {INSTEAD}"),
+            Ok(Answer::GaveUp(words)) => {
+                format!("its decoder gave up ({words}); it is damaged, or of an unknown kind: {INSTEAD}")
+            }
+            Err(_) => return Err(self.nonsense()),
+        };
+        Err(Error::format(&self.name, problem))
+    }
+
+    /// The next bytes.
+    ///
+    /// # Errors
+    ///
+    /// Where fewer come: what became of the child.
+    pub fn fill(&mut self, mut bytes: &mut [u8]) -> Result<()> {
+        while !bytes.is_empty() {
+            match self.some(bytes) {
+                Ok(count) => bytes = &mut bytes[count..],
+                Err(silence) => return Err(self.end_of(silence)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes sure that nothing follows, and that the child ends well.
+    pub fn finish(&mut self) -> Result<()> {
+        match self.some(&mut [0]) {
+            Ok(_) => Err(self.nonsense()),
+            Err(Silence::Closed) => match self.ended() {
+                Some(status) if status.success() => Ok(()),
+                _ => Err(self.end_of(Silence::Closed)),
+            },
+            Err(silence) => Err(self.end_of(silence)),
+        }
+    }
+
+    /// Some bytes, at least one, as soon as they come.
+    fn some(&mut self, bytes: &mut [u8]) -> std::result::Result<usize, Silence> {
+        let deadline = Instant::now() + self.limits.silence;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let left = PollTimeout::try_from(left).unwrap_or(PollTimeout::MAX);
+            let ready = poll(&mut [PollFd::new(self.output.as_fd(), PollFlags::POLLIN)], left);
+            match ready {
+                Ok(0) => return Err(Silence::TooLong),
+                Ok(_) => match self.output.read(bytes) {
+                    Ok(0) => return Err(Silence::Closed),
+                    Ok(count) => return Ok(count),
+                    Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                    Err(error) => return Err(Silence::Failed(error)),
+                },
+                Err(nix::errno::Errno::EINTR) => {}
+                Err(error) => return Err(Silence::Failed(error.into())),
+            }
+        }
+    }
+
+    /// How the child ended, which has closed its output; none of one that does not end.
+    fn ended(&mut self) -> Option<ExitStatus> {
+        let deadline = Instant::now() + FAREWELL;
+        loop {
+            match self.child.try_wait() {
+                Ok(Some(status)) => return Some(status),
+                Ok(None) if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(1)),
+                _ => return None,
+            }
+        }
+    }
+
+    /// What became of the child, in words.
+    fn end_of(&mut self, silence: Silence) -> Error {
+        let Limits { memory_bytes, processor_s, silence: patience } = self.limits;
+        let too_long = |what: String| format!("its decoder took {what}");
+        let what = match silence {
+            Silence::Failed(error) => return Error::disk(&self.name, "read what its decoder says", error),
+            Silence::TooLong => too_long(format!("more than {} s", patience.as_secs_f64())),
+            Silence::Closed => {
+                let status = self.ended();
+                let signal = status.and_then(|status| status.signal()).and_then(|number| Signal::try_from(number).ok());
+                match (signal, status.and_then(|status| status.code())) {
+                    (Some(Signal::SIGXCPU | Signal::SIGKILL), _) => {
+                        too_long(format!("more than {processor_s} s of processor time, or was killed"))
+                    }
+                    (_, Some(NO_MEMORY)) => too_long(format!("more than {} MiB of memory", memory_bytes >> 20)),
+                    (Some(signal), _) => format!("its decoder gave up ({signal})"),
+                    _ => "its decoder gave up".into(),
+                }
+            }
+        };
+        Error::format(&self.name, format!("{what}; it is damaged, or of an unknown kind: {INSTEAD}"))
+    }
+
+    fn nonsense(&self) -> Error {
+        Error::format(&self.name, format!("its decoder answers what is no image; {INSTEAD}"))
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // One that has ended cannot be killed, and is waited for all the same.
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}
