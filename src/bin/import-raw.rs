@@ -9,10 +9,11 @@ use cyanometer::formats::makers::{self, Worker};
 use cyanometer::formats::pipe;
 use cyanometer::names::Named;
 use cyanometer::report::RawMatrixOutput;
+use cyanometer::requests::batch::{Job, jobs};
 use cyanometer::requests::{options, values};
 use cyanometer::stages::import::Import;
 use cyanometer::stream::RowSource;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -20,16 +21,18 @@ static MEMORY: cli::Memory = cli::Memory;
 
 /// Make a frame of a camera's raw file: its codes as they are, with filter array, levels and exposure
 ///
-/// All programs read the raw files that this one reads; here a part is chosen, and what the file tells is kept beside the
-/// codes in our terms. The frame begins at its place on the sensor, whose corner is that of the stored image. Where the file has
+/// DNG is read by all programs; here a part is chosen, and what the file tells is kept beside the codes in our terms. The makers'
+/// own formats (NEF, CR2, CR3, ARW, RAF, ORF, RW2, PEF and others) are read here alone, by the LGPL-2.1 library rawler in a
+/// process of its own, whose memory and time are limited. The frame begins at its place on the sensor, whose corner is that of the stored image. Where the file has
 /// color matrices, that for its own light goes along, for relative XYZ under the scene's own white: ColorMatrix,
 /// CameraCalibration and AnalogBalance for AsShotNeutral or AsShotWhiteXY. Nothing is adapted to D50, so that ForwardMatrix does
 /// not count, nor does BaselineExposure.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
-    /// Raw file, DNG; `-` or none for standard input
-    raw: Option<PathBuf>,
+    /// Raw files; `-` or none for standard input. Several go to -o DIR/, or to a name with {stem}, such as {stem}.tiff
+    #[arg(value_name = "RAW")]
+    raws: Vec<PathBuf>,
     /// Which photosites: active, those that see light; full, all that are stored; default, those that converters show
     #[arg(long, value_name = "PART", default_value = RawArea::Active.name(), value_parser = values::choice::<RawArea>())]
     crop: RawArea,
@@ -49,20 +52,30 @@ fn main() -> ExitCode {
         return done;
     }
     let general = |arguments: &Arguments| {
-        let pipeline = pipe::is_input(arguments.raw.as_deref()) || arguments.output.is_pipe();
+        let pipeline = pipe::is_input(arguments.raws.first().map(PathBuf::as_path)) || arguments.output.is_pipe();
         arguments.general.clone().in_pipeline(pipeline)
     };
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let Arguments { raw, metadata, output, write_matrix, .. } = arguments;
-    write_matrix.announce(output.output.as_deref())?;
-    let options = InputOptions { path: raw.clone(), metadata: metadata.clone(), ..InputOptions::default() };
-    let reader = FrameReader::open_raw(&options, arguments.crop, Worker::this_program())?;
+    let Arguments { raws, output, write_matrix, .. } = arguments;
+    let jobs = jobs(raws, output.output.as_deref(), output.extension(), &[write_matrix.write_matrix.as_deref()])?;
+    write_matrix.announce(&jobs)?;
+    session.each::<Arguments, _>(&jobs, |job| import(job, arguments, session))
+}
+
+/// Imports one of the files.
+fn import(job: &Job, arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    let Arguments { raws, crop, metadata, .. } = arguments;
+    let options = InputOptions { path: job.input.clone(), metadata: metadata.clone(), ..InputOptions::default() };
+    let reader = FrameReader::open_raw(&options, *crop, Worker::this_program())?;
+    let write_matrix = RawMatrixOutput { write_matrix: job.beside.first().cloned().flatten() };
     let matrix = write_matrix.of(reader.header())?;
     let mut stage = Import::new(reader.header())?;
-    session.sign(stage.header_mut());
-    session.drive(reader, &stage, output)?;
+    let others: Vec<&Path> =
+        raws.iter().map(PathBuf::as_path).filter(|raw| Some(*raw) != job.input.as_deref()).collect();
+    session.sign_among(stage.header_mut(), &others);
+    session.drive(reader, &stage, &options::Output { output: job.frame.clone(), ..arguments.output.clone() })?;
     write_matrix.write(matrix.as_deref())
 }

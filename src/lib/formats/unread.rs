@@ -63,8 +63,11 @@ const fn tagged(name: &'static str, is_one: fn(&mut TiffFile, &Directory) -> Res
     FrameFormat { name, sign: Sign::Tags(is_one), reading: Reading::MakersRaw }
 }
 
+/// A plane behind a color filter array (PhotometricInterpretation).
+const CFA: u64 = 32_803;
+
 /// Whether a file is a raw of one of these makers, and not a TIFF of theirs: its first image is a reduced one that has
-/// others below it, or is compressed as only raws are.
+/// others below it, or one behind a filter array, or is compressed as only raws are.
 fn is_raw_of(file: &mut TiffFile, directory: &Directory, makers: &[&str]) -> Result<bool> {
     let make = file.text(directory, Tag::Make)?.unwrap_or_default().to_ascii_uppercase();
     if !makers.iter().any(|maker| make.starts_with(maker)) {
@@ -72,7 +75,10 @@ fn is_raw_of(file: &mut TiffFile, directory: &Directory, makers: &[&str]) -> Res
     }
     let is_reduced = is_reduced(file, directory)?;
     let compression = file.one(directory, Tag::Compression)?;
-    Ok(is_reduced && directory.has(Tag::SubIfd) || compression.is_some_and(|number| OWN_COMPRESSIONS.contains(&number)))
+    let is_plane = file.one(directory, Tag::PhotometricInterpretation)? == Some(CFA);
+    Ok(is_reduced && directory.has(Tag::SubIfd)
+        || is_plane
+        || compression.is_some_and(|number| OWN_COMPRESSIONS.contains(&number)))
 }
 
 /// Whether the first image is a smaller one of another.

@@ -7,31 +7,37 @@ use crate::formats::output::write_text;
 use crate::formats::places::{same_place, sidecar_path};
 use crate::formats::register;
 use crate::metadata::FrameHeader;
+use crate::requests::batch::Job;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Where the matrix of a raw file goes, beside the frame.
 #[derive(Debug, Clone, Default, Args)]
 pub struct RawMatrixOutput {
-    /// Matrix file to write, the camera's own for relative XYZ, for `to-xyz --matrix`
+    /// Matrix file to write, the camera's own for relative XYZ, for `to-xyz --matrix`; of several raws a name with {stem}
     #[arg(long, value_name = "FILE")]
     pub write_matrix: Option<PathBuf>,
 }
 
 impl RawMatrixOutput {
-    /// Tells, before anything is read, where matrix and frame go.
+    /// Tells, before anything is read, where matrices and frames go.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] where the matrix would go where the frame or its sidecar goes; those of [`register::announce`].
-    pub fn announce(&self, frame: Option<&Path>) -> Result<()> {
-        let sidecar = frame.map(sidecar_path);
-        if let Some(path) = &self.write_matrix
-            && [frame, sidecar.as_deref()].iter().any(|other| same_place(Some(path), *other))
-        {
-            return Err(Error::Usage("the matrix and the frame have the same place; name a file for each".into()));
+    /// [`Error::Usage`] where a matrix would go where its frame or its sidecar goes; those of [`register::announce`].
+    pub fn announce(&self, jobs: &[Job]) -> Result<()> {
+        let mut outputs = Vec::new();
+        for Job { frame, beside, .. } in jobs {
+            let sidecar = frame.as_deref().map(sidecar_path);
+            let matrix = beside.first().and_then(Option::as_deref);
+            if let Some(path) = matrix
+                && [frame, &sidecar].iter().any(|other| same_place(Some(path), other.as_deref()))
+            {
+                return Err(Error::Usage("the matrix and the frame have the same place; name a file for each".into()));
+            }
+            outputs.extend([frame.as_deref(), matrix]);
         }
-        register::announce(&[frame, self.write_matrix.as_deref()])
+        register::announce(&outputs)
     }
 
     /// What will be written of a raw file; nothing where nobody asked.

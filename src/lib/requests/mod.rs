@@ -16,6 +16,7 @@
 //! # Ok::<(), cyanometer::error::Error>(())
 //! ```
 
+pub mod batch;
 pub mod comparison;
 pub mod conversion;
 pub mod described;

@@ -9,6 +9,8 @@ use std::process::ExitCode;
 
 /// Bytes of rows that are written together.
 const WRITTEN_BYTES: usize = 1 << 16;
+/// What `rawler` says before most reasons.
+const DECODE_FAILED: &str = "Failed to decode image, possibly corrupt image: ";
 /// Characters of a reason.
 const MOST_REASON: usize = 300;
 
@@ -112,6 +114,6 @@ fn answer(answer: &Answer) -> io::Result<()> {
 /// The first line of what a decoder says, without a full stop, in bounds.
 fn reason(words: &str) -> String {
     let line = words.lines().next().unwrap_or_default();
-    let line = line.trim().trim_start_matches("Error: ").trim_end_matches('.');
+    let line = line.trim().trim_start_matches("Error: ").trim_start_matches(DECODE_FAILED).trim_end_matches('.');
     line.chars().take(MOST_REASON).collect()
 }
