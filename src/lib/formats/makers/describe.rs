@@ -195,3 +195,144 @@ fn neutral(head: &Head) -> std::result::Result<Light, String> {
         _ => Err("nothing tells the white of the exposure (white balance as shot)".into()),
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::cfa::Class;
+
+    /// A head of 6x4 samples.
+    pub(in crate::formats::makers) fn head() -> Head {
+        Head {
+            width: 6,
+            height: 4,
+            samples_per_site: 1,
+            rotated: false,
+            filters: Some(wire::Filters { columns: 2, rows: 2, letters: "GRBG".into() }),
+            black: Black { columns: 2, rows: 2, levels: vec![1.0, 2.0, 3.0, 4.5] },
+            white: vec![4095.0],
+            active: Some([1, 1, 4, 3]),
+            default_crop: Some([2, 1, 2, 2]),
+            camera: "Nikon D700".into(),
+            matrices: vec![
+                (21, vec![0.8, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.9]),
+                (17, vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.7]),
+            ],
+            white_balance: [Some(2.0), Some(1.0), Some(1.5)],
+            exposure_s: Some(0.004),
+            f_number: Some(5.6),
+            iso: Some(200),
+            orientation: Some(6),
+            images: 1,
+        }
+    }
+
+    fn described(head: &Head, part: RawArea) -> Described {
+        describe(head, "a.nef", part).unwrap()
+    }
+
+    #[test]
+    fn a_head_becomes_metadata_at_the_corner_of_the_stored_image() {
+        let head = head();
+        for (part, [left, top, width, height]) in
+            [(RawArea::Active, [1, 1, 4, 3]), (RawArea::Full, [0, 0, 6, 4]), (RawArea::Default, [2, 1, 2, 2])]
+        {
+            let Described { area, metadata, notes } = described(&head, part);
+            assert_eq!(area, Rectangle { left, top, width, height });
+            // Whatever part is read, pattern and levels are those at the corner.
+            let cfa = metadata.cfa.unwrap();
+            assert_eq!(
+                [cfa.class(0, 0), cfa.class(1, 0), cfa.class(0, 1)],
+                [Class::Green, Class::Red, Class::Blue].map(Some)
+            );
+            assert_eq!(metadata.black_level_adu, Some(BlackLevel::Sites([1.0, 2.0, 3.0, 4.5])));
+            assert_eq!(metadata.white_level_adu, Some(4095.0.into()));
+            assert_eq!(metadata.exposure.map(|exposure| exposure.f_number), Some(5.6));
+            let said = notes.join("\n");
+            assert!(
+                ["Nikon D700", "ISO 200", "Orientation is passed over"].iter().all(|text| said.contains(text)),
+                "{said}"
+            );
+        }
+    }
+
+    /// With matrices that are diagonal, and alike for both illuminants, XYZ of white are what the signals of white are divided
+    /// by: X : Y : Z = (1/2)/a : 1/b : (1/1.5)/c.
+    #[test]
+    fn the_matrix_is_that_of_the_white_of_the_exposure() {
+        let [a, b, c] = [0.8, 1.0, 0.9];
+        let diagonal = vec![a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c];
+        let same = Head { matrices: vec![(21, diagonal.clone()), (17, diagonal)], ..head() };
+        let found = described(&same, RawArea::Active).metadata.relative_matrix.unwrap();
+        let xyz = [0.5 / a, 1.0 / b, 1.0 / 1.5 / c];
+        let sum: f64 = xyz.iter().sum();
+        assert!((found.white_xy[0] - xyz[0] / sum).abs() < 1e-12 && (found.white_xy[1] - xyz[1] / sum).abs() < 1e-12);
+        let none = Head { white_balance: [None; 3], ..head() };
+        let Described { metadata, notes, .. } = described(&none, RawArea::Active);
+        assert_eq!(metadata.relative_matrix, None);
+        assert!(notes.iter().any(|note| note.contains("nothing tells the white of the exposure")), "{notes:?}");
+    }
+
+    #[test]
+    fn other_arrays_are_taken_as_they_are() {
+        let x_trans = "RBGBRGGGRGGBGGBGGRBRGRBGGGBGGRGGRGGB";
+        let filters = Some(wire::Filters { columns: 6, rows: 6, letters: x_trans.into() });
+        let black = Black { columns: 6, rows: 6, levels: vec![1024.0; 36] };
+        let metadata = described(&Head { filters, black, ..head() }, RawArea::Active).metadata;
+        assert_eq!(metadata.cfa.unwrap().in_words(), "an X-Trans filter array");
+        assert_eq!(metadata.black_level_adu, Some(1024.0.into()));
+        let quad = Some(wire::Filters { columns: 4, rows: 4, letters: "RRGGRRGGGGBBGGBB".into() });
+        let metadata = described(&Head { filters: quad, ..head() }, RawArea::Active).metadata;
+        assert_eq!(metadata.cfa.unwrap().in_words(), "a quad Bayer filter array");
+        let metadata = described(&Head { filters: None, ..head() }, RawArea::Active).metadata;
+        assert_eq!((metadata.cfa, metadata.relative_matrix), (Some(FilterArray::Monochrome), None));
+    }
+
+    #[test]
+    fn what_is_no_raw_image_is_refused() {
+        let black = |columns, rows, levels: &[f64]| Black { columns, rows, levels: levels.to_vec() };
+        for (head, wanted) in [
+            (Head { width: 0, ..head() }, "it is damaged; it says that it has 0x4 samples"),
+            (Head { height: usize::MAX, ..head() }, "it is damaged; it says that it has 6x18446744073709551615"),
+            (
+                Head { samples_per_site: 3, ..head() },
+                "it holds 3 samples at each photosite: a reduced raw (sRAW, mRAW) or planes",
+            ),
+            (Head { rotated: true, ..head() }, "the rows of its sensor run at 45 degrees"),
+            (
+                Head { filters: Some(wire::Filters { columns: 12, rows: 12, letters: "G".repeat(144) }), ..head() },
+                "its filter array has a period of 12x12 sites",
+            ),
+            (
+                Head { filters: Some(wire::Filters { columns: 2, rows: 2, letters: "RG".into() }), ..head() },
+                "its filter array has a period of 2x2 sites",
+            ),
+            (Head { black: black(3, 1, &[1.0, 2.0, 3.0]), ..head() }, "its black level differs by 3x1 sites"),
+            (Head { black: black(0, 0, &[]), ..head() }, "its black level repeats after 0x0 sites"),
+            (Head { black: black(2, 2, &[1.0]), ..head() }, "its black level differs by 2x2 sites"),
+            (Head { black: black(1, 1, &[f64::NAN]), ..head() }, "its black level"),
+            (
+                Head { black: black(1, 1, &[4095.0]), ..head() },
+                "its black level, 4095, and its white level, 4095, are none",
+            ),
+            (Head { white: vec![], ..head() }, "it tells no white level"),
+            (Head { white: vec![1e9], ..head() }, "its black level, 4.5, and its white level, 1000000000, are none"),
+            (Head { white: vec![9.0, 10.0], ..head() }, "its white levels differ"),
+            (
+                Head { active: Some([0, 0, 7, 4]), ..head() },
+                "its active area, 7x4 from column 0, row 0, does not lie in the 6x4",
+            ),
+            (
+                Head { active: Some([usize::MAX, 0, 7, 4]), ..head() },
+                "its active area, 7x4 from column 18446744073709551615",
+            ),
+            (Head { active: Some([0, 0, 0, 4]), ..head() }, "its active area, 0x4"),
+        ] {
+            let complaint = describe(&head, "a.nef", RawArea::Active).unwrap_err().to_string();
+            assert!(complaint.starts_with(&format!("a.nef: {wanted}")), "{complaint}");
+        }
+        let crop = Head { default_crop: Some([5, 0, 2, 4]), ..head() };
+        assert!(described(&crop, RawArea::Active).notes.iter().any(|note| note.ends_with("; it is passed over")));
+        assert!(describe(&crop, "a.nef", RawArea::Default).is_err());
+    }
+}

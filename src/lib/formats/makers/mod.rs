@@ -9,6 +9,7 @@
 
 #[cfg(feature = "makers-raw")]
 mod child;
+mod complete;
 #[cfg(feature = "makers-raw")]
 mod decode;
 mod describe;

@@ -1,9 +1,10 @@
 //! The child as its parent sees it: started, listened to, waited for, and ended whatever happens.
 
 use super::wire::{Answer, Head, MOST_ANSWER_BYTES};
-use super::{INSTEAD, SERVE};
+use super::{INSTEAD, SERVE, complete};
 use crate::error::{Error, Result};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::resource::{Resource, getrlimit};
 use nix::sys::signal::Signal;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -55,6 +56,7 @@ impl Worker {
         }
         let failed = |e| Error::disk(name, "read", e);
         let bytes = file.seek(SeekFrom::End(0)).map_err(failed)?;
+        complete::check(&file, name)?;
         file.rewind().map_err(failed)?;
         let limits = Limits::of_file(bytes);
         let command = Self::command(limits).map_err(|e| Error::disk(name, "start a process that decodes it", e))?;
@@ -92,8 +94,11 @@ impl Limits {
     /// Those for a file of so many bytes.
     fn of_file(bytes: u64) -> Self {
         let processor_s = OWN_SECONDS + bytes / BYTES_PER_SECOND;
+        let wanted = bytes.saturating_mul(BYTES_PER_BYTE).saturating_add(OWN_BYTES).min(MOST_BYTES);
+        // What limits this process limits a child of it.
+        let own = getrlimit(Resource::RLIMIT_AS).map_or(MOST_BYTES, |(soft, _)| soft);
         Self {
-            memory_bytes: bytes.saturating_mul(BYTES_PER_BYTE).saturating_add(OWN_BYTES).min(MOST_BYTES),
+            memory_bytes: wanted.min(own),
             processor_s,
             silence: Duration::from_secs(processor_s).saturating_mul(PATIENCE),
         }
@@ -243,5 +248,82 @@ impl Drop for Running {
         // One that has ended cannot be killed, and is waited for all the same.
         drop(self.child.kill());
         drop(self.child.wait());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    const LIMITS: Limits = Limits { memory_bytes: 64 << 20, processor_s: 1, silence: Duration::from_millis(300) };
+
+    /// What becomes of a child that is this script of a shell, and the number that it had as a process.
+    fn said(script: &str) -> (String, u32, Duration) {
+        let mut command = Command::new("sh");
+        command.args(["-c", script]);
+        let start = Instant::now();
+        let mut running = Running::start(command, tempfile::tempfile().unwrap(), "a.nef", LIMITS).unwrap();
+        let process = running.child.id();
+        let done = running.head("a Nikon NEF").and_then(|head| {
+            running.fill(&mut vec![0; head.width * head.height * 2])?;
+            running.finish()
+        });
+        drop(running);
+        (done.map_or_else(|error| error.to_string(), |()| "done".into()), process, start.elapsed())
+    }
+
+    /// A script that prints an answer, and then does something.
+    fn answer(answer: &Answer, then: &str) -> String {
+        let text = serde_json::to_string(answer).unwrap();
+        let length: String =
+            u32::try_from(text.len()).unwrap().to_le_bytes().map(|byte| format!("\\{byte:03o}")).concat();
+        format!("printf '{length}'; printf '%s' '{text}'; {then}")
+    }
+
+    fn image() -> Answer {
+        Answer::Image(Box::new(super::super::describe::tests::head()))
+    }
+
+    #[test]
+    fn whatever_becomes_of_a_child_is_one_line() {
+        let rows = "head -c 48 /dev/zero";
+        for (script, wanted) in [
+            ("sleep 60".into(), "its decoder took more than 0.3 s; "),
+            ("yes".into(), "its decoder answers what is no image; "),
+            ("printf '\\002\\000\\000\\000no'".into(), "its decoder answers what is no image; "),
+            ("exit 0".into(), "its decoder gave up; it is damaged"),
+            ("exit 1".into(), "its decoder took more than 64 MiB of memory; "),
+            ("exit 101".into(), "its decoder gave up; "),
+            ("kill -ABRT $$".into(), "its decoder gave up (SIGABRT); "),
+            ("kill -SEGV $$".into(), "its decoder gave up (SIGSEGV); "),
+            ("ulimit -t 1; while :; do :; done >&2".into(), "its decoder took more than 0.3 s; "),
+            ("kill -XCPU $$".into(), "its decoder took more than 1 s of processor time, or was killed; "),
+            (answer(&Answer::GaveUp("index".into()), ""), "its decoder gave up (index); "),
+            (answer(&Answer::Refused("no".into()), ""), "it is a Nikon NEF that cannot be decoded (no); "),
+            (answer(&image(), rows), "done"),
+            (answer(&image(), "head -c 47 /dev/zero"), "its decoder gave up; "),
+            (answer(&image(), "head -c 49 /dev/zero"), "its decoder answers what is no image; "),
+            (answer(&image(), &format!("{rows}; kill -BUS $$")), "its decoder gave up (SIGBUS); "),
+            (answer(&image(), &format!("{rows}; sleep 60")), "its decoder took more than 0.3 s; "),
+            (answer(&image(), &format!("{rows}; exec >&-; sleep 60")), "its decoder gave up; "),
+        ] {
+            let (complaint, process, took) = said(&script);
+            let wanted = if wanted == "done" { wanted.to_owned() } else { format!("a.nef: {wanted}") };
+            assert!(complaint.starts_with(&wanted), "{script}: {complaint}");
+            assert!(complaint == "done" || complaint.ends_with("with `unprocessed_raw -T` of LibRaw"), "{complaint}");
+            assert!(took < Duration::from_secs(10), "{script}: {took:?}");
+            // Neither it nor what the system keeps of it is left.
+            assert!(!Path::new(&format!("/proc/{process}")).exists(), "{script}");
+        }
+    }
+
+    #[test]
+    fn limits_go_with_the_file() {
+        let [none, some] = [0, 10 << 20].map(Limits::of_file);
+        assert_eq!((none.processor_s, none.silence), (6, Duration::from_secs(24)));
+        assert_eq!(some.processor_s, 16);
+        assert!(some.memory_bytes >= none.memory_bytes && some.memory_bytes <= (256 + 640) << 20);
+        assert!(Limits::of_file(u64::MAX).memory_bytes <= MOST_BYTES);
     }
 }
