@@ -7,6 +7,7 @@ use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Strea
 use super::makers::{MakersReader, Worker};
 use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
+use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
@@ -232,6 +233,11 @@ impl FrameReader {
     /// What a careful user should know: channels left out, tags passed over.
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// The noise of the samples, where the file tells it.
+    pub fn noise_profile(&self) -> Option<&NoiseProfile> {
+        self.reader.noise_profile()
     }
 
     /// The warning that the sidecar describes other samples; none before the last row is in.

@@ -10,6 +10,7 @@ mod color;
 mod describe;
 mod image;
 mod levels;
+mod noise;
 mod preview;
 mod ratio;
 mod read;
