@@ -45,9 +45,12 @@ impl File {
         u32::try_from(place).unwrap()
     }
 
-    /// Appends a directory, and gives its place.
+    /// Appends a directory, its values behind it, and gives its place.
     fn directory(&mut self, mut tags: Vec<(u16, Value)>) -> u32 {
         tags.sort();
+        let place = self.0.len().next_multiple_of(2);
+        let behind = place + 2 + 12 * tags.len() + 4;
+        let mut values: Vec<u8> = Vec::new();
         let mut table = u16::try_from(tags.len()).unwrap().to_be_bytes().to_vec();
         for (tag, (kind, mut bytes)) in tags {
             let size = match kind {
@@ -58,13 +61,15 @@ impl File {
             };
             let count = u32::try_from(bytes.len() / size).unwrap();
             if bytes.len() > 4 {
-                bytes = self.put(&bytes).to_be_bytes().to_vec();
+                bytes.resize(bytes.len().next_multiple_of(2), 0);
+                let at = u32::try_from(behind + values.len()).unwrap();
+                values.append(&mut bytes);
+                bytes = at.to_be_bytes().to_vec();
             }
             bytes.resize(4, 0);
             table.extend([&tag.to_be_bytes()[..], &kind.to_be_bytes(), &count.to_be_bytes(), &bytes].concat());
         }
-        table.extend([0; 4]);
-        self.put(&table)
+        self.put(&[table, vec![0; 4], values].concat())
     }
 
     fn done(mut self, first: u32) -> Vec<u8> {
@@ -85,6 +90,7 @@ pub fn nef([width, height]: [u32; 2], codes: &[u16]) -> Vec<u8> {
         .collect();
     let mut notes = File::new();
     // The multipliers of R and B, which follow one another, then those of the two greens.
+    // Readers take it for granted that this directory begins right behind the header.
     let first = notes.directory(vec![(0x0C, ratios(&[2, 1, 3, 2, 1, 1, 1, 1])), (0x93, shorts(&[1]))]);
     let notes = [b"Nikon\0\x02\x10\0\0".to_vec(), notes.done(first)].concat();
 
