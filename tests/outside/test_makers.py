@@ -155,8 +155,10 @@ def raf(samples):
 class Makers(ProgramCase):
     """What `import-raw` makes of such files, and what LibRaw makes of them."""
 
-    def same_as_libraw(self, path):
-        """Compares all that is stored, the filter of each photosite, and black by site. White levels are of different tables."""
+    def same_as_libraw(self, path, masked=None):
+        """Compares all that is stored, the filter of each photosite, and black by site, or with the code of masked photosites.
+
+        White levels are of different tables."""
         self.run_program(["import-raw", path, "--crop", "full", "-o", "full.exr", "-q"])
         full = self.planes((self.directory / "full.exr").read_bytes())["Y"]
         known = (self.directory / "full.exr.yaml").read_text(encoding="utf-8")
@@ -177,6 +179,7 @@ class Makers(ProgramCase):
         black = [float(black)] * 4 if black else [float(line.strip(" -")) for line in text]
         # LibRaw has them by its colors: R, G, B and the second G.
         expected = levels[[0, 1, 3, 2]] if period == 2 and pattern == "RGGB" else levels
+        expected = expected if masked is None else [masked] * 4
         np.testing.assert_allclose(black, expected, atol=0.5, err_msg=str(path))
         return value
 
@@ -186,15 +189,19 @@ class Makers(ProgramCase):
             samples = scene(12, height=96, width=128)
             path = self.directory / f"a.{make.__name__}"
             with self.subTest(make.__name__):
+                # Of this camera rawler measures black in 40 columns that see no light, which LibRaw finds in files of full size.
+                masked = 256 if make is cr2 else None
+                if masked:
+                    samples[:, :40] = masked
                 path.write_bytes(make(samples))
-                self.same_as_libraw(path)
+                self.same_as_libraw(path, masked)
 
     def test_x_trans(self):
         samples = np.maximum(scene(14, height=60, width=120), 1024)
         path = self.directory / "a.raf"
         path.write_bytes(raf(samples))
         value = self.same_as_libraw(path)
-        self.assertEqual(value["cfa"].strip("'\""), f"6x6:{X_TRANS.lower()}")
+        self.assertEqual(value["cfa"].strip("'\""), f"6x6:{X_TRANS}")
 
     def test_files_of_cameras(self):
         named = os.environ.get("CYANOMETER_RAWS")

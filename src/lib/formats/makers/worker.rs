@@ -23,8 +23,9 @@ const MOST_BYTES: u64 = 16 << 30;
 const OWN_SECONDS: u64 = 6;
 /// Bytes of a file that a child may take another second for.
 const BYTES_PER_SECOND: u64 = 1 << 20;
-/// A busy machine may take so many times the processor time.
-const PATIENCE: u32 = 4;
+/// A busy machine may take longer: how long a child may keep silent, s, and how much longer for each of those seconds.
+const OWN_SILENCE: u64 = 9;
+const SILENCE_PER_SECOND: u64 = 2;
 /// Exit status of a child that the system gave no more memory.
 const NO_MEMORY: i32 = 1;
 /// How long a child that has closed its output may take to end.
@@ -93,14 +94,14 @@ pub(super) struct Limits {
 impl Limits {
     /// Those for a file of so many bytes.
     fn of_file(bytes: u64) -> Self {
-        let processor_s = OWN_SECONDS + bytes / BYTES_PER_SECOND;
+        let longer = bytes / BYTES_PER_SECOND;
         let wanted = bytes.saturating_mul(BYTES_PER_BYTE).saturating_add(OWN_BYTES).min(MOST_BYTES);
         // What limits this process limits a child of it.
         let own = getrlimit(Resource::RLIMIT_AS).map_or(MOST_BYTES, |(soft, _)| soft);
         Self {
             memory_bytes: wanted.min(own),
-            processor_s,
-            silence: Duration::from_secs(processor_s).saturating_mul(PATIENCE),
+            processor_s: OWN_SECONDS + longer,
+            silence: Duration::from_secs(OWN_SILENCE + SILENCE_PER_SECOND * longer),
         }
     }
 }
@@ -321,8 +322,8 @@ mod tests {
     #[test]
     fn limits_go_with_the_file() {
         let [none, some] = [0, 10 << 20].map(Limits::of_file);
-        assert_eq!((none.processor_s, none.silence), (6, Duration::from_secs(24)));
-        assert_eq!(some.processor_s, 16);
+        assert_eq!((none.processor_s, none.silence), (6, Duration::from_secs(9)));
+        assert_eq!((some.processor_s, some.silence), (16, Duration::from_secs(29)));
         assert!(some.memory_bytes >= none.memory_bytes && some.memory_bytes <= (256 + 640) << 20);
         assert!(Limits::of_file(u64::MAX).memory_bytes <= MOST_BYTES);
     }
