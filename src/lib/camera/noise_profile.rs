@@ -46,7 +46,7 @@ mod tests {
     /// A camera of 0.25 ADU per electron and 8 electrons of read noise, whose codes have 4000 ADU from black to white.
     #[test]
     fn a_camera_comes_back_from_its_profile() {
-        let (gain, noise_e, range) = (0.25, 8.0, 4000.0);
+        let (gain, noise_e, range) = (0.25_f64, 8.0, 4000.0);
         let line = [gain / range, (gain * noise_e / range).powi(2)];
         let profile = NoiseProfile { lines: vec![line] };
         let found = profile.read_out(2, range).unwrap();

@@ -8,11 +8,13 @@ use crate::formats::output::write_text;
 use crate::formats::places::{same_place, sidecar_path};
 use crate::formats::{register, yaml_writer};
 use crate::metadata::FrameHeader;
-use crate::requests::batch::Job;
+use crate::requests::RawFiles;
+use crate::requests::batch::{Job, jobs};
+use crate::requests::options::Output;
 use crate::stream::RowSource;
 use clap::Args;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Where matrix and read-out of a raw file go, beside the frame.
 #[derive(Debug, Clone, Default, Args)]
@@ -26,31 +28,30 @@ pub struct RawOutputs {
 }
 
 impl RawOutputs {
-    /// Both, in the order that those of a job have.
-    pub fn paths(&self) -> [Option<&Path>; 2] {
-        [self.write_matrix.as_deref(), self.write_readout.as_deref()]
-    }
-
-    /// Tells, before anything is read, where the frames go and what is written beside them.
+    /// What is to be done with some raw files. Tells, before any is read, where the frames go and what is written beside them.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] where something would go where its frame or its sidecar goes; those of [`register::announce`].
-    pub fn announce(jobs: &[Job]) -> Result<()> {
+    /// [`Error::Usage`] where something would go where its frame or its sidecar goes; those of [`jobs`] and of
+    /// [`register::announce`].
+    pub fn jobs(&self, files: &RawFiles, output: &Output) -> Result<Vec<Job>> {
+        let beside = [self.write_matrix.as_deref(), self.write_readout.as_deref()];
+        let jobs = jobs(&files.raws, output.output.as_deref(), output.extension(), &beside)?;
         let mut outputs = Vec::new();
-        for Job { frame, beside, .. } in jobs {
+        for Job { frame, beside, .. } in &jobs {
             let sidecar = frame.as_deref().map(sidecar_path);
-            for path in beside.iter().flatten() {
-                if [frame, &sidecar].iter().any(|other| same_place(Some(path), other.as_deref())) {
-                    return Err(Error::Usage(
-                        "the matrix and the frame have the same place; name a file for each".into(),
-                    ));
+            for (path, what) in beside.iter().zip(["matrix", "read-out"]).filter(|(path, _)| path.is_some()) {
+                if [frame, &sidecar].iter().any(|other| same_place(path.as_deref(), other.as_deref())) {
+                    return Err(Error::Usage(format!(
+                        "the {what} and the frame have the same place; name a file for each"
+                    )));
                 }
             }
             outputs.push(frame.as_deref());
             outputs.extend(beside.iter().map(Option::as_deref));
         }
-        register::announce(&outputs)
+        register::announce(&outputs)?;
+        Ok(jobs)
     }
 
     /// What will be written of a raw file beside its frame, and where; nothing where nobody asked.
