@@ -58,9 +58,10 @@ fn lower(resource: Resource, limit: u64) -> nix::Result<()> {
 /// Does what a child is there for. What goes wrong is answered, or seen in how it ends.
 pub(super) fn work(words: impl Iterator<Item = OsString>) -> ExitCode {
     std::panic::set_hook(Box::new(|panic| {
-        let words = panic.payload_as_str().unwrap_or_default();
+        let payload = panic.payload();
+        let words = payload.downcast_ref::<&str>().copied().or(payload.downcast_ref::<String>().map(String::as_str));
         // Whoever waits for an answer has it, or sees that there is none.
-        drop(answer(&Answer::GaveUp(reason(words))));
+        drop(answer(&Answer::GaveUp(reason(words.unwrap_or_default()))));
         std::process::exit(PANICKED);
     }));
     let Some(task) = Task::of(words) else { return ExitCode::from(MISUSED) };
