@@ -134,7 +134,7 @@ fn mistakes_with_raws_are_told() {
             BAD_DATA,
             "xl.dng: its raw image is JPEG XL, which is not supported; convert it",
         ),
-        ("import-raw a.cr2 -o out.exr", BAD_DATA, "a.cr2: it is a Canon CR2, which is not read yet; write its codes"),
+        ("import-raw a.cr2 -o out.exr", BAD_DATA, "a.cr2: it is a Canon CR2 that cannot be decoded ("),
         (
             "import-raw matrix.yaml -o out.exr",
             BAD_DATA,
@@ -279,4 +279,36 @@ fn a_charts_colors_follow_from_the_cameras_own_matrix() {
     assert!(green[1] > white[1] + 0.05, "{green:?} {white:?}");
     assert!(red[0] > white[0] + 0.1, "{red:?} {white:?}");
     assert!(yellow[0] > white[0] + 0.03 && yellow[1] > white[1] + 0.03 && yellow[2] > red[2], "{yellow:?} {white:?}");
+}
+
+/// The read-out of the sensor that made a DNG comes back from its noise profile: the slope is K (1 + PRNU²), the offset that of
+/// read noise, dark signal and rounding.
+#[test]
+fn a_dng_tells_the_read_out_that_made_it() {
+    let shop = Workshop::new();
+    shop.run("render-radiance SAMPLES/skies/sky912.exr --patch 3x3 --expose-to 0.8 --cfa rggb -o rates.exr", &[]);
+    shop.run("add-noise rates.exr --seed 7 -o noisy.exr", &[]);
+    shop.run("digitize noisy.exr -o codes.dng", &[]);
+    shop.run("import-raw codes.dng -o out.exr --write-readout r.yaml", &[]);
+    let metadata = shop.frame("out.exr").header.metadata;
+    let sensor = metadata.sensor.unwrap();
+    let readout = sensor.readout.unwrap();
+    let told: serde_yaml::Value = serde_yaml::from_slice(&shop.bytes("r.yaml")).unwrap();
+    let of = |class: usize, key: &str| told["classes"][class][key].as_f64().unwrap();
+    for class in 0..3 {
+        let expected = readout.adu_per_e * (1.0 + readout.prnu.powi(2));
+        assert!((of(class, "adu_per_e") / expected - 1.0).abs() < 1e-9);
+        let range = told["white_level_adu"].as_f64().unwrap() - told["black_level_adu"].as_f64().unwrap();
+        assert!((of(class, "saturation_e") * of(class, "adu_per_e") / range - 1.0).abs() < 1e-12);
+        let noise = metadata.noise.as_ref().unwrap();
+        let dark = noise.dark_e + (noise.dark_e * readout.dcnu).powi(2);
+        let variance = readout.adu_per_e.powi(2) * (readout.read_noise_e.powi(2) + dark) + 1.0 / 12.0;
+        // The pattern of the dark signal is cut off at zero, far out.
+        assert!((of(class, "noise_at_black_adu").powi(2) / variance - 1.0).abs() < 1e-3);
+    }
+    fs::write(shop.path("raw.dng"), small()).unwrap();
+    let refused = shop.attempt("import-raw raw.dng -o none.exr --write-readout none.yaml", &[]);
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(said.starts_with("import-raw: raw.dng: it tells no noise: that takes the NoiseProfile of a DNG"), "{said}");
+    assert!(!shop.path("none.exr").exists() && !shop.path("none.yaml").exists());
 }

@@ -1,64 +1,61 @@
-//! `import-raw`: a camera's raw file as a frame.
+//! `import-raw`: cameras' raw files as frames.
 
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::dng::RawArea;
-use cyanometer::formats::input::{FrameReader, InputOptions};
-use cyanometer::formats::pipe;
-use cyanometer::names::Named;
-use cyanometer::report::RawMatrixOutput;
-use cyanometer::requests::{options, values};
+use cyanometer::formats::makers::{self, Worker};
+use cyanometer::report::RawOutputs;
+use cyanometer::requests::RawFiles;
+use cyanometer::requests::batch::Job;
+use cyanometer::requests::options::Output;
 use cyanometer::stages::import::Import;
 use cyanometer::stream::RowSource;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 #[global_allocator]
 static MEMORY: cli::Memory = cli::Memory;
 
-/// Make a frame of a camera's raw file: its codes as they are, with filter array, levels and exposure
+/// Make frames of cameras' raw files: their codes as they are, with filter array, levels and exposure
 ///
-/// All programs read the raw files that this one reads; here a part is chosen, and what the file tells is kept beside the
-/// codes in our terms. The frame begins at its place on the sensor, whose corner is that of the stored image. Where the file has
-/// color matrices, that for its own light goes along, for relative XYZ under the scene's own white: ColorMatrix,
-/// CameraCalibration and AnalogBalance for AsShotNeutral or AsShotWhiteXY. Nothing is adapted to D50, so that ForwardMatrix does
-/// not count, nor does BaselineExposure.
+/// DNG is read by all programs; here a part is chosen, and what the file tells is kept beside the codes in our terms. The makers'
+/// own formats (NEF, CR2, CR3, ARW, RAF, ORF, RW2, PEF and others) are read here alone, by the library rawler (LGPL-2.1) in a
+/// process of its own, whose memory and time are limited. The frame begins at its place on the sensor, whose corner is that of
+/// the stored image. Where color matrices are known, that for the file's own light goes along, for relative XYZ under the scene's
+/// own white: ColorMatrix, CameraCalibration and AnalogBalance for AsShotNeutral or AsShotWhiteXY. Nothing is adapted to D50, so
+/// that ForwardMatrix does not count, nor does BaselineExposure.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
-    /// Raw file, DNG; `-` or none for standard input
-    raw: Option<PathBuf>,
-    /// Which photosites: active, those that see light; full, all that are stored; default, those that converters show
-    #[arg(long, value_name = "PART", default_value = RawArea::Active.name(), value_parser = values::choice::<RawArea>())]
-    crop: RawArea,
     #[command(flatten)]
-    write_matrix: RawMatrixOutput,
-    /// YAML file whose metadata replace those that come with the file
-    #[arg(long, value_name = "FILE")]
-    metadata: Option<PathBuf>,
+    files: RawFiles,
     #[command(flatten)]
-    output: options::Output,
+    beside: RawOutputs,
+    #[command(flatten)]
+    output: Output,
     #[command(flatten)]
     general: cli::General,
 }
 
 fn main() -> ExitCode {
+    if let Some(done) = makers::serve() {
+        return done;
+    }
     let general = |arguments: &Arguments| {
-        let pipeline = pipe::is_input(arguments.raw.as_deref()) || arguments.output.is_pipe();
-        arguments.general.clone().in_pipeline(pipeline)
+        arguments.general.clone().in_pipeline(arguments.files.is_pipe() || arguments.output.is_pipe())
     };
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let Arguments { raw, metadata, output, write_matrix, .. } = arguments;
-    write_matrix.announce(output.output.as_deref())?;
-    let options = InputOptions { path: raw.clone(), metadata: metadata.clone(), ..InputOptions::default() };
-    let reader = FrameReader::open_raw(&options, arguments.crop)?;
-    let matrix = write_matrix.of(reader.header())?;
+    let jobs = arguments.beside.jobs(&arguments.files, &arguments.output)?;
+    session.each::<Arguments, _>(&jobs, |job| import(job, arguments, session))
+}
+
+fn import(job: &Job, arguments: &Arguments, session: &cli::Session) -> Result<()> {
+    let reader = arguments.files.open(job, Worker::this_program())?;
+    let texts = RawOutputs::of(&reader, job)?;
     let mut stage = Import::new(reader.header())?;
-    session.sign(stage.header_mut());
-    session.drive(reader, &stage, output)?;
-    write_matrix.write(matrix.as_deref())
+    session.sign_among(stage.header_mut(), &arguments.files.besides(job));
+    session.drive(reader, &stage, &Output { output: job.frame.clone(), ..arguments.output.clone() })?;
+    RawOutputs::write(&texts)
 }

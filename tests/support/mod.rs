@@ -5,6 +5,7 @@
 
 pub mod bounds;
 pub mod dng;
+pub mod makers;
 pub mod workshop;
 
 use cyanometer::camera::optics::Exposure;

@@ -22,6 +22,28 @@ impl From<f64> for BlackLevel {
 }
 
 impl BlackLevel {
+    /// Levels that repeat after so many columns and rows, row by row; none where they differ by more than 2×2 sites, or are
+    /// fewer than that.
+    pub fn repeating(columns: usize, rows: usize, levels: &[f64]) -> Option<Self> {
+        if columns == 0 || rows == 0 || columns.checked_mul(rows) != Some(levels.len()) {
+            return None;
+        }
+        let level = |x: usize, y: usize| levels[y % rows * columns + x % columns];
+        // An odd period and two sites meet again after twice the period.
+        let differs = (0..2 * rows).any(|y| (0..2 * columns).any(|x| level(x, y) != level(x % 2, y % 2)));
+        let sites = Self::Sites([level(0, 0), level(1, 0), level(0, 1), level(1, 1)]);
+        (!differs).then(|| sites.uniform().map_or(sites, Self::Uniform))
+    }
+
+    /// The same with the corner so many columns and rows further back.
+    #[must_use]
+    pub fn beginning_at(self, [column, row]: [usize; 2]) -> Self {
+        let sites = self.sites();
+        let site = |x: usize, y: usize| sites[(y + row) % 2 * 2 + (x + column) % 2];
+        let moved = Self::Sites([site(0, 0), site(1, 0), site(0, 1), site(1, 1)]);
+        moved.uniform().map_or(moved, Self::Uniform)
+    }
+
     /// The levels of the four sites.
     pub fn sites(self) -> [f64; 4] {
         match self {

@@ -4,6 +4,7 @@
 //! [`response`]. [`sensor`] holds what a file says of both, [`levels`] what is black and white among its codes.
 
 pub mod levels;
+pub mod noise_profile;
 pub mod optics;
 pub mod readout;
 pub mod response;

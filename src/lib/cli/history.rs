@@ -3,11 +3,12 @@
 use crate::metadata::HistoryEntry;
 
 /// Options that say where and how the output is stored, or how the program talks: the samples do not depend on them.
-const NOT_RECORDED: [(&str, bool); 11] = [
+const NOT_RECORDED: [(&str, bool); 12] = [
     ("--output", true),
     ("--output-format", true),
     ("--map", true),
     ("--write-matrix", true),
+    ("--write-readout", true),
     ("--format", true),
     ("--compression", true),
     ("--sample-type", true),

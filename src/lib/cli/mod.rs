@@ -28,6 +28,7 @@ use crate::text::one_line;
 use clap::{ArgAction, Command, CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Exit status after an internal error, as Rust's programs have it.
@@ -157,10 +158,45 @@ impl Session {
         }
     }
 
+    /// Does something for each of several inputs, of program `A`. Where one alone fails the others are done all the same, and
+    /// each failure is told.
+    ///
+    /// # Errors
+    ///
+    /// That of a single input; [`Error::Data`] with the number of those that failed.
+    pub fn each<A: CommandFactory, T>(&self, inputs: &[T], work: impl Fn(&T) -> Result<()>) -> Result<()> {
+        if let [input] = inputs {
+            return work(input);
+        }
+        let mut failed = 0;
+        for input in inputs {
+            match work(input) {
+                Err(Error::ClosedPipe) => return Err(Error::ClosedPipe),
+                Err(error) => {
+                    failed += 1;
+                    complain(self.program, &advice::advised(&error, &A::command()));
+                }
+                Ok(()) => {}
+            }
+        }
+        let summary = |done: usize| format!("{done} of {} inputs", inputs.len());
+        if failed > 0 {
+            return Err(Error::Data(format!("{} failed; the others are done", summary(failed))));
+        }
+        self.note(&format!("{} are done", summary(inputs.len())));
+        Ok(())
+    }
+
     /// Adds this program to a frame's history and says what it leaves out.
     pub fn sign(&self, header: &mut FrameHeader) {
+        self.sign_among(header, &[]);
+    }
+
+    /// The same for a frame of one of several inputs: the history is that of this one alone.
+    pub fn sign_among(&self, header: &mut FrameHeader, others: &[&Path]) {
         // A file's name may be no UTF-8; the history is.
-        let arguments = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+        let words = std::env::args_os().skip(1).filter(|word| !others.contains(&Path::new(word)));
+        let arguments = words.map(|word| word.to_string_lossy().into_owned());
         header.metadata.history.push(history_entry(self.program, arguments));
         for left_out in header.metadata.left_out.iter().filter(|entry| entry.program == self.program) {
             self.note(&format!("left out: {} ({})", left_out.what, left_out.why));

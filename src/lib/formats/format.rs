@@ -3,6 +3,7 @@
 //! A new format is a file that ends in a [`FrameFormat`], and a line in [`super::table`].
 
 use super::tiff::{Directory, TiffFile};
+use crate::camera::noise_profile::NoiseProfile;
 use crate::error::Result;
 use crate::frame::Geometry;
 use crate::metadata::Metadata;
@@ -34,6 +35,11 @@ pub trait SampleReader: Send {
 
     /// What of the file was passed over, and why.
     fn notes(&self) -> &[String];
+
+    /// The noise of the samples, where the file tells it.
+    fn noise_profile(&self) -> Option<&NoiseProfile> {
+        None
+    }
 
     /// Appends the next `rows` rows, laid out as `[row][channel][column]`; the values are those stored, integers not
     /// scaled. Rows beyond the last must not be asked for.
@@ -128,6 +134,8 @@ pub enum Sign {
 pub enum Reading {
     /// Their samples are read.
     Rows(Readers),
+    /// A maker's own raw format: `import-raw` alone reads them ([`super::makers`]).
+    MakersRaw,
     /// They are not read yet: what a user can do instead.
     NotYet(&'static str),
 }

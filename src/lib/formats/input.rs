@@ -4,8 +4,10 @@ use super::digest::SamplesDigest;
 use super::dng::{DngReader, RawArea};
 use super::files::{STDIN_NAME, named, open_named, read_file, sidecar_path, spool};
 use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Streaming, U16_FULL_SCALE};
+use super::makers::{MakersReader, Worker};
 use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
+use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
@@ -121,12 +123,12 @@ impl FrameReader {
         Self::of(reader, name, path, options)
     }
 
-    /// Opens a part of the raw image in a camera's file.
+    /// Opens a part of the raw image in a camera's file; those of makers' own formats are decoded by a worker.
     ///
     /// # Errors
     ///
-    /// As [`Self::open`]; [`Error::Format`] for files that are no raws.
-    pub fn open_raw(options: &InputOptions, part: RawArea) -> Result<Self> {
+    /// As [`Self::open`]; [`Error::Format`] for files that are no raws, and for what the worker does not decode.
+    pub fn open_raw(options: &InputOptions, part: RawArea, worker: Worker) -> Result<Self> {
         let path = named(options.path.as_deref());
         register::check_inputs(options.metadata.as_deref().map(Some).into_iter().chain([path]))?;
         let (mut input, name) = open_named(path)?;
@@ -134,6 +136,10 @@ impl FrameReader {
             input = spool(&mut input, &name)?;
         }
         let head = head_of(&mut input, &name)?;
+        if let Some(format) = table::makers_raw(&input, &head, &name)? {
+            let reader = MakersReader::open(worker, input, &name, format.name, part)?;
+            return Self::of(Box::new(reader), &name, path, options);
+        }
         // Those that are not read are refused here by name.
         let readers = readers_of(&head, &name)?;
         let is_raw = tiff::begins_so(&head) && table::by_tags(&input, &name)?.is_some();
@@ -227,6 +233,11 @@ impl FrameReader {
     /// What a careful user should know: channels left out, tags passed over.
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// The noise of the samples, where the file tells it.
+    pub fn noise_profile(&self) -> Option<&NoiseProfile> {
+        self.reader.noise_profile()
     }
 
     /// The warning that the sidecar describes other samples; none before the last row is in.

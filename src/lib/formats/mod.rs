@@ -13,6 +13,7 @@ pub mod format;
 pub mod headerless;
 pub mod input;
 mod ljpeg;
+pub mod makers;
 pub mod output;
 pub mod picture;
 pub mod pipe;

@@ -5,8 +5,9 @@
 //! before the work with every file that is opened later. Library users who read a file and write it again later are left
 //! alone: without [`keep`] there is no register.
 
-use super::places::{STDIN_NAME, named, same_place, sidecar_path};
+use super::places::{STDIN_NAME, named, place, sidecar_path};
 use crate::error::{Error, Result};
+use std::collections::HashSet;
 use std::fs::Metadata;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -104,10 +105,10 @@ pub(super) fn check_output(about: &Metadata, name: &str) -> Result<()> {
 ///
 /// [`Error::Usage`].
 pub fn announce(outputs: &[Option<&Path>]) -> Result<()> {
-    let named: Vec<&Path> = outputs.iter().filter_map(|path| named(*path)).collect();
-    for (index, output) in named.iter().enumerate() {
+    let mut places = HashSet::new();
+    for output in outputs.iter().filter_map(|path| named(*path)) {
         let name = output.display().to_string();
-        if named[..index].iter().any(|other| same_place(Some(other), Some(output))) {
+        if !places.insert(place(Some(output))) {
             return Err(Error::Usage(format!("{name}: two outputs cannot be one file")));
         }
         if let Some(register) = &mut *register()

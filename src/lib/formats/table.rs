@@ -20,6 +20,10 @@ pub const FORMATS: &[FrameFormat] = &[
     unread::ORF,
     unread::RW2,
     unread::RAF,
+    unread::MRW,
+    unread::ARI,
+    unread::X3F,
+    unread::IIQ,
     png::FORMAT,
     unread::JPEG,
     fits::FORMAT,
@@ -31,7 +35,7 @@ pub const FORMATS: &[FrameFormat] = &[
 ///
 /// # Errors
 ///
-/// [`Error::Format`] for a format that is not read.
+/// [`Error::Format`] for a format that is not read, [`Error::Order`] for one that `import-raw` alone reads.
 pub fn by_head(head: &[u8], name: &str) -> Result<Option<Readers>> {
     let found = FORMATS.iter().find(|format| matches!(format.sign, Sign::Bytes(is_one) if is_one(head)));
     found.map(|format| readers(format, name)).transpose()
@@ -41,14 +45,10 @@ pub fn by_head(head: &[u8], name: &str) -> Result<Option<Readers>> {
 ///
 /// # Errors
 ///
-/// [`Error::Format`] for a format that is not read, [`Error::Disk`] where the file cannot be looked at.
+/// Those of [`by_head`]; [`Error::Disk`] where the file cannot be looked at.
 pub fn by_tags(file: &File, name: &str) -> Result<Option<Readers>> {
-    match narrower(file, name) {
-        Ok(found) => found.map(|format| readers(format, name)).transpose(),
-        // A damaged file: the reader of TIFF meets the damage again, and tells it if it matters.
-        Err(Error::Format { .. }) => Ok(None),
-        Err(error) => Err(error),
-    }
+    // Of a damaged file the reader of TIFF meets the damage again, and tells it if it matters.
+    whole(narrower(file, name))?.flatten().map(|format| readers(format, name)).transpose()
 }
 
 fn narrower(file: &File, name: &str) -> Result<Option<&'static FrameFormat>> {
@@ -65,9 +65,34 @@ fn narrower(file: &File, name: &str) -> Result<Option<&'static FrameFormat>> {
     Ok(None)
 }
 
+/// The format of a file of a maker's own raw format, which begins with the bytes `head`; none of another.
+///
+/// # Errors
+///
+/// [`Error::Disk`] where the file cannot be looked at.
+pub fn makers_raw(file: &File, head: &[u8], name: &str) -> Result<Option<&'static FrameFormat>> {
+    let by_head = FORMATS.iter().find(|format| matches!(format.sign, Sign::Bytes(is_one) if is_one(head)));
+    let by_tags = if tiff::begins_so(head) { whole(narrower(file, name))?.flatten() } else { None };
+    let is_makers = |format: &&FrameFormat| matches!(format.reading, Reading::MakersRaw);
+    Ok(by_tags.filter(is_makers).or(by_head.filter(is_makers)))
+}
+
+/// What was found in a file, nothing in one that is damaged.
+fn whole<T>(found: Result<T>) -> Result<Option<T>> {
+    match found {
+        Err(Error::Format { .. }) => Ok(None),
+        other => other.map(Some),
+    }
+}
+
 fn readers(format: &FrameFormat, name: &str) -> Result<Readers> {
     match format.reading {
         Reading::Rows(readers) => Ok(readers),
+        Reading::MakersRaw => Err(Error::Order {
+            file: name.into(),
+            problem: format!("it is {}, a maker's own raw format", format.name),
+            first: "import-raw",
+        }),
         Reading::NotYet(instead) => {
             Err(Error::format(name, format!("it is {}, which is not read yet; {instead}", format.name)))
         }
@@ -91,8 +116,7 @@ mod tests {
     use crate::stream::RowSource;
     use std::io::Cursor;
 
-    const RAW: &str = "which is not read yet; write its codes as a TIFF first, for example with `unprocessed_raw -T` of \
-                       LibRaw, and name that file";
+    const RAW: &str = "a maker's own raw format; run `import-raw` first";
 
     /// Opens bytes as a file or as what comes down a pipe, which holds them.
     fn open(bytes: &[u8], piped: bool) -> Result<FrameReader> {
@@ -131,6 +155,10 @@ mod tests {
             (b"IIRO\x08\0\0\0", "an Olympus ORF"),
             (b"IIU\0\x18\0\0\0", "a Panasonic RW2"),
             (b"FUJIFILMCCD-RAW 0201", "a Fujifilm RAF"),
+            (b"\0MRM\0\0\0\0", "a Minolta MRW"),
+            (b"ARRI\x12\x34\x56\x78", "an Arri ARI"),
+            (b"FOVb\0\0\x02\0", "a Sigma X3F"),
+            (b"II*\0\x08\0\0\0IIII", "a Phase One IIQ"),
         ] {
             let bytes = [begin, &[0; 64]].concat();
             assert_eq!(complaint(&bytes), format!("in: it is {name}, {RAW}"));

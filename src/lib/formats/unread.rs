@@ -1,4 +1,5 @@
-//! Formats that are known, so that none is taken for what it is not, but not read yet.
+//! Formats that are known, so that none is taken for what it is not, but that not every program reads: the makers' own raw
+//! formats, which `import-raw` reads through [`super::makers`], and JPEG.
 //!
 //! Camera raws mostly begin as a TIFF does, and their first image is a small picture of what was taken: it must not pass
 //! for the frame.
@@ -8,10 +9,6 @@ use super::tiff::{Directory, TiffFile};
 use crate::error::Result;
 use tiff::tags::Tag;
 
-/// LibRaw's program of this name writes the codes of the whole sensor, as they are, to NAME.tiff.
-const RAW: Reading = Reading::NotYet(
-    "write its codes as a TIFF first, for example with `unprocessed_raw -T` of LibRaw, and name that file",
-);
 /// Nikon's raw format.
 pub const NEF: FrameFormat = tagged("a Nikon NEF", |file, directory| is_raw_of(file, directory, &["NIKON"]));
 /// Sony's raw format.
@@ -37,6 +34,17 @@ pub const ORF: FrameFormat =
 pub const RW2: FrameFormat = raw("a Panasonic RW2", |head| head.starts_with(b"IIU\0"));
 /// Fujifilm's raw format.
 pub const RAF: FrameFormat = raw("a Fujifilm RAF", |head| head.starts_with(b"FUJIFILMCCD-RAW"));
+/// Minolta's raw format.
+pub const MRW: FrameFormat = raw("a Minolta MRW", |head| head.starts_with(b"\0MRM"));
+/// Arri's raw format.
+pub const ARI: FrameFormat = raw("an Arri ARI", |head| head.starts_with(b"ARRI"));
+/// Sigma's raw format, of three samples at a photosite.
+pub const X3F: FrameFormat = raw("a Sigma X3F", |head| head.starts_with(b"FOVb"));
+/// Phase One's raw format.
+pub const IIQ: FrameFormat = raw("a Phase One IIQ", |head| {
+    [b"II*\0", b"MM\0*"].iter().any(|magic| head.starts_with(*magic))
+        && head.get(8..12).is_some_and(|at| at == b"IIII" || at == b"MMMM")
+});
 /// JPEG pictures.
 pub const JPEG: FrameFormat = FrameFormat {
     name: "a JPEG",
@@ -48,15 +56,18 @@ pub const JPEG: FrameFormat = FrameFormat {
 const OWN_COMPRESSIONS: [u64; 3] = [32_767, 34_713, 65_535];
 
 const fn raw(name: &'static str, is_one: fn(&[u8]) -> bool) -> FrameFormat {
-    FrameFormat { name, sign: Sign::Bytes(is_one), reading: RAW }
+    FrameFormat { name, sign: Sign::Bytes(is_one), reading: Reading::MakersRaw }
 }
 
 const fn tagged(name: &'static str, is_one: fn(&mut TiffFile, &Directory) -> Result<bool>) -> FrameFormat {
-    FrameFormat { name, sign: Sign::Tags(is_one), reading: RAW }
+    FrameFormat { name, sign: Sign::Tags(is_one), reading: Reading::MakersRaw }
 }
 
+/// A plane behind a color filter array (PhotometricInterpretation).
+const CFA: u64 = 32_803;
+
 /// Whether a file is a raw of one of these makers, and not a TIFF of theirs: its first image is a reduced one that has
-/// others below it, or is compressed as only raws are.
+/// others below it, or one behind a filter array, or is compressed as only raws are.
 fn is_raw_of(file: &mut TiffFile, directory: &Directory, makers: &[&str]) -> Result<bool> {
     let make = file.text(directory, Tag::Make)?.unwrap_or_default().to_ascii_uppercase();
     if !makers.iter().any(|maker| make.starts_with(maker)) {
@@ -64,7 +75,10 @@ fn is_raw_of(file: &mut TiffFile, directory: &Directory, makers: &[&str]) -> Res
     }
     let is_reduced = is_reduced(file, directory)?;
     let compression = file.one(directory, Tag::Compression)?;
-    Ok(is_reduced && directory.has(Tag::SubIfd) || compression.is_some_and(|number| OWN_COMPRESSIONS.contains(&number)))
+    let is_plane = file.one(directory, Tag::PhotometricInterpretation)? == Some(CFA);
+    Ok(is_reduced && directory.has(Tag::SubIfd)
+        || is_plane
+        || compression.is_some_and(|number| OWN_COMPRESSIONS.contains(&number)))
 }
 
 /// Whether the first image is a smaller one of another.

@@ -5,13 +5,13 @@ pub mod characterization;
 mod difference;
 mod photon_transfer;
 mod prediction;
-mod raw_matrix;
+mod raw_outputs;
 mod trade_off;
 
 pub use difference::difference;
 pub use photon_transfer::photon_transfer;
 pub use prediction::{BudgetOutputs, prediction};
-pub use raw_matrix::RawMatrixOutput;
+pub use raw_outputs::RawOutputs;
 pub use trade_off::trade_off;
 
 use crate::analysis::statistics::check::{Subject, Test};

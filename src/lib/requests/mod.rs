@@ -16,6 +16,7 @@
 //! # Ok::<(), cyanometer::error::Error>(())
 //! ```
 
+pub mod batch;
 pub mod comparison;
 pub mod conversion;
 pub mod described;
@@ -25,6 +26,7 @@ pub mod prediction;
 pub mod values;
 
 mod notes;
+mod raw_files;
 mod scene;
 
 pub use comparison::ColorPair;
@@ -33,4 +35,5 @@ pub use fit::Fit;
 pub use notes::{Note, of_levels, of_marks, of_reader, of_slope, of_statistics};
 pub use options::SignalLevel;
 pub use prediction::NoisePrediction;
+pub use raw_files::RawFiles;
 pub use scene::{OpenScene, Scene, Uniform};

@@ -12,6 +12,7 @@ use crate::formats::headerless::Layout;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::formats::pipe;
+use crate::names::Named;
 use crate::random::Source;
 use crate::stages::noise::NoiseSettings;
 use crate::units::{RadianceUnit, kelvin};
@@ -127,6 +128,11 @@ impl Output {
     pub fn is_exr(&self) -> bool {
         let ends_so = |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr"));
         self.output.as_ref().is_some_and(ends_so) && self.format.is_none_or(|format| format == Format::Exr)
+    }
+
+    /// What names end in that nobody has chosen.
+    pub fn extension(&self) -> &'static str {
+        self.format.unwrap_or(Format::Exr).name()
     }
 
     /// Where and how to write.

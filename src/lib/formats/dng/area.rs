@@ -32,7 +32,7 @@ impl Named for RawArea {
 
 /// A rectangle of the stored image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Rectangle {
+pub(in crate::formats) struct Rectangle {
     pub left: usize,
     pub top: usize,
     pub width: usize,

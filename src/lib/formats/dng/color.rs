@@ -143,7 +143,7 @@ fn calibration(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Res
 }
 
 /// Temperature of an illuminant by its number; none of those that have none.
-fn temperature_k(number: usize) -> Option<f64> {
+pub(in crate::formats) fn temperature_k(number: usize) -> Option<f64> {
     ILLUMINANTS.into_iter().find(|(known, _)| *known == number).map(|(_, kelvin)| kelvin)
 }
 

@@ -135,26 +135,35 @@ fn exposure(file: &mut TiffFile, first: &Directory, notes: &mut Vec<String>) -> 
         Ok(file.ratio(directory, tag.tag())?.filter(|number| *number > 0.0))
     };
     let (time, aperture) = (number(tags::EXPOSURE_TIME)?, number(tags::F_NUMBER)?);
-    let (exposure_s, f_number) = match (time, aperture) {
+    Ok(exposure_of(time, aperture, notes))
+}
+
+/// The exposure of a raw file that tells so much of it, where both are known; notes tell what is passed over.
+pub(in crate::formats) fn exposure_of(
+    exposure_s: Option<f64>,
+    f_number: Option<f64>,
+    notes: &mut Vec<String>,
+) -> Option<Exposure> {
+    let (exposure_s, f_number) = match (exposure_s, f_number) {
         (Some(time), Some(aperture)) => (time, aperture),
-        (None, None) => return Ok(None),
+        (None, None) => return None,
         (Some(time), None) => {
             notes.push(format!("its exposure of {time} s is passed over: it does not tell the f-number"));
-            return Ok(None);
+            return None;
         }
         (None, Some(aperture)) => {
             notes.push(format!("its f-number {aperture} is passed over: it does not tell the exposure time"));
-            return Ok(None);
+            return None;
         }
     };
     match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
         Ok(exposure) => {
-            notes.push("its lens is taken to lose no light: a DNG does not tell the transmittance".into());
-            Ok(Some(exposure))
+            notes.push("its lens is taken to lose no light: the file does not tell the transmittance".into());
+            Some(exposure)
         }
         Err(problem) => {
             notes.push(format!("its exposure is passed over: {problem}"));
-            Ok(None)
+            None
         }
     }
 }

@@ -81,17 +81,12 @@ fn black(file: &mut TiffFile, image: &RawImage, active: Rectangle) -> Result<Bla
             levels.len()
         )));
     }
-    let level = |x: usize, y: usize| levels[y % rows * columns + x % columns];
-    // An odd period and two sites meet again after twice the period.
-    let differs = (0..2 * rows).any(|y| (0..2 * columns).any(|x| level(x, y) != level(x % 2, y % 2)));
-    if differs {
-        return Err(file.problem(format!(
+    let black = BlackLevel::repeating(columns, rows, &levels[..count]).ok_or_else(|| {
+        file.problem(format!(
             "its black level differs by {rows}x{columns} sites (BlackLevelRepeatDim); levels of 2x2 sites are supported"
-        )));
-    }
-    let site = |x: usize, y: usize| level((x + active.left) % 2, (y + active.top) % 2);
-    let sites = BlackLevel::Sites([site(0, 0), site(1, 0), site(0, 1), site(1, 1)]);
-    Ok(sites.uniform().map_or(sites, BlackLevel::Uniform))
+        ))
+    })?;
+    Ok(black.beginning_at([active.left, active.top]))
 }
 
 /// What rows or columns add to the black level, from the sensor's corner on: nothing outside the active area, which has

@@ -10,6 +10,7 @@ mod color;
 mod describe;
 mod image;
 mod levels;
+mod noise;
 mod preview;
 mod ratio;
 mod read;
@@ -25,5 +26,8 @@ mod write;
 mod written;
 
 pub use area::RawArea;
+pub(super) use area::Rectangle;
+pub(super) use color::temperature_k;
+pub(super) use describe::exposure_of;
 pub use read::{DngReader, FORMAT};
 pub use write::{DngWriter, check_frame};

@@ -4,9 +4,11 @@ use super::area::{self, RawArea, Rectangle};
 use super::describe;
 use super::image::RawImage;
 use super::levels::Levels;
+use super::noise;
 use super::samples::ChunkRows;
 use super::storage::{Compression, Storage};
 use super::tags;
+use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
 use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
 use crate::formats::tiff::TiffFile;
@@ -53,6 +55,7 @@ pub struct DngReader {
     area: Rectangle,
     geometry: Geometry,
     own_tags: Metadata,
+    noise_profile: Option<NoiseProfile>,
     description: Option<String>,
     notes: Vec<String>,
     /// The stored row that [`SampleReader::read`] gives next.
@@ -92,6 +95,7 @@ impl DngReader {
         let mut notes = Vec::new();
         describe::note_area(&mut file, &image, active, area, &mut notes)?;
         let own_tags = describe::describe(&mut file, &image, on_sensor, &levels, &mut notes)?;
+        let noise_profile = noise::profile(&mut file, &image, &mut notes)?;
         let origin = [area.left + place[0], area.top + place[1]].map(|place| i32::try_from(place).unwrap_or(i32::MAX));
         let geometry = Geometry { origin, ..Geometry::new(area.width, area.height, &["Y"]) };
         // Decoding begins with the row of chunks that the area begins in.
@@ -103,6 +107,7 @@ impl DngReader {
             area,
             geometry,
             own_tags,
+            noise_profile,
             description,
             notes,
             next_row: area.top,
@@ -261,6 +266,10 @@ impl SampleReader for DngReader {
 
     fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    fn noise_profile(&self) -> Option<&NoiseProfile> {
+        self.noise_profile.as_ref()
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {

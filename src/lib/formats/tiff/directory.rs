@@ -16,6 +16,9 @@ pub fn begins_so(head: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| head.starts_with(*magic))
 }
 
+/// The number that a classic TIFF has behind its byte order.
+const CLASSIC: u64 = 42;
+
 /// A TIFF file: its bytes, and how its numbers are written.
 #[derive(Debug)]
 pub struct TiffFile {
@@ -37,7 +40,24 @@ impl TiffFile {
     /// # Errors
     ///
     /// When the file cannot be read or is no TIFF.
-    pub fn open(mut file: File, name: &str) -> Result<Self> {
+    pub fn open(file: File, name: &str) -> Result<Self> {
+        Self::open_with(file, name, &[CLASSIC])
+    }
+
+    /// The same for files that are laid out so but have a number of their own instead of TIFF's: those of Olympus and Panasonic.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`].
+    pub(in crate::formats) fn open_kin(file: File, name: &str) -> Result<Self> {
+        Self::open_with(
+            file,
+            name,
+            &[CLASSIC, u64::from(u16::from_le_bytes(*b"RO")), u64::from(u16::from_le_bytes(*b"RS")), 0x55],
+        )
+    }
+
+    fn open_with(mut file: File, name: &str, classic: &[u64]) -> Result<Self> {
         let length = file.seek(SeekFrom::End(0)).map_err(|source| Error::disk(name, "read", source))?;
         let mut opened =
             Self { file, name: name.to_owned(), length, big_endian: false, big_tiff: false, first_directory: 0 };
@@ -56,7 +76,7 @@ impl TiffFile {
             _ => return Err(opened.problem(no_tiff)),
         };
         opened.first_directory = match opened.number(&head[2..4]) {
-            42 => opened.number(&head[4..8]),
+            number if classic.contains(&number) => opened.number(&head[4..8]),
             43 if opened.number(&head[4..6]) == 8 && opened.number(&head[6..8]) == 0 => {
                 opened.big_tiff = true;
                 let mut offset = [0; 8];

@@ -1,0 +1,140 @@
+//! Several inputs, each with outputs of its own.
+
+use crate::error::{Error, Result};
+use crate::formats::places::{STEM, named, output_of, place, sidecar_path};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// An input, and where what is made of it goes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Job {
+    /// None for the standard input.
+    pub input: Option<PathBuf>,
+    /// The frame; none for the standard output.
+    pub frame: Option<PathBuf>,
+    /// What is written beside the frame, as far as it was asked for.
+    pub beside: Vec<Option<PathBuf>>,
+}
+
+/// The jobs for some inputs by patterns of their outputs ([`output_of`]): that of frames, which end in `extension` where it is a
+/// directory, and those of what is written beside them.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where two outputs would have one place, or several inputs come or go through a pipe.
+pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &[Option<&Path>]) -> Result<Vec<Job>> {
+    let (Some(first), several) = (inputs.first(), inputs.len() > 1) else {
+        let beside = beside.iter().map(|path| path.map(Path::to_owned)).collect();
+        return Ok(vec![Job { input: None, frame: frame.map(Path::to_owned), beside }]);
+    };
+    if several && inputs.iter().any(|input| named(Some(input)).is_none()) {
+        return Err(Error::Usage("the standard input cannot be one of several inputs; name a file".into()));
+    }
+    if several && named(frame).is_none() {
+        return Err(Error::Usage(format!(
+            "frames of several inputs go into files; give -o DIR/, or a name with {STEM}"
+        )));
+    }
+    if named(Some(first)).is_none() && [&[frame], beside].concat().into_iter().flatten().any(takes_a_name) {
+        return Err(Error::Usage(format!("the standard input has no name for {STEM}; name the output")));
+    }
+    let job = |input: &PathBuf| {
+        let of = |pattern: Option<&Path>, extension| pattern.map(|pattern| output_of(pattern, input, extension));
+        Job {
+            input: Some(input.clone()),
+            frame: of(frame, extension),
+            beside: beside.iter().map(|pattern| of(*pattern, "yaml")).collect(),
+        }
+    };
+    let jobs: Vec<Job> = inputs.iter().map(job).collect();
+    if several {
+        check_apart(&jobs)?;
+    }
+    Ok(jobs)
+}
+
+fn takes_a_name(pattern: &Path) -> bool {
+    let name = pattern.as_os_str().as_encoded_bytes();
+    name.ends_with(b"/") || name.windows(STEM.len()).any(|part| part == STEM.as_bytes())
+}
+
+/// Makes sure that no two outputs, the sidecars of frames among them, have one place.
+fn check_apart(jobs: &[Job]) -> Result<()> {
+    let mut taken = HashMap::new();
+    for Job { input, frame, beside } in jobs {
+        let input = input.as_deref().unwrap_or(Path::new("-")).display();
+        let sidecar = frame.as_deref().map(sidecar_path);
+        for output in [frame, &sidecar].into_iter().chain(beside).flatten() {
+            if let Some(other) = taken.insert(place(Some(output)), input.to_string()) {
+                return Err(Error::Usage(format!(
+                    "{}: what is made of {other} and of {input} would both go there; give -o DIR/, or names with {STEM}, and inputs \
+                     whose names differ",
+                    output.display()
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn planned(inputs: &[&str], frame: Option<&str>, beside: &[Option<&str>]) -> std::result::Result<Vec<Job>, String> {
+        let inputs: Vec<PathBuf> = inputs.iter().map(PathBuf::from).collect();
+        let beside: Vec<Option<&Path>> = beside.iter().map(|path| path.map(Path::new)).collect();
+        jobs(&inputs, frame.map(Path::new), "exr", &beside).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn each_input_has_outputs_of_its_own() {
+        let plan = planned(&["a/x.nef", "b/y.dng"], Some("out/"), &[Some("{stem}-m.yaml"), None]).unwrap();
+        let frames: Vec<_> = plan.iter().map(|job| job.frame.clone().unwrap()).collect();
+        assert_eq!(frames, [PathBuf::from("out/x.exr"), PathBuf::from("out/y.exr")]);
+        assert_eq!(plan[1].beside, [Some(PathBuf::from("y-m.yaml")), None]);
+        // One input goes where it is told, or through a pipe.
+        assert_eq!(planned(&["x.nef"], Some("{stem}.tiff"), &[]).unwrap()[0].frame, Some(PathBuf::from("x.tiff")));
+        assert_eq!(planned(&["x.nef"], None, &[]).unwrap()[0].frame, None);
+        assert_eq!(
+            planned(&[], Some("x.tiff"), &[None]).unwrap(),
+            [Job { frame: Some("x.tiff".into()), beside: vec![None], ..Job::default() }]
+        );
+    }
+
+    #[test]
+    fn outputs_that_would_meet_are_refused() {
+        for (inputs, frame, beside, wanted) in [
+            (
+                &["a/x.nef", "b/x.dng"][..],
+                Some("out/"),
+                None,
+                "out/x.exr: what is made of a/x.nef and of b/x.dng would both",
+            ),
+            (
+                &["x.nef", "y.nef"],
+                Some("o.tiff"),
+                None,
+                "o.tiff: what is made of x.nef and of y.nef would both go there",
+            ),
+            (&["x.nef", "y.nef"], Some("{stem}.exr"), Some("m.yaml"), "m.yaml: what is made of x.nef and of y.nef"),
+            (
+                &["x.nef", "y.nef"],
+                Some("{stem}.exr"),
+                Some("{stem}.exr.yaml"),
+                "x.exr.yaml: what is made of x.nef and of x.nef",
+            ),
+            (
+                &["x.nef", "y.nef"],
+                None,
+                None,
+                "frames of several inputs go into files; give -o DIR/, or a name with {stem}",
+            ),
+            (&["x.nef", "-"], Some("out/"), None, "the standard input cannot be one of several inputs; name a file"),
+            (&["-"], Some("out/"), None, "the standard input has no name for {stem}; name the output"),
+        ] {
+            let complaint = planned(inputs, frame, &[beside]).unwrap_err();
+            assert!(complaint.starts_with(wanted), "{complaint}");
+        }
+    }
+}
