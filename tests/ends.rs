@@ -34,7 +34,7 @@ const QUIET: NoiseModel = NoiseModel {
     poisson: PoissonKind::Exact,
 };
 
-const PAPER: AdcRecord = AdcRecord { bits: 12, bias_adu: 1753.0, adu_per_e: 0.058824 };
+const PAPER: AdcRecord = AdcRecord::new(12, 1753.0, 0.058824);
 
 impl Case {
     fn codes(&self) -> Prediction {
@@ -231,7 +231,7 @@ impl Dice {
         let signal_shot = self.next() > 0.15;
         let light_e = f64::from(to_sample(light_e));
         let model = NoiseModel { dark_e, dcnu, prnu, read_noise_e, full_well_e, signal_shot, ..QUIET };
-        Case { model, adc: AdcRecord { bits, bias_adu, adu_per_e }, light_e }
+        Case { model, adc: AdcRecord::new(bits, bias_adu, adu_per_e), light_e }
     }
 }
 
@@ -248,8 +248,7 @@ fn random_cameras_are_predicted_as_sums_over_counts_have_it() {
 /// A count on a lattice of codes, without read noise: ties go up; 20 e⁻ at half a code each give the mean 100 + 10 + ¼.
 #[test]
 fn lattices_and_ties_are_counted() {
-    let case =
-        |light_e, adu_per_e| Case { model: QUIET, adc: AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e }, light_e };
+    let case = |light_e, adu_per_e| Case { model: QUIET, adc: AdcRecord::new(12, 100.0, adu_per_e), light_e };
     assert!((case(20.0, 0.5).codes().moments.mean - 110.25).abs() < 1e-9);
     for (light_e, slope) in [(20.0, 0.5), (561.0, 0.0498), (300.0, 1.0), (250.0, 0.0499), (3.0, 0.3)] {
         Reference::new(case(light_e, slope)).check(1e-9);
@@ -264,8 +263,7 @@ fn small_wells_and_few_electrons_are_counted() {
             for read_noise_e in [0.0, 0.2, 0.9] {
                 for bias_adu in [-3.0, 0.0, 0.4, 2.0] {
                     let model = NoiseModel { full_well_e, read_noise_e, ..QUIET };
-                    Reference::new(Case { model, adc: AdcRecord { bits: 8, bias_adu, adu_per_e: 1.7 }, light_e })
-                        .check(1e-8);
+                    Reference::new(Case { model, adc: AdcRecord::new(8, bias_adu, 1.7), light_e }).check(1e-8);
                 }
             }
         }
@@ -364,7 +362,7 @@ fn random_cameras_are_simulated_as_predicted() {
         let without = if case.model.signal_shot { vec![] } else { vec![cyanometer::random::Source::Ssn] };
         let settings = NoiseSettings { seed: number, sensor_seed: number, without, ..NoiseSettings::default() };
         let noisy = through(&scene, &AddNoise::new(&scene.header, &settings).unwrap());
-        let AdcRecord { bits, bias_adu, adu_per_e } = case.adc;
+        let AdcRecord { bits, bias_adu, adu_per_e, .. } = case.adc;
         let converter = AdcSettings { bits: Some(bits), bias_adu: Some(bias_adu), adu_per_e: Some(adu_per_e) };
         let codes = through(&noisy, &Digitize::new(&noisy.header, &converter).unwrap());
         for frame in [noisy, codes] {

@@ -172,7 +172,7 @@ fn levels_by_site_that_no_word_is_left_for_are_refused() {
     assert_eq!(less.header().metadata.black_by_row, codes.header.metadata.black_by_row);
     for black in [Black::None, Black::Level(100.0)] {
         let mut codes = codes.clone();
-        codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });
+        codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord::new(12, 100.0, 0.1));
         refused(correct(&codes.header, black, Some(0.999)), "differs among photosites, so that it is no charge");
         assert!(correct(&codes.header, Black::Auto, Some(0.999)).is_ok());
     }
@@ -220,7 +220,7 @@ fn nothing_is_predicted_behind_levels_by_site() {
     let scene = Scene::uniform("test", [100.0; 3]);
     let mut codes = with_levels(plane(12, 8, CfaPattern::Rggb.into()));
     codes.header.metadata.scene = Some(scene);
-    codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });
+    codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord::new(12, 100.0, 0.1));
     let why = propagation::of_frame(&codes.header, Equations::Exact).unwrap_err();
     assert_eq!(why, Unpredictable::Beyond("the black level differs among photosites"));
     let corrected = correct(&codes.header, Black::Auto, None).unwrap();

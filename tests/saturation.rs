@@ -29,7 +29,7 @@ fn plane_header(width: usize, height: usize, pattern: CfaPattern) -> FrameHeader
     header.metadata.cfa = Some(pattern.into());
     header.metadata.black_level_adu = Some(100.0.into());
     header.metadata.white_level_adu = Some(f64::from(WHITE).into());
-    header.metadata.adc = Some(AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });
+    header.metadata.adc = Some(AdcRecord::new(12, 100.0, 0.1));
     header
 }
 
@@ -93,7 +93,7 @@ fn levels_are_those_of_the_class_and_of_the_full_well() {
     let mut header = plane_header(6, 4, CfaPattern::Rggb);
     // 40 000 e⁻ at 0.1 ADU lie at 4100, above the largest code.
     assert_eq!(levels(&header), [WHITE; 3]);
-    header.metadata.adc = Some(AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.05 });
+    header.metadata.adc = Some(AdcRecord::new(12, 100.0, 0.05));
     assert_eq!(levels(&header), [2100.0; 3]);
     header.metadata.adc = None;
     header.metadata.white_level_adu = Some(cyanometer::camera::levels::WhiteLevel::Classes([3000.0, 3500.0, 4000.0]));
@@ -138,7 +138,7 @@ fn marks_are_made_before_dark_frames_come_off() {
 #[test]
 fn the_uncertainty_of_a_marked_pixel_is_infinite() {
     let mut header = plane_header(12, 10, CfaPattern::Rggb);
-    header.metadata.adc = Some(AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.1 });
+    header.metadata.adc = Some(AdcRecord::new(12, 100.0, 0.1));
     let plane = frame(header, |x, y, _| if (x, y) == (6, 5) { WHITE } else { 700.0 });
     let stage = WithSigma::of_demosaicking(demosaicking(&plane, Method::EffectiveColor)).unwrap();
     let (made, counts) = masked(&plane, &stage);

@@ -1,5 +1,6 @@
 //! The read-out of a sensor: geometry, wells, noise, converter; and its dark current.
 
+use super::linearity::Linearization;
 use crate::cfa::FilterArray;
 use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, kelvin};
 use serde::{Deserialize, Serialize};
@@ -53,6 +54,9 @@ pub struct ReadOut {
     pub bias_adu: f64,
     /// Slope of the converter, ADU per e⁻.
     pub adu_per_e: f64,
+    /// What makes its codes proportional to charge; none where they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub linearization: Option<Linearization>,
 }
 
 impl ReadOut {
@@ -145,6 +149,9 @@ impl ReadOut {
                 self.bias_adu, self.bits
             ));
         }
+        if let Some(curve) = self.linearization {
+            curve.check_rises([-0.5, top_code + 0.5].map(|edge| edge - self.bias_adu))?;
+        }
         Ok(())
     }
 
@@ -215,6 +222,7 @@ pub(crate) mod tests {
             bits: 12,
             bias_adu: 1753.0,
             adu_per_e: 0.058824,
+            linearization: None,
         }
     }
 

@@ -190,6 +190,7 @@ impl From<FlatSensor> for Sensor {
                 bits: flat.bits,
                 bias_adu: flat.bias_adu,
                 adu_per_e: flat.adu_per_e,
+                linearization: None,
             }),
             response: Some(ResponseFiles {
                 quantum_efficiency: flat.quantum_efficiency,

@@ -11,6 +11,7 @@ use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
+use crate::stages::linearize::Linearize;
 use crate::stages::saturation::{MASK_LAYER, with_mask};
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
@@ -75,6 +76,7 @@ pub struct FrameReader {
     buffer: Vec<f32>,
     /// What stored samples are divided by: sRGB in 16 bits runs to 65535.
     divisor: Option<f32>,
+    linearize: Option<Linearize>,
     notes: Vec<String>,
     /// The place of the layer of marks among the stored channels, where stages do not see it.
     mask: Option<usize>,
@@ -191,6 +193,7 @@ impl FrameReader {
             mismatch: None,
             buffer: Vec::new(),
             divisor,
+            linearize: None,
             notes,
             mask,
             keeps_mask: false,
@@ -204,6 +207,16 @@ impl FrameReader {
     /// Metadata to amend before a stage is built on them.
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
+    }
+
+    /// Makes codes proportional to charge from now on, in rows and metadata.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Linearize::of`].
+    pub fn linearize(&mut self) -> Result<()> {
+        self.linearize = Some(Linearize::of(&mut self.header)?);
+        Ok(())
     }
 
     /// How the file stores its samples, in a word: `u16`, `f32` …; `mixed` where channels differ.
@@ -299,7 +312,8 @@ impl RowSource for FrameReader {
         let width = self.header.geometry.width;
         let kept = self.header.geometry.channels.len() - usize::from(mask.is_some());
         let direct = kept * width == whole;
-        let start = if direct { samples.len() } else { 0 };
+        let first = samples.len();
+        let start = if direct { first } else { 0 };
         let into: &mut Vec<f32> = if direct { samples } else { &mut buffer };
         into.truncate(start);
         self.reader.read(rows, into)?;
@@ -321,6 +335,10 @@ impl RowSource for FrameReader {
                     self.marked += plane(mask).iter().filter(|mark| **mark != 0.0).count() as u64;
                 }
             }
+        }
+        if let Some(linearize) = &self.linearize {
+            let row_samples = self.header.geometry.row_samples();
+            samples[first..].chunks_exact_mut(row_samples).for_each(|row| linearize.apply(&mut row[..kept * width]));
         }
         self.buffer = buffer;
         self.rows_read += rows;

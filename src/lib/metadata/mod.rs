@@ -1,10 +1,12 @@
 //! What is known about a frame: its quantity, its camera, and everything that was done to it.
 
+mod converter;
 mod records;
 
+pub use converter::AdcRecord;
 pub use records::{
-    AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
-    NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
+    ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord,
+    PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
 };
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};

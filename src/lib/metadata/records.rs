@@ -2,7 +2,6 @@
 
 use crate::camera::levels::BlackLevel;
 use crate::camera::optics::Exposure;
-use crate::camera::readout::ReadOut;
 use crate::cfa::CfaPattern;
 use crate::color;
 use crate::names::{Named, serde_by_name};
@@ -97,24 +96,6 @@ pub struct NoiseRecord {
     /// Share of a packet that each move to the output takes along, where charge transfer was simulated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cte: Option<f64>,
-}
-
-/// The converter as it was set.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct AdcRecord {
-    /// Bits.
-    pub bits: u32,
-    /// Bias in ADU.
-    pub bias_adu: f64,
-    /// Slope in ADU per e⁻.
-    pub adu_per_e: f64,
-}
-
-impl AdcRecord {
-    /// The converter of a sensor as the description of its read-out has it.
-    pub fn of_readout(readout: &ReadOut) -> Self {
-        Self { bits: readout.bits, bias_adu: readout.bias_adu, adu_per_e: readout.adu_per_e }
-    }
 }
 
 /// What was taken back of a frame of codes.

@@ -165,7 +165,7 @@ impl Photosite {
 
     /// The variance of the codes, in ADU².
     fn digitized_budget(&self, adc: &AdcRecord, expected_e: f64) -> Budget {
-        let square = adc.adu_per_e * adc.adu_per_e;
+        let square = adc.sample_per_e(self.model.dark_e + expected_e).powi(2);
         let mut budget = self.charge_budget(expected_e).map(|variance| variance * square);
         if self.equations == Equations::Exact {
             let charge: f64 = budget.iter().sum();

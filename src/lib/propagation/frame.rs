@@ -239,6 +239,9 @@ fn subtracted(level: BlackLevel, with_deltas: bool) -> Predicted<f64> {
 fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Predicted<(Photosite, [Prediction; 3])> {
     let metadata = &frame.metadata;
     check_levels(frame, &codes)?;
+    if codes.equations == Equations::Paper && codes.adc.is_some_and(|adc| adc.is_bent()) {
+        return Err(Unpredictable::Beyond("the paper's converter is straight"));
+    }
     let shifted = |prediction: Prediction, by: f64| Prediction {
         moments: MeanVariance { mean: prediction.moments.mean + by, ..prediction.moments },
         ..prediction
@@ -272,7 +275,7 @@ fn check_levels(frame: &FrameHeader, codes: &Photosite) -> Predicted<()> {
     if is_known && metadata.uniform_black_adu().is_none() {
         return Err(Unpredictable::Beyond("the black level differs among photosites"));
     }
-    let top = codes.adc.map(|adc| f64::from(adc.top_code()));
+    let top = codes.adc.map(|adc| adc.sample(adc.top_code().into()));
     if metadata.demosaic.is_none() && metadata.white_level_adu.is_some_and(|white| white.uniform() != top) {
         return Err(Unpredictable::Beyond("the white level is not the largest code of the converter"));
     }
@@ -292,6 +295,9 @@ fn transferred(
     let is_level = classes.iter().all(|class| class.moments.mean == classes[0].moments.mean);
     if frame.metadata.demosaic.is_some() || (frame.metadata.cfa.is_some() && !is_level) {
         return Err(Unpredictable::Beyond("charge transfer mixes classes of unequal signals"));
+    }
+    if photosite.adc.is_some_and(|adc| adc.linearization.is_some()) {
+        return Err(Unpredictable::Beyond("charge transfer before a converter that is not straight"));
     }
     let transfer = Transfer::new(cte, &frame.geometry)
         .map_err(|_| Unpredictable::Beyond("its charge transfer efficiency is impossible"))?;

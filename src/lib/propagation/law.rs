@@ -54,7 +54,8 @@ impl Law {
         let smoothing = self.read_noise_e.hypot(self.least_pattern_std());
         let [low, high] = self.reach();
         let top = f64::from(adc.top_code());
-        adc.adu_per_e * smoothing >= SMOOTH
+        adc.linearization.is_none()
+            && adc.adu_per_e * smoothing >= SMOOTH
             && !self.light.is_rectified(self.full_well_e)
             && !self.dark.is_rectified(self.full_well_e)
             && !self.reaches_full_well()

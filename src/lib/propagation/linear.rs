@@ -44,7 +44,7 @@ mod tests {
     /// theirs by quadrature, good to 10⁻⁷ here; the others are formulas.
     #[test]
     fn it_is_the_exact_variance_less_the_pattern() {
-        let adc = AdcRecord { bits: 16, bias_adu: 800.0, adu_per_e: 0.8 };
+        let adc = AdcRecord::new(16, 800.0, 0.8);
         for (prnu, dcnu, shot) in [(0.0, 0.0, true), (0.008, 0.2, true), (0.3, 0.5, true), (0.01, 0.1, false)] {
             let model = NoiseModel {
                 dark_e: 73.0,

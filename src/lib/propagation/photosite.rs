@@ -4,6 +4,7 @@ use super::charge::{charge, sensitivity};
 use super::law::Law;
 use super::moments::{Equations, Prediction};
 use super::pattern::Shared;
+use super::reading::codes_of;
 use crate::metadata::AdcRecord;
 use crate::stages::noise::NoiseModel;
 
@@ -62,7 +63,19 @@ impl Photosite {
         Self { dark_frames, ..self }
     }
 
-    /// Units of its samples to an electron.
+    /// The signal electrons that a level above what no light reads stands for.
+    pub(super) fn expected_at(&self, level: f64) -> f64 {
+        match self.adc {
+            None => level,
+            Some(adc) if adc.is_bent() => {
+                let black = adc.level_at(self.model.dark_e);
+                adc.electrons_between(black, black + level)
+            }
+            Some(adc) => level / adc.adu_per_e,
+        }
+    }
+
+    /// Units of its samples to an electron; of codes that are not straight, where there are few.
     pub fn slope(&self) -> f64 {
         self.adc.map_or(1.0, |adc| adc.adu_per_e)
     }
@@ -106,7 +119,7 @@ impl Photosite {
         let law = Law::of(&self.model, expected_e);
         let is_paper = self.equations == Equations::Paper;
         if !is_paper && !law.is_plain(adc) {
-            return law.predict(&law.of_codes(adc, adc.codes()));
+            return law.predict(&law.of_codes(adc, codes_of(adc)));
         }
         let (before, slope) = (self.electrons(expected_e), adc.adu_per_e);
         let [of_variance, of_fourth] = if is_paper { [0.0; 2] } else { [1.0 / 12.0, -1.0 / 120.0] };
@@ -148,7 +161,7 @@ impl Photosite {
             let light = self.pattern(self.model.prnu) * expected_e * expected_e * square;
             return Shared { light: light + dark, dark, both: dark };
         }
-        let [light, dark] = [law, of_dark].map(|law| law.of_codes(adc, adc.codes()));
+        let [light, dark] = [law, of_dark].map(|law| law.of_codes(adc, codes_of(adc)));
         Shared::of((&law, &light), (&of_dark, &dark))
     }
 
@@ -290,7 +303,7 @@ mod tests {
         assert!((cross - 73.2138 * 0.04).abs() < 1e-4);
     }
 
-    const ADC: AdcRecord = AdcRecord { bits: 12, bias_adu: 1753.0, adu_per_e: 0.058824 };
+    const ADC: AdcRecord = AdcRecord::new(12, 1753.0, 0.058824);
 
     /// MODEL's figures, from the paper's constants: 16.96 by Eq. 11, 17.05 with the cross term; with 15.7 e⁻ of read
     /// noise 23.2, not the 23.0 of Table 1.

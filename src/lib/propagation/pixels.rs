@@ -126,9 +126,9 @@ impl LevelVariance {
         let is_rectified = photosite.model.prnu.max(photosite.model.dcnu) > 0.2;
         let steps = if is_rectified { STEPS / 8 } else { STEPS };
         let step = largest / steps as f64;
-        let slope = photosite.slope();
         let variance = |index: usize| {
-            let expected_e = index as f64 * step / slope;
+            let expected_e = photosite.expected_at(index as f64 * step);
+            let slope = photosite.adc.map_or(1.0, |adc| adc.sample_per_e(photosite.model.dark_e + expected_e));
             let charge = charge::charge(&photosite.model, expected_e).variance + photosite.model.read_noise_e.powi(2);
             // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
             if photosite.adc.is_some() && charge.sqrt() * slope < 0.5 {

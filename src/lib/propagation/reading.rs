@@ -1,5 +1,6 @@
 //! What is asked of a photosite's charge: the moments of its electrons or codes, or the chance to be beyond a level.
 
+use super::bent;
 use crate::metadata::AdcRecord;
 use crate::numerics::normal::cumulative;
 use crate::numerics::rounding::{REACH, Rounding, SMOOTH, about};
@@ -28,21 +29,9 @@ pub(super) enum Asked {
     Beyond(f64),
 }
 
-impl AdcRecord {
-    /// The charge that a level stands for, in e⁻.
-    pub(super) fn electrons_at(&self, level_adu: f64) -> f64 {
-        (level_adu - self.bias_adu) / self.adu_per_e
-    }
-
-    /// The level of a charge, in ADU.
-    fn level_at(&self, electrons: f64) -> f64 {
-        self.bias_adu + self.adu_per_e * electrons
-    }
-
-    /// Its codes.
-    pub(super) fn codes(&self) -> Rounding {
-        Rounding { lowest: 0.0, highest: f64::from(self.top_code()) }
-    }
+/// The codes of a converter.
+pub(super) fn codes_of(adc: &AdcRecord) -> Rounding {
+    Rounding { lowest: 0.0, highest: f64::from(adc.top_code()) }
 }
 
 /// Codes without ends.
@@ -56,7 +45,7 @@ impl Reading {
 
     /// Codes between ends, about the code of a charge.
     pub fn codes(adc: AdcRecord, ends: Rounding, noise_e: f64, about_e: f64) -> Self {
-        Self { asked: Asked::Codes(adc, ends), noise_e, center: ends.code(adc.level_at(about_e)) }
+        Self { asked: Asked::Codes(adc, ends), noise_e, center: adc.sample(ends.code(adc.level_at(about_e))) }
     }
 
     /// Whether a charge and read noise exceed a level.
@@ -79,6 +68,9 @@ impl Reading {
         let variance = variance + self.noise_e * self.noise_e;
         match self.asked {
             Asked::Electrons => about(electrons - self.center, variance, 0.0),
+            Asked::Codes(adc, ends) if adc.linearization.is_some() => {
+                bent::moments(&adc, ends, electrons, variance.sqrt(), self.center)
+            }
             Asked::Codes(adc, ends) => {
                 ends.moments(adc.level_at(electrons), adc.adu_per_e * variance.sqrt(), self.center)
             }
@@ -99,8 +91,9 @@ impl Reading {
     pub fn smooth_at(&self, electrons: f64) -> Moments {
         match self.asked {
             Asked::Codes(adc, _) => {
-                let variance = (adc.adu_per_e * self.noise_e).powi(2) + 1.0 / 12.0;
-                about(adc.level_at(electrons) - self.center, variance, -1.0 / 120.0)
+                let (slope, step) = (adc.sample_per_e(electrons), adc.sample_slope(adc.level_at(electrons)));
+                let variance = (slope * self.noise_e).powi(2) + step * step / 12.0;
+                about(adc.sample_at(electrons) - self.center, variance, -step.powi(4) / 120.0)
             }
             _ => self.at(electrons, 0.0),
         }
@@ -123,10 +116,18 @@ impl Reading {
         electrons - reach - code > lower && electrons + reach + code < upper
     }
 
-    /// Electrons to the width of a code; none where there is none, or read noise hides it.
+    /// Electrons to the width of a code, the narrower of those at the two ends; none where there is none, or read noise hides
+    /// it.
     pub fn visible_code_e(&self) -> Option<f64> {
+        let width = |adc: &AdcRecord| {
+            let of_end = |edge: f64| adc.electrons_at(edge + 1.0) - adc.electrons_at(edge);
+            match adc.linearization {
+                None => 1.0 / adc.adu_per_e,
+                Some(_) => of_end(-0.5).min(of_end(f64::from(adc.top_code()) - 0.5)),
+            }
+        };
         match self.asked {
-            Asked::Codes(adc, _) if adc.adu_per_e * self.noise_e < SMOOTH => Some(1.0 / adc.adu_per_e),
+            Asked::Codes(adc, _) if self.noise_e < SMOOTH * width(&adc) => Some(width(&adc)),
             _ => None,
         }
     }

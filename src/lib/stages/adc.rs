@@ -22,6 +22,8 @@ pub struct AdcSettings {
 ///
 /// y = round(K·n + y₀)        n in e⁻, y₀ = bias        [HP2005, Eq. 12]
 ///
+/// A sensor with a linearization f has y = round(f⁻¹(K·n) + y₀).
+///
 /// Rounding *is* the quantization noise (variance 1/12 ADU² while σ ≥ ½ ADU); nothing else is added for it. Ties go
 /// away from zero. NaN stays NaN.
 ///
@@ -48,18 +50,7 @@ pub struct AdcSettings {
 pub struct Digitize {
     header: FrameHeader,
     adc: AdcRecord,
-}
-
-impl AdcRecord {
-    /// The largest code, 2^bits − 1.
-    pub fn top_code(&self) -> u32 {
-        (1 << self.bits) - 1
-    }
-
-    /// The lowest code of a full photosite: the largest, or that of full well (electrons) where it is smaller.
-    pub fn full_code(&self, full_well_e: f64) -> f64 {
-        f64::from(self.top_code()).min((self.bias_adu + self.adu_per_e * full_well_e).floor())
-    }
+    bent: Option<BentEdges>,
 }
 
 impl Digitize {
@@ -82,7 +73,10 @@ impl Digitize {
         }
         let readout = input.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
         let needed = |key| input.missing(key);
+        let of_sensor = readout.and_then(|readout| readout.linearization);
         let adc = AdcRecord {
+            linearization: of_sensor,
+            is_linearized: false,
             bits: settings.bits.or(readout.map(|r| r.bits)).ok_or_else(|| needed("sensor.readout.bits"))?,
             bias_adu: settings
                 .bias_adu
@@ -105,14 +99,18 @@ impl Digitize {
                 adc.adu_per_e
             )));
         }
+        if let Some(curve) = adc.linearization {
+            curve.check_rises(adc.range()).map_err(Error::Usage)?;
+        }
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
         metadata.adc = Some(adc);
         // Expected electrons are those of light alone.
         let is_light = input.metadata.quantity == QuantityKind::ExpectedElectrons;
         let dark_signal_e = metadata.dark_signal_e.take().or(is_light.then_some(0.0));
-        metadata.set_black_adu(dark_signal_e.map(|dark_e| (adc.bias_adu + adc.adu_per_e * dark_e).into()));
+        metadata.set_black_adu(dark_signal_e.map(|dark_e| adc.level_at(dark_e).into()));
         metadata.white_level_adu = Some(f64::from(adc.top_code()).into());
-        Ok(Self { header: FrameHeader { metadata, ..input.clone() }, adc })
+        let bent = adc.linearization.map(|_| BentEdges::of(&adc));
+        Ok(Self { header: FrameHeader { metadata, ..input.clone() }, adc, bent })
     }
 
     /// The head of the digitized frame, to add to.
@@ -128,6 +126,15 @@ impl Digitize {
         mut output: Rows<'_, Adu>,
     ) -> Counts {
         let mut counts = Counts::default();
+        if let Some(edges) = &self.bent {
+            for y in output.range() {
+                for channel in 0..input.channels() {
+                    let (charges, codes) = (input.row(y.cast_signed(), channel), output.row(y, channel));
+                    counts = counts.plus(edges.digitize(charges, codes));
+                }
+            }
+            return counts;
+        }
         let clipping = Clipping::of(&self.adc);
         for y in output.range() {
             for channel in 0..input.channels() {
@@ -135,6 +142,31 @@ impl Digitize {
                 let of_row = vectors::run_on(instructions, Row { adc: self.adc, clipping, charges, codes });
                 counts = counts.plus(of_row);
             }
+        }
+        counts
+    }
+}
+
+/// The charges between the codes of a converter that is not straight: from the first on, they rise from −½ to ½ above the largest
+/// code.
+#[derive(Debug, Clone)]
+struct BentEdges(Vec<f64>);
+
+impl BentEdges {
+    fn of(adc: &AdcRecord) -> Self {
+        Self((0..=adc.top_code() + 1).map(|code| adc.electrons_at(f64::from(code) - 0.5)).collect())
+    }
+
+    fn digitize(&self, charges: &[f32], codes: &mut [f32]) -> Counts {
+        let Self(edges) = self;
+        let top = edges.len() - 2;
+        let mut counts = Counts::default();
+        for (&charge, code) in charges.iter().zip(codes) {
+            let below = edges.partition_point(|edge| *edge <= f64::from(charge));
+            counts.clipped_low += u64::from(below == 0 && !charge.is_nan());
+            counts.clipped_high += u64::from(below == edges.len());
+            counts.not_finite += u64::from(charge.is_nan());
+            *code = if charge.is_nan() { charge } else { below.saturating_sub(1).min(top) as f32 };
         }
         counts
     }
@@ -307,7 +339,7 @@ mod tests {
         for (bias_adu, adu_per_e) in [(0.0, 1.0), (0.5_f64.next_down(), 1.0), (-0.5, 1.0), (102.4, 0.1), (-17.3, 3e-4)]
         {
             for bits in [1, 12, 16] {
-                let adc = AdcRecord { bits, bias_adu, adu_per_e };
+                let adc = AdcRecord::new(bits, bias_adu, adu_per_e);
                 let clipping = Clipping::of(&adc);
                 let mut expected = Counts::default();
                 let plain: Vec<u32> =

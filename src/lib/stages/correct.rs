@@ -220,7 +220,7 @@ mod tests {
     fn codes() -> FrameHeader {
         let mut metadata = Metadata::new(QuantityKind::Adu);
         metadata.cfa = Some(CfaPattern::Rggb.into());
-        metadata.adc = Some(AdcRecord { bits: 12, bias_adu: 100.0, adu_per_e: 0.05 });
+        metadata.adc = Some(AdcRecord::new(12, 100.0, 0.05));
         metadata.black_level_adu = Some(104.0.into());
         metadata.white_level_adu = Some(4095.0.into());
         metadata.exposure = Some(Exposure { exposure_s: 0.1, f_number: 8.0, lens_transmittance: 1.0 });

@@ -13,6 +13,7 @@ pub mod adc;
 pub mod correct;
 pub mod darks;
 
+pub mod linearize;
 pub mod mosaic;
 
 pub mod saturation;

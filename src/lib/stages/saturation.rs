@@ -37,7 +37,8 @@ impl FullLevels {
                 let white = metadata.white_level_adu?;
                 // Both levels are shifted alike by what was subtracted.
                 let full_well_e = readout.map_or(f64::INFINITY, |readout| readout.full_well_e);
-                let below_top = |adc: AdcRecord| f64::from(adc.top_code()) - adc.full_code(full_well_e);
+                let below_top =
+                    |adc: AdcRecord| adc.sample(adc.top_code().into()) - adc.sample(adc.full_code(full_well_e));
                 let missing = metadata.adc.map_or(0.0, below_top);
                 white.classes().map(|level| level - missing)
             }

@@ -261,10 +261,11 @@ fn means(tally: &Tally) -> Option<[f64; 3]> {
 /// the first is far below the sampling error of a spread, the second leaves no level to work back to.
 pub fn expected_electrons(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 3]> {
     let metadata = &frame.metadata;
+    let straight = metadata.adc.filter(|adc| !adc.is_bent());
     let camera_signals = |xyz: [f64; 3]| -> Option<[f64; 3]> {
         let record = metadata.color.as_ref()?;
         let adu_from_xyz = record.xyz_from_adu(metadata.exposure)?.try_inverse()?;
-        Some((adu_from_xyz * Vector3::from(xyz) / metadata.adc?.adu_per_e).into())
+        Some((adu_from_xyz * Vector3::from(xyz) / straight?.adu_per_e).into())
     };
     let [first, second, third] = means;
     let electrons = match metadata.quantity {
@@ -273,7 +274,7 @@ pub fn expected_electrons(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 
         QuantityKind::Adu => {
             let adc = metadata.adc?;
             let black = metadata.uniform_black_adu()?;
-            means.map(|mean| (mean - black) / adc.adu_per_e)
+            means.map(|mean| adc.electrons_between(black, mean))
         }
         QuantityKind::Xyz => camera_signals(means)?,
         QuantityKind::Xyy => camera_signals(color::xyz_of_chromaticity([first, second], third))?,
@@ -389,7 +390,7 @@ mod tests {
         assert_eq!(expected_electrons(&frame, [10.0, f64::NAN, 31.0]), Some([0.0, 0.0, 1.0]));
         frame.metadata.quantity = QuantityKind::Adu;
         assert_eq!(expected_electrons(&frame, electrons), None);
-        frame.metadata.adc = Some(AdcRecord { bits: 14, bias_adu: 100.0, adu_per_e: 0.25 });
+        frame.metadata.adc = Some(AdcRecord::new(14, 100.0, 0.25));
         frame.metadata.black_level_adu = Some(107.5.into());
         check(&frame, electrons.map(|e| 0.25 * e + 107.5));
 

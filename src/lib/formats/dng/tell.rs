@@ -155,7 +155,7 @@ fn black_levels(black: &BlackLevels, width: usize) -> Vec<ExtraTag> {
 /// know all that it follows from.
 fn noise_profile(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<ExtraTag> {
     let metadata = &header.metadata;
-    let (record, adc) = (metadata.noise.as_ref()?, metadata.adc?);
+    let (record, adc) = (metadata.noise.as_ref()?, metadata.adc.filter(|adc| !adc.is_bent())?);
     // Charge that moved makes neighbors alike, and dark frames bring noise of their own.
     let is_plain = metadata.correction.is_none_or(|record| record.dark_frames == 0 && record.cte.is_none());
     if record.cte.is_some() || !is_plain {

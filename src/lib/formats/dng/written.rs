@@ -168,7 +168,7 @@ fn numbers(file: &mut TiffFile, directory: &Directory, tag: DngTag) -> Vec<f64> 
 
 /// Noise, converter and levels that agree.
 fn with_noise(header: &mut FrameHeader) -> Photosite {
-    let adc = AdcRecord { bits: 16, bias_adu: 800.0, adu_per_e: 0.8 };
+    let adc = AdcRecord::new(16, 800.0, 0.8);
     let metadata = &mut header.metadata;
     metadata.adc = Some(adc);
     metadata.noise = Some(NoiseRecord {

@@ -1,0 +1,112 @@
+//! The converter of a frame's codes: which charge a code stands for.
+
+use crate::camera::linearity::Linearization;
+use crate::camera::readout::ReadOut;
+use serde::{Deserialize, Serialize};
+
+/// The converter as it was set, and whether its codes were made straight since.
+///
+/// Codes are whole numbers from 0 to 2^bits − 1: the nearest to bias + b(K n), n the charge in e⁻, K the slope, and b the
+/// inverse of the linearization, where there is one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AdcRecord {
+    /// Bits.
+    pub bits: u32,
+    /// Bias in ADU.
+    pub bias_adu: f64,
+    /// Slope in ADU per e⁻; that of straight codes.
+    pub adu_per_e: f64,
+    /// What makes its codes straight; none where they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub linearization: Option<Linearization>,
+    /// Whether samples are codes that were made straight.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not", rename = "linearized")]
+    pub is_linearized: bool,
+}
+
+impl AdcRecord {
+    /// A converter whose codes are straight.
+    pub const fn new(bits: u32, bias_adu: f64, adu_per_e: f64) -> Self {
+        Self { bits, bias_adu, adu_per_e, linearization: None, is_linearized: false }
+    }
+
+    /// The converter of a sensor as the description of its read-out has it.
+    pub fn of_readout(readout: &ReadOut) -> Self {
+        let straight = Self::new(readout.bits, readout.bias_adu, readout.adu_per_e);
+        Self { linearization: readout.linearization, ..straight }
+    }
+
+    /// Whether its samples are not proportional to charge.
+    pub fn is_bent(&self) -> bool {
+        self.linearization.is_some() && !self.is_linearized
+    }
+
+    /// The largest code, 2^bits − 1.
+    pub fn top_code(&self) -> u32 {
+        (1 << self.bits) - 1
+    }
+
+    /// From the lower edge of the lowest code to the upper edge of the highest, above the bias.
+    pub fn range(&self) -> [f64; 2] {
+        [-0.5, f64::from(self.top_code()) + 0.5].map(|edge| edge - self.bias_adu)
+    }
+
+    /// A level of codes, made straight, above the bias.
+    fn above_bias(&self, code: f64) -> f64 {
+        let above = code - self.bias_adu;
+        self.linearization.map_or(above, |curve| curve.extended(above, self.range()))
+    }
+
+    /// The charge that a level of codes stands for, in e⁻.
+    pub fn electrons_at(&self, code: f64) -> f64 {
+        self.above_bias(code) / self.adu_per_e
+    }
+
+    /// The level of a charge among the codes, before it is rounded.
+    pub fn level_at(&self, electrons: f64) -> f64 {
+        let above = self.adu_per_e * electrons;
+        self.bias_adu + self.linearization.map_or(above, |curve| curve.bent(above, self.range()))
+    }
+
+    /// The sample of a level of codes: the code, or what it was made straight to.
+    pub fn sample(&self, code: f64) -> f64 {
+        if self.is_linearized { self.bias_adu + self.above_bias(code) } else { code }
+    }
+
+    /// How much the sample of a level of codes rises with the code.
+    pub fn sample_slope(&self, code: f64) -> f64 {
+        let curve = self.linearization.filter(|_| self.is_linearized);
+        let [from, to] = self.range();
+        curve.map_or(1.0, |curve| curve.slope((code - self.bias_adu).clamp(from, to)))
+    }
+
+    /// The sample of a charge, before it is rounded.
+    pub fn sample_at(&self, electrons: f64) -> f64 {
+        if self.is_bent() { self.level_at(electrons) } else { self.bias_adu + self.adu_per_e * electrons }
+    }
+
+    /// The charge by which one sample exceeds another, in e⁻.
+    pub fn electrons_between(&self, lower: f64, upper: f64) -> f64 {
+        if self.is_bent() {
+            self.electrons_at(upper) - self.electrons_at(lower)
+        } else {
+            (upper - lower) / self.adu_per_e
+        }
+    }
+
+    /// How much the sample of a charge rises with it, in ADU per e⁻.
+    pub fn sample_per_e(&self, electrons: f64) -> f64 {
+        match self.linearization.filter(|_| !self.is_linearized) {
+            None => self.adu_per_e,
+            Some(curve) => {
+                let [from, to] = self.range();
+                self.adu_per_e / curve.slope((self.level_at(electrons) - self.bias_adu).clamp(from, to))
+            }
+        }
+    }
+
+    /// The lowest code of a full photosite: the largest, or that of full well (electrons) where it is smaller.
+    pub fn full_code(&self, full_well_e: f64) -> f64 {
+        f64::from(self.top_code()).min(self.level_at(full_well_e).floor())
+    }
+}

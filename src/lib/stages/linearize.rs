@@ -1,0 +1,121 @@
+//! Codes made proportional to charge.
+
+use crate::error::Result;
+use crate::frame::to_sample;
+use crate::metadata::{AdcRecord, FrameHeader};
+use crate::stages::darks::check_codes;
+use crate::units::QuantityKind;
+
+/// Makes codes straight, by the linearization of the sensor that they come from.
+///
+/// y = b + f(x − b)        b the bias, f of [`crate::camera::linearity::Linearization`], extended along its tangents beyond the codes
+#[derive(Debug, Clone)]
+pub struct Linearize {
+    adc: AdcRecord,
+    /// What becomes of each code.
+    table: Vec<f32>,
+}
+
+impl Linearize {
+    /// What makes the samples of `frame` straight, in whose metadata they are so from now on, as are their levels.
+    ///
+    /// # Errors
+    ///
+    /// [`crate::error::Error::Order`] and [`crate::error::Error::Format`] unless the frame holds codes as the converter gave them; [`crate::error::Error::Format`] where
+    /// they are straight already, or nothing is known to make them so, or black levels differ among rows or columns;
+    /// [`crate::error::Error::MissingKey`] where the metadata name no sensor.
+    pub fn of(frame: &mut FrameHeader) -> Result<Self> {
+        check_codes(frame)?;
+        let known = frame.metadata.adc;
+        let adc = known.map_or_else(|| frame.readout().map(AdcRecord::of_readout), Ok)?;
+        if adc.is_linearized {
+            return Err(frame.refuse("its codes are made straight already"));
+        }
+        if adc.linearization.is_none() {
+            return Err(frame.refuse("its sensor has no `linearization`; a sensor file can have one in its `readout`"));
+        }
+        let metadata = &mut frame.metadata;
+        if metadata.black_by_row.iter().chain(&metadata.black_by_column).any(|delta| *delta != 0.0) {
+            return Err(frame.refuse(
+                "its black level differs among rows or columns, and codes are made straight before that is subtracted",
+            ));
+        }
+        let straight = AdcRecord { is_linearized: true, ..adc };
+        let sample = |code: f64| straight.sample(code);
+        metadata.black_level_adu = metadata.black_level_adu.map(|level| level.map(sample));
+        metadata.white_level_adu = metadata.white_level_adu.map(|level| level.map(sample));
+        *metadata = metadata.becoming(QuantityKind::Adu);
+        metadata.adc = Some(straight);
+        let table = (0..=straight.top_code()).map(|code| to_sample(sample(code.into()))).collect();
+        Ok(Self { adc: straight, table })
+    }
+
+    /// Makes samples straight.
+    pub fn apply(&self, samples: &mut [f32]) {
+        for sample in samples {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "NaN and what is below 0 become 0"
+            )]
+            let code = *sample as usize;
+            *sample = match self.table.get(code) {
+                Some(straight) if code as f32 == *sample => *straight,
+                _ => to_sample(self.adc.sample(f64::from(*sample))),
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::linearity::Linearization;
+    use crate::cfa::CfaPattern;
+    use crate::error::Error;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+
+    fn bent() -> FrameHeader {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some(CfaPattern::Rggb.into());
+        let linearization = Some(Linearization::polynomial(vec![1.0, 1e-5]).unwrap());
+        metadata.adc = Some(AdcRecord { linearization, ..AdcRecord::new(12, 100.0, 0.05) });
+        metadata.black_level_adu = Some(110.0.into());
+        metadata.white_level_adu = Some(4095.0.into());
+        FrameHeader { name: "codes".into(), geometry: Geometry::new(4, 3, &["Y"]), metadata }
+    }
+
+    #[test]
+    fn codes_and_levels_become_straight_alike() {
+        let mut frame = bent();
+        let linearize = Linearize::of(&mut frame).unwrap();
+        let mut samples = [110.0, 4095.0, 100.0, 1100.5, -0.0, f32::NAN, f32::INFINITY];
+        linearize.apply(&mut samples);
+        assert_eq!(samples[..3], [110.001, 4095.0 + 1e-5 * 3995.0 * 3995.0, 100.0].map(to_sample));
+        assert_eq!(samples[3], to_sample(1100.5 + 1e-5 * 1000.5 * 1000.5));
+        assert_eq!(samples[4], to_sample(1e-5 * 1e4));
+        assert!(samples[5].is_nan() && samples[6] == f32::INFINITY);
+        let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        near(frame.metadata.uniform_black_adu().unwrap(), 110.001);
+        near(frame.metadata.white_level_adu.unwrap().largest(), 4095.0 + 1e-5 * 3995.0 * 3995.0);
+        assert!(frame.metadata.adc.unwrap().is_linearized);
+    }
+
+    #[test]
+    fn what_cannot_be_made_straight_is_refused() {
+        let refused = |change: &dyn Fn(&mut FrameHeader)| {
+            let mut frame = bent();
+            change(&mut frame);
+            Linearize::of(&mut frame).unwrap_err()
+        };
+        let said = |change: &dyn Fn(&mut FrameHeader)| refused(change).to_string();
+        assert!(said(&|f| f.metadata.adc = Some(AdcRecord::new(12, 100.0, 0.05))).contains("no `linearization`"));
+        assert!(said(&|f| f.metadata.black_by_row = vec![1.0]).contains("rows or columns"));
+        assert!(matches!(refused(&|f| f.metadata.adc = None), Error::MissingKey { key: "sensor", .. }));
+        assert!(matches!(refused(&|f| f.metadata.quantity = QuantityKind::Electrons), Error::Order { .. }));
+        let mut once = bent();
+        Linearize::of(&mut once).unwrap();
+        assert!(Linearize::of(&mut once).unwrap_err().to_string().contains("already"));
+    }
+}
