@@ -1,9 +1,13 @@
 //! What is known about a frame: its quantity, its camera, and everything that was done to it.
 
+mod correction;
 mod records;
 
+pub use correction::{
+    AverageRecord, CorrectionRecord, DefectsRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
+};
 pub use records::{
-    AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
+    AdcRecord, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
     NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
 };
 
@@ -95,6 +99,9 @@ pub struct Metadata {
     /// Expected share of the pixels that were made of saturated samples, by the law of a uniform scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturated_share: Option<f64>,
+    /// What the bits of the layer `mask` mean, where the frame has one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mask_bits: Vec<String>,
     /// What was left out because the scene did not need it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
@@ -135,6 +142,7 @@ impl Metadata {
             predicted: None,
             uncertainty: None,
             saturated_share: None,
+            mask_bits: Vec::new(),
             left_out: Vec::new(),
             history: Vec::new(),
             samples: None,
@@ -150,6 +158,7 @@ impl Metadata {
             predicted: None,
             uncertainty: None,
             samples: None,
+            mask_bits: Vec::new(),
             ..self.clone()
         }
     }

@@ -4,6 +4,7 @@
 //! pixels ([`PixelMoments`]).
 
 use super::curved;
+use super::masters::{self, Dark, Flat};
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
@@ -254,12 +255,40 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
             "what charge transfer and its undoing do to noise differs from place to place",
         ));
     }
-    let corrected = codes.less_dark_frames(correction.dark_frames);
-    let black_adu = match correction.dark_frames {
-        0 => subtracted(correction.black_adu, correction.black_deltas)?,
-        _ => 0.0,
-    };
-    Ok((corrected, expected_e.map(|mean| shifted(corrected.moments(mean), -black_adu))))
+    if let Some(false) = correction.flat.as_ref().map(|flat| flat.even) {
+        return Err(Unpredictable::Beyond("nothing says that the flat field by which it was divided was lit evenly"));
+    }
+    let corrected = corrected(frame, codes)?;
+    let black_adu = subtracted(correction.black_adu, correction.black_deltas)?;
+    if corrected.flat.is_none() {
+        return Ok((corrected, expected_e.map(|mean| shifted(corrected.moments(mean), -black_adu))));
+    }
+    let bias_adu = codes.adc.map_or(0.0, |adc| adc.bias_adu);
+    let mut classes = [Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0); 3];
+    for (class, prediction) in classes.iter_mut().enumerate() {
+        // What is left of the bias would be divided too.
+        if (bias_adu * (1.0 - corrected.weight()) - black_adu).abs() > 1e-6 * (1.0 + bias_adu.abs()) {
+            return Err(Unpredictable::Beyond("what was divided by a flat field had not lost its bias"));
+        }
+        let found = corrected.divided(class, expected_e[class]);
+        *prediction = found.ok_or(Unpredictable::Beyond(masters::NARROW))?;
+    }
+    Ok((corrected, classes))
+}
+
+/// Codes of photosites as the record of a frame's corrections has them.
+pub(super) fn corrected(frame: &FrameHeader, codes: Photosite) -> Predicted<Photosite> {
+    let Some(correction) = &frame.metadata.correction else { return Ok(codes) };
+    let unknown = Unpredictable::Beyond("the noise of the frames that it was corrected by is not known");
+    let mut corrected = codes.less_dark_frames(correction.dark_frames);
+    if !correction.masters.is_empty() {
+        corrected.darks = Dark::all(frame, &correction.masters).ok_or(unknown)?;
+    }
+    if let Some(flat) = &correction.flat {
+        let adc = codes.adc.ok_or(Unpredictable::Missing("adc"))?;
+        corrected.flat = Some(Flat::of(frame, flat, &adc).ok_or(unknown)?);
+    }
+    Ok(corrected)
 }
 
 /// Makes sure that levels of the metadata are those of the converter, from which codes are predicted.

@@ -14,6 +14,7 @@ pub mod frame;
 pub mod gains;
 mod law;
 pub mod linear;
+pub mod masters;
 mod memory;
 pub mod moments;
 mod node;

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{CorrectionRecord, FrameHeader, Metadata};
 use crate::stages::black::{Black, white_left};
-use crate::stages::darks::{DarkStack, check_alike, check_codes, differences};
+use crate::stages::darks::{DarkStack, check_alike, check_codes};
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
 use crate::units::{Adu, QuantityKind};
@@ -54,9 +54,7 @@ impl CorrectFrame {
         if let Some(darks) = darks {
             check_alike(input, darks.head())?;
             darks.check_dark()?;
-            warnings = differences(input, darks.head());
-            warnings.extend(darks.taken_on_trust(input));
-            warnings.extend_from_slice(darks.warnings());
+            warnings = darks.warnings_beside(input);
         }
         let known_cte = input.metadata.noise.as_ref().map(|noise| noise.cte.unwrap_or(1.0));
         if let Some((undone, simulated)) = cte.zip(known_cte).filter(|(undone, simulated)| undone != simulated) {
@@ -90,7 +88,12 @@ impl CorrectFrame {
         }
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
         // How much a dark takes off is known where the black level is.
-        let off = if darks.is_none() { Some(&levels) } else { known_black.as_ref() };
+        let bias = input.metadata.adc.map(|adc| BlackLevels::uniform_at(adc.bias_adu));
+        let off = match darks {
+            None => Some(&levels),
+            Some(darks) if darks.is_bias() && bias.is_some() => bias.as_ref(),
+            Some(_) => known_black.as_ref(),
+        };
         note_levels(&mut metadata, input, off, is_subtracted)?;
         if let Some(cte) = cte {
             if metadata.black_level_adu.is_some() && metadata.uniform_black_adu().is_none() {
@@ -106,9 +109,13 @@ impl CorrectFrame {
         if is_subtracted && darks.is_none() && levels.uniform() == Some(0.0) {
             metadata.leave_out("correct-frame", "subtraction of the black level", "it is zero");
         }
-        let dark_frames = darks.map_or(0, DarkStack::frames);
-        let (black_adu, black_deltas) = (levels.level(), levels.has_deltas());
-        metadata.correction = Some(CorrectionRecord { black_adu, black_deltas, dark_frames, cte });
+        let off = darks.and_then(DarkStack::level).unwrap_or(&levels);
+        metadata.correction = Some(CorrectionRecord {
+            dark_frames: darks.map_or(0, DarkStack::frames),
+            masters: darks.map_or_else(Vec::new, DarkStack::masters),
+            cte,
+            ..CorrectionRecord::of_black(off.level(), off.has_deltas())
+        });
         let header = FrameHeader { metadata, ..input.clone() };
         Ok(Self { header, black: levels, bias_adu, transfer, warnings })
     }

@@ -12,6 +12,7 @@ pub mod adc;
 
 pub mod correct;
 pub mod darks;
+pub mod masters;
 
 pub mod mosaic;
 

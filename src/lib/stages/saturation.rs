@@ -7,7 +7,7 @@
 use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::Result;
 use crate::frame::{Rows, Window, mirror};
-use crate::metadata::{AdcRecord, FrameHeader};
+use crate::metadata::{AdcRecord, CorrectionRecord, FrameHeader};
 use crate::stream::{Counts, Footprint, RowSink, RowSource, Stage};
 use crate::units::QuantityKind;
 
@@ -101,7 +101,7 @@ pub fn samples_tell(frame: &FrameHeader) -> bool {
         metadata.quantity,
         QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu | QuantityKind::Unspecified
     );
-    let is_shifted = metadata.correction.is_none_or(|c| c.dark_frames == 0 && c.cte.is_none() && !c.black_deltas);
+    let is_shifted = metadata.correction.as_ref().is_none_or(CorrectionRecord::is_a_shift);
     is_of_photosites && is_shifted && metadata.demosaic.is_none()
 }
 

@@ -8,6 +8,7 @@ mod fold;
 mod memory;
 mod outlet;
 mod stage;
+mod through;
 #[cfg(test)]
 mod tests;
 
@@ -18,3 +19,4 @@ pub use fold::{fold, fold_into};
 pub use memory::MemoryFrame;
 pub use outlet::Outlet;
 pub use stage::{Footprint, RowSink, RowSource, Stage};
+pub use through::Through;
