@@ -12,6 +12,7 @@ pub mod foreign;
 pub mod format;
 pub mod headerless;
 pub mod input;
+pub mod many;
 mod ljpeg;
 pub mod output;
 pub mod picture;

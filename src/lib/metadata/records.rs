@@ -300,4 +300,13 @@ pub struct SamplesRecord {
     /// Samples at full well or the white level or above; of demosaicked frames and colors, pixels that were made of such.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturated: Option<u64>,
+    /// Defective photosites.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub defective: Option<u64>,
+    /// Those among them that were interpolated from others of their class.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corrected: Option<u64>,
+    /// Pixels that were made of defective or interpolated samples, or of others that are marked but not saturated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub marked: Option<u64>,
 }

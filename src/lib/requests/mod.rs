@@ -18,6 +18,7 @@
 
 pub mod comparison;
 pub mod conversion;
+pub mod correction;
 pub mod described;
 pub mod fit;
 pub mod options;

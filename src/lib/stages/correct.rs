@@ -7,7 +7,7 @@ use crate::camera::levels::{BlackLevels, RowBlack};
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
-use crate::metadata::{CorrectionRecord, FrameHeader, Metadata};
+use crate::metadata::{CorrectionRecord, DefectsRecord, FlatRecord, FrameHeader, Metadata};
 use crate::stages::black::{Black, white_left};
 use crate::stages::darks::{DarkStack, check_alike, check_codes};
 use crate::stages::transfer::{Transfer, uniform_share};
@@ -48,6 +48,20 @@ impl CorrectFrame {
     /// darks that do not fit, and crops whose transfer would be undone; [`Error::MissingKey`] where the metadata know no
     /// black level or bias; [`Error::Usage`] where there is nothing to do, or too much.
     pub fn new(input: &FrameHeader, settings: &CorrectionSettings, darks: Option<&DarkStack>) -> Result<Self> {
+        Self::of(input, settings, darks, false)
+    }
+
+    /// The same where `is_more` says that there is something to correct even if nothing of these.
+    ///
+    /// # Errors
+    ///
+    /// As of [`Self::new`].
+    pub fn of(
+        input: &FrameHeader,
+        settings: &CorrectionSettings,
+        darks: Option<&DarkStack>,
+        is_more: bool,
+    ) -> Result<Self> {
         let CorrectionSettings { black, cte } = *settings;
         check_codes(input)?;
         let mut warnings = Vec::new();
@@ -66,7 +80,7 @@ impl CorrectFrame {
         }
         let known_black = input.black_levels()?;
         let levels = match black {
-            Black::None if darks.is_none() && cte.is_none() => {
+            Black::None if darks.is_none() && cte.is_none() && !is_more => {
                 return Err(Error::Usage("there is nothing to correct".into()).give(&["black", "dark", "cte"]));
             }
             Black::None => BlackLevels::uniform_at(0.0),
@@ -118,6 +132,14 @@ impl CorrectFrame {
         });
         let header = FrameHeader { metadata, ..input.clone() };
         Ok(Self { header, black: levels, bias_adu, transfer, warnings })
+    }
+
+    /// Notes the flat field by which samples are divided next, and how defective photosites are told; nothing is predicted of
+    /// samples any more by their levels alone.
+    pub fn note_further(&mut self, flat: Option<FlatRecord>, defects: Option<DefectsRecord>) {
+        if let Some(correction) = &mut self.header.metadata.correction {
+            (correction.flat, correction.defects) = (flat, defects);
+        }
     }
 
     /// The head of the corrected frame, to add to.

@@ -7,7 +7,10 @@ use crate::error::{Error, Result};
 use crate::frame::to_sample;
 use crate::metadata::{AverageRecord, FrameHeader, MasterKind, MasterNoise, MasterRecord, Metadata};
 use crate::numerics::averages::Combine;
+use crate::stages::defects::{Survey, add};
 use crate::stages::masters::{Averaging, Frames};
+use crate::stages::saturation::DEFECTIVE;
+use crate::stages::sites::SiteClasses;
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 
@@ -430,6 +433,8 @@ pub struct DarkFrames<S> {
     rows_made: usize,
     made: Vec<f64>,
     average: Vec<f64>,
+    /// Photosites that were found to be off, and unstable, so far.
+    found: [u64; 2],
 }
 
 impl<S: RowSource> DarkFrames<S> {
@@ -463,7 +468,7 @@ impl<S: RowSource> DarkFrames<S> {
             Frames::new(of_master, Averaging::of(&record.average))
         };
         let masters = stack.masters.iter().map(master).collect();
-        Self { stack, masters, rows_made: 0, made: Vec::new(), average: Vec::new() }
+        Self { stack, masters, rows_made: 0, made: Vec::new(), average: Vec::new(), found: [0; 2] }
     }
 
     /// What is known of them.
@@ -481,6 +486,11 @@ impl<S: RowSource> DarkFrames<S> {
         &mut self.masters
     }
 
+    /// Photosites that were found to be off, and unstable, so far.
+    pub fn found(&self) -> [u64; 2] {
+        self.found
+    }
+
     /// Samples of theirs that were clipped so far.
     pub fn clipped(&self) -> u64 {
         self.masters.iter().map(Frames::clipped).sum()
@@ -492,6 +502,48 @@ impl<S: RowSource> DarkFrames<S> {
 
     pub(super) fn may_wait(&self) -> bool {
         self.frames().any(S::may_wait)
+    }
+
+    /// Reads all rows for what is ordinary among what comes off, within so many standard deviations; and among variances
+    /// from frame to frame, where there are frames enough of the first average.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames.
+    pub fn survey(mut self, beyond: f64) -> Result<DarkLimits> {
+        let geometry = self.stack.head.geometry.clone();
+        let (width, planes) = (geometry.width, geometry.channels.len());
+        let classes = SiteClasses::of(&self.stack.head, planes);
+        let survey = || Survey::new(classes.count(), width * geometry.height);
+        let [mut levels, mut scatters] = [survey(), survey()];
+        let has_scatter = self.keep_scatter();
+        while self.rows_made < geometry.height {
+            let first = self.rows_made;
+            self.next(geometry.cached_rows().min(geometry.height - first))?;
+            for (index, line) in self.made.chunks_exact(width).enumerate() {
+                let of_row = classes.row(first + index / planes, index % planes);
+                for (x, dark) in line.iter().enumerate() {
+                    let class = of_row[x % of_row.len()];
+                    levels.take(class, *dark);
+                    if has_scatter {
+                        scatters.take(class, self.masters[0].scatter()[index * width + x].cbrt());
+                    }
+                }
+            }
+        }
+        // Rounding alone scatters by as much.
+        let levels = levels.limits(beyond, 0.25);
+        let scatters = has_scatter.then(|| scatters.limits(beyond, 1e-3));
+        Ok(DarkLimits { levels, scatters, classes })
+    }
+
+    /// Keeps the scatter of the frames of the first average, where they are enough; gives whether they are.
+    fn keep_scatter(&mut self) -> bool {
+        let is_enough = self.masters.first().is_some_and(|master| master.frames().count() >= ENOUGH_TO_SCATTER);
+        if is_enough {
+            self.masters[0].keep_scatter();
+        }
+        is_enough
     }
 
     /// What comes off the next `rows` rows, `[row][channel][column]`; doubles, as samples would round it.
@@ -517,17 +569,69 @@ impl<S: RowSource> DarkFrames<S> {
     }
 }
 
+/// Frames from which on their scatter tells unstable photosites.
+const ENOUGH_TO_SCATTER: usize = 5;
+
+/// What is ordinary among dark frames, by class.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DarkLimits {
+    levels: Vec<[f64; 2]>,
+    /// Of cube roots of variances, which are nearly normal \[WH1931].
+    scatters: Option<Vec<[f64; 2]>>,
+    classes: SiteClasses,
+}
+
+impl DarkLimits {
+    /// Whether frames were enough to tell unstable photosites.
+    pub fn tell_unstable(&self) -> bool {
+        self.scatters.is_some()
+    }
+}
+
 /// The rows of a frame less what dark frames make, all read in step.
 pub struct LessDarks<'a, S> {
     frame: &'a mut dyn RowSource,
     darks: &'a mut DarkFrames<S>,
+    limits: Option<&'a DarkLimits>,
 }
 
 impl<'a, S: RowSource> LessDarks<'a, S> {
     /// `frame` less `darks`, which fit it as [`CorrectFrame::new`](super::correct::CorrectFrame::new) makes sure. What
     /// channels it has behind those of the darks stay as they are.
     pub fn new(frame: &'a mut dyn RowSource, darks: &'a mut DarkFrames<S>) -> Self {
-        Self { frame, darks }
+        Self { frame, darks, limits: None }
+    }
+
+    /// The same; photosites beyond `limits` are marked as defective in the last channel of `frame`, the layer of marks.
+    pub fn marking(frame: &'a mut dyn RowSource, darks: &'a mut DarkFrames<S>, limits: &'a DarkLimits) -> Self {
+        darks.keep_scatter();
+        Self { limits: Some(limits), ..Self::new(frame, darks) }
+    }
+
+    /// Marks rows of the frame from `first` on.
+    fn mark(&mut self, first: usize, samples: &mut [f32]) {
+        let Some(limits) = self.limits else { return };
+        let geometry = &self.darks.stack.head.geometry;
+        let (width, planes) = (geometry.width, geometry.channels.len());
+        let of_frame = self.frame.header().geometry.row_samples();
+        let DarkFrames { masters, made, found, .. } = &mut *self.darks;
+        let scatter = masters[0].scatter();
+        for (index, line) in made.chunks_exact(width).enumerate() {
+            let marks = &mut samples[(index / planes + 1) * of_frame - width..][..width];
+            let of_row = limits.classes.row(first + index / planes, index % planes);
+            for (x, (dark, mark)) in line.iter().zip(marks).enumerate() {
+                let class = of_row[x % of_row.len()];
+                let [low, high] = limits.levels[class];
+                let is_off = !(low..=high).contains(dark);
+                let is_unstable = limits.scatters.as_ref().is_some_and(|scatters| {
+                    scatter.get(index * width + x).is_some_and(|scatter| scatter.cbrt() > scatters[class][1])
+                });
+                if is_off || is_unstable {
+                    add(mark, DEFECTIVE);
+                    found[usize::from(!is_off)] += 1;
+                }
+            }
+        }
     }
 }
 
@@ -555,6 +659,7 @@ impl<S: RowSource> RowSource for LessDarks<'_, S> {
                 *sample = to_sample(f64::from(*sample) - dark);
             }
         }
+        self.mark(self.darks.rows_made - rows, &mut samples[start..]);
         Ok(())
     }
 }

@@ -58,12 +58,24 @@ pub struct Frames<S> {
     /// Whether the scatter among frames is kept too, and that of the last rows.
     keeps_scatter: bool,
     scatter: Vec<f64>,
+    /// The same of the largest samples.
+    keeps_largest: bool,
+    largest: Vec<f32>,
 }
 
 impl<S: RowSource> Frames<S> {
     /// Frames that fit each other.
     pub fn new(frames: Vec<S>, averaging: Averaging) -> Self {
-        Self { frames, averaging, band: Vec::new(), clipped: 0, keeps_scatter: false, scatter: Vec::new() }
+        Self {
+            frames,
+            averaging,
+            band: Vec::new(),
+            clipped: 0,
+            keeps_scatter: false,
+            scatter: Vec::new(),
+            keeps_largest: false,
+            largest: Vec::new(),
+        }
     }
 
     /// Each of them.
@@ -81,6 +93,16 @@ impl<S: RowSource> Frames<S> {
         &self.scatter
     }
 
+    /// Keeps the largest of each sample among the frames from now on.
+    pub fn keep_largest(&mut self) {
+        self.keeps_largest = true;
+    }
+
+    /// The largest among the frames, of the rows that were averaged last; empty where they are not kept.
+    pub fn largest(&self) -> &[f32] {
+        &self.largest
+    }
+
     /// Samples that were clipped so far.
     pub fn clipped(&self) -> u64 {
         self.clipped
@@ -94,6 +116,7 @@ impl<S: RowSource> Frames<S> {
     pub fn next(&mut self, rows: usize, made: &mut Vec<f64>) -> Result<()> {
         made.clear();
         self.scatter.clear();
+        self.largest.clear();
         let row_samples = self.frames.first().map_or(0, |frame| frame.header().geometry.row_samples());
         if self.averaging.combine == Combine::Mean {
             return self.mean(rows * row_samples, rows, made);
@@ -120,6 +143,10 @@ impl<S: RowSource> Frames<S> {
             for (sum, &sample) in made.iter_mut().zip(&self.band) {
                 *sum += f64::from(sample);
             }
+            if self.keeps_largest {
+                self.largest.resize(samples, f32::NEG_INFINITY);
+                raise(&mut self.largest, &self.band);
+            }
             if self.keeps_scatter {
                 if first.is_empty() {
                     first.clone_from(&self.band);
@@ -140,6 +167,11 @@ impl<S: RowSource> Frames<S> {
         self.band.clear();
         for frame in &mut self.frames {
             frame.read(rows, &mut self.band)?;
+        }
+        if self.keeps_largest {
+            let start = self.largest.len();
+            self.largest.resize(start + samples, f32::NEG_INFINITY);
+            self.band.chunks_exact(samples).for_each(|frame| raise(&mut self.largest[start..], frame));
         }
         let start = made.len();
         made.resize(start + samples, 0.0);
@@ -177,6 +209,12 @@ impl<S: RowSource> Frames<S> {
     }
 }
 
+/// Raises each of `largest` to the sample of a frame.
+fn raise(largest: &mut [f32], frame: &[f32]) {
+    largest.iter_mut().zip(frame).for_each(|(largest, sample)| *largest = largest.max(*sample));
+}
+
+/// The variance of samples of one photosite.
 fn variance(samples: &[f32]) -> f64 {
     let count = samples.len() as f64;
     let mean = samples.iter().map(|sample| f64::from(*sample)).sum::<f64>() / count;

@@ -47,7 +47,7 @@ impl<'a> Watched<'a> {
         match (layer, levels) {
             (None, Some(levels)) => {
                 let layer = header.geometry.channels.len();
-                (Self::Marked(Box::new(Marked::new(source, levels))), Some(layer))
+                (Self::Marked(Box::new(Marked::new(source, Some(levels)))), Some(layer))
             }
             _ => (Self::AsTheyCome(source), layer),
         }
