@@ -4,7 +4,8 @@
 //! pixels ([`PixelMoments`]).
 
 use super::curved;
-use super::masters::{self, Dark, Flat};
+use super::divided::NARROW;
+use super::masters::{Dark, Flat};
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
@@ -271,7 +272,7 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
             return Err(Unpredictable::Beyond("what was divided by a flat field had not lost its bias"));
         }
         let found = corrected.divided(class, expected_e[class]);
-        *prediction = found.ok_or(Unpredictable::Beyond(masters::NARROW))?;
+        *prediction = found.ok_or(Unpredictable::Beyond(NARROW))?;
     }
     Ok((corrected, classes))
 }

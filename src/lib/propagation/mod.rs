@@ -9,6 +9,7 @@ mod charge;
 mod counts;
 pub mod covariance;
 mod curved;
+mod divided;
 mod ends;
 pub mod frame;
 pub mod gains;
