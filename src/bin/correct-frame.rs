@@ -6,7 +6,6 @@ use cyanometer::error::Result;
 use cyanometer::propagation::{self, Equations};
 use cyanometer::requests::correction::Correction;
 use cyanometer::requests::{self, described::Described, options};
-use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -40,8 +39,8 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     arguments.correction.check(&arguments.input)?;
-    let reader = arguments.described.open(&arguments.input.options())?;
-    let mut correction = arguments.correction.open(reader.header(), &arguments.input)?;
+    let mut reader = arguments.described.open(&arguments.input.options())?;
+    let mut correction = arguments.correction.open(reader.header_mut(), &arguments.input)?;
     let header = correction.stage.header_mut();
     session.sign(header);
     propagation::note(header, Equations::Exact);

@@ -7,8 +7,8 @@ pub use correction::{
     AverageRecord, CorrectionRecord, DefectsRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
 };
 pub use records::{
-    AdcRecord, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
-    NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
+    AdcRecord, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord, PoissonKind,
+    PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
 };
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
@@ -54,6 +54,9 @@ pub struct Metadata {
     /// What each column of the sensor adds to the black level.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub black_by_column: Vec<f64>,
+    /// Rectangles of photosites that no light reaches, in the frame or not: X, Y, width and height on the sensor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub masked_areas: Vec<[i64; 4]>,
     /// The largest code, on the scale of the samples. Where the black level differed among photosites of a class, that
     /// which the first of them reaches.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -128,6 +131,7 @@ impl Metadata {
             black_level_adu: None,
             black_by_row: Vec::new(),
             black_by_column: Vec::new(),
+            masked_areas: Vec::new(),
             white_level_adu: None,
             sensor: None,
             exposure: None,

@@ -148,7 +148,14 @@ fn draw(trial: u32, samples: &mut [f32]) {
     let mut words = RunWords::default();
     let mut column = 0_i32;
     for chunk in samples.chunks_mut(128) {
-        let run = Run { seed: 0x00c1_1bbe_d000, sensor_seed: 0, frame: trial, place: [column, 0], classes: [0; 2], length: 128 };
+        let run = Run {
+            seed: 0x00c1_1bbe_d000,
+            sensor_seed: 0,
+            frame: trial,
+            place: [column, 0],
+            classes: [0; 2],
+            length: 128,
+        };
         let mut normals = [0.0; 128];
         run.make_temporal(&mut words);
         run.normals(&words, Source::Ron, &mut normals);

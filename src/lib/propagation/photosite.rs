@@ -2,8 +2,8 @@
 
 use super::charge::{charge, sensitivity};
 use super::law::Law;
-use super::moments::{Equations, Prediction};
 use super::masters::{Dark, Flat, MOST_DARKS};
+use super::moments::{Equations, Prediction};
 use super::pattern::Shared;
 use crate::metadata::{AdcRecord, PoissonKind};
 use crate::stages::noise::NoiseModel;

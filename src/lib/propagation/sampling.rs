@@ -148,7 +148,8 @@ impl SamplingBasis {
         let law = |classes: &[usize], excess_kurtosis: f64| {
             let variance = |class| if classes.contains(&class) { 1.0 } else { 0.0 };
             let moments = |class| MeanVariance { mean: 0.0, variance: variance(class) };
-            let sites = [0, 1, 2].map(|class| Prediction { moments: moments(class), third: 0.0, excess_kurtosis, common: 0.0 });
+            let sites =
+                [0, 1, 2].map(|class| Prediction { moments: moments(class), third: 0.0, excess_kurtosis, common: 0.0 });
             Sampling::of(weights, &sites, place)
         };
         Self {

@@ -1,8 +1,9 @@
 //! Corrections of a frame of codes before demosaicking.
 
+use super::border::measure_black;
 use super::notes::Note;
 use super::options::Input;
-use super::values;
+use super::values::{self, BlackChoice};
 use crate::error::{Error, Result};
 use crate::formats::files::read_file;
 use crate::formats::input::InputOptions;
@@ -24,9 +25,15 @@ use std::path::{Path, PathBuf};
 /// What is corrected, and by which frames.
 #[derive(Debug, Clone, Args)]
 pub struct Correction {
-    /// Black level to remove: auto (from the metadata), none, or a number of ADU
-    #[arg(long, default_value = "none", value_name = "auto|none|N", value_parser = values::black)]
-    pub black: Black,
+    /// Black level to remove: auto (from the metadata), none, a number of ADU, or that of the masked border, which
+    /// `import-raw --crop full` keeps: border (a level for each 2x2 site), rows or columns (and what each row or column is off)
+    #[arg(
+        long = "black",
+        default_value = "none",
+        value_name = "auto|none|N|border|rows|columns",
+        value_parser = values::black_or_border
+    )]
+    pub black_choice: BlackChoice,
     /// Dark frame to subtract sample by sample, read with the --raw, --channel and --crop of the input; given more than once,
     /// the average of all
     #[arg(long, value_name = "FILE", conflicts_with = "black")]
@@ -85,16 +92,27 @@ impl Correction {
         let lists = [&self.dark, &self.bias, &self.flat, &self.flat_dark];
         let once = lists.into_iter().flatten().chain(&self.defects).map(PathBuf::as_path);
         check_inputs(once.map(Some).chain([input.input.as_deref()]))?;
-        let of_flats = [&self.flat, &self.flat_dark, &self.bias].into_iter().flatten().filter(|_| !self.flat.is_empty());
+        let of_flats =
+            [&self.flat, &self.flat_dark, &self.bias].into_iter().flatten().filter(|_| !self.flat.is_empty());
         let for_defects = self.dark.iter().chain(&self.bias).filter(|_| self.find_defects.is_some());
         if of_flats.chain(for_defects).any(|path| path.as_os_str() == "-") {
-            return Err(Error::Usage("flats, and frames in which defects are found, are read twice; name files".into()));
+            return Err(Error::Usage(
+                "flats, and frames in which defects are found, are read twice; name files".into(),
+            ));
         }
         if self.find_defects.is_some() && self.dark.is_empty() && self.bias.is_empty() && self.flat.is_empty() {
             let problem = "defects are found among dark frames, bias frames or flats";
             return Err(Error::Usage(problem.into()).give(&["dark", "flat"]));
         }
         Ok(())
+    }
+
+    /// The black level to subtract; what the border tells stands in the metadata.
+    fn black(&self) -> Black {
+        match self.black_choice {
+            BlackChoice::Known(black) => black,
+            BlackChoice::Border(_) => Black::Auto,
+        }
     }
 
     fn settings(&self) -> DarkSettings {
@@ -129,7 +147,7 @@ impl Correction {
         let is_scaled = self.scale_dark && !self.flat_dark.is_empty();
         let needs_bias = self.flat_dark.is_empty() || is_scaled;
         let biases = if needs_bias { frames(&self.bias)? } else { Vec::new() };
-        let black = match self.black {
+        let black = match self.black() {
             Black::Level(level) => Some(crate::camera::levels::BlackLevels::uniform_at(level)),
             _ => None,
         };
@@ -139,7 +157,8 @@ impl Correction {
 
     fn map(&self, frame: &FrameHeader, input: &Input) -> Result<Option<DefectMap<OneOfMany>>> {
         let Some(path) = &self.defects else { return Ok(None) };
-        let is_list = path.extension().is_some_and(|end| ["txt", "csv"].iter().any(|list| end.eq_ignore_ascii_case(list)));
+        let is_list =
+            path.extension().is_some_and(|end| ["txt", "csv"].iter().any(|list| end.eq_ignore_ascii_case(list)));
         if !is_list {
             let mut map = self.open_frames(std::slice::from_ref(path), input)?;
             return map.pop().map(|map| DefectMap::of_frame(map, frame)).transpose();
@@ -155,14 +174,18 @@ impl Correction {
     /// # Errors
     ///
     /// Those of the frames and of [`CorrectFrame::new`]; [`Error::Usage`] for what makes no sense.
-    pub fn open(&self, frame: &FrameHeader, input: &Input) -> Result<OpenCorrection> {
+    pub fn open(&self, frame: &mut FrameHeader, input: &Input) -> Result<OpenCorrection> {
+        if let BlackChoice::Border(border) = self.black_choice {
+            measure_black(frame, &input.options(), border)?;
+        }
+        let frame = &*frame;
         let darks = self.darks(frame, input)?;
         let is_more = !self.flat.is_empty() || self.defects.is_some();
-        if !self.flat.is_empty() && darks.is_none() && self.black == Black::None {
+        if !self.flat.is_empty() && darks.is_none() && self.black() == Black::None {
             let problem = "a flat field divides what is above black, which must come off first";
             return Err(Error::Usage(problem.into()).give(&["dark", "bias", "black"]));
         }
-        let settings = CorrectionSettings { black: self.black, cte: self.cte };
+        let settings = CorrectionSettings { black: self.black(), cte: self.cte };
         let mut stage = CorrectFrame::of(frame, &settings, darks.as_ref().map(DarkFrames::stack), is_more)?;
         let geometry = &frame.geometry;
         let samples = (geometry.row_samples() * geometry.height) as u64;
@@ -185,7 +208,8 @@ impl Correction {
                 warnings.push(format!("{} photosites of the flats are saturated; they are marked", means.full));
             }
         }
-        let sources = darks.iter().flat_map(DarkFrames::frames).chain(flats.iter().flat_map(|(flats, _)| flats.frames()));
+        let sources =
+            darks.iter().flat_map(DarkFrames::frames).chain(flats.iter().flat_map(|(flats, _)| flats.frames()));
         let mut remarks: Vec<String> = sources.flat_map(|source| source.notes().to_vec()).collect();
         remarks.extend(darks.iter().flat_map(|darks| darks.stack().remarks().to_vec()));
         let found_in = |is_there: bool, what: &str| is_there.then(|| what.to_owned());
@@ -213,12 +237,15 @@ impl OpenCorrection {
     /// What was found while the frame was corrected.
     pub fn findings(&self) -> Vec<Note> {
         let Corrections { darks, dark_limits, flats, found, .. } = &self.corrections;
-        let clipped = darks.as_ref().map_or(0, DarkFrames::clipped) + flats.as_ref().map_or(0, |(flats, _)| flats.clipped());
+        let clipped =
+            darks.as_ref().map_or(0, DarkFrames::clipped) + flats.as_ref().map_or(0, |(flats, _)| flats.clipped());
         let [off, unstable, dead] = found;
         let said = [
             (clipped > 0).then(|| format!("{clipped} samples of averaged frames were clipped")),
             (dark_limits.is_some() || *dead > 0).then(|| {
-                format!("found {off} photosites off in dark frames, {unstable} unstable ones, {dead} off in flats or unlit")
+                format!(
+                    "found {off} photosites off in dark frames, {unstable} unstable ones, {dead} off in flats or unlit"
+                )
             }),
         ];
         said.into_iter().flatten().map(Note::Remark).collect()

@@ -16,6 +16,7 @@
 //! # Ok::<(), cyanometer::error::Error>(())
 //! ```
 
+pub mod border;
 pub mod comparison;
 pub mod conversion;
 pub mod correction;

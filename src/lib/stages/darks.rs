@@ -329,7 +329,8 @@ fn bias_level(frame: &FrameHeader, warnings: &mut Vec<String>) -> Result<BlackLe
         return Ok(BlackLevels::uniform_at(adc.bias_adu));
     }
     let level = frame.black_levels()?.ok_or_else(|| frame.missing("black_level_adu"))?;
-    warnings.push(format!("{}: its black level is taken for the bias, beside which dark signals are scaled", frame.name));
+    warnings
+        .push(format!("{}: its black level is taken for the bias, beside which dark signals are scaled", frame.name));
     Ok(level)
 }
 

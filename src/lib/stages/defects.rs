@@ -56,7 +56,10 @@ impl<S: RowSource> DefectMap<S> {
             });
             let [x, y] = place.ok_or_else(|| {
                 let number = number + 1;
-                Error::format(name, format!("line {number}, `{line}`, is no column and row of a photosite, such as 12,34"))
+                Error::format(
+                    name,
+                    format!("line {number}, `{line}`, is no column and row of a photosite, such as 12,34"),
+                )
             })?;
             let of_frame = |at: i64, axis: usize, extent: usize| {
                 let at = at - i64::from(frame.geometry.origin[axis]);

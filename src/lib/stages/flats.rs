@@ -106,7 +106,8 @@ impl<S: RowSource> FlatFrames<S> {
         let mut frames = Frames::new(flats, settings.averaging);
         frames.keep_largest();
         let transfer = cte.map(|cte| Transfer::undoing(cte, &head.geometry)).transpose()?;
-        let passages = transfer.iter().flat_map(|transfer| (0..planes).map(|_| Passage::of(transfer.clone()))).collect();
+        let passages =
+            transfer.iter().flat_map(|transfer| (0..planes).map(|_| Passage::of(transfer.clone()))).collect();
         let made = Vec::new();
         Ok(Some(Self {
             frames,
@@ -210,7 +211,9 @@ impl<S: RowSource> FlatFrames<S> {
                 )));
             }
             if 2 * full[class] > counts[class] {
-                return Err(self.head.refuse("most of its samples are saturated; expose flat fields to half of full well"));
+                return Err(self
+                    .head
+                    .refuse("most of its samples are saturated; expose flat fields to half of full well"));
             }
         }
         let in_shares = |[low, high]: [f64; 2], mean: f64| [low / mean, high / mean];

@@ -8,9 +8,9 @@ mod fold;
 mod memory;
 mod outlet;
 mod stage;
-mod through;
 #[cfg(test)]
 mod tests;
+mod through;
 
 pub use bands::Band;
 pub use counts::Counts;

@@ -122,7 +122,13 @@ impl Expectation {
         let std = prediction.moments.std();
         // Var(s²) = σ⁴ (2/(n−1) + κ/n); the standard deviation has a quarter of its relative variance.
         let std_error = ((2.0 / (n - 1.0) + prediction.excess_kurtosis / n).max(0.0) / 4.0).sqrt();
-        Self { mean: prediction.moments.mean, std, mean_error: (std * std / n + prediction.common).sqrt(), sample_std: std, std_error }
+        Self {
+            mean: prediction.moments.mean,
+            std,
+            mean_error: (std * std / n + prediction.common).sqrt(),
+            sample_std: std,
+            std_error,
+        }
     }
 }
 
