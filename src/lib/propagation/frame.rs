@@ -281,13 +281,15 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
 pub(super) fn corrected(frame: &FrameHeader, codes: Photosite) -> Predicted<Photosite> {
     let Some(correction) = &frame.metadata.correction else { return Ok(codes) };
     let unknown = Unpredictable::Beyond("the noise of the frames that it was corrected by is not known");
+    // Of a frame that no noise is recorded of, that of its sensor is taken for all.
+    let of_sensor = frame.metadata.noise.is_none().then_some(codes.model);
     let mut corrected = codes.less_dark_frames(correction.dark_frames);
     if !correction.masters.is_empty() {
-        corrected.darks = Dark::all(frame, &correction.masters).ok_or(unknown)?;
+        corrected.darks = Dark::all(frame, &correction.masters, of_sensor).ok_or(unknown)?;
     }
     if let Some(flat) = &correction.flat {
         let adc = codes.adc.ok_or(Unpredictable::Missing("adc"))?;
-        corrected.flat = Some(Flat::of(frame, flat, &adc).ok_or(unknown)?);
+        corrected.flat = Some(Flat::of(frame, flat, &adc, of_sensor).ok_or(unknown)?);
     }
     Ok(corrected)
 }

@@ -65,19 +65,26 @@ impl Dark {
         Self { weight: 1.0, is_bias: false, model, frames, combine: Combine::Mean, clip: CLIP }
     }
 
-    /// What is recorded of an average; none where the noise of its frames is not.
-    fn of(frame: &FrameHeader, record: &MasterRecord) -> Option<Self> {
-        let model = NoiseModel::of(frame, &record.noise.as_ref()?.record()).ok()?;
+    /// What is recorded of an average; none where the noise of its frames is not, unless that of the sensor counts for all.
+    fn of(frame: &FrameHeader, record: &MasterRecord, of_sensor: Option<NoiseModel>) -> Option<Self> {
+        let model = match &record.noise {
+            Some(noise) => NoiseModel::of(frame, &noise.record()).ok()?,
+            None => NoiseModel { dark_e: dark_e(frame, record)?, ..of_sensor? },
+        };
         let AverageRecord { frames, combine, clip } = record.average;
         let is_bias = record.kind == MasterKind::Bias;
         Some(Self { weight: record.weight, is_bias, model, frames, combine, clip: clip.unwrap_or(CLIP) })
     }
 
     /// All that is recorded; none where one of them is not known.
-    pub fn all(frame: &FrameHeader, records: &[MasterRecord]) -> Option<[Option<Self>; MOST_DARKS]> {
+    pub fn all(
+        frame: &FrameHeader,
+        records: &[MasterRecord],
+        of_sensor: Option<NoiseModel>,
+    ) -> Option<[Option<Self>; MOST_DARKS]> {
         let mut found = [None; MOST_DARKS];
         for (place, record) in records.iter().enumerate() {
-            *found.get_mut(place)? = Some(Self::of(frame, record)?);
+            *found.get_mut(place)? = Some(Self::of(frame, record, of_sensor)?);
         }
         Some(found)
     }
@@ -104,6 +111,17 @@ impl Dark {
         let average = self.average(one.variance, one.third);
         Drawn { mean: one.mean + average.mean, variance: average.variance, third: one.third * average.kept.powi(2) }
     }
+}
+
+/// The dark signal of frames whose noise is that of the sensor, e⁻; bias frames of unknown exposure have none.
+fn dark_e(frame: &FrameHeader, record: &MasterRecord) -> Option<f64> {
+    let readout = frame.readout().ok()?;
+    let of_frame = || frame.metadata.exposure.map(|exposure| exposure.exposure_s);
+    let exposure_s = match record.kind {
+        MasterKind::Bias => record.exposure_s.or(Some(0.0)),
+        MasterKind::Dark => record.exposure_s.or_else(of_frame),
+    };
+    Some(readout.dark_current_e_per_s(record.temperature_k.unwrap_or(readout.temperature_k)) * exposure_s?)
 }
 
 /// A flat field.
@@ -156,10 +174,19 @@ impl Drawn {
 }
 
 impl Flat {
-    /// What is recorded of a flat field; none where the noise of its frames is not, or not all of its classes are R, G and B.
-    pub fn of(frame: &FrameHeader, record: &FlatRecord, adc: &AdcRecord) -> Option<Self> {
+    /// What is recorded of a flat field; none where the noise of its frames is not, unless that of the sensor counts for all, or
+    /// where not all of its classes are R, G and B.
+    pub fn of(
+        frame: &FrameHeader,
+        record: &FlatRecord,
+        adc: &AdcRecord,
+        of_sensor: Option<NoiseModel>,
+    ) -> Option<Self> {
         let AverageRecord { frames, combine, clip } = record.average;
-        let model = NoiseModel::of(frame, &record.noise.as_ref()?.record()).ok()?;
+        let model = match &record.noise {
+            Some(noise) => NoiseModel::of(frame, &noise.record()).ok()?,
+            None => of_sensor?,
+        };
         let three = |values: &[f64]| match values {
             [one] => Some([*one; 3]),
             [red, green, blue] => Some([*red, *green, *blue]),
@@ -171,7 +198,7 @@ impl Flat {
             expected_e: three(&record.means_adu)?.map(|mean| mean / signal),
             photosites: three(&photosites)?,
             frames: Dark { weight: 1.0, is_bias: false, model, frames, combine, clip: clip.unwrap_or(CLIP) },
-            darks: Dark::all(frame, &record.masters)?,
+            darks: Dark::all(frame, &record.masters, of_sensor)?,
         })
     }
 }
