@@ -185,6 +185,9 @@ fn chain(seed: u64) -> (String, MemoryFrame) {
             _ => {}
         }
         said += &format!(", {darks} darks of {factor}, {} biases", kit.biases.len());
+    } else if chance.next() < 0.2 {
+        kit.black = Some(Black::Auto);
+        said += ", black";
     } else if chance.next() < 0.85 {
         kit.darks = camera.darks(darks, exposure_s, temperature_k);
         said += &format!(", {darks} darks");

@@ -163,6 +163,9 @@ pub struct FlatRecord {
     /// The noise that was drawn in them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<MasterNoise>,
+    /// The level that was subtracted from it first, where it is one, ADU.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub black_adu: Option<f64>,
     /// The averages that were subtracted from it first; none where a level was.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masters: Vec<MasterRecord>,

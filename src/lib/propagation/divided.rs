@@ -63,8 +63,10 @@ impl Photosite {
         let mut sums = [0.0; 6];
         for (&(x, of_x), &(u, of_u)) in lights.iter().flat_map(|x| darks.iter().map(move |u| (x, u))) {
             let site = [x, u];
-            let above = Drawn::codes(&self.model, &adc, expected_e, site).less(&self.darks, &adc, site);
-            let below = flat.frames.drawn(&adc, light_e, site).less(&flat.darks, &adc, site);
+            let mut above = Drawn::codes(&self.model, &adc, expected_e, site).less(&self.darks, &adc, site);
+            let mut below = flat.frames.drawn(&adc, light_e, site).less(&flat.darks, &adc, site);
+            above.mean -= flat.levels_adu[0];
+            below.mean -= flat.levels_adu[1];
             // Photosites that see no light are marked as defective.
             if below.mean <= 0.0 {
                 continue;

@@ -264,13 +264,8 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
     if corrected.flat.is_none() {
         return Ok((corrected, expected_e.map(|mean| shifted(corrected.moments(mean), -black_adu))));
     }
-    let bias_adu = codes.adc.map_or(0.0, |adc| adc.bias_adu);
     let mut classes = [Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0); 3];
     for (class, prediction) in classes.iter_mut().enumerate() {
-        // What is left of the bias would be divided too.
-        if (bias_adu * (1.0 - corrected.weight()) - black_adu).abs() > 1e-6 * (1.0 + bias_adu.abs()) {
-            return Err(Unpredictable::Beyond("what was divided by a flat field had not lost its bias"));
-        }
         let found = corrected.divided(class, expected_e[class]);
         *prediction = found.ok_or(Unpredictable::Beyond(NARROW))?;
     }
@@ -289,7 +284,10 @@ pub(super) fn corrected(frame: &FrameHeader, codes: Photosite) -> Predicted<Phot
     }
     if let Some(flat) = &correction.flat {
         let adc = codes.adc.ok_or(Unpredictable::Missing("adc"))?;
-        corrected.flat = Some(Flat::of(frame, flat, &adc, of_sensor).ok_or(unknown)?);
+        let mut flat = Flat::of(frame, flat, &adc, of_sensor).ok_or(unknown)?;
+        let black_adu = subtracted(correction.black_adu, correction.black_deltas)?;
+        flat.levels_adu[0] = black_adu - adc.bias_adu * (1.0 - corrected.weight());
+        corrected.flat = Some(flat);
     }
     Ok(corrected)
 }

@@ -135,6 +135,8 @@ pub struct Flat {
     pub frames: Dark,
     /// What came off them first.
     pub darks: [Option<Dark>; MOST_DARKS],
+    /// What came off as a level, beyond the bias of the converter, ADU: of the frame that is divided, and of the flat field.
+    pub levels_adu: [f64; 2],
 }
 
 /// Cumulants of what is drawn anew at one photosite.
@@ -193,12 +195,19 @@ impl Flat {
             _ => None,
         };
         let photosites: Vec<f64> = record.photosites.iter().map(|count| *count as f64).collect();
-        let signal = sensitivity(model.prnu).0 * adc.adu_per_e;
+        let darks = Dark::all(frame, &record.masters, of_sensor)?;
+        let level_adu = record.black_adu.map_or(0.0, |black| black - adc.bias_adu);
+        // What dark signal is left in the means is no light.
+        let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0;
+        let off_e: f64 = darks.iter().flatten().map(|dark| dark.weight * dark_e(&dark.model)).sum();
+        let left_e = dark_e(&model) - off_e - level_adu / adc.adu_per_e;
+        let light_e = |mean: f64| (mean / adc.adu_per_e - left_e) / sensitivity(model.prnu).0;
         Some(Self {
-            expected_e: three(&record.means_adu)?.map(|mean| mean / signal),
+            expected_e: three(&record.means_adu)?.map(light_e),
             photosites: three(&photosites)?,
             frames: Dark { weight: 1.0, is_bias: false, model, frames, combine, clip: clip.unwrap_or(CLIP) },
-            darks: Dark::all(frame, &record.masters, of_sensor)?,
+            darks,
+            levels_adu: [0.0, level_adu],
         })
     }
 }

@@ -420,6 +420,7 @@ mod tests {
             moments: MeanVariance { mean: 0.0, variance },
             third: 0.0,
             excess_kurtosis,
+            common: 0.0,
         })
     }
 
@@ -430,6 +431,7 @@ mod tests {
             moments: MeanVariance { mean: 0.0, variance },
             third: 0.0,
             excess_kurtosis,
+            common: 0.0,
         });
         let matrix = Matrix3::new(0.4, 0.3, 0.2, 0.1, 0.9, -0.1, 0.02, 0.1, 0.9);
         let place = Place { frame: [30, 20], origin: [1, 0], corner: [2, 5], size: [7, 5] };

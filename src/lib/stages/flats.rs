@@ -224,13 +224,17 @@ impl<S: RowSource> FlatFrames<S> {
 
     /// What metadata keep of them.
     pub fn record(&self, means: &FlatMeans) -> FlatRecord {
-        let masters = if let Pedestal::Frames(darks) = &self.pedestal { darks.stack().masters() } else { Vec::new() };
+        let (masters, black_adu) = match &self.pedestal {
+            Pedestal::Frames(darks) => (darks.stack().masters(), None),
+            Pedestal::Level(level) => (Vec::new(), level.uniform()),
+        };
         FlatRecord {
             average: self.settings.averaging.record(self.count),
             means_adu: means.means.clone(),
             photosites: means.photosites.clone(),
             even: self.is_even,
             noise: self.head.metadata.noise.as_ref().map(MasterNoise::of),
+            black_adu,
             masters,
         }
     }
