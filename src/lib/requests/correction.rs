@@ -28,7 +28,8 @@ pub struct Correction {
     /// Black level to remove: auto (from the metadata), none, a number of ADU, or that of the masked border, which
     /// `import-raw --crop full` keeps: border (a level for each 2x2 site), rows or columns (and what each row or column is off)
     #[arg(
-        long = "black",
+        id = "black",
+        long,
         default_value = "none",
         value_name = "auto|none|N|border|rows|columns",
         value_parser = values::black_or_border
@@ -121,7 +122,8 @@ impl Correction {
     }
 
     fn files(&self) -> usize {
-        self.dark.len() + 2 * self.bias.len() + self.flat.len() + self.flat_dark.len() + 2
+        // Frames in which defects are found are open twice.
+        2 * (self.dark.len() + 2 * self.bias.len() + self.flat.len() + self.flat_dark.len()) + 2
     }
 
     /// Opens frames beside the input.
