@@ -154,7 +154,10 @@ class Correction(ProgramCase):
         found = self.correct(
             *self.options("--dark", darks), "--flat", "flat.raw", "--flat-dark", darks[0], "--find-defects"
         )
-        self.assertEqual(set(zip(*np.nonzero(found["mask"]))), {(4, 5), (8, 9), (15, 20)})
+        places = {(int(y), int(x)) for y, x in zip(*np.nonzero(found["mask"]))}
+        self.assertLessEqual({(4, 5), (8, 9), (15, 20)}, places)
+        # Chance finds less than one in a frame on average; limits of 200 samples of a class are good to a tenth.
+        self.assertLessEqual(len(places), 5)
         self.assertEqual(light.shape, found["Y"].shape)
 
     def test_any_number_of_frames(self):
