@@ -276,7 +276,7 @@ impl DarkStack {
 
     /// What a user should hear of them beside `frame`, from which they come off.
     pub(super) fn warnings_beside(&self, frame: &FrameHeader) -> Vec<String> {
-        let is_scaled = self.remarks.first().is_some();
+        let is_scaled = !self.remarks.is_empty();
         let mut warnings = if is_scaled || self.is_bias() { Vec::new() } else { differences(frame, &self.head) };
         warnings.extend(self.taken_on_trust(frame));
         warnings.extend_from_slice(&self.warnings);

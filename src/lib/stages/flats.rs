@@ -19,7 +19,7 @@ use crate::stream::RowSource;
 /// What no light reads in flats.
 #[derive(Debug)]
 enum Pedestal<S> {
-    Frames(DarkFrames<S>),
+    Frames(Box<DarkFrames<S>>),
     Level(BlackLevels),
 }
 
@@ -89,7 +89,7 @@ impl<S: RowSource> FlatFrames<S> {
                 check_alike(&head, darks.stack().head())?;
                 darks.stack().check_dark()?;
                 warnings.extend(darks.stack().warnings_beside(&head));
-                Pedestal::Frames(darks)
+                Pedestal::Frames(Box::new(darks))
             }
             None => {
                 let known = black.map_or_else(|| head.black_levels(), |black| Ok(Some(black)))?;
@@ -133,7 +133,7 @@ impl<S: RowSource> FlatFrames<S> {
 
     /// Each of the frames: flats, then what comes off them.
     pub fn frames(&self) -> impl Iterator<Item = &S> {
-        let darks = if let Pedestal::Frames(darks) = &self.pedestal { Some(darks) } else { None };
+        let darks = if let Pedestal::Frames(darks) = &self.pedestal { Some(darks.as_ref()) } else { None };
         self.frames.frames().chain(darks.into_iter().flat_map(DarkFrames::frames))
     }
 
@@ -204,7 +204,7 @@ impl<S: RowSource> FlatFrames<S> {
         }
         let means: Vec<f64> = sums.iter().zip(&counts).map(|(sum, count)| sum / *count as f64).collect();
         for class in 0..classes {
-            if counts[class] > 0 && !(means[class] > 0.0) {
+            if counts[class] > 0 && (means[class].is_nan() || means[class] <= 0.0) {
                 return Err(self.head.refuse(format!(
                     "its mean is {:.1} ADU above what no light reads; a flat field is lit",
                     means[class]
