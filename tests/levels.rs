@@ -453,7 +453,7 @@ fn a_mosaic_of_demosaicked_planes_has_lost_its_black() {
     let rgb = through(&codes, &Demosaic::new(&codes.header, Method::Malvar, Black::Auto, None).unwrap());
     let again = through(&rgb, &Mosaic::new(&rgb.header, Some(CfaPattern::Rggb)).unwrap());
     assert_same(&again, &by_hand(&codes), "measured samples, less black");
-    let record = again.header.metadata.correction.unwrap();
+    let record = again.header.metadata.correction.clone().unwrap();
     assert_eq!((record.black_adu, record.black_deltas), (BlackLevel::Sites(SITES), true));
     let twice = through(&again, &Demosaic::new(&again.header, Method::Malvar, Black::Auto, None).unwrap());
     assert_same(&twice, &rgb, "demosaicked twice");

@@ -395,7 +395,7 @@ fn old_metadata_get_the_parts_of_their_sensor() {
     assert_eq!(files.quantum_efficiency.sha256.as_deref(), Some("7f9ab3a1"));
     assert_eq!(files.cover_glass.unwrap().column.as_deref(), Some("T_ext_1mm"));
     assert_eq!(metadata.uniform_black_adu(), Some(1757.3066749999998));
-    assert_eq!(metadata.correction.unwrap().black_adu, 4.5.into());
+    assert_eq!(metadata.correction.as_ref().unwrap().black_adu, 4.5.into());
     // What nobody knows of goes on, and the new form is read as it is written.
     let text = write_metadata(&metadata).unwrap();
     assert!(text.contains("observer: me") && text.contains("serial_number: 17"), "{text}");

@@ -3,9 +3,12 @@
 use crate::error::Result;
 use crate::metadata::FrameHeader;
 use crate::propagation::saturation;
-use crate::stages::darks::{DarkFrames, LessDarks};
+use crate::stages::correct::CorrectFrame;
+use crate::stages::darks::{DarkFrames, DarkLimits, LessDarks};
+use crate::stages::defects::{DefectMap, Mapped, Mend};
+use crate::stages::flats::{FlatFrames, FlatMeans, Flattened};
 use crate::stages::saturation::{Counted, FullLevels, Marked, WithMask, samples_tell, with_mask};
-use crate::stream::{Counts, RowSink, RowSource, Stage, run};
+use crate::stream::{Counts, RowSink, RowSource, Stage, Through, run};
 use crate::units::QuantityKind;
 
 /// How the marks of saturated samples come through a stage.
@@ -92,7 +95,7 @@ impl Masking {
         let mut marked;
         let frame: &mut dyn RowSource = match self.need {
             Need::Made(levels) => {
-                marked = Marked::new(frame, levels);
+                marked = Marked::new(frame, Some(levels));
                 &mut marked
             }
             _ => frame,
@@ -119,6 +122,81 @@ impl Masking {
                 run(&masked, source, &mut FirstSamples { sink, row_samples, kept }, progress)
             }
         }
+    }
+}
+
+/// What comes off a frame, divides it, and tells its defective photosites, each read in step with it.
+pub struct Corrections<S> {
+    /// Dark and bias frames.
+    pub darks: Option<DarkFrames<S>>,
+    /// What is ordinary among them, where defects are looked for.
+    pub dark_limits: Option<DarkLimits>,
+    /// Flats and the means of their classes.
+    pub flats: Option<(FlatFrames<S>, FlatMeans)>,
+    /// Defects that are known.
+    pub map: Option<DefectMap<S>>,
+    /// Photosites that were found to be off in dark frames, unstable there, and off in flats.
+    pub found: [u64; 3],
+}
+
+impl<S: RowSource> Corrections<S> {
+    /// Whether photosites may be marked for another reason than saturation.
+    pub fn may_mark(&self) -> bool {
+        self.dark_limits.is_some() || self.flats.is_some() || self.map.is_some()
+    }
+
+    /// Corrects `frame`, whose layer of marks comes with it where `is_masked`, in the order of a camera's signal backwards:
+    /// black level, or dark frames; charge transfer (both by `stage`, which dark frames come before, as transfer is linear);
+    /// flat field; defects. The layer of marks is the last channel of what is made; `holds_layers` where the sink takes it.
+    ///
+    /// # Errors
+    ///
+    /// Those of the sources and the sink.
+    pub fn run(
+        &mut self,
+        stage: &CorrectFrame,
+        frame: &mut dyn RowSource,
+        [is_masked, holds_layers]: [bool; 2],
+        sink: &mut dyn RowSink,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<Counts> {
+        let levels = FullLevels::of(frame.header()).filter(|levels| saturation::is_possible(frame.header(), levels));
+        let mut marked;
+        let mut source: &mut dyn RowSource = frame;
+        if !is_masked {
+            marked = Marked::new(source, levels);
+            source = &mut marked;
+        }
+        let mut mapped;
+        if let Some(map) = &mut self.map {
+            mapped = Mapped::new(source, map);
+            source = &mut mapped;
+        }
+        let mut less_darks;
+        if let Some(darks) = &mut self.darks {
+            less_darks = match &self.dark_limits {
+                Some(limits) => LessDarks::marking(source, darks, limits),
+                None => LessDarks::new(source, darks),
+            };
+            source = &mut less_darks;
+        }
+        let masked = WithMask::new(stage);
+        let mut through = Through::new(&masked, source);
+        let mend = Mend::new(stage.header());
+        let row_samples = mend.header().geometry.row_samples();
+        let kept = if holds_layers { row_samples } else { stage.header().geometry.row_samples() };
+        let mut sink = FirstSamples { sink, row_samples, kept };
+        let counts = match &mut self.flats {
+            Some((flats, means)) => {
+                let mut flattened = Flattened::new(&mut through, flats, means);
+                let counts = run(&mend, &mut flattened, &mut sink, progress)?;
+                self.found[2] = flattened.found;
+                counts
+            }
+            None => run(&mend, &mut through, &mut sink, progress)?,
+        };
+        self.found[..2].copy_from_slice(&self.darks.as_ref().map_or([0; 2], DarkFrames::found));
+        Ok(counts)
     }
 }
 

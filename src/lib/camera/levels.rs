@@ -192,6 +192,18 @@ impl BlackLevels {
         })
     }
 
+    /// The same with another value in place of each, of what rows and columns add too.
+    #[must_use]
+    pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        let all = |deltas: &[f64]| deltas.iter().map(|delta| f(*delta)).collect();
+        Self {
+            level: self.level.map(&f),
+            sites: self.sites.map(&f),
+            by_row: all(&self.by_row),
+            by_column: all(&self.by_column),
+        }
+    }
+
     /// The level by the sites at the sensor's corner, without what rows and columns add.
     pub fn level(&self) -> BlackLevel {
         self.level

@@ -184,13 +184,19 @@ impl ReadOut {
     pub fn dark_current_e_per_s(&self, temperature_k: f64) -> f64 {
         /// Electrons per s, cm² and nA cm⁻² that Eq. 6 has in front of T^1.5.
         const PREFACTOR: f64 = 2.5e15;
-        let law = |t: f64| t.powf(1.5) * (-silicon_band_gap_ev(t) / (2.0 * BOLTZMANN_EV_PER_K * t)).exp();
+        let law = dark_current_law;
         match (self.dark_current_na_per_cm2.zip(self.pixel_area_cm2()), self.dark_current_e_per_s) {
             (Some((density, area)), _) => PREFACTOR * area * density * law(temperature_k),
             (None, Some(measured)) => measured * law(temperature_k) / law(self.temperature_k),
             (None, None) => 0.0,
         }
     }
+}
+
+/// What Eq. 6 of \[HP2005] makes of temperature: T^1.5 exp(−E_g / 2kT), T in K.
+pub fn dark_current_law(temperature_k: f64) -> f64 {
+    let t = temperature_k;
+    t.powf(1.5) * (-silicon_band_gap_ev(t) / (2.0 * BOLTZMANN_EV_PER_K * t)).exp()
 }
 
 /// Band gap of silicon in eV at a temperature in K.

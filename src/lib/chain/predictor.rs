@@ -298,7 +298,7 @@ impl Predictor {
             let none = |why| {
                 Error::Data(format!("nothing can be predicted of {} at {electrons:?} electrons: {why}", stage.name()))
             };
-            let plane = (quantity_of_sites(head), head.metadata.correction);
+            let plane = (quantity_of_sites(head), head.metadata.correction.clone());
             let (sites, causes) = match known.take().filter(|(of, ..)| *of == plane) {
                 Some((_, sites, causes)) => (sites, causes),
                 None => {

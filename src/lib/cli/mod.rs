@@ -20,9 +20,11 @@ use crate::formats::{register, standard};
 use crate::masking::Masking;
 use crate::metadata::{FrameHeader, METADATA_TEMPLATE};
 use crate::numerics::vectors::Instructions;
+use crate::requests::correction::OpenCorrection;
 use crate::requests::options::Output;
 use crate::requests::{self, Note};
 use crate::stages::darks::DarkFrames;
+use crate::stages::saturation::with_mask;
 use crate::stream::{Counts, RowSource, Stage};
 use crate::text::one_line;
 use clap::{ArgAction, Command, CommandFactory, FromArgMatches};
@@ -231,32 +233,51 @@ impl Session {
     /// # Errors
     ///
     /// Those of reader, stage and writer.
-    pub fn drive<S: Stage>(&self, reader: FrameReader, stage: &S, output: &Output) -> Result<Counts> {
-        self.drive_less_darks(reader, None, stage, output)
+    pub fn drive<S: Stage>(&self, mut reader: FrameReader, stage: &S, output: &Output) -> Result<Counts> {
+        self.report_reader(&reader);
+        let layers = output.options().holds_layers()?;
+        let masking = Masking::of(reader.header(), reader.has_mask(), stage.header(), layers);
+        reader.keep_mask();
+        let no_darks: Option<&mut DarkFrames<FrameReader>> = None;
+        self.write(&masking.header(stage), output, |writer, progress| {
+            masking.run(stage, &mut reader, no_darks, writer, progress)
+        })
     }
 
-    /// Drives a frame less the mean of dark frames through a stage.
+    /// Corrects a frame from an open reader to a new output.
     ///
     /// # Errors
     ///
-    /// Those of readers, stage and writer.
-    pub fn drive_less_darks<S: Stage>(
-        &self,
-        mut reader: FrameReader,
-        mut darks: Option<DarkFrames<FrameReader>>,
-        stage: &S,
-        output: &Output,
-    ) -> Result<Counts> {
-        let readers = std::iter::once(&reader).chain(darks.iter().flat_map(DarkFrames::frames));
-        readers.for_each(|reader| self.report_reader(reader));
+    /// Those of readers and writer.
+    pub fn correct(&self, mut reader: FrameReader, correction: &mut OpenCorrection, output: &Output) -> Result<Counts> {
+        self.report_reader(&reader);
         let layers = output.options().holds_layers()?;
-        let masking = Masking::of(reader.header(), reader.has_mask(), stage.header(), layers);
-        let made = masking.header(stage);
+        let OpenCorrection { stage, corrections, .. } = correction;
+        let is_masked = reader.has_mask();
+        if corrections.may_mark() {
+            let made = if layers { with_mask(stage.header().clone()) } else { stage.header().clone() };
+            reader.keep_mask();
+            return self.write(&made, output, |writer, progress| {
+                corrections.run(stage, &mut reader, [is_masked, layers], writer, progress)
+            });
+        }
+        let masking = Masking::of(reader.header(), is_masked, stage.header(), layers);
         reader.keep_mask();
-        let mut writer = FrameWriter::create(&output.options(), &made)?;
+        self.write(&masking.header(stage), output, |writer, progress| {
+            masking.run(stage, &mut reader, corrections.darks.as_mut(), writer, progress)
+        })
+    }
+
+    /// Has `run` write a frame whose head is `made`, beside a progress bar.
+    fn write(
+        &self,
+        made: &FrameHeader,
+        output: &Output,
+        run: impl FnOnce(&mut FrameWriter, &mut dyn FnMut(usize)) -> Result<Counts>,
+    ) -> Result<Counts> {
+        let mut writer = FrameWriter::create(&output.options(), made)?;
         let bar = self.progress(made.geometry.height);
-        let mut progress = |rows| bar.set_position(rows as u64);
-        let counts = masking.run(stage, &mut reader, darks.as_mut(), &mut writer, &mut progress)?;
+        let counts = run(&mut writer, &mut |rows| bar.set_position(rows as u64))?;
         bar.finish_and_clear();
         self.finish(writer, counts)?;
         Ok(counts)

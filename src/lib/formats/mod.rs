@@ -14,6 +14,7 @@ pub mod headerless;
 pub mod input;
 mod ljpeg;
 pub mod makers;
+pub mod many;
 pub mod output;
 pub mod picture;
 pub mod pipe;

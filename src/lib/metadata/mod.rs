@@ -1,12 +1,16 @@
 //! What is known about a frame: its quantity, its camera, and everything that was done to it.
 
 mod converter;
+mod correction;
 mod records;
 
 pub use converter::AdcRecord;
+pub use correction::{
+    AverageRecord, CorrectionRecord, DefectsRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
+};
 pub use records::{
-    ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord,
-    PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
+    ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord, PoissonKind,
+    PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
 };
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
@@ -55,6 +59,9 @@ pub struct Metadata {
     /// What each column of the sensor adds to the black level.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub black_by_column: Vec<f64>,
+    /// Rectangles of photosites that no light reaches, in the frame or not: X, Y, width and height on the sensor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub masked_areas: Vec<[i64; 4]>,
     /// The largest code, on the scale of the samples. Where the black level differed among photosites of a class, that
     /// which the first of them reaches.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -100,6 +107,9 @@ pub struct Metadata {
     /// Expected share of the pixels that were made of saturated samples, by the law of a uniform scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturated_share: Option<f64>,
+    /// What the bits of the layer `mask` mean, where the frame has one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mask_bits: Vec<String>,
     /// What was left out because the scene did not need it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
@@ -126,6 +136,7 @@ impl Metadata {
             black_level_adu: None,
             black_by_row: Vec::new(),
             black_by_column: Vec::new(),
+            masked_areas: Vec::new(),
             white_level_adu: None,
             sensor: None,
             exposure: None,
@@ -140,6 +151,7 @@ impl Metadata {
             predicted: None,
             uncertainty: None,
             saturated_share: None,
+            mask_bits: Vec::new(),
             left_out: Vec::new(),
             history: Vec::new(),
             samples: None,
@@ -155,6 +167,7 @@ impl Metadata {
             predicted: None,
             uncertainty: None,
             samples: None,
+            mask_bits: Vec::new(),
             ..self.clone()
         }
     }

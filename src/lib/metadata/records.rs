@@ -98,45 +98,8 @@ pub struct NoiseRecord {
     pub cte: Option<f64>,
 }
 
-/// What was taken back of a frame of codes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct CorrectionRecord {
-    /// What was subtracted as a constant, or by site, ADU.
-    pub black_adu: BlackLevel,
-    /// Whether what rows and columns add came off with it.
-    #[serde(default, skip_serializing_if = "is_false")]
-    pub black_deltas: bool,
-    /// How many dark frames the mean was of that was subtracted sample by sample.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub dark_frames: u32,
-    /// Charge transfer efficiency that was undone.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cte: Option<f64>,
-}
-
-impl CorrectionRecord {
-    /// Whether anything was subtracted.
-    pub fn took_black(&self) -> bool {
-        self.black_adu.uniform() != Some(0.0) || self.black_deltas || self.dark_frames > 0
-    }
-
-    /// The same with what was subtracted later.
-    #[must_use]
-    pub fn and_black(self, black: BlackLevel, black_deltas: bool) -> Self {
-        let ([a, b, c, d], [e, f, g, h]) = (self.black_adu.sites(), black.sites());
-        let sum = BlackLevel::Sites([a + e, b + f, c + g, d + h]);
-        let black_adu = sum.uniform().map_or(sum, BlackLevel::from);
-        Self { black_adu, black_deltas: self.black_deltas || black_deltas, ..self }
-    }
-}
-
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
-fn is_zero(count: &u32) -> bool {
-    *count == 0
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
-fn is_false(flag: &bool) -> bool {
+pub(super) fn is_false(flag: &bool) -> bool {
     !*flag
 }
 
@@ -318,4 +281,13 @@ pub struct SamplesRecord {
     /// Samples at full well or the white level or above; of demosaicked frames and colors, pixels that were made of such.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturated: Option<u64>,
+    /// Defective photosites.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub defective: Option<u64>,
+    /// Those among them that were interpolated from others of their class.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corrected: Option<u64>,
+    /// Pixels that were made of defective or interpolated samples, or of others that are marked but not saturated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub marked: Option<u64>,
 }

@@ -1,5 +1,6 @@
 //! Mathematics that knows no camera.
 
+pub mod averages;
 pub mod distribution;
 pub mod gauss;
 pub mod least_squares;

@@ -2,6 +2,7 @@
 
 use super::charge::sensitivity;
 use super::law::Law;
+use super::masters::Dark;
 use super::moments::Equations;
 use super::pattern::Shared;
 use super::photosite::Photosite;
@@ -101,19 +102,21 @@ impl Photosite {
     /// The variance of its samples by cause, in e² or ADU².
     pub fn budget(&self, expected_e: f64) -> Budget {
         match self.adc {
-            Some(adc) if self.dark_frames > 0 => self.less_dark_budget(&adc, expected_e),
+            Some(adc) if self.darks[0].is_some() => self.less_dark_budget(&adc, expected_e),
             Some(adc) => self.digitized_budget(&adc, expected_e),
             None => self.charge_budget(expected_e),
         }
     }
 
-    /// Less the mean of n dark frames: what is drawn anew in each adds, of dark frames an nth; of the pattern, which is the
-    /// same in all, stays what the two do not share.
+    /// Less averages of dark frames: what is drawn anew in each adds, of dark frames what the average keeps; of the pattern,
+    /// which is the same in all, stays what the two do not share.
     fn less_dark_budget(&self, adc: &AdcRecord, expected_e: f64) -> Budget {
-        let (light, dark) = (self.digitized_budget(adc, expected_e), self.digitized_budget(adc, 0.0));
+        let light = self.digitized_budget(adc, expected_e);
+        let of_dark = |dark: &Dark| (dark.weight.powi(2) * dark.kept(), self.of_dark(dark).digitized_budget(adc, 0.0));
+        let darks: Vec<(f64, Budget)> = self.darks.iter().flatten().map(of_dark).collect();
         let mut budget = Cause::ALL.map(|cause| match cause {
             Cause::Dcnu | Cause::ClippedPattern => 0.0,
-            _ => light[cause as usize] + dark[cause as usize] / f64::from(self.dark_frames),
+            _ => light[cause as usize] + darks.iter().map(|(kept, dark)| kept * dark[cause as usize]).sum::<f64>(),
         });
         let left = self.less_dark(adc, expected_e).moments.variance - budget.iter().sum::<f64>();
         let is_left = left.abs() > 1e-9 * (light[Cause::Dcnu as usize] + light[Cause::Prnu as usize]);
@@ -175,7 +178,7 @@ impl Photosite {
             budget[Cause::Quantization as usize] = endless - charge;
             if !law.is_plain(adc) {
                 let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
-                let clipped = self.shared(adc, expected_e).light.min(whole) - patterns;
+                let clipped = self.shared(adc, expected_e, self).light.min(whole) - patterns;
                 let further = clipped - budget[Cause::ClippedPattern as usize];
                 let is_told = further.abs() > 1e-9 * patterns;
                 budget[Cause::ClippedPattern as usize] += if is_told { further } else { 0.0 };

@@ -4,6 +4,8 @@
 //! pixels ([`PixelMoments`]).
 
 use super::curved;
+use super::divided::NARROW;
+use super::masters::{Dark, Flat};
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
@@ -257,12 +259,40 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
             "what charge transfer and its undoing do to noise differs from place to place",
         ));
     }
-    let corrected = codes.less_dark_frames(correction.dark_frames);
-    let black_adu = match correction.dark_frames {
-        0 => subtracted(correction.black_adu, correction.black_deltas)?,
-        _ => 0.0,
-    };
-    Ok((corrected, expected_e.map(|mean| shifted(corrected.moments(mean), -black_adu))))
+    if let Some(false) = correction.flat.as_ref().map(|flat| flat.even) {
+        return Err(Unpredictable::Beyond("nothing says that the flat field by which it was divided was lit evenly"));
+    }
+    let corrected = corrected(frame, codes)?;
+    let black_adu = subtracted(correction.black_adu, correction.black_deltas)?;
+    if corrected.flat.is_none() {
+        return Ok((corrected, expected_e.map(|mean| shifted(corrected.moments(mean), -black_adu))));
+    }
+    let mut classes = [Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0); 3];
+    for (class, prediction) in classes.iter_mut().enumerate() {
+        let found = corrected.divided(class, expected_e[class]);
+        *prediction = found.ok_or(Unpredictable::Beyond(NARROW))?;
+    }
+    Ok((corrected, classes))
+}
+
+/// Codes of photosites as the record of a frame's corrections has them.
+pub(super) fn corrected(frame: &FrameHeader, codes: Photosite) -> Predicted<Photosite> {
+    let Some(correction) = &frame.metadata.correction else { return Ok(codes) };
+    let unknown = Unpredictable::Beyond("the noise of the frames that it was corrected by is not known");
+    // Of a frame that no noise is recorded of, that of its sensor is taken for all.
+    let of_sensor = frame.metadata.noise.is_none().then_some(codes.model);
+    let mut corrected = codes.less_dark_frames(correction.dark_frames);
+    if !correction.masters.is_empty() {
+        corrected.darks = Dark::all(frame, &correction.masters, of_sensor).ok_or(unknown)?;
+    }
+    if let Some(flat) = &correction.flat {
+        let adc = codes.adc.ok_or(Unpredictable::Missing("adc"))?;
+        let mut flat = Flat::of(frame, flat, &adc, of_sensor).ok_or(unknown)?;
+        let black_adu = subtracted(correction.black_adu, correction.black_deltas)?;
+        flat.levels_adu[0] = black_adu - adc.bias_adu * (1.0 - corrected.weight());
+        corrected.flat = Some(flat);
+    }
+    Ok(corrected)
 }
 
 /// Makes sure that levels of the metadata are those of the converter, from which codes are predicted.

@@ -35,6 +35,8 @@ pub struct Prediction {
     pub third: f64,
     /// Excess kurtosis, for the spread of a sample variance.
     pub excess_kurtosis: f64,
+    /// Variance of what all samples of the class in a frame are off together, which no number of them averages away.
+    pub common: f64,
 }
 
 impl Prediction {
@@ -42,7 +44,7 @@ impl Prediction {
     pub fn of_cumulants(mean: f64, variance: f64, third: f64, fourth: f64) -> Self {
         let of_spread = |cumulant: f64| if variance > 0.0 { cumulant } else { 0.0 };
         let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) } else { 0.0 };
-        Self { moments: MeanVariance { mean, variance }, third: of_spread(third), excess_kurtosis }
+        Self { moments: MeanVariance { mean, variance }, third: of_spread(third), excess_kurtosis, common: 0.0 }
     }
 
     /// Fourth cumulant.

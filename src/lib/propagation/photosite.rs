@@ -2,10 +2,11 @@
 
 use super::charge::{charge, sensitivity};
 use super::law::Law;
+use super::masters::{Dark, Flat, MOST_DARKS};
 use super::moments::{Equations, Prediction};
 use super::pattern::Shared;
 use super::reading::codes_of;
-use crate::metadata::AdcRecord;
+use crate::metadata::{AdcRecord, PoissonKind};
 use crate::stages::noise::NoiseModel;
 
 /// What a photosite's samples follow from, but for the light that reaches it.
@@ -39,8 +40,10 @@ pub struct Photosite {
     pub model: NoiseModel,
     /// The converter that reads it; none where samples are electrons.
     pub adc: Option<AdcRecord>,
-    /// Dark frames whose mean was subtracted from its codes.
-    pub dark_frames: u32,
+    /// Averages of dark frames that were subtracted from its codes.
+    pub darks: [Option<Dark>; MOST_DARKS],
+    /// The flat field by which it was divided.
+    pub flat: Option<Flat>,
     /// Which equations to predict by.
     pub equations: Equations,
 }
@@ -48,7 +51,7 @@ pub struct Photosite {
 impl Photosite {
     /// A photosite in electrons.
     pub fn of_electrons(model: NoiseModel, equations: Equations) -> Self {
-        Self { model, adc: None, dark_frames: 0, equations }
+        Self { model, adc: None, darks: [None; MOST_DARKS], flat: None, equations }
     }
 
     /// The same as the converter reads it.
@@ -60,7 +63,14 @@ impl Photosite {
     /// The same after the mean of so many dark frames was subtracted; before a converter there are none.
     #[must_use]
     pub fn less_dark_frames(self, dark_frames: u32) -> Self {
-        Self { dark_frames, ..self }
+        let mut darks = [None; MOST_DARKS];
+        darks[0] = (dark_frames > 0).then(|| Dark::mean_of(self.model, dark_frames));
+        Self { darks, ..self }
+    }
+
+    /// Sum of the weights of the averages that were subtracted.
+    pub(super) fn weight(&self) -> f64 {
+        self.darks.iter().flatten().map(|dark| dark.weight).sum()
     }
 
     /// The signal electrons that a level above what no light reads stands for.
@@ -80,11 +90,11 @@ impl Photosite {
         self.adc.map_or(1.0, |adc| adc.adu_per_e)
     }
 
-    /// Mean and variance of its samples over the photosites of a frame.
+    /// Mean and variance of its samples over the photosites of a frame, before any division by a flat field.
     pub fn moments(&self, expected_e: f64) -> Prediction {
         match self.adc {
             None => self.electrons(expected_e),
-            Some(adc) if self.dark_frames > 0 => self.less_dark(&adc, expected_e),
+            Some(adc) if self.darks[0].is_some() => self.less_dark(&adc, expected_e),
             Some(adc) => self.adu(&adc, expected_e),
         }
     }
@@ -131,35 +141,54 @@ impl Photosite {
         )
     }
 
-    /// After the mean of n dark frames of the same sensor was subtracted:
+    /// After averages of dark frames of the same sensor were subtracted, each times its weight w:
     ///
-    /// Var(y − d̄) = \[Var y − v] + \[Var d − v]/n + v + v − 2 cov,
+    /// Var(y − Σ w d̄) = \[Var y − v] + Σ w² e \[Var d − v_d] + Var(E y − Σ w E d),
     ///
-    /// v the variances of the means that each photosite has over exposures, of the one and of the other, and cov their
-    /// covariance: light and dark frames share the pattern of the dark current, and everything else is drawn anew. Where
-    /// nothing is clipped cov is λ² c₂, as is the v of dark frames.
+    /// v the variances of the means that each photosite has over exposures, and e what an average keeps of variance. The last
+    /// term is that of what these means leave of each other: light and dark frames share the pattern of the dark current,
+    /// and everything else is drawn anew. Where nothing is clipped it is that of light, and of the dose of dark current
+    /// that is left.
     pub(super) fn less_dark(&self, adc: &AdcRecord, expected_e: f64) -> Prediction {
-        let (light, dark) = (self.adu(adc, expected_e), self.adu(adc, 0.0));
-        let n = f64::from(self.dark_frames);
-        let shared = self.shared(adc, expected_e);
-        let variance =
-            light.moments.variance + dark.moments.variance / n + shared.dark * (1.0 - 1.0 / n) - 2.0 * shared.both;
-        Prediction::of_cumulants(
-            light.moments.mean - dark.moments.mean,
-            variance.max(0.0),
-            light.third - dark.third / (n * n),
-            light.fourth() + dark.fourth() / n.powi(3),
-        )
+        let light = self.adu(adc, expected_e);
+        let darks: Vec<(&Dark, Self)> = self.darks.iter().flatten().map(|dark| (dark, self.of_dark(dark))).collect();
+        let (mut mean, mut third, mut fourth) = (light.moments.mean, light.third, light.fourth());
+        let mut variance = light.moments.variance;
+        for (index, (dark, site)) in darks.iter().enumerate() {
+            let code = site.adu(adc, 0.0);
+            let shared = self.shared(adc, expected_e, site);
+            let (weight, temporal) = (dark.weight, code.moments.variance - shared.dark);
+            let average = dark.average(temporal, site.temporal_third(adc));
+            mean -= weight * (code.moments.mean + average.mean);
+            third -= weight.powi(3) * average.kept.powi(2) * code.third;
+            fourth += weight.powi(4) * average.kept.powi(3) * code.fourth();
+            variance += weight * weight * (average.variance + shared.dark) - 2.0 * weight * shared.both;
+            for (other, of_other) in &darks[..index] {
+                variance += 2.0 * weight * other.weight * of_other.shared(adc, 0.0, site).both;
+            }
+        }
+        Prediction::of_cumulants(mean, variance.max(0.0), third, fourth)
     }
 
-    /// What codes of light and of dark frames have of the pattern.
-    pub(super) fn shared(&self, adc: &AdcRecord, expected_e: f64) -> Shared {
-        let (law, of_dark) = (Law::of(&self.model, expected_e), Law::of(&self.model, 0.0));
+    /// Photosites of dark frames.
+    pub(super) fn of_dark(&self, dark: &Dark) -> Self {
+        Self { model: dark.model, darks: [None; MOST_DARKS], flat: None, ..*self }
+    }
+
+    /// Third cumulant of what is drawn anew in each dark frame at a photosite of mean sensitivity, ADU³.
+    fn temporal_third(&self, adc: &AdcRecord) -> f64 {
+        let is_counted = self.model.dark_shot && self.model.poisson == PoissonKind::Exact;
+        if is_counted { self.model.dark_e * adc.adu_per_e.powi(3) } else { 0.0 }
+    }
+
+    /// What its codes and those of dark frames have of the pattern.
+    pub(super) fn shared(&self, adc: &AdcRecord, expected_e: f64, dark: &Self) -> Shared {
+        let (law, of_dark) = (Law::of(&self.model, expected_e), Law::of(&dark.model, 0.0));
         if self.equations == Equations::Paper || (law.is_plain(adc) && of_dark.is_plain(adc)) {
             let square = adc.adu_per_e * adc.adu_per_e;
-            let dark = self.dark_pattern() * square;
+            let [own, of_dark] = [self, dark].map(|site| site.dark_pattern() * square);
             let light = self.pattern(self.model.prnu) * expected_e * expected_e * square;
-            return Shared { light: light + dark, dark, both: dark };
+            return Shared { light: light + own, dark: of_dark, both: (own * of_dark).sqrt() };
         }
         let [light, dark] = [law, of_dark].map(|law| law.of_codes(adc, codes_of(adc)));
         Shared::of((&law, &light), (&of_dark, &dark))
@@ -183,7 +212,6 @@ impl Photosite {
 mod tests {
     use super::*;
     use crate::frame::to_sample;
-    use crate::metadata::PoissonKind;
     use crate::numerics::normal::{self, NearlyNormal};
     use crate::propagation::budget::Cause;
     use crate::propagation::charge::product;

@@ -6,6 +6,7 @@
 
 use super::charge;
 use super::covariance::{Covariance, PAIRS};
+use super::frame::corrected;
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::smooth_hue;
@@ -30,7 +31,7 @@ pub struct PixelNoise {
     /// Gains of the pixels of each row class and, within, each column class.
     gains: Vec<PixelGains>,
     depends_on_hue: bool,
-    variance: LevelVariance,
+    variances: [LevelVariance; 3],
     /// What no light reads in the frame, in the unit of its samples.
     black: f64,
 }
@@ -121,17 +122,31 @@ struct LevelVariance {
 const STEPS: usize = 1024;
 
 impl LevelVariance {
-    fn new(photosite: &Photosite, largest: f64) -> Self {
+    /// Of R, G and B, which differ where flat fields do.
+    fn of_classes(photosite: &Photosite, largest: f64) -> [Self; 3] {
+        match photosite.flat {
+            None => {
+                let all = Self::new(photosite, 0, largest);
+                [all.clone(), all.clone(), all]
+            }
+            Some(_) => [0, 1, 2].map(|class| Self::new(photosite, class, largest)),
+        }
+    }
+
+    fn new(photosite: &Photosite, class: usize, largest: f64) -> Self {
         // Patterns that are cut off at zero take long to predict, and their variances are smooth.
         let is_rectified = photosite.model.prnu.max(photosite.model.dcnu) > 0.2;
         let steps = if is_rectified { STEPS / 8 } else { STEPS };
         let step = largest / steps as f64;
         let variance = |index: usize| {
             let expected_e = photosite.expected_at(index as f64 * step);
+            if photosite.flat.is_some() {
+                return photosite.variance_divided(class, expected_e);
+            }
             let slope = photosite.adc.map_or(1.0, |adc| adc.sample_per_e(photosite.model.dark_e + expected_e));
             let charge = charge::charge(&photosite.model, expected_e).variance + photosite.model.read_noise_e.powi(2);
             // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
-            if photosite.adc.is_some() && charge.sqrt() * slope < 0.5 {
+            if photosite.adc.is_some() && photosite.darks[0].is_none() && charge.sqrt() * slope < 0.5 {
                 charge * slope * slope + 1.0 / 12.0
             } else {
                 photosite.moments(expected_e).moments.variance
@@ -180,8 +195,8 @@ impl PixelNoise {
             .flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]))
             .map(|at| PixelGains::new(table, at, &frame.geometry))
             .collect();
-        let variance = LevelVariance::new(&photosite, largest);
-        Ok(Self { columns, rows, gains, depends_on_hue: table.depends_on_hue(), variance, black })
+        let variances = LevelVariance::of_classes(&photosite, largest);
+        Ok(Self { columns, rows, gains, depends_on_hue: table.depends_on_hue(), variances, black })
     }
 
     /// The covariance of the pixel in column `x` and row `y` of the frame, whose samples are `rgb`; and whether
@@ -192,7 +207,7 @@ impl PixelNoise {
     pub fn covariance(&self, [x, y]: [usize; 2], rgb: [f64; 3]) -> (Covariance, bool) {
         let gains = &self.gains[self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x)];
         let level = rgb.map(|sample| sample - self.black);
-        let variances = level.map(|level| self.variance.at(level));
+        let variances = [0, 1, 2].map(|class| self.variances[class].at(level[class]));
         if !self.depends_on_hue {
             return (gains.covariance(variances, None), true);
         }
@@ -211,7 +226,7 @@ impl PixelNoise {
 /// The photosites that a demosaicked frame was made of, and what no light reads in it, in the unit of its samples.
 fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
     let metadata = &frame.metadata;
-    if metadata.is_transferred() || metadata.correction.is_some_and(|correction| correction.cte.is_some()) {
+    if metadata.is_transferred() || metadata.correction.as_ref().is_some_and(|correction| correction.cte.is_some()) {
         return Err(frame.refuse(
             "its charge was transferred, and what that does to noise differs from place to place; no standard \
              deviations can be told",
@@ -223,13 +238,12 @@ fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
         None => whole_noise(frame)?,
     };
     let model = NoiseModel::of(frame, &noise)?;
-    let dark_frames = metadata.correction.map_or(0, |correction| correction.dark_frames);
     let photosite = Photosite::of_electrons(model, Equations::Exact);
     let found = match metadata.quantity {
         QuantityKind::Electrons | QuantityKind::ExpectedElectrons => (photosite, metadata.dark_signal_e.unwrap_or(0.0)),
         _ => {
             let adc = metadata.adc.unwrap_or_else(|| AdcRecord::of_readout(readout));
-            let codes = photosite.digitized(adc).less_dark_frames(dark_frames);
+            let codes = corrected(frame, photosite.digitized(adc)).map_err(|why| frame.refuse(why.to_string()))?;
             (codes, frame.uniform_black_adu()?)
         }
     };

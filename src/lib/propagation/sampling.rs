@@ -81,7 +81,8 @@ impl Sampling {
             };
         }
         let covariance = Matrix3::from_diagonal(&variances.into());
-        Self { count, mean_covariance: covariance / count, covariance, spread }
+        let common = Matrix3::from_diagonal(&classes.map(|class| class.common).into());
+        Self { count, mean_covariance: covariance / count + common, covariance, spread }
     }
 
     /// Of a rectangle of demosaicked pixels with `weights` on photosites of such moments.
@@ -147,7 +148,8 @@ impl SamplingBasis {
         let law = |classes: &[usize], excess_kurtosis: f64| {
             let variance = |class| if classes.contains(&class) { 1.0 } else { 0.0 };
             let moments = |class| MeanVariance { mean: 0.0, variance: variance(class) };
-            let sites = [0, 1, 2].map(|class| Prediction { moments: moments(class), third: 0.0, excess_kurtosis });
+            let sites =
+                [0, 1, 2].map(|class| Prediction { moments: moments(class), third: 0.0, excess_kurtosis, common: 0.0 });
             Sampling::of(weights, &sites, place)
         };
         Self {
@@ -418,6 +420,7 @@ mod tests {
             moments: MeanVariance { mean: 0.0, variance },
             third: 0.0,
             excess_kurtosis,
+            common: 0.0,
         })
     }
 
@@ -428,6 +431,7 @@ mod tests {
             moments: MeanVariance { mean: 0.0, variance },
             third: 0.0,
             excess_kurtosis,
+            common: 0.0,
         });
         let matrix = Matrix3::new(0.4, 0.3, 0.2, 0.1, 0.9, -0.1, 0.02, 0.1, 0.9);
         let place = Place { frame: [30, 20], origin: [1, 0], corner: [2, 5], size: [7, 5] };

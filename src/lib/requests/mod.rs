@@ -17,8 +17,10 @@
 //! ```
 
 pub mod batch;
+pub mod border;
 pub mod comparison;
 pub mod conversion;
+pub mod correction;
 pub mod described;
 pub mod fit;
 pub mod options;

@@ -51,7 +51,14 @@ pub fn of_statistics(report: &Report) -> Vec<Note> {
             "{pixels} samples are saturated; the statistics hold for what was recorded, not for the light"
         )),
     };
-    Note::not_finite(not_finite).into_iter().chain(saturated.map(Note::Warning)).collect()
+    let defective: u64 = report.regions.iter().map(|region| region.defective.max(region.corrected)).sum();
+    let defective = (defective > 0)
+        .then(|| format!("{defective} pixels are, or used, defective photosites; they are left out of the statistics"));
+    let beyond: u64 = report.regions.iter().map(|region| region.beyond_model).sum();
+    let beyond = (beyond > 0)
+        .then(|| format!("{beyond} pixels are beyond the model of a correction; they are left out of the statistics"));
+    let marked = saturated.into_iter().chain(defective).chain(beyond).map(Note::Warning);
+    Note::not_finite(not_finite).into_iter().chain(marked).collect()
 }
 
 /// What a reader found.

@@ -1,5 +1,6 @@
 //! How values of options are read.
 
+use super::border::Border;
 use crate::analysis::statistics::Region;
 use crate::cfa::CfaPattern;
 use crate::color::White;
@@ -232,6 +233,31 @@ pub fn black(text: &str) -> Result<Black, String> {
         "none" => Ok(Black::None),
         level => number(level).map(Black::Level).map_err(|_| "give auto, none or a number".into()),
     }
+}
+
+/// Reads a black level as [`black`] does, or the border that tells it: `border`, `rows` or `columns`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn black_or_border(text: &str) -> Result<BlackChoice, String> {
+    match text {
+        "border" => Ok(BlackChoice::Border(Border::Whole)),
+        "rows" => Ok(BlackChoice::Border(Border::Rows)),
+        "columns" => Ok(BlackChoice::Border(Border::Columns)),
+        other => black(other)
+            .map(BlackChoice::Known)
+            .map_err(|expected| expected.replace(" or a", ", border, rows, columns or a")),
+    }
+}
+
+/// A black level that is known, or is told by the masked border.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BlackChoice {
+    /// One that is known.
+    Known(Black),
+    /// That of the border.
+    Border(Border),
 }
 
 /// Reads a region `X,Y,W,H`.

@@ -47,7 +47,7 @@ impl Black {
 /// Whether a program has subtracted all of the black level.
 fn is_off(frame: &FrameHeader) -> Result<bool> {
     let is_left = frame.black_levels()?.is_none_or(|black| black.uniform() != Some(0.0));
-    Ok(frame.metadata.correction.is_some_and(|record| record.took_black()) && !is_left)
+    Ok(frame.metadata.correction.as_ref().is_some_and(|record| record.took_black()) && !is_left)
 }
 
 /// What no light reads once `subtracted` is off; a frame of unknown black counts as black-free after a subtraction. None

@@ -7,9 +7,9 @@ use crate::camera::levels::{BlackLevels, RowBlack};
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
-use crate::metadata::{CorrectionRecord, FrameHeader, Metadata};
+use crate::metadata::{CorrectionRecord, DefectsRecord, FlatRecord, FrameHeader, Metadata};
 use crate::stages::black::{Black, white_left};
-use crate::stages::darks::{DarkStack, check_alike, check_codes, differences};
+use crate::stages::darks::{DarkStack, check_alike, check_codes};
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
 use crate::units::{Adu, QuantityKind};
@@ -48,15 +48,27 @@ impl CorrectFrame {
     /// darks that do not fit, and crops whose transfer would be undone; [`Error::MissingKey`] where the metadata know no
     /// black level or bias; [`Error::Usage`] where there is nothing to do, or too much.
     pub fn new(input: &FrameHeader, settings: &CorrectionSettings, darks: Option<&DarkStack>) -> Result<Self> {
+        Self::of(input, settings, darks, false)
+    }
+
+    /// The same where `is_more` says that there is something to correct even if nothing of these.
+    ///
+    /// # Errors
+    ///
+    /// As of [`Self::new`].
+    pub fn of(
+        input: &FrameHeader,
+        settings: &CorrectionSettings,
+        darks: Option<&DarkStack>,
+        is_more: bool,
+    ) -> Result<Self> {
         let CorrectionSettings { black, cte } = *settings;
         check_codes(input)?;
         let mut warnings = Vec::new();
         if let Some(darks) = darks {
             check_alike(input, darks.head())?;
             darks.check_dark()?;
-            warnings = differences(input, darks.head());
-            warnings.extend(darks.taken_on_trust(input));
-            warnings.extend_from_slice(darks.warnings());
+            warnings = darks.warnings_beside(input);
         }
         let known_cte = input.metadata.noise.as_ref().map(|noise| noise.cte.unwrap_or(1.0));
         if let Some((undone, simulated)) = cte.zip(known_cte).filter(|(undone, simulated)| undone != simulated) {
@@ -68,7 +80,7 @@ impl CorrectFrame {
         }
         let known_black = input.black_levels()?;
         let levels = match black {
-            Black::None if darks.is_none() && cte.is_none() => {
+            Black::None if darks.is_none() && cte.is_none() && !is_more => {
                 return Err(Error::Usage("there is nothing to correct".into()).give(&["black", "dark", "cte"]));
             }
             Black::None => BlackLevels::uniform_at(0.0),
@@ -90,7 +102,12 @@ impl CorrectFrame {
         }
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
         // How much a dark takes off is known where the black level is.
-        let off = if darks.is_none() { Some(&levels) } else { known_black.as_ref() };
+        let bias = input.metadata.adc.map(|adc| BlackLevels::uniform_at(adc.bias_adu));
+        let off = match darks {
+            None => Some(&levels),
+            Some(darks) if darks.is_bias() && bias.is_some() => bias.as_ref(),
+            Some(_) => known_black.as_ref(),
+        };
         note_levels(&mut metadata, input, off, is_subtracted)?;
         if let Some(cte) = cte {
             if metadata.black_level_adu.is_some() && metadata.uniform_black_adu().is_none() {
@@ -106,11 +123,23 @@ impl CorrectFrame {
         if is_subtracted && darks.is_none() && levels.uniform() == Some(0.0) {
             metadata.leave_out("correct-frame", "subtraction of the black level", "it is zero");
         }
-        let dark_frames = darks.map_or(0, DarkStack::frames);
-        let (black_adu, black_deltas) = (levels.level(), levels.has_deltas());
-        metadata.correction = Some(CorrectionRecord { black_adu, black_deltas, dark_frames, cte });
+        let off = darks.and_then(DarkStack::level).unwrap_or(&levels);
+        metadata.correction = Some(CorrectionRecord {
+            dark_frames: darks.map_or(0, DarkStack::frames),
+            masters: darks.map_or_else(Vec::new, DarkStack::masters),
+            cte,
+            ..CorrectionRecord::of_black(off.level(), off.has_deltas())
+        });
         let header = FrameHeader { metadata, ..input.clone() };
         Ok(Self { header, black: levels, bias_adu, transfer, warnings })
+    }
+
+    /// Notes the flat field by which samples are divided next, and how defective photosites are told; nothing is predicted of
+    /// samples any more by their levels alone.
+    pub fn note_further(&mut self, flat: Option<FlatRecord>, defects: Option<DefectsRecord>) {
+        if let Some(correction) = &mut self.header.metadata.correction {
+            (correction.flat, correction.defects) = (flat, defects);
+        }
     }
 
     /// The head of the corrected frame, to add to.

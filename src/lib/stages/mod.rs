@@ -12,6 +12,10 @@ pub mod adc;
 
 pub mod correct;
 pub mod darks;
+pub mod defects;
+pub mod flats;
+pub mod masters;
+pub mod sites;
 
 pub mod linearize;
 pub mod mosaic;

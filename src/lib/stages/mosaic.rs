@@ -102,15 +102,15 @@ impl Mosaic {
 
 /// What is off the codes of a plane: what demosaicking subtracted, which it no longer tells, with what came off before.
 fn correction_of(metadata: &Metadata) -> Option<CorrectionRecord> {
-    let nothing = CorrectionRecord { black_adu: BlackLevel::from(0.0), black_deltas: false, dark_frames: 0, cte: None };
+    let nothing = CorrectionRecord::of_black(BlackLevel::from(0.0), false);
     let is_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
     match metadata.demosaic.as_ref().filter(|_| is_codes) {
         Some(record) => {
-            let before = metadata.correction.unwrap_or(nothing);
+            let before = metadata.correction.clone().unwrap_or_else(|| nothing.clone());
             let sum = before.and_black(record.black, record.black_deltas);
             Some(sum).filter(|sum| *sum != nothing)
         }
-        None => metadata.correction,
+        None => metadata.correction.clone(),
     }
 }
 

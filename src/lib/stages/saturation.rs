@@ -7,7 +7,7 @@
 use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::Result;
 use crate::frame::{Rows, Window, mirror};
-use crate::metadata::{AdcRecord, FrameHeader};
+use crate::metadata::{AdcRecord, CorrectionRecord, FrameHeader};
 use crate::stream::{Counts, Footprint, RowSink, RowSource, Stage};
 use crate::units::QuantityKind;
 
@@ -16,6 +16,23 @@ pub const MASK_LAYER: &str = "mask";
 
 /// The bit of [`MASK_LAYER`] for a pixel that used a saturated sample.
 pub const SATURATED: u32 = 1;
+
+/// The bit for a defective photosite, or a pixel that used one.
+pub const DEFECTIVE: u32 = 2;
+
+/// The bit for a sample that was interpolated from others in place of a defective one, or a pixel that used it.
+pub const CORRECTED: u32 = 4;
+
+/// The bit for a sample of which a correction knows nothing, or a pixel that used it.
+pub const BEYOND_MODEL: u32 = 8;
+
+/// The bits and what they mean.
+pub const MASK_BITS: [(u32, &str); 4] = [
+    (SATURATED, "saturated"),
+    (DEFECTIVE, "defective"),
+    (CORRECTED, "corrected: interpolated from neighbors"),
+    (BEYOND_MODEL, "beyond the model of a correction"),
+];
 
 /// The levels from which samples are full, by class.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,7 +78,7 @@ impl FullLevels {
     }
 
     /// The levels of even and odd columns in row `y` of a plane.
-    fn of_row(&self, y: usize, channel: usize) -> [f32; 2] {
+    pub(super) fn of_row(&self, y: usize, channel: usize) -> [f32; 2] {
         match self.pattern {
             Some(pattern) => pattern.row_classes(self.origin, y).map(|class| self.levels[class as usize]),
             None => [self.levels[channel.min(2)]; 2],
@@ -102,13 +119,14 @@ pub fn samples_tell(frame: &FrameHeader) -> bool {
         metadata.quantity,
         QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu | QuantityKind::Unspecified
     );
-    let is_shifted = metadata.correction.is_none_or(|c| c.dark_frames == 0 && c.cte.is_none() && !c.black_deltas);
+    let is_shifted = metadata.correction.as_ref().is_none_or(CorrectionRecord::is_a_shift);
     is_of_photosites && is_shifted && metadata.demosaic.is_none()
 }
 
 /// The head of a frame that has the layer of marks behind its channels.
 pub fn with_mask(mut frame: FrameHeader) -> FrameHeader {
     frame.geometry.channels.push(MASK_LAYER.into());
+    frame.metadata.mask_bits = MASK_BITS.iter().map(|(bit, meaning)| format!("{bit} {meaning}")).collect();
     frame
 }
 
@@ -116,7 +134,7 @@ pub fn with_mask(mut frame: FrameHeader) -> FrameHeader {
 /// they are those of colors, otherwise the first. What follows says how uncertain these are.
 pub struct Marked<'a> {
     source: &'a mut dyn RowSource,
-    levels: FullLevels,
+    levels: Option<FullLevels>,
     header: FrameHeader,
     planes: usize,
     rows_read: usize,
@@ -124,8 +142,8 @@ pub struct Marked<'a> {
 }
 
 impl<'a> Marked<'a> {
-    /// The rows of `source`, whose samples are full from `levels` on.
-    pub fn new(source: &'a mut dyn RowSource, levels: FullLevels) -> Self {
+    /// The rows of `source`, whose samples are full from `levels` on; none where no level is known or reached.
+    pub fn new(source: &'a mut dyn RowSource, levels: Option<FullLevels>) -> Self {
         let header = with_mask(source.header().clone());
         let planes = if header.leads_with_three_planes() { 3 } else { 1 };
         Self { source, levels, header, planes, rows_read: 0, buffer: Vec::new() }
@@ -154,7 +172,9 @@ impl RowSource for Marked<'_> {
             let marks = samples.len();
             samples.resize(marks + width, 0.0);
             for (channel, line) in row.chunks_exact(width).take(self.planes).enumerate() {
-                self.levels.mark(self.rows_read, channel, line, &mut samples[marks..]);
+                if let Some(levels) = self.levels {
+                    levels.mark(self.rows_read, channel, line, &mut samples[marks..]);
+                }
             }
             self.rows_read += 1;
         }
@@ -203,7 +223,7 @@ impl<'a, S: Stage> WithMask<'a, S> {
 }
 
 /// The bits of a mark.
-fn bits(mark: f32) -> u32 {
+pub fn bits(mark: f32) -> u32 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -234,6 +254,7 @@ impl<S: Stage> Stage for WithMask<'_, S> {
                 continue;
             }
             counts.saturated_pixels += marks.iter().filter(|mark| bits(**mark) & SATURATED != 0).count() as u64;
+            counts.marked_pixels += marks.iter().filter(|mark| bits(**mark) & !SATURATED != 0).count() as u64;
             let marked: Vec<usize> = (0..marks.len()).filter(|x| marks[*x] != 0.0).collect();
             for (channel, name) in self.header.geometry.channels.iter().enumerate() {
                 if let Some(unknown) = of_unknown(name) {

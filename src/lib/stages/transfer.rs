@@ -13,6 +13,7 @@
 
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
+use std::borrow::Borrow;
 
 /// Coefficients are left out where all that are left out come to less than this at any photosite: the error of a sum is
 /// below this share of the largest sample around.
@@ -140,14 +141,8 @@ impl Transfer {
     }
 
     /// The passage of some rows of one plane.
-    pub fn passage(&self) -> Passage<'_> {
-        let width = self.across[0].len();
-        Passage {
-            transfer: self,
-            rows: vec![vec![0.0; width]; self.reach() + 1],
-            column_sums: vec![0.0; width],
-            moved: vec![0.0; width],
-        }
+    pub fn passage(&self) -> Passage<&Self> {
+        Passage::of(self)
     }
 }
 
@@ -170,15 +165,22 @@ pub fn uniform_share(cte: f64) -> f64 {
 
 /// Rows on their way: each is put in from the top on, [`Transfer::reach`] rows before the first that is taken out.
 #[derive(Debug)]
-pub struct Passage<'a> {
-    transfer: &'a Transfer,
+pub struct Passage<T> {
+    transfer: T,
     /// The last rows that were put in, by their number modulo the reach plus one.
     rows: Vec<Vec<f64>>,
     column_sums: Vec<f64>,
     moved: Vec<f64>,
 }
 
-impl Passage<'_> {
+impl<T: Borrow<Transfer>> Passage<T> {
+    /// The passage of some rows of one plane by `transfer`.
+    pub fn of(transfer: T) -> Self {
+        let (width, reach) = (transfer.borrow().across[0].len(), transfer.borrow().reach());
+        let row = || vec![0.0; width];
+        Self { transfer, rows: vec![row(); reach + 1], column_sums: row(), moved: row() }
+    }
+
     /// Room for the charges of the frame's row `y`.
     pub fn entering(&mut self, y: usize) -> &mut [f64] {
         let index = y % self.rows.len();
@@ -188,6 +190,7 @@ impl Passage<'_> {
     /// What comes out of the row `y` that was put in last.
     pub fn leaving(&mut self, y: usize) -> &[f64] {
         let Self { transfer, rows, column_sums, moved } = self;
+        let transfer: &Transfer = (*transfer).borrow();
         column_sums.fill(0.0);
         for (missed, coefficient) in transfer.down.coefficients(y).enumerate() {
             let above = &rows[(y - missed) % rows.len()];

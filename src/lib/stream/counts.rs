@@ -27,6 +27,12 @@ pub struct Counts {
     pub saturated_samples: u64,
     /// Pixels that were made of such samples.
     pub saturated_pixels: u64,
+    /// Defective photosites.
+    pub defective: u64,
+    /// Those among them that were interpolated.
+    pub corrected: u64,
+    /// Pixels that were made of samples that are marked for another reason than saturation.
+    pub marked_pixels: u64,
 }
 
 impl Counts {
@@ -44,6 +50,9 @@ impl Counts {
             propagation_void: self.propagation_void + other.propagation_void,
             saturated_samples: self.saturated_samples + other.saturated_samples,
             saturated_pixels: self.saturated_pixels + other.saturated_pixels,
+            defective: self.defective + other.defective,
+            corrected: self.corrected + other.corrected,
+            marked_pixels: self.marked_pixels + other.marked_pixels,
         }
     }
 
@@ -62,6 +71,9 @@ impl Counts {
             out_of_gamut: some(self.out_of_gamut),
             propagation_void: some(self.propagation_void),
             saturated: some(self.saturated_samples + self.saturated_pixels),
+            defective: some(self.defective),
+            corrected: some(self.corrected),
+            marked: some(self.marked_pixels),
         }
     }
 
@@ -75,6 +87,13 @@ impl Counts {
                 self.saturated_pixels,
                 "pixels were made of saturated samples: their values are wrong, and their uncertainty, which --sigma tells, is \
                  infinite",
+            ),
+            (self.defective - self.corrected.min(self.defective), "defective photosites have no good neighbor of their class and stay as they are"),
+            (self.corrected, "defective photosites were interpolated from others of their class, and marked"),
+            (
+                self.marked_pixels,
+                "pixels were made of defective or interpolated samples: they are marked, and their uncertainty, which --sigma tells, \
+                 is infinite",
             ),
             (self.full_well, "photosites were clipped at full well"),
             (self.clipped_low, "samples were clipped to the smallest code"),

@@ -1,12 +1,13 @@
 //! Drives a frame through a stage: bands that move between a few buffers, on one thread or on several.
 
-use super::bands::{Band, Bands};
+use super::bands::Bands;
 use super::counts::Counts;
 use super::outlet::with_outlet;
 use super::stage::{RowSink, RowSource, Stage};
 use crate::error::Result;
-use crate::frame::Rows;
+use crate::frame::{Rows, Window};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Drives a whole frame through a stage, band by band; memory is a few bands whatever the height.
 ///
@@ -54,7 +55,7 @@ pub fn run<S: Stage>(
     with_outlet(sink, overlaps, |outlet| {
         bands.each(overlaps, |band| {
             let samples = band.rows().len() * output.row_samples();
-            let counted = outlet.make(samples, |made| make(stage, band, made, threads))?;
+            let counted = outlet.make(samples, |made| make(stage, band.window(0), band.rows(), made, threads))?;
             counts = counts.plus(counted);
             progress(band.rows().end);
             Ok(())
@@ -63,12 +64,17 @@ pub fn run<S: Stage>(
     Ok(counts)
 }
 
-/// Makes the rows of a band in `made`, and gives what was counted.
-fn make<S: Stage>(stage: &S, band: &Band, made: &mut [f32], threads: usize) -> Counts {
+/// Makes such rows in `made`, and gives what was counted.
+pub(super) fn make<S: Stage>(
+    stage: &S,
+    window: Window<'_, S::Input>,
+    rows: Range<usize>,
+    made: &mut [f32],
+    threads: usize,
+) -> Counts {
     let output = &stage.header().geometry;
-    let rows = band.rows();
     let apply = |first: usize, samples: &mut [f32]| {
-        stage.apply(band.window(0), Rows::new(first, output.width, output.channels.len(), samples))
+        stage.apply(window, Rows::new(first, output.width, output.channels.len(), samples))
     };
     if threads == 1 {
         return apply(rows.start, made);

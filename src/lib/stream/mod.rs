@@ -10,6 +10,7 @@ mod outlet;
 mod stage;
 #[cfg(test)]
 mod tests;
+mod through;
 
 pub use bands::Band;
 pub use counts::Counts;
@@ -18,3 +19,4 @@ pub use fold::{fold, fold_into};
 pub use memory::MemoryFrame;
 pub use outlet::Outlet;
 pub use stage::{Footprint, RowSink, RowSource, Stage};
+pub use through::Through;

@@ -104,7 +104,7 @@ impl Predicted {
         Self {
             channels: vec![expectation],
             covariance: Some(vec![vec![std * std]]),
-            mean_std: (count > 0).then(|| vec![std / (count as f64).sqrt()]),
+            mean_std: (count > 0).then(|| vec![expectation.mean_error]),
             tested: None,
         }
     }
@@ -122,7 +122,13 @@ impl Expectation {
         let std = prediction.moments.std();
         // Var(s²) = σ⁴ (2/(n−1) + κ/n); the standard deviation has a quarter of its relative variance.
         let std_error = ((2.0 / (n - 1.0) + prediction.excess_kurtosis / n).max(0.0) / 4.0).sqrt();
-        Self { mean: prediction.moments.mean, std, mean_error: std / n.sqrt(), sample_std: std, std_error }
+        Self {
+            mean: prediction.moments.mean,
+            std,
+            mean_error: (std * std / n + prediction.common).sqrt(),
+            sample_std: std,
+            std_error,
+        }
     }
 }
 
@@ -143,5 +149,6 @@ fn mixed(classes: &[Prediction; 3], counts: [u64; 3]) -> Option<Prediction> {
         })
         .sum();
     let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) - 3.0 } else { 0.0 };
-    Some(Prediction { moments: MeanVariance { mean, variance }, third: 0.0, excess_kurtosis })
+    let common = shares.iter().zip(classes).map(|(w, p)| w * w * p.common).sum();
+    Some(Prediction { moments: MeanVariance { mean, variance }, third: 0.0, excess_kurtosis, common })
 }

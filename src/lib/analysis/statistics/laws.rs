@@ -19,6 +19,7 @@ impl Samplings {
         }
         let mut made = Sampling::of(&mixture.weights, &mixture.sites, &place);
         made.covariance += beyond_weights(mixture);
+        made.mean_covariance += common(mixture);
         self.0.push((place, made.clone()));
         made
     }
@@ -29,4 +30,10 @@ impl Samplings {
 pub(super) fn beyond_weights(mixture: &PixelMoments) -> Matrix3<f64> {
     let variances = mixture.sites.map(|site| site.moments.variance);
     mixture.covariance - gains::mean_pixel(&mixture.weights).covariance(variances)
+}
+
+/// What all pixels are off together: each channel as the class that it is named for.
+fn common(mixture: &PixelMoments) -> Matrix3<f64> {
+    let classes = Matrix3::from_diagonal(&mixture.sites.map(|site| site.common).into());
+    mixture.from_camera * classes * mixture.from_camera.transpose()
 }

@@ -7,7 +7,7 @@ use super::levels::Levels;
 use super::region::Region;
 use super::report::{RegionReport, Report, coverage};
 use super::tally::{Tally, tallies};
-use super::watch::{Saturated, Watch};
+use super::watch::{Marks, Saturated, Watch};
 use crate::error::{Error, Result};
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments};
 use crate::stream::RowSource;
@@ -52,20 +52,22 @@ pub fn measure(
             frame.name
         )));
     }
-    if let (Some(_), true, Some(pixels)) = (level, left_out, counts.iter().find(|count| **count > 0)) {
+    let saturated = counts.iter().map(|marks| marks.saturated).find(|count| *count > 0);
+    if let (Some(_), true, Some(pixels)) = (level, left_out, saturated) {
         return Err(Error::Data(format!(
             "{}: nothing can be checked: {pixels} pixels used saturated samples; without them the others are no fair sample",
             frame.name
         ))
         .give(&["keep_saturated"]));
     }
-    let report = |((region, tally), pixels): ((&Region, &Tally), &u64)| {
+    let report = |((region, tally), marks): ((&Region, &Tally), &Marks)| {
         let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, *region);
-        // What is left where pixels are left out by their values follows no formula.
-        let prediction = prediction.as_ref().ok().filter(|_| !left_out || *pixels == 0);
+        // What is left where pixels are left out by their values follows no formula; those of defects are any.
+        let by_value = marks.beyond_model + if left_out { marks.saturated } else { 0 };
+        let prediction = prediction.as_ref().ok().filter(|_| by_value == 0);
         let assessment = Assessment::new(tally, &frame, prediction, sampling);
         let tests = if level.is_some() { assessment.tests() } else { Vec::new() };
-        RegionReport { tests, ..assessment.report(&frame, *region, &levels).with_saturated(*pixels, left_out) }
+        RegionReport { tests, ..assessment.report(&frame, *region, &levels).with_marks(*marks, left_out) }
     };
     let regions = regions.iter().zip(&tallies).zip(&counts).map(report).collect();
     let mut report = Report { regions, check: None, uncertainty: coverage(&frame), unpredicted: prediction.err() };

@@ -187,10 +187,11 @@ pub fn measure(
                 .collect()
         }
     };
-    let reports = reports.into_iter().zip(patches).zip(counts).map(|((report, patch), pixels)| {
+    let reports = reports.into_iter().zip(patches).zip(counts).map(|((report, patch), marks)| {
         let report = RegionReport { patch: Some(patch.at), sample: patch.sample, ..report };
-        let report = report.with_saturated(pixels, left_out);
-        if left_out && pixels > 0 { report.without_predictions() } else { report }
+        let report = report.with_marks(marks, left_out);
+        let by_value = marks.beyond_model + if left_out { marks.saturated } else { 0 };
+        if by_value > 0 { report.without_predictions() } else { report }
     });
     let reports = reports.collect();
     Ok(Report { regions: reports, check: None, uncertainty: coverage(&frame), unpredicted })

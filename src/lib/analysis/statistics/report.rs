@@ -2,6 +2,7 @@
 
 use super::check::{Test, Verdict};
 use super::region::Region;
+use super::watch::Marks;
 use crate::metadata::{Coverage, FrameHeader};
 use crate::propagation::Unpredictable;
 use crate::units::QuantityKind;
@@ -45,7 +46,16 @@ pub struct RegionReport {
     /// Pixels that were made of saturated samples, which are left out unless they are asked for; of the samples of
     /// photosites those at full well or the white level, which are not.
     pub saturated: u64,
-    /// Whether these are left out.
+    /// Pixels that are, or used, defective photosites, which are left out.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub defective: u64,
+    /// Pixels that are, or used, samples interpolated in their place, which are left out.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub corrected: u64,
+    /// Pixels of which a correction knows nothing, which are left out.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub beyond_model: u64,
+    /// Whether saturated pixels are left out.
     #[serde(skip)]
     pub leaves_saturated_out: bool,
     /// Quantity and unit of the samples.
@@ -69,11 +79,12 @@ pub struct RegionReport {
 }
 
 impl RegionReport {
-    /// The same with so many saturated pixels; those that were left out were taken as not finite before.
+    /// The same with so many marked pixels; those that were left out were taken as not finite before.
     #[must_use]
-    pub(super) fn with_saturated(self, saturated: u64, left_out: bool) -> Self {
-        let not_finite = if left_out { self.not_finite.saturating_sub(saturated) } else { self.not_finite };
-        Self { not_finite, saturated, leaves_saturated_out: left_out, ..self }
+    pub(super) fn with_marks(self, marks: Marks, leaves_saturated_out: bool) -> Self {
+        let Marks { saturated, defective, corrected, beyond_model, left_out } = marks;
+        let not_finite = self.not_finite.saturating_sub(left_out);
+        Self { not_finite, saturated, defective, corrected, beyond_model, leaves_saturated_out, ..self }
     }
 
     /// The same with nothing predicted: what is left where pixels are left out by their values follows no formula.
@@ -94,6 +105,11 @@ impl RegionReport {
             ..self
         }
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 /// Statistics of one channel, or of one class of a CFA plane.

@@ -4,7 +4,9 @@ use super::region::Region;
 use crate::error::Result;
 use crate::metadata::FrameHeader;
 use crate::propagation::saturation;
-use crate::stages::saturation::{FullLevels, MASK_LAYER, Marked, samples_tell};
+use crate::stages::saturation::{
+    BEYOND_MODEL, CORRECTED, DEFECTIVE, FullLevels, MASK_LAYER, Marked, SATURATED, bits, samples_tell,
+};
 use crate::stream::RowSource;
 
 /// What becomes of pixels that were made of saturated samples.
@@ -17,15 +19,38 @@ pub enum Saturated {
     Kept,
 }
 
+/// Marked pixels of a region, by what the marks mean; one may have several.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Marks {
+    pub saturated: u64,
+    pub defective: u64,
+    pub corrected: u64,
+    pub beyond_model: u64,
+    /// Those that are left out.
+    pub left_out: u64,
+}
+
+impl Marks {
+    fn add(&mut self, bits: u32, left_out: u32) {
+        let has = |bit: u32| u64::from(bits & bit != 0);
+        self.saturated += has(SATURATED);
+        self.defective += has(DEFECTIVE);
+        self.corrected += has(CORRECTED);
+        self.beyond_model += has(BEYOND_MODEL);
+        self.left_out += has(left_out);
+    }
+}
+
 /// The rows of a frame without its layer of marks, marked pixels as NaN where they are left out.
 pub(super) struct Watch<'a> {
     source: Watched<'a>,
     header: FrameHeader,
     /// Place of the layer among the channels of the source; none where no pixel can be marked.
     layer: Option<usize>,
-    leaves_out: bool,
+    /// The bits whose pixels are left out.
+    left_out: u32,
     regions: Vec<Region>,
-    counts: Vec<u64>,
+    counts: Vec<Marks>,
     rows_read: usize,
     buffer: Vec<f32>,
 }
@@ -47,7 +72,7 @@ impl<'a> Watched<'a> {
         match (layer, levels) {
             (None, Some(levels)) => {
                 let layer = header.geometry.channels.len();
-                (Self::Marked(Box::new(Marked::new(source, levels))), Some(layer))
+                (Self::Marked(Box::new(Marked::new(source, Some(levels)))), Some(layer))
             }
             _ => (Self::AsTheyCome(source), layer),
         }
@@ -82,22 +107,25 @@ impl<'a> Watch<'a> {
                 header.geometry.channels.truncate(3);
             }
         }
-        let leaves_out = saturated == Saturated::LeftOut && (comes_with_layer || !samples_tell(&header));
+        let left_out = match saturated {
+            Saturated::LeftOut if comes_with_layer || !samples_tell(&header) => u32::MAX,
+            _ => !SATURATED,
+        };
         Self {
             source,
             header,
             layer,
-            leaves_out,
+            left_out,
             regions: regions.to_vec(),
-            counts: vec![0; regions.len()],
+            counts: vec![Marks::default(); regions.len()],
             rows_read: 0,
             buffer: Vec::new(),
         }
     }
 
-    /// Saturated pixels of each region, and whether they were left out.
-    pub fn seen(self) -> (Vec<u64>, bool) {
-        (self.counts, self.leaves_out)
+    /// Marked pixels of each region, and whether saturated ones were left out.
+    pub fn seen(self) -> (Vec<Marks>, bool) {
+        (self.counts, self.left_out & SATURATED != 0)
     }
 
     /// Takes in one row of samples and its marks: counts, and leaves out.
@@ -110,14 +138,12 @@ impl<'a> Watch<'a> {
         for (region, count) in self.regions.iter().zip(&mut self.counts) {
             if (region.y..region.y + region.height).contains(&y) {
                 let marks = &marks[region.x..region.x + region.width];
-                *count += marks.iter().filter(|mark| **mark != 0.0).count() as u64;
+                marks.iter().for_each(|mark| count.add(bits(*mark), self.left_out));
             }
         }
-        if self.leaves_out {
-            for line in samples.chunks_exact_mut(marks.len()) {
-                for (sample, mark) in line.iter_mut().zip(marks) {
-                    *sample = if *mark == 0.0 { *sample } else { f32::NAN };
-                }
+        for line in samples.chunks_exact_mut(marks.len()) {
+            for (sample, mark) in line.iter_mut().zip(marks) {
+                *sample = if bits(*mark) & self.left_out == 0 { *sample } else { f32::NAN };
             }
         }
     }

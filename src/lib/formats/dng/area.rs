@@ -74,6 +74,43 @@ pub(super) fn active(file: &mut TiffFile, image: &RawImage) -> Result<Rectangle>
     )))
 }
 
+/// The photosites that no light reaches \[DNG2023, MaskedAreas], as X, Y, width and height on the sensor, whose corner the
+/// image's is `place` from. Where the tag is missing, all that lies beside the active area but for [`LEAK`] photosites.
+///
+/// # Errors
+///
+/// When the tag is damaged.
+pub(super) fn masked(
+    file: &mut TiffFile,
+    image: &RawImage,
+    active: Rectangle,
+    place: [usize; 2],
+) -> Result<Vec<[i64; 4]>> {
+    let [width, height] = image.size.map(|side| side as u64);
+    let given = tags::MASKED_AREAS.unsigned(file, image.directory(), 4 * 64)?;
+    // Top, left, bottom and right, again and again.
+    let beside = || {
+        let (left, top) = (active.left as u64, active.top as u64);
+        let (right, bottom) = (left + active.width as u64, top + active.height as u64);
+        vec![
+            [0, 0, top.saturating_sub(LEAK), width],
+            [bottom + LEAK, 0, height, width],
+            [0, 0, height, left.saturating_sub(LEAK)],
+            [0, right + LEAK, height, width],
+        ]
+    };
+    let areas = given.map_or_else(beside, |given| given.as_chunks::<4>().0.to_vec());
+    let on_sensor = |[top, left, bottom, right]: [u64; 4]| {
+        let is_one = top < bottom && bottom <= height && left < right && right <= width;
+        let [x, y] = [left + place[0] as u64, top + place[1] as u64];
+        is_one.then(|| [x, y, right - left, bottom - top].map(u64::cast_signed))
+    };
+    Ok(areas.into_iter().filter_map(on_sensor).collect())
+}
+
+/// Photosites beside the active area that light may leak into.
+const LEAK: u64 = 2;
+
 /// The default crop, as far as it is one of whole photosites in the active area; that area where there is none. Else why it
 /// is none, in words.
 ///

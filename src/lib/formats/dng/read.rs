@@ -94,7 +94,10 @@ impl DngReader {
         let levels = Levels::read(&mut file, &image, on_sensor, reach, storage.sample)?;
         let mut notes = Vec::new();
         describe::note_area(&mut file, &image, active, area, &mut notes)?;
-        let own_tags = describe::describe(&mut file, &image, on_sensor, &levels, &mut notes)?;
+        let mut own_tags = describe::describe(&mut file, &image, on_sensor, &levels, &mut notes)?;
+        if part == RawArea::Full {
+            own_tags.masked_areas = area::masked(&mut file, &image, active, place)?;
+        }
         let noise_profile = noise::profile(&mut file, &image, &mut notes)?;
         let origin = [area.left + place[0], area.top + place[1]].map(|place| i32::try_from(place).unwrap_or(i32::MAX));
         let geometry = Geometry { origin, ..Geometry::new(area.width, area.height, &["Y"]) };

@@ -45,6 +45,7 @@ pub(super) const CALIBRATION_SIGNATURES: [DngTag; 2] =
 pub(super) const SUB_TILE_BLOCK: DngTag = DngTag(50974, "SubTileBlockSize");
 pub(super) const ROW_INTERLEAVE: DngTag = DngTag(50975, "RowInterleaveFactor");
 pub(super) const COLUMN_INTERLEAVE: DngTag = DngTag(52547, "ColumnInterleaveFactor");
+pub(super) const MASKED_AREAS: DngTag = DngTag(50830, "MaskedAreas");
 pub(super) const ACTIVE_AREA: DngTag = DngTag(50829, "ActiveArea");
 pub(super) const OPCODES: [DngTag; 2] = [DngTag(51008, "OpcodeList1"), DngTag(51009, "OpcodeList2")];
 

@@ -157,7 +157,7 @@ fn noise_profile(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<E
     let metadata = &header.metadata;
     let (record, adc) = (metadata.noise.as_ref()?, metadata.adc.filter(|adc| !adc.is_bent())?);
     // Charge that moved makes neighbors alike, and dark frames bring noise of their own.
-    let is_plain = metadata.correction.is_none_or(|record| record.dark_frames == 0 && record.cte.is_none());
+    let is_plain = metadata.correction.as_ref().is_none_or(|record| !record.took_frames() && record.is_plain());
     if record.cte.is_some() || !is_plain {
         return None;
     }

@@ -1,0 +1,101 @@
+//! Frames that are read in step, however many there are: those that the system does not let be open together are opened for
+//! each band anew.
+
+use super::input::{FrameReader, InputOptions};
+use crate::error::Result;
+use crate::metadata::FrameHeader;
+use crate::stream::RowSource;
+use nix::sys::resource::{Resource, getrlimit, setrlimit};
+
+/// Files besides those frames that a program may have open.
+const OTHERS: u64 = 48;
+
+/// A frame among many.
+pub struct OneOfMany {
+    header: FrameHeader,
+    natural_rows: usize,
+    may_wait: bool,
+    notes: Vec<String>,
+    /// None while the file is closed.
+    reader: Option<FrameReader>,
+    options: InputOptions,
+    rows_read: usize,
+    stays_open: bool,
+}
+
+/// How many files may be open besides [`OTHERS`], once the limit is raised as far as it goes.
+fn allowed(wanted: u64) -> u64 {
+    let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_NOFILE) else { return 128 };
+    let raised = (wanted + OTHERS).min(hard).max(soft);
+    let is_raised = raised > soft && setrlimit(Resource::RLIMIT_NOFILE, raised, hard).is_ok();
+    (if is_raised { raised } else { soft }).saturating_sub(OTHERS)
+}
+
+impl OneOfMany {
+    /// Opens frames, the standard input among them at most once; `already` are opened besides.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`FrameReader::open`].
+    pub fn open_all(all: Vec<InputOptions>, already: usize) -> Result<Vec<Self>> {
+        let room = allowed((all.len() + already) as u64).saturating_sub(already as u64);
+        let open = |(index, options): (usize, InputOptions)| {
+            let reader = FrameReader::open(&options)?;
+            let is_stream = options.path.as_deref().is_none_or(|path| path.as_os_str() == "-") || reader.may_wait();
+            let stays_open = is_stream || (index as u64) < room;
+            Ok(Self {
+                header: reader.header().clone(),
+                natural_rows: reader.natural_rows(),
+                may_wait: reader.may_wait(),
+                notes: reader.notes().to_vec(),
+                reader: stays_open.then_some(reader),
+                options,
+                rows_read: 0,
+                stays_open,
+            })
+        };
+        all.into_iter().enumerate().map(open).collect()
+    }
+
+    /// What a careful user should know of it.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}
+
+impl RowSource for OneOfMany {
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn natural_rows(&self) -> usize {
+        self.natural_rows
+    }
+
+    fn may_wait(&self) -> bool {
+        self.may_wait
+    }
+
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        let mut reader = match self.reader.take() {
+            Some(reader) => reader,
+            None => {
+                let mut reader = FrameReader::open(&self.options)?;
+                let mut passed = Vec::new();
+                let step = self.natural_rows.max(1);
+                let mut left = self.rows_read;
+                while left > 0 {
+                    passed.clear();
+                    reader.read(step.min(left), &mut passed)?;
+                    left -= step.min(left);
+                }
+                reader
+            }
+        };
+        reader.read(rows, samples)?;
+        self.rows_read += rows;
+        let is_done = self.rows_read >= self.header.geometry.height;
+        self.reader = (self.stays_open && !is_done).then_some(reader);
+        Ok(())
+    }
+}

@@ -1,0 +1,191 @@
+//! What corrections took off a frame of codes, as its metadata keep it.
+
+use super::records::{NoiseRecord, PoissonKind, is_false};
+use crate::camera::levels::BlackLevel;
+use crate::names::{Named, serde_by_name};
+use crate::numerics::averages::Combine;
+use crate::random::Source;
+use serde::{Deserialize, Serialize};
+
+/// What was taken back of a frame of codes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CorrectionRecord {
+    /// What was subtracted as a constant, or by site, ADU.
+    pub black_adu: BlackLevel,
+    /// Whether what rows and columns add came off with it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub black_deltas: bool,
+    /// How many dark frames were subtracted sample by sample.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub dark_frames: u32,
+    /// The averages that were subtracted, each times its weight; none of records that know `dark_frames` alone, whose mean it
+    /// was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub masters: Vec<MasterRecord>,
+    /// Charge transfer efficiency that was undone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cte: Option<f64>,
+    /// The flat field by which samples were divided.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flat: Option<FlatRecord>,
+    /// How defective photosites were told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub defects: Option<DefectsRecord>,
+}
+
+impl CorrectionRecord {
+    /// That of a level alone.
+    pub fn of_black(black_adu: BlackLevel, black_deltas: bool) -> Self {
+        Self { black_adu, black_deltas, dark_frames: 0, masters: Vec::new(), cte: None, flat: None, defects: None }
+    }
+
+    /// Whether anything was subtracted.
+    pub fn took_black(&self) -> bool {
+        self.black_adu.uniform() != Some(0.0) || self.black_deltas || self.took_frames()
+    }
+
+    /// Whether frames were subtracted.
+    pub fn took_frames(&self) -> bool {
+        self.dark_frames > 0 || !self.masters.is_empty()
+    }
+
+    /// Whether samples are those of the converter less what is the same at all of a class, so that their level still tells
+    /// what they were.
+    pub fn is_a_shift(&self) -> bool {
+        !self.took_frames() && self.is_plain() && !self.black_deltas
+    }
+
+    /// Whether nothing but levels and frames came off.
+    pub fn is_plain(&self) -> bool {
+        self.cte.is_none() && self.flat.is_none() && self.defects.is_none()
+    }
+
+    /// The same with what was subtracted later.
+    #[must_use]
+    pub fn and_black(self, black: BlackLevel, black_deltas: bool) -> Self {
+        let ([a, b, c, d], [e, f, g, h]) = (self.black_adu.sites(), black.sites());
+        let sum = BlackLevel::Sites([a + e, b + f, c + g, d + h]);
+        let black_adu = sum.uniform().map_or(sum, BlackLevel::from);
+        Self { black_adu, black_deltas: self.black_deltas || black_deltas, ..self }
+    }
+}
+
+/// What frames without light tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MasterKind {
+    /// Bias and dark signal.
+    Dark,
+    /// The bias: frames of next to no exposure.
+    Bias,
+}
+
+impl Named for MasterKind {
+    const ALL: &'static [Self] = &[Self::Dark, Self::Bias];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Dark => "dark",
+            Self::Bias => "bias",
+        }
+    }
+}
+
+serde_by_name!(MasterKind);
+
+/// How frames were averaged.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AverageRecord {
+    /// How many.
+    pub frames: u32,
+    /// How.
+    pub combine: Combine,
+    /// Standard deviations beyond which samples were clipped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clip: Option<f64>,
+}
+
+/// An average that was subtracted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MasterRecord {
+    /// What its frames tell.
+    pub kind: MasterKind,
+    /// How they were averaged.
+    pub average: AverageRecord,
+    /// What it was multiplied by.
+    pub weight: f64,
+    /// Exposure of the frames in s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_s: Option<f64>,
+    /// Temperature of the sensor in K.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_k: Option<f64>,
+    /// The noise that was drawn in them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<MasterNoise>,
+}
+
+/// The noise that was drawn in averaged frames, but for seeds and numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MasterNoise {
+    /// Sources drawn.
+    pub sources: Vec<Source>,
+    /// Mean dark signal before non-uniformity, e⁻.
+    pub dark_e: f64,
+    /// How Poisson numbers were drawn.
+    pub poisson: PoissonKind,
+}
+
+impl MasterNoise {
+    /// That of a frame.
+    pub fn of(noise: &NoiseRecord) -> Self {
+        Self { sources: noise.sources.clone(), dark_e: noise.dark_e, poisson: noise.poisson }
+    }
+
+    /// As a record of a frame; seeds and temperature, on which no moments hang, are 0.
+    pub fn record(&self) -> NoiseRecord {
+        let Self { sources, dark_e, poisson } = self.clone();
+        NoiseRecord { sources, seed: 0, sensor_seed: 0, frame: 0, temperature_k: 0.0, dark_e, poisson, cte: None }
+    }
+}
+
+/// A flat field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FlatRecord {
+    /// How its frames were averaged.
+    pub average: AverageRecord,
+    /// Means of its classes above what no light reads, in ADU, by which it was divided: of R, G and B, of the filters of
+    /// another array in the order of their letters, of the one class there is, or of planes.
+    pub means_adu: Vec<f64>,
+    /// How many photosites each is the mean of.
+    pub photosites: Vec<u64>,
+    /// Whether the metadata of all its frames say that they were lit evenly.
+    pub even: bool,
+    /// The noise that was drawn in them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<MasterNoise>,
+    /// The level that was subtracted from it first, where it is one, ADU.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub black_adu: Option<f64>,
+    /// The averages that were subtracted from it first; none where a level was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub masters: Vec<MasterRecord>,
+}
+
+/// How defective photosites were told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DefectsRecord {
+    /// The map.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<String>,
+    /// Standard deviations beyond which photosites were found defective.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub found_beyond: Option<f64>,
+    /// What they were found in.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub found_in: Vec<String>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}

@@ -1,0 +1,128 @@
+//! Moments of photosites that were divided by a flat field.
+
+use super::charge::{charge, sensitivity};
+use super::masters::{Dark, Drawn};
+use super::moments::Prediction;
+use super::photosite::Photosite;
+use crate::metadata::AdcRecord;
+use crate::numerics::gauss::panel;
+use crate::numerics::normal::{cumulative, density};
+
+/// Sensitivities max(0, 1 + σ z) and their weights.
+fn sensitivities(sigma: f64) -> Vec<(f64, f64)> {
+    /// Standard deviations beyond which nothing counts.
+    const REACH: f64 = 8.0;
+    const PANELS: u32 = 4;
+    if sigma <= 0.0 {
+        return vec![(1.0, 1.0)];
+    }
+    let lowest = (-1.0 / sigma).max(-REACH);
+    let width = (REACH - lowest) / f64::from(PANELS);
+    let mut found = vec![(0.0, cumulative(lowest))];
+    for index in 0..PANELS {
+        let low = lowest + width * f64::from(index);
+        found.extend(panel(low, low + width).map(|(z, weight)| (1.0 + sigma * z, weight * density(z))));
+    }
+    found.retain(|(_, weight)| *weight > 1e-14);
+    found
+}
+
+/// Why nothing is predicted of samples that were divided by a flat field.
+pub(super) const NARROW: &str = "what was divided by a flat field, or the flat field, reaches full well or an end of the codes, or \
+                                 scatters over less than a code";
+
+/// The least standard deviation, in codes, of which rounding is a uniform error: what else it does to the variance is below
+/// 4σ² e^(−2π²σ²), 1 % of it, and less where patterns spread it.
+const LEAST_CODES: f64 = 0.5;
+
+/// Relative variance of a flat field beyond which dividing by it follows no series.
+const MOST_NOISE: f64 = 0.01;
+
+impl Photosite {
+    /// Moments of the class R, G or B after division by the flat field: with A what is left of the codes and F the flat
+    /// field at a photosite, ⟨F⟩ the mean of the class,
+    ///
+    /// y = A ⟨F⟩ / F,  E\[1/F] = (1 + ρ − s + 3ρ²)/f,  E\[1/F²] = (1 + 3ρ − 4s + 15ρ²)/f²
+    ///
+    /// f, ρ and s are mean, relative variance and κ₃/f³ of F over exposures; all is averaged over the sensitivities of
+    /// photosites, which A and F share. Noise of bias frames that came off both is in both. None where samples are clipped
+    /// or scatter over less than a code.
+    pub fn divided(&self, class: usize, expected_e: f64) -> Option<Prediction> {
+        let (adc, flat) = (self.adc?, self.flat?);
+        let light_e = flat.expected_e[class];
+        let mut averages = self.darks.iter().chain(&flat.darks).flatten();
+        let is_open = self.is_open(&adc, expected_e)
+            && self.of_dark(&flat.frames).is_open(&adc, light_e)
+            && averages.all(|dark| self.of_dark(dark).is_open(&adc, 0.0));
+        if !is_open {
+            return None;
+        }
+        let bias = |darks: &[Option<Dark>]| darks.iter().flatten().find(|dark| dark.is_bias).copied();
+        let in_both = bias(&self.darks).zip(bias(&flat.darks)).filter(|(a, b)| a.frames == b.frames);
+        let [lights, darks] = [self.model.prnu, self.model.dcnu].map(sensitivities);
+        let mut sums = [0.0; 6];
+        for (&(x, of_x), &(u, of_u)) in lights.iter().flat_map(|x| darks.iter().map(move |u| (x, u))) {
+            let site = [x, u];
+            let mut above = Drawn::codes(&self.model, &adc, expected_e, site).less(&self.darks, &adc, site);
+            let mut below = flat.frames.drawn(&adc, light_e, site).less(&flat.darks, &adc, site);
+            above.mean -= flat.levels_adu[0];
+            below.mean -= flat.levels_adu[1];
+            // Photosites that see no light are marked as defective.
+            if below.mean <= 0.0 {
+                continue;
+            }
+            let f = below.mean;
+            let (rho, skew) = (below.variance / (f * f), below.third / f.powi(3));
+            if rho > MOST_NOISE {
+                return None;
+            }
+            let both = in_both.map_or(0.0, |(a, b)| a.weight * b.weight * a.drawn(&adc, 0.0, site).variance) / f;
+            let first = (above.mean * (1.0 + rho - skew + 3.0 * rho * rho) - both) / f;
+            let of_square = 1.0 + 3.0 * rho - 4.0 * skew + 15.0 * rho * rho;
+            let square = ((above.mean.powi(2) + above.variance) * of_square - 4.0 * above.mean * both) / (f * f);
+            // Third cumulant of the quotient, of its own noise and of the curvature of 1/F.
+            let noise = above.variance / (f * f);
+            let third = (above.third - above.mean.powi(3) * skew) / f.powi(3)
+                + 6.0 * first * rho * (noise + first * first * rho);
+            for (sum, value) in sums.iter_mut().zip([1.0, first, square, f, third, rho]) {
+                *sum += of_x * of_u * value;
+            }
+        }
+        let [weight, sums @ ..] = sums;
+        let [first, square, scale, third, rho] = sums.map(|sum| sum / weight);
+        let mean = first * scale;
+        let variance = ((square - first * first) * scale * scale).max(0.0);
+        // The mean of the flat field is that of so many sensitivities, as is that of the frame; its noise is in both too.
+        let off = (sensitivity(self.model.prnu).1 - rho) / flat.photosites[class].max(1.0);
+        let prediction = Prediction::of_cumulants(mean, variance, third * scale.powi(3), 0.0);
+        Some(Prediction { common: mean * mean * off, ..prediction })
+    }
+
+    /// The variance after division by the flat field; where [`Self::divided`] gives none, to first order: that of the codes
+    /// less the pattern of the response, and what the noise of the flat field adds.
+    pub(super) fn variance_divided(&self, class: usize, expected_e: f64) -> f64 {
+        if let Some(divided) = self.divided(class, expected_e) {
+            return divided.moments.variance;
+        }
+        let own = self.moments(expected_e).moments.variance;
+        let (Some(adc), Some(flat)) = (self.adc, self.flat) else { return own };
+        let below = flat.frames.drawn(&adc, flat.expected_e[class], [1.0; 2]).less(&flat.darks, &adc, [1.0; 2]);
+        let level = expected_e * adc.adu_per_e;
+        (own - (self.model.prnu * level).powi(2)).max(0.0) + below.variance * (level / below.mean).powi(2)
+    }
+
+    /// Whether codes are charge and a uniform error: they scatter, and neither full well nor an end of the codes is within 6
+    /// standard deviations.
+    fn is_open(&self, adc: &AdcRecord, expected_e: f64) -> bool {
+        const REACH: f64 = 6.0;
+        let of_charge = charge(&self.model, expected_e);
+        let temporal = Drawn::codes(&self.model, adc, expected_e, [1.0; 2]).variance - 1.0 / 12.0;
+        let read_e = self.model.read_noise_e;
+        let reach_e = REACH * (of_charge.variance + read_e * read_e).sqrt();
+        let level = |charge_e: f64| adc.bias_adu + adc.adu_per_e * charge_e;
+        temporal.sqrt() >= LEAST_CODES
+            && level((of_charge.mean - reach_e).max(-REACH * read_e)) > 0.0
+            && level(of_charge.mean + reach_e) < f64::from(adc.top_code())
+            && of_charge.mean + REACH * of_charge.variance.sqrt() < self.model.full_well_e
+    }
+}

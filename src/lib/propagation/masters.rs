@@ -1,0 +1,213 @@
+//! Averages of dark frames, and of flats, as predictions know them.
+
+use super::charge::sensitivity;
+use crate::metadata::{AdcRecord, AverageRecord, FlatRecord, FrameHeader, MasterKind, MasterRecord, PoissonKind};
+use crate::numerics::averages::{CLIP, Combine, Kept};
+use crate::stages::noise::NoiseModel;
+use std::sync::{Mutex, PoisonError};
+
+/// Averages that can come off a frame: of the dark frames on either side of it, and of the bias.
+pub const MOST_DARKS: usize = 3;
+
+/// An average of frames without light that was subtracted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dark {
+    /// What it was multiplied by.
+    pub weight: f64,
+    /// Whether it is the bias, which flats may share.
+    pub is_bias: bool,
+    /// The noise of its frames.
+    pub model: NoiseModel,
+    /// How many there are.
+    pub frames: u32,
+    /// How they were averaged.
+    pub combine: Combine,
+    /// Standard deviations beyond which samples were clipped.
+    pub clip: f64,
+}
+
+/// What averaging leaves of what is drawn anew in each frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Average {
+    /// How far skewness moves the mean.
+    pub mean: f64,
+    /// Variance.
+    pub variance: f64,
+    /// Share of the variance that is kept, rounding apart.
+    pub kept: f64,
+}
+
+/// What is asked of averages that take time to work out: how, of how many, clipped where, and at which spread in codes.
+type Asked = (Combine, u32, u64, u64);
+
+/// What averages keep, worked out once for each.
+fn kept(combine: Combine, frames: u32, clip: f64, std_codes: f64) -> Kept {
+    static KNOWN: Mutex<Vec<(Asked, Kept)>> = Mutex::new(Vec::new());
+    if combine == Combine::Mean {
+        return Kept::of_mean(frames);
+    }
+    // The spread matters for the rounding of the median of an even number alone, for which two digits will do.
+    let is_even_median = combine == Combine::Median && frames.is_multiple_of(2);
+    let std_codes = if is_even_median { (std_codes * 20.0).round() / 20.0 } else { 1.0 };
+    let asked = (combine, frames, clip.to_bits(), std_codes.to_bits());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, kept)) = known.iter().find(|(of, _)| *of == asked) {
+        return *kept;
+    }
+    let found = Kept::of(combine, frames, clip, std_codes);
+    known.push((asked, found));
+    found
+}
+
+impl Dark {
+    /// The mean of so many frames, less which a frame is.
+    pub fn mean_of(model: NoiseModel, frames: u32) -> Self {
+        Self { weight: 1.0, is_bias: false, model, frames, combine: Combine::Mean, clip: CLIP }
+    }
+
+    /// What is recorded of an average; none where the noise of its frames is not, unless that of the sensor counts for all.
+    fn of(frame: &FrameHeader, record: &MasterRecord, of_sensor: Option<NoiseModel>) -> Option<Self> {
+        let model = match &record.noise {
+            Some(noise) => NoiseModel::of(frame, &noise.record()).ok()?,
+            None => NoiseModel { dark_e: dark_e(frame, record)?, ..of_sensor? },
+        };
+        let AverageRecord { frames, combine, clip } = record.average;
+        let is_bias = record.kind == MasterKind::Bias;
+        Some(Self { weight: record.weight, is_bias, model, frames, combine, clip: clip.unwrap_or(CLIP) })
+    }
+
+    /// All that is recorded; none where one of them is not known.
+    pub fn all(
+        frame: &FrameHeader,
+        records: &[MasterRecord],
+        of_sensor: Option<NoiseModel>,
+    ) -> Option<[Option<Self>; MOST_DARKS]> {
+        let mut found = [None; MOST_DARKS];
+        for (place, record) in records.iter().enumerate() {
+            *found.get_mut(place)? = Some(Self::of(frame, record, of_sensor)?);
+        }
+        Some(found)
+    }
+
+    /// What the average keeps of the variance of its frames, about.
+    pub(super) fn kept(&self) -> f64 {
+        kept(self.combine, self.frames, self.clip, 10.0).variance
+    }
+
+    /// What it keeps of samples of such variance, rounding included, and third cumulant about the mean of a photosite.
+    pub(super) fn average(&self, variance: f64, third: f64) -> Average {
+        let before = (variance - 1.0 / 12.0).max(0.0);
+        let kept = kept(self.combine, self.frames, self.clip, before.sqrt());
+        if self.combine == Combine::Mean {
+            return Average { mean: 0.0, variance: kept.variance * variance, kept: kept.variance };
+        }
+        let mean = if before > 0.0 { third / (6.0 * before) * kept.lean } else { 0.0 };
+        Average { mean, variance: kept.variance * before + kept.rounding / 12.0, kept: kept.variance }
+    }
+
+    /// The average at a photosite.
+    pub(super) fn drawn(&self, adc: &AdcRecord, expected_e: f64, site: [f64; 2]) -> Drawn {
+        let one = Drawn::codes(&self.model, adc, expected_e, site);
+        let average = self.average(one.variance, one.third);
+        Drawn { mean: one.mean + average.mean, variance: average.variance, third: one.third * average.kept.powi(2) }
+    }
+}
+
+/// The dark signal of frames whose noise is that of the sensor, e⁻; bias frames of unknown exposure have none.
+fn dark_e(frame: &FrameHeader, record: &MasterRecord) -> Option<f64> {
+    let readout = frame.readout().ok()?;
+    let of_frame = || frame.metadata.exposure.map(|exposure| exposure.exposure_s);
+    let exposure_s = match record.kind {
+        MasterKind::Bias => record.exposure_s.or(Some(0.0)),
+        MasterKind::Dark => record.exposure_s.or_else(of_frame),
+    };
+    Some(readout.dark_current_e_per_s(record.temperature_k.unwrap_or(readout.temperature_k)) * exposure_s?)
+}
+
+/// A flat field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flat {
+    /// Signal electrons of its classes R, G and B.
+    pub expected_e: [f64; 3],
+    /// Photosites over which each was normalized.
+    pub photosites: [f64; 3],
+    /// The frames themselves: the noise of each, and how they were averaged.
+    pub frames: Dark,
+    /// What came off them first.
+    pub darks: [Option<Dark>; MOST_DARKS],
+    /// What came off as a level, beyond the bias of the converter, ADU: of the frame that is divided, and of the flat field.
+    pub levels_adu: [f64; 2],
+}
+
+/// Cumulants of what is drawn anew at one photosite.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Drawn {
+    pub mean: f64,
+    pub variance: f64,
+    pub third: f64,
+}
+
+impl Drawn {
+    /// Codes of one exposure at a photosite of sensitivities x to light and u to dark current, above the bias of the
+    /// converter.
+    pub fn codes(model: &NoiseModel, adc: &AdcRecord, expected_e: f64, [x, u]: [f64; 2]) -> Self {
+        let k = adc.adu_per_e;
+        let shot = |rate: f64, is_shot: bool| if is_shot { rate } else { 0.0 };
+        let (light, dark) = (shot(expected_e, model.signal_shot), shot(model.dark_e, model.dark_shot));
+        let charge = x * x * light + u * u * dark;
+        let skew = x.powi(3) * light + u.powi(3) * dark;
+        Self {
+            mean: k * (x * expected_e + u * model.dark_e),
+            variance: k * k * (charge + model.read_noise_e.powi(2)) + 1.0 / 12.0,
+            third: if model.poisson == PoissonKind::Exact { k.powi(3) * skew } else { 0.0 },
+        }
+    }
+
+    /// The same less averages of dark frames.
+    pub fn less(mut self, darks: &[Option<Dark>], adc: &AdcRecord, site: [f64; 2]) -> Self {
+        for dark in darks.iter().flatten() {
+            let average = dark.drawn(adc, 0.0, site);
+            self.mean -= dark.weight * average.mean;
+            self.variance += dark.weight.powi(2) * average.variance;
+            self.third -= dark.weight.powi(3) * average.third;
+        }
+        self
+    }
+}
+
+impl Flat {
+    /// What is recorded of a flat field; none where the noise of its frames is not, unless that of the sensor counts for all, or
+    /// where not all of its classes are R, G and B.
+    pub fn of(
+        frame: &FrameHeader,
+        record: &FlatRecord,
+        adc: &AdcRecord,
+        of_sensor: Option<NoiseModel>,
+    ) -> Option<Self> {
+        let AverageRecord { frames, combine, clip } = record.average;
+        let model = match &record.noise {
+            Some(noise) => NoiseModel::of(frame, &noise.record()).ok()?,
+            None => of_sensor?,
+        };
+        let three = |values: &[f64]| match values {
+            [one] => Some([*one; 3]),
+            [red, green, blue] => Some([*red, *green, *blue]),
+            _ => None,
+        };
+        let photosites: Vec<f64> = record.photosites.iter().map(|count| *count as f64).collect();
+        let darks = Dark::all(frame, &record.masters, of_sensor)?;
+        let level_adu = record.black_adu.map_or(0.0, |black| black - adc.bias_adu);
+        // What dark signal is left in the means is no light.
+        let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0;
+        let off_e: f64 = darks.iter().flatten().map(|dark| dark.weight * dark_e(&dark.model)).sum();
+        let left_e = dark_e(&model) - off_e - level_adu / adc.adu_per_e;
+        let light_e = |mean: f64| (mean / adc.adu_per_e - left_e) / sensitivity(model.prnu).0;
+        Some(Self {
+            expected_e: three(&record.means_adu)?.map(light_e),
+            photosites: three(&photosites)?,
+            frames: Dark { weight: 1.0, is_bias: false, model, frames, combine, clip: clip.unwrap_or(CLIP) },
+            darks,
+            levels_adu: [0.0, level_adu],
+        })
+    }
+}

@@ -1,0 +1,260 @@
+//! Corrections of a frame of codes before demosaicking.
+
+use super::border::measure_black;
+use super::notes::Note;
+use super::options::Input;
+use super::values::{self, BlackChoice};
+use crate::error::{Error, Result};
+use crate::formats::files::read_file;
+use crate::formats::input::InputOptions;
+use crate::formats::many::OneOfMany;
+use crate::formats::register::check_inputs;
+use crate::masking::Corrections;
+use crate::metadata::{DefectsRecord, FrameHeader};
+use crate::numerics::averages::{CLIP, Combine};
+use crate::stages::black::Black;
+use crate::stages::correct::{CorrectFrame, CorrectionSettings};
+use crate::stages::darks::{DarkFrames, DarkSettings};
+use crate::stages::defects::{DefectMap, beyond_chance};
+use crate::stages::flats::FlatFrames;
+use crate::stages::masters::Averaging;
+use crate::stream::Stage;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// What is corrected, and by which frames.
+#[derive(Debug, Clone, Args)]
+pub struct Correction {
+    /// Black level to remove: auto (from the metadata), none, a number of ADU, or that of the masked border, which
+    /// `import-raw --crop full` keeps: border (a level for each 2x2 site), rows or columns (and what each row or column is off)
+    #[arg(
+        id = "black",
+        long,
+        default_value = "none",
+        value_name = "auto|none|N|border|rows|columns",
+        value_parser = values::black_or_border
+    )]
+    pub black_choice: BlackChoice,
+    /// Dark frame to subtract sample by sample, read with the --raw, --channel and --crop of the input; given more than once,
+    /// the average of all
+    #[arg(long, value_name = "FILE", conflicts_with = "black")]
+    pub dark: Vec<PathBuf>,
+    /// Bias frame, of next to no exposure; any number. Comes off where there is no dark frame; beside dark frames it is what
+    /// --scale-dark scales above
+    #[arg(long, value_name = "FILE", conflicts_with = "black")]
+    pub bias: Vec<PathBuf>,
+    /// Bring dark signals to the exposure and the temperature of the frame: dark frames alike, else between the nearest two,
+    /// else the nearest, scaled above the bias by exposure and Eq. 6 of [HP2005]
+    #[arg(long, requires = "dark")]
+    pub scale_dark: bool,
+    /// Flat field to divide by, lit evenly; any number. Each class is divided by its share of its own mean
+    #[arg(long, value_name = "FILE")]
+    pub flat: Vec<PathBuf>,
+    /// Dark frame of the flats; any number. By default bias frames come off them, or their black level
+    #[arg(long, value_name = "FILE", requires = "flat")]
+    pub flat_dark: Vec<PathBuf>,
+    /// How frames of a kind are averaged: mean, median, or clipped, the mean without outliers
+    #[arg(long, default_value = "mean", value_parser = values::choice::<Combine>())]
+    pub combine: Combine,
+    /// Standard deviations from the median beyond which `clipped` leaves samples out, again and again; of N samples none
+    /// lies farther off than the root of N
+    #[arg(long, default_value_t = CLIP, value_name = "KAPPA", value_parser = values::positive)]
+    pub clip: f64,
+    /// Defective photosites to interpolate: a frame that is not zero there, or a list (.txt, .csv) of column,row on the sensor
+    #[arg(long, value_name = "FILE")]
+    pub defects: Option<PathBuf>,
+    /// Find defective photosites, beyond so many standard deviations of their class: hot and cold ones in dark or bias frames,
+    /// unstable ones in five dark frames or more, dead ones in flats; by default so many that chance finds less than one
+    /// in a frame
+    #[arg(long, value_name = "SIGMA", value_parser = values::positive, num_args = 0..=1, require_equals = true)]
+    pub find_defects: Option<Option<f64>>,
+    /// Charge transfer efficiency to undo, above 0 and at most 1; the bias of the converter is left out of it
+    #[arg(long, value_name = "X", value_parser = values::fraction)]
+    pub cte: Option<f64>,
+}
+
+/// A correction, ready to run.
+pub struct OpenCorrection {
+    /// What is subtracted as a constant, and the charge transfer that is undone.
+    pub stage: CorrectFrame,
+    /// What comes off and divides, sample by sample.
+    pub corrections: Corrections<OneOfMany>,
+    /// What came up.
+    pub notes: Vec<Note>,
+}
+
+impl Correction {
+    /// Makes sure that files can be read as often as they must.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`].
+    pub fn check(&self, input: &Input) -> Result<()> {
+        let lists = [&self.dark, &self.bias, &self.flat, &self.flat_dark];
+        let once = lists.into_iter().flatten().chain(&self.defects).map(PathBuf::as_path);
+        check_inputs(once.map(Some).chain([input.input.as_deref()]))?;
+        let of_flats =
+            [&self.flat, &self.flat_dark, &self.bias].into_iter().flatten().filter(|_| !self.flat.is_empty());
+        let for_defects = self.dark.iter().chain(&self.bias).filter(|_| self.find_defects.is_some());
+        if of_flats.chain(for_defects).any(|path| path.as_os_str() == "-") {
+            return Err(Error::Usage(
+                "flats, and frames in which defects are found, are read twice; name files".into(),
+            ));
+        }
+        if self.find_defects.is_some() && self.dark.is_empty() && self.bias.is_empty() && self.flat.is_empty() {
+            let problem = "defects are found among dark frames, bias frames or flats";
+            return Err(Error::Usage(problem.into()).give(&["dark", "flat"]));
+        }
+        Ok(())
+    }
+
+    /// The black level to subtract; what the border tells stands in the metadata.
+    fn black(&self) -> Black {
+        match self.black_choice {
+            BlackChoice::Known(black) => black,
+            BlackChoice::Border(_) => Black::Auto,
+        }
+    }
+
+    fn settings(&self) -> DarkSettings {
+        let averaging = Averaging { combine: self.combine, clip: self.clip };
+        DarkSettings { averaging, is_scaled: self.scale_dark }
+    }
+
+    fn files(&self) -> usize {
+        // Frames in which defects are found are open twice.
+        2 * (self.dark.len() + 2 * self.bias.len() + self.flat.len() + self.flat_dark.len()) + 2
+    }
+
+    /// Opens frames beside the input.
+    fn open_frames(&self, paths: &[PathBuf], input: &Input) -> Result<Vec<OneOfMany>> {
+        let options: Vec<InputOptions> = paths.iter().map(|path| input.beside(path)).collect();
+        let others = self.files() - paths.len();
+        OneOfMany::open_all(options, others)
+    }
+
+    fn darks(&self, frame: &FrameHeader, input: &Input) -> Result<Option<DarkFrames<OneOfMany>>> {
+        let frames = |paths: &[PathBuf]| self.open_frames(paths, input);
+        // Bias frames beside darks that are not scaled may be those of flats.
+        let biases = if self.is_bias_of_flats() { Vec::new() } else { frames(&self.bias)? };
+        DarkFrames::matched(frame, frames(&self.dark)?, biases, self.settings())
+    }
+
+    fn is_bias_of_flats(&self) -> bool {
+        !self.dark.is_empty() && !self.scale_dark && !self.flat.is_empty() && self.flat_dark.is_empty()
+    }
+
+    fn flats(&self, frame: &FrameHeader, input: &Input) -> Result<Option<FlatFrames<OneOfMany>>> {
+        let frames = |paths: &[PathBuf]| self.open_frames(paths, input);
+        let is_scaled = self.scale_dark && !self.flat_dark.is_empty();
+        let needs_bias = self.flat_dark.is_empty() || is_scaled;
+        let biases = if needs_bias { frames(&self.bias)? } else { Vec::new() };
+        let black = match self.black() {
+            Black::Level(level) => Some(crate::camera::levels::BlackLevels::uniform_at(level)),
+            _ => None,
+        };
+        let settings = DarkSettings { is_scaled, ..self.settings() };
+        FlatFrames::of(frame, frames(&self.flat)?, [frames(&self.flat_dark)?, biases], black, settings, self.cte)
+    }
+
+    fn map(&self, frame: &FrameHeader, input: &Input) -> Result<Option<DefectMap<OneOfMany>>> {
+        let Some(path) = &self.defects else { return Ok(None) };
+        let is_list =
+            path.extension().is_some_and(|end| ["txt", "csv"].iter().any(|list| end.eq_ignore_ascii_case(list)));
+        if !is_list {
+            let mut map = self.open_frames(std::slice::from_ref(path), input)?;
+            return map.pop().map(|map| DefectMap::of_frame(map, frame)).transpose();
+        }
+        let (bytes, name) = (read_file(path)?, path.display().to_string());
+        let text = String::from_utf8(bytes).map_err(|_| Error::format(&name, "it is no text"))?;
+        DefectMap::of_list(&text, &name, frame).map(Some)
+    }
+
+    /// Opens what `frame` is corrected by, and reads flats, and frames in which defects are found, for what they are on the
+    /// whole.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames and of [`CorrectFrame::new`]; [`Error::Usage`] for what makes no sense.
+    pub fn open(&self, frame: &mut FrameHeader, input: &Input) -> Result<OpenCorrection> {
+        if let BlackChoice::Border(border) = self.black_choice {
+            measure_black(frame, &input.options(), border)?;
+        }
+        let frame = &*frame;
+        let darks = self.darks(frame, input)?;
+        let is_more = !self.flat.is_empty() || self.defects.is_some();
+        if !self.flat.is_empty() && darks.is_none() && self.black() == Black::None {
+            let problem = "a flat field divides what is above black, which must come off first";
+            return Err(Error::Usage(problem.into()).give(&["dark", "bias", "black"]));
+        }
+        let settings = CorrectionSettings { black: self.black(), cte: self.cte };
+        let mut stage = CorrectFrame::of(frame, &settings, darks.as_ref().map(DarkFrames::stack), is_more)?;
+        let geometry = &frame.geometry;
+        let samples = (geometry.row_samples() * geometry.height) as u64;
+        let beyond = self.find_defects.map(|given| given.unwrap_or_else(|| beyond_chance(samples)));
+        let dark_limits = match beyond.zip(self.darks(frame, input).transpose()) {
+            Some((beyond, darks)) => Some(darks?.survey(beyond)?),
+            None => None,
+        };
+        let flats = match self.flats(frame, input)? {
+            Some(flats) => {
+                let means = flats.survey(beyond)?;
+                self.flats(frame, input)?.map(|flats| (flats, means))
+            }
+            None => None,
+        };
+        let mut warnings: Vec<String> = stage.warnings().to_vec();
+        if let Some((flats, means)) = &flats {
+            warnings.extend_from_slice(flats.warnings());
+            if means.full > 0 {
+                warnings.push(format!("{} photosites of the flats are saturated; they are marked", means.full));
+            }
+        }
+        let sources =
+            darks.iter().flat_map(DarkFrames::frames).chain(flats.iter().flat_map(|(flats, _)| flats.frames()));
+        let mut remarks: Vec<String> = sources.flat_map(|source| source.notes().to_vec()).collect();
+        remarks.extend(darks.iter().flat_map(|darks| darks.stack().remarks().to_vec()));
+        let found_in = |is_there: bool, what: &str| is_there.then(|| what.to_owned());
+        let defects = (self.defects.is_some() || beyond.is_some()).then(|| DefectsRecord {
+            map: self.defects.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned()),
+            found_beyond: beyond,
+            found_in: [
+                found_in(dark_limits.is_some(), "level of dark frames"),
+                found_in(dark_limits.as_ref().is_some_and(|limits| limits.tell_unstable()), "scatter of dark frames"),
+                found_in(beyond.is_some() && flats.is_some(), "flat field"),
+            ]
+            .into_iter()
+            .flatten()
+            .collect(),
+        });
+        stage.note_further(flats.as_ref().map(|(flats, means)| flats.record(means)), defects);
+        let map = self.map(frame, input)?;
+        let notes = warnings.into_iter().map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)).collect();
+        let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
+        Ok(OpenCorrection { stage, corrections, notes })
+    }
+}
+
+impl OpenCorrection {
+    /// What was found while the frame was corrected.
+    pub fn findings(&self) -> Vec<Note> {
+        let Corrections { darks, dark_limits, flats, found, .. } = &self.corrections;
+        let clipped =
+            darks.as_ref().map_or(0, DarkFrames::clipped) + flats.as_ref().map_or(0, |(flats, _)| flats.clipped());
+        let [off, unstable, dead] = found;
+        let said = [
+            (clipped > 0).then(|| format!("{clipped} samples of averaged frames were clipped")),
+            (dark_limits.is_some() || *dead > 0).then(|| {
+                format!(
+                    "found {off} photosites off in dark frames, {unstable} unstable ones, {dead} off in flats or unlit"
+                )
+            }),
+        ];
+        said.into_iter().flatten().map(Note::Remark).collect()
+    }
+
+    /// The head of the frame that is made.
+    pub fn header(&self) -> &FrameHeader {
+        self.stage.header()
+    }
+}

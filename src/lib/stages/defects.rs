@@ -1,0 +1,293 @@
+//! Defective photosites: told by a map, found among dark frames and flats, and interpolated within their class.
+
+use crate::error::{Error, Result};
+use crate::frame::{Rows, Window, to_sample};
+use crate::metadata::FrameHeader;
+use crate::numerics::normal::cumulative;
+use crate::stages::saturation::{CORRECTED, DEFECTIVE, SATURATED, bits, with_mask};
+use crate::stages::sites::SiteClasses;
+use crate::stream::{Counts, RowSource, Stage};
+use crate::units::Adu;
+use std::collections::BTreeSet;
+
+/// Defective photosites that a user knows.
+pub enum DefectMap<S> {
+    /// A frame of the same size whose samples are not zero there.
+    Frame(S),
+    /// Columns and rows of the frame, in rows.
+    List(BTreeSet<[usize; 2]>),
+}
+
+impl<S: RowSource> DefectMap<S> {
+    /// A frame as a map of `frame`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for one of another size or place.
+    pub fn of_frame(map: S, frame: &FrameHeader) -> Result<Self> {
+        let (its, theirs) = (&map.header().geometry, &frame.geometry);
+        if [its.width, its.height] != [theirs.width, theirs.height] {
+            let size = |width, height| format!("{width}x{height}");
+            return Err(map.header().refuse(format!(
+                "its size is {}, but that of {} is {}",
+                size(its.width, its.height),
+                frame.name,
+                size(theirs.width, theirs.height)
+            )));
+        }
+        Ok(Self::Frame(map))
+    }
+
+    /// A list of columns and rows on the sensor, `x,y` in each line; what follows `#` does not count.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] naming the line that is none.
+    pub fn of_list(text: &str, name: &str, frame: &FrameHeader) -> Result<Self> {
+        let mut found = BTreeSet::new();
+        for (number, line) in text.lines().enumerate() {
+            let line = line.split('#').next().unwrap_or_default().trim();
+            if line.is_empty() {
+                continue;
+            }
+            let place = line.split_once([',', ' ', '\t', ';']).and_then(|(x, y)| {
+                let [x, y] = [x, y].map(|text| text.trim().parse::<i64>());
+                Some([x.ok()?, y.ok()?])
+            });
+            let [x, y] = place.ok_or_else(|| {
+                let number = number + 1;
+                Error::format(
+                    name,
+                    format!("line {number}, `{line}`, is no column and row of a photosite, such as 12,34"),
+                )
+            })?;
+            let of_frame = |at: i64, axis: usize, extent: usize| {
+                let at = at - i64::from(frame.geometry.origin[axis]);
+                usize::try_from(at).ok().filter(|at| *at < extent)
+            };
+            // Those of the sensor that a crop leaves out do not count.
+            if let Some((x, y)) = of_frame(x, 0, frame.geometry.width).zip(of_frame(y, 1, frame.geometry.height)) {
+                found.insert([y, x]);
+            }
+        }
+        Ok(Self::List(found))
+    }
+
+    /// Marks the photosites of the rows from `first` on in the last channel of `samples`.
+    fn mark(&mut self, [first, rows, width]: [usize; 3], samples: &mut [f32], buffer: &mut Vec<f32>) -> Result<()> {
+        let row_samples = samples.len() / rows.max(1);
+        match self {
+            Self::Frame(map) => {
+                let of_map = map.header().geometry.row_samples();
+                buffer.clear();
+                map.read(rows, buffer)?;
+                for (row, map) in samples.chunks_exact_mut(row_samples).zip(buffer.chunks_exact(of_map)) {
+                    let marks = &mut row[row_samples - width..];
+                    for (mark, _) in marks.iter_mut().zip(&map[..width]).filter(|(_, sample)| **sample != 0.0) {
+                        add(mark, DEFECTIVE);
+                    }
+                }
+            }
+            Self::List(list) => {
+                for [y, x] in list.range([first, 0]..[first + rows, 0]) {
+                    add(&mut samples[(y - first + 1) * row_samples - width + x], DEFECTIVE);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Adds bits to a mark.
+pub(super) fn add(mark: &mut f32, more: u32) {
+    *mark = (bits(*mark) | more) as f32;
+}
+
+/// The rows of a frame whose last channel is the layer of marks, those of a map added.
+pub struct Mapped<'a, S> {
+    frame: &'a mut dyn RowSource,
+    map: &'a mut DefectMap<S>,
+    rows_read: usize,
+    buffer: Vec<f32>,
+}
+
+impl<'a, S: RowSource> Mapped<'a, S> {
+    /// The rows of `frame`.
+    pub fn new(frame: &'a mut dyn RowSource, map: &'a mut DefectMap<S>) -> Self {
+        Self { frame, map, rows_read: 0, buffer: Vec::new() }
+    }
+}
+
+impl<S: RowSource> RowSource for Mapped<'_, S> {
+    fn header(&self) -> &FrameHeader {
+        self.frame.header()
+    }
+
+    fn natural_rows(&self) -> usize {
+        self.frame.natural_rows()
+    }
+
+    fn may_wait(&self) -> bool {
+        let waits = if let DefectMap::Frame(map) = &*self.map { map.may_wait() } else { false };
+        waits || self.frame.may_wait()
+    }
+
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        let start = samples.len();
+        self.frame.read(rows, samples)?;
+        let width = self.frame.header().geometry.width;
+        self.map.mark([self.rows_read, rows, width], &mut samples[start..], &mut self.buffer)?;
+        self.rows_read += rows;
+        Ok(())
+    }
+}
+
+/// Standard deviations beyond which one tenth of a sample in so many is expected to lie by chance, on either side.
+pub fn beyond_chance(samples: u64) -> f64 {
+    let wanted = 0.05 / samples.max(1) as f64;
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if cumulative(-middle) > wanted { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// The limits of what is ordinary among the samples of each class: median and median deviation of at most 2¹⁷ of them.
+#[derive(Debug)]
+pub(super) struct Survey {
+    classes: Vec<Vec<f32>>,
+    every: usize,
+    seen: Vec<usize>,
+}
+
+impl Survey {
+    pub fn new(classes: usize, samples: usize) -> Self {
+        const MOST: usize = 1 << 17;
+        Self { classes: vec![Vec::new(); classes], every: samples.div_ceil(MOST).max(1), seen: vec![0; classes] }
+    }
+
+    pub fn take(&mut self, class: usize, value: f64) {
+        if self.seen[class].is_multiple_of(self.every) && value.is_finite() {
+            self.classes[class].push(to_sample(value));
+        }
+        self.seen[class] += 1;
+    }
+
+    /// Lower and upper limits of each class, so many standard deviations off; these are at least `least`.
+    pub fn limits(self, beyond: f64, least: f64) -> Vec<[f64; 2]> {
+        /// Standard deviations to the median deviation of a normal law.
+        const NORMAL: f64 = 1.482_602_218_505_602;
+        let median = |values: &mut [f32]| {
+            let half = values.len() / 2;
+            f64::from(*values.select_nth_unstable_by(half, f32::total_cmp).1)
+        };
+        let limits = |mut values: Vec<f32>| {
+            if values.is_empty() {
+                return [f64::NEG_INFINITY, f64::INFINITY];
+            }
+            let center = median(&mut values);
+            let mut off: Vec<f32> = values.iter().map(|value| to_sample((f64::from(*value) - center).abs())).collect();
+            let reach = beyond * (NORMAL * median(&mut off)).max(least);
+            [center - reach, center + reach]
+        };
+        self.classes.into_iter().map(limits).collect()
+    }
+}
+
+/// Interpolates photosites that are marked as defective from good ones of their class, and marks them as corrected.
+///
+/// The mean of the nearest pairs on either side, in the row or the column, is exact where the scene is linear. Where there is
+/// none, the mean of all good ones within reach counts, each by the inverse square of its distance; where there is none
+/// of these the sample stays as it is, marked as defective alone.
+#[derive(Debug, Clone)]
+pub struct Mend {
+    header: FrameHeader,
+    classes: SiteClasses,
+}
+
+/// Photosites on either side that are looked at.
+const REACH: usize = 4;
+
+impl Mend {
+    /// Of the frame `corrected`, whose layer of marks is added.
+    pub fn new(corrected: &FrameHeader) -> Self {
+        let classes = SiteClasses::of(corrected, corrected.geometry.channels.len());
+        Self { header: with_mask(corrected.clone()), classes }
+    }
+
+    /// What stands for a sample; none where no good one is within reach.
+    fn mended(&self, input: &Window<'_, Adu>, [x, y]: [usize; 2], plane: usize) -> Option<f64> {
+        let (layer, class) = (input.channels() - 1, self.classes.class(x, y, plane));
+        let at = |dx: isize, dy: isize| {
+            let (x, y) = (x.checked_add_signed(dx)?, y.checked_add_signed(dy)?);
+            let is_inside = x < input.width() && y < input.frame_height();
+            let is_alike = is_inside && self.classes.class(x, y, plane) == class;
+            let row = y.cast_signed();
+            let is_good = is_alike && input.row(row, layer)[x] == 0.0;
+            is_good.then(|| f64::from(input.row(row, plane)[x])).filter(|sample| sample.is_finite())
+        };
+        for step in 1..=REACH.cast_signed() {
+            let pairs = [[step, 0], [0, step]].map(|[dx, dy]| at(dx, dy).zip(at(-dx, -dy)).map(|(a, b)| 0.5 * (a + b)));
+            match pairs {
+                [Some(a), Some(b)] => return Some(0.5 * (a + b)),
+                [Some(one), None] | [None, Some(one)] => return Some(one),
+                [None, None] => {}
+            }
+        }
+        let reach = REACH.cast_signed();
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (dx, dy) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy))) {
+            if let Some(sample) = at(dx, dy) {
+                let weight = 1.0 / (dx * dx + dy * dy).max(1) as f64;
+                sum += weight * sample;
+                weights += weight;
+            }
+        }
+        (weights > 0.0).then(|| sum / weights)
+    }
+}
+
+impl Stage for Mend {
+    type Input = Adu;
+    type Output = Adu;
+
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn reach(&self) -> usize {
+        REACH
+    }
+
+    fn apply(&self, input: Window<'_, Adu>, mut output: Rows<'_, Adu>) -> Counts {
+        let mut counts = Counts::default();
+        let layer = input.channels() - 1;
+        for y in output.range() {
+            let row = y.cast_signed();
+            let marks = input.row(row, layer);
+            let defective: Vec<usize> = (0..marks.len()).filter(|x| bits(marks[*x]) & DEFECTIVE != 0).collect();
+            let mut made = vec![true; defective.len()];
+            for plane in 0..layer {
+                let samples = output.row(y, plane);
+                samples.copy_from_slice(input.row(row, plane));
+                for (x, made) in defective.iter().zip(&mut made) {
+                    match self.mended(&input, [*x, y], plane) {
+                        Some(sample) => samples[*x] = to_sample(sample),
+                        None => *made = false,
+                    }
+                }
+                counts.not_finite += samples.iter().filter(|sample| !sample.is_finite()).count() as u64;
+            }
+            let to = output.row(y, layer);
+            to.copy_from_slice(marks);
+            for (x, _) in defective.iter().zip(&made).filter(|(_, made)| **made) {
+                add(&mut to[*x], CORRECTED);
+            }
+            counts.defective += defective.len() as u64;
+            counts.corrected += made.iter().filter(|made| **made).count() as u64;
+            counts.saturated_pixels += marks.iter().filter(|mark| bits(**mark) & SATURATED != 0).count() as u64;
+        }
+        counts
+    }
+}

@@ -1,0 +1,313 @@
+//! Flat fields: what each photosite of a class makes of the same light, by which frames are divided.
+//!
+//! x / g,  g = F / ⟨F⟩,  F = M − D
+//!
+//! M is an average of frames that were lit evenly, D what no light reads in them, ⟨F⟩ the mean over the photosites of a class.
+
+use crate::camera::levels::BlackLevels;
+use crate::error::Result;
+use crate::frame::to_sample;
+use crate::metadata::{FlatRecord, FrameHeader, MasterNoise};
+use crate::stages::darks::{DarkFrames, DarkSettings, check_alike, check_codes};
+use crate::stages::defects::{Survey, add};
+use crate::stages::masters::Frames;
+use crate::stages::saturation::{DEFECTIVE, FullLevels, SATURATED};
+use crate::stages::sites::SiteClasses;
+use crate::stages::transfer::{Passage, Transfer};
+use crate::stream::RowSource;
+
+/// What no light reads in flats.
+#[derive(Debug)]
+enum Pedestal<S> {
+    Frames(Box<DarkFrames<S>>),
+    Level(BlackLevels),
+}
+
+/// Flats read in step.
+#[derive(Debug)]
+pub struct FlatFrames<S> {
+    frames: Frames<S>,
+    head: FrameHeader,
+    is_even: bool,
+    count: usize,
+    pedestal: Pedestal<S>,
+    classes: SiteClasses,
+    full: Option<FullLevels>,
+    settings: DarkSettings,
+    transfer: Option<Transfer>,
+    passages: Vec<Passage<Transfer>>,
+    rows_made: usize,
+    made: Vec<f64>,
+    warnings: Vec<String>,
+}
+
+/// What a first reading of flats tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlatMeans {
+    /// Mean of each class above what no light reads, ADU.
+    means: Vec<f64>,
+    photosites: Vec<u64>,
+    /// Photosites that are saturated in a flat.
+    pub full: u64,
+    /// Ordinary values of g, by class.
+    limits: Option<Vec<[f64; 2]>>,
+}
+
+impl<S: RowSource> FlatFrames<S> {
+    /// Flats for `frame`; their own dark frames, or bias frames, come off first, or else `black`, or the black level that
+    /// their metadata tell. With an efficiency of charge transfer, that is undone. None of none.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Order`](crate::error::Error::Order) and [`Error::Format`](crate::error::Error::Format) for flats that do not fit
+    /// the frame, or on which no light fell; [`Error::MissingKey`](crate::error::Error::MissingKey) where nothing tells what no
+    /// light reads in them; those of [`DarkFrames::matched`].
+    pub fn of(
+        frame: &FrameHeader,
+        flats: Vec<S>,
+        [darks, biases]: [Vec<S>; 2],
+        black: Option<BlackLevels>,
+        settings: DarkSettings,
+        cte: Option<f64>,
+    ) -> Result<Option<Self>> {
+        let Some(first) = flats.first() else { return Ok(None) };
+        let mut warnings = Vec::new();
+        for flat in &flats {
+            let head = flat.header();
+            check_codes(head)?;
+            check_alike(frame, head)?;
+            let scene = head.metadata.scene.as_ref();
+            if scene.is_some_and(|scene| scene.expected_electrons == Some([0.0; 3])) {
+                return Err(head.refuse("no light fell on it; a flat field is lit evenly"));
+            }
+        }
+        let is_even = |flat: &S| flat.header().metadata.scene.as_ref().is_some_and(|scene| scene.uniform);
+        let mut head = first.header().clone();
+        let is_even = flats.iter().all(is_even);
+        let pedestal = match DarkFrames::matched(&head, darks, biases, settings)? {
+            Some(darks) => {
+                check_alike(&head, darks.stack().head())?;
+                darks.stack().check_dark()?;
+                warnings.extend(darks.stack().warnings_beside(&head));
+                Pedestal::Frames(Box::new(darks))
+            }
+            None => {
+                let known = black.map_or_else(|| head.black_levels(), |black| Ok(Some(black)))?;
+                Pedestal::Level(known.ok_or_else(|| head.missing("black_level_adu"))?)
+            }
+        };
+        let count = flats.len();
+        if count > 1 {
+            head.name = format!("the {} of {} and {} more", settings.averaging.name(), head.name, count - 1);
+        }
+        let planes = head.geometry.channels.len();
+        let classes = SiteClasses::of(&head, planes);
+        let full = FullLevels::of(&head);
+        let mut frames = Frames::new(flats, settings.averaging);
+        frames.keep_largest();
+        let transfer = cte.map(|cte| Transfer::undoing(cte, &head.geometry)).transpose()?;
+        let passages =
+            transfer.iter().flat_map(|transfer| (0..planes).map(|_| Passage::of(transfer.clone()))).collect();
+        let made = Vec::new();
+        Ok(Some(Self {
+            frames,
+            head,
+            is_even,
+            count,
+            pedestal,
+            classes,
+            full,
+            settings,
+            transfer,
+            passages,
+            rows_made: 0,
+            made,
+            warnings,
+        }))
+    }
+
+    /// What a user should hear of them.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Each of the frames: flats, then what comes off them.
+    pub fn frames(&self) -> impl Iterator<Item = &S> {
+        let darks = if let Pedestal::Frames(darks) = &self.pedestal { Some(darks.as_ref()) } else { None };
+        self.frames.frames().chain(darks.into_iter().flat_map(DarkFrames::frames))
+    }
+
+    /// Samples of theirs that were clipped so far.
+    pub fn clipped(&self) -> u64 {
+        let of_darks = if let Pedestal::Frames(darks) = &self.pedestal { darks.clipped() } else { 0 };
+        self.frames.clipped() + of_darks
+    }
+
+    /// Makes F of the next rows.
+    fn next(&mut self, rows: usize) -> Result<()> {
+        let (width, planes) = (self.head.geometry.width, self.head.geometry.channels.len());
+        self.frames.next(rows, &mut self.made)?;
+        match &mut self.pedestal {
+            Pedestal::Frames(darks) => {
+                let darks = darks.next(rows)?;
+                self.made.iter_mut().zip(darks).for_each(|(flat, dark)| *flat -= dark);
+            }
+            Pedestal::Level(level) => {
+                for (index, line) in self.made.chunks_exact_mut(width).enumerate() {
+                    let black = level.row(self.rows_made + index / planes);
+                    line.iter_mut().enumerate().for_each(|(x, flat)| *flat -= black.at(x));
+                }
+            }
+        }
+        if self.transfer.is_some() {
+            for (index, line) in self.made.chunks_exact_mut(width).enumerate() {
+                let (y, passage) = (self.rows_made + index / planes, &mut self.passages[index % planes]);
+                passage.entering(y).copy_from_slice(line);
+                line.copy_from_slice(passage.leaving(y));
+            }
+        }
+        self.rows_made += rows;
+        Ok(())
+    }
+
+    /// Reads all rows for the means of the classes and, for defects beyond so many standard deviations, what is ordinary.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames; [`Error::Format`](crate::error::Error::Format) for a class that is not lit, or saturated for the most part.
+    pub fn survey(mut self, beyond: Option<f64>) -> Result<FlatMeans> {
+        let geometry = self.head.geometry.clone();
+        let (width, planes, classes) = (geometry.width, geometry.channels.len(), self.classes.count());
+        let mut sums = vec![0.0; classes];
+        let (mut counts, mut full) = (vec![0_u64; classes], vec![0_u64; classes]);
+        let mut survey = beyond.map(|_| Survey::new(classes, width * geometry.height));
+        let step = geometry.cached_rows();
+        while self.rows_made < geometry.height {
+            let first = self.rows_made;
+            self.next(step.min(geometry.height - first))?;
+            for (index, line) in self.made.chunks_exact(width).enumerate() {
+                let (y, plane) = (first + index / planes, index % planes);
+                let of_row = self.classes.row(y, plane);
+                let largest = &self.frames.largest()[index * width..][..width];
+                for (x, (flat, largest)) in line.iter().zip(largest).enumerate() {
+                    let class = of_row[x % of_row.len()];
+                    if flat.is_finite() {
+                        sums[class] += flat;
+                        counts[class] += 1;
+                        full[class] += u64::from(is_full(self.full, x, y, plane, *largest));
+                    }
+                    if let Some(survey) = &mut survey {
+                        survey.take(class, *flat);
+                    }
+                }
+            }
+        }
+        let means: Vec<f64> = sums.iter().zip(&counts).map(|(sum, count)| sum / *count as f64).collect();
+        for class in 0..classes {
+            if counts[class] > 0 && (means[class].is_nan() || means[class] <= 0.0) {
+                return Err(self.head.refuse(format!(
+                    "its mean is {:.1} ADU above what no light reads; a flat field is lit",
+                    means[class]
+                )));
+            }
+            if 2 * full[class] > counts[class] {
+                return Err(self
+                    .head
+                    .refuse("most of its samples are saturated; expose flat fields to half of full well"));
+            }
+        }
+        let in_shares = |[low, high]: [f64; 2], mean: f64| [low / mean, high / mean];
+        let limits = survey.zip(beyond).map(|(survey, beyond)| survey.limits(beyond, 1e-6));
+        let limits = limits.map(|limits| limits.into_iter().zip(&means).map(|(l, mean)| in_shares(l, *mean)).collect());
+        Ok(FlatMeans { means, photosites: counts, full: full.iter().sum(), limits })
+    }
+
+    /// What metadata keep of them.
+    pub fn record(&self, means: &FlatMeans) -> FlatRecord {
+        let (masters, black_adu) = match &self.pedestal {
+            Pedestal::Frames(darks) => (darks.stack().masters(), None),
+            Pedestal::Level(level) => (Vec::new(), level.uniform()),
+        };
+        FlatRecord {
+            average: self.settings.averaging.record(self.count),
+            means_adu: means.means.clone(),
+            photosites: means.photosites.clone(),
+            even: self.is_even,
+            noise: self.head.metadata.noise.as_ref().map(MasterNoise::of),
+            black_adu,
+            masters,
+        }
+    }
+}
+
+fn is_full(full: Option<FullLevels>, x: usize, y: usize, plane: usize, sample: f32) -> bool {
+    full.is_some_and(|full| sample >= full.of_row(y, plane)[x % 2])
+}
+
+/// The rows of a frame, whose last channel is the layer of marks, divided by a flat field.
+///
+/// A photosite whose flat field is not above zero is marked as defective and not divided; one whose flats are saturated is marked
+/// as saturated.
+pub struct Flattened<'a, S> {
+    frame: &'a mut dyn RowSource,
+    flats: &'a mut FlatFrames<S>,
+    means: &'a FlatMeans,
+    /// Photosites that were found defective.
+    pub found: u64,
+}
+
+impl<'a, S: RowSource> Flattened<'a, S> {
+    /// `frame` divided by `flats`.
+    pub fn new(frame: &'a mut dyn RowSource, flats: &'a mut FlatFrames<S>, means: &'a FlatMeans) -> Self {
+        Self { frame, flats, means, found: 0 }
+    }
+}
+
+impl<S: RowSource> RowSource for Flattened<'_, S> {
+    fn header(&self) -> &FrameHeader {
+        self.frame.header()
+    }
+
+    fn natural_rows(&self) -> usize {
+        self.flats.frames().map(S::natural_rows).fold(self.frame.natural_rows(), usize::max)
+    }
+
+    fn may_wait(&self) -> bool {
+        self.frame.may_wait() || self.flats.frames().any(S::may_wait)
+    }
+
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        let (start, first) = (samples.len(), self.flats.rows_made);
+        self.frame.read(rows, samples)?;
+        self.flats.next(rows)?;
+        let geometry = &self.flats.head.geometry;
+        let (width, planes) = (geometry.width, geometry.channels.len());
+        let of_frame = self.frame.header().geometry.row_samples();
+        for (index, row) in samples[start..].chunks_exact_mut(of_frame).enumerate() {
+            let y = first + index;
+            let (row, marks) = row.split_at_mut(of_frame - width);
+            for (plane, line) in row.chunks_exact_mut(width).take(planes).enumerate() {
+                let from = (index * planes + plane) * width;
+                let of_row = self.flats.classes.row(y, plane);
+                let (flats, largest) = (&self.flats.made[from..], &self.flats.frames.largest()[from..]);
+                for (x, (sample, mark)) in line.iter_mut().zip(marks.iter_mut()).enumerate() {
+                    let class = of_row[x % of_row.len()];
+                    let gain = flats[x] / self.means.means[class];
+                    if is_full(self.flats.full, x, y, plane, largest[x]) {
+                        add(mark, SATURATED);
+                    }
+                    let is_lit = gain > 0.0 && gain.is_finite();
+                    let limits = self.means.limits.as_ref().map(|limits| limits[class]);
+                    if !is_lit || limits.is_some_and(|[low, high]| !(low..=high).contains(&gain)) {
+                        add(mark, DEFECTIVE);
+                        self.found += 1;
+                    }
+                    if is_lit {
+                        *sample = to_sample(f64::from(*sample) / gain);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,222 @@
+//! Frames of one kind that count as one: their average, sample by sample, while all are read in step.
+
+use crate::error::Result;
+use crate::metadata::AverageRecord;
+use crate::numerics::averages::{CLIP, Combine, average};
+use crate::stream::RowSource;
+use rayon::prelude::*;
+
+/// How frames are averaged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Averaging {
+    /// Mean, median or clipped mean.
+    pub combine: Combine,
+    /// Standard deviations beyond which the last leaves samples out.
+    pub clip: f64,
+}
+
+impl Default for Averaging {
+    fn default() -> Self {
+        Self { combine: Combine::Mean, clip: CLIP }
+    }
+}
+
+impl Averaging {
+    /// As a record has it.
+    pub fn of(record: &AverageRecord) -> Self {
+        Self { combine: record.combine, clip: record.clip.unwrap_or(CLIP) }
+    }
+
+    /// The record of so many frames.
+    pub(super) fn record(self, frames: usize) -> AverageRecord {
+        let clip = (self.combine == Combine::Clipped).then_some(self.clip);
+        AverageRecord { frames: u32::try_from(frames).unwrap_or(u32::MAX), combine: self.combine, clip }
+    }
+
+    pub(super) fn name(self) -> &'static str {
+        match self.combine {
+            Combine::Mean => "mean",
+            Combine::Median => "median",
+            Combine::Clipped => "clipped mean",
+        }
+    }
+}
+
+/// What the rows of all frames may take that an average needs at a time, where it is no mean.
+const ALL_BYTES: usize = 64 << 20;
+
+/// Samples of a frame that are worth a task of their own.
+const SHARE: usize = 1 << 10;
+
+/// Frames read in step. The mean needs some rows of one of them at a time, others some rows of each.
+#[derive(Debug)]
+pub struct Frames<S> {
+    frames: Vec<S>,
+    averaging: Averaging,
+    band: Vec<f32>,
+    clipped: u64,
+    /// Whether the scatter among frames is kept too, and that of the last rows.
+    keeps_scatter: bool,
+    scatter: Vec<f64>,
+    /// The same of the largest samples.
+    keeps_largest: bool,
+    largest: Vec<f32>,
+}
+
+impl<S: RowSource> Frames<S> {
+    /// Frames that fit each other.
+    pub fn new(frames: Vec<S>, averaging: Averaging) -> Self {
+        Self {
+            frames,
+            averaging,
+            band: Vec::new(),
+            clipped: 0,
+            keeps_scatter: false,
+            scatter: Vec::new(),
+            keeps_largest: false,
+            largest: Vec::new(),
+        }
+    }
+
+    /// Each of them.
+    pub fn frames(&self) -> impl Iterator<Item = &S> {
+        self.frames.iter()
+    }
+
+    /// Keeps the scatter of each sample among the frames from now on.
+    pub fn keep_scatter(&mut self) {
+        self.keeps_scatter = true;
+    }
+
+    /// Variances among the frames, of the rows that were averaged last; empty where they are not kept.
+    pub fn scatter(&self) -> &[f64] {
+        &self.scatter
+    }
+
+    /// Keeps the largest of each sample among the frames from now on.
+    pub fn keep_largest(&mut self) {
+        self.keeps_largest = true;
+    }
+
+    /// The largest among the frames, of the rows that were averaged last; empty where they are not kept.
+    pub fn largest(&self) -> &[f32] {
+        &self.largest
+    }
+
+    /// Samples that were clipped so far.
+    pub fn clipped(&self) -> u64 {
+        self.clipped
+    }
+
+    /// Averages the next `rows` rows, `[row][channel][column]`.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames.
+    pub fn next(&mut self, rows: usize, made: &mut Vec<f64>) -> Result<()> {
+        made.clear();
+        self.scatter.clear();
+        self.largest.clear();
+        let row_samples = self.frames.first().map_or(0, |frame| frame.header().geometry.row_samples());
+        if self.averaging.combine == Combine::Mean {
+            return self.mean(rows * row_samples, rows, made);
+        }
+        let row_bytes = (self.frames.len() * row_samples * size_of::<f32>()).max(1);
+        let mut left = rows;
+        while left > 0 {
+            let step = (ALL_BYTES / row_bytes).clamp(1, left);
+            self.average(step * row_samples, step, made)?;
+            left -= step;
+        }
+        Ok(())
+    }
+
+    fn mean(&mut self, samples: usize, rows: usize, made: &mut Vec<f64>) -> Result<()> {
+        made.resize(samples, 0.0);
+        let count = self.frames.len() as f64;
+        // Of samples less those of the first frame, so that nothing is lost.
+        let mut first: Vec<f32> = Vec::new();
+        let mut sums = vec![[0.0_f64; 2]; if self.keeps_scatter { samples } else { 0 }];
+        for frame in &mut self.frames {
+            self.band.clear();
+            frame.read(rows, &mut self.band)?;
+            for (sum, &sample) in made.iter_mut().zip(&self.band) {
+                *sum += f64::from(sample);
+            }
+            if self.keeps_largest {
+                self.largest.resize(samples, f32::NEG_INFINITY);
+                raise(&mut self.largest, &self.band);
+            }
+            if self.keeps_scatter {
+                if first.is_empty() {
+                    first.clone_from(&self.band);
+                }
+                for ((sums, sample), first) in sums.iter_mut().zip(&self.band).zip(&first) {
+                    let off = f64::from(*sample) - f64::from(*first);
+                    sums[0] += off;
+                    sums[1] += off * off;
+                }
+            }
+        }
+        made.iter_mut().for_each(|sum| *sum /= count);
+        self.scatter.extend(sums.iter().map(|[sum, square]| (square - sum * sum / count).max(0.0) / (count - 1.0)));
+        Ok(())
+    }
+
+    fn average(&mut self, samples: usize, rows: usize, made: &mut Vec<f64>) -> Result<()> {
+        self.band.clear();
+        for frame in &mut self.frames {
+            frame.read(rows, &mut self.band)?;
+        }
+        if self.keeps_largest {
+            let start = self.largest.len();
+            self.largest.resize(start + samples, f32::NEG_INFINITY);
+            self.band.chunks_exact(samples).for_each(|frame| raise(&mut self.largest[start..], frame));
+        }
+        let start = made.len();
+        made.resize(start + samples, 0.0);
+        let kept = self.scatter.len();
+        self.scatter.resize(if self.keeps_scatter { kept + samples } else { 0 }, 0.0);
+        let Self { averaging, band, frames, keeps_scatter, .. } = self;
+        let (averaging, band, count) = (*averaging, &*band, frames.len());
+        let share = |first: usize, made: &mut [f64], scatter: Option<&mut [f64]>| {
+            let mut of_site = Vec::with_capacity(count);
+            let mut clipped = 0;
+            let mut variances = Vec::new();
+            for (index, made) in made.iter_mut().enumerate() {
+                of_site.clear();
+                of_site.extend((0..count).map(|frame| band[frame * samples + first + index]));
+                if scatter.is_some() {
+                    variances.push(variance(&of_site));
+                }
+                let (average, left_out) = average(averaging.combine, &mut of_site, averaging.clip);
+                *made = average;
+                clipped += left_out;
+            }
+            if let Some(scatter) = scatter {
+                scatter.copy_from_slice(&variances);
+            }
+            clipped
+        };
+        let shares = made[start..].par_chunks_mut(SHARE).enumerate();
+        self.clipped += if *keeps_scatter {
+            let scatters = self.scatter[kept..].par_chunks_mut(SHARE);
+            shares.zip(scatters).map(|((index, made), scatter)| share(index * SHARE, made, Some(scatter))).sum::<u64>()
+        } else {
+            shares.map(|(index, made)| share(index * SHARE, made, None)).sum::<u64>()
+        };
+        Ok(())
+    }
+}
+
+/// Raises each of `largest` to the sample of a frame.
+fn raise(largest: &mut [f32], frame: &[f32]) {
+    largest.iter_mut().zip(frame).for_each(|(largest, sample)| *largest = largest.max(*sample));
+}
+
+/// The variance of samples of one photosite.
+fn variance(samples: &[f32]) -> f64 {
+    let count = samples.len() as f64;
+    let mean = samples.iter().map(|sample| f64::from(*sample)).sum::<f64>() / count;
+    samples.iter().map(|sample| (f64::from(*sample) - mean).powi(2)).sum::<f64>() / (count - 1.0)
+}

@@ -1,0 +1,385 @@
+//! Corrected frames have the noise that is predicted of them, whatever they were corrected by.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::analysis::statistics::{ChannelReport, Saturated, measure};
+use cyanometer::camera::optics::Exposure;
+use cyanometer::camera::readout::ReadOut;
+use cyanometer::cfa::CfaPattern;
+use cyanometer::frame::{Geometry, to_sample};
+use cyanometer::masking::Corrections;
+use cyanometer::metadata::{FrameHeader, Metadata, Scene};
+use cyanometer::numerics::averages::Combine;
+use cyanometer::propagation::Equations;
+use cyanometer::sigma::WithSigma;
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::darks::{DarkFrames, DarkSettings};
+use cyanometer::stages::defects::DefectMap;
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::flats::FlatFrames;
+use cyanometer::stages::masters::Averaging;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::saturation::{WithMask, with_mask};
+use cyanometer::stream::{MemoryFrame, Stage};
+use cyanometer::units::QuantityKind;
+use std::collections::BTreeSet;
+use support::{sensor, through};
+
+/// A camera, and the numbers of its exposures.
+struct Camera {
+    readout: ReadOut,
+    size: [usize; 2],
+    cfa: Option<CfaPattern>,
+    seed: u64,
+    frames: std::cell::Cell<u32>,
+}
+
+impl Camera {
+    /// One exposure of a uniform scene, in codes.
+    fn expose(&self, electrons: [f64; 3], exposure_s: f64, temperature_k: f64) -> MemoryFrame {
+        let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+        let mut camera = sensor();
+        camera.readout = Some(self.readout.clone());
+        metadata.sensor = Some(camera);
+        metadata.exposure = Some(Exposure { exposure_s, f_number: 8.0, lens_transmittance: 1.0 });
+        metadata.scene = Some(Scene::uniform("test", electrons));
+        metadata.cfa = self.cfa.map(Into::into);
+        let channels: &[&str] = if self.cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
+        let geometry = Geometry::new(self.size[0], self.size[1], channels);
+        let header = FrameHeader { name: "test".into(), geometry, metadata };
+        let scene = support::frame(header, |x, y, channel| {
+            let class = self.cfa.map_or(channel, |cfa| cfa.class(x as i64, y as i64) as usize);
+            to_sample(electrons[class])
+        });
+        let frame = self.frames.replace(self.frames.get() + 1);
+        let settings = NoiseSettings {
+            seed: self.seed,
+            sensor_seed: self.seed + 1,
+            frame,
+            temperature_k: Some(temperature_k),
+            ..Default::default()
+        };
+        let noisy = through(&scene, &AddNoise::new(&scene.header, &settings).unwrap());
+        through(&noisy, &Digitize::new(&noisy.header, &AdcSettings::default()).unwrap())
+    }
+
+    fn darks(&self, count: usize, exposure_s: f64, temperature_k: f64) -> Vec<MemoryFrame> {
+        (0..count).map(|_| self.expose([0.0; 3], exposure_s, temperature_k)).collect()
+    }
+}
+
+/// What a frame is corrected by.
+#[derive(Default)]
+struct Kit {
+    darks: Vec<MemoryFrame>,
+    biases: Vec<MemoryFrame>,
+    flats: Vec<MemoryFrame>,
+    flat_darks: Vec<MemoryFrame>,
+    settings: DarkSettings,
+    defects: BTreeSet<[usize; 2]>,
+    black: Option<Black>,
+}
+
+impl Kit {
+    /// The corrected frame; its layer of marks is the last channel where there is one.
+    fn correct(&self, frame: &MemoryFrame) -> MemoryFrame {
+        let darks = DarkFrames::matched(&frame.header, self.darks.clone(), self.biases.clone(), self.settings).unwrap();
+        let flats = || {
+            let is_scaled = self.settings.is_scaled && !self.flat_darks.is_empty();
+            let needs_bias = is_scaled || self.flat_darks.is_empty();
+            let biases = if needs_bias { self.biases.clone() } else { Vec::new() };
+            let settings = DarkSettings { is_scaled, ..self.settings };
+            FlatFrames::of(&frame.header, self.flats.clone(), [self.flat_darks.clone(), biases], None, settings, None)
+                .unwrap()
+        };
+        let settings = CorrectionSettings { black: self.black.unwrap_or(Black::None), cte: None };
+        let mut stage =
+            CorrectFrame::of(&frame.header, &settings, darks.as_ref().map(DarkFrames::stack), true).unwrap();
+        let flats = flats().map(|surveyed| (flats().unwrap(), surveyed.survey(None).unwrap()));
+        stage.note_further(flats.as_ref().map(|(flats, means)| flats.record(means)), None);
+        let map = Some(DefectMap::List(self.defects.clone()));
+        let mut corrections = Corrections { darks, dark_limits: None, flats, map, found: [0; 3] };
+        let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+        let mut made = MemoryFrame::new(with_mask(stage.header().clone()), Vec::new());
+        corrections.run(&stage, &mut source, [false, true], &mut made, &mut |_| ()).unwrap();
+        // Only what programs made has a layer of marks.
+        made.header.metadata.history.push(cyanometer::cli::history_entry("correct-frame", std::iter::empty()));
+        made
+    }
+}
+
+/// What is said of the classes of a corrected frame.
+fn classes(frame: &MemoryFrame) -> Vec<ChannelReport> {
+    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+    let report = measure(&mut source, &[], Saturated::LeftOut, Equations::Exact, None).unwrap();
+    let why = report.unpredicted.map(|why| why.to_string());
+    let region = report.regions.into_iter().next().unwrap();
+    let classes = if region.classes.is_empty() { region.channels } else { region.classes };
+    assert!(classes.iter().all(|class| class.z_std.is_some()), "nothing predicted: {why:?}");
+    classes
+}
+
+/// Numbers from 0 to 1 that follow from a seed.
+struct Chance(u64);
+
+impl Chance {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((bits ^ (bits >> 31)) >> 11) as f64 / 2_f64.powi(53)
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+
+    fn whole(&mut self, low: usize, high: usize) -> usize {
+        low + (self.next() * (high + 1 - low) as f64) as usize
+    }
+}
+
+/// A camera and a chain of corrections as chance has them, and the corrected frame.
+fn chain(seed: u64) -> (String, MemoryFrame) {
+    let mut chance = Chance(seed);
+    for _ in 0..4 {
+        chance.next();
+    }
+    let mut readout = support::readout();
+    readout.dcnu = [0.0, chance.between(0.02, 0.3)][chance.whole(0, 1)];
+    readout.prnu = chance.between(0.0, 0.03);
+    readout.read_noise_e = chance.between(8.0, 30.0);
+    readout.bits = 14;
+    readout.adu_per_e = chance.between(0.15, 0.3);
+    readout.bias_adu = chance.between(200.0, 900.0);
+    let cfa = (chance.next() < 0.7).then_some(CfaPattern::ALL[chance.whole(0, 3)]);
+    let camera = Camera { readout, size: [90, 70], cfa, seed: 1000 * seed, frames: 0.into() };
+    let (exposure_s, temperature_k) = (chance.between(0.02, 0.2), chance.between(310.0, 335.0));
+    let electrons = [(); 3].map(|()| chance.between(100.0, 20_000.0));
+    let combine = [Combine::Mean, Combine::Median, Combine::Clipped][chance.whole(0, 2)];
+    let averaging = Averaging { combine, clip: chance.between(1.6, 3.5) };
+    let is_scaled = chance.next() < 0.5;
+    let has_flats = chance.next() < 0.75;
+    let count = |chance: &mut Chance| chance.whole(1, 9);
+    let mut kit = Kit { settings: DarkSettings { averaging, is_scaled }, ..Default::default() };
+    let mut said = format!("{seed}: {averaging:?}, scaled {is_scaled}, {:?}", camera.cfa);
+    let darks = count(&mut chance);
+    if is_scaled {
+        let factor = chance.between(0.3, 3.0);
+        let at_k = temperature_k + chance.between(-5.0, 5.0);
+        kit.darks = camera.darks(darks, factor * exposure_s, at_k);
+        match chance.whole(0, 2) {
+            0 => {
+                let n = count(&mut chance);
+                kit.biases = camera.darks(n, 1e-4, temperature_k);
+            }
+            1 => {
+                let n = count(&mut chance);
+                kit.darks.extend(camera.darks(n, exposure_s * if factor > 1.0 { 0.4 } else { 2.5 }, temperature_k));
+            }
+            _ => {}
+        }
+        said += &format!(", {darks} darks of {factor}, {} biases", kit.biases.len());
+    } else if chance.next() < 0.2 {
+        kit.black = Some(Black::Auto);
+        said += ", black";
+    } else if chance.next() < 0.85 {
+        kit.darks = camera.darks(darks, exposure_s, temperature_k);
+        said += &format!(", {darks} darks");
+    } else {
+        kit.biases = camera.darks(darks, 1e-4, temperature_k);
+        said += &format!(", {darks} biases");
+    }
+    if has_flats {
+        let (flats, flat_s) = (count(&mut chance), chance.between(0.01, 0.1));
+        let level = [(); 3].map(|()| chance.between(6000.0, 20_000.0));
+        kit.flats = (0..flats).map(|_| camera.expose(level, flat_s, temperature_k)).collect();
+        said += &format!(", {flats} flats");
+        if chance.next() < 0.7 {
+            let n = count(&mut chance);
+            kit.flat_darks = camera.darks(n, flat_s, temperature_k);
+            said += &format!(", {n} flat darks");
+        }
+    }
+    let defects = chance.whole(0, 60);
+    kit.defects = (0..defects).map(|_| [chance.whole(0, 69), chance.whole(0, 89)]).collect();
+    let frame = camera.expose(electrons, exposure_s, temperature_k);
+    (said, kit.correct(&frame))
+}
+
+/// z scores of means and standard deviations of all classes over 200 chains: they are normal numbers where predictions hold,
+/// the largest of 1200 of which exceeds 5 in one of 1500 cases, and the rms of which is 1 to within 1/√2400 = 0.02, four
+/// times of which is allowed.
+#[test]
+fn corrected_frames_have_the_noise_that_is_predicted() {
+    let (mut square, mut count) = ([0.0; 2], 0.0);
+    let mut worst = (0.0, String::new());
+    for seed in 1..=200 {
+        let (said, corrected) = chain(seed);
+        for class in classes(&corrected) {
+            let z = [class.z_mean.unwrap(), class.z_std.unwrap()];
+            if std::env::var("SHOW").is_ok() && z.iter().any(|z| z.abs() > 3.0) {
+                eprintln!("{said}: {z:?} {class:?}");
+            }
+            for (square, z) in square.iter_mut().zip(z) {
+                *square += z * z;
+                if z.abs() > worst.0 {
+                    worst = (z.abs(), format!("{said}: {class:?}"));
+                }
+            }
+            count += 1.0;
+        }
+    }
+    let rms = square.map(|square: f64| (square / count).sqrt());
+    if std::env::var("SHOW").is_ok() {
+        eprintln!("rms {rms:?} over {count}; worst {worst:?}");
+    }
+    let tolerance = 4.0 / (2.0_f64 * count).sqrt();
+    assert!(rms.iter().all(|rms| (rms - 1.0).abs() < tolerance), "rms {rms:?} over {count}; worst {worst:?}");
+    assert!(worst.0 < 5.0, "rms {rms:?}; {worst:?}");
+}
+
+/// A camera with a strong pattern of the response, and a kit of five darks and four flats with three darks of their own.
+fn strong() -> (Camera, Kit) {
+    let readout = ReadOut { prnu: 0.02, dcnu: 0.2, adu_per_e: 0.2, bits: 14, bias_adu: 400.0, ..support::readout() };
+    let camera = Camera { readout, size: [240, 200], cfa: Some(CfaPattern::Rggb), seed: 77, frames: 0.into() };
+    let kit = Kit {
+        darks: camera.darks(5, 0.05, 330.0),
+        flats: (0..4).map(|_| camera.expose([9000.0, 16_000.0, 12_000.0], 0.03, 330.0)).collect(),
+        flat_darks: camera.darks(3, 0.03, 330.0),
+        defects: (0..40).map(|i| [5 * i % 200, 7 * i % 240]).collect(),
+        ..Default::default()
+    };
+    (camera, kit)
+}
+
+/// What the record is wrong about is seen: of a flat field of so many frames more, or darks that were scaled otherwise.
+#[test]
+fn wrong_records_are_seen() {
+    let (camera, kit) = strong();
+    let corrected = kit.correct(&camera.expose([9000.0, 16_000.0, 12_000.0], 0.05, 330.0));
+    let largest = |frame: &MemoryFrame| {
+        let z = classes(frame).into_iter().flat_map(|class| [class.z_mean.unwrap(), class.z_std.unwrap()]);
+        z.fold(0.0_f64, |most, z| most.max(z.abs()))
+    };
+    assert!(largest(&corrected) < 4.5, "{}", largest(&corrected));
+    type Change = fn(&mut FrameHeader);
+    let changes: [Change; 4] = [
+        // A fifth of the variance is that of the flat field.
+        |head| correction(head).flat.as_mut().unwrap().average.frames = 8,
+        |head| correction(head).flat.as_mut().unwrap().average.combine = Combine::Median,
+        |head| correction(head).masters[0].weight = 0.9,
+        |head| correction(head).flat = None,
+    ];
+    for (index, change) in changes.into_iter().enumerate() {
+        let mut wrong = corrected.clone();
+        change(&mut wrong.header);
+        assert!(largest(&wrong) > 6.0, "{index}: {}", largest(&wrong));
+    }
+}
+
+fn correction(head: &mut FrameHeader) -> &mut cyanometer::metadata::CorrectionRecord {
+    head.metadata.correction.as_mut().unwrap()
+}
+
+/// Behind demosaicking predictions hold, marked pixels left out; and the layer of standard deviations, whose mean square is the
+/// temporal variance, is what pixels scatter by about the scene.
+#[test]
+fn demosaicked_frames_have_the_noise_that_is_predicted() {
+    let (camera, kit) = strong();
+    let corrected = kit.correct(&camera.expose([2000.0, 9000.0, 5000.0], 0.05, 330.0));
+    for method in [Method::Bilinear, Method::EffectiveColor, Method::Malvar] {
+        let demosaic = Demosaic::new(&corrected.header, method, Black::Auto, None).unwrap();
+        let stage = WithSigma::of_demosaicking(demosaic).unwrap();
+        let masked = WithMask::new(&stage);
+        let mut made = through(&corrected, &masked);
+        made.header.metadata.history = corrected.header.metadata.history.clone();
+        for channel in classes(&made).into_iter().take(3) {
+            let z = [channel.z_mean.unwrap(), channel.z_std.unwrap()];
+            // Six numbers, each beyond 4.5 in one of 150 000 cases; the correlations of neighbors widen that of std.
+            assert!(z[0].abs() < 4.5 && z[1].abs() < 9.0, "{method:?}: {channel:?}");
+        }
+        let mut source = MemoryFrame::new(made.header.clone(), made.samples.clone());
+        let report = measure(&mut source, &[], Saturated::LeftOut, Equations::Exact, None).unwrap();
+        let region = &report.regions[0];
+        assert!(region.corrected > 40 && region.not_finite == 0, "{region:?}");
+        for k in 0..3 {
+            let (pixel, sigma) = (&region.channels[k], &region.channels[3 + k]);
+            let ratio = sigma.mean.unwrap() / pixel.std.unwrap();
+            // Levels of pixels scatter by a tenth, their standard deviations by a twentieth; phases differ by more.
+            assert!((ratio - 1.0).abs() < 0.04, "{method:?} {k}: {ratio}");
+            assert!(sigma.max.unwrap().is_finite());
+        }
+        let infinite = made.samples.iter().filter(|sample| sample.is_infinite()).count() as u64;
+        assert_eq!(infinite, 3 * region.corrected.max(region.defective));
+    }
+}
+
+/// Rows may be asked for in any steps, and made on any threads: not a bit changes. A crop is corrected as the whole is,
+/// where nothing hangs on means over the frame.
+#[test]
+fn threads_and_crops_change_nothing() {
+    let (camera, mut kit) = strong();
+    kit.settings.averaging = Averaging { combine: Combine::Clipped, clip: 1.2 };
+    let frame = camera.expose([2000.0, 9000.0, 5000.0], 0.05, 330.0);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let (_, mut kit) = strong();
+            kit.settings.averaging = Averaging { combine: Combine::Clipped, clip: 1.2 };
+            kit.correct(&frame)
+        })
+    };
+    let alone = on(1);
+    for threads in [2, 5] {
+        support::assert_same(&on(threads), &alone, "threads");
+    }
+    let (x, y, size) = (31, 17, [100, 90]);
+    kit.flats.clear();
+    kit.flat_darks.clear();
+    kit.defects.clear();
+    let whole = kit.correct(&frame);
+    let cut = |frame: &MemoryFrame| support::crop(frame, x, y, size[0], size[1]);
+    kit.darks = kit.darks.iter().map(cut).collect();
+    support::assert_same(&kit.correct(&cut(&frame)), &cut(&whole), "crop");
+}
+
+/// A linear scene is interpolated exactly; a photosite without good neighbors stays, marked as defective alone.
+#[test]
+fn defects_are_interpolated_within_their_class() {
+    let head = {
+        let (camera, _) = strong();
+        camera.expose([100.0; 3], 0.05, 330.0).header
+    };
+    let mut head = FrameHeader { geometry: Geometry::new(20, 16, &["Y"]), ..head };
+    head.metadata.scene = None;
+    let ramp =
+        |x: usize, y: usize| (100 + 7 * x + 3 * y) as f32 + 1000.0 * f32::from(u8::from(x % 2 == 0 && y % 2 == 0));
+    let frame = support::frame(head, |x, y, _| ramp(x, y));
+    let isolated = [8, 10];
+    let around = (4..=12).flat_map(|y| (6..=14).map(move |x| [y, x]));
+    let mut kit = Kit { defects: around.filter(|[y, x]| y % 2 == 0 && x % 2 == 0).collect(), ..Kit::default() };
+    kit.black = Some(Black::Level(0.0));
+    kit.defects.extend([[3, 3], [2, 2], [15, 4]]);
+    let made = kit.correct(&frame);
+    for y in 0..16 {
+        for x in 0..20 {
+            let (sample, mark) = (support::at(&made, x, y, 0), support::at(&made, x, y, 1));
+            if !kit.defects.contains(&[y, x]) {
+                assert_eq!((sample, mark), (ramp(x, y), 0.0));
+            } else if [y, x] == isolated {
+                assert_eq!((sample, mark), (ramp(x, y), 2.0));
+            } else {
+                assert_eq!(mark, 6.0, "{x} {y}");
+                if y == 3 || y == 2 {
+                    assert!((sample - ramp(x, y)).abs() < 1e-3, "{x} {y}: {sample}");
+                }
+            }
+        }
+    }
+}

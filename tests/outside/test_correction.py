@@ -1,0 +1,172 @@
+"""`correct-frame` against NumPy and Astropy: averages, clipping, scaling by exposure and Eq. 6, flat fields, defects."""
+
+import math
+import unittest
+
+import numpy as np
+from astropy.stats import sigma_clip
+
+from programs import ProgramCase
+
+SHAPE = (24, 36)
+
+
+def eq6(kelvin):
+    """T^1.5 exp(-Eg / 2kT) with Varshni's band gap and the 2019 Boltzmann constant in eV/K."""
+    gap = 1.1557 - 7.021e-4 * kelvin**2 / (1108.0 + kelvin)
+    return kelvin**1.5 * math.exp(-gap / (2 * 8.617333262e-5 * kelvin))
+
+
+class Correction(ProgramCase):
+    def setUp(self):
+        super().setUp()
+        self.chance = np.random.default_rng(11)
+
+    def codes(self, name, mean, std, exposure=None, black=None, outliers=0):
+        """Writes a frame of codes; gives them as doubles."""
+        samples = self.chance.normal(mean, std, SHAPE).round().clip(0, 65535)
+        places = self.chance.integers(0, samples.size, outliers)
+        samples.flat[places] = 60000
+        samples.astype("<u2").tofile(self.directory / name)
+        lines = ["schema: cyanometer/1", "quantity: adu", "cfa: rggb"]
+        if exposure:
+            lines.append(f"exposure: {{exposure_s: {exposure}, f_number: 8.0, lens_transmittance: 1.0}}")
+        if black is not None:
+            lines.append(f"black_level_adu: {black}")
+        (self.directory / f"{name}.yaml").write_text("\n".join(lines) + "\n")
+        return samples
+
+    def many(self, stem, count, *args, **kwargs):
+        names = [f"{stem}{index}.raw" for index in range(count)]
+        return names, np.stack([self.codes(name, *args, **kwargs) for name in names])
+
+    def correct(self, *words):
+        return self.frame(["correct-frame", "-q", "light.raw", "--raw", f"{SHAPE[1]}x{SHAPE[0]}:u16le", *words])
+
+    def close(self, found, wanted):
+        # Samples are single precision.
+        np.testing.assert_allclose(found, wanted, rtol=3e-7, atol=1e-4)
+
+    @staticmethod
+    def options(name, files):
+        return [word for file in files for word in (name, file)]
+
+    def test_averages_of_darks(self):
+        light = self.codes("light.raw", 3000, 50)
+        for count in (1, 2, 5, 8, 14):
+            names, darks = self.many("dark", count, 500, 12, outliers=9)
+            words = self.options("--dark", names)
+            self.close(self.correct(*words)["Y"], light - darks.mean(axis=0))
+            self.close(self.correct(*words, "--combine", "median")["Y"], light - np.median(darks, axis=0))
+            for kappa in (1.5, 3):
+                # Nothing is clipped of fewer than three.
+                clipped = sigma_clip(
+                    darks, sigma=kappa, axis=0, maxiters=None, cenfunc="median", stdfunc=lambda x, axis: np.nanstd(x, axis=axis, ddof=1)
+                ) if count > 2 else darks
+                wanted = light - np.asarray(clipped.mean(axis=0))
+                found = self.correct(*words, "--combine", "clipped", "--clip", kappa)["Y"]
+                self.close(found, wanted)
+
+    def test_darks_are_scaled_by_exposure(self):
+        light = self.codes("light.raw", 3000, 50, exposure=0.4)
+        short, at_short = self.many("short", 3, 520, 9, exposure=0.1)
+        long, at_long = self.many("long", 2, 900, 9, exposure=2.0)
+        bias, at_bias = self.many("bias", 4, 500, 5, exposure=1e-5)
+        scale = ["--scale-dark"]
+        [short_mean, long_mean, bias_mean] = [frames.mean(axis=0) for frames in (at_short, at_long, at_bias)]
+        # Between the two doses.
+        share = (0.4 - 0.1) / (2.0 - 0.1)
+        found = self.correct(*self.options("--dark", short + long), *scale)["Y"]
+        self.close(found, light - (1 - share) * short_mean - share * long_mean)
+        # On the line through the bias.
+        weight = (0.4 - 1e-5) / (2.0 - 1e-5)
+        found = self.correct(*self.options("--dark", long), *self.options("--bias", bias), *scale)["Y"]
+        self.close(found, light - weight * long_mean - (1 - weight) * bias_mean)
+        # The bias alone.
+        self.close(self.correct(*self.options("--bias", bias))["Y"], light - bias_mean)
+
+    def test_darks_are_scaled_by_temperature(self):
+        """Dark frames of 320 K and 1 s for a light frame of 330 K and 0.3 s, their bias known: weight by Eq. 6."""
+        without = ["--without", "dcsn,dcnu,ssn,prnu,ron"]
+        def frame(name, exposure, kelvin, light):
+            self.run_pipe(
+                ["render-radiance", "--size", "8x6", "--exposure", exposure, "--electrons", light],
+                ["add-noise", "--temperature", kelvin, *without],
+                ["digitize", "--bits", "16", "--bias", "300", "--slope", "1", "-o", name],
+            )
+        frame("light.exr", 0.3, 330, "5000,5000,5000")
+        frame("dark.exr", 1, 320, "0,0,0")
+        planes = self.frame(["correct-frame", "-q", "light.exr", "--dark", "dark.exr", "--scale-dark"])
+        current = 2.5e15 * (6.8e-4) ** 2 * 0.068558
+        light, dark = [round(300 + e) for e in (5000 + 0.3 * current * eq6(330), current * eq6(320))]
+        weight = 0.3 * eq6(330) / eq6(320)
+        wanted = light - weight * dark - (1 - weight) * 300
+        for name in "RGB":
+            self.close(planes[name], np.full((6, 8), wanted))
+
+    def test_flat_fields(self):
+        light = self.codes("light.raw", 3000, 50)
+        darks, at_dark = self.many("dark", 2, 500, 8)
+        flats, at_flat = self.many("flat", 3, 9000, 300)
+        flat_darks, at_flat_dark = self.many("flatdark", 2, 510, 8)
+        found = self.correct(
+            *self.options("--dark", darks), *self.options("--flat", flats), *self.options("--flat-dark", flat_darks)
+        )
+        flat = at_flat.mean(axis=0) - at_flat_dark.mean(axis=0)
+        rows, columns = np.indices(SHAPE)
+        site = (rows % 2) * 2 + columns % 2
+        wanted = light - at_dark.mean(axis=0)
+        for sites in ([0], [1, 2], [3]):
+            here = np.isin(site, sites)
+            wanted[here] *= flat[here].mean() / flat[here]
+        self.close(found["Y"], wanted)
+        self.assertFalse(found["mask"].any())
+
+    def test_defects(self):
+        light = self.codes("light.raw", 3000, 50)
+        self.codes("dark.raw", 500, 0)
+        (self.directory / "map.txt").write_text("# column,row\n10,7\n0,0\n12,7\n")
+        found = self.correct("--dark", "dark.raw", "--defects", "map.txt")
+        wanted = light - 500.0
+        # Column 12 is defective too, so that the column alone has a pair for 10, and for 12.
+        for x in (10, 12):
+            wanted[7, x] = (wanted[5, x] + wanted[9, x]) / 2
+        # The corner has no pairs: those of its class within four photosites, by the inverse square of their distance.
+        sites = [(y, x) for y in (0, 2, 4) for x in (0, 2, 4) if (y, x) != (0, 0)]
+        weights = [1 / (y * y + x * x) for y, x in sites]
+        wanted[0, 0] = sum(w * wanted[at] for w, at in zip(weights, sites)) / sum(weights)
+        self.close(found["Y"], wanted)
+        marks = np.zeros(SHAPE)
+        marks[7, 10] = marks[7, 12] = marks[0, 0] = 2 + 4
+        np.testing.assert_array_equal(found["mask"], marks)
+
+    def test_defects_are_found(self):
+        light = self.codes("light.raw", 3000, 50)
+        darks, _ = self.many("dark", 9, 500, 6)
+        for index, name in enumerate(darks):
+            samples = np.fromfile(self.directory / name, "<u2").reshape(SHAPE)
+            samples[4, 5] += 100
+            samples[8, 9] += 60 * (index % 2)
+            samples.tofile(self.directory / name)
+        flat = self.codes("flat.raw", 9000, 100)
+        flat[15, 20] = 3000
+        flat.astype("<u2").tofile(self.directory / "flat.raw")
+        found = self.correct(
+            *self.options("--dark", darks), "--flat", "flat.raw", "--flat-dark", darks[0], "--find-defects"
+        )
+        places = {(int(y), int(x)) for y, x in zip(*np.nonzero(found["mask"]))}
+        self.assertLessEqual({(4, 5), (8, 9), (15, 20)}, places)
+        # Chance finds less than one in a frame on average; limits of 200 samples of a class are good to a tenth.
+        self.assertLessEqual(len(places), 5)
+        self.assertEqual(light.shape, found["Y"].shape)
+
+    def test_any_number_of_frames(self):
+        light = self.codes("light.raw", 3000, 50)
+        names, darks = self.many("dark", 2000, 500, 12)
+        words = self.options("--dark", names)
+        self.close(self.correct(*words)["Y"], light - darks.mean(axis=0))
+        self.close(self.correct(*words, "--combine", "median")["Y"], light - np.median(darks, axis=0))
+
+
+if __name__ == "__main__":
+    unittest.main()
