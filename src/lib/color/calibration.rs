@@ -2,14 +2,11 @@
 //! Space to CIE XYZ Space].
 
 use super::temperature::correlated;
-use super::xyz_of_chromaticity;
+use super::{D50_XY, xyz_of_chromaticity};
 use crate::spectrum::Observer;
 use nalgebra::{Matrix3, Vector3};
 
-/// Chromaticity of D50, where the search for a white begins.
-const D50_XY: [f64; 2] = [0.3457, 0.3585];
-
-/// Steps of that search, and where it ends, as Adobe's own program has them.
+/// Steps of the search for a white from D50 on, and where it ends, as Adobe's own program has them.
 const MOST_STEPS: usize = 30;
 const NEAR: f64 = 1e-7;
 

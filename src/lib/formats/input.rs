@@ -16,6 +16,10 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+/// What three planes of one frame are called.
+pub(super) const THREE_PLANES: [[&str; 3]; 5] =
+    [["R", "G", "B"], ["x", "y", "Y"], ["L", "a", "b"], ["L", "u", "v"], ["CCT", "Duv", "Y"]];
+
 /// What to open.
 #[derive(Debug, Clone, Default)]
 pub struct InputOptions {
@@ -216,6 +220,17 @@ impl FrameReader {
             self.keeps_mask = true;
             self.header = with_mask(self.header.clone());
         }
+    }
+
+    /// Keeps the channels `layer` too, where the file has them right behind those that are kept; tells whether it does.
+    pub fn keep(&mut self, layer: &[&str]) -> bool {
+        let kept = self.first_channel + self.header.geometry.channels.len();
+        let stored = &self.reader.geometry().channels;
+        let is_there = stored.get(kept..kept + layer.len()).is_some_and(|channels| channels.iter().eq(layer));
+        if is_there {
+            self.header.geometry.channels.extend(layer.iter().map(|name| (*name).to_owned()));
+        }
+        is_there
     }
 
     /// Pixels among those read so far that were made of saturated samples, as the frame's layer of marks says; of one that is
@@ -459,7 +474,7 @@ fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry
     let starts =
         |names: &[&str]| stored.channels.len() > names.len() && stored.channels.iter().zip(names).all(|(a, b)| a == b);
     if !all && quantity != QuantityKind::SpectralRadiance {
-        if [["R", "G", "B"], ["x", "y", "Y"], ["L", "a", "b"]].iter().any(|planes| starts(planes)) {
+        if THREE_PLANES.iter().any(|planes| starts(planes)) {
             kept.channels.truncate(3);
         } else if starts(&["Y"]) {
             kept.channels.truncate(1);

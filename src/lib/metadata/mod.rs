@@ -3,7 +3,7 @@
 mod records;
 
 pub use records::{
-    AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
+    AdaptationRecord, AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
     NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
 };
 
@@ -215,6 +215,8 @@ impl FrameHeader {
             QuantityKind::Xyz => ["X", "Y", "Z"],
             QuantityKind::Xyy => ["x", "y", "Y"],
             QuantityKind::Lab => ["L", "a", "b"],
+            QuantityKind::Luv => ["L", "u", "v"],
+            QuantityKind::Cct => ["CCT", "Duv", "Y"],
             _ => return name,
         };
         match name {

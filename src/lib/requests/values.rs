@@ -2,9 +2,10 @@
 
 use crate::analysis::statistics::Region;
 use crate::cfa::CfaPattern;
-use crate::color::White;
+use crate::color::illuminant::Illuminant;
+use crate::color::{White, chromaticity};
 use crate::names::Named;
-use crate::spectrum::WavelengthGrid;
+use crate::spectrum::{Observer, WavelengthGrid};
 use crate::stages::black::Black;
 use crate::units::{self, RadianceUnit};
 use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
@@ -247,7 +248,7 @@ pub fn region(text: &str) -> Result<Region, String> {
     }
 }
 
-/// Reads a white: `d65`, `e`, or absolute X,Y,Z.
+/// Reads a white: `d65`, `d50`, `e`, or X,Y,Z.
 ///
 /// # Errors
 ///
@@ -255,10 +256,49 @@ pub fn region(text: &str) -> Result<Region, String> {
 pub fn white(text: &str) -> Result<White, String> {
     match text {
         "d65" => Ok(White::D65),
+        "d50" => Ok(White::D50),
         "e" => Ok(White::EqualEnergy),
         numbers => three_numbers(numbers)
             .map(White::Absolute)
-            .map_err(|_| "give d65, e, or the white's X,Y,Z between commas".into()),
+            .map_err(|_| "give d65, d50, e, or the white's X,Y,Z between commas".into()),
+    }
+}
+
+/// Reads the color of a light: an illuminant or a temperature, x,y, or X,Y,Z.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn light(text: &str) -> Result<LightColor, String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    let wrong = || "give a light such as a, d50, d65, e or 3200K, its x,y, or its X,Y,Z, all above 0".to_owned();
+    match numbers.as_deref() {
+        Some([x, y]) if *x > 0.0 && *y > 0.0 && x + y < 1.0 => Ok(LightColor::Chromaticity([*x, *y])),
+        Some([x, y, z]) if [x, y, z].iter().all(|value| **value > 0.0) => {
+            Ok(LightColor::Chromaticity(chromaticity([*x, *y, *z])))
+        }
+        Some([_, _, ..]) => Err(wrong()),
+        _ => text.parse().map(LightColor::Illuminant).map_err(|_| wrong()),
+    }
+}
+
+/// The color of a light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LightColor {
+    /// That of an illuminant.
+    Illuminant(Illuminant),
+    /// Its chromaticity.
+    Chromaticity([f64; 2]),
+}
+
+impl LightColor {
+    /// Its chromaticity for an observer.
+    pub fn xy(self, observer: &Observer) -> [f64; 2] {
+        match self {
+            Self::Illuminant(illuminant) => illuminant.white_xy(observer),
+            Self::Chromaticity(xy) => xy,
+        }
     }
 }
 

@@ -165,6 +165,7 @@ impl Fitting<'_> {
         let name = match self.fit.white.white {
             White::Absolute([x, y, z]) => return format!("XYZ {x} {y} {z}"),
             White::D65 => "D65",
+            White::D50 => "D50",
             White::EqualEnergy => "equal energy",
         };
         match self.fit.white.white_luminance {
