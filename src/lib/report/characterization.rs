@@ -1,5 +1,6 @@
 //! Reports of fitted matrices and of how well they do.
 
+use super::chart;
 use super::trade_off::trade_off;
 use super::{ReportFormat, shown, table, unwritable};
 use crate::analysis::characterization::CameraMatrix;
@@ -8,7 +9,7 @@ use crate::color::difference::{Difference, DifferenceReport};
 use crate::error::{Error, Result};
 use crate::formats::plots::{PlotFormat, write_plot};
 use crate::formats::{files, output, register, yaml_writer};
-use crate::requests::fit::{Characterization, Conditions, Evaluation, Fit, Group, NoiseReport};
+use crate::requests::fit::{Characterization, ChartFound, Conditions, Evaluation, Fit, Group, NoiseReport};
 use crate::requests::values;
 use crate::text::visible;
 use clap::Args;
@@ -51,6 +52,47 @@ impl MatrixOutputs {
             ));
         }
         register::announce(&[self.output.as_deref(), self.plot.as_deref()])
+    }
+
+    /// Refuses what a matrix from a chart or a raw file does not give, before any work.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`]; those of [`register::announce`].
+    pub fn check_alone(&self, has_patches: bool) -> Result<()> {
+        if self.plot.is_some() {
+            return Err(Error::Usage("--plot draws the trade-off of --noise-weight, which a chart or a raw has not".into()));
+        }
+        if self.output_format == Some(ReportFormat::Csv) && !has_patches {
+            return Err(Error::Usage("csv has one row for each patch of a chart; a raw file has none".into()));
+        }
+        register::announce(&[self.output.as_deref()])
+    }
+
+    /// Writes the matrix file of a chart, and its report: as text where nothing else is asked for.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`chart::chart`] and of the disk.
+    pub fn write_chart(&self, found: &ChartFound) -> Result<()> {
+        let to_file = files::named(self.output.as_deref());
+        if let Some(path) = to_file {
+            output::write_text(Some(path), &matrix(&found.matrix)?)?;
+        }
+        match (to_file, self.output_format) {
+            (None, None) => output::write_text(None, &matrix(&found.matrix)?),
+            (_, format) => output::write_text(None, &chart::chart(found, format.unwrap_or(ReportFormat::Text))?),
+        }
+    }
+
+    /// Writes a matrix of which no more is known.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`characterization`] and of the disk.
+    pub fn write_matrix(&self, found: CameraMatrix) -> Result<()> {
+        let found = Characterization { matrix: found, evaluation: None, trade_off: Vec::new(), notes: Vec::new() };
+        self.write(&found)
     }
 
     /// Writes matrix file, plot and report.
@@ -240,7 +282,7 @@ fn text(found: &Characterization) -> String {
     out
 }
 
-fn matrix_text(matrix: &CameraMatrix, out: &mut String) {
+pub(super) fn matrix_text(matrix: &CameraMatrix, out: &mut String) {
     let unit = matrix.unit.as_deref().unwrap_or_default();
     let _ = writeln!(out, "XYZ from R, G, B [{unit}], {}", matrix.method.as_deref().unwrap_or("method unknown"));
     for (i, (name, row)) in ["X", "Y", "Z"].iter().zip(matrix.xyz_from_camera).enumerate() {
@@ -281,7 +323,7 @@ fn matrix_text(matrix: &CameraMatrix, out: &mut String) {
 }
 
 /// A table of differences: one row per formula and heading.
-fn differences_text(rows: &[(String, DifferenceReport)], out: &mut String) {
+pub(super) fn differences_text(rows: &[(String, DifferenceReport)], out: &mut String) {
     let mut columns: Vec<Vec<String>> =
         ["", "min", "mean", "median", "p95", "max", "<1/10", "<1/4", "<1/2"].map(|heading| vec![heading.into()]).into();
     for (name, report) in rows {

@@ -1,6 +1,7 @@
 //! Reports: statistics and matrices as text, JSON, YAML and CSV, and as plots.
 
 pub mod characterization;
+pub mod chart;
 
 mod difference;
 mod photon_transfer;

@@ -52,6 +52,42 @@ pub fn size(text: &str) -> Result<[usize; 2], String> {
         .ok_or_else(|| "a size is WIDTHxHEIGHT in photosites, such as 1332x1000".into())
 }
 
+/// Reads the centers of four corner patches, `X,Y,X,Y,X,Y,X,Y`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| number(part.trim()).ok()).collect();
+    match numbers.as_deref() {
+        Some([a, b, c, d, e, f, g, h]) => Ok([[*a, *b], [*c, *d], [*e, *f], [*g, *h]]),
+        _ => Err("give column and row of the centers of dark skin, bluish green, black and white: eight numbers".into()),
+    }
+}
+
+/// Reads `BLACK,WHITE`, the second above the first.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn levels(text: &str) -> Result<[f64; 2], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| number(part.trim()).ok()).collect();
+    match numbers.as_deref() {
+        Some([black, white]) if white > black => Ok([*black, *white]),
+        _ => Err("give the black level and the white level above it, ADU".into()),
+    }
+}
+
+/// Reads the temperature of a light in K, and keeps it as a light's name.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn temperature(text: &str) -> Result<String, String> {
+    let kelvin = kelvin(text)?;
+    Illuminant::of_temperature(kelvin).map(|light| light.to_string())
+}
+
 /// Reads finite numbers between commas.
 ///
 /// # Errors

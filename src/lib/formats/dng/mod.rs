@@ -25,5 +25,6 @@ mod write;
 mod written;
 
 pub use area::RawArea;
+pub use color::{OwnMatrix, own_matrix};
 pub use read::{DngReader, FORMAT};
 pub use write::{DngWriter, check_frame};

@@ -30,6 +30,7 @@ pub(super) const WHITE_LEVEL: DngTag = DngTag(50717, "WhiteLevel");
 pub(super) const DEFAULT_CROP_ORIGIN: DngTag = DngTag(50719, "DefaultCropOrigin");
 pub(super) const DEFAULT_CROP_SIZE: DngTag = DngTag(50720, "DefaultCropSize");
 pub(super) const COLOR_MATRICES: [DngTag; 2] = [DngTag(50721, "ColorMatrix1"), DngTag(50722, "ColorMatrix2")];
+pub(super) const FORWARD_MATRICES: [DngTag; 2] = [DngTag(50964, "ForwardMatrix1"), DngTag(50965, "ForwardMatrix2")];
 pub(super) const COLOR_MATRIX_3: DngTag = DngTag(52531, "ColorMatrix3");
 pub(super) const CAMERA_CALIBRATIONS: [DngTag; 2] =
     [DngTag(50723, "CameraCalibration1"), DngTag(50724, "CameraCalibration2")];

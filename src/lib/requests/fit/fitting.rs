@@ -88,6 +88,7 @@ impl Fitting<'_> {
             training: Some(self.training(fitted)),
             uncertainty: fitted.uncertainty.clone(),
             performance: self.performance(fitted)?,
+            chart: None,
             observer: Some("CIE 1931 2 degrees".into()),
             wavelengths: Some(grid),
         })

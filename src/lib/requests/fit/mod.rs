@@ -1,10 +1,15 @@
 //! Fitting a matrix: from a library of spectra, with parts of it held out, to a matrix and how well it does.
 
+mod chart;
 mod evaluation;
 mod fitting;
 mod library;
+mod raw;
 mod request;
 mod training;
+
+pub use chart::{ChartFit, ChartFound};
+pub use raw::RawMatrix;
 
 pub use evaluation::{Conditions, DifferenceSummaries, Evaluation, Group, NoiseReport};
 pub use request::{Fit, TrainingChoice};
