@@ -20,6 +20,7 @@ static MEMORY: cli::Memory = cli::Memory;
 /// relative XYZ.
 #[derive(Parser)]
 #[command(version)]
+#[command(mut_group("Fit", |group| group.args(Fit::ids())))]
 #[command(mut_arg("library", |library| library.required(false).required_unless_present_any(["chart", "patches", "from_raw"])))]
 struct Arguments {
     #[command(flatten)]

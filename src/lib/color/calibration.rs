@@ -109,9 +109,7 @@ impl Calibration {
     pub fn camera_from_xyz(&self, observer: &Observer, white_xy: [f64; 2]) -> Matrix3<f64> {
         let share = self.share_of_first(observer, white_xy);
         let analog_balance = Matrix3::from_diagonal(&Vector3::from(self.analog_balance));
-        analog_balance
-            * self.mixed(share, |set| set.camera_calibration)
-            * self.mixed(share, |set| set.color_matrix)
+        analog_balance * self.mixed(share, |set| set.camera_calibration) * self.mixed(share, |set| set.color_matrix)
     }
 
     fn share_of_first(&self, observer: &Observer, white_xy: [f64; 2]) -> f64 {
@@ -236,7 +234,9 @@ mod tests {
             let signals =
                 calibration.camera_from_xyz(&observer, white) * Vector3::from(xyz_of_chromaticity(white, 1.0));
             let seen = mapped.xyz_from_camera * (signals / signals.max());
-            assert!((seen - Vector3::from(xyz_of_chromaticity(D50_XY, 1.0))).amax() < 1e-12 && mapped.white_xy == D50_XY);
+            assert!(
+                (seen - Vector3::from(xyz_of_chromaticity(D50_XY, 1.0))).amax() < 1e-12 && mapped.white_xy == D50_XY
+            );
         }
         for set in [Some(first), second].into_iter().flatten() {
             let white = crate::color::locus::planckian(&observer, set.temperature_k);

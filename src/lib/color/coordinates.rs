@@ -2,9 +2,7 @@
 
 use super::luv::{luv_about, luv_from_xyz};
 use super::temperature::Locus;
-use super::{
-    Space, chromaticity, lab_about, lab_from_xyz, linear_srgb_from_xyz, srgb_encode, xyy_about, xyy_from_xyz,
-};
+use super::{Space, chromaticity, lab_about, lab_from_xyz, linear_srgb_from_xyz, srgb_encode, xyy_about, xyy_from_xyz};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 

@@ -141,3 +141,47 @@ impl fmt::Display for Illuminant {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::chromaticity;
+    use crate::formats::data::{load_daylight, load_observer};
+
+    /// Chromaticities that the spectra sum to, against those published [CIE 015, Table T.3], to five digits; M₁ and M₂ of three
+    /// digits leave the same as the published ones, and the published sums go to 780 nm by 5 nm.
+    #[test]
+    fn spectra_have_the_colors_that_are_published() {
+        let (observer, daylight) = (load_observer().unwrap(), load_daylight().unwrap());
+        for light in [Illuminant::A, Illuminant::D50, Illuminant::D55, Illuminant::D65, Illuminant::D75, Illuminant::E]
+        {
+            let mut xyz = [0.0; 3];
+            for nm in (360..=830).map(f64::from) {
+                let power = light.power(nm, |nm| daylight.each_ref().map(|curve| curve.at(nm)));
+                for (sum, matching) in xyz.iter_mut().zip(&observer.matching) {
+                    *sum += power * matching.at(nm);
+                }
+            }
+            let (found, published) = (chromaticity(xyz), light.white_xy(&observer));
+            assert!((0..2).all(|i| (found[i] - published[i]).abs() < 1e-4), "{light}: {found:?}, not {published:?}");
+        }
+    }
+
+    /// Published beside each other: D65 is 6504 K, so that its chromaticity by formula is that of the illuminant.
+    #[test]
+    fn lights_are_known_by_name_and_temperature() {
+        let observer = load_observer().unwrap();
+        let xy = |text: &str| text.parse::<Illuminant>().unwrap().white_xy(&observer);
+        for (kelvin, name) in [("5003", "d50"), ("6504K", "D65"), ("7504 K", "d75"), ("2856k", "A")] {
+            let (found, named) = (xy(kelvin), xy(name));
+            assert!((0..2).all(|i| (found[i] - named[i]).abs() < 2e-4), "{name}: {found:?}, not {named:?}");
+        }
+        for wrong in ["", "f2", "500K", "30000K", "nan", "-5000"] {
+            assert!(wrong.parse::<Illuminant>().is_err(), "{wrong}");
+        }
+        for (name, light) in Illuminant::NAMED {
+            assert_eq!((light.to_string().as_str(), name.parse()), (name, Ok(light)));
+        }
+        assert_eq!(Illuminant::Temperature(3200.0).to_string().parse(), Ok(Illuminant::Temperature(3200.0)));
+    }
+}

@@ -33,8 +33,7 @@ pub enum Space {
 }
 
 impl Named for Space {
-    const ALL: &'static [Self] =
-        &[Self::Xyz, Self::Xyy, Self::Lab, Self::Luv, Self::Cct, Self::Srgb, Self::LinearSrgb];
+    const ALL: &'static [Self] = &[Self::Xyz, Self::Xyy, Self::Lab, Self::Luv, Self::Cct, Self::Srgb, Self::LinearSrgb];
 
     fn name(self) -> &'static str {
         match self {

@@ -157,9 +157,10 @@ pub fn load_patches(path: &Path) -> Result<PatchMeans> {
 /// Three columns of numbers, row by row.
 fn three_columns(name: &str, bytes: &[u8], wanted: [&str; 3]) -> Result<Vec<[f64; 3]>> {
     let number = |column: &str, (row, text): (usize, String)| {
-        text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| {
-            Error::format(name, format!("row {}: `{column}` is `{text}`, which is no number", row + 1))
-        })
+        text.parse()
+            .ok()
+            .filter(|value: &f64| value.is_finite())
+            .ok_or_else(|| Error::format(name, format!("row {}: `{column}` is `{text}`, which is no number", row + 1)))
     };
     let column = |column: &str| -> Result<Vec<f64>> {
         text_column(name, bytes, column)?.into_iter().enumerate().map(|cell| number(column, cell)).collect()
@@ -193,7 +194,10 @@ impl Light {
                 let table = SpectralTable::parse(text, &read_file(Path::new(text))?)?;
                 let curve = table.curve(None)?;
                 if curve.extremes().0 < 0.0 || curve.extremes().1 <= 0.0 {
-                    return Err(Error::format(text, "a light has a power above 0 at some wavelengths, and below at none"));
+                    return Err(Error::format(
+                        text,
+                        "a light has a power above 0 at some wavelengths, and below at none",
+                    ));
                 }
                 Ok(Self::Measured(text.into(), curve))
             }
@@ -223,9 +227,10 @@ impl Light {
         };
         let (wavelengths, _) = WavelengthGrid::default().points()?;
         let sums = |curve: &dyn Fn(f64) -> f64| {
-            observer.matching.each_ref().map(|matching| {
-                wavelengths.iter().map(|nm| matching.at(*nm) * at(*nm) * curve(*nm)).sum::<f64>()
-            })
+            observer
+                .matching
+                .each_ref()
+                .map(|matching| wavelengths.iter().map(|nm| matching.at(*nm) * at(*nm) * curve(*nm)).sum::<f64>())
         };
         let white = sums(&|_| 1.0);
         let covers = |curve: &Curve| {
@@ -235,7 +240,8 @@ impl Light {
         };
         if !reflectances.iter().all(covers) {
             return Err(Error::Data(
-                "the reflectances do not cover the wavelengths that the observer weighs; 380 to 730 nm is the least".into(),
+                "the reflectances do not cover the wavelengths that the observer weighs; 380 to 730 nm is the least"
+                    .into(),
             ));
         }
         let share = |xyz: [f64; 3]| xyz.map(|value| value / white[1]);

@@ -61,7 +61,9 @@ impl MatrixOutputs {
     /// [`Error::Usage`]; those of [`register::announce`].
     pub fn check_alone(&self, has_patches: bool) -> Result<()> {
         if self.plot.is_some() {
-            return Err(Error::Usage("--plot draws the trade-off of --noise-weight, which a chart or a raw has not".into()));
+            return Err(Error::Usage(
+                "--plot draws the trade-off of --noise-weight, which a chart or a raw has not".into(),
+            ));
         }
         if self.output_format == Some(ReportFormat::Csv) && !has_patches {
             return Err(Error::Usage("csv has one row for each patch of a chart; a raw file has none".into()));

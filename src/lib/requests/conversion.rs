@@ -126,6 +126,7 @@ impl Conversion {
         if let Some(record) = &mut stage.header_mut().metadata.color {
             record.scene_white_xy = adapting.map(|adapting| adapting.to_xy).or(matrix.white_xy);
             record.adapted = adapting.map(Adapting::record);
+            notes.extend(self.doubt_of_light(record.scene_white_xy));
         }
         Ok((stage, notes))
     }
@@ -171,6 +172,23 @@ impl Conversion {
             locus: self.locus()?,
         };
         FromXyz::new(reader.header(), &settings).map(Some)
+    }
+
+    /// What to say where the light of the colors is not the white that they are referred to.
+    fn doubt_of_light(&self, light_xy: Option<[f64; 2]>) -> Option<Note> {
+        /// Chromaticities that are nearer are those of one light.
+        const NEAR: f64 = 0.005;
+        let needs_white = matches!(self.space, Space::Lab | Space::Luv | Space::Srgb | Space::LinearSrgb);
+        let [x, y] = light_xy.filter(|_| needs_white)?;
+        let white = color::chromaticity(self.white.white.xyz(1.0));
+        let is_far = (x - white[0]).abs().max((y - white[1]).abs()) > NEAR;
+        is_far.then(|| {
+            let text = format!(
+                "what is white in its light, x {x:.4}, y {y:.4}, is not that under the white {}; --adapt-to {} makes it so",
+                self.white.white, self.white.white
+            );
+            Note::Remark(text)
+        })
     }
 
     /// The adaptation that is asked for, from the light that is given or known.

@@ -61,7 +61,9 @@ pub fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|part| number(part.trim()).ok()).collect();
     match numbers.as_deref() {
         Some([a, b, c, d, e, f, g, h]) => Ok([[*a, *b], [*c, *d], [*e, *f], [*g, *h]]),
-        _ => Err("give column and row of the centers of dark skin, bluish green, black and white: eight numbers".into()),
+        _ => {
+            Err("give column and row of the centers of dark skin, bluish green, black and white: eight numbers".into())
+        }
     }
 }
 

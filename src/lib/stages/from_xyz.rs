@@ -34,7 +34,8 @@ pub fn layers_of(space: Space) -> Result<Vec<&'static str>> {
         Space::Cct => Ok(vec!["sigma.CCT", "sigma.Duv", "sigma.Y"]),
         Space::LinearSrgb => Ok(vec!["sigma.R", "sigma.G", "sigma.B"]),
         Space::Srgb => Err(Error::Usage(
-            "standard deviations are those of xyz, xyy, lab, luv, cct or linear-srgb; srgb is a picture to look at".into(),
+            "standard deviations are those of xyz, xyy, lab, luv, cct or linear-srgb; srgb is a picture to look at"
+                .into(),
         )),
     }
 }
@@ -241,5 +242,117 @@ impl Stage for FromXyz {
             }
         }
         counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::{D50_XY, D65_XY};
+    use crate::formats::data::load_observer;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+    use crate::stream::MemoryFrame;
+
+    fn settings(space: Space) -> XyzSettings {
+        let locus = Some(Arc::new(Locus::new(&load_observer().unwrap())));
+        XyzSettings { space, white: White::D65, white_luminance: Some(100.0), adapting: None, locus }
+    }
+
+    /// One pixel of XYZ with covariances.
+    fn pixel(xyz: [f32; 3], covariance: Option<[f32; 6]>) -> MemoryFrame {
+        let names: Vec<&str> = ["R", "G", "B"].into_iter().chain(COVARIANCE_LAYER).collect();
+        let channels = if covariance.is_some() { &names[..] } else { &names[..3] };
+        let geometry = Geometry::new(1, 1, channels);
+        let header = FrameHeader { name: "xyz".into(), geometry, metadata: Metadata::new(QuantityKind::Xyz) };
+        MemoryFrame::new(header, xyz.into_iter().chain(covariance.into_iter().flatten()).collect())
+    }
+
+    fn through(frame: &MemoryFrame, settings: &XyzSettings) -> (MemoryFrame, Counts) {
+        frame.through(&FromXyz::new(&frame.header, settings).unwrap()).unwrap()
+    }
+
+    /// A white is white everywhere, to the last digit of a sample but for the four decimals of sRGB; and it has a temperature.
+    #[test]
+    fn white_is_white_in_every_space() {
+        let white = pixel([95.0456, 100.0, 108.9058], None);
+        for (space, expected, tolerance) in [
+            (Space::Xyz, [95.0456, 100.0, 108.9058], 1e-5),
+            (Space::Xyy, [0.3127, 0.3290, 100.0], 1e-5),
+            (Space::Lab, [100.0, 0.0, 0.0], 1e-3),
+            (Space::Luv, [100.0, 0.0, 0.0], 1e-3),
+            (Space::Cct, [6503.0, 0.0032, 100.0], 2.0),
+            (Space::LinearSrgb, [1.0; 3], 3e-4),
+            (Space::Srgb, [1.0; 3], 3e-4),
+        ] {
+            let (made, counts) = through(&white, &settings(space));
+            for (value, expected) in made.samples.iter().zip(expected) {
+                assert!((f64::from(*value) - expected).abs() < tolerance, "{space}: {:?}", made.samples);
+            }
+            assert_eq!((counts.not_finite, counts.off_locus), (0, 0));
+        }
+        let (_, counts) = through(&pixel([0.0, 100.0, 0.0], None), &settings(Space::Cct));
+        assert_eq!((counts.not_finite, counts.off_locus), (0, 1));
+    }
+
+    /// Covariances against small shifts along a column of a factor of Σ = f fᵀ: a space that is smooth moves by J f.
+    #[test]
+    fn covariances_come_along() {
+        let (xyz, f) = ([40.0, 30.0, 20.0], [2e-2, -1e-2, 3e-2]);
+        let product = |(i, j): (usize, usize)| (f[i] * f[j]) as f32;
+        let adapting = Adapting { transform: Adaptation::Cat16, from_xy: D65_XY, to_xy: D50_XY };
+        for space in [Space::Xyz, Space::Xyy, Space::Lab, Space::Luv, Space::Cct, Space::LinearSrgb] {
+            for adapting in [None, Some(adapting)] {
+                let settings = XyzSettings { adapting, ..settings(space) };
+                let made = through(&pixel(xyz.map(|v| v as f32), Some(PAIRS.map(product))), &settings).0;
+                let shift = adapting.map_or(Matrix3::identity(), |by| by.matrix().unwrap());
+                let at = |by: f64| {
+                    let moved = Vector3::from(xyz) + Vector3::from(f) * by;
+                    Coordinates::new(space, White::D65.xyz(100.0), settings.locus.clone())
+                        .of((shift * moved).into())
+                        .value
+                };
+                let (low, high) = (at(-1.0), at(1.0));
+                let stds = &made.samples[made.samples.len() - 3..];
+                let largest = (0..3).map(|k| (high[k] - low[k]).abs() / 2.0).fold(0.0, f64::max);
+                for k in 0..3 {
+                    let expected = (high[k] - low[k]).abs() / 2.0;
+                    // Curvature, over 10⁻³ of the color, and the digits of the samples, whose squares cancel.
+                    assert!(
+                        (f64::from(stds[k]) - expected).abs() < 2e-3 * expected + 3e-4 * largest,
+                        "{space}: {stds:?} {k}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_light_that_colors_were_adapted_to_is_recorded() {
+        let adapting = Adapting { transform: Adaptation::Bradford, from_xy: D65_XY, to_xy: D50_XY };
+        let frame = pixel([95.0456, 100.0, 108.9058], None);
+        let settings = XyzSettings { adapting: Some(adapting), ..settings(Space::Xyz) };
+        let made = through(&frame, &settings).0;
+        let white = White::D50.xyz(100.0);
+        assert!(made.samples.iter().zip(white).all(|(made, white)| (f64::from(*made) - white).abs() < 1e-3));
+        let record = made.header.metadata.color.clone().unwrap();
+        assert_eq!((record.scene_white_xy, record.adapted), (Some(D50_XY), Some(adapting.record())));
+        assert_eq!(scene_white(&made.header), Some(D50_XY));
+    }
+
+    #[test]
+    fn what_tells_no_white_is_refused() {
+        let frame = pixel([1.0; 3], None);
+        let said = |settings: XyzSettings| FromXyz::new(&frame.header, &settings).unwrap_err().to_string();
+        assert!(said(XyzSettings { white_luminance: None, ..settings(Space::Lab) }).contains("how bright white is"));
+        assert!(FromXyz::new(&frame.header, &XyzSettings { white_luminance: None, ..settings(Space::Xyy) }).is_ok());
+        let white = White::Absolute([1.0, 0.0, 1.0]);
+        assert!(said(XyzSettings { white, ..settings(Space::Luv) }).contains("is impossible"));
+        let mut relative = frame.header.clone();
+        relative.metadata.unit = RELATIVE_UNIT.into();
+        assert!(FromXyz::new(&relative, &settings(Space::Lab)).unwrap_err().to_string().contains("are relative"));
+        let mut camera = frame.header.clone();
+        camera.metadata.quantity = QuantityKind::Adu;
+        assert!(FromXyz::new(&camera, &settings(Space::Lab)).is_err());
     }
 }

@@ -119,7 +119,8 @@ impl ToXyz {
         let scaled = record.xyz_from_adu(input.metadata.exposure);
         let xyz_from_adu = scaled.ok_or_else(|| input.missing("exposure"))?;
         record.white = reference_white(input, settings, &xyz_from_adu, black)?;
-        let Some(white) = record.white.or_else(|| (!needs_white(settings.space)).then(|| settings.white.xyz(1.0))) else {
+        let Some(white) = record.white.or_else(|| (!needs_white(settings.space)).then(|| settings.white.xyz(1.0)))
+        else {
             return Err(input.missing("white_level_adu"));
         };
         check_white(settings.space, white)?;

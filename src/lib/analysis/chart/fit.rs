@@ -93,7 +93,9 @@ pub struct ChartMatrix {
 pub fn fit(patches: &[Patch], misfit: Misfit) -> Result<ChartMatrix> {
     if patches.len() < FEWEST {
         let count = patches.len();
-        return Err(Error::Data(format!("{count} patches do not determine a matrix and its errors; give {FEWEST} or more")));
+        return Err(Error::Data(format!(
+            "{count} patches do not determine a matrix and its errors; give {FEWEST} or more"
+        )));
     }
     let condition = condition(patches);
     if !(condition < LARGEST_CONDITION) {
@@ -114,7 +116,7 @@ pub fn fit(patches: &[Patch], misfit: Misfit) -> Result<ChartMatrix> {
             Some(found) if found.chi_squared <= expected => (0.0, found.clone()),
             _ => {
                 // No W is larger than I / τ², so that the sum at this τ² is no more than expected.
-                let most = squares / expected;
+                let most = (squares / expected).max(f64::EPSILON.powi(2));
                 let variance = balanced(most, |variance| {
                     settled(patches, start, variance).map_or(f64::INFINITY, |found| found.chi_squared) - expected
                 });
@@ -154,7 +156,8 @@ fn plain(patches: &[Patch]) -> Result<Matrix3<f64>> {
         patches.iter().fold(Matrix3::zeros(), |sum, patch| sum + right(patch) * patch.signal.transpose())
     };
     let inverse = moments(|patch| patch.signal).try_inverse();
-    let inverse = inverse.ok_or_else(|| Error::Data("the signals of the patches do not determine the matrix".into()))?;
+    let inverse =
+        inverse.ok_or_else(|| Error::Data("the signals of the patches do not determine the matrix".into()))?;
     Ok(moments(|patch| patch.reference) * inverse)
 }
 
@@ -243,7 +246,9 @@ impl Factors {
 
 fn settled_or(patches: &[Patch], start: Matrix3<f64>, variance: f64) -> Result<Settled> {
     settled(patches, start, variance).ok_or_else(|| {
-        Error::Data("the patches contradict each other so much that no matrix was found; check their order and names".into())
+        Error::Data(
+            "the patches contradict each other so much that no matrix was found; check their order and names".into(),
+        )
     })
 }
 
@@ -256,9 +261,11 @@ fn unknown_noise(patches: &[Patch]) -> Error {
              estimated",
             patch.name
         ),
-        None => "the patches are off by so much more than their noise that no matrix was found; leave the misfit to be \
+        None => {
+            "the patches are off by so much more than their noise that no matrix was found; leave the misfit to be \
                  estimated"
-            .into(),
+                .into()
+        }
     })
 }
 
@@ -281,11 +288,135 @@ fn balanced(most: f64, excess: impl Fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::distribution::Distribution;
-    use crate::random::Gaussian;
+    use crate::numerics::significance::of_chi_square;
+    use crate::random::gaussian::quantile;
+
+    const FITS: usize = 200;
+
+    /// Standard normal numbers from the words of SplitMix64.
+    struct Normals(u64);
+
+    impl Normals {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            quantile(mixed ^ (mixed >> 31))
+        }
+
+        fn three(&mut self) -> Vector3<f64> {
+            Vector3::from_fn(|_, _| self.next())
+        }
+    }
+
+    /// Of the size of a camera's.
+    const TRUE: Matrix3<f64> = Matrix3::new(0.9, 0.4, 0.25, 0.35, 1.0, -0.1, 0.02, -0.2, 1.6);
+
+    /// 24 colors: signals from 0.02 to 0.9 that are alike, as those of real charts.
+    fn signals() -> Vec<Vector3<f64>> {
+        let mut normals = Normals(24);
+        let color = |level: f64, hue: Vector3<f64>| (hue * 0.35).map(f64::exp) * level;
+        (0..24).map(|k| color(0.02 + 0.025 * f64::from(k), normals.three())).collect()
+    }
+
+    /// One chart: signals with shot and read noise of means of `photosites`, full well 20 000 e⁻, read noise 20 e⁻; references that
+    /// are off by `misfit`.
+    fn chart(seed: u64, photosites: f64, misfit: f64) -> Vec<Patch> {
+        let mut normals = Normals(seed << 32);
+        let patch = |signal: Vector3<f64>| {
+            let variance = signal.map(|c| (c * 20_000.0 + 400.0) / (4e8 * photosites));
+            let noise = normals.three().component_mul(&variance.map(f64::sqrt));
+            Patch {
+                name: String::new(),
+                reference: TRUE * signal + normals.three() * misfit,
+                signal: signal + noise,
+                covariance: Matrix3::from_diagonal(&variance),
+            }
+        };
+        signals().into_iter().map(patch).collect()
+    }
+
+    /// What many fits are off by, in units of what they say: the sum of the nine squares, and the share of single elements within
+    /// 1.96 standard errors; with means of χ² and of the misfit.
+    fn many(photosites: f64, misfit: f64, taken: Misfit) -> [f64; 5] {
+        let (mut distances, mut within, mut chi_squared, mut found_misfit) = (0.0, 0.0, 0.0, 0.0);
+        let mut bias = SVector::<f64, ELEMENTS>::zeros();
+        let mut spread = ElementCovariance::zeros();
+        for seed in 0..FITS as u64 {
+            let found = fit(&chart(seed, photosites, misfit), taken).unwrap();
+            let off = found.xyz_from_camera - TRUE;
+            let off = SVector::<f64, ELEMENTS>::from_fn(|k, _| off[(k / 3, k % 3)]);
+            distances += off.dot(&scaled_cholesky(&found.covariance).unwrap().solve(&off));
+            let inside = |k: &usize| off[*k].abs() <= 1.959_964 * found.covariance[(*k, *k)].sqrt();
+            within += (0..ELEMENTS).filter(inside).count() as f64 / ELEMENTS as f64;
+            chi_squared += found.chi_squared;
+            found_misfit += found.misfit;
+            bias += off;
+            spread += found.covariance;
+        }
+        let count = FITS as f64;
+        // The mean over the fits against its own uncertainty: χ² of nine degrees.
+        let of_mean = bias.dot(&scaled_cholesky(&spread).unwrap().solve(&bias));
+        [distances / count, within / count, chi_squared / count, of_mean, found_misfit / count]
+    }
+
+    /// Noise alone. χ² of nine degrees has a variance of 18 and that of 63 one of 126, so that means of 200 lie within 4.5
+    /// standard errors of 1.35 and 3.6; 95 % of 1800 intervals, of which the three of a row hang together, within
+    /// 4.5 √(0.95 · 0.05 · 3/1800) = 4 %; and the mean of all matrices is the true one. Means of four photosites are so noisy
+    /// that weights alone, without the true signals, would draw it away by many standard errors.
+    #[test]
+    fn the_true_matrix_lies_within_its_standard_errors() {
+        for photosites in [4.0, 400.0] {
+            let [distance, within, chi_squared, of_mean, _] = many(photosites, 0.0, Misfit::None);
+            assert!((distance - 9.0).abs() < 1.35, "{photosites}: {distance}");
+            assert!((within - 0.95).abs() < 0.04, "{photosites}: {within}");
+            assert!((chi_squared - 63.0).abs() < 3.6, "{photosites}: {chi_squared}");
+            assert!(of_chi_square(of_mean, 9.0) > 1e-4, "{photosites}: {of_mean}");
+        }
+    }
+
+    /// References that are off by 0.01. Its estimate has 63 degrees of freedom, so that the nine squares are 9 F(9, 63), of mean
+    /// 9 · 63/61 = 9.3 and variance 23.6: within 4.5 √(23.6/200) = 1.55; the misfit's own error is 0.01/√(2 · 63), that of
+    /// the mean of 200 is 0.6 % of it, and a root is short by 1/(4 · 63): 3.3 % in all.
+    #[test]
+    fn errors_of_the_references_are_found_beside_the_noise() {
+        let [distance, within, chi_squared, of_mean, misfit] = many(400.0, 0.01, Misfit::Estimated);
+        assert!((distance - 9.3).abs() < 1.55, "{distance}");
+        assert!((within - 0.95).abs() < 0.04, "{within}");
+        assert!((chi_squared - 63.0).abs() < 1e-6, "{chi_squared}");
+        assert!(of_chi_square(of_mean, 9.0) > 1e-4, "{of_mean}");
+        assert!((misfit / 0.01 - 1.0).abs() < 0.033, "{misfit}");
+    }
+
+    /// Patches without known noise are fitted by least squares with equal weights, whose standard errors are those of the
+    /// textbook: s² (Cᵀ C)⁻¹, rows independent.
+    #[test]
+    fn without_noise_it_is_plain_least_squares() {
+        let patches: Vec<Patch> =
+            chart(5, 400.0, 0.01).into_iter().map(|p| Patch { covariance: Matrix3::zeros(), ..p }).collect();
+        let found = fit(&patches, Misfit::Estimated).unwrap();
+        let plain = plain(&patches).unwrap();
+        assert!((found.xyz_from_camera - plain).amax() < 1e-10 && found.chi_squared_of_noise.is_none());
+        let squares: f64 = patches.iter().map(|patch| patch.residual(&plain).norm_squared()).sum();
+        let moments = patches.iter().fold(Matrix3::zeros(), |sum, p| sum + p.signal * p.signal.transpose());
+        let expected = moments.try_inverse().unwrap() * (squares / 63.0);
+        for (i, k) in [(0, 0), (1, 1), (2, 2), (0, 1)] {
+            let block = found.covariance.fixed_view::<3, 3>(3 * i, 3 * k).into_owned();
+            let expected = if i == k { expected } else { Matrix3::zeros() };
+            assert!((block - expected).amax() < 1e-8 * moments.try_inverse().unwrap().amax());
+        }
+    }
 
     #[test]
-    fn placeholder() {
-        let _ = (Distribution::default(), std::any::type_name::<Gaussian>());
+    fn what_determines_no_matrix_is_told() {
+        let said = |patches: &[Patch], misfit| fit(patches, misfit).unwrap_err().to_string();
+        let all = chart(1, 400.0, 0.01);
+        assert!(said(&all[..3], Misfit::Estimated).contains("3 patches"));
+        let gray: Vec<Patch> = all.iter().map(|p| Patch { signal: Vector3::repeat(p.signal.y), ..p.clone() }).collect();
+        assert!(said(&gray, Misfit::Estimated).contains("condition number"));
+        let silent: Vec<Patch> = all.iter().map(|p| Patch { covariance: Matrix3::zeros(), ..p.clone() }).collect();
+        assert!(said(&silent, Misfit::None).contains("is not known"));
+        let lost: Vec<Patch> = all.iter().map(|p| Patch { signal: p.signal * f64::NAN, ..p.clone() }).collect();
+        assert!(fit(&lost, Misfit::Estimated).is_err());
     }
 }

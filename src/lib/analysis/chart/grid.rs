@@ -34,12 +34,16 @@ impl Grid {
         };
         let turns = [0, 1, 2, 3].map(turn);
         if turns.iter().all(|turn| *turn < 0.0) {
-            return Err("the corners run against the clock; the chart is mirrored, or they are in another order than dark \
+            return Err(
+                "the corners run against the clock; the chart is mirrored, or they are in another order than dark \
                         skin, bluish green, black, white"
-                .into());
+                    .into(),
+            );
         }
         if !turns.iter().all(|turn| *turn > 0.0 && turn.is_finite()) {
-            return Err("the corners make no quadrangle; give the centers of dark skin, bluish green, black, white".into());
+            return Err(
+                "the corners make no quadrangle; give the centers of dark skin, bluish green, black, white".into()
+            );
         }
         let (right, bottom) = ((COLUMNS - 1) as f64, (ROWS - 1) as f64);
         let chart = [[0.0, 0.0], [right, 0.0], [right, bottom], [0.0, bottom]];

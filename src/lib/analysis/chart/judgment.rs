@@ -47,13 +47,16 @@ pub struct Judgment {
 /// Judges a matrix on the patches that it was fitted on, about a white; none of no patches.
 pub fn judge(found: &ChartMatrix, patches: &[Patch], white: [f64; 3]) -> Option<Judgment> {
     let lab = |xyz: Vector3<f64>| lab_from_xyz(xyz.into(), white);
-    let difference = |patch: &Patch, matrix: &Matrix3<f64>| {
-        Difference::between(lab(patch.reference), lab(matrix * patch.signal))
-    };
+    let difference =
+        |patch: &Patch, matrix: &Matrix3<f64>| Difference::between(lab(patch.reference), lab(matrix * patch.signal));
     let own: Vec<Difference> = patches.iter().map(|patch| difference(patch, &found.xyz_from_camera)).collect();
     let without = |left_out: usize| {
-        let others: Vec<Patch> =
-            patches.iter().enumerate().filter(|(index, _)| *index != left_out).map(|(_, patch)| patch.clone()).collect();
+        let others: Vec<Patch> = patches
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| *index != left_out)
+            .map(|(_, patch)| patch.clone())
+            .collect();
         let matrix = fit(&others, Misfit::Known(found.misfit)).ok()?.xyz_from_camera;
         Some(difference(&patches[left_out], &matrix))
     };

@@ -93,7 +93,9 @@ impl ChartReader {
         };
         let black = frame.black_levels()?.ok_or_else(|| frame.missing("black_level_adu"))?;
         let (Some(white), Some(full)) = (frame.metadata.white_level_adu, FullLevels::of(frame)) else {
-            return Err(frame.missing("white_level_adu"));
+            return Err(
+                frame.refuse("its metadata have no `white_level_adu`, in which signals are counted; add it to them")
+            );
         };
         let [width, height] = [frame.geometry.width, frame.geometry.height];
         let highest = black.largest([width, height], |_, _| None)[0];
@@ -103,7 +105,9 @@ impl ChartReader {
         }
         let inside = |[x, y]: [f64; 2]| x >= 0.0 && y >= 0.0 && x < width as f64 && y < height as f64;
         if let Some([x, y]) = grid.corners().into_iter().find(|corner| !inside(*corner)) {
-            return Err(frame.refuse(format!("the corner {x},{y} of the chart lies outside its {width}x{height} pixels")));
+            return Err(
+                frame.refuse(format!("the corner {x},{y} of the chart lies outside its {width}x{height} pixels"))
+            );
         }
         let sums = vec![[Sums::default(); 3]; PATCHES];
         let origin = frame.geometry.origin;
@@ -163,5 +167,100 @@ impl ChartReader {
             }
         };
         Ok(self.sums.into_iter().map(read).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cfa::FilterArray;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+    use crate::units::QuantityKind;
+
+    const SIZE: [usize; 2] = [240, 170];
+
+    fn header() -> FrameHeader {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some(FilterArray::from(CfaPattern::Rggb));
+        metadata.black_level_adu = Some(100.0.into());
+        metadata.white_level_adu = Some(1100.0.into());
+        let geometry = Geometry { origin: [3, 1], ..Geometry::new(SIZE[0], SIZE[1], &["Y"]) };
+        FrameHeader { name: "chart".into(), geometry, metadata }
+    }
+
+    fn grid() -> Grid {
+        Grid::new([[20.0, 25.0], [220.0, 25.0], [220.0, 145.0], [20.0, 145.0]]).unwrap()
+    }
+
+    /// A chart 40 photosites a patch, whose codes are 100 + 10 (patch + 1) of red, twice that of green, three times of blue, and
+    /// what `more` adds.
+    fn read(more: impl Fn(usize, usize, usize) -> f32) -> Vec<ReadPatch> {
+        let frame = header();
+        let mut reader = ChartReader::new(&frame, grid()).unwrap();
+        for y in 0..SIZE[1] {
+            let classes = CfaPattern::Rggb.row_classes(frame.geometry.origin, y);
+            let code = |x: usize| {
+                let patch = (x / 40).min(COLUMNS - 1) + COLUMNS * (y.saturating_sub(5) / 40).min(ROWS - 1);
+                100.0 + 10.0 * (patch + 1) as f32 * (1 + classes[x % 2] as usize) as f32 + more(patch, x, y)
+            };
+            let row: Vec<f32> = (0..SIZE[0]).map(code).collect();
+            reader.take(&row);
+        }
+        reader.finish().unwrap()
+    }
+
+    /// Means are exact, by class, where nothing scatters; a quarter of the photosites are red, half green. What is saturated is
+    /// counted.
+    #[test]
+    fn means_are_those_of_the_photosites_of_each_class() {
+        let patches = read(|patch, x, y| if patch == 7 && x == 60 && y == 65 { 2000.0 } else { 0.0 });
+        for (index, patch) in patches.iter().enumerate().filter(|(index, _)| *index != 7) {
+            for (class, signal) in patch.signal.into_iter().enumerate() {
+                let expected = 0.01 * (index + 1) as f64 * (class + 1) as f64;
+                assert!((signal - expected).abs() < 1e-12, "{index} {class}: {signal}");
+            }
+            assert_eq!((patch.variance, patch.saturated, patch.is_uneven()), ([0.0; 3], 0, false));
+            let [red, green, blue] = patch.count;
+            // 17 columns and rows within ±0.21 · 40.
+            assert_eq!((red + green + blue, green), (17 * 17, 144));
+        }
+        assert_eq!(patches[7].saturated, 1);
+    }
+
+    /// Scatter of a known size: ± 8 in turn by rows of a class has the standard deviation 8; neighbors in a row agree, so that it
+    /// counts as uneven, while alternating photosites do not.
+    #[test]
+    fn scatter_that_neighbors_do_not_share_is_no_unevenness() {
+        let patches = read(|_, x, y| if (x / 2 + y / 2) % 2 == 0 { 8.0 } else { -8.0 });
+        for patch in &patches {
+            for class in 0..3 {
+                // Of n codes that are half above: s² = 64 n/(n − 1), but for one row or column too many of 9.
+                assert!((patch.scatter[class] / 0.008 - 1.0).abs() < 0.02, "{patch:?}");
+                assert!((patch.noise[class] / (0.008 * 2f64.sqrt()) - 1.0).abs() < 1e-9 && !patch.is_uneven());
+                let expected = patch.scatter[class].powi(2) / patch.count[class] as f64;
+                assert!((patch.variance[class] / expected - 1.0).abs() < 1e-12);
+            }
+        }
+        let stripes = read(|_, _, y| if (y / 2) % 2 == 0 { 8.0 } else { -8.0 });
+        assert!(stripes.iter().all(ReadPatch::is_uneven));
+    }
+
+    #[test]
+    fn what_is_no_chart_is_told() {
+        let said = |frame: &FrameHeader, grid| ChartReader::new(frame, grid).unwrap_err().to_string();
+        let outside = Grid::new([[20.0, 25.0], [260.0, 25.0], [220.0, 145.0], [20.0, 145.0]]).unwrap();
+        assert!(said(&header(), outside).contains("outside its 240x170 pixels"));
+        let mut three = header();
+        three.geometry = three.geometry.with_channels(&["R", "G", "B"]);
+        three.metadata.cfa = None;
+        assert!(said(&three, grid()).contains("give the CFA plane"));
+        let mut silent = header();
+        silent.metadata.white_level_adu = None;
+        assert!(said(&silent, grid()).contains("white_level_adu"));
+        let small = Grid::new([[20.0, 25.0], [40.0, 25.0], [40.0, 37.0], [20.0, 37.0]]).unwrap();
+        let mut reader = ChartReader::new(&header(), small).unwrap();
+        reader.take(&vec![100.0; SIZE[0] * SIZE[1]]);
+        assert!(reader.finish().unwrap_err().contains("photosites of a class"));
     }
 }

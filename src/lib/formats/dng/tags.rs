@@ -49,6 +49,10 @@ pub(super) const COLUMN_INTERLEAVE: DngTag = DngTag(52547, "ColumnInterleaveFact
 pub(super) const ACTIVE_AREA: DngTag = DngTag(50829, "ActiveArea");
 pub(super) const OPCODES: [DngTag; 2] = [DngTag(51008, "OpcodeList1"), DngTag(51009, "OpcodeList2")];
 
+// Light sources of Exif.
+pub(super) const UNKNOWN_LIGHT: u16 = 0;
+pub(super) const D65: u16 = 21;
+
 // Those that are written only.
 pub(super) const NEW_SUBFILE_TYPE: DngTag = DngTag(254, "NewSubfileType");
 pub(super) const MAKE: DngTag = DngTag(271, "Make");

@@ -1,11 +1,11 @@
 //! What the headers of an EXR file say about its parts, or why a part cannot be read.
 
 use super::{ExrTags, METADATA_ATTRIBUTE, Primaries, XYZ_PRIMARIES, attributes};
-use crate::formats::input::THREE_PLANES;
 use crate::camera::optics::Exposure;
 use crate::error::{Error, Result};
 use crate::formats::foreign::{self, STORE_WITHOUT_LOSS, SUBSAMPLED};
 use crate::formats::format::SampleType;
+use crate::formats::input::THREE_PLANES;
 use crate::frame::{Geometry, bare_name};
 use crate::metadata::Metadata;
 use crate::spectrum::channel_wavelength_nm;

@@ -28,13 +28,13 @@ use std::path::{Path, PathBuf};
 #[command(next_help_heading = "From a chart")]
 pub struct ChartFit {
     /// Frame of a ColorChecker, a CFA plane of ADU such as a DNG: fit the matrix to its 24 patches
-    #[arg(long, value_name = "FRAME", requires = "corners", conflicts_with_all = ["patches", "Fit", "WhiteChoice", "SampleExposureChoice", "Lens"])]
+    #[arg(long, value_name = "FRAME", requires = "corners", conflicts_with_all = ["patches", "Fit"])]
     pub chart: Option<PathBuf>,
     /// Centers of the corner patches in pixels from the frame's first sample: dark skin, bluish green, black, white
     #[arg(long, value_name = "X,Y,X,Y,X,Y,X,Y", value_parser = values::corners, requires = "chart", allow_hyphen_values = true)]
     pub corners: Option<[[f64; 2]; 4]>,
     /// CSV of means of patches: columns R, G, B, where known name, std_R, std_G, std_B, cov_RG, cov_RB, cov_GB
-    #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["Fit", "WhiteChoice", "SampleExposureChoice", "Lens"])]
+    #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["Fit"])]
     pub patches: Option<PathBuf>,
     /// Black and white level of the means in --patches, ADU; without, they are shares of white level less black level
     #[arg(long, value_name = "BLACK,WHITE", value_parser = values::levels, requires = "patches")]
@@ -229,7 +229,8 @@ impl ChartFit {
                 ..Training::of(format!("the chart in {}", seen.source), patches.len())
             }),
             uncertainty: Some(MatrixUncertainty {
-                method: if found.misfit > 0.0 { "noise of the patches and misfit" } else { "noise of the patches" }.into(),
+                method: if found.misfit > 0.0 { "noise of the patches and misfit" } else { "noise of the patches" }
+                    .into(),
                 standard_error: [0, 1, 2].map(|i| [0, 1, 2].map(|j| covariance(3 * i + j, 3 * i + j).max(0.0).sqrt())),
                 covariance: [0, 1, 2].map(|i| [0, 1, 2].map(|j| [0, 1, 2].map(|k| covariance(3 * i + j, 3 * i + k)))),
                 element_covariance: Some(std::array::from_fn(|a| std::array::from_fn(|b| covariance(a, b)))),
@@ -237,7 +238,11 @@ impl ChartFit {
             chart: Some(ChartRecord {
                 reference: reference.name.clone(),
                 light: expected.light.clone(),
-                left_out: seen.left_out.iter().map(|(index, why)| format!("{}: {why}", expected.names[*index])).collect(),
+                left_out: seen
+                    .left_out
+                    .iter()
+                    .map(|(index, why)| format!("{}: {why}", expected.names[*index]))
+                    .collect(),
                 misfit: found.misfit,
                 chi_squared_per_degree: found.chi_squared / found.degrees as f64,
                 chi_squared_per_degree_of_noise: found.chi_squared_of_noise.map(|sum| sum / found.degrees as f64),
@@ -289,7 +294,10 @@ fn see_frame(path: &Path, corners: [[f64; 2]; 4]) -> Result<Seen> {
         left_out: full.map(|(index, patch)| (index, format!("{} photosites are saturated", patch.saturated))).collect(),
         uneven: (0..read.len()).filter(|index| read[*index].is_uneven()).collect(),
         signals: read.iter().map(|patch| Vector3::from(patch.signal)).collect(),
-        covariances: read.iter().map(|patch: &ReadPatch| Matrix3::from_diagonal(&Vector3::from(patch.variance))).collect(),
+        covariances: read
+            .iter()
+            .map(|patch: &ReadPatch| Matrix3::from_diagonal(&Vector3::from(patch.variance)))
+            .collect(),
         frame: Some(frame),
         notes,
     })
@@ -305,7 +313,9 @@ fn matched(seen: &Seen, expected: &Expected, reference: &Reference) -> Result<Ve
     let (count, known) = (seen.signals.len(), expected.names.len());
     if seen.names.is_none() && count != known {
         let (source, reference) = (&seen.source, &reference.name);
-        return Err(Error::Usage(format!("{source} has {count} patches and {reference} has {known}; they must be the same")));
+        return Err(Error::Usage(format!(
+            "{source} has {count} patches and {reference} has {known}; they must be the same"
+        )));
     }
     let place = |index: usize| match &seen.names {
         None => Ok(index),

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 #[command(next_help_heading = "From a raw file")]
 pub struct RawMatrix {
     /// DNG whose own matrix is wanted, for the light of --illuminant or --temperature, or else that of the exposure
-    #[arg(long, value_name = "FRAME.dng", conflicts_with_all = ["chart", "patches", "luminance", "no_misfit", "Fit", "WhiteChoice", "SampleExposureChoice", "Lens"])]
+    #[arg(long, value_name = "FRAME.dng", conflicts_with_all = ["chart", "patches", "luminance", "no_misfit", "Fit"])]
     pub from_raw: Option<PathBuf>,
     /// Which of its matrices: color, to XYZ under the light itself, or forward, to XYZ adapted to D50
     #[arg(long, value_name = "NAME", default_value = OwnMatrix::default().name(), value_parser = values::choice::<OwnMatrix>(), requires = "from_raw")]
@@ -36,7 +36,8 @@ impl RawMatrix {
         let light = match chart.light()? {
             Some(Light::Illuminant(illuminant)) => Some(illuminant),
             Some(Light::Measured(name, _)) => {
-                let problem = format!("{name}: the matrices of a raw file are for a light by its color; name an illuminant");
+                let problem =
+                    format!("{name}: the matrices of a raw file are for a light by its color; name an illuminant");
                 return Err(Error::Usage(problem).change(&["illuminant"]));
             }
             None => None,
