@@ -167,10 +167,7 @@ impl FrameReader {
         let is_ours = !metadata.history.is_empty();
         let mask = left_out.iter().position(|channel| channel == MASK_LAYER).map(|at| geometry.channels.len() + at);
         let mask = mask.filter(|_| is_ours);
-        let dropped: Vec<&str> = left_out.iter().map(String::as_str).filter(|channel| *channel != MASK_LAYER).collect();
-        if !dropped.is_empty() {
-            notes.push(format!("{name}: channels {} are left out", dropped.join(", ")));
-        }
+        notes.extend(self::left_out(name, left_out));
         let check = metadata.samples.as_ref().zip(sidecar).map(|(samples, sidecar)| DigestCheck {
             digest: SamplesDigest::like(&samples.digest),
             expected: samples.digest.clone(),
@@ -228,6 +225,8 @@ impl FrameReader {
         let stored = &self.reader.geometry().channels;
         let is_there = stored.get(kept..kept + layer.len()).is_some_and(|channels| channels.iter().eq(layer));
         if is_there {
+            self.notes.retain(|note| !note.ends_with(LEFT_OUT));
+            self.notes.extend(left_out(&self.header.name, &stored[kept + layer.len()..]));
             self.header.geometry.channels.extend(layer.iter().map(|name| (*name).to_owned()));
         }
         is_there
@@ -331,6 +330,15 @@ impl RowSource for FrameReader {
         self.check_digest();
         Ok(())
     }
+}
+
+/// How the note of channels that no stage sees ends.
+const LEFT_OUT: &str = " are left out";
+
+/// That note; none where there are no such channels but marks.
+fn left_out(name: &str, channels: &[String]) -> Option<String> {
+    let dropped: Vec<&str> = channels.iter().map(String::as_str).filter(|channel| *channel != MASK_LAYER).collect();
+    (!dropped.is_empty()).then(|| format!("{name}: channels {}{LEFT_OUT}", dropped.join(", ")))
 }
 
 /// Whether an open file is one that can seek, and no pipe.

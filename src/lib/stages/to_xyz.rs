@@ -143,6 +143,11 @@ impl ToXyz {
         self.coordinates.space()
     }
 
+    /// XYZ of the white that L*a*b*, L*u*v* and sRGB refer to.
+    pub fn white(&self) -> [f64; 3] {
+        self.coordinates.white()
+    }
+
     /// From XYZ to the coordinates of its space.
     pub fn coordinates(&self) -> &Coordinates {
         &self.coordinates
