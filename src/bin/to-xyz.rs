@@ -2,7 +2,6 @@
 
 use clap::Parser;
 use cyanometer::cli;
-use cyanometer::color::Space;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::register::{announce, check_inputs};
@@ -45,6 +44,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
+    session.tell(conversion.doubt_of(output).as_slice());
     announce(&[output.output.as_deref()])?;
     check_inputs(conversion.matrix.as_deref().map(Some).into_iter().chain([arguments.input.input.as_deref()]))?;
     let matrix = conversion.load_matrix()?;
@@ -57,12 +57,6 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     }
     let (mut stage, notes) = conversion.stage(matrix, reader.header_mut())?;
     session.tell(&notes);
-    if conversion.space == Space::Srgb && output.is_exr() {
-        session.warn(
-            "other programs take an EXR for linear light, and these are samples encoded for viewing; for a picture name a \
-             .tiff, or let `preview` make one",
-        );
-    }
     session.sign(stage.header_mut());
     if arguments.sigma {
         let stage = WithSigma::of_conversion(stage, reader.header())?;

@@ -9,7 +9,9 @@ use crate::color::difference::{Difference, DifferenceReport};
 use crate::error::{Error, Result};
 use crate::formats::plots::{PlotFormat, write_plot};
 use crate::formats::{files, output, register, yaml_writer};
-use crate::requests::fit::{Characterization, ChartFound, Conditions, Evaluation, Fit, Group, NoiseReport};
+use crate::requests::fit::{
+    Characterization, ChartFound, Conditions, Evaluation, Fit, Group, MatrixFound, MatrixRequest, NoiseReport,
+};
 use crate::requests::values;
 use crate::text::visible;
 use clap::Args;
@@ -54,47 +56,53 @@ impl MatrixOutputs {
         register::announce(&[self.output.as_deref(), self.plot.as_deref()])
     }
 
-    /// Refuses what a matrix from a chart or a raw file does not give, before any work.
+    /// Refuses, before any work, what the request does not give or what cannot be written.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`]; those of [`register::announce`].
-    pub fn check_alone(&self, has_patches: bool) -> Result<()> {
+    /// [`Error::Usage`]; those of [`Self::check`].
+    pub fn check_request(&self, request: &MatrixRequest) -> Result<()> {
+        if let Some(fit) = &request.fit {
+            return self.check(fit);
+        }
         if self.plot.is_some() {
             return Err(Error::Usage(
                 "--plot draws the trade-off of --noise-weight, which a chart or a raw has not".into(),
             ));
         }
-        if self.output_format == Some(ReportFormat::Csv) && !has_patches {
+        if self.output_format == Some(ReportFormat::Csv) && request.raw.from_raw.is_some() {
             return Err(Error::Usage("csv has one row for each patch of a chart; a raw file has none".into()));
         }
         register::announce(&[self.output.as_deref()])
     }
 
-    /// Writes the matrix file of a chart, and its report: as text where nothing else is asked for.
+    /// Writes matrix file and report, of a chart as text where nothing else is asked for.
     ///
     /// # Errors
     ///
-    /// Those of [`chart::chart`] and of the disk.
-    pub fn write_chart(&self, found: &ChartFound) -> Result<()> {
-        let to_file = files::named(self.output.as_deref());
-        if let Some(path) = to_file {
-            output::write_text(Some(path), &matrix(&found.matrix)?)?;
-        }
-        match (to_file, self.output_format) {
-            (None, None) => output::write_text(None, &matrix(&found.matrix)?),
-            (_, format) => output::write_text(None, &chart::chart(found, format.unwrap_or(ReportFormat::Text))?),
+    /// Those of [`Self::write`] and [`chart::chart`].
+    pub fn write_found(&self, found: &MatrixFound) -> Result<()> {
+        match found {
+            MatrixFound::Fitted(found) => self.write(found),
+            MatrixFound::OfChart(found) => self.write_chart(found),
+            MatrixFound::Own(matrix, _) => {
+                let matrix = CameraMatrix::clone(matrix);
+                self.write(&Characterization { matrix, evaluation: None, trade_off: Vec::new(), notes: Vec::new() })
+            }
         }
     }
 
-    /// Writes a matrix of which no more is known.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`characterization`] and of the disk.
-    pub fn write_matrix(&self, found: CameraMatrix) -> Result<()> {
-        let found = Characterization { matrix: found, evaluation: None, trade_off: Vec::new(), notes: Vec::new() };
-        self.write(&found)
+    /// Writes the matrix file of a chart, and its report.
+    fn write_chart(&self, found: &ChartFound) -> Result<()> {
+        let to_file = files::named(self.output.as_deref());
+        let file = matrix(&found.matrix)?;
+        if let Some(path) = to_file {
+            output::write_text(Some(path), &file)?;
+        }
+        match (to_file, self.output_format) {
+            (None, None) => output::write_text(None, &file),
+            (_, format) => output::write_text(None, &chart::chart(found, format.unwrap_or(ReportFormat::Text))?),
+        }
     }
 
     /// Writes matrix file, plot and report.

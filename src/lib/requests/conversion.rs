@@ -1,7 +1,7 @@
 //! Turning camera frames into colors, by a matrix file or the matrix that comes with the frame; and XYZ into other spaces.
 
 use super::notes::Note;
-use super::options::WhiteChoice;
+use super::options::{Output, WhiteChoice};
 use super::values::{self, LightColor};
 use crate::analysis::characterization::CameraMatrix;
 use crate::camera::optics::Exposure;
@@ -68,6 +68,13 @@ pub struct Conversion {
 }
 
 impl Conversion {
+    /// A warning of a picture in a file that other programs take for linear light.
+    pub fn doubt_of(&self, output: &Output) -> Option<Note> {
+        let text = "other programs take an EXR for linear light, and these are samples encoded for viewing; for a picture name a \
+                    .tiff, or let `preview` make one";
+        (self.space == Space::Srgb && output.is_exr()).then(|| Note::Warning(text.into()))
+    }
+
     /// The matrix of a file, before any frame is waited for.
     ///
     /// # Errors

@@ -222,8 +222,8 @@ mod tests {
             }
             assert_eq!((patch.variance, patch.saturated, patch.is_uneven()), ([0.0; 3], 0, false));
             let [red, green, blue] = patch.count;
-            // 17 columns and rows within ±0.21 · 40.
-            assert_eq!((red + green + blue, green), (17 * 17, 144));
+            // 17 columns and rows within ±0.21 · 40; half of an odd number.
+            assert!(red + green + blue == 17 * 17 && (144..=145).contains(&green));
         }
         assert_eq!(patches[7].saturated, 1);
     }
