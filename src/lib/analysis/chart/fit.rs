@@ -362,11 +362,12 @@ mod tests {
 
     /// Noise alone. χ² of nine degrees has a variance of 18 and that of 63 one of 126, so that means of 200 lie within 4.5
     /// standard errors of 1.35 and 3.6; 95 % of 1800 intervals, of which the three of a row hang together, within
-    /// 4.5 √(0.95 · 0.05 · 3/1800) = 4 %; and the mean of all matrices is the true one. Means of four photosites are so noisy
-    /// that weights alone, without the true signals, would draw it away by many standard errors.
+    /// 4.5 √(0.95 · 0.05 · 3/1800) = 4 %; and the mean of all matrices is the true one. Noise of
+    /// three times the variance of a photosite is so strong that weights alone, without the true signals, would draw it away: χ² of
+    /// the mean is 42 then.
     #[test]
     fn the_true_matrix_lies_within_its_standard_errors() {
-        for photosites in [4.0, 400.0] {
+        for photosites in [0.3, 400.0] {
             let [distance, within, chi_squared, of_mean, _] = many(photosites, 0.0, Misfit::None);
             assert!((distance - 9.0).abs() < 1.35, "{photosites}: {distance}");
             assert!((within - 0.95).abs() < 0.04, "{photosites}: {within}");
