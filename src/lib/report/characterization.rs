@@ -22,7 +22,8 @@ use std::path::PathBuf;
 /// Where a matrix and its report go, in which form, and the plot.
 #[derive(Debug, Clone, Default, Args)]
 pub struct MatrixOutputs {
-    /// Form of what goes to standard output; by default yaml, and text with --evaluate or --noise-weight
+    /// Form of what goes to standard output; by default yaml, and text with --evaluate or --noise-weight, or of a
+    /// chart whose matrix goes to a file
     #[arg(long, value_parser = values::one_of(&[ReportFormat::Yaml, ReportFormat::Json, ReportFormat::Text, ReportFormat::Csv]))]
     pub output_format: Option<ReportFormat>,
     /// Draw the trade-off of --noise-weight, as SVG or PNG

@@ -25,16 +25,15 @@ use std::path::{Path, PathBuf};
 
 /// A chart, as a frame or as a table, the colors that it has, and the light on it.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "From a chart")]
 pub struct ChartFit {
     /// Frame of a ColorChecker, a CFA plane of ADU such as a DNG: fit the matrix to its 24 patches
-    #[arg(long, value_name = "FRAME", requires = "corners", conflicts_with_all = ["patches", "Fit"])]
+    #[arg(long, value_name = "FRAME", requires = "corners", conflicts_with = "patches")]
     pub chart: Option<PathBuf>,
     /// Centers of the corner patches in pixels from the frame's first sample: dark skin, bluish green, black, white
     #[arg(long, value_name = "X,Y,X,Y,X,Y,X,Y", value_parser = values::corners, requires = "chart", allow_hyphen_values = true)]
     pub corners: Option<[[f64; 2]; 4]>,
     /// CSV of means of patches: columns R, G, B, where known name, std_R, std_G, std_B, cov_RG, cov_RB, cov_GB
-    #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["Fit"])]
+    #[arg(long, value_name = "FILE.csv")]
     pub patches: Option<PathBuf>,
     /// Black and white level of the means in --patches, ADU; without, they are shares of white level less black level
     #[arg(long, value_name = "BLACK,WHITE", value_parser = values::levels, requires = "patches")]
@@ -43,7 +42,7 @@ pub struct ChartFit {
     /// L,a,b with a column name, or of reflectances
     #[arg(long, value_name = "NAME|FILE.csv", default_value = DEFAULT_REFERENCE)]
     pub reference: String,
-    /// Light that the colors of --reference are for, and the white of its L\*a\*b\*
+    /// Light that the colors of --reference are for, and the white of its L*a*b*
     #[arg(long, value_name = "LIGHT", default_value = "d50", value_parser = values::light)]
     pub reference_light: LightColor,
     /// Light on the chart, or of --from-raw: a, d50, d55, d65, d75, e, a temperature such as 3200K, or a file of its spectrum.
@@ -260,7 +259,11 @@ impl ChartFit {
             let problem = "absolute XYZ take the exposure of a frame, which means of patches do not have";
             return Err(Error::Usage(problem.into()).leave_out(&["luminance"]));
         };
-        let exposure_s_sr = frame.exposure()?.exposure_s_sr();
+        let Some(exposure) = frame.metadata.exposure else {
+            let problem = "its metadata have no `exposure`, which absolute XYZ take";
+            return Err(frame.refuse(problem).leave_out(&["luminance"]));
+        };
+        let exposure_s_sr = exposure.exposure_s_sr();
         let black = frame.uniform_black_adu()?;
         let white = frame.metadata.white_level_adu.ok_or_else(|| frame.missing("white_level_adu"))?;
         Ok(white.less([black; 3]).classes().map(|range| luminance * exposure_s_sr / range))

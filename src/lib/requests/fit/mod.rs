@@ -29,6 +29,9 @@ use training::Plan;
 /// A matrix from a library of spectra, from a chart, or from a raw file.
 #[derive(Debug, Clone, Args)]
 #[command(mut_group("Fit", |group| group.args(Fit::ids())))]
+#[command(mut_arg("chart", |chart| chart.conflicts_with_all(Fit::ids())))]
+#[command(mut_arg("patches", |patches| patches.conflicts_with_all(Fit::ids())))]
+#[command(mut_arg("from_raw", |from_raw| from_raw.conflicts_with_all(Fit::ids())))]
 #[command(mut_arg("library", |library| {
     library.required(false).required_unless_present_any(["chart", "patches", "from_raw"])
 }))]

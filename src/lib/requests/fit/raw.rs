@@ -14,10 +14,9 @@ use std::path::PathBuf;
 
 /// A raw file whose matrix is wanted, and which of its matrices.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "From a raw file")]
 pub struct RawMatrix {
     /// DNG whose own matrix is wanted, for the light of --illuminant or --temperature, or else that of the exposure
-    #[arg(long, value_name = "FRAME.dng", conflicts_with_all = ["chart", "patches", "luminance", "no_misfit", "Fit"])]
+    #[arg(long, value_name = "FRAME.dng", conflicts_with_all = ["chart", "patches", "luminance", "no_misfit"])]
     pub from_raw: Option<PathBuf>,
     /// Which of its matrices: color, to XYZ under the light itself, or forward, to XYZ adapted to D50
     #[arg(long, value_name = "NAME", default_value = OwnMatrix::default().name(), value_parser = values::choice::<OwnMatrix>(), requires = "from_raw")]
