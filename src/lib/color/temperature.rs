@@ -108,7 +108,7 @@ impl Locus {
             s += offset.dot(&tangent) / (tangent.norm_squared() - 2.0 * offset.dot(&half_second));
         }
         // At the ends of the table the nearest body lies beyond it.
-        if !(s.abs() <= 1.0) {
+        if !(-1.0..=1.0).contains(&s) {
             return None;
         }
         let (offset, tangent) = (color - body(s), tangent(s));
@@ -116,7 +116,7 @@ impl Locus {
         let along = if tangent.x > 0.0 { tangent } else { -tangent }.normalize();
         let across = Vector2::new(-along.y, along.x);
         let duv = offset.dot(&across);
-        if !(duv.abs() <= LARGEST_DISTANCE) {
+        if !(-LARGEST_DISTANCE..=LARGEST_DISTANCE).contains(&duv) {
             return None;
         }
         let reciprocal = (nearest + 1) as f64 + s;

@@ -143,7 +143,7 @@ pub fn load_patches(path: &Path) -> Result<PatchMeans> {
         let [[r, g, b], [rg, rb, gb]] = [*std, *mixed];
         let matrix = Matrix3::new(r * r, rg, rb, rg, g * g, gb, rb, gb, b * b);
         let smallest = matrix.symmetric_eigenvalues().min();
-        if std.iter().any(|std| *std < 0.0) || !(smallest >= -1e-9 * matrix.amax()) {
+        if std.iter().any(|std| *std < 0.0) || smallest.is_nan() || smallest < -1e-9 * matrix.amax() {
             let problem = format!("row {}: its deviations and covariances are no covariance matrix", row + 1);
             return Err(Error::format(&name, problem));
         }

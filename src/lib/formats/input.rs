@@ -7,7 +7,7 @@ use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Strea
 use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
 use crate::error::{Error, Result};
-use crate::frame::Geometry;
+use crate::frame::{Geometry, THREE_PLANES};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::stages::saturation::{MASK_LAYER, with_mask};
 use crate::stream::RowSource;
@@ -15,10 +15,6 @@ use crate::units::QuantityKind;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-
-/// What three planes of one frame are called.
-pub(super) const THREE_PLANES: [[&str; 3]; 5] =
-    [["R", "G", "B"], ["x", "y", "Y"], ["L", "a", "b"], ["L", "u", "v"], ["CCT", "Duv", "Y"]];
 
 /// What to open.
 #[derive(Debug, Clone, Default)]

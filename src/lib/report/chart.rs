@@ -1,6 +1,6 @@
 //! Reports of matrices that were fitted to charts.
 
-use super::characterization::{differences_text, matrix_text};
+use super::matrix_text::{differences_text, matrix_text};
 use super::{ReportFormat, table, unwritable};
 use crate::analysis::characterization::CameraMatrix;
 use crate::analysis::chart::judgment::JudgedPatch;

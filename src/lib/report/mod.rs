@@ -4,6 +4,7 @@ pub mod characterization;
 pub mod chart;
 
 mod difference;
+mod matrix_text;
 mod photon_transfer;
 mod prediction;
 mod raw_matrix;

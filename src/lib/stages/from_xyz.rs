@@ -299,12 +299,12 @@ mod tests {
     #[test]
     fn covariances_come_along() {
         let (xyz, f) = ([40.0, 30.0, 20.0], [2e-2, -1e-2, 3e-2]);
-        let product = |(i, j): (usize, usize)| (f[i] * f[j]) as f32;
+        let product = |(i, j): (usize, usize)| to_sample(f[i] * f[j]);
         let adapting = Adapting { transform: Adaptation::Cat16, from_xy: D65_XY, to_xy: D50_XY };
         for space in [Space::Xyz, Space::Xyy, Space::Lab, Space::Luv, Space::Cct, Space::LinearSrgb] {
             for adapting in [None, Some(adapting)] {
                 let settings = XyzSettings { adapting, ..settings(space) };
-                let made = through(&pixel(xyz.map(|v| v as f32), Some(PAIRS.map(product))), &settings).0;
+                let made = through(&pixel(xyz.map(to_sample), Some(PAIRS.map(product))), &settings).0;
                 let shift = adapting.map_or(Matrix3::identity(), |by| by.matrix().unwrap());
                 let at = |by: f64| {
                     let moved = Vector3::from(xyz) + Vector3::from(f) * by;

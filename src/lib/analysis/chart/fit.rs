@@ -98,7 +98,7 @@ pub fn fit(patches: &[Patch], misfit: Misfit) -> Result<ChartMatrix> {
         )));
     }
     let condition = condition(patches);
-    if !(condition < LARGEST_CONDITION) {
+    if !(0.0..LARGEST_CONDITION).contains(&condition) {
         return Err(Error::Data(format!(
             "the signals of the patches do not determine the matrix: their condition number {condition:.1e} is above \
              {LARGEST_CONDITION:.0e}; give more varied colors"

@@ -56,7 +56,7 @@ impl Grid {
     pub fn patch(&self, x: f64, y: f64) -> Option<usize> {
         let seen = self.chart_from_frame * Vector3::new(x, y, 1.0);
         // Behind the horizon there is no chart.
-        if !(seen.z > 0.0) {
+        if seen.z.is_nan() || seen.z <= 0.0 {
             return None;
         }
         let inside = |place: f64, count: usize| -> Option<usize> {

@@ -131,7 +131,7 @@ impl ChartReader {
                 let class = classes[x % 2] as usize;
                 let value = (f64::from(*sample) - black.at(x)) / self.range[class];
                 let sums = &mut self.sums[patch][class];
-                sums.saturated += u64::from(!(*sample < self.full[class]));
+                sums.saturated += u64::from(sample.is_nan() || *sample >= self.full[class]);
                 sums.add(value);
                 if let Some((_, before)) = last[x % 2].filter(|(other, _)| *other == patch) {
                     sums.pairs += 1;
