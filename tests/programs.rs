@@ -341,7 +341,7 @@ fn noise_is_predicted_checked_and_carried_along() {
         (
             "to-xyz rgb.exr --matrix m.yaml --space srgb --sigma",
             2,
-            "standard deviations are those of xyz, xyy or lab; srgb is a picture to look at",
+            "standard deviations are those of xyz, xyy, lab, luv, cct or linear-srgb; srgb is a picture to look at",
         ),
         ("predict-noise", 2, "give a spectrum, --electrons R,G,B, --dark or --sweep"),
         ("predict-noise --dark --sweep 1:10:3lin", 2, "a sweep scales the signal of a scene, but this one is dark"),

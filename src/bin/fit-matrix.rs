@@ -1,10 +1,10 @@
-//! `fit-matrix`: a characterization matrix from a library of spectra, and how well it does.
+//! `fit-matrix`: a characterization matrix from spectra, from a chart or from a raw file's own tags, and how well it does.
 
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::report::characterization::MatrixOutputs;
-use cyanometer::requests::Fit;
+use cyanometer::requests::fit::MatrixRequest;
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -14,12 +14,13 @@ static MEMORY: cli::Memory = cli::Memory;
 ///
 /// The training samples are spectral radiances: a spectral EXR (channels named like S0.550,000000nm), or a CSV table with one spectrum in
 /// each row or column. The matrix takes ADU above black, divided by exposure, to absolute XYZ. With --evaluate every sample
-/// of a library goes through the camera, without noise and with it, and the color differences are reported.
+/// of a library goes through the camera, without noise and with it, and the color differences are reported. From a chart or a
+/// DNG's own tags no spectra are needed; the matrix gives relative XYZ.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
     #[command(flatten)]
-    fit: Fit,
+    request: MatrixRequest,
     #[command(flatten)]
     outputs: MatrixOutputs,
     #[command(flatten)]
@@ -30,9 +31,9 @@ fn main() -> ExitCode {
     cli::start(env!("CARGO_BIN_NAME"), |arguments: &Arguments| arguments.general.clone(), run)
 }
 
-fn run(Arguments { fit, outputs, .. }: &Arguments, session: &cli::Session) -> Result<()> {
-    outputs.check(fit)?;
-    let found = fit.run()?;
-    session.tell(&found.notes);
-    outputs.write(&found)
+fn run(Arguments { request, outputs, .. }: &Arguments, session: &cli::Session) -> Result<()> {
+    outputs.check_request(request)?;
+    let found = request.run()?;
+    session.tell(found.notes());
+    outputs.write_found(&found)
 }

@@ -2,7 +2,6 @@
 
 use clap::Parser;
 use cyanometer::cli;
-use cyanometer::color::Space;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::formats::register::{announce, check_inputs};
@@ -14,11 +13,11 @@ use std::process::ExitCode;
 #[global_allocator]
 static MEMORY: cli::Memory = cli::Memory;
 
-/// Turn demosaicked ADU into CIE XYZ, xyY, L*a*b* or a viewable sRGB picture
+/// Turn demosaicked ADU into CIE XYZ, and either into xyY, L*a*b*, L*u*v*, color temperatures, linear or viewable sRGB
 ///
 /// XYZ is absolute, Y in cd/m2, or, by a matrix that says so, relative: Y = 1 for the white by which the first class reaches
-/// its white level, whatever the exposure. L*a*b* and sRGB refer to a white; by default that of D65, as bright as makes the
-/// camera saturate.
+/// its white level, whatever the exposure. L*a*b*, L*u*v* and sRGB refer to a white; by default that of D65, as bright as
+/// makes the camera saturate. Colors are those under the light of the scene, unless --adapt-to names another.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -27,7 +26,7 @@ struct Arguments {
     #[command(flatten)]
     conversion: Conversion,
     /// Add a layer with the standard deviation of each pixel, and for xyz one with the covariances, from the sensor's noise
-    /// model at the pixel's own level
+    /// model at the pixel's own level; of XYZ from their layer of covariances, which also comes along without this
     #[arg(long)]
     sigma: bool,
     #[command(flatten)]
@@ -45,19 +44,19 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
+    session.tell(conversion.doubt_of(output).as_slice());
     announce(&[output.output.as_deref()])?;
     check_inputs(conversion.matrix.as_deref().map(Some).into_iter().chain([arguments.input.input.as_deref()]))?;
     let matrix = conversion.load_matrix()?;
     let mut reader = FrameReader::open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
+    let holds_layers = output.options().holds_layers()?;
+    if let Some(mut stage) = conversion.stage_of_xyz(&mut reader, arguments.sigma, holds_layers)? {
+        session.sign(stage.header_mut());
+        return session.drive(reader, &stage, output).map(drop);
+    }
     let (mut stage, notes) = conversion.stage(matrix, reader.header_mut())?;
     session.tell(&notes);
-    if conversion.space == Space::Srgb && output.is_exr() {
-        session.warn(
-            "other programs take an EXR for linear light, and these are samples encoded for viewing; for a picture name a \
-             .tiff, or let `preview` make one",
-        );
-    }
     session.sign(stage.header_mut());
     if arguments.sigma {
         let stage = WithSigma::of_conversion(stage, reader.header())?;

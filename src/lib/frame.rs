@@ -205,6 +205,10 @@ impl<'a, Q: Quantity> Rows<'a, Q> {
     }
 }
 
+/// What three planes of one frame are called.
+pub const THREE_PLANES: [[&str; 3]; 5] =
+    [["R", "G", "B"], ["x", "y", "Y"], ["L", "a", "b"], ["L", "u", "v"], ["CCT", "Duv", "Y"]];
+
 /// A channel's name without that of its layer: `R` of `left.R`.
 pub fn bare_name(channel: &str) -> &str {
     channel.rsplit('.').next().unwrap_or(channel)

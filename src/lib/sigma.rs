@@ -3,19 +3,17 @@
 //! The noise of each pixel follows from the sensor's noise model at the pixel's own level ([`PixelNoise`]), so that scenes
 //! need not be uniform.
 
-use crate::color::{Space, lab_about, xyy_about};
-use crate::error::{Error, Result};
+use crate::color::Space;
+use crate::error::Result;
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{Coverage, FrameHeader};
 use crate::propagation::covariance::{stds, through};
 use crate::propagation::pixels::PixelNoise;
 use crate::stages::demosaic::Demosaic;
+pub use crate::stages::from_xyz::COVARIANCE_LAYER;
+use crate::stages::from_xyz::layers_of;
 use crate::stages::to_xyz::ToXyz;
 use crate::stream::{Counts, Footprint, Stage};
-
-/// Channels of the layer of covariances of XYZ.
-pub const COVARIANCE_LAYER: [&str; 6] =
-    ["covariance.XX", "covariance.XY", "covariance.XZ", "covariance.YY", "covariance.YZ", "covariance.ZZ"];
 
 /// A stage that makes three planes of pixels whose noise can be told from the noise of demosaicked R, G and B.
 pub trait Propagating: Stage {
@@ -59,8 +57,8 @@ impl WithSigma<Demosaic> {
 }
 
 impl WithSigma<ToXyz> {
-    /// The conversion of `input` with a layer of standard deviations and, for XYZ, one of the six covariances. xyY and
-    /// L\*a\*b\* are taken to first order.
+    /// The conversion of `input` with a layer of standard deviations and, for XYZ, one of the six covariances. Spaces that are
+    /// curved in XYZ are taken to first order.
     ///
     /// # Errors
     ///
@@ -128,14 +126,7 @@ impl Propagating for Demosaic {
 
 impl Propagating for ToXyz {
     fn layers(&self) -> Result<Vec<&'static str>> {
-        match self.space() {
-            Space::Xyz => Ok(COVARIANCE_LAYER.into_iter().chain(["sigma.R", "sigma.G", "sigma.B"]).collect()),
-            Space::Xyy => Ok(vec!["sigma.x", "sigma.y", "sigma.Y"]),
-            Space::Lab => Ok(vec!["sigma.L", "sigma.a", "sigma.b"]),
-            Space::Srgb => Err(Error::Usage(
-                "standard deviations are those of xyz, xyy or lab; srgb is a picture to look at".into(),
-            )),
-        }
+        layers_of(self.space())
     }
 
     fn fill_layers(
@@ -152,10 +143,12 @@ impl Propagating for ToXyz {
             let (camera, holds) = noise.covariance([x, y], rgb);
             let of_xyz = through(&camera, self.xyz_from_adu());
             let xyz = self.xyz(rgb).into();
-            let covariance = match self.space() {
-                Space::Lab => through(&of_xyz, &lab_about(xyz, self.white()).jacobian),
-                Space::Xyy => xyy_about(xyz).map_or([0.0; 6], |local| through(&of_xyz, &local.jacobian)),
-                Space::Xyz | Space::Srgb => of_xyz,
+            let covariance = match (self.space(), self.coordinates().jacobian(xyz)) {
+                (Space::Xyz, _) => of_xyz,
+                (_, Some(jacobian)) => through(&of_xyz, &jacobian),
+                // Without a temperature there is no uncertainty of one; other colors without chromaticity have a fixed one.
+                (Space::Cct, None) => [f64::NAN; 6],
+                (_, None) => [0.0; 6],
             };
             let shown = if self.space() == Space::Xyz { covariance.len() } else { 0 };
             (covariance.into_iter().take(shown).chain(stds(&covariance)), holds)

@@ -2,14 +2,11 @@
 //! Space to CIE XYZ Space].
 
 use super::temperature::correlated;
-use super::xyz_of_chromaticity;
+use super::{D50_XY, xyz_of_chromaticity};
 use crate::spectrum::Observer;
 use nalgebra::{Matrix3, Vector3};
 
-/// Chromaticity of D50, where the search for a white begins.
-const D50_XY: [f64; 2] = [0.3457, 0.3585];
-
-/// Steps of that search, and where it ends, as Adobe's own program has them.
+/// Steps of the search for a white from D50 on, and where it ends, as Adobe's own program has them.
 const MOST_STEPS: usize = 30;
 const NEAR: f64 = 1e-7;
 
@@ -22,6 +19,8 @@ pub struct Illuminated {
     pub color_matrix: Matrix3<f64>,
     /// This camera from the reference camera, CC.
     pub camera_calibration: Matrix3<f64>,
+    /// XYZ under D50 from the signals of the reference camera, white 1, FM.
+    pub forward_matrix: Option<Matrix3<f64>>,
 }
 
 /// What is known of the light of an exposure.
@@ -75,16 +74,42 @@ impl Calibration {
         Ok(Mapped { xyz_from_camera: inverse(&camera_from_xyz)? * largest, white_xy })
     }
 
+    /// The matrix for a light by FM, with XYZ adapted to D50, which [`Mapped::white_xy`] then is.
+    ///
+    /// XYZ = FM · diag(1 / (AB · CC)⁻¹ n) · (AB · CC)⁻¹ · camera        n: signals of the white, the largest 1
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::mapped`]; that a matrix FM is missing.
+    pub fn mapped_forward(&self, observer: &Observer, light: Light) -> Result<Mapped, String> {
+        let missing = || "it has no ForwardMatrix for each of its illuminants".to_owned();
+        if self.first.forward_matrix.is_none() || self.second.is_some_and(|second| second.forward_matrix.is_none()) {
+            return Err(missing());
+        }
+        let Mapped { xyz_from_camera, white_xy } = self.mapped(observer, light)?;
+        let neutral = inverse(&xyz_from_camera)? * Vector3::from(xyz_of_chromaticity(white_xy, 1.0));
+        let share = self.share_of_first(observer, white_xy);
+        let forward = self.mixed(share, |set| set.forward_matrix.unwrap_or_else(Matrix3::identity));
+        let analog_balance = Matrix3::from_diagonal(&Vector3::from(self.analog_balance));
+        let reference = inverse(&(analog_balance * self.mixed(share, |set| set.camera_calibration)))?;
+        let gains = Matrix3::from_diagonal(&(reference * neutral).map(f64::recip));
+        Ok(Mapped { xyz_from_camera: forward * gains * reference, white_xy: D50_XY })
+    }
+
+    /// What the two illuminants have, by the share of the first.
+    fn mixed(&self, share: f64, of: impl Fn(&Illuminated) -> Matrix3<f64>) -> Matrix3<f64> {
+        match &self.second {
+            Some(second) => of(&self.first) * share + of(second) * (1.0 - share),
+            None => of(&self.first),
+        }
+    }
+
     /// Camera from XYZ for a white, AB · CC · CM: CM and CC are linear in the reciprocal of its correlated color temperature
     /// between those of the illuminants, and constant beyond.
     pub fn camera_from_xyz(&self, observer: &Observer, white_xy: [f64; 2]) -> Matrix3<f64> {
         let share = self.share_of_first(observer, white_xy);
-        let mixed = |of: fn(&Illuminated) -> Matrix3<f64>| match &self.second {
-            Some(second) => of(&self.first) * share + of(second) * (1.0 - share),
-            None => of(&self.first),
-        };
         let analog_balance = Matrix3::from_diagonal(&Vector3::from(self.analog_balance));
-        analog_balance * mixed(|set| set.camera_calibration) * mixed(|set| set.color_matrix)
+        analog_balance * self.mixed(share, |set| set.camera_calibration) * self.mixed(share, |set| set.color_matrix)
     }
 
     fn share_of_first(&self, observer: &Observer, white_xy: [f64; 2]) -> f64 {
@@ -140,6 +165,7 @@ fn inverse(matrix: &Matrix3<f64>) -> Result<Matrix3<f64>, String> {
 mod tests {
     use super::*;
     use crate::color::D65_XY;
+    use crate::color::adaptation::Adaptation;
     use crate::formats::data::load_observer;
 
     fn two() -> Calibration {
@@ -147,6 +173,7 @@ mod tests {
             temperature_k,
             color_matrix,
             camera_calibration: Matrix3::identity(),
+            forward_matrix: None,
         };
         // Of the size of a camera's, for A and D65.
         let warm = Matrix3::new(0.7, -0.1, -0.05, -0.45, 1.25, 0.22, -0.07, 0.17, 0.55);
@@ -183,6 +210,42 @@ mod tests {
         let middle = 2.0 / (1.0 / 2850.0 + 1.0 / 6500.0);
         let expected = (calibration.first.color_matrix + second) * 0.5;
         assert!((at(middle) - expected).norm() < 1e-4);
+    }
+
+    /// Forward matrices that are made of the color matrices for their own illuminant, adapted to D50: what is white becomes
+    /// D50 of Y = 1 where its largest signal is 1, and at the illuminants all colors are those of the color matrix, adapted.
+    #[test]
+    fn forward_matrices_give_colors_under_d50() {
+        let observer = load_observer().unwrap();
+        let plain = Calibration { analog_balance: [1.0, 0.8, 1.3], ..two() };
+        let with_forward = |set: Illuminated| {
+            let white = crate::color::locus::planckian(&observer, set.temperature_k);
+            let adaptation = Adaptation::Bradford.between(white, D50_XY).unwrap();
+            let neutral = set.color_matrix * Vector3::from(xyz_of_chromaticity(white, 1.0));
+            let back = set.color_matrix.try_inverse().unwrap();
+            let forward = adaptation * back * Matrix3::from_diagonal(&neutral);
+            Illuminated { forward_matrix: Some(forward), ..set }
+        };
+        assert!(plain.mapped_forward(&observer, Light::White(D65_XY)).unwrap_err().contains("ForwardMatrix"));
+        let (first, second) = (with_forward(plain.first), plain.second.map(with_forward));
+        let calibration = Calibration { first, second, ..plain };
+        for white in [D65_XY, [0.40, 0.39]] {
+            let mapped = calibration.mapped_forward(&observer, Light::White(white)).unwrap();
+            let signals =
+                calibration.camera_from_xyz(&observer, white) * Vector3::from(xyz_of_chromaticity(white, 1.0));
+            let seen = mapped.xyz_from_camera * (signals / signals.max());
+            assert!(
+                (seen - Vector3::from(xyz_of_chromaticity(D50_XY, 1.0))).amax() < 1e-12 && mapped.white_xy == D50_XY
+            );
+        }
+        for set in [Some(first), second].into_iter().flatten() {
+            let white = crate::color::locus::planckian(&observer, set.temperature_k);
+            let adapted = Adaptation::Bradford.between(white, D50_XY).unwrap()
+                * calibration.mapped(&observer, Light::White(white)).unwrap().xyz_from_camera;
+            let forward = calibration.mapped_forward(&observer, Light::White(white)).unwrap().xyz_from_camera;
+            // The temperature of the white is found to 10⁻⁶.
+            assert!((adapted - forward).amax() < 1e-5, "{adapted} {forward}");
+        }
     }
 
     #[test]

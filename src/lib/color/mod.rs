@@ -1,8 +1,12 @@
 //! Color: CIE XYZ, xyY, L*a*b* and a viewable sRGB; differences; loci. Knows no camera.
 
+pub mod adaptation;
 pub mod calibration;
+pub mod coordinates;
 pub mod difference;
+pub mod illuminant;
 pub mod locus;
+pub mod luv;
 pub mod temperature;
 
 use crate::names::Named;
@@ -18,19 +22,28 @@ pub enum Space {
     Xyy,
     /// CIE 1976 L*a*b*.
     Lab,
+    /// CIE 1976 L*u*v*.
+    Luv,
+    /// Correlated color temperature in K, distance from black bodies Duv, luminance Y in cd m⁻².
+    Cct,
     /// sRGB for viewing.
     Srgb,
+    /// Linear light of the primaries of sRGB, white 1, signed and not clipped.
+    LinearSrgb,
 }
 
 impl Named for Space {
-    const ALL: &'static [Self] = &[Self::Xyz, Self::Xyy, Self::Lab, Self::Srgb];
+    const ALL: &'static [Self] = &[Self::Xyz, Self::Xyy, Self::Lab, Self::Luv, Self::Cct, Self::Srgb, Self::LinearSrgb];
 
     fn name(self) -> &'static str {
         match self {
             Self::Xyz => "xyz",
             Self::Xyy => "xyy",
             Self::Lab => "lab",
+            Self::Luv => "luv",
+            Self::Cct => "cct",
             Self::Srgb => "srgb",
+            Self::LinearSrgb => "linear-srgb",
         }
     }
 }
@@ -41,17 +54,22 @@ impl fmt::Display for Space {
             Self::Xyz => "XYZ",
             Self::Xyy => "xyY",
             Self::Lab => "L*a*b*",
+            Self::Luv => "L*u*v*",
+            Self::Cct => "CCT, Duv, Y",
             Self::Srgb => "sRGB",
+            Self::LinearSrgb => "linear sRGB",
         })
     }
 }
 
-/// The white that L*a*b* and sRGB refer to.
+/// The white that L*a*b*, L*u*v* and sRGB refer to.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum White {
     /// Chromaticity of D65; the luminance is chosen apart.
     #[default]
     D65,
+    /// That of D50.
+    D50,
     /// Chromaticity of equal energy, (⅓, ⅓).
     EqualEnergy,
     /// Absolute XYZ.
@@ -59,18 +77,37 @@ pub enum White {
 }
 
 impl fmt::Display for White {
-    /// As options have it: `d65`, `e`, or X,Y,Z.
+    /// As options have it: `d65`, `d50`, `e`, or X,Y,Z.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::D65 => f.write_str("d65"),
+            Self::D50 => f.write_str("d50"),
             Self::EqualEnergy => f.write_str("e"),
             Self::Absolute([x, y, z]) => write!(f, "{x},{y},{z}"),
         }
     }
 }
 
+impl White {
+    /// Its XYZ where it has this luminance; those given outright stay.
+    pub fn xyz(self, luminance: f64) -> [f64; 3] {
+        match self {
+            Self::Absolute(white) => white,
+            Self::D65 => xyz_of_chromaticity(D65_XY, luminance),
+            Self::D50 => xyz_of_chromaticity(D50_XY, luminance),
+            Self::EqualEnergy => xyz_of_chromaticity([1.0 / 3.0; 2], luminance),
+        }
+    }
+}
+
 /// Chromaticity of D65 for the 2° observer, as IEC 61966-2-1 has it.
 pub const D65_XY: [f64; 2] = [0.3127, 0.3290];
+
+/// Chromaticity of D50 for the 2° observer.
+pub const D50_XY: [f64; 2] = [0.3457, 0.3585];
+
+/// Primaries of sRGB, red, green, blue, and its white [IEC 61966-2-1].
+pub const SRGB_PRIMARIES: [[f64; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], D65_XY];
 
 /// Linear sRGB from XYZ of unit white luminance [IEC 61966-2-1].
 const SRGB_FROM_XYZ: Matrix3<f64> = Matrix3::new(
@@ -89,6 +126,12 @@ const BRADFORD: Matrix3<f64> = Matrix3::new(
 /// XYZ of a chromaticity at a luminance.
 pub fn xyz_of_chromaticity([x, y]: [f64; 2], luminance: f64) -> [f64; 3] {
     [luminance * x / y, luminance, luminance * (1.0 - x - y) / y]
+}
+
+/// The chromaticity of XYZ.
+pub fn chromaticity([x, y, z]: [f64; 3]) -> [f64; 2] {
+    let sum = x + y + z;
+    [x / sum, y / sum]
 }
 
 /// xyY of XYZ; where X + Y + Z is not above zero there is no chromaticity, and that of `white` stands in.

@@ -25,6 +25,18 @@ const MAX_CELLS: usize = 1 << 25;
 /// A table may have this many columns: as text they take many times the memory of their numbers.
 const MAX_COLUMNS: usize = 1 << 20;
 
+/// The names of the columns of a table of any kind; `name` is the file in messages.
+///
+/// # Errors
+///
+/// [`Error::Format`] for what is no CSV table.
+pub fn columns(name: &str, bytes: &[u8]) -> Result<Vec<String>> {
+    check_cells(name, bytes)?;
+    let mut reader = reader(bytes, true);
+    let headers = reader.headers().map_err(|error| csv_complaint(name, &error))?;
+    Ok(headers.iter().take(MAX_COLUMNS).map(ToOwned::to_owned).collect())
+}
+
 /// Reads one column of a table of any kind as text; `name` is the file in messages.
 ///
 /// # Errors

@@ -18,11 +18,14 @@ pub const DATA_VARIABLE: &str = "CYANOMETER_DATA";
 pub const DEFAULT_SENSOR: &str = "kaf-5101ce";
 
 /// Files that every program carries, by their place in `sample_data`.
-const BUILT_IN: [(&str, &[u8]); 4] = [
+const BUILT_IN: [(&str, &[u8]); 7] = [
     ("sensors/kaf-5101ce.yaml", include_bytes!("../../../sample_data/sensors/kaf-5101ce.yaml")),
     ("sensors/kaf5101ce_est_qe_1nm.csv", include_bytes!("../../../sample_data/sensors/kaf5101ce_est_qe_1nm.csv")),
     ("sensors/bg39_1mm.csv", include_bytes!("../../../sample_data/sensors/bg39_1mm.csv")),
     ("observers/cie1931_2deg_1nm.csv", include_bytes!("../../../sample_data/observers/cie1931_2deg_1nm.csv")),
+    ("illuminants/cie_daylight_1nm.csv", include_bytes!("../../../sample_data/illuminants/cie_daylight_1nm.csv")),
+    ("charts/colorchecker.csv", include_bytes!("../../../sample_data/charts/colorchecker.csv")),
+    ("charts/colorchecker-2005.csv", include_bytes!("../../../sample_data/charts/colorchecker-2005.csv")),
 ];
 
 /// A sensor with its curves.
@@ -151,6 +154,36 @@ pub fn load_observer() -> Result<Observer> {
     let name = "observers/cie1931_2deg_1nm.csv";
     let table = SpectralTable::parse(name, built_in(name).unwrap_or_default())?;
     Ok(Observer { matching: [table.curve(Some("xbar"))?, table.curve(Some("ybar"))?, table.curve(Some("zbar"))?] })
+}
+
+/// The components S₀, S₁ and S₂ of CIE daylight, built in.
+///
+/// # Errors
+///
+/// None unless the built-in table is damaged.
+pub fn load_daylight() -> Result<[Curve; 3]> {
+    let name = "illuminants/cie_daylight_1nm.csv";
+    let table = SpectralTable::parse(name, built_in(name).unwrap_or_default())?;
+    Ok([table.curve(Some("S0"))?, table.curve(Some("S1"))?, table.curve(Some("S2"))?])
+}
+
+/// The table of a chart, with its name in messages: one of the installed, in-tree and built-in ones, or the path of a file.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for an unknown name; those of readers.
+pub fn chart(name: &str) -> Result<(String, Vec<u8>)> {
+    let path = Path::new(name);
+    if path.components().count() > 1 || path.extension().is_some_and(|end| !end.is_empty()) {
+        return Ok((name.to_owned(), read_file(path)?));
+    }
+    let Some((_, bytes)) = find(&format!("charts/{name}.csv"))? else {
+        return Err(Error::Usage(format!(
+            "there is no chart `{name}`; known are colorchecker (made from November 2014 on) and colorchecker-2005 (made \
+             before); for a table of your own give its path, ending in .csv"
+        )));
+    };
+    Ok((name.to_owned(), bytes))
 }
 
 /// An efficiency or a transmittance is a fraction.

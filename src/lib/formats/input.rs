@@ -9,7 +9,7 @@ use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
 use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
-use crate::frame::Geometry;
+use crate::frame::{Geometry, THREE_PLANES};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::stages::linearize::Linearize;
 use crate::stages::saturation::{MASK_LAYER, with_mask};
@@ -171,10 +171,7 @@ impl FrameReader {
         let is_ours = !metadata.history.is_empty();
         let mask = left_out.iter().position(|channel| channel == MASK_LAYER).map(|at| geometry.channels.len() + at);
         let mask = mask.filter(|_| is_ours);
-        let dropped: Vec<&str> = left_out.iter().map(String::as_str).filter(|channel| *channel != MASK_LAYER).collect();
-        if !dropped.is_empty() {
-            notes.push(format!("{name}: channels {} are left out", dropped.join(", ")));
-        }
+        notes.extend(self::left_out(name, left_out));
         let check = metadata.samples.as_ref().zip(sidecar).map(|(samples, sidecar)| DigestCheck {
             digest: SamplesDigest::like(&samples.digest),
             expected: samples.digest.clone(),
@@ -235,6 +232,19 @@ impl FrameReader {
             self.keeps_mask = true;
             self.header = with_mask(self.header.clone());
         }
+    }
+
+    /// Keeps the channels `layer` too, where the file has them right behind those that are kept; tells whether it does.
+    pub fn keep(&mut self, layer: &[&str]) -> bool {
+        let kept = self.first_channel + self.header.geometry.channels.len();
+        let stored = &self.reader.geometry().channels;
+        let is_there = stored.get(kept..kept + layer.len()).is_some_and(|channels| channels.iter().eq(layer));
+        if is_there {
+            self.notes.retain(|note| !note.ends_with(LEFT_OUT));
+            self.notes.extend(left_out(&self.header.name, &stored[kept + layer.len()..]));
+            self.header.geometry.channels.extend(layer.iter().map(|name| (*name).to_owned()));
+        }
+        is_there
     }
 
     /// Pixels among those read so far that were made of saturated samples, as the frame's layer of marks says; of one that is
@@ -345,6 +355,15 @@ impl RowSource for FrameReader {
         self.check_digest();
         Ok(())
     }
+}
+
+/// How the note of channels that no stage sees ends.
+const LEFT_OUT: &str = " are left out";
+
+/// That note; none where there are no such channels but marks.
+fn left_out(name: &str, channels: &[String]) -> Option<String> {
+    let dropped: Vec<&str> = channels.iter().map(String::as_str).filter(|channel| *channel != MASK_LAYER).collect();
+    (!dropped.is_empty()).then(|| format!("{name}: channels {}{LEFT_OUT}", dropped.join(", ")))
 }
 
 /// Whether an open file is one that can seek, and no pipe.
@@ -488,7 +507,7 @@ fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry
     let starts =
         |names: &[&str]| stored.channels.len() > names.len() && stored.channels.iter().zip(names).all(|(a, b)| a == b);
     if !all && quantity != QuantityKind::SpectralRadiance {
-        if [["R", "G", "B"], ["x", "y", "Y"], ["L", "a", "b"]].iter().any(|planes| starts(planes)) {
+        if THREE_PLANES.iter().any(|planes| starts(planes)) {
             kept.channels.truncate(3);
         } else if starts(&["Y"]) {
             kept.channels.truncate(1);

@@ -1,6 +1,7 @@
 //! Files: bytes to frames and back.
 
 pub mod atomic;
+pub mod chart;
 pub mod csv;
 pub mod data;
 pub mod digest;

@@ -10,7 +10,7 @@ use super::standard::open_stdout;
 use super::storing::Encoding;
 use super::tiff::{TiffSamples, TiffSettings, TiffTags, TiffWriter};
 use super::yaml;
-use crate::color;
+use crate::color::{self, SRGB_PRIMARIES};
 use crate::error::{Error, Result};
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
@@ -148,6 +148,7 @@ fn native_tags(header: &FrameHeader) -> ExrTags {
     let FrameHeader { metadata, .. } = header;
     let primaries = match metadata.quantity {
         QuantityKind::Xyz => Some(XYZ_PRIMARIES),
+        QuantityKind::LinearSrgb => Some(SRGB_PRIMARIES),
         QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu
             if header.leads_with_three_planes() =>
         {

@@ -9,8 +9,8 @@ pub use correction::{
     AverageRecord, CorrectionRecord, DefectsRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
 };
 pub use records::{
-    ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord, PoissonKind,
-    PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
+    AdaptationRecord, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord,
+    PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
 };
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
@@ -233,6 +233,8 @@ impl FrameHeader {
             QuantityKind::Xyz => ["X", "Y", "Z"],
             QuantityKind::Xyy => ["x", "y", "Y"],
             QuantityKind::Lab => ["L", "a", "b"],
+            QuantityKind::Luv => ["L", "u", "v"],
+            QuantityKind::Cct => ["CCT", "Duv", "Y"],
             _ => return name,
         };
         match name {

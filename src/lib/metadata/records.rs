@@ -3,7 +3,7 @@
 use crate::camera::levels::BlackLevel;
 use crate::camera::optics::Exposure;
 use crate::cfa::CfaPattern;
-use crate::color;
+use crate::color::{self, adaptation::Adaptation};
 use crate::names::{Named, serde_by_name};
 use crate::random::Source;
 use nalgebra::{Matrix3, Vector3};
@@ -147,12 +147,51 @@ pub struct ColorRecord {
     /// XYZ of the white that Lab and sRGB refer to, on the scale of the frame's XYZ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub white: Option<[f64; 3]>,
+    /// Chromaticity of the light that the colors are seen under, where it is known: that of the scene, or that which they were
+    /// adapted to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene_white_xy: Option<[f64; 2]>,
+    /// The adaptation from one light to another, which is part of the matrix.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adapted: Option<AdaptationRecord>,
     /// How far the matrix is off without noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix_residual: Option<MatrixResidual>,
 }
 
+/// How colors were adapted from one light to another.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AdaptationRecord {
+    /// The transform.
+    pub transform: Adaptation,
+    /// Chromaticity of the light that they had.
+    pub from_xy: [f64; 2],
+    /// Chromaticity of the light that they have now.
+    pub to_xy: [f64; 2],
+}
+
 impl ColorRecord {
+    /// That of XYZ of which no camera is known: the matrix is the identity.
+    pub fn of_xyz() -> Self {
+        Self {
+            xyz_from_camera: color::rows_of(&Matrix3::identity()),
+            range_adu: None,
+            method: None,
+            black_adu: 0.0,
+            white: None,
+            scene_white_xy: None,
+            adapted: None,
+            matrix_residual: None,
+        }
+    }
+
+    /// Notes that XYZ were adapted by a matrix, which becomes part of that of the camera.
+    pub fn adapt(&mut self, record: AdaptationRecord, adaptation: &Matrix3<f64>) {
+        self.xyz_from_camera = color::rows_of(&(adaptation * color::matrix(&self.xyz_from_camera)));
+        self.scene_white_xy = Some(record.to_xy);
+        self.adapted = Some(record);
+    }
+
     /// Whether XYZ are relative: Y = 1 for the white by which the first class reaches its white level.
     pub fn is_relative(&self) -> bool {
         self.range_adu.is_some()
@@ -275,6 +314,9 @@ pub struct SamplesRecord {
     /// Colors outside sRGB, clipped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub out_of_gamut: Option<u64>,
+    /// Colors without a correlated color temperature, NaN.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub off_locus: Option<u64>,
     /// Pixels whose noise cannot be propagated, green being too near its noise to divide by.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub propagation_void: Option<u64>,

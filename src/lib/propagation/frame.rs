@@ -11,6 +11,7 @@ use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
 use crate::camera::levels::BlackLevel;
 use crate::color;
+use crate::color::luv::{luv_about, luv_from_xyz};
 use crate::error::Error;
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::names::Named;
@@ -198,7 +199,16 @@ impl Sites {
                 let local = color::lab_about(xyz.mean, white);
                 xyz.to_color(&local, |xyz| color::lab_from_xyz(xyz, white), is_straight, equations)
             }
-            _ => return Err(Unpredictable::Beyond("of colors only XYZ, xyY and L*a*b* are predicted")),
+            QuantityKind::Luv => {
+                let white = record.white.ok_or(Unpredictable::Missing("color.white"))?;
+                let local = luv_about(xyz.mean, white).ok_or(Unpredictable::Beyond("its mean has no chromaticity"))?;
+                xyz.to_color(&local, |xyz| luv_from_xyz(xyz, white), |_, _| false, equations)
+            }
+            QuantityKind::LinearSrgb => {
+                let white = record.white.ok_or(Unpredictable::Missing("color.white"))?;
+                xyz.through(&color::linear_srgb_from_xyz(white), 0.0)
+            }
+            _ => return Err(Unpredictable::Beyond("of colors XYZ, xyY, L*a*b*, L*u*v* and linear sRGB are predicted")),
         };
         Ok(FramePrediction::Pixels(Box::new(pixels)))
     }

@@ -1,5 +1,7 @@
 //! Reports of fitted matrices and of how well they do.
 
+use super::chart;
+use super::matrix_text::{differences_text, matrix_text};
 use super::trade_off::trade_off;
 use super::{ReportFormat, shown, table, unwritable};
 use crate::analysis::characterization::CameraMatrix;
@@ -8,7 +10,9 @@ use crate::color::difference::{Difference, DifferenceReport};
 use crate::error::{Error, Result};
 use crate::formats::plots::{PlotFormat, write_plot};
 use crate::formats::{files, output, register, yaml_writer};
-use crate::requests::fit::{Characterization, Conditions, Evaluation, Fit, Group, NoiseReport};
+use crate::requests::fit::{
+    Characterization, ChartFound, Conditions, Evaluation, Fit, Group, MatrixFound, MatrixRequest, NoiseReport,
+};
 use crate::requests::values;
 use crate::text::visible;
 use clap::Args;
@@ -19,7 +23,8 @@ use std::path::PathBuf;
 /// Where a matrix and its report go, in which form, and the plot.
 #[derive(Debug, Clone, Default, Args)]
 pub struct MatrixOutputs {
-    /// Form of what goes to standard output; by default yaml, and text with --evaluate or --noise-weight
+    /// Form of what goes to standard output; by default yaml, and text with --evaluate or --noise-weight, or of a
+    /// chart whose matrix goes to a file
     #[arg(long, value_parser = values::one_of(&[ReportFormat::Yaml, ReportFormat::Json, ReportFormat::Text, ReportFormat::Csv]))]
     pub output_format: Option<ReportFormat>,
     /// Draw the trade-off of --noise-weight, as SVG or PNG
@@ -51,6 +56,55 @@ impl MatrixOutputs {
             ));
         }
         register::announce(&[self.output.as_deref(), self.plot.as_deref()])
+    }
+
+    /// Refuses, before any work, what the request does not give or what cannot be written.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`]; those of [`Self::check`].
+    pub fn check_request(&self, request: &MatrixRequest) -> Result<()> {
+        if let Some(fit) = &request.fit {
+            return self.check(fit);
+        }
+        if self.plot.is_some() {
+            return Err(Error::Usage(
+                "--plot draws the trade-off of --noise-weight, which a chart or a raw has not".into(),
+            ));
+        }
+        if self.output_format == Some(ReportFormat::Csv) && request.raw.from_raw.is_some() {
+            return Err(Error::Usage("csv has one row for each patch of a chart; a raw file has none".into()));
+        }
+        register::announce(&[self.output.as_deref()])
+    }
+
+    /// Writes matrix file and report, of a chart as text where nothing else is asked for.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::write`] and [`chart::chart`].
+    pub fn write_found(&self, found: &MatrixFound) -> Result<()> {
+        match found {
+            MatrixFound::Fitted(found) => self.write(found),
+            MatrixFound::OfChart(found) => self.write_chart(found),
+            MatrixFound::Own(matrix, _) => {
+                let matrix = CameraMatrix::clone(matrix);
+                self.write(&Characterization { matrix, evaluation: None, trade_off: Vec::new(), notes: Vec::new() })
+            }
+        }
+    }
+
+    /// Writes the matrix file of a chart, and its report.
+    fn write_chart(&self, found: &ChartFound) -> Result<()> {
+        let to_file = files::named(self.output.as_deref());
+        let file = matrix(&found.matrix)?;
+        if let Some(path) = to_file {
+            output::write_text(Some(path), &file)?;
+        }
+        match (to_file, self.output_format) {
+            (None, None) => output::write_text(None, &file),
+            (_, format) => output::write_text(None, &chart::chart(found, format.unwrap_or(ReportFormat::Text))?),
+        }
     }
 
     /// Writes matrix file, plot and report.
@@ -238,67 +292,6 @@ fn text(found: &Characterization) -> String {
         table(&columns, &mut out);
     }
     out
-}
-
-fn matrix_text(matrix: &CameraMatrix, out: &mut String) {
-    let unit = matrix.unit.as_deref().unwrap_or_default();
-    let _ = writeln!(out, "XYZ from R, G, B [{unit}], {}", matrix.method.as_deref().unwrap_or("method unknown"));
-    for (i, (name, row)) in ["X", "Y", "Z"].iter().zip(matrix.xyz_from_camera).enumerate() {
-        let _ = write!(out, "{name} {:>14.6e} {:>14.6e} {:>14.6e}", row[0], row[1], row[2]);
-        let _ = match &matrix.uncertainty {
-            Some(known) => {
-                let [a, b, c] = known.standard_error[i];
-                writeln!(out, "   standard error {a:.1e} {b:.1e} {c:.1e}")
-            }
-            None => writeln!(out),
-        };
-    }
-    if matrix.uncertainty.is_none() && matrix.training.is_some() {
-        out.push_str("no standard errors: without any one of the samples the matrix would not be determined\n");
-    }
-    if let Some(condition) = matrix.condition {
-        let rank = matrix.rank.map_or(String::new(), |rank| format!(", rank {rank}"));
-        let _ = writeln!(out, "condition number {condition:.2}{rank}");
-    }
-    if let Some(training) = &matrix.training {
-        let [x, y, z] = training.relative_rms.map(|rms| 100.0 * rms);
-        let [dx, dy] = training.max_chromaticity_error;
-        let held = if training.held_out.is_empty() {
-            String::new()
-        } else {
-            format!(", without {}", training.held_out.join(", "))
-        };
-        let kept = training.white_sample.map_or(String::new(), |sample| format!(", sample {sample} kept exact"));
-        let what = if training.samples.is_none() && matrix.method.as_deref().is_some_and(|m| m.starts_with("max-ign")) {
-            "observations of the responses alone, judged on"
-        } else {
-            "samples of"
-        };
-        let _ = writeln!(out, "{} {what} {}{held}{kept}", training.count, training.library);
-        let _ = writeln!(out, "rms error of X, Y, Z: {x:.3} %, {y:.3} %, {z:.3} %");
-        let _ = writeln!(out, "largest error of x, y: {dx:.5}, {dy:.5}");
-    }
-}
-
-/// A table of differences: one row per formula and heading.
-fn differences_text(rows: &[(String, DifferenceReport)], out: &mut String) {
-    let mut columns: Vec<Vec<String>> =
-        ["", "min", "mean", "median", "p95", "max", "<1/10", "<1/4", "<1/2"].map(|heading| vec![heading.into()]).into();
-    for (name, report) in rows {
-        for (formula, found) in report.formulas() {
-            let summary = found.summary;
-            columns[0].push(format!("{name}{formula}"));
-            let numbers = [summary.min, summary.mean, summary.median, summary.p95, summary.max];
-            for (column, number) in columns[1..6].iter_mut().zip(numbers) {
-                column.push(format!("{number:.4}"));
-            }
-            let shares = [found.below_tenth, found.below_quarter, found.below_half];
-            for (column, share) in columns[6..].iter_mut().zip(shares) {
-                column.push(format!("{:.1} %", 100.0 * share));
-            }
-        }
-    }
-    table(&columns, out);
 }
 
 fn evaluation_text(evaluation: &Evaluation, out: &mut String) {

@@ -1,8 +1,10 @@
 //! Reports: statistics and matrices as text, JSON, YAML and CSV, and as plots.
 
 pub mod characterization;
+pub mod chart;
 
 mod difference;
+mod matrix_text;
 mod photon_transfer;
 mod prediction;
 mod raw_outputs;

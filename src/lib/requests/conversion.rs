@@ -1,18 +1,25 @@
-//! Turning camera frames into colors, by a matrix file or the matrix that comes with the frame.
+//! Turning camera frames into colors, by a matrix file or the matrix that comes with the frame; and XYZ into other spaces.
 
 use super::notes::Note;
-use super::options::WhiteChoice;
-use super::values;
+use super::options::{Output, WhiteChoice};
+use super::values::{self, LightColor};
 use crate::analysis::characterization::CameraMatrix;
 use crate::camera::optics::Exposure;
-use crate::color::{Space, White};
+use crate::color::adaptation::Adaptation;
+use crate::color::temperature::Locus;
+use crate::color::{self, Space, White, rows_of};
 use crate::error::{Error, Result};
 use crate::formats::data;
+use crate::formats::input::FrameReader;
 use crate::metadata::{FrameHeader, Metadata};
 use crate::names::Named;
+use crate::stages::from_xyz::{Adapting, COVARIANCE_LAYER, FromXyz, XyzSettings, layers_of, scene_white};
 use crate::stages::to_xyz::{ColorSettings, ToXyz};
+use crate::stream::RowSource;
+use crate::units::QuantityKind;
 use clap::Args;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Y of a relative white that must be one in cd/m².
 const BRIGHT_WHITE: f64 = 10.0;
@@ -20,19 +27,29 @@ const BRIGHT_WHITE: f64 = 10.0;
 /// Which colors are made of a frame, and by which matrix.
 #[derive(Debug, Clone, Args)]
 #[command(mut_arg("white", |option| option.help(
-    "White of lab and srgb: d65, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative"
+    "White of lab, luv, srgb and linear-srgb: d65, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative"
 )))]
 #[command(mut_arg("white_luminance", |option| option.help(
-    "Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates. Of relative XYZ it is 1"
+    "Luminance of the white d65, d50 or e in cd/m2; by default that at which the camera saturates, or of XYZ what they record. Of relative XYZ it is 1"
 )))]
 pub struct Conversion {
     /// Matrix file, as fit-matrix or import-raw --write-matrix makes it; by default that of the frame's sensor, or of the raw
     /// file that it comes from
     #[arg(long, value_name = "FILE")]
     pub matrix: Option<PathBuf>,
-    /// Color space
+    /// Color space; cct is correlated color temperature in K, Duv and Y; linear-srgb is neither clipped nor encoded
     #[arg(long, default_value = Space::Xyz.name(), value_parser = values::choice::<Space>())]
     pub space: Space,
+    /// Adapt colors to this light first, so that what is white in the scene becomes its white: an illuminant (d65, d50, a, e),
+    /// a temperature (5500K), x,y or X,Y,Z
+    #[arg(long, value_name = "LIGHT", value_parser = values::light)]
+    pub adapt_to: Option<LightColor>,
+    /// The light of the scene, that colors are adapted from; by default what the matrix or the frame tells
+    #[arg(long, value_name = "LIGHT", value_parser = values::light, requires = "adapt_to")]
+    pub scene_white: Option<LightColor>,
+    /// Transform of the adaptation
+    #[arg(long, value_name = "NAME", default_value = Adaptation::default().name(), value_parser = values::choice::<Adaptation>())]
+    pub adaptation: Adaptation,
     /// The white of L\*a\*b\* and sRGB.
     #[command(flatten)]
     pub white: WhiteChoice,
@@ -51,6 +68,13 @@ pub struct Conversion {
 }
 
 impl Conversion {
+    /// A warning of a picture in a file that other programs take for linear light.
+    pub fn doubt_of(&self, output: &Output) -> Option<Note> {
+        let text = "other programs take an EXR for linear light, and these are samples encoded for viewing; for a picture name a \
+                    .tiff, or let `preview` make one";
+        (self.space == Space::Srgb && output.is_exr()).then(|| Note::Warning(text.into()))
+    }
+
     /// The matrix of a file, before any frame is waited for.
     ///
     /// # Errors
@@ -65,7 +89,7 @@ impl Conversion {
     /// # Errors
     ///
     /// Those of [`Exposure::checked`] and [`ToXyz::new`]; [`Error::Usage`] for another black level than the metadata state,
-    /// and where there is no matrix.
+    /// and where there is no matrix, or no light of the scene to adapt from.
     pub fn stage(&self, matrix: Option<CameraMatrix>, frame: &mut FrameHeader) -> Result<(ToXyz, Vec<Note>)> {
         if let Some(black) = self.black {
             if frame.black_levels()?.is_some_and(|known| known.uniform() != Some(black)) {
@@ -93,16 +117,102 @@ impl Conversion {
             }
         };
         notes.extend(self.doubts(&matrix, frame));
+        let adapting = self.adapting(matrix.white_xy, &frame.name)?;
+        let adaptation = adapting.map(|adapting| adapting.matrix()).transpose()?;
+        let adapted = |rows| adaptation.map_or(rows, |by| rows_of(&(by * color::matrix(&rows))));
         let settings = ColorSettings {
             is_relative: matrix.is_relative(),
-            xyz_from_camera: matrix.xyz_from_camera,
+            xyz_from_camera: adapted(matrix.xyz_from_camera),
             residual: matrix.residual(),
             method: matrix.method,
             space: self.space,
             white: self.white.white,
             white_luminance: self.white.white_luminance,
         };
-        Ok((ToXyz::new(frame, &settings)?, notes))
+        let mut stage = ToXyz::beside(frame, &settings, self.locus()?)?;
+        if let Some(record) = &mut stage.header_mut().metadata.color {
+            record.scene_white_xy = adapting.map(|adapting| adapting.to_xy).or(matrix.white_xy);
+            record.adapted = adapting.map(Adapting::record);
+            notes.extend(self.doubt_of_light(record.scene_white_xy));
+        }
+        Ok((stage, notes))
+    }
+
+    /// The stage that takes a frame of XYZ to another space, none of frames that hold something else; covariances come along
+    /// where the frame has them and the output `holds_layers`. With `sigma` they must.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`FromXyz::new`]; [`Error::Usage`] for options that are those of camera frames, and where there is no light of
+    /// the scene to adapt from; [`Error::Format`] without the covariances that `sigma` asks for.
+    pub fn stage_of_xyz(&self, reader: &mut FrameReader, sigma: bool, holds_layers: bool) -> Result<Option<FromXyz>> {
+        if reader.header().metadata.quantity != QuantityKind::Xyz {
+            return Ok(None);
+        }
+        let name = reader.header().name.clone();
+        let of_cameras: [(&'static [&'static str], bool); 5] = [
+            (&["matrix"], self.matrix.is_some()),
+            (&["black"], self.black.is_some()),
+            (&["exposure"], self.exposure_s.is_some()),
+            (&["f_number"], self.f_number.is_some()),
+            (&["lens_transmittance"], self.lens_transmittance.is_some()),
+        ];
+        if let Some((option, _)) = of_cameras.into_iter().find(|(_, is_given)| *is_given) {
+            let problem = format!("{name}: it holds XYZ already, and this is an option for frames of a camera");
+            return Err(Error::Usage(problem).leave_out(option));
+        }
+        if sigma {
+            layers_of(self.space)?;
+        }
+        let is_wanted = self.space != Space::Srgb && (holds_layers || sigma);
+        let has_covariance = is_wanted && reader.keep(&COVARIANCE_LAYER);
+        if sigma && !has_covariance {
+            let problem = "it has no layer `covariance.*`, from which the standard deviations of other colors follow; make it \
+                           anew with `to-xyz --sigma`";
+            return Err(reader.header().refuse(problem));
+        }
+        let settings = XyzSettings {
+            space: self.space,
+            white: self.white.white,
+            white_luminance: self.white.white_luminance,
+            adapting: self.adapting(scene_white(reader.header()), &name)?,
+            locus: self.locus()?,
+        };
+        FromXyz::new(reader.header(), &settings).map(Some)
+    }
+
+    /// What to say where the light of the colors is not the white that they are referred to.
+    fn doubt_of_light(&self, light_xy: Option<[f64; 2]>) -> Option<Note> {
+        /// Chromaticities that are nearer are those of one light.
+        const NEAR: f64 = 0.005;
+        let needs_white = matches!(self.space, Space::Lab | Space::Luv | Space::Srgb | Space::LinearSrgb);
+        let [x, y] = light_xy.filter(|_| needs_white)?;
+        let white = color::chromaticity(self.white.white.xyz(1.0));
+        let is_far = (x - white[0]).abs().max((y - white[1]).abs()) > NEAR;
+        is_far.then(|| {
+            let text = format!(
+                "what is white in its light, x {x:.4}, y {y:.4}, is not that under the white {}; --adapt-to {} makes it so",
+                self.white.white, self.white.white
+            );
+            Note::Remark(text)
+        })
+    }
+
+    /// The adaptation that is asked for, from the light that is given or known.
+    fn adapting(&self, known: Option<[f64; 2]>, frame: &str) -> Result<Option<Adapting>> {
+        let Some(to) = self.adapt_to else { return Ok(None) };
+        let observer = data::load_observer()?;
+        let from_xy = self.scene_white.map(|light| light.xy(&observer)).or(known);
+        let Some(from_xy) = from_xy else {
+            let problem = format!("{frame}: neither matrix nor frame tells the light of the scene to adapt from");
+            return Err(Error::Usage(problem).give(&["scene_white"]));
+        };
+        Ok(Some(Adapting { transform: self.adaptation, from_xy, to_xy: to.xy(&observer) }))
+    }
+
+    /// The black bodies that temperatures are told by, where these are asked for.
+    fn locus(&self) -> Result<Option<Arc<Locus>>> {
+        (self.space == Space::Cct).then(|| Ok(Arc::new(Locus::new(&data::load_observer()?)))).transpose()
     }
 
     /// What may not be meant about a matrix and a frame.

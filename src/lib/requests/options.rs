@@ -304,10 +304,10 @@ impl NoiseChoice {
 /// The white that colors refer to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct WhiteChoice {
-    /// White of L*a*b*: d65, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative by a matrix that says so
-    #[arg(long, default_value_t, value_name = "d65|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
+    /// White of L*a*b*: d65, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative by a matrix that says so
+    #[arg(long, default_value_t, value_name = "d65|d50|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
     pub white: White,
-    /// Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates
+    /// Luminance of the white d65, d50 or e in cd/m2; by default that at which the camera saturates
     #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
     pub white_luminance: Option<f64>,
 }

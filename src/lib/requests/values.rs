@@ -3,9 +3,10 @@
 use super::border::Border;
 use crate::analysis::statistics::Region;
 use crate::cfa::CfaPattern;
-use crate::color::White;
+use crate::color::illuminant::Illuminant;
+use crate::color::{White, chromaticity};
 use crate::names::Named;
-use crate::spectrum::WavelengthGrid;
+use crate::spectrum::{Observer, WavelengthGrid};
 use crate::stages::black::Black;
 use crate::units::{self, RadianceUnit};
 use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
@@ -50,6 +51,44 @@ pub fn size(text: &str) -> Result<[usize; 2], String> {
     text.split_once(['x', 'X'])
         .and_then(|(width, height)| Some([parse(width)?, parse(height)?]))
         .ok_or_else(|| "a size is WIDTHxHEIGHT in photosites, such as 1332x1000".into())
+}
+
+/// Reads the centers of four corner patches, `X,Y,X,Y,X,Y,X,Y`.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| number(part.trim()).ok()).collect();
+    match numbers.as_deref() {
+        Some([a, b, c, d, e, f, g, h]) => Ok([[*a, *b], [*c, *d], [*e, *f], [*g, *h]]),
+        _ => {
+            Err("give column and row of the centers of dark skin, bluish green, black and white: eight numbers".into())
+        }
+    }
+}
+
+/// Reads `BLACK,WHITE`, the second above the first.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn levels(text: &str) -> Result<[f64; 2], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| number(part.trim()).ok()).collect();
+    match numbers.as_deref() {
+        Some([black, white]) if white > black => Ok([*black, *white]),
+        _ => Err("give the black level and the white level above it, ADU".into()),
+    }
+}
+
+/// Reads the temperature of a light in K, and keeps it as a light's name.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn temperature(text: &str) -> Result<String, String> {
+    let kelvin = kelvin(text)?;
+    Illuminant::of_temperature(kelvin).map(|light| light.to_string())
 }
 
 /// Reads finite numbers between commas.
@@ -273,7 +312,7 @@ pub fn region(text: &str) -> Result<Region, String> {
     }
 }
 
-/// Reads a white: `d65`, `e`, or absolute X,Y,Z.
+/// Reads a white: `d65`, `d50`, `e`, or X,Y,Z.
 ///
 /// # Errors
 ///
@@ -281,10 +320,49 @@ pub fn region(text: &str) -> Result<Region, String> {
 pub fn white(text: &str) -> Result<White, String> {
     match text {
         "d65" => Ok(White::D65),
+        "d50" => Ok(White::D50),
         "e" => Ok(White::EqualEnergy),
         numbers => three_numbers(numbers)
             .map(White::Absolute)
-            .map_err(|_| "give d65, e, or the white's X,Y,Z between commas".into()),
+            .map_err(|_| "give d65, d50, e, or the white's X,Y,Z between commas".into()),
+    }
+}
+
+/// Reads the color of a light: an illuminant or a temperature, x,y, or X,Y,Z.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn light(text: &str) -> Result<LightColor, String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    let wrong = || "give a light such as a, d50, d65, e or 3200K, its x,y, or its X,Y,Z, all above 0".to_owned();
+    match numbers.as_deref() {
+        Some([x, y]) if *x > 0.0 && *y > 0.0 && x + y < 1.0 => Ok(LightColor::Chromaticity([*x, *y])),
+        Some([x, y, z]) if [x, y, z].iter().all(|value| **value > 0.0) => {
+            Ok(LightColor::Chromaticity(chromaticity([*x, *y, *z])))
+        }
+        Some([_, _, ..]) => Err(wrong()),
+        _ => text.parse().map(LightColor::Illuminant).map_err(|_| wrong()),
+    }
+}
+
+/// The color of a light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LightColor {
+    /// That of an illuminant.
+    Illuminant(Illuminant),
+    /// Its chromaticity.
+    Chromaticity([f64; 2]),
+}
+
+impl LightColor {
+    /// Its chromaticity for an observer.
+    pub fn xy(self, observer: &Observer) -> [f64; 2] {
+        match self {
+            Self::Illuminant(illuminant) => illuminant.white_xy(observer),
+            Self::Chromaticity(xy) => xy,
+        }
     }
 }
 

@@ -24,4 +24,5 @@ pub mod saturation;
 
 pub mod demosaic;
 
+pub mod from_xyz;
 pub mod to_xyz;

@@ -56,6 +56,9 @@ impl Mosaic {
             QuantityKind::Xyz
                 | QuantityKind::Xyy
                 | QuantityKind::Lab
+                | QuantityKind::Luv
+                | QuantityKind::Cct
+                | QuantityKind::LinearSrgb
                 | QuantityKind::Srgb
                 | QuantityKind::SpectralRadiance
                 | QuantityKind::ColorDifference

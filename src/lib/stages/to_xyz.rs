@@ -1,8 +1,8 @@
-//! From demosaicked ADU to CIE XYZ and on to xyY, L*a*b* and a viewable sRGB.
+//! From demosaicked ADU to CIE XYZ and on to xyY, L*a*b*, L*u*v*, color temperatures and sRGB.
 
-use crate::color::{
-    D65_XY, Space, White, lab_from_xyz, linear_srgb_from_xyz, rows_of, srgb_encode, xyy_from_xyz, xyz_of_chromaticity,
-};
+use crate::color::coordinates::Coordinates;
+use crate::color::temperature::Locus;
+use crate::color::{Space, White, rows_of};
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{ColorRecord, FrameHeader, MatrixResidual};
@@ -10,6 +10,7 @@ use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::stream::{Counts, Stage};
 use crate::units::{Adu, QuantityKind, Tristimulus};
 use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
 
 /// What a user may set of the conversion.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,12 +76,10 @@ pub struct ColorSettings {
 #[derive(Debug, Clone)]
 pub struct ToXyz {
     header: FrameHeader,
-    space: Space,
+    coordinates: Coordinates,
     /// XYZ from ADU above black, the exposure or the range of codes included.
     xyz_from_adu: Matrix3<f64>,
     black: f64,
-    white: [f64; 3],
-    srgb_from_xyz: Matrix3<f64>,
 }
 
 impl ToXyz {
@@ -92,6 +91,15 @@ impl ToXyz {
     /// exposure where the matrix needs one; [`Error::Usage`] for an impossible white; [`Error::Format`] where the black level
     /// differs among photosites, and without white level above black where the matrix is relative.
     pub fn new(input: &FrameHeader, settings: &ColorSettings) -> Result<Self> {
+        Self::beside(input, settings, None)
+    }
+
+    /// The same, with the black bodies that [`Space::Cct`] looks for the nearest of; without them its temperatures are NaN.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::new`].
+    pub fn beside(input: &FrameHeader, settings: &ColorSettings, locus: Option<Arc<Locus>>) -> Result<Self> {
         check_camera(input)?;
         if !settings.is_relative {
             input.exposure()?;
@@ -104,27 +112,19 @@ impl ToXyz {
             method: settings.method.clone(),
             black_adu: black,
             white: None,
+            scene_white_xy: None,
+            adapted: None,
             matrix_residual: settings.residual.clone(),
         };
         let scaled = record.xyz_from_adu(input.metadata.exposure);
         let xyz_from_adu = scaled.ok_or_else(|| input.missing("exposure"))?;
-        let needs_white = matches!(settings.space, Space::Lab | Space::Srgb);
         record.white = reference_white(input, settings, &xyz_from_adu, black)?;
-        let Some(white) = record.white.or_else(|| (!needs_white).then(|| white_of(settings.white, 1.0))) else {
+        let Some(white) = record.white.or_else(|| (!needs_white(settings.space)).then(|| settings.white.xyz(1.0)))
+        else {
             return Err(input.missing("white_level_adu"));
         };
-        if needs_white && !white.iter().all(|&value| value > 0.0 && value.is_finite()) {
-            return Err(Error::Usage(format!(
-                "a white of XYZ {:.6} {:.6} {:.6} is impossible; all three must be above 0",
-                white[0], white[1], white[2]
-            )));
-        }
-        let (quantity, channels) = match settings.space {
-            Space::Xyz => (QuantityKind::Xyz, ["R", "G", "B"]),
-            Space::Xyy => (QuantityKind::Xyy, ["x", "y", "Y"]),
-            Space::Lab => (QuantityKind::Lab, ["L", "a", "b"]),
-            Space::Srgb => (QuantityKind::Srgb, ["R", "G", "B"]),
-        };
+        check_white(settings.space, white)?;
+        let (quantity, channels) = planes_of(settings.space);
         let mut metadata = input.metadata.becoming(quantity);
         metadata.set_black_adu(None);
         metadata.white_level_adu = None;
@@ -133,19 +133,24 @@ impl ToXyz {
             metadata.unit = quantity.relative_unit().into();
         }
         let geometry = input.geometry.with_channels(&channels);
-        let srgb_from_xyz = if needs_white { linear_srgb_from_xyz(white) } else { Matrix3::identity() };
         let header = FrameHeader { name: input.name.clone(), geometry, metadata };
-        Ok(Self { header, space: settings.space, xyz_from_adu, black, white, srgb_from_xyz })
+        let coordinates = Coordinates::new(settings.space, white, locus);
+        Ok(Self { header, coordinates, xyz_from_adu, black })
     }
 
     /// The space of the converted frame.
     pub fn space(&self) -> Space {
-        self.space
+        self.coordinates.space()
     }
 
-    /// XYZ of the white that L*a*b* and sRGB refer to.
+    /// XYZ of the white that L*a*b*, L*u*v* and sRGB refer to.
     pub fn white(&self) -> [f64; 3] {
-        self.white
+        self.coordinates.white()
+    }
+
+    /// From XYZ to the coordinates of its space.
+    pub fn coordinates(&self) -> &Coordinates {
+        &self.coordinates
     }
 
     /// XYZ from ADU above black, the exposure or the range of codes included.
@@ -171,7 +176,7 @@ impl ToXyz {
         mut output: Rows<'_, Tristimulus>,
     ) -> Counts {
         let mut counts = Counts::default();
-        if self.space == Space::Xyz {
+        if self.space() == Space::Xyz {
             let xyz_from_adu = rows_of(&self.xyz_from_adu);
             for y in output.range() {
                 let rgb = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
@@ -180,24 +185,12 @@ impl ToXyz {
             }
             return counts;
         }
-        let white_sum: f64 = self.white.iter().sum();
-        let white_xy = [self.white[0] / white_sum, self.white[1] / white_sum];
         for y in output.range() {
             let planes = [0, 1, 2].map(|channel| input.row(y.cast_signed(), channel));
             let [first, second, third] = output.three(y);
             for x in 0..input.width() {
                 let xyz = self.xyz(planes.map(|plane| f64::from(plane[x])));
-                let color = match self.space {
-                    Space::Xyz => xyz.into(),
-                    Space::Xyy => xyy_from_xyz(xyz.into(), white_xy),
-                    Space::Lab => lab_from_xyz(xyz.into(), self.white),
-                    Space::Srgb => {
-                        let linear = self.srgb_from_xyz * xyz;
-                        counts.out_of_gamut += u64::from(linear.iter().any(|v| !(-1e-6..=1.0 + 1e-6).contains(v)));
-                        <[f64; 3]>::from(linear).map(|v| srgb_encode(v.clamp(0.0, 1.0)))
-                    }
-                };
-                counts.not_finite += u64::from(color.iter().any(|value| !value.is_finite()));
+                let color = place(&self.coordinates, xyz.into(), &mut counts);
                 (first[x], second[x], third[x]) = (to_sample(color[0]), to_sample(color[1]), to_sample(color[2]));
             }
         }
@@ -205,13 +198,42 @@ impl ToXyz {
     }
 }
 
-/// XYZ of a white of this chromaticity at a luminance, or as it is given.
-fn white_of(white: White, luminance: f64) -> [f64; 3] {
-    match white {
-        White::Absolute(white) => white,
-        White::D65 => xyz_of_chromaticity(D65_XY, luminance),
-        White::EqualEnergy => xyz_of_chromaticity([1.0 / 3.0, 1.0 / 3.0], luminance),
+/// The coordinates of XYZ, and what is counted of them.
+pub(super) fn place(coordinates: &Coordinates, xyz: [f64; 3], counts: &mut Counts) -> [f64; 3] {
+    let placed = coordinates.of(xyz);
+    counts.out_of_gamut += u64::from(placed.was_clipped);
+    counts.off_locus += u64::from(placed.is_off_locus);
+    // Where there is no temperature, what is no number is counted already.
+    let is_finite = placed.value.iter().all(|value| value.is_finite());
+    counts.not_finite += u64::from(!is_finite && !placed.is_off_locus);
+    placed.value
+}
+
+/// What the planes of a space hold, and what they are called.
+pub(super) fn planes_of(space: Space) -> (QuantityKind, [&'static str; 3]) {
+    match space {
+        Space::Xyz => (QuantityKind::Xyz, ["R", "G", "B"]),
+        Space::Xyy => (QuantityKind::Xyy, ["x", "y", "Y"]),
+        Space::Lab => (QuantityKind::Lab, ["L", "a", "b"]),
+        Space::Luv => (QuantityKind::Luv, ["L", "u", "v"]),
+        Space::Cct => (QuantityKind::Cct, ["CCT", "Duv", "Y"]),
+        Space::Srgb => (QuantityKind::Srgb, ["R", "G", "B"]),
+        Space::LinearSrgb => (QuantityKind::LinearSrgb, ["R", "G", "B"]),
     }
+}
+
+/// Whether the colors of a space hang on a white.
+pub(super) fn needs_white(space: Space) -> bool {
+    matches!(space, Space::Lab | Space::Luv | Space::Srgb | Space::LinearSrgb)
+}
+
+/// Refuses a white that cannot be, where the space needs one.
+pub(super) fn check_white(space: Space, white: [f64; 3]) -> Result<()> {
+    if !needs_white(space) || white.iter().all(|&value| value > 0.0 && value.is_finite()) {
+        return Ok(());
+    }
+    let [x, y, z] = white;
+    Err(Error::Usage(format!("a white of XYZ {x:.6} {y:.6} {z:.6} is impossible; all three must be above 0")))
 }
 
 /// XYZ of the white that colors refer to; none where its luminance is that at which the camera saturates, and the white
@@ -230,14 +252,14 @@ fn reference_white(
         return Ok(Some(white));
     }
     if settings.is_relative {
-        return Ok(Some(white_of(settings.white, 1.0)));
+        return Ok(Some(settings.white.xyz(1.0)));
     }
     let at_saturation = || -> Option<f64> {
         let range = input.metadata.white_level_adu?.less([black; 3]).classes();
         Some((xyz_from_adu * Vector3::from(range)).y)
     };
     let luminance = settings.white_luminance.or_else(at_saturation);
-    Ok(luminance.map(|luminance| white_of(settings.white, luminance)))
+    Ok(luminance.map(|luminance| settings.white.xyz(luminance)))
 }
 
 /// White level less black level of R, G and B.

@@ -21,6 +21,8 @@ pub struct Counts {
     pub dim_green: u64,
     /// Colors outside sRGB.
     pub out_of_gamut: u64,
+    /// Colors without a correlated color temperature.
+    pub off_locus: u64,
     /// Pixels whose noise cannot be propagated.
     pub propagation_void: u64,
     /// Samples at or above the level from which they are full.
@@ -47,6 +49,7 @@ impl Counts {
             undefined_hue: self.undefined_hue + other.undefined_hue,
             dim_green: self.dim_green + other.dim_green,
             out_of_gamut: self.out_of_gamut + other.out_of_gamut,
+            off_locus: self.off_locus + other.off_locus,
             propagation_void: self.propagation_void + other.propagation_void,
             saturated_samples: self.saturated_samples + other.saturated_samples,
             saturated_pixels: self.saturated_pixels + other.saturated_pixels,
@@ -69,6 +72,7 @@ impl Counts {
             undefined_hue: some(self.undefined_hue),
             dim_green: some(self.dim_green),
             out_of_gamut: some(self.out_of_gamut),
+            off_locus: some(self.off_locus),
             propagation_void: some(self.propagation_void),
             saturated: some(self.saturated_samples + self.saturated_pixels),
             defective: some(self.defective),
@@ -110,6 +114,11 @@ impl Counts {
                  blue are biased; other methods do not divide",
             ),
             (self.out_of_gamut, "colors lie outside sRGB and were clipped"),
+            (
+                self.off_locus,
+                "colors have no correlated color temperature, which is NaN: they lie more than 0.05 from black bodies, or beyond \
+                 1000 K to 1000000 K",
+            ),
             (
                 self.propagation_void,
                 "pixels have a green too near its noise to divide by; their standard deviations say only that they are large",

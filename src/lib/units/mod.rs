@@ -63,8 +63,14 @@ pub enum QuantityKind {
     Xyy,
     /// CIE 1976 L*a*b*.
     Lab,
+    /// CIE 1976 L*u*v*.
+    Luv,
+    /// Correlated color temperature in K, distance from black bodies Duv, and luminance Y in cd m⁻².
+    Cct,
     /// sRGB encoded for viewing, 0…1.
     Srgb,
+    /// Linear light of the primaries of sRGB, white 1.
+    LinearSrgb,
     /// Differences of colors, by each formula.
     ColorDifference,
 }
@@ -79,7 +85,8 @@ impl QuantityKind {
             Self::Adu => "ADU",
             Self::Xyz => "cd m-2",
             Self::Xyy => "1, 1, cd m-2",
-            Self::Lab | Self::Srgb | Self::ColorDifference => "1",
+            Self::Cct => "K, 1, cd m-2",
+            Self::Lab | Self::Luv | Self::Srgb | Self::LinearSrgb | Self::ColorDifference => "1",
         }
     }
 
@@ -88,6 +95,7 @@ impl QuantityKind {
         match self {
             Self::Xyz => RELATIVE_UNIT,
             Self::Xyy => "1, 1, relative",
+            Self::Cct => "K, 1, relative",
             other => other.unit(),
         }
     }
@@ -107,7 +115,10 @@ impl fmt::Display for QuantityKind {
             Self::Xyz => "XYZ",
             Self::Xyy => "xyY",
             Self::Lab => "L*a*b*",
+            Self::Luv => "L*u*v*",
+            Self::Cct => "color temperatures",
             Self::Srgb => "sRGB",
+            Self::LinearSrgb => "linear sRGB",
             Self::ColorDifference => "color differences",
         })
     }

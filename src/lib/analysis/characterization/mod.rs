@@ -63,6 +63,9 @@ pub struct CameraMatrix {
     /// How well it does without noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub performance: Option<Performance>,
+    /// The chart that it was fitted to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chart: Option<ChartRecord>,
     /// The observer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observer: Option<String>,
@@ -88,7 +91,7 @@ impl CameraMatrix {
     }
 
     /// A matrix of which no more is known.
-    fn bare(unit: &str, xyz_from_camera: [[f64; 3]; 3]) -> Self {
+    pub fn bare(unit: &str, xyz_from_camera: [[f64; 3]; 3]) -> Self {
         Self {
             schema: MATRIX_SCHEMA.into(),
             sensor: None,
@@ -102,6 +105,7 @@ impl CameraMatrix {
             training: None,
             uncertainty: None,
             performance: None,
+            chart: None,
             observer: None,
             wavelengths: None,
         }
@@ -154,8 +158,52 @@ pub struct Training {
     pub max_chromaticity_error: [f64; 2],
 }
 
+impl Training {
+    /// So many samples of a library; how well they are met is not known.
+    pub fn of(library: String, count: usize) -> Self {
+        Self {
+            library,
+            samples: None,
+            chosen_by: None,
+            held_out: Vec::new(),
+            count,
+            weights: None,
+            ridge: None,
+            noise_weight: None,
+            white_sample: None,
+            relative_rms: [0.0; 3],
+            max_chromaticity_error: [0.0; 2],
+        }
+    }
+}
+
+/// The chart that a matrix was fitted to. XYZ are those in the light of the chart, Y = 1 for a perfect diffuser in its place, at
+/// its exposure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChartRecord {
+    /// Where the colors come from.
+    pub reference: String,
+    /// The light that XYZ are for.
+    pub light: String,
+    /// Patches that do not count, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
+    /// Standard deviation by which X, Y and Z are off beside the noise, in units of the diffuser's Y.
+    pub misfit: f64,
+    /// Squared residuals, in units of noise and misfit, over their degrees of freedom.
+    pub chi_squared_per_degree: f64,
+    /// The same in units of noise alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chi_squared_per_degree_of_noise: Option<f64>,
+    /// Degrees of freedom: three a patch, less nine.
+    pub degrees: usize,
+    /// Y of the white by which the first class reaches its white level.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub saturation_y: Option<f64>,
+}
+
 /// How well a matrix is known: how it changes when training samples are left out one at a time (the jackknife), ridge and
-/// noise terms staying as they are.
+/// noise terms staying as they are; or by the noise of the patches of a chart and what they are off by beside it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MatrixUncertainty {
     /// What it comes from.
@@ -164,6 +212,9 @@ pub struct MatrixUncertainty {
     pub standard_error: [[f64; 3]; 3],
     /// Covariance of the three elements of the rows X, Y and Z.
     pub covariance: [[[f64; 3]; 3]; 3],
+    /// Covariance of all nine elements, row by row, where rows hang together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub element_covariance: Option<[[f64; 9]; 9]>,
 }
 
 /// How well a matrix does without noise on a library.

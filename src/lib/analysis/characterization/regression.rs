@@ -267,6 +267,7 @@ fn uncertainty(fit: &Fit) -> Option<MatrixUncertainty> {
         method: "jackknife".into(),
         standard_error: [0, 1, 2].map(|i| [0, 1, 2].map(|j| covariance[i][j][j].max(0.0).sqrt())),
         covariance,
+        element_covariance: None,
     })
 }
 

@@ -288,6 +288,8 @@ mod tests {
             method: None,
             black_adu: 0.0,
             white: Some(white),
+            scene_white_xy: None,
+            adapted: None,
             matrix_residual: None,
         });
         let header = FrameHeader { name: "frame".into(), geometry: Geometry::new(2, 1, channels), metadata };

@@ -46,6 +46,9 @@ pub(super) fn space_of(frame: &FrameHeader, stated: Option<Space>) -> Result<Spa
                 "it holds {holds}, a picture whose colors may be clipped; run `to-xyz --space lab` instead"
             )));
         }
+        QuantityKind::Luv | QuantityKind::Cct | QuantityKind::LinearSrgb => {
+            return Err(frame.refuse(format!("it holds {holds}; compare XYZ, xyY or L*a*b*")));
+        }
         QuantityKind::SpectralRadiance => {
             return Err(frame.out_of_order(format!("it holds {holds}, not colors"), "render-radiance"));
         }
@@ -141,7 +144,7 @@ pub(super) fn white(
             );
         }
         (Some(White::Absolute(white)), _) => white,
-        (Some(White::EqualEnergy), _) => xyz_of_chromaticity([1.0 / 3.0, 1.0 / 3.0], luminance()?),
+        (Some(white @ (White::EqualEnergy | White::D50)), _) => white.xyz(luminance()?),
         (None, Some(known)) => match settings.white_luminance {
             Some(luminance) => known.map(|value| value * luminance / known[1]),
             None => known,

@@ -405,6 +405,8 @@ mod tests {
             method: None,
             black_adu: 7.0,
             white: Some(white),
+            scene_white_xy: None,
+            adapted: None,
             matrix_residual: None,
         });
         let camera = Vector3::from(electrons.map(|e| 0.25 * e));

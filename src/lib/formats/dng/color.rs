@@ -6,9 +6,12 @@ use crate::color;
 use crate::color::calibration::{Calibration, Illuminated, Light};
 use crate::error::{Error, Result};
 use crate::formats::data::load_observer;
+use crate::formats::files::open_named;
 use crate::formats::tiff::TiffFile;
 use crate::metadata::RelativeMatrix;
+use crate::names::Named;
 use nalgebra::Matrix3;
+use std::path::Path;
 
 /// Numbers of illuminants (Exif, LightSource) and their temperatures, K, as Adobe's DNG SDK has them: of fluorescent lamps
 /// the middle of their range.
@@ -77,16 +80,79 @@ fn found(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Re
         Ok(light) => light,
         Err(why) => return Ok(Err(why)),
     };
+    mapped(file, image, light, "the white of the exposure", OwnMatrix::Color)
+}
+
+/// Which of the matrices of a DNG.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OwnMatrix {
+    /// ColorMatrix, to XYZ under the light itself.
+    #[default]
+    Color,
+    /// ForwardMatrix, to XYZ adapted to D50.
+    Forward,
+}
+
+impl Named for OwnMatrix {
+    const ALL: &'static [Self] = &[Self::Color, Self::Forward];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Color => "color",
+            Self::Forward => "forward",
+        }
+    }
+}
+
+/// The matrix of a DNG for a light by its chromaticity and name, or for that of the exposure.
+///
+/// # Errors
+///
+/// [`Error::Format`] for files that are no DNG, and where they tell no such matrix; those of the disk.
+pub fn own_matrix(path: &Path, light_named: Option<([f64; 2], String)>, which: OwnMatrix) -> Result<RelativeMatrix> {
+    let (file, name) = open_named(Some(path))?;
+    let mut file = TiffFile::open(file, &name)?;
+    let image = RawImage::find(&mut file)?;
+    if image.is_monochrome || !tags::COLOR_MATRICES[0].is_in(&image.first) {
+        return Err(Error::format(&name, "it tells no color matrix (ColorMatrix1)"));
+    }
+    let (light, named) = match light_named {
+        Some((xy, named)) => (Ok(Light::White(xy)), named),
+        None => (light(&mut file, &image)?, "the white of the exposure".into()),
+    };
+    let found = match light {
+        Ok(light) => mapped(&mut file, &image, light, &named, which)?,
+        Err(why) => Err(format!("{why}; name a light by --illuminant or --temperature")),
+    };
+    found.map_err(|why| Error::format(&name, why))
+}
+
+/// The matrix for a light, or why there is none.
+fn mapped(
+    file: &mut TiffFile,
+    image: &RawImage,
+    light: Light,
+    named: &str,
+    which: OwnMatrix,
+) -> Result<std::result::Result<RelativeMatrix, String>> {
     let calibration = match calibration(file, image)? {
         Ok(calibration) => calibration,
         Err(why) => return Ok(Err(why)),
     };
-    let name = if calibration.second.is_some() { "ColorMatrix1 and ColorMatrix2" } else { "ColorMatrix1" };
+    let (tag, adapted) = match which {
+        OwnMatrix::Color => ("ColorMatrix", "not adapted"),
+        OwnMatrix::Forward => ("ForwardMatrix", "adapted to D50"),
+    };
+    let name = if calibration.second.is_some() { format!("{tag}1 and {tag}2") } else { format!("{tag}1") };
     let observer = load_observer()?;
-    Ok(calibration.mapped(&observer, light).map(|mapped| RelativeMatrix {
+    let mapped = match which {
+        OwnMatrix::Color => calibration.mapped(&observer, light),
+        OwnMatrix::Forward => calibration.mapped_forward(&observer, light),
+    };
+    Ok(mapped.map(|mapped| RelativeMatrix {
         xyz_from_camera: color::rows_of(&mapped.xyz_from_camera),
         white_xy: mapped.white_xy,
-        method: format!("{name} of the DNG, for the white of the exposure, not adapted"),
+        method: format!("{name} of the DNG, for {named}, {adapted}"),
     }))
 }
 
@@ -114,6 +180,8 @@ fn calibration(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Res
     let matrices = [matrix(one)?, matrix(two)?];
     let [calibration_1, calibration_2] = tags::CAMERA_CALIBRATIONS;
     let calibrations = [matrix(calibration_1)?, matrix(calibration_2)?];
+    let [forward_1, forward_2] = tags::FORWARD_MATRICES;
+    let forwards = [matrix(forward_1)?, matrix(forward_2)?];
     let signature =
         |file: &mut TiffFile, tag: DngTag| -> Result<String> { Ok(file.text(first, tag.tag())?.unwrap_or_default()) };
     // Those of the camera count where the profile was made for them.
@@ -122,7 +190,8 @@ fn calibration(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Res
     let mut set = |index: usize, color_matrix: Matrix3<f64>| -> Result<Illuminated> {
         let known = tags::CALIBRATION_ILLUMINANTS[index].one(file, first)?.and_then(temperature_k);
         let camera_calibration = calibrations[index].filter(|_| counts).unwrap_or_else(Matrix3::identity);
-        Ok(Illuminated { temperature_k: known.unwrap_or(0.0), color_matrix, camera_calibration })
+        let forward_matrix = forwards[index];
+        Ok(Illuminated { temperature_k: known.unwrap_or(0.0), color_matrix, camera_calibration, forward_matrix })
     };
     let Some(one) = matrices[0].map(|matrix| set(0, matrix)).transpose()? else {
         return Ok(Err("ColorMatrix1 is missing".into()));

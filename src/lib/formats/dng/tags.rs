@@ -30,6 +30,7 @@ pub(super) const WHITE_LEVEL: DngTag = DngTag(50717, "WhiteLevel");
 pub(super) const DEFAULT_CROP_ORIGIN: DngTag = DngTag(50719, "DefaultCropOrigin");
 pub(super) const DEFAULT_CROP_SIZE: DngTag = DngTag(50720, "DefaultCropSize");
 pub(super) const COLOR_MATRICES: [DngTag; 2] = [DngTag(50721, "ColorMatrix1"), DngTag(50722, "ColorMatrix2")];
+pub(super) const FORWARD_MATRICES: [DngTag; 2] = [DngTag(50964, "ForwardMatrix1"), DngTag(50965, "ForwardMatrix2")];
 pub(super) const COLOR_MATRIX_3: DngTag = DngTag(52531, "ColorMatrix3");
 pub(super) const CAMERA_CALIBRATIONS: [DngTag; 2] =
     [DngTag(50723, "CameraCalibration1"), DngTag(50724, "CameraCalibration2")];
@@ -48,6 +49,10 @@ pub(super) const COLUMN_INTERLEAVE: DngTag = DngTag(52547, "ColumnInterleaveFact
 pub(super) const MASKED_AREAS: DngTag = DngTag(50830, "MaskedAreas");
 pub(super) const ACTIVE_AREA: DngTag = DngTag(50829, "ActiveArea");
 pub(super) const OPCODES: [DngTag; 2] = [DngTag(51008, "OpcodeList1"), DngTag(51009, "OpcodeList2")];
+
+// Light sources of Exif.
+pub(super) const UNKNOWN_LIGHT: u16 = 0;
+pub(super) const D65: u16 = 21;
 
 // Those that are written only.
 pub(super) const NEW_SUBFILE_TYPE: DngTag = DngTag(254, "NewSubfileType");

@@ -19,8 +19,6 @@ const VERSION: [u8; 4] = [1, 4, 0, 0];
 const BACKWARD_OF_INTEGERS: [u8; 4] = [1, 1, 0, 0];
 /// Floats came with this.
 const BACKWARD_OF_FLOATS: [u8; 4] = [1, 4, 0, 0];
-/// D65 among the light sources of Exif.
-const D65: u16 = 21;
 /// sRGB among the color spaces of previews.
 const SRGB: u32 = 2;
 /// What cameras are called whose sensor has no name, and who made them.
@@ -62,8 +60,7 @@ impl Told {
             ));
         }
         let range = f64::from(white) - highest;
-        let color = metadata.sensor.as_ref().and_then(|sensor| sensor.xyz_from_camera);
-        let color = color.and_then(|matrix| CameraColor::of(&matrix)).filter(|_| cfa.has_three_classes());
+        let color = CameraColor::of_frame(metadata).filter(|_| cfa.has_three_classes());
 
         let mut raw = places(header, cfa);
         raw.extend(black.iter().flat_map(|black| black_levels(black, geometry.width)));
@@ -183,7 +180,7 @@ fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor
     if let Some(color) = color {
         let matrix = color.camera_from_xyz.as_flattened().iter().map(|element| signed(*element)).collect();
         found.extend([
-            tags::CALIBRATION_ILLUMINANT_1.with(TagValue::Shorts(vec![D65])),
+            tags::CALIBRATION_ILLUMINANT_1.with(TagValue::Shorts(vec![color.illuminant])),
             tags::COLOR_MATRIX_1.with(TagValue::SignedRatios(matrix)),
             tags::AS_SHOT_NEUTRAL.with(TagValue::Ratios(color.neutral.map(ratio).to_vec())),
         ]);

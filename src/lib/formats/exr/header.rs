@@ -5,7 +5,7 @@ use crate::camera::optics::Exposure;
 use crate::error::{Error, Result};
 use crate::formats::foreign::{self, STORE_WITHOUT_LOSS, SUBSAMPLED};
 use crate::formats::format::SampleType;
-use crate::frame::{Geometry, bare_name};
+use crate::frame::{Geometry, THREE_PLANES, bare_name};
 use crate::metadata::Metadata;
 use crate::spectrum::channel_wavelength_nm;
 use crate::stages::saturation::MASK_LAYER;
@@ -175,10 +175,9 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
         let exact = names.iter().position(|name| name == wanted);
         exact.or_else(|| names.iter().position(|name| bare_name(name) == wanted))
     };
-    let leading: Vec<usize> = [&["R", "G", "B"][..], &["x", "y", "Y"], &["L", "a", "b"], &["X", "Y", "Z"], &["Y"]]
-        .into_iter()
-        .find_map(|set| set.iter().map(|name| place(name)).collect())
-        .unwrap_or_default();
+    let sets = THREE_PLANES.iter().map(|planes| &planes[..]).chain([&["X", "Y", "Z"][..], &["Y"]]);
+    let mut sets = sets.map(|set| set.iter().map(|name| place(name)).collect());
+    let leading: Vec<usize> = sets.find_map(|found| found).unwrap_or_default();
     let mut order: Vec<usize> = (0..names.len()).collect();
     let prefix = |place: usize| {
         let name = &names[place];
@@ -198,10 +197,8 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
     }
     let first_of_layer = |place: usize| first_of.get(prefix(place)).copied();
     let rank = |place: usize| {
-        ["R", "G", "B", "x", "y", "Y", "L", "a", "b"]
-            .iter()
-            .position(|name| *name == bare_name(&names[place]))
-            .unwrap_or(9)
+        const INNER: [&str; 13] = ["R", "G", "B", "CCT", "Duv", "x", "y", "Y", "L", "a", "b", "u", "v"];
+        INNER.iter().position(|name| *name == bare_name(&names[place])).unwrap_or(INNER.len())
     };
     order.sort_by_cached_key(|&place| {
         let leads = leading.iter().position(|leader| *leader == place);

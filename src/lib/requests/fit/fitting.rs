@@ -88,6 +88,7 @@ impl Fitting<'_> {
             training: Some(self.training(fitted)),
             uncertainty: fitted.uncertainty.clone(),
             performance: self.performance(fitted)?,
+            chart: None,
             observer: Some("CIE 1931 2 degrees".into()),
             wavelengths: Some(grid),
         })
@@ -165,6 +166,7 @@ impl Fitting<'_> {
         let name = match self.fit.white.white {
             White::Absolute([x, y, z]) => return format!("XYZ {x} {y} {z}"),
             White::D65 => "D65",
+            White::D50 => "D50",
             White::EqualEnergy => "equal energy",
         };
         match self.fit.white.white_luminance {

@@ -1,10 +1,15 @@
 //! Fitting a matrix: from a library of spectra, with parts of it held out, to a matrix and how well it does.
 
+mod chart;
 mod evaluation;
 mod fitting;
 mod library;
+mod raw;
 mod request;
 mod training;
+
+pub use chart::{ChartFit, ChartFound};
+pub use raw::RawMatrix;
 
 pub use evaluation::{Conditions, DifferenceSummaries, Evaluation, Group, NoiseReport};
 pub use request::{Fit, TrainingChoice};
@@ -12,13 +17,77 @@ pub use request::{Fit, TrainingChoice};
 use super::notes::Note;
 use crate::analysis::characterization::noise_aware::TradeOff;
 use crate::analysis::characterization::{CameraMatrix, responses};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::formats::data;
 use crate::spectrum::WavelengthGrid;
+use clap::Args;
 use fitting::Fitting;
 use library::Viewer;
 use std::path::Path;
 use training::Plan;
+
+/// A matrix from a library of spectra, from a chart, or from a raw file.
+#[derive(Debug, Clone, Args)]
+#[command(mut_group("Fit", |group| group.args(Fit::ids())))]
+#[command(mut_arg("chart", |chart| chart.conflicts_with_all(Fit::ids())))]
+#[command(mut_arg("patches", |patches| patches.conflicts_with_all(Fit::ids())))]
+#[command(mut_arg("from_raw", |from_raw| from_raw.conflicts_with_all(Fit::ids())))]
+#[command(mut_arg("library", |library| {
+    library.required(false).required_unless_present_any(["chart", "patches", "from_raw"])
+}))]
+pub struct MatrixRequest {
+    /// From spectra.
+    #[command(flatten)]
+    pub fit: Option<Fit>,
+    /// From a chart.
+    #[command(flatten)]
+    pub chart: ChartFit,
+    /// From a raw file.
+    #[command(flatten)]
+    pub raw: RawMatrix,
+}
+
+/// A matrix, with what is known of it by where it comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MatrixFound {
+    /// From spectra.
+    Fitted(Box<Characterization>),
+    /// From a chart.
+    OfChart(Box<ChartFound>),
+    /// From a raw file, with what came up.
+    Own(Box<CameraMatrix>, Vec<Note>),
+}
+
+impl MatrixRequest {
+    /// Makes the matrix.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Fit::run`], [`ChartFit::run`] and [`RawMatrix::run`]; [`Error::Usage`] where nothing to make one of is named.
+    pub fn run(&self) -> Result<MatrixFound> {
+        if let Some(fit) = &self.fit {
+            return fit.run().map(|found| MatrixFound::Fitted(Box::new(found)));
+        }
+        if let Some((matrix, notes)) = self.raw.run(&self.chart)? {
+            return Ok(MatrixFound::Own(Box::new(matrix), notes));
+        }
+        let found = self.chart.run()?;
+        found
+            .map(|found| MatrixFound::OfChart(Box::new(found)))
+            .ok_or_else(|| Error::Usage("name a library, a chart or a raw file".into()))
+    }
+}
+
+impl MatrixFound {
+    /// What came up.
+    pub fn notes(&self) -> &[Note] {
+        match self {
+            Self::Fitted(found) => &found.notes,
+            Self::OfChart(found) => &found.notes,
+            Self::Own(_, notes) => notes,
+        }
+    }
+}
 
 /// A fitted matrix with what was found out about it.
 #[derive(Debug, Clone, PartialEq)]

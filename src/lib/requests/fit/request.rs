@@ -146,6 +146,11 @@ impl Fit {
         defaults(&["--".into(), library.into().into_os_string()])
     }
 
+    /// The names of its options, those of the groups in it included.
+    pub fn ids() -> Vec<clap::Id> {
+        Self::augment_args(clap::Command::new("fit")).get_arguments().map(|option| option.get_id().clone()).collect()
+    }
+
     /// Refuses a white that cannot be.
     pub(super) fn check_white(&self) -> Result<()> {
         match self.white.white {

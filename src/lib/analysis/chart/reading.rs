@@ -1,0 +1,266 @@
+//! What a camera reads of the patches of a chart: means of the photosites of each class, without demosaicking.
+
+use super::grid::{COLUMNS, Grid, ROWS};
+use crate::camera::levels::BlackLevels;
+use crate::cfa::CfaPattern;
+use crate::error::Result;
+use crate::metadata::FrameHeader;
+use crate::stages::saturation::FullLevels;
+
+/// Patches of the chart.
+pub const PATCHES: usize = ROWS * COLUMNS;
+
+/// So few photosites of a class make no mean.
+const FEWEST_SITES: u64 = 16;
+
+/// A patch is uneven where its photosites scatter by more than so many times what neighbors differ by.
+const UNEVEN: f64 = 2.0;
+
+/// What was read of a patch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReadPatch {
+    /// Means of R, G and B as shares of white level less black level.
+    pub signal: [f64; 3],
+    /// Variances of these means, from the scatter of the photosites: s²/n of each class.
+    pub variance: [f64; 3],
+    /// Standard deviations of single photosites, shares of white level less black level.
+    pub scatter: [f64; 3],
+    /// The same from the differences of neighbors, which what varies slowly does not add to.
+    pub noise: [f64; 3],
+    /// Photosites of each class.
+    pub count: [u64; 3],
+    /// Photosites that are saturated.
+    pub saturated: u64,
+}
+
+impl ReadPatch {
+    /// Whether it scatters by far more than its noise: texture, glare, a gradient, an edge.
+    pub fn is_uneven(&self) -> bool {
+        (0..3).any(|class| self.scatter[class] > UNEVEN * self.noise[class])
+    }
+}
+
+/// Sums of one class of one patch.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    count: u64,
+    /// Mean and sum of squares about it, updated photosite by photosite.
+    mean: f64,
+    about_mean: f64,
+    pairs: u64,
+    of_differences: f64,
+    saturated: u64,
+}
+
+impl Sums {
+    fn add(&mut self, value: f64) {
+        self.count += 1;
+        let from_mean = value - self.mean;
+        self.mean += from_mean / self.count as f64;
+        self.about_mean += from_mean * (value - self.mean);
+    }
+}
+
+/// Reads the patches of a chart from the rows of a frame.
+#[derive(Debug)]
+pub struct ChartReader {
+    grid: Grid,
+    pattern: CfaPattern,
+    origin: [i32; 2],
+    black: BlackLevels,
+    full: [f32; 3],
+    range: [f64; 3],
+    width: usize,
+    next_row: usize,
+    sums: Vec<[Sums; 3]>,
+}
+
+impl ChartReader {
+    /// A reader of the chart in a frame.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`](crate::error::Error::Format) unless the frame is a plane of ADU behind a Bayer array with levels;
+    /// [`Error::MissingKey`](crate::error::Error::MissingKey) for levels that are not known.
+    pub fn new(frame: &FrameHeader, grid: Grid) -> Result<Self> {
+        let holds = frame.holds();
+        let is_plane = frame.geometry.channels.len() == 1 && frame.metadata.demosaic.is_none();
+        let pattern = frame.bayer("read of charts")?.filter(|_| is_plane);
+        let Some(pattern) = pattern else {
+            return Err(frame.refuse(format!(
+                "it holds {holds}; a chart is read from the photosites, so that their noise is known: give the CFA plane of ADU"
+            )));
+        };
+        let black = frame.black_levels()?.ok_or_else(|| frame.missing("black_level_adu"))?;
+        let (Some(white), Some(full)) = (frame.metadata.white_level_adu, FullLevels::of(frame)) else {
+            return Err(
+                frame.refuse("its metadata have no `white_level_adu`, in which signals are counted; add it to them")
+            );
+        };
+        let [width, height] = [frame.geometry.width, frame.geometry.height];
+        let highest = black.largest([width, height], |_, _| None)[0];
+        let range = white.less([highest; 3]).classes();
+        if !range.iter().all(|range| *range > 0.0 && range.is_finite()) {
+            return Err(frame.refuse("its white level is not above its black level; signals are counted between them"));
+        }
+        let inside = |[x, y]: [f64; 2]| x >= 0.0 && y >= 0.0 && x < width as f64 && y < height as f64;
+        if let Some([x, y]) = grid.corners().into_iter().find(|corner| !inside(*corner)) {
+            return Err(
+                frame.refuse(format!("the corner {x},{y} of the chart lies outside its {width}x{height} pixels"))
+            );
+        }
+        let sums = vec![[Sums::default(); 3]; PATCHES];
+        let origin = frame.geometry.origin;
+        Ok(Self { grid, pattern, origin, black, full: full.classes(), range, width, next_row: 0, sums })
+    }
+
+    /// Takes the next rows of the frame.
+    pub fn take(&mut self, rows: &[f32]) {
+        for row in rows.chunks_exact(self.width) {
+            let y = self.next_row;
+            self.next_row += 1;
+            let classes = self.pattern.row_classes(self.origin, y);
+            let black = self.black.row(y);
+            // Of even and odd columns the last photosite and its patch.
+            let mut last: [Option<(usize, f64)>; 2] = [None; 2];
+            for (x, sample) in row.iter().enumerate() {
+                let Some(patch) = self.grid.patch(x as f64, y as f64) else {
+                    last[x % 2] = None;
+                    continue;
+                };
+                let class = classes[x % 2] as usize;
+                let value = (f64::from(*sample) - black.at(x)) / self.range[class];
+                let sums = &mut self.sums[patch][class];
+                sums.saturated += u64::from(sample.is_nan() || *sample >= self.full[class]);
+                sums.add(value);
+                if let Some((_, before)) = last[x % 2].filter(|(other, _)| *other == patch) {
+                    sums.pairs += 1;
+                    sums.of_differences += (value - before).powi(2);
+                }
+                last[x % 2] = Some((patch, value));
+            }
+        }
+    }
+
+    /// What was read of the patches, row by row.
+    ///
+    /// # Errors
+    ///
+    /// In words, where the chart is too small in the frame.
+    pub fn finish(self) -> std::result::Result<Vec<ReadPatch>, String> {
+        let fewest = self.sums.as_flattened().iter().map(|sums| sums.count).min().unwrap_or(0);
+        if fewest < FEWEST_SITES {
+            return Err(format!(
+                "a patch of the chart has {fewest} photosites of a class; the means take {FEWEST_SITES} at least"
+            ));
+        }
+        let read = |sums: [Sums; 3]| {
+            let variance = |s: Sums| s.about_mean / (s.count - 1) as f64;
+            let noise = |s: Sums| (s.of_differences / (2 * s.pairs.max(1)) as f64).sqrt();
+            ReadPatch {
+                signal: sums.map(|s| s.mean),
+                variance: sums.map(|s| variance(s) / s.count as f64),
+                scatter: sums.map(|s| variance(s).sqrt()),
+                noise: sums.map(noise),
+                count: sums.map(|s| s.count),
+                saturated: sums.iter().map(|s| s.saturated).sum(),
+            }
+        };
+        Ok(self.sums.into_iter().map(read).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cfa::FilterArray;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+    use crate::units::QuantityKind;
+
+    const SIZE: [usize; 2] = [240, 170];
+
+    fn header() -> FrameHeader {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some(FilterArray::from(CfaPattern::Rggb));
+        metadata.black_level_adu = Some(100.0.into());
+        metadata.white_level_adu = Some(1100.0.into());
+        let geometry = Geometry { origin: [3, 1], ..Geometry::new(SIZE[0], SIZE[1], &["Y"]) };
+        FrameHeader { name: "chart".into(), geometry, metadata }
+    }
+
+    fn grid() -> Grid {
+        Grid::new([[20.0, 25.0], [220.0, 25.0], [220.0, 145.0], [20.0, 145.0]]).unwrap()
+    }
+
+    /// A chart 40 photosites a patch, whose codes are 100 + 10 (patch + 1) of red, twice that of green, three times of blue, and
+    /// what `more` adds.
+    fn read(more: impl Fn(usize, usize, usize) -> f32) -> Vec<ReadPatch> {
+        let frame = header();
+        let mut reader = ChartReader::new(&frame, grid()).unwrap();
+        for y in 0..SIZE[1] {
+            let classes = CfaPattern::Rggb.row_classes(frame.geometry.origin, y);
+            let code = |x: usize| {
+                let patch = (x / 40).min(COLUMNS - 1) + COLUMNS * (y.saturating_sub(5) / 40).min(ROWS - 1);
+                100.0 + 10.0 * (patch + 1) as f32 * (1 + classes[x % 2] as usize) as f32 + more(patch, x, y)
+            };
+            let row: Vec<f32> = (0..SIZE[0]).map(code).collect();
+            reader.take(&row);
+        }
+        reader.finish().unwrap()
+    }
+
+    /// Means are exact, by class, where nothing scatters; a quarter of the photosites are red, half green. What is saturated is
+    /// counted.
+    #[test]
+    fn means_are_those_of_the_photosites_of_each_class() {
+        let patches = read(|patch, x, y| if patch == 7 && x == 60 && y == 65 { 2000.0 } else { 0.0 });
+        for (index, patch) in patches.iter().enumerate().filter(|(index, _)| *index != 7) {
+            for (class, signal) in patch.signal.into_iter().enumerate() {
+                let expected = 0.01 * (index + 1) as f64 * (class + 1) as f64;
+                assert!((signal - expected).abs() < 1e-12, "{index} {class}: {signal}");
+            }
+            assert_eq!((patch.variance, patch.saturated, patch.is_uneven()), ([0.0; 3], 0, false));
+            let [red, green, blue] = patch.count;
+            // 17 columns and rows within ±0.21 · 40; half of an odd number.
+            assert!(red + green + blue == 17 * 17 && (144..=145).contains(&green));
+        }
+        assert_eq!(patches[7].saturated, 1);
+    }
+
+    /// Scatter of a known size: ± 8 in turn by rows of a class has the standard deviation 8; neighbors in a row agree, so that it
+    /// counts as uneven, while alternating photosites do not.
+    #[test]
+    fn scatter_that_neighbors_do_not_share_is_no_unevenness() {
+        let patches = read(|_, x, y| if (x / 2 + y / 2) % 2 == 0 { 8.0 } else { -8.0 });
+        for patch in &patches {
+            for class in 0..3 {
+                // Of n codes that are half above: s² = 64 n/(n − 1), but for one row or column too many of 9.
+                assert!((patch.scatter[class] / 0.008 - 1.0).abs() < 0.02, "{patch:?}");
+                assert!((patch.noise[class] / (0.008 * 2f64.sqrt()) - 1.0).abs() < 1e-9 && !patch.is_uneven());
+                let expected = patch.scatter[class].powi(2) / patch.count[class] as f64;
+                assert!((patch.variance[class] / expected - 1.0).abs() < 1e-12);
+            }
+        }
+        let stripes = read(|_, _, y| if (y / 2) % 2 == 0 { 8.0 } else { -8.0 });
+        assert!(stripes.iter().all(ReadPatch::is_uneven));
+    }
+
+    #[test]
+    fn what_is_no_chart_is_told() {
+        let said = |frame: &FrameHeader, grid| ChartReader::new(frame, grid).unwrap_err().to_string();
+        let outside = Grid::new([[20.0, 25.0], [260.0, 25.0], [220.0, 145.0], [20.0, 145.0]]).unwrap();
+        assert!(said(&header(), outside).contains("outside its 240x170 pixels"));
+        let mut three = header();
+        three.geometry = three.geometry.with_channels(&["R", "G", "B"]);
+        three.metadata.cfa = None;
+        assert!(said(&three, grid()).contains("give the CFA plane"));
+        let mut silent = header();
+        silent.metadata.white_level_adu = None;
+        assert!(said(&silent, grid()).contains("white_level_adu"));
+        let small = Grid::new([[20.0, 25.0], [40.0, 25.0], [40.0, 37.0], [20.0, 37.0]]).unwrap();
+        let mut reader = ChartReader::new(&header(), small).unwrap();
+        reader.take(&vec![100.0; SIZE[0] * SIZE[1]]);
+        assert!(reader.finish().unwrap_err().contains("photosites of a class"));
+    }
+}

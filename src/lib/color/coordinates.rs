@@ -1,0 +1,93 @@
+//! From XYZ to the coordinates of a space, and what small changes of XYZ become there.
+
+use super::luv::{luv_about, luv_from_xyz};
+use super::temperature::Locus;
+use super::{Space, chromaticity, lab_about, lab_from_xyz, linear_srgb_from_xyz, srgb_encode, xyy_about, xyy_from_xyz};
+use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
+
+/// Linear light that is so little outside 0…1 counts as inside: the roundings of the four decimals of the matrix.
+const GAMUT_MARGIN: f64 = 1e-6;
+
+/// A space about a white.
+#[derive(Debug, Clone)]
+pub struct Coordinates {
+    space: Space,
+    white: [f64; 3],
+    white_xy: [f64; 2],
+    srgb_from_xyz: Matrix3<f64>,
+    locus: Option<Arc<Locus>>,
+}
+
+/// A color in a space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placed {
+    /// Its coordinates.
+    pub value: [f64; 3],
+    /// Whether it was clipped to a gamut.
+    pub was_clipped: bool,
+    /// Whether it has no correlated color temperature.
+    pub is_off_locus: bool,
+}
+
+impl Coordinates {
+    /// Those of a space about XYZ of a white; `locus` is for [`Space::Cct`], which gives NaN without.
+    pub fn new(space: Space, white: [f64; 3], locus: Option<Arc<Locus>>) -> Self {
+        let is_srgb = matches!(space, Space::Srgb | Space::LinearSrgb);
+        let srgb_from_xyz = if is_srgb { linear_srgb_from_xyz(white) } else { Matrix3::identity() };
+        Self { space, white, white_xy: chromaticity(white), srgb_from_xyz, locus }
+    }
+
+    /// The space.
+    pub fn space(&self) -> Space {
+        self.space
+    }
+
+    /// XYZ of the white.
+    pub fn white(&self) -> [f64; 3] {
+        self.white
+    }
+
+    /// The coordinates of XYZ.
+    pub fn of(&self, xyz: [f64; 3]) -> Placed {
+        let (mut was_clipped, mut is_off_locus) = (false, false);
+        let value = match self.space {
+            Space::Xyz => xyz,
+            Space::Xyy => xyy_from_xyz(xyz, self.white_xy),
+            Space::Lab => lab_from_xyz(xyz, self.white),
+            Space::Luv => luv_from_xyz(xyz, self.white),
+            Space::Cct => {
+                let found = self.locus.as_ref().and_then(|locus| locus.beside(xyz));
+                is_off_locus = found.is_none();
+                found.map_or([f64::NAN, f64::NAN, xyz[1]], |found| [found.temperature_k, found.duv, xyz[1]])
+            }
+            Space::LinearSrgb => (self.srgb_from_xyz * Vector3::from(xyz)).into(),
+            Space::Srgb => {
+                let linear = self.srgb_from_xyz * Vector3::from(xyz);
+                was_clipped = linear.iter().any(|v| !(-GAMUT_MARGIN..=1.0 + GAMUT_MARGIN).contains(v));
+                <[f64; 3]>::from(linear).map(|v| srgb_encode(v.clamp(0.0, 1.0)))
+            }
+        };
+        Placed { value, was_clipped, is_off_locus }
+    }
+
+    /// Derivatives of the coordinates in X, Y and Z at a color; none of a picture to look at, and where the color has no
+    /// chromaticity or temperature.
+    pub fn jacobian(&self, xyz: [f64; 3]) -> Option<Matrix3<f64>> {
+        match self.space {
+            Space::Xyz => Some(Matrix3::identity()),
+            Space::Xyy => xyy_about(xyz).map(|local| local.jacobian),
+            Space::Lab => Some(lab_about(xyz, self.white).jacobian),
+            Space::Luv => luv_about(xyz, self.white).map(|local| local.jacobian),
+            Space::Cct => {
+                let [temperature, duv] = {
+                    let found = self.locus.as_ref()?.beside(xyz)?.jacobian;
+                    [found.row(0).into_owned(), found.row(1).into_owned()]
+                };
+                Some(Matrix3::from_rows(&[temperature, duv, nalgebra::RowVector3::new(0.0, 1.0, 0.0)]))
+            }
+            Space::LinearSrgb => Some(self.srgb_from_xyz),
+            Space::Srgb => None,
+        }
+    }
+}
