@@ -5,8 +5,8 @@
 //! and [`linearity`] how these bend.
 
 pub mod levels;
-pub mod noise_profile;
 pub mod linearity;
+pub mod noise_profile;
 pub mod optics;
 pub mod readout;
 pub mod response;

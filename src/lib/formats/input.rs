@@ -8,6 +8,7 @@ use super::makers::{MakersReader, Worker};
 use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
 use crate::camera::noise_profile::NoiseProfile;
+use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, THREE_PLANES};
 use crate::metadata::{FrameHeader, Metadata};
@@ -36,6 +37,18 @@ pub struct InputOptions {
     pub channel: Option<String>,
     /// The rectangle that is taken alone; none for all of the frame. Its photosites keep their places on the sensor.
     pub crop: Option<Region>,
+    /// Whether codes are made proportional to charge, by the linearization of their sensor.
+    pub linearize: Linearizing,
+}
+
+/// Whether codes are made proportional to charge as they are read.
+#[derive(Debug, Clone, Default)]
+pub enum Linearizing {
+    /// They stay as they are.
+    #[default]
+    No,
+    /// By the sensor of the metadata, or this one where they name none.
+    As(Option<Box<Sensor>>),
 }
 
 /// A frame that is being read.
@@ -181,6 +194,13 @@ impl FrameReader {
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
         let mut header = FrameHeader { name: name.into(), geometry, metadata };
         let corner = options.crop.map_or(Ok([0, 0]), |crop| cut(&mut header, crop))?;
+        let linearize = match &options.linearize {
+            Linearizing::No => None,
+            Linearizing::As(sensor) => {
+                header.metadata.sensor = header.metadata.sensor.or_else(|| sensor.as_deref().cloned());
+                Some(Linearize::of(&mut header)?)
+            }
+        };
         Ok(Self {
             reader,
             header,
@@ -190,7 +210,7 @@ impl FrameReader {
             mismatch: None,
             buffer: Vec::new(),
             divisor,
-            linearize: None,
+            linearize,
             notes,
             mask,
             keeps_mask: false,

@@ -105,6 +105,12 @@ impl AdcRecord {
         }
     }
 
+    /// The variance of a uniform rounding of the samples at a charge, ADU².
+    pub fn rounding_at(&self, electrons: f64) -> f64 {
+        let step = if self.linearization.is_none() { 1.0 } else { self.sample_slope(self.level_at(electrons)) };
+        step * step / 12.0
+    }
+
     /// The lowest code of a full photosite: the largest, or that of full well (electrons) where it is smaller.
     pub fn full_code(&self, full_well_e: f64) -> f64 {
         f64::from(self.top_code()).min(self.level_at(full_well_e).floor())

@@ -116,11 +116,13 @@ impl Photosite {
     fn is_open(&self, adc: &AdcRecord, expected_e: f64) -> bool {
         const REACH: f64 = 6.0;
         let of_charge = charge(&self.model, expected_e);
-        let temporal = Drawn::codes(&self.model, adc, expected_e, [1.0; 2]).variance - 1.0 / 12.0;
+        let rounding = adc.rounding_at(expected_e + self.model.dark_e);
+        let temporal = Drawn::codes(&self.model, adc, expected_e, [1.0; 2]).variance - rounding;
         let read_e = self.model.read_noise_e;
         let reach_e = REACH * (of_charge.variance + read_e * read_e).sqrt();
-        let level = |charge_e: f64| adc.bias_adu + adc.adu_per_e * charge_e;
-        temporal.sqrt() >= LEAST_CODES
+        let level = |charge_e: f64| adc.level_at(charge_e);
+        !adc.is_bent()
+            && temporal.sqrt() >= LEAST_CODES
             && level((of_charge.mean - reach_e).max(-REACH * read_e)) > 0.0
             && level(of_charge.mean + reach_e) < f64::from(adc.top_code())
             && of_charge.mean + REACH * of_charge.variance.sqrt() < self.model.full_well_e

@@ -156,9 +156,10 @@ impl Drawn {
         let (light, dark) = (shot(expected_e, model.signal_shot), shot(model.dark_e, model.dark_shot));
         let charge = x * x * light + u * u * dark;
         let skew = x.powi(3) * light + u.powi(3) * dark;
+        let mean_e = x * expected_e + u * model.dark_e;
         Self {
-            mean: k * (x * expected_e + u * model.dark_e),
-            variance: k * k * (charge + model.read_noise_e.powi(2)) + 1.0 / 12.0,
+            mean: k * mean_e,
+            variance: k * k * (charge + model.read_noise_e.powi(2)) + adc.rounding_at(mean_e),
             third: if model.poisson == PoissonKind::Exact { k.powi(3) * skew } else { 0.0 },
         }
     }

@@ -2,11 +2,11 @@
 
 use super::border::measure_black;
 use super::notes::Note;
-use super::options::Input;
+use super::options::{Input, SensorChoice};
 use super::values::{self, BlackChoice};
 use crate::error::{Error, Result};
 use crate::formats::files::read_file;
-use crate::formats::input::InputOptions;
+use crate::formats::input::{FrameReader, InputOptions, Linearizing};
 use crate::formats::many::OneOfMany;
 use crate::formats::register::check_inputs;
 use crate::masking::Corrections;
@@ -25,6 +25,12 @@ use std::path::{Path, PathBuf};
 /// What is corrected, and by which frames.
 #[derive(Debug, Clone, Args)]
 pub struct Correction {
+    /// Make codes proportional to charge first, those of darks, bias frames and flats too, by the `linearization` of the sensor
+    #[arg(long)]
+    pub linearize: bool,
+    /// The sensor that the frames come from.
+    #[command(flatten)]
+    pub sensor: SensorChoice,
     /// Black level to remove: auto (from the metadata), none, a number of ADU, or that of the masked border, which
     /// `import-raw --crop full` keeps: border (a level for each 2x2 site), rows or columns (and what each row or column is off)
     #[arg(
@@ -108,9 +114,31 @@ impl Correction {
         Ok(())
     }
 
+    /// Makes the frame ready: its sensor, and codes that are proportional to charge.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`SensorChoice::apply`] and [`FrameReader::linearize`]; [`Error::Usage`] for a black level of the border, which
+    /// is that of codes.
+    pub fn prepare(&self, reader: &mut FrameReader) -> Result<Vec<Note>> {
+        let notes = self.sensor.apply(reader)?;
+        if self.linearize {
+            if matches!(self.black_choice, BlackChoice::Border(_)) {
+                let problem = "the masked border tells the level of codes, not of those made proportional to charge";
+                return Err(Error::Usage(problem.into()).leave_out(&["linearize"]));
+            }
+            reader.linearize()?;
+        }
+        Ok(notes)
+    }
+
     /// The black level to subtract; what the border tells stands in the metadata.
-    fn black(&self) -> Black {
+    fn black(&self, frame: &FrameHeader) -> Black {
         match self.black_choice {
+            // A number is one of codes as they come.
+            BlackChoice::Known(Black::Level(level)) => {
+                Black::Level(frame.metadata.adc.map_or(level, |adc| adc.sample(level)))
+            }
             BlackChoice::Known(black) => black,
             BlackChoice::Border(_) => Black::Auto,
         }
@@ -127,17 +155,27 @@ impl Correction {
     }
 
     /// Opens frames beside the input.
-    fn open_frames(&self, paths: &[PathBuf], input: &Input) -> Result<Vec<OneOfMany>> {
-        let options: Vec<InputOptions> = paths.iter().map(|path| input.beside(path)).collect();
+    fn open_frames(&self, paths: &[PathBuf], input: &Input, linearize: &Linearizing) -> Result<Vec<OneOfMany>> {
+        let beside = |path: &PathBuf| InputOptions { linearize: linearize.clone(), ..input.beside(path) };
+        let options: Vec<InputOptions> = paths.iter().map(beside).collect();
         let others = self.files() - paths.len();
         OneOfMany::open_all(options, others)
     }
 
     fn darks(&self, frame: &FrameHeader, input: &Input) -> Result<Option<DarkFrames<OneOfMany>>> {
-        let frames = |paths: &[PathBuf]| self.open_frames(paths, input);
+        let linearize = self.linearizing(frame);
+        let frames = |paths: &[PathBuf]| self.open_frames(paths, input, &linearize);
         // Bias frames beside darks that are not scaled may be those of flats.
         let biases = if self.is_bias_of_flats() { Vec::new() } else { frames(&self.bias)? };
         DarkFrames::matched(frame, frames(&self.dark)?, biases, self.settings())
+    }
+
+    /// How the codes of frames beside `frame` are read.
+    fn linearizing(&self, frame: &FrameHeader) -> Linearizing {
+        match self.linearize {
+            true => Linearizing::As(frame.metadata.sensor.clone().map(Box::new)),
+            false => Linearizing::No,
+        }
     }
 
     fn is_bias_of_flats(&self) -> bool {
@@ -145,11 +183,12 @@ impl Correction {
     }
 
     fn flats(&self, frame: &FrameHeader, input: &Input) -> Result<Option<FlatFrames<OneOfMany>>> {
-        let frames = |paths: &[PathBuf]| self.open_frames(paths, input);
+        let linearize = self.linearizing(frame);
+        let frames = |paths: &[PathBuf]| self.open_frames(paths, input, &linearize);
         let is_scaled = self.scale_dark && !self.flat_dark.is_empty();
         let needs_bias = self.flat_dark.is_empty() || is_scaled;
         let biases = if needs_bias { frames(&self.bias)? } else { Vec::new() };
-        let black = match self.black() {
+        let black = match self.black(frame) {
             Black::Level(level) => Some(crate::camera::levels::BlackLevels::uniform_at(level)),
             _ => None,
         };
@@ -162,7 +201,7 @@ impl Correction {
         let is_list =
             path.extension().is_some_and(|end| ["txt", "csv"].iter().any(|list| end.eq_ignore_ascii_case(list)));
         if !is_list {
-            let mut map = self.open_frames(std::slice::from_ref(path), input)?;
+            let mut map = self.open_frames(std::slice::from_ref(path), input, &Linearizing::No)?;
             return map.pop().map(|map| DefectMap::of_frame(map, frame)).transpose();
         }
         let (bytes, name) = (read_file(path)?, path.display().to_string());
@@ -182,12 +221,12 @@ impl Correction {
         }
         let frame = &*frame;
         let darks = self.darks(frame, input)?;
-        let is_more = !self.flat.is_empty() || self.defects.is_some();
-        if !self.flat.is_empty() && darks.is_none() && self.black() == Black::None {
+        let is_more = !self.flat.is_empty() || self.defects.is_some() || self.linearize;
+        if !self.flat.is_empty() && darks.is_none() && self.black(frame) == Black::None {
             let problem = "a flat field divides what is above black, which must come off first";
             return Err(Error::Usage(problem.into()).give(&["dark", "bias", "black"]));
         }
-        let settings = CorrectionSettings { black: self.black(), cte: self.cte };
+        let settings = CorrectionSettings { black: self.black(frame), cte: self.cte };
         let mut stage = CorrectFrame::of(frame, &settings, darks.as_ref().map(DarkFrames::stack), is_more)?;
         let geometry = &frame.geometry;
         let samples = (geometry.row_samples() * geometry.height) as u64;

@@ -61,7 +61,7 @@ impl Input {
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
         let Self { input, part, raw, metadata, channel, crop, .. } = self.clone();
-        InputOptions { path: input, part, raw, metadata, all_channels: false, channel, crop }
+        InputOptions { path: input, part, raw, metadata, channel, crop, ..InputOptions::default() }
     }
 
     /// The same with all channels.

@@ -28,7 +28,7 @@ mod written;
 pub use area::RawArea;
 pub(super) use area::Rectangle;
 pub(super) use color::temperature_k;
-pub(super) use describe::exposure_of;
 pub use color::{OwnMatrix, own_matrix};
+pub(super) use describe::exposure_of;
 pub use read::{DngReader, FORMAT};
 pub use write::{DngWriter, check_frame};

@@ -173,6 +173,7 @@ fn calibration(head: &Head) -> std::result::Result<Calibration, String> {
         temperature_k: temperature_k((*illuminant).into()).unwrap_or(0.0),
         color_matrix: Matrix3::from_row_slice(elements),
         camera_calibration: Matrix3::identity(),
+        forward_matrix: None,
     };
     let mut sets: Vec<Illuminated> = head.matrices.iter().filter(|(_, matrix)| is_one(matrix)).map(set).collect();
     if sets.len() > 1 {
