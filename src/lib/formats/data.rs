@@ -8,6 +8,7 @@ use crate::analysis::characterization::CameraMatrix;
 use crate::camera::response::SpectralResponse;
 use crate::camera::sensor::{CurveFile, ResponseFiles, Sensor};
 use crate::cfa::FilterArray;
+use crate::color::illuminant;
 use crate::error::{Error, Result};
 use crate::spectrum::{Curve, Observer};
 use std::path::{Path, PathBuf};
@@ -18,11 +19,12 @@ pub const DATA_VARIABLE: &str = "CYANOMETER_DATA";
 pub const DEFAULT_SENSOR: &str = "kaf-5101ce";
 
 /// Files that every program carries, by their place in `sample_data`.
-const BUILT_IN: [(&str, &[u8]); 4] = [
+const BUILT_IN: [(&str, &[u8]); 5] = [
     ("sensors/kaf-5101ce.yaml", include_bytes!("../../../sample_data/sensors/kaf-5101ce.yaml")),
     ("sensors/kaf5101ce_est_qe_1nm.csv", include_bytes!("../../../sample_data/sensors/kaf5101ce_est_qe_1nm.csv")),
     ("sensors/bg39_1mm.csv", include_bytes!("../../../sample_data/sensors/bg39_1mm.csv")),
     ("observers/cie1931_2deg_1nm.csv", include_bytes!("../../../sample_data/observers/cie1931_2deg_1nm.csv")),
+    ("illuminants/cie_d65_1nm.csv", include_bytes!("../../../sample_data/illuminants/cie_d65_1nm.csv")),
 ];
 
 /// A sensor with its curves.
@@ -151,6 +153,33 @@ pub fn load_observer() -> Result<Observer> {
     let name = "observers/cie1931_2deg_1nm.csv";
     let table = SpectralTable::parse(name, built_in(name).unwrap_or_default())?;
     Ok(Observer { matching: [table.curve(Some("xbar"))?, table.curve(Some("ybar"))?, table.curve(Some("zbar"))?] })
+}
+
+/// The relative spectral power of an illuminant: `d65`, which is built in, `a`, `e`, or a table of one curve.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for another name, [`Error::Disk`] and [`Error::Format`] for a file that is no such table.
+pub fn load_illuminant(name: &str) -> Result<Curve> {
+    let d65 = "illuminants/cie_d65_1nm.csv";
+    let path = Path::new(name);
+    let curve = match name {
+        "d65" => SpectralTable::parse(d65, built_in(d65).unwrap_or_default())?.curve(None)?,
+        "a" => illuminant::a(),
+        "e" => illuminant::equal_energy(),
+        _ if path.extension().is_some() || path.components().count() > 1 => {
+            SpectralTable::parse(name, &read_file(path)?)?.curve(None)?
+        }
+        _ => {
+            let problem = format!("there is no illuminant `{name}`; known are d65, a, e; for others give a table, as CSV");
+            return Err(Error::Usage(problem));
+        }
+    };
+    let (lowest, highest) = curve.extremes();
+    if lowest < 0.0 || highest <= 0.0 {
+        return Err(Error::format(name, "it is no light: its power is negative somewhere, or zero everywhere"));
+    }
+    Ok(curve)
 }
 
 /// An efficiency or a transmittance is a fraction.

@@ -2,10 +2,7 @@
 
 mod records;
 
-pub use records::{
-    AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
-    NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
-};
+pub use records::{AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene, UpsamplingRecord};
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
 use crate::camera::optics::Exposure;

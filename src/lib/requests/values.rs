@@ -3,6 +3,7 @@
 use crate::analysis::statistics::Region;
 use crate::cfa::CfaPattern;
 use crate::color::White;
+use crate::color::rgb::{Encoding, NamedPrimaries, Primaries};
 use crate::names::Named;
 use crate::spectrum::WavelengthGrid;
 use crate::stages::black::Black;
@@ -259,6 +260,40 @@ pub fn white(text: &str) -> Result<White, String> {
         numbers => three_numbers(numbers)
             .map(White::Absolute)
             .map_err(|_| "give d65, e, or the white's X,Y,Z between commas".into()),
+    }
+}
+
+/// Reads how samples stand for light: `srgb`, `linear`, or a power of them.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn encoding(text: &str) -> Result<Encoding, String> {
+    match text {
+        "srgb" => Ok(Encoding::Srgb),
+        "linear" => Ok(Encoding::Linear),
+        power => positive(power)
+            .map(Encoding::Power)
+            .map_err(|_| "give srgb, linear, or the power of the samples that light is, such as 2.2".into()),
+    }
+}
+
+/// Reads primaries: a name, or x,y of R, G, B and white.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn primaries(text: &str) -> Result<Primaries, String> {
+    if let Some(known) = NamedPrimaries::named(text) {
+        return Ok(known.chromaticities());
+    }
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref().map(<[f64]>::as_chunks::<2>) {
+        Some(([red, green, blue, white], [])) => Ok([*red, *green, *blue, *white]),
+        _ => {
+            let names: Vec<&str> = NamedPrimaries::ALL.iter().map(|set| set.name()).collect();
+            Err(format!("give one of {}, or x,y of R, G, B and white, eight numbers", names.join(", ")))
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The light of a scene: expected electrons per pixel of its source, at the exposure for which it was opened.
 
+use super::picture::Picture;
 use crate::camera::response::Camera;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
@@ -23,28 +24,36 @@ pub(super) type Electrons = Vec<[f64; 3]>;
 
 pub(super) enum ImageRows {
     /// As the file is read; the first row was read to judge the sum over wavelengths.
-    Streamed { first: Electrons, others: Box<SpectralImage> },
+    Streamed { first: Electrons, others: Box<SceneImage> },
     /// All rows, read once to find the brightest.
     Kept(Vec<Electrons>),
 }
 
-/// A spectral image whose planes are summed up to signal electrons.
-pub(super) struct SpectralImage {
-    reader: FrameReader,
-    planes: Vec<WeightedPlane>,
+/// How the pixels of an image become signal electrons.
+pub(super) enum Pixels {
+    /// As sums of its planes.
+    Spectral(Vec<WeightedPlane>),
+    /// As colors.
+    Colored(Box<Picture>),
 }
 
-impl SpectralImage {
-    /// An image, as the sums of these planes.
-    pub(super) fn new(reader: FrameReader, planes: Vec<WeightedPlane>) -> Self {
-        Self { reader, planes }
+/// An image whose pixels become signal electrons.
+pub(super) struct SceneImage {
+    reader: FrameReader,
+    pixels: Pixels,
+}
+
+impl SceneImage {
+    /// An image, seen so.
+    pub(super) fn new(reader: FrameReader, pixels: Pixels) -> Self {
+        Self { reader, pixels }
     }
 
     /// Gives the electrons of the next `rows` rows to `take`, band by band.
     fn fold(&mut self, rows: usize, mut take: impl FnMut(&Band, Vec<Electrons>)) -> Result<()> {
-        let (planes, name) = (&self.planes, self.reader.header().name.clone());
+        let (pixels, name) = (&self.pixels, self.reader.header().name.clone());
         fold([&mut self.reader as &mut dyn RowSource], rows, |band| {
-            take(band, electrons(band, planes, &name)?);
+            take(band, pixels.electrons(band, &name)?);
             Ok(())
         })
     }
@@ -56,10 +65,24 @@ impl SpectralImage {
         sink: &mut dyn RowSink,
         mut draw: impl FnMut(&Band, Vec<Electrons>, &mut Outlet<'_>) -> Result<()>,
     ) -> Result<()> {
-        let (planes, name) = (&self.planes, self.reader.header().name.clone());
+        let (pixels, name) = (&self.pixels, self.reader.header().name.clone());
         fold_into([&mut self.reader as &mut dyn RowSource], rows, sink, |band, outlet| {
-            draw(band, electrons(band, planes, &name)?, outlet)
+            draw(band, pixels.electrons(band, &name)?, outlet)
         })
+    }
+
+    /// The electrons of the next row.
+    pub(super) fn next_row(&mut self) -> Result<Electrons> {
+        let mut found = None;
+        self.fold(1, |_, rows| found = rows.into_iter().next())?;
+        Ok(found.unwrap_or_default())
+    }
+
+    /// The electrons of a pixel.
+    pub(super) fn electrons_at(&mut self, [x, y]: [usize; 2]) -> Result<[f64; 3]> {
+        let mut found = None;
+        self.fold(y + 1, |_, rows| found = rows.last().map(|row| row[x]))?;
+        Ok(found.unwrap_or_default())
     }
 
     /// The electrons of the next row, and the radiance of its brightest pixel, W cm⁻² sr⁻¹ nm⁻¹.
@@ -86,15 +109,23 @@ impl SpectralImage {
     }
 }
 
-/// The electrons of the rows of a band.
-fn electrons(band: &Band, planes: &[WeightedPlane], name: &str) -> Result<Vec<Electrons>> {
-    let window = band.window::<Any>(0);
-    let of_row = |y: usize| {
-        let mut row = Vec::with_capacity(window.width());
-        weighted_sums(window.all_channels(y), window.width(), planes, |electrons| row.push(electrons));
-        row.into_iter().map(|electrons| checked(electrons, name)).collect()
-    };
-    band.rows().into_par_iter().map(of_row).collect()
+impl Pixels {
+    /// The electrons of the rows of a band.
+    fn electrons(&self, band: &Band, name: &str) -> Result<Vec<Electrons>> {
+        let window = band.window::<Any>(0);
+        let of_row = |y: usize| {
+            let row = match self {
+                Self::Spectral(planes) => {
+                    let mut row = Vec::with_capacity(window.width());
+                    weighted_sums(window.all_channels(y), window.width(), planes, |electrons| row.push(electrons));
+                    row
+                }
+                Self::Colored(picture) => picture.electrons(window.all_channels(y), window.width(), y, name)?,
+            };
+            row.into_iter().map(|electrons| checked(electrons, name)).collect()
+        };
+        band.rows().into_par_iter().map(of_row).collect()
+    }
 }
 
 /// The radiance of a pixel, W cm⁻² sr⁻¹ nm⁻¹.

@@ -1,6 +1,8 @@
 //! Opens the light of a scene, and settles its exposure.
 
-use super::light::{ImageRows, Light, Seen, SpectralImage, brightest, checked};
+use super::light::{ImageRows, Light, Pixels, SceneImage, Seen, brightest, checked};
+use super::picture::Losses;
+use super::picture;
 use super::request::Scene;
 use crate::camera::optics::Exposure;
 use crate::camera::readout::ReadOut;
@@ -13,7 +15,7 @@ use crate::formats::data::{self, LoadedSensor};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::frame::Geometry;
-use crate::metadata::Metadata;
+use crate::metadata::{Metadata, UpsamplingRecord};
 use crate::numerics::quadrature::Rule;
 use crate::requests::notes::{self, Note};
 use crate::spectrum::{WavelengthGrid, chart_columns};
@@ -41,10 +43,20 @@ pub(super) struct Found {
     /// What is left out, and the error of the sum over wavelengths.
     pub(super) metadata: Metadata,
     pub(super) notes: Vec<Note>,
+    /// How the spectra of a picture are made up, and what is lost of its colors on the way.
+    pub(super) upsampling: Option<UpsamplingRecord>,
+    pub(super) losses: Losses,
+}
+
+impl Found {
+    fn none() -> Self {
+        let metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+        Self { metadata, notes: Vec::new(), upsampling: None, losses: Losses::default() }
+    }
 }
 
 /// The sums over wavelengths that turn radiance into electrons.
-struct Sums<'a> {
+pub(super) struct Sums<'a> {
     loaded: &'a LoadedSensor,
     exposure: &'a Exposure,
     grid: WavelengthGrid,
@@ -67,7 +79,7 @@ impl<'a> Sums<'a> {
     }
 
     /// The camera for radiances at these wavelengths, those of `name`.
-    fn camera(&self, sampled_nm: &[f64], name: &str, notes: &mut Vec<Note>) -> Result<Seen> {
+    pub(super) fn camera(&self, sampled_nm: &[f64], name: &str, notes: &mut Vec<Note>) -> Result<Seen> {
         let response = self.loaded.response()?;
         let (of_sum, uncovered) = self.weights.camera(sampled_nm);
         let exact = response.weights_between(&self.loaded.sensor, self.exposure, &self.grid, sampled_nm)?;
@@ -110,7 +122,7 @@ impl Scene {
             // The signal is proportional to time: work it out for 1 s, then choose.
             exposure.exposure_s = 1.0;
         }
-        let mut found = Found { metadata: Metadata::new(QuantityKind::ExpectedElectrons), notes: Vec::new() };
+        let mut found = Found::none();
         found.notes.extend(loaded.sensor.doubts().into_iter().chain(self.doubt(exposure)).map(Note::Warning));
         let mut light = match self.level.given() {
             Some(electrons) => {
@@ -119,6 +131,10 @@ impl Scene {
             }
             None => self.open_light(&loaded, &exposure, &mut found)?,
         };
+        if self.picture.is_given() && found.upsampling.is_none() {
+            let problem = "--rgb, --primaries, --illuminant and --luminance are for a picture in R, G, B, which this scene is not";
+            return Err(Error::Usage(problem.into()));
+        }
         let mut brightest_e = None;
         if let Some(fraction) = self.level.expose_to {
             let (kept, brightest) = light.keep_and_find_brightest()?;
@@ -156,6 +172,9 @@ impl Scene {
         let options = InputOptions { path, part: self.part, all_channels: true, ..InputOptions::default() };
         match spectral::open(&options)? {
             Radiances::Table(table) => self.light_of_table(&table, &sums, found),
+            Radiances::Image(reader) if picture::is_one(reader.header()) => {
+                self.light_of_picture(*reader, &sums, found)
+            }
             Radiances::Image(reader) => self.light_of_image(*reader, &sums, found),
         }
     }
@@ -210,7 +229,7 @@ impl Scene {
             found.metadata.leave_out("render-radiance", what, "no class responds to them");
         }
         let Geometry { width, height, .. } = header.geometry;
-        let mut image = SpectralImage::new(reader, planes);
+        let mut image = SceneImage::new(reader, Pixels::Spectral(planes));
         let Some(sample) = self.spectrum.sample else {
             let (first, radiance) = image.first_row(&spectral)?;
             found.metadata.quadrature_error = seen.quadrature_error(&radiance);
@@ -272,6 +291,6 @@ fn inexact([red, green, blue]: [f64; 3]) -> Note {
     }
 }
 
-fn no_sample(name: &str, sample: usize, count: usize) -> Error {
+pub(super) fn no_sample(name: &str, sample: usize, count: usize) -> Error {
     Error::Usage(format!("{name}: there is no sample {sample}; it has samples 0 to {}", count - 1))
 }

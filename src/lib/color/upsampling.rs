@@ -1,0 +1,478 @@
+//! Smooth spectra of colors \[Jakob2019].
+
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over wavelengths that the compiler turns into vectors index several arrays"
+)]
+
+use super::lab_from_xyz;
+use crate::numerics::vectors::{self, Instructions, Kernel};
+use crate::spectrum::{Curve, Observer};
+use nalgebra::{Matrix3, Vector3};
+
+/// Where spectra begin and end, nm.
+pub const EXTENT_NM: [f64; 2] = [360.0, 830.0];
+
+/// Distance of the nodes on which spectra are summed, nm.
+const STEP_NM: f64 = 5.0;
+const NODES: usize = 95;
+const LANES: usize = 4;
+const BLOCKS: usize = NODES.div_ceil(LANES);
+/// Nodes between which a smooth spectrum is taken as a polynomial.
+const POINTS: usize = 8;
+
+/// The largest of the three tristimulus values relative to white of the spectra that are solved for; colors are scaled to it.
+const LEVEL: f64 = 0.25;
+
+/// Spectra whose polynomial is steeper where it crosses zero, or has larger coefficients, are too narrow for the nodes.
+const STEEPEST: f64 = 30.0;
+const LARGEST: f64 = 200.0;
+
+/// One number a node.
+type Nodes = [[f64; LANES]; BLOCKS];
+
+/// The wavelength as the polynomial takes it: −1 to 1.
+fn place(wavelength_nm: f64) -> f64 {
+    let [first, last] = EXTENT_NM;
+    (2.0 * wavelength_nm - first - last) / (last - first)
+}
+
+/// A spectrum relative to that of white.
+///
+/// a · S(λ), S = ½ + x / (2 √(1 + x²)), x = c₀ + c₁ l + c₂ l²        \[Jakob2019, Eqs. 2 and 3]
+///
+/// l = −1 at 360 nm, 1 at 830 nm. The factor a is that of the unbounded spectra of \[PBRT4, Sec. 4.6.6], but for the level
+/// that it scales to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SmoothSpectrum {
+    /// The factor a; 0 of black.
+    pub factor: f64,
+    /// c₀, c₁, c₂.
+    pub coefficients: [f64; 3],
+}
+
+impl SmoothSpectrum {
+    const BLACK: Self = Self { factor: 0.0, coefficients: [0.0; 3] };
+
+    /// Its value at a wavelength in nm.
+    pub fn at(&self, wavelength_nm: f64) -> f64 {
+        let [constant, linear, quadratic] = self.coefficients;
+        let l = place(wavelength_nm);
+        self.factor * sigmoid(constant + (linear + quadratic * l) * l).0
+    }
+}
+
+/// ½ + x / (2 √(1 + x²)), which loses no digits where it is small, and its derivative.
+#[inline(always)]
+fn sigmoid(x: f64) -> (f64, f64) {
+    let square = 1.0 + x * x;
+    let root = square.sqrt();
+    let tail = 0.5 / (square + x.abs() * root);
+    (if x < 0.0 { tail } else { 1.0 - tail }, 0.5 / (square * root))
+}
+
+/// The x of a value of the sigmoid, and its derivative.
+#[inline(always)]
+fn argument(value: f64) -> (f64, f64) {
+    let product = value * (1.0 - value);
+    let root = product.sqrt();
+    ((value - 0.5) / root, 0.25 / (product * root))
+}
+
+/// Weights of three sums over wavelengths of a smooth spectrum.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SmoothWeights([Nodes; 3]);
+
+impl SmoothWeights {
+    /// Those that give the sums of `weights` at `wavelengths_nm`; what lies beyond [`EXTENT_NM`] is left out.
+    ///
+    /// A spectrum is taken between its nodes, 5 nm apart, as the polynomial through the eight nearest: of all that an
+    /// [`Upsampler`] gives the sums are within 10⁻⁴ of those with the spectrum itself, within 10⁻⁵ of colors of sRGB.
+    pub fn of(wavelengths_nm: &[f64], weights: &[Vec<f64>; 3]) -> Self {
+        let mut nodes = [[[0.0; LANES]; BLOCKS]; 3];
+        for (index, &nm) in wavelengths_nm.iter().enumerate() {
+            if !(EXTENT_NM[0]..=EXTENT_NM[1]).contains(&nm) {
+                continue;
+            }
+            let at = (nm - EXTENT_NM[0]) / STEP_NM;
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the nodes")]
+            let first = (at as usize + 1).saturating_sub(POINTS / 2).min(NODES - POINTS);
+            for node in first..first + POINTS {
+                let others = (first..first + POINTS).filter(|other| *other != node);
+                let share: f64 =
+                    others.map(|other| (at - other as f64) / (node as f64 - other as f64)).product();
+                for (nodes, weights) in nodes.iter_mut().zip(weights) {
+                    nodes[node / LANES][node % LANES] += share * weights[index];
+                }
+            }
+        }
+        Self(nodes)
+    }
+
+    /// The sum of all weights of each.
+    fn totals(&self) -> [f64; 3] {
+        self.0.map(|nodes| nodes.as_flattened().iter().sum())
+    }
+}
+
+/// What became of colors that no spectrum was found for.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Moved {
+    /// How many there are.
+    pub pixels: u64,
+    /// The largest difference between color and spectrum, ΔE\*ab about the white of luminance 1.
+    pub delta_e: f64,
+}
+
+impl Moved {
+    /// Both together.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self { pixels: self.pixels + other.pixels, delta_e: self.delta_e.max(other.delta_e) }
+    }
+}
+
+/// Finds smooth spectra of colors.
+///
+/// A color is scaled so that the largest of its tristimulus values, relative to those of white, is ¼; the spectrum that has it
+/// is that of \[Jakob2019] and is scaled back. So twice the color is twice the spectrum at every wavelength, gray is flat, and no
+/// color is too bright. The three coefficients are solved for by Newton's method to 10⁻¹² from the solution of the linear
+/// problem about gray, each color by itself.
+///
+/// Colors too pure for a spectrum that the nodes resolve, or beyond all that there is, are moved straight towards the gray of
+/// their luminance, by the least of 1024 steps that finds one; those without luminance become black.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Upsampler {
+    matching: SmoothWeights,
+    places: Nodes,
+    /// Coefficients from x of the tristimulus values, where color is slight.
+    start: Matrix3<f64>,
+    white: [f64; 3],
+    instructions: Instructions,
+}
+
+impl Upsampler {
+    /// For colors as an observer sees them under an illuminant; none where one of the two is zero everywhere.
+    pub fn new(observer: &Observer, illuminant: &Curve) -> Option<Self> {
+        let [first, last] = EXTENT_NM.map(|nm| nm as u32);
+        let wavelengths: Vec<f64> = (first..=last).map(f64::from).collect();
+        let sums = observer.matching.each_ref().map(|curve| -> Vec<f64> {
+            wavelengths.iter().map(|&nm| curve.at(nm) * illuminant.at(nm)).collect()
+        });
+        let xyz = sums.each_ref().map(|weights| weights.iter().sum::<f64>());
+        let relative = [0, 1, 2].map(|i| sums[i].iter().map(|weight| weight / xyz[i]).collect());
+        let matching = SmoothWeights::of(&wavelengths, &relative);
+        let place_of = |node: usize| place(EXTENT_NM[0] + STEP_NM * node as f64);
+        let places: Nodes = std::array::from_fn(|block| std::array::from_fn(|lane| place_of(block * LANES + lane)));
+        let moment = |i: usize, power: i32| -> f64 {
+            let nodes = matching.0[i].as_flattened().iter().zip(places.as_flattened());
+            nodes.map(|(weight, place)| weight * place.powi(power)).sum()
+        };
+        let start = Matrix3::from_fn(|i, power| moment(i, [0, 1, 2][power])).try_inverse()?;
+        let white = xyz.map(|value| value / xyz[1]);
+        let is_sound = matching.totals().into_iter().chain(white).all(f64::is_finite);
+        is_sound.then_some(Self { matching, places, start, white, instructions: Instructions::widest() })
+    }
+
+    /// XYZ of the illuminant, Y = 1.
+    pub fn white(&self) -> [f64; 3] {
+        self.white
+    }
+
+    /// Works on a narrower set of instructions than the widest there is; spectra are the same.
+    #[must_use]
+    pub fn on(self, instructions: Instructions) -> Self {
+        Self { instructions, ..self }
+    }
+
+    /// The spectrum of a color of XYZ, Y = 1 of white, and what became of it; black where it is not finite.
+    pub fn spectrum(&self, xyz: [f64; 3]) -> (SmoothSpectrum, Moved) {
+        vectors::run_on(self.instructions, One { upsampler: self, xyz })
+    }
+
+    /// The sums of the spectra of colors of XYZ, Y = 1 of white.
+    ///
+    /// # Panics
+    ///
+    /// Where there are not as many sums as colors.
+    pub fn sums(&self, colors: &[[f64; 3]], weights: &SmoothWeights, sums: &mut [[f64; 3]]) -> Moved {
+        assert_eq!(colors.len(), sums.len());
+        vectors::run_on(self.instructions, Many { upsampler: self, colors, weights, sums })
+    }
+
+    #[inline(always)]
+    fn solve(&self, xyz: [f64; 3]) -> (SmoothSpectrum, Moved) {
+        let color = [0, 1, 2].map(|i| xyz[i] / self.white[i]);
+        if color == [0.0; 3] || !color.iter().all(|value| value.is_finite()) {
+            return (SmoothSpectrum::BLACK, Moved::default());
+        }
+        if let Some(found) = self.reached(color) {
+            return (found, Moved::default());
+        }
+        let gray = color[1];
+        let at = |share: f64| color.map(|value| gray + share * (value - gray));
+        let (mut share, mut found) = (0.0, SmoothSpectrum::BLACK);
+        if gray > 0.0 {
+            found = self.reached([gray; 3]).unwrap_or(SmoothSpectrum::BLACK);
+            for halving in 1..=10 {
+                let further = share + 0.5_f64.powi(halving);
+                if let Some(spectrum) = self.reached(at(further)) {
+                    (share, found) = (further, spectrum);
+                }
+            }
+        }
+        let [asked, given] = [color, if found.factor > 0.0 { at(share) } else { [0.0; 3] }]
+            .map(|color| Vector3::from(lab_from_xyz(color, [1.0; 3])));
+        (found, Moved { pixels: 1, delta_e: (asked - given).norm() })
+    }
+
+    /// The spectrum of a color relative to white, where one is found that the nodes resolve.
+    #[inline(always)]
+    fn reached(&self, color: [f64; 3]) -> Option<SmoothSpectrum> {
+        /// What is left of x of the tristimulus values, relative to 1 + |x|.
+        const CONVERGED: f64 = 1e-12;
+        let largest = color[0].max(color[1]).max(color[2]);
+        let factor = largest / LEVEL;
+        let wanted = color.map(|value| value / factor);
+        if !wanted.iter().all(|value| *value > 0.0) || !factor.is_normal() {
+            return None;
+        }
+        let x = wanted.map(|value| argument(value).0);
+        let mut coefficients = times(&self.start, x);
+        let mut state = self.state(coefficients, x);
+        for _ in 0..30 {
+            if (0..3).all(|i| state.rest[i].abs() <= CONVERGED * (1.0 + x[i].abs())) {
+                return resolved(coefficients).then_some(SmoothSpectrum { factor, coefficients });
+            }
+            let step = solved(&state.slopes, state.rest)?;
+            let mut share = 1.0;
+            let (next, reached) = loop {
+                let next = [0, 1, 2].map(|j| coefficients[j] - share * step[j]);
+                let reached = self.state(next, x);
+                // What is not a number is no progress.
+                if reached.size() < state.size() {
+                    break (next, reached);
+                }
+                share *= 0.5;
+                if share < 0.01 {
+                    return None;
+                }
+            };
+            (coefficients, state) = (next, reached);
+        }
+        None
+    }
+
+    /// How far a spectrum is from the color whose tristimulus values have these x.
+    #[inline(always)]
+    fn state(&self, [constant, linear, quadratic]: [f64; 3], x: [f64; 3]) -> State {
+        let mut values = [[0.0; LANES]; 3];
+        let mut slopes = [[[0.0; LANES]; 3]; 3];
+        for block in 0..BLOCKS {
+            let places = &self.places[block];
+            let mut value = [0.0; LANES];
+            let mut powers = [[0.0; LANES]; 3];
+            for lane in 0..LANES {
+                let l = places[lane];
+                let (sigmoid, slope) = sigmoid(constant + (linear + quadratic * l) * l);
+                value[lane] = sigmoid;
+                powers[0][lane] = slope;
+                powers[1][lane] = slope * l;
+                powers[2][lane] = slope * l * l;
+            }
+            for i in 0..3 {
+                let weights = &self.matching.0[i][block];
+                for lane in 0..LANES {
+                    values[i][lane] += weights[lane] * value[lane];
+                    for j in 0..3 {
+                        slopes[i][j][lane] += weights[lane] * powers[j][lane];
+                    }
+                }
+            }
+        }
+        let reached = values.map(|lanes| argument(total(lanes)));
+        State {
+            rest: [0, 1, 2].map(|i| reached[i].0 - x[i]),
+            slopes: [0, 1, 2].map(|i| slopes[i].map(|lanes| reached[i].1 * total(lanes))),
+        }
+    }
+
+    #[inline(always)]
+    fn sum(&self, spectrum: &SmoothSpectrum, weights: &SmoothWeights) -> [f64; 3] {
+        let [constant, linear, quadratic] = spectrum.coefficients;
+        let mut sums = [[0.0; LANES]; 3];
+        for block in 0..BLOCKS {
+            for lane in 0..LANES {
+                let l = self.places[block][lane];
+                let value = sigmoid(constant + (linear + quadratic * l) * l).0;
+                for i in 0..3 {
+                    sums[i][lane] += weights.0[i][block][lane] * value;
+                }
+            }
+        }
+        sums.map(|lanes| spectrum.factor * total(lanes))
+    }
+}
+
+/// How far a spectrum is from what it shall be: x of its tristimulus values less x of those wanted, and the derivatives.
+struct State {
+    rest: [f64; 3],
+    slopes: [[f64; 3]; 3],
+}
+
+impl State {
+    /// The largest distance; not a number where one is none.
+    #[inline(always)]
+    fn size(&self) -> f64 {
+        self.rest.iter().fold(0.0, |size: f64, rest| if rest.abs() > size || rest.is_nan() { rest.abs() } else { size })
+    }
+}
+
+#[inline(always)]
+fn total(lanes: [f64; LANES]) -> f64 {
+    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3])
+}
+
+#[inline(always)]
+fn times(matrix: &Matrix3<f64>, vector: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| matrix[(i, 0)] * vector[0] + matrix[(i, 1)] * vector[1] + matrix[(i, 2)] * vector[2])
+}
+
+/// Solves three equations by Cramer's rule; none where they are singular.
+#[inline(always)]
+fn solved(rows: &[[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
+    let cross = |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let minors = [cross(rows[1], rows[2]), cross(rows[2], rows[0]), cross(rows[0], rows[1])];
+    let determinant = dot(rows[0], minors[0]);
+    let solution = [0, 1, 2].map(|j| {
+        (right[0] * minors[0][j] + right[1] * minors[1][j] + right[2] * minors[2][j]) / determinant
+    });
+    solution.iter().all(|value| value.is_finite()).then_some(solution)
+}
+
+/// Whether the nodes resolve a spectrum.
+#[inline(always)]
+fn resolved([constant, linear, quadratic]: [f64; 3]) -> bool {
+    // At its zeros the polynomial has the slope ±√(c₁² − 4 c₀ c₂).
+    linear * linear - 4.0 * constant * quadratic <= STEEPEST * STEEPEST
+        && [constant, linear, quadratic].iter().all(|value| value.abs() <= LARGEST)
+}
+
+struct One<'a> {
+    upsampler: &'a Upsampler,
+    xyz: [f64; 3],
+}
+
+impl Kernel for One<'_> {
+    type Output = (SmoothSpectrum, Moved);
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        self.upsampler.solve(self.xyz)
+    }
+}
+
+struct Many<'a> {
+    upsampler: &'a Upsampler,
+    colors: &'a [[f64; 3]],
+    weights: &'a SmoothWeights,
+    sums: &'a mut [[f64; 3]],
+}
+
+impl Kernel for Many<'_> {
+    type Output = Moved;
+
+    #[inline(always)]
+    fn run(self) -> Moved {
+        let Self { upsampler, colors, weights, sums } = self;
+        let mut moved = Moved::default();
+        let mut last = ([0.0; 3], [0.0; 3], Moved::default());
+        for (&color, sums) in colors.iter().zip(sums) {
+            // Neighbors are often alike.
+            if color != last.0 {
+                let (spectrum, of_color) = upsampler.solve(color);
+                last = (color, upsampler.sum(&spectrum, weights), of_color);
+            }
+            *sums = last.1;
+            moved = moved.plus(last.2);
+        }
+        moved
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rgb::{NamedPrimaries, xyz_from_rgb};
+    use super::*;
+    use crate::formats::data::{load_illuminant, load_observer};
+    use crate::names::Named;
+
+    fn upsampler() -> Upsampler {
+        Upsampler::new(&load_observer().unwrap(), &load_illuminant("d65").unwrap()).unwrap()
+    }
+
+    /// XYZ of a spectrum under D65, Y = 1 of white, by the tables of 1 nm.
+    fn seen(spectrum: &SmoothSpectrum) -> [f64; 3] {
+        let (observer, d65) = (load_observer().unwrap(), load_illuminant("d65").unwrap());
+        let sum = |curve: &Curve, relative: &dyn Fn(f64) -> f64| -> f64 {
+            (360..=830).map(f64::from).map(|nm| curve.at(nm) * d65.at(nm) * relative(nm)).sum()
+        };
+        let white = sum(&observer.matching[1], &|_| 1.0);
+        observer.matching.each_ref().map(|curve| sum(curve, &|nm| spectrum.at(nm)) / white)
+    }
+
+    fn cube(steps: u32) -> impl Iterator<Item = Vector3<f64>> {
+        let part = move |index: u32| f64::from(index) / f64::from(steps);
+        let (count, all) = (steps + 1, (steps + 1).pow(3));
+        (0..all).map(move |i| Vector3::new(part(i % count), part(i / count % count), part(i / count / count)))
+    }
+
+    fn matrix(upsampler: &Upsampler, set: NamedPrimaries) -> Matrix3<f64> {
+        xyz_from_rgb(&set.chromaticities(), upsampler.white()).unwrap()
+    }
+
+    /// All of sRGB, its corners too, and the same down to 10⁻³⁰ and up to 10⁶ of white: by the tables of 1 nm each
+    /// tristimulus value is that of the color within 10⁻⁶ of white's for colors up to white. None has to be moved.
+    #[test]
+    fn spectra_have_the_colors_of_srgb() {
+        let upsampler = upsampler();
+        let srgb = matrix(&upsampler, NamedPrimaries::Srgb);
+        let (mut worst, mut worst_relative) = (0.0_f64, 0.0_f64);
+        for rgb in cube(8) {
+            for scale in [1.0, 1e-30, 1e6, 0.01] {
+                let xyz = srgb * rgb * scale;
+                let (spectrum, moved) = upsampler.spectrum(xyz.into());
+                assert_eq!(moved, Moved::default(), "{rgb} {scale}");
+                let made = seen(&spectrum);
+                for i in 0..3 {
+                    worst = worst.max((made[i] - xyz[i]).abs() / scale);
+                    worst_relative = worst_relative.max((made[i] / xyz[i] - 1.0).abs());
+                    if xyz == Vector3::zeros() { assert_eq!(made, [0.0; 3]); worst_relative = 0.0_f64.max(worst_relative); }
+                }
+            }
+        }
+        eprintln!("worst {worst:e} relative {worst_relative:e}");
+        assert!(worst < 1e-6, "{worst:e}");
+    }
+
+    #[test]
+    fn wide_gamuts() {
+        let upsampler = upsampler();
+        for set in NamedPrimaries::ALL {
+            let matrix = matrix(&upsampler, *set);
+            let (mut worst, mut count, mut moves) = (0.0_f64, 0, Moved::default());
+            for rgb in cube(12) {
+                let xyz = matrix * rgb;
+                let (spectrum, moved) = upsampler.spectrum(xyz.into());
+                moves = moves.plus(moved);
+                count += 1;
+                if moved.pixels == 0 && rgb != Vector3::zeros() {
+                    let made = seen(&spectrum);
+                    worst = (0..3).map(|i| (made[i] / xyz[i] - 1.0).abs()).fold(worst, f64::max);
+                }
+            }
+            eprintln!("{} {moves:?} of {count} worst {worst:e}", set.name());
+        }
+    }
+}
