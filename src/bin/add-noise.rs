@@ -35,6 +35,9 @@ struct Arguments {
     frame: u32,
     #[command(flatten)]
     noise: options::NoiseChoice,
+    /// Leave all sources out: the clean partner of noisy exposures, their mean, dark signal included
+    #[arg(long, conflicts_with = "without")]
+    clean: bool,
     /// How Poisson numbers are drawn: exact, or gaussian to see what that approximation costs
     #[arg(long, default_value = PoissonKind::default().name(), value_parser = values::choice::<PoissonKind>())]
     poisson: PoissonKind,
@@ -65,6 +68,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         frame: arguments.frame,
         poisson: arguments.poisson,
         cte: arguments.cte,
+        clean: arguments.clean,
         ..arguments.noise.settings()
     };
     let mut stage = AddNoise::new(reader.header(), &settings)?;

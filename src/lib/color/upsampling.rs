@@ -58,17 +58,31 @@ impl SmoothSpectrum {
     pub fn at(&self, wavelength_nm: f64) -> f64 {
         let [constant, linear, quadratic] = self.coefficients;
         let l = place(wavelength_nm);
-        self.factor * sigmoid(constant + (linear + quadratic * l) * l).0
+        self.factor * sigmoid(constant + (linear + quadratic * l) * l)
     }
 }
 
-/// ½ + x / (2 √(1 + x²)), which loses no digits where it is small, and its derivative.
-#[inline(always)]
-fn sigmoid(x: f64) -> (f64, f64) {
+/// ½ + x / (2 √(1 + x²)), which loses no digits where it is small.
+fn sigmoid(x: f64) -> f64 {
     let square = 1.0 + x * x;
-    let root = square.sqrt();
-    let tail = 0.5 / (square + x.abs() * root);
-    (if x < 0.0 { tail } else { 1.0 - tail }, 0.5 / (square * root))
+    let tail = 0.5 / (square + x.abs() * square.sqrt());
+    if x < 0.0 { tail } else { 1.0 - tail }
+}
+
+/// The same to 10⁻¹⁶ by a single division, and its derivative.
+#[inline(always)]
+fn quick_sigmoid(x: f64) -> (f64, f64) {
+    let square = 1.0 + x * x;
+    let derivative = 0.5 / (square * square.sqrt());
+    (0.5 + x * square * derivative, derivative)
+}
+
+/// Adds products lane by lane.
+#[inline(always)]
+fn add(sums: &mut [f64; LANES], weights: &[f64; LANES], values: &[f64; LANES]) {
+    for lane in 0..LANES {
+        sums[lane] += weights[lane] * values[lane];
+    }
 }
 
 /// The x of a value of the sigmoid, and its derivative.
@@ -99,8 +113,7 @@ impl SmoothWeights {
             let first = (at as usize + 1).saturating_sub(POINTS / 2).min(NODES - POINTS);
             for node in first..first + POINTS {
                 let others = (first..first + POINTS).filter(|other| *other != node);
-                let share: f64 =
-                    others.map(|other| (at - other as f64) / (node as f64 - other as f64)).product();
+                let share: f64 = others.map(|other| (at - other as f64) / (node as f64 - other as f64)).product();
                 for (nodes, weights) in nodes.iter_mut().zip(weights) {
                     nodes[node / LANES][node % LANES] += share * weights[index];
                 }
@@ -136,7 +149,7 @@ impl Moved {
 ///
 /// A color is scaled so that the largest of its tristimulus values, relative to those of white, is ¼; the spectrum that has it
 /// is that of \[Jakob2019] and is scaled back. So twice the color is twice the spectrum at every wavelength, gray is flat, and no
-/// color is too bright. The three coefficients are solved for by Newton's method to 10⁻¹² from the solution of the linear
+/// color is too bright. The three coefficients are solved for by Newton's method to rounding from the solution of the linear
 /// problem about gray, each color by itself.
 ///
 /// Colors too pure for a spectrum that the nodes resolve, or beyond all that there is, are moved straight towards the gray of
@@ -156,9 +169,10 @@ impl Upsampler {
     pub fn new(observer: &Observer, illuminant: &Curve) -> Option<Self> {
         let [first, last] = EXTENT_NM.map(|nm| nm as u32);
         let wavelengths: Vec<f64> = (first..=last).map(f64::from).collect();
-        let sums = observer.matching.each_ref().map(|curve| -> Vec<f64> {
-            wavelengths.iter().map(|&nm| curve.at(nm) * illuminant.at(nm)).collect()
-        });
+        let sums = observer
+            .matching
+            .each_ref()
+            .map(|curve| -> Vec<f64> { wavelengths.iter().map(|&nm| curve.at(nm) * illuminant.at(nm)).collect() });
         let xyz = sums.each_ref().map(|weights| weights.iter().sum::<f64>());
         let relative = [0, 1, 2].map(|i| sums[i].iter().map(|weight| weight / xyz[i]).collect());
         let matching = SmoothWeights::of(&wavelengths, &relative);
@@ -229,8 +243,9 @@ impl Upsampler {
     /// The spectrum of a color relative to white, where one is found that the nodes resolve.
     #[inline(always)]
     fn reached(&self, color: [f64; 3]) -> Option<SmoothSpectrum> {
-        /// What is left of x of the tristimulus values, relative to 1 + |x|.
-        const CONVERGED: f64 = 1e-12;
+        /// What is left of x of the tristimulus values, relative to 1 + |x|, from which one more step leaves nothing but
+        /// rounding: each squares it.
+        const CONVERGED: f64 = 1e-7;
         let largest = color[0].max(color[1]).max(color[2]);
         let factor = largest / LEVEL;
         let wanted = color.map(|value| value / factor);
@@ -241,10 +256,11 @@ impl Upsampler {
         let mut coefficients = times(&self.start, x);
         let mut state = self.state(coefficients, x);
         for _ in 0..30 {
+            let step = solved(&state.slopes, state.rest)?;
             if (0..3).all(|i| state.rest[i].abs() <= CONVERGED * (1.0 + x[i].abs())) {
+                let coefficients = [0, 1, 2].map(|j| coefficients[j] - step[j]);
                 return resolved(coefficients).then_some(SmoothSpectrum { factor, coefficients });
             }
-            let step = solved(&state.slopes, state.rest)?;
             let mut share = 1.0;
             let (next, reached) = loop {
                 let next = [0, 1, 2].map(|j| coefficients[j] - share * step[j]);
@@ -266,28 +282,25 @@ impl Upsampler {
     /// How far a spectrum is from the color whose tristimulus values have these x.
     #[inline(always)]
     fn state(&self, [constant, linear, quadratic]: [f64; 3], x: [f64; 3]) -> State {
+        let [mut sigmoids, mut derivatives] = [[[0.0; LANES]; BLOCKS]; 2];
+        let nodes = sigmoids.as_flattened_mut().iter_mut().zip(derivatives.as_flattened_mut());
+        for ((sigmoid, derivative), l) in nodes.zip(self.places.as_flattened()) {
+            let x = constant + (linear + quadratic * l) * l;
+            (*sigmoid, *derivative) = quick_sigmoid(x);
+        }
         let mut values = [[0.0; LANES]; 3];
         let mut slopes = [[[0.0; LANES]; 3]; 3];
         for block in 0..BLOCKS {
-            let places = &self.places[block];
-            let mut value = [0.0; LANES];
-            let mut powers = [[0.0; LANES]; 3];
-            for lane in 0..LANES {
-                let l = places[lane];
-                let (sigmoid, slope) = sigmoid(constant + (linear + quadratic * l) * l);
-                value[lane] = sigmoid;
-                powers[0][lane] = slope;
-                powers[1][lane] = slope * l;
-                powers[2][lane] = slope * l * l;
-            }
+            let (sigmoid, l) = (&sigmoids[block], &self.places[block]);
+            let constant = derivatives[block];
+            let linear: [f64; LANES] = std::array::from_fn(|lane| constant[lane] * l[lane]);
+            let quadratic: [f64; LANES] = std::array::from_fn(|lane| linear[lane] * l[lane]);
             for i in 0..3 {
                 let weights = &self.matching.0[i][block];
-                for lane in 0..LANES {
-                    values[i][lane] += weights[lane] * value[lane];
-                    for j in 0..3 {
-                        slopes[i][j][lane] += weights[lane] * powers[j][lane];
-                    }
-                }
+                add(&mut values[i], weights, sigmoid);
+                add(&mut slopes[i][0], weights, &constant);
+                add(&mut slopes[i][1], weights, &linear);
+                add(&mut slopes[i][2], weights, &quadratic);
             }
         }
         let reached = values.map(|lanes| argument(total(lanes)));
@@ -300,14 +313,14 @@ impl Upsampler {
     #[inline(always)]
     fn sum(&self, spectrum: &SmoothSpectrum, weights: &SmoothWeights) -> [f64; 3] {
         let [constant, linear, quadratic] = spectrum.coefficients;
+        let mut sigmoids = [[0.0; LANES]; BLOCKS];
+        for (sigmoid, l) in sigmoids.as_flattened_mut().iter_mut().zip(self.places.as_flattened()) {
+            *sigmoid = quick_sigmoid(constant + (linear + quadratic * l) * l).0;
+        }
         let mut sums = [[0.0; LANES]; 3];
         for block in 0..BLOCKS {
-            for lane in 0..LANES {
-                let l = self.places[block][lane];
-                let value = sigmoid(constant + (linear + quadratic * l) * l).0;
-                for i in 0..3 {
-                    sums[i][lane] += weights.0[i][block][lane] * value;
-                }
+            for (sums, weights) in sums.iter_mut().zip(&weights.0) {
+                add(sums, &weights[block], &sigmoids[block]);
             }
         }
         sums.map(|lanes| spectrum.factor * total(lanes))
@@ -341,13 +354,13 @@ fn times(matrix: &Matrix3<f64>, vector: [f64; 3]) -> [f64; 3] {
 /// Solves three equations by Cramer's rule; none where they are singular.
 #[inline(always)]
 fn solved(rows: &[[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
-    let cross = |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let minors = [cross(rows[1], rows[2]), cross(rows[2], rows[0]), cross(rows[0], rows[1])];
     let determinant = dot(rows[0], minors[0]);
-    let solution = [0, 1, 2].map(|j| {
-        (right[0] * minors[0][j] + right[1] * minors[1][j] + right[2] * minors[2][j]) / determinant
-    });
+    let solution =
+        [0, 1, 2].map(|j| (right[0] * minors[0][j] + right[1] * minors[1][j] + right[2] * minors[2][j]) / determinant);
     solution.iter().all(|value| value.is_finite()).then_some(solution)
 }
 
@@ -432,47 +445,115 @@ mod tests {
         xyz_from_rgb(&set.chromaticities(), upsampler.white()).unwrap()
     }
 
-    /// All of sRGB, its corners too, and the same down to 10⁻³⁰ and up to 10⁶ of white: by the tables of 1 nm each
-    /// tristimulus value is that of the color within 10⁻⁶ of white's for colors up to white. None has to be moved.
+    /// All of sRGB, its corners too, and the same from 10⁻³⁰ to 10⁶ of white: by the tables of 1 nm each tristimulus value is
+    /// that of the color within 10⁻⁶ of itself: what a polynomial through eight nodes leaves. None has to be moved.
     #[test]
     fn spectra_have_the_colors_of_srgb() {
         let upsampler = upsampler();
         let srgb = matrix(&upsampler, NamedPrimaries::Srgb);
-        let (mut worst, mut worst_relative) = (0.0_f64, 0.0_f64);
-        for rgb in cube(8) {
-            for scale in [1.0, 1e-30, 1e6, 0.01] {
+        for rgb in cube(5).skip(1) {
+            for scale in [1.0, 1e-30, 1e6] {
                 let xyz = srgb * rgb * scale;
                 let (spectrum, moved) = upsampler.spectrum(xyz.into());
                 assert_eq!(moved, Moved::default(), "{rgb} {scale}");
                 let made = seen(&spectrum);
-                for i in 0..3 {
-                    worst = worst.max((made[i] - xyz[i]).abs() / scale);
-                    worst_relative = worst_relative.max((made[i] / xyz[i] - 1.0).abs());
-                    if xyz == Vector3::zeros() { assert_eq!(made, [0.0; 3]); worst_relative = 0.0_f64.max(worst_relative); }
-                }
+                assert!((0..3).all(|i| (made[i] / xyz[i] - 1.0).abs() < 1e-6), "{rgb} {made:?} for {xyz}");
             }
         }
-        eprintln!("worst {worst:e} relative {worst_relative:e}");
-        assert!(worst < 1e-6, "{worst:e}");
+        assert_eq!(upsampler.spectrum([0.0; 3]), (SmoothSpectrum::BLACK, Moved::default()));
     }
 
+    /// Of the primaries of wider sets no spectrum has the color. What is not moved is within 10⁻⁴, that of the nodes; what is
+    /// keeps its luminance to that.
     #[test]
-    fn wide_gamuts() {
+    fn colors_of_wide_gamuts_are_met_or_moved_at_their_luminance() {
         let upsampler = upsampler();
-        for set in NamedPrimaries::ALL {
-            let matrix = matrix(&upsampler, *set);
-            let (mut worst, mut count, mut moves) = (0.0_f64, 0, Moved::default());
-            for rgb in cube(12) {
+        for (set, moves) in [
+            (NamedPrimaries::AdobeRgb, false),
+            (NamedPrimaries::DisplayP3, true),
+            (NamedPrimaries::Rec2020, true),
+            (NamedPrimaries::AcesCg, true),
+        ] {
+            let matrix = matrix(&upsampler, set);
+            let mut all = Moved::default();
+            for rgb in cube(6).skip(1) {
                 let xyz = matrix * rgb;
                 let (spectrum, moved) = upsampler.spectrum(xyz.into());
-                moves = moves.plus(moved);
-                count += 1;
-                if moved.pixels == 0 && rgb != Vector3::zeros() {
-                    let made = seen(&spectrum);
-                    worst = (0..3).map(|i| (made[i] / xyz[i] - 1.0).abs()).fold(worst, f64::max);
-                }
+                let made = seen(&spectrum);
+                let is_met = |i: usize| (made[i] / xyz[i] - 1.0).abs() < 1e-4;
+                assert!(is_met(1) && (moved.pixels > 0 || (is_met(0) && is_met(2))), "{rgb} {made:?} for {xyz}");
+                all = all.plus(moved);
             }
-            eprintln!("{} {moves:?} of {count} worst {worst:e}", set.name());
+            assert_eq!(all.pixels > 0, moves, "{} {all:?}", set.name());
+        }
+        let (dark, moved) = upsampler.spectrum([0.1, -0.1, 0.1]);
+        assert!(dark.factor == 0.0 && moved.pixels == 1 && moved.delta_e > 10.0);
+    }
+
+    /// Neutrals are flat to the rounding of the tables, and twice the color is twice the spectrum to the bit.
+    #[test]
+    fn gray_is_flat_and_light_is_proportional() {
+        let upsampler = upsampler();
+        let (gray, _) = upsampler.spectrum(upsampler.white().map(|value| 0.18 * value));
+        assert!([360.0, 450.0, 830.0].iter().all(|nm| (gray.at(*nm) - 0.18).abs() < 1e-12), "{gray:?}");
+        let (once, _) = upsampler.spectrum([0.2, 0.1, 0.3]);
+        let (twice, _) = upsampler.spectrum([0.4, 0.2, 0.6]);
+        assert_eq!(twice, SmoothSpectrum { factor: 2.0 * once.factor, ..once });
+    }
+
+    /// Steps of 1/512 along edges of the cube and across it move no value of a spectrum between 410 and 690 nm by more than 0.1
+    /// of the brightest: spectra of neighbors are neighbors, on one branch of solutions. Fastest are those near blue, by 0.06.
+    #[test]
+    fn spectra_of_neighbors_are_neighbors() {
+        let upsampler = upsampler();
+        let srgb = matrix(&upsampler, NamedPrimaries::Srgb);
+        let corner = |bits: u8| Vector3::new(bits & 1, bits >> 1 & 1, bits >> 2).map(f64::from);
+        let mut worst = 0.0_f64;
+        for (from, to) in (1..8).flat_map(|from| (1..from).map(move |to| (from, to))) {
+            let mut last: Option<Vec<f64>> = None;
+            for step in 0..=512 {
+                let rgb = corner(from).lerp(&corner(to), f64::from(step) / 512.0);
+                let (spectrum, _) = upsampler.spectrum((srgb * rgb).into());
+                let values: Vec<f64> = (41..=69).map(|nm| spectrum.at(f64::from(10 * nm))).collect();
+                let most = values.iter().copied().fold(0.0, f64::max);
+                if let Some(last) = last {
+                    worst = values.iter().zip(&last).map(|(a, b)| (a - b).abs() / most).fold(worst, f64::max);
+                }
+                last = Some(values);
+            }
+        }
+        assert!(worst < 0.1, "{worst}");
+    }
+
+    /// On all sets of instructions, in any company.
+    #[test]
+    fn sums_are_the_same_to_the_bit_and_those_of_the_spectra() {
+        let upsampler = upsampler();
+        let matrix = matrix(&upsampler, NamedPrimaries::DisplayP3);
+        let colors: Vec<[f64; 3]> = cube(3).map(|rgb| (matrix * rgb).into()).collect();
+        let wavelengths: Vec<f64> = (400..=700).map(f64::from).collect();
+        let bell =
+            |center: f64| wavelengths.iter().map(|nm| (-((nm - center) / 40.0).powi(2)).exp()).collect::<Vec<_>>();
+        let curves = [bell(600.0), bell(540.0), bell(450.0)];
+        let weights = SmoothWeights::of(&wavelengths, &curves);
+        let on = |instructions: Instructions| {
+            let mut sums = vec![[0.0; 3]; colors.len()];
+            let moved = upsampler.clone().on(instructions).sums(&colors, &weights, &mut sums);
+            (sums, moved)
+        };
+        let (sums, moved) = on(Instructions::Baseline);
+        for instructions in Instructions::ALL {
+            assert_eq!(on(instructions), (sums.clone(), moved));
+        }
+        for (color, sums) in colors.iter().zip(&sums) {
+            let (spectrum, _) = upsampler.spectrum(*color);
+            let mut alone = [[0.0; 3]];
+            upsampler.sums(&[*color], &weights, &mut alone);
+            assert_eq!(alone[0], *sums);
+            for (curve, sum) in curves.iter().zip(sums) {
+                let direct: f64 = wavelengths.iter().zip(curve).map(|(nm, weight)| weight * spectrum.at(*nm)).sum();
+                assert!((sum - direct).abs() <= 1e-5 * direct, "{color:?}: {sum} for {direct}");
+            }
         }
     }
 }

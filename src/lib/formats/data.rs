@@ -171,7 +171,8 @@ pub fn load_illuminant(name: &str) -> Result<Curve> {
             SpectralTable::parse(name, &read_file(path)?)?.curve(None)?
         }
         _ => {
-            let problem = format!("there is no illuminant `{name}`; known are d65, a, e; for others give a table, as CSV");
+            let problem =
+                format!("there is no illuminant `{name}`; known are d65, a, e; for others give a table, as CSV");
             return Err(Error::Usage(problem));
         }
     };

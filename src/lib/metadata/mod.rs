@@ -2,7 +2,10 @@
 
 mod records;
 
-pub use records::{AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene, UpsamplingRecord};
+pub use records::{
+    AdcRecord, ColorRecord, CorrectionRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
+    NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene, UpsamplingRecord,
+};
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
 use crate::camera::optics::Exposure;

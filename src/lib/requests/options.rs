@@ -302,9 +302,6 @@ pub struct NoiseChoice {
     /// Sources to leave out, between commas; their means stay: dcsn, dcnu, ssn, prnu, ron
     #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = values::choice::<Source>())]
     pub without: Vec<Source>,
-    /// Leave all of them out: the clean partner of noisy exposures, their mean, dark signal included
-    #[arg(long, conflicts_with = "without")]
-    pub clean: bool,
     /// Temperature of the sensor in K; by default the sensor's own
     #[arg(id = "temperature", long, value_name = "K", value_parser = values::kelvin)]
     pub temperature_k: Option<f64>,
@@ -322,7 +319,7 @@ impl NoiseChoice {
 
     /// The noise of the seeds 0.
     pub fn settings(&self) -> NoiseSettings {
-        NoiseSettings { without: self.without.clone(), clean: self.clean, temperature_k: self.temperature_k, ..NoiseSettings::default() }
+        NoiseSettings { without: self.without.clone(), temperature_k: self.temperature_k, ..NoiseSettings::default() }
     }
 }
 

@@ -1,8 +1,8 @@
 //! Opens the light of a scene, and settles its exposure.
 
 use super::light::{ImageRows, Light, Pixels, SceneImage, Seen, brightest, checked};
-use super::picture::Losses;
 use super::picture;
+use super::picture::Losses;
 use super::request::Scene;
 use crate::camera::optics::Exposure;
 use crate::camera::readout::ReadOut;

@@ -88,7 +88,10 @@ impl Picture {
         let color = |x: usize| -> Result<[f64; 3]> {
             let rgb = [0, 1, 2].map(|channel| row[channel * width + x]);
             if let Some(bad) = rgb.iter().find(|sample| !sample.is_finite()) {
-                return Err(Error::format(name, format!("its pixel {x},{y} has a sample that is {bad}; no light has such a color")));
+                return Err(Error::format(
+                    name,
+                    format!("its pixel {x},{y} has a sample that is {bad}; no light has such a color"),
+                ));
             }
             let [red, green, blue] = rgb.map(|sample| self.decoding.light(sample));
             Ok((self.xyz_from_rgb * Vector3::new(red, green, blue)).into())
@@ -105,7 +108,8 @@ impl Picture {
 /// Whether a frame is a picture: it has R, G, B, and no spectral channels.
 pub(super) fn is_one(frame: &FrameHeader) -> bool {
     let channels = &frame.geometry.channels;
-    let has_rgb = channels.len() >= 3 && channels.iter().zip(["R", "G", "B"]).all(|(name, wanted)| bare_name(name) == wanted);
+    let has_rgb =
+        channels.len() >= 3 && channels.iter().zip(["R", "G", "B"]).all(|(name, wanted)| bare_name(name) == wanted);
     has_rgb && !channels.iter().any(|channel| channel_wavelength_nm(channel).is_some())
 }
 
@@ -131,8 +135,9 @@ impl Scene {
         };
         let no_light = || Error::format(illuminant, "it has no power between 360 and 830 nm that an observer sees");
         let upsampler = Upsampler::new(&observer, &data::load_illuminant("d65")?).ok_or_else(no_light)?;
-        let xyz_from_rgb = xyz_from_rgb(&primaries, upsampler.white())
-            .ok_or_else(|| header.refuse("its primaries lie on a line, or their white is none; give others with --primaries"))?;
+        let xyz_from_rgb = xyz_from_rgb(&primaries, upsampler.white()).ok_or_else(|| {
+            header.refuse("its primaries lie on a line, or their white is none; give others with --primaries")
+        })?;
         let white_luminance = self.picture.luminance.unwrap_or(WHITE_LUMINANCE);
         let (sampled_nm, white) = white_radiance(&light, &observer, white_luminance).ok_or_else(no_light)?;
         let seen = sums.camera(&sampled_nm, &format!("illuminant {illuminant}"), &mut found.notes)?;
@@ -179,7 +184,8 @@ impl Scene {
                 unread: None,
             },
             _ => {
-                let problem = format!("it holds {}, neither spectral radiance nor a picture in R, G, B", header.holds());
+                let problem =
+                    format!("it holds {}, neither spectral radiance nor a picture in R, G, B", header.holds());
                 return Err(header.refuse(problem));
             }
         };
@@ -188,7 +194,8 @@ impl Scene {
         };
         let is_integer = kind.full_scale().is_some();
         if !is_integer && !kind.is_float() {
-            let problem = format!("its samples are stored as {}, which no picture's are; give u8, u16 or floats", kind.name());
+            let problem =
+                format!("its samples are stored as {}, which no picture's are; give u8, u16 or floats", kind.name());
             return Err(header.refuse(problem));
         }
         let usual = if is_integer { Encoding::Srgb } else { Encoding::Linear };
@@ -204,9 +211,9 @@ impl Scene {
             Some(unread) if !is_chosen => {
                 Note::Warning(format!("{name}: {unread} is not read; {taken}; --rgb and --primaries say otherwise"))
             }
-            _ if self.picture.rgb.or(tags.encoding).is_none() => {
-                Note::Warning(format!("{name}: it does not say how its samples stand for light; {taken}; --rgb says otherwise"))
-            }
+            _ if self.picture.rgb.or(tags.encoding).is_none() => Note::Warning(format!(
+                "{name}: it does not say how its samples stand for light; {taken}; --rgb says otherwise"
+            )),
             _ => Note::Remark(format!("{name}: {taken}")),
         });
         Ok((encoding, primaries))
@@ -217,7 +224,10 @@ impl Scene {
         let name = &header.name;
         let others = &header.geometry.channels[3..];
         if !others.is_empty() {
-            found.notes.push(Note::Warning(format!("{name}: channels {} are left out; colors are taken as stored", others.join(", "))));
+            found.notes.push(Note::Warning(format!(
+                "{name}: channels {} are left out; colors are taken as stored",
+                others.join(", ")
+            )));
         }
         found.notes.push(Note::Remark(format!(
             "{name}: its spectra are made up by Jakob and Hanika (2019), metamers of its colors under d65; white has \
@@ -237,8 +247,7 @@ fn white_radiance(light: &Curve, observer: &Observer, luminance: f64) -> Option<
     let (first, last) = (own[0].max(EXTENT_NM[0]), own[own.len() - 1].min(EXTENT_NM[1]));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 360 to 830")]
     let whole = (EXTENT_NM[0] as u32..=EXTENT_NM[1] as u32).map(f64::from);
-    let mut sampled_nm: Vec<f64> =
-        whole.chain(own.iter().copied()).filter(|nm| (first..=last).contains(nm)).collect();
+    let mut sampled_nm: Vec<f64> = whole.chain(own.iter().copied()).filter(|nm| (first..=last).contains(nm)).collect();
     sampled_nm.sort_by(f64::total_cmp);
     sampled_nm.dedup();
     let lightness = &observer.matching[1];
