@@ -6,7 +6,7 @@ mod support;
 
 use cyanometer::color::rgb::{Encoding, NamedPrimaries, xyz_from_rgb};
 use cyanometer::color::xyz_of_chromaticity;
-use cyanometer::frame::Geometry;
+use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::metadata::{FrameHeader, Metadata};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
@@ -40,7 +40,7 @@ fn observing(shop: &Workshop) {
     let mut table = String::from("wavelength_nm,R,G,B\n");
     for row in observer.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())) {
         let numbers: Vec<f64> = row.split(',').map(|part| part.parse().unwrap()).collect();
-        let efficiency = |k: usize| OBSERVED * numbers[k] / numbers[0];
+        let efficiency = |k: usize| (OBSERVED * numbers[k] / numbers[0]).max(0.0);
         table += &format!("{},{:e},{:e},{:e}\n", numbers[0], efficiency(1), efficiency(2), efficiency(3));
     }
     fs::write(shop.path("observer.csv"), table).unwrap();
@@ -127,7 +127,7 @@ fn codes_and_floats_of_the_same_light_give_the_same_scene() {
     for (option, encoding) in
         [("", Encoding::Srgb), (" --rgb linear", Encoding::Linear), (" --rgb 2", Encoding::Power(2.0))]
     {
-        let light: Vec<f32> = codes.iter().map(|code| encoding.decode(f64::from(*code) / 255.0) as f32).collect();
+        let light: Vec<f32> = codes.iter().map(|code| to_sample(encoding.decode(f64::from(*code) / 255.0))).collect();
         shop.write_colors("in.exr", QuantityKind::Unspecified, light.as_chunks::<3>().0);
         shop.run(&format!("render-radiance in.png --luminance 100 -o a.exr{option}"), &[]);
         shop.run("render-radiance in.exr --luminance 100 -o b.exr", &[]);
@@ -149,22 +149,22 @@ fn the_scene_does_not_hang_on_how_it_is_worked_out() {
     let codes: Vec<u8> = (0_u32..70 * 40 * 3).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     fs::write(shop.path("in.png"), png(70, png::BitDepth::Eight, png::ColorType::Rgb, &codes)).unwrap();
     let render = |options: &str| {
-        shop.run(&format!("render-radiance in.png --luminance 100 -o out.exr {options}"), &[]);
+        shop.run(&format!("render-radiance in.png -o out.exr --luminance {options}"), &[]);
         shop.read("out.exr").0
     };
-    let whole = render("--threads 1");
-    assert_eq!(render("--threads 3"), whole);
+    let whole = render("100 --threads 1");
+    assert_eq!(render("100 --threads 3"), whole);
     let mut baseline = shop.command("render-radiance in.png --luminance 100 -o out.exr");
     assert!(baseline.env("CYANOMETER_VECTORS", "baseline").status().unwrap().success());
     assert_eq!(shop.read("out.exr").0, whole);
-    let cut = render("--size 30x20");
+    let cut = render("100 --size 30x20");
     assert_eq!(cut[..30], whole[..30]);
     assert_eq!(cut[19 * 90 + 60..][..30], whole[19 * 210 + 140..][..30]);
-    let sample = render("--sample 75 --size 1x1");
+    let sample = render("100 --sample 75 --size 1x1");
     assert_eq!(sample, [whole[210 + 5], whole[210 + 75], whole[210 + 145]]);
-    let patches = render("--patch 2x3");
+    let patches = render("100 --patch 2x3");
     assert_eq!(patches[5 * 420..][..4], [whole[210], whole[210], whole[211], whole[211]]);
-    let double = render("--luminance 200");
+    let double = render("200");
     assert!(double.iter().zip(&whole).all(|(a, b)| (a / (2.0 * b) - 1.0).abs() < 2e-7 || *b == 0.0));
 }
 
@@ -245,8 +245,8 @@ fn the_clean_partner_is_the_mean_of_noisy_frames() {
     let rounded = digitized(&clean).samples;
     assert!(clean.samples.iter().zip(&rounded).all(|(e, adu)| (code(*e) - f64::from(*adu)).abs() <= 0.5 + 1e-3));
     let mut sums = [[[0.0_f64; 2]; LEVELS]; 2];
-    let seeds = 64;
-    for seed in 0..seeds {
+    let seeds = 64_u32;
+    for seed in (0..seeds).map(u64::from) {
         let noisy = exposed(&NoiseSettings { seed, sensor_seed: seed, ..NoiseSettings::default() });
         let codes = digitized(&noisy).samples;
         for (index, (&e, &adu)) in noisy.samples.iter().zip(&codes).enumerate() {
@@ -260,7 +260,7 @@ fn the_clean_partner_is_the_mean_of_noisy_frames() {
             }
         }
     }
-    let n = (seeds as usize * 3 * 128) as f64;
+    let n = f64::from(seeds * 3 * 128);
     for (kind, sums) in sums.iter().enumerate() {
         for (level, [sum, squares]) in sums.iter().enumerate() {
             let mean = sum / n;

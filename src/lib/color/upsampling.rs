@@ -13,6 +13,11 @@ use nalgebra::{Matrix3, Vector3};
 /// Where spectra begin and end, nm.
 pub const EXTENT_NM: [f64; 2] = [360.0, 830.0];
 
+/// The whole wavelengths of that extent, nm.
+pub fn whole_nm() -> impl Iterator<Item = f64> {
+    (360..=830).map(f64::from)
+}
+
 /// Distance of the nodes on which spectra are summed, nm.
 const STEP_NM: f64 = 5.0;
 const NODES: usize = 95;
@@ -39,7 +44,7 @@ fn place(wavelength_nm: f64) -> f64 {
 
 /// A spectrum relative to that of white.
 ///
-/// a · S(λ), S = ½ + x / (2 √(1 + x²)), x = c₀ + c₁ l + c₂ l²        \[Jakob2019, Eqs. 2 and 3]
+/// a · S(λ), S = ½ + x / (2 √(1 + x²)), x = c₀ + c₁ l + c₂ l²        \[Jakob2019]
 ///
 /// l = −1 at 360 nm, 1 at 830 nm. The factor a is that of the unbounded spectra of \[PBRT4, Sec. 4.6.6], but for the level
 /// that it scales to.
@@ -167,8 +172,7 @@ pub struct Upsampler {
 impl Upsampler {
     /// For colors as an observer sees them under an illuminant; none where one of the two is zero everywhere.
     pub fn new(observer: &Observer, illuminant: &Curve) -> Option<Self> {
-        let [first, last] = EXTENT_NM.map(|nm| nm as u32);
-        let wavelengths: Vec<f64> = (first..=last).map(f64::from).collect();
+        let wavelengths: Vec<f64> = whole_nm().collect();
         let sums = observer
             .matching
             .each_ref()
@@ -499,6 +503,22 @@ mod tests {
         let (once, _) = upsampler.spectrum([0.2, 0.1, 0.3]);
         let (twice, _) = upsampler.spectrum([0.4, 0.2, 0.6]);
         assert_eq!(twice, SmoothSpectrum { factor: 2.0 * once.factor, ..once });
+    }
+
+    /// Values that colour-science 0.4.7 prints for the coefficients −9·10⁻⁵, 8.5·10⁻², −20 of a wavelength in nm, to the digits that
+    /// it prints.
+    #[test]
+    fn spectra_are_those_that_others_make_of_their_coefficients() {
+        let [quadratic, linear, constant] = [-9e-5, 8.5e-2, -20.0];
+        let coefficients = [
+            (quadratic * 595.0 + linear) * 595.0 + constant,
+            235.0 * (2.0 * quadratic * 595.0 + linear),
+            235.0 * 235.0 * quadratic,
+        ];
+        let spectrum = SmoothSpectrum { factor: 1.0, coefficients };
+        for (nm, value) in [(400.0, 0.314_304_6), (420.0, 0.413_332_0), (500.0, 0.5), (600.0, 0.093_133_2)] {
+            assert!((spectrum.at(nm) - value).abs() < 1e-7, "{nm} nm: {}", spectrum.at(nm));
+        }
     }
 
     /// Steps of 1/512 along edges of the cube and across it move no value of a spectrum between 410 and 690 nm by more than 0.1

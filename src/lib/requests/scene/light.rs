@@ -41,19 +41,22 @@ pub(super) enum Pixels {
 pub(super) struct SceneImage {
     reader: FrameReader,
     pixels: Pixels,
+    /// Rows that were read.
+    rows_read: usize,
 }
 
 impl SceneImage {
     /// An image, seen so.
     pub(super) fn new(reader: FrameReader, pixels: Pixels) -> Self {
-        Self { reader, pixels }
+        Self { reader, pixels, rows_read: 0 }
     }
 
     /// Gives the electrons of the next `rows` rows to `take`, band by band.
     fn fold(&mut self, rows: usize, mut take: impl FnMut(&Band, Vec<Electrons>)) -> Result<()> {
-        let (pixels, name) = (&self.pixels, self.reader.header().name.clone());
+        let (pixels, first, name) = (&self.pixels, self.rows_read, self.reader.header().name.clone());
+        self.rows_read += rows;
         fold([&mut self.reader as &mut dyn RowSource], rows, |band| {
-            take(band, pixels.electrons(band, &name)?);
+            take(band, pixels.electrons(band, first, &name)?);
             Ok(())
         })
     }
@@ -65,9 +68,10 @@ impl SceneImage {
         sink: &mut dyn RowSink,
         mut draw: impl FnMut(&Band, Vec<Electrons>, &mut Outlet<'_>) -> Result<()>,
     ) -> Result<()> {
-        let (pixels, name) = (&self.pixels, self.reader.header().name.clone());
+        let (pixels, first, name) = (&self.pixels, self.rows_read, self.reader.header().name.clone());
+        self.rows_read += rows;
         fold_into([&mut self.reader as &mut dyn RowSource], rows, sink, |band, outlet| {
-            draw(band, pixels.electrons(band, &name)?, outlet)
+            draw(band, pixels.electrons(band, first, &name)?, outlet)
         })
     }
 
@@ -110,8 +114,8 @@ impl SceneImage {
 }
 
 impl Pixels {
-    /// The electrons of the rows of a band.
-    fn electrons(&self, band: &Band, name: &str) -> Result<Vec<Electrons>> {
+    /// The electrons of the rows of a band; the first that could be in it is row `first` of the image.
+    fn electrons(&self, band: &Band, first: usize, name: &str) -> Result<Vec<Electrons>> {
         let window = band.window::<Any>(0);
         let of_row = |y: usize| {
             let row = match self {
@@ -120,7 +124,7 @@ impl Pixels {
                     weighted_sums(window.all_channels(y), window.width(), planes, |electrons| row.push(electrons));
                     row
                 }
-                Self::Colored(picture) => picture.electrons(window.all_channels(y), window.width(), y, name)?,
+                Self::Colored(picture) => picture.electrons(window.all_channels(y), window.width(), first + y, name)?,
             };
             row.into_iter().map(|electrons| checked(electrons, name)).collect()
         };

@@ -4,7 +4,7 @@ use super::light::{Electrons, ImageRows, Light, Pixels, SceneImage};
 use super::open::{Found, Sums, no_sample};
 use super::request::Scene;
 use crate::color::rgb::{Encoding, NamedPrimaries, Primaries, xyz_from_rgb};
-use crate::color::upsampling::{EXTENT_NM, Moved, SmoothWeights, Upsampler};
+use crate::color::upsampling::{EXTENT_NM, Moved, SmoothWeights, Upsampler, whole_nm};
 use crate::error::{Error, Result};
 use crate::formats::data;
 use crate::formats::format::ColorTags;
@@ -245,9 +245,8 @@ impl Scene {
 fn white_radiance(light: &Curve, observer: &Observer, luminance: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let own = light.wavelengths_nm();
     let (first, last) = (own[0].max(EXTENT_NM[0]), own[own.len() - 1].min(EXTENT_NM[1]));
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 360 to 830")]
-    let whole = (EXTENT_NM[0] as u32..=EXTENT_NM[1] as u32).map(f64::from);
-    let mut sampled_nm: Vec<f64> = whole.chain(own.iter().copied()).filter(|nm| (first..=last).contains(nm)).collect();
+    let mut sampled_nm: Vec<f64> =
+        whole_nm().chain(own.iter().copied()).filter(|nm| (first..=last).contains(nm)).collect();
     sampled_nm.sort_by(f64::total_cmp);
     sampled_nm.dedup();
     let lightness = &observer.matching[1];
