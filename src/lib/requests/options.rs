@@ -323,6 +323,24 @@ impl NoiseChoice {
     }
 }
 
+/// Which noise of an exposure, or none.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
+pub struct DrawnNoise {
+    /// Which.
+    #[command(flatten)]
+    pub choice: NoiseChoice,
+    /// Leave all sources out: the clean partner of noisy exposures, their mean, dark signal included
+    #[arg(long, conflicts_with = "without")]
+    pub clean: bool,
+}
+
+impl DrawnNoise {
+    /// The noise of the seeds 0.
+    pub fn settings(&self) -> NoiseSettings {
+        NoiseSettings { clean: self.clean, ..self.choice.settings() }
+    }
+}
+
 /// The white that colors refer to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct WhiteChoice {
