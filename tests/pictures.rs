@@ -184,7 +184,7 @@ fn what_is_no_picture_or_not_said_is_told() {
     fs::write(shop.path("dark.csv"), table).unwrap();
     for (line, status, said) in [
         ("gray.png", BAD_DATA, "it holds no spectral radiance"),
-        ("nan.exr --luminance 1", BAD_DATA, "its pixel 0,1 has a sample that is NaN"),
+        ("nan.exr --luminance 1", BAD_DATA, "its pixel 0,1 is [0.1, NaN, 0.3]; no light has such a color"),
         ("xyz.exr", BAD_DATA, "neither spectral radiance nor a picture in R, G, B"),
         ("rgb.png --illuminant d50", BAD_USAGE, "there is no illuminant `d50`; known are d65, a, e"),
         ("rgb.png --illuminant dark.csv", BAD_DATA, "it is no light"),

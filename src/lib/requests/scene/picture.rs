@@ -83,18 +83,17 @@ impl Picture {
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] for samples that are not finite.
+    /// [`Error::Format`] for samples that are not finite, or whose light is not.
     pub(super) fn electrons(&self, row: &[f32], width: usize, y: usize, name: &str) -> Result<Electrons> {
         let color = |x: usize| -> Result<[f64; 3]> {
             let rgb = [0, 1, 2].map(|channel| row[channel * width + x]);
-            if let Some(bad) = rgb.iter().find(|sample| !sample.is_finite()) {
-                return Err(Error::format(
-                    name,
-                    format!("its pixel {x},{y} has a sample that is {bad}; no light has such a color"),
-                ));
-            }
             let [red, green, blue] = rgb.map(|sample| self.decoding.light(sample));
-            Ok((self.xyz_from_rgb * Vector3::new(red, green, blue)).into())
+            let xyz = self.xyz_from_rgb * Vector3::new(red, green, blue);
+            if !xyz.iter().all(|value| value.is_finite()) {
+                let problem = format!("its pixel {x},{y} is {rgb:?}; no light has such a color");
+                return Err(Error::format(name, problem));
+            }
+            Ok(xyz.into())
         };
         let colors: Vec<[f64; 3]> = (0..width).map(color).collect::<Result<_>>()?;
         let mut electrons = vec![[0.0; 3]; width];
