@@ -145,6 +145,11 @@ pub(super) fn brightest(electrons: &[[f64; 3]]) -> usize {
     (0..electrons.len()).max_by(|&a, &b| largest(a).total_cmp(&largest(b)).then(b.cmp(&a))).unwrap_or_default()
 }
 
+/// A complaint of a sample that is not there.
+pub(super) fn no_sample(name: &str, sample: usize, count: usize) -> Error {
+    Error::Usage(format!("{name}: there is no sample {sample}; it has samples 0 to {}", count - 1))
+}
+
 /// Electrons that can be.
 pub(super) fn checked(electrons: [f64; 3], name: &str) -> Result<[f64; 3]> {
     if electrons.iter().any(|e| !(0.0..f64::INFINITY).contains(e)) {

@@ -1,10 +1,12 @@
 //! Rendering a scene: from spectra, or electrons given outright, to the frame that a camera expects to collect.
 
+mod illuminated;
 mod layout;
 mod light;
 mod open;
 mod picture;
 mod request;
+mod sums;
 
 pub use request::Scene;
 

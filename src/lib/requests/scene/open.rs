@@ -1,9 +1,9 @@
 //! Opens the light of a scene, and settles its exposure.
 
-use super::light::{ImageRows, Light, Pixels, SceneImage, Seen, brightest, checked};
+use super::light::{ImageRows, Light, Pixels, SceneImage, brightest, checked, no_sample};
 use super::picture;
-use super::picture::Losses;
 use super::request::Scene;
+use super::sums::{Found, Sums};
 use crate::camera::optics::Exposure;
 use crate::camera::readout::ReadOut;
 use crate::camera::response::GridWeights;
@@ -15,15 +15,9 @@ use crate::formats::data::{self, LoadedSensor};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::frame::Geometry;
-use crate::metadata::{Metadata, UpsamplingRecord};
-use crate::numerics::quadrature::Rule;
 use crate::requests::notes::{self, Note};
-use crate::spectrum::{WavelengthGrid, chart_columns};
+use crate::spectrum::chart_columns;
 use crate::stream::RowSource;
-use crate::units::QuantityKind;
-
-/// Share of a sensor's response beyond the summed wavelengths from which it is told.
-const TOLD_BEYOND: f64 = 1e-3;
 
 /// Error of a sum over wavelengths from which it is a warning.
 const TOLD_ERROR: f64 = 1e-2;
@@ -36,81 +30,6 @@ pub(super) struct Prepared {
     /// Electrons of the brightest class, where the exposure was chosen by them.
     pub(super) brightest_e: Option<f64>,
     pub(super) found: Found,
-}
-
-/// What comes up while a scene is opened.
-pub(super) struct Found {
-    /// What is left out, and the error of the sum over wavelengths.
-    pub(super) metadata: Metadata,
-    pub(super) notes: Vec<Note>,
-    /// How the spectra of a picture are made up, and what is lost of its colors on the way.
-    pub(super) upsampling: Option<UpsamplingRecord>,
-    pub(super) losses: Losses,
-}
-
-impl Found {
-    fn none() -> Self {
-        let metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-        Self { metadata, notes: Vec::new(), upsampling: None, losses: Losses::default() }
-    }
-}
-
-/// The sums over wavelengths that turn radiance into electrons.
-pub(super) struct Sums<'a> {
-    loaded: &'a LoadedSensor,
-    exposure: &'a Exposure,
-    grid: WavelengthGrid,
-    /// Whether a radiance whose samples are closer than the grid's is integrated between them instead.
-    follows: bool,
-    weights: GridWeights,
-}
-
-impl<'a> Sums<'a> {
-    /// Those of a grid that was `chosen`, or of the default.
-    fn on(
-        chosen: Option<WavelengthGrid>,
-        quadrature: Rule,
-        loaded: &'a LoadedSensor,
-        exposure: &'a Exposure,
-    ) -> Result<Self> {
-        let grid = WavelengthGrid { quadrature, ..chosen.unwrap_or_default() };
-        let weights = loaded.response()?.weights_on(&loaded.sensor, exposure, &grid)?;
-        Ok(Self { loaded, exposure, grid, follows: chosen.is_none(), weights })
-    }
-
-    /// The camera for radiances at these wavelengths, those of `name`.
-    pub(super) fn camera(&self, sampled_nm: &[f64], name: &str, notes: &mut Vec<Note>) -> Result<Seen> {
-        let response = self.loaded.response()?;
-        let (of_sum, uncovered) = self.weights.camera(sampled_nm);
-        let exact = response.weights_between(&self.loaded.sensor, self.exposure, &self.grid, sampled_nm)?;
-        let exact = exact.camera(sampled_nm).0;
-        let is_followed = self.follows && self.grid.is_coarser_than(sampled_nm);
-        let WavelengthGrid { start_nm, end_nm, step_nm, .. } = self.grid;
-        if is_followed {
-            notes.push(Note::Remark(format!(
-                "{name}: its samples are closer than {step_nm} nm: it is integrated between them"
-            )));
-        }
-        let beyond = response.beyond(&self.grid);
-        if beyond > TOLD_BEYOND {
-            notes.push(Note::Warning(format!(
-                "{:.1} % of the response of the sensor {} lies beyond {start_nm} to {end_nm} nm, where nothing is summed; \
-                 --wavelengths sets other ends",
-                100.0 * beyond,
-                self.loaded.sensor.name
-            )));
-        }
-        if uncovered > 1e-6 {
-            notes.push(Note::Warning(format!(
-                "{name}: it covers {} to {} nm; {:.2} % of the sensor's response lies beyond, where its radiance is \
-                 taken as zero",
-                sampled_nm[0],
-                sampled_nm[sampled_nm.len() - 1],
-                100.0 * uncovered
-            )));
-        }
-        Ok(Seen { camera: if is_followed { exact.clone() } else { of_sum }, exact })
-    }
 }
 
 impl Scene {
@@ -289,8 +208,4 @@ fn inexact([red, green, blue]: [f64; 3]) -> Note {
     } else {
         Note::Remark(text)
     }
-}
-
-pub(super) fn no_sample(name: &str, sample: usize, count: usize) -> Error {
-    Error::Usage(format!("{name}: there is no sample {sample}; it has samples 0 to {}", count - 1))
 }
