@@ -410,6 +410,7 @@ fn a_source_left_out_leaves_the_other_draws_alone() {
                     temperature_k: Some(temperature_k),
                     poisson,
                     cte: None,
+                    clean: false,
                 },
             )
         };

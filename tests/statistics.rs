@@ -149,6 +149,7 @@ fn gather(levels: &[[f64; 3]], temperatures_k: &[f64], poisson: PoissonKind) -> 
                         temperature_k: Some(temperature_k),
                         poisson,
                         cte: None,
+                        clean: false,
                     };
                     let case = format!("{temperature_k} K, without {without:?}, {seed}");
                     let electrons = noisy(&scene, &settings);

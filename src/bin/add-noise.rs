@@ -34,7 +34,7 @@ struct Arguments {
     #[arg(long, default_value_t = 0, value_parser = values::whole::<u32>)]
     frame: u32,
     #[command(flatten)]
-    noise: options::NoiseChoice,
+    noise: options::DrawnNoise,
     /// How Poisson numbers are drawn: exact, or gaussian to see what that approximation costs
     #[arg(long, default_value = PoissonKind::default().name(), value_parser = values::choice::<PoissonKind>())]
     poisson: PoissonKind,
@@ -58,7 +58,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = arguments.input.open()?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
-    session.tell(arguments.noise.doubt().as_slice());
+    session.tell(arguments.noise.choice.doubt().as_slice());
     let settings = NoiseSettings {
         seed: arguments.seed,
         sensor_seed: arguments.sensor_seed,

@@ -14,7 +14,8 @@ static MEMORY: cli::Memory = cli::Memory;
 /// Render what a camera expects to collect of a spectral radiance: electrons per photosite and sensor class
 ///
 /// Takes a spectrum (CSV: wavelength in nm, radiance), one of a library, or a spectral EXR (channels like S0.550,000000nm) whose
-/// every pixel becomes a patch; or electrons given outright. Nothing is random yet: add-noise comes next.
+/// every pixel becomes a patch; a picture in R, G, B, for which smooth spectra are made up; or electrons given outright. Nothing
+/// is random yet: add-noise comes next.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -33,11 +34,11 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut scene = arguments.scene.open()?;
-    let notes = std::mem::take(&mut scene.notes);
+    let mut notes = std::mem::take(&mut scene.notes);
     session.sign(scene.header_mut());
     let mut writer = FrameWriter::create(&arguments.output.options(), scene.header())?;
     let bar = session.progress(scene.header().geometry.height);
-    scene.draw(&mut writer, &mut |rows| bar.set_position(rows as u64))?;
+    notes.extend(scene.draw(&mut writer, &mut |rows| bar.set_position(rows as u64))?);
     bar.finish_and_clear();
     writer.finish(Counts::default())?;
     session.tell(&notes);

@@ -150,6 +150,11 @@ impl Camera {
         self.weights.each_ref().map(|weights| weights.iter().zip(radiance).map(|(w, l)| w * l).sum())
     }
 
+    /// What each sample of a radiance in W cm⁻² sr⁻¹ nm⁻¹ adds to the signal electrons of R, G and B.
+    pub fn shares(&self, radiance: &[f64]) -> [Vec<f64>; 3] {
+        self.weights.each_ref().map(|weights| weights.iter().zip(radiance).map(|(w, l)| w * l).collect())
+    }
+
     /// The planes of a spectral image that this camera sees, `channels` the place of each wavelength and `factor` the W
     /// cm⁻² sr⁻¹ nm⁻¹ of a sample of 1. Planes to which no class responds are left out: they would add zeros.
     pub fn planes(&self, channels: &[usize], factor: f64) -> Vec<WeightedPlane> {

@@ -7,7 +7,9 @@ pub mod difference;
 pub mod illuminant;
 pub mod locus;
 pub mod luv;
+pub mod rgb;
 pub mod temperature;
+pub mod upsampling;
 
 use crate::names::Named;
 use nalgebra::{Matrix3, Vector3};
@@ -237,6 +239,11 @@ pub fn xyy_about([x, y, z]: [f64; 3]) -> Option<Local> {
 /// The transfer curve of sRGB from linear light 0…1 [IEC 61966-2-1].
 pub fn srgb_encode(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Linear light of a value of sRGB, the inverse of [`srgb_encode`] [IEC 61966-2-1].
+pub fn srgb_decode(encoded: f64) -> f64 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
 /// The matrix to linear sRGB from absolute XYZ under a white that shall look white: Bradford adaptation to D65.

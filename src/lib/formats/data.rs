@@ -8,6 +8,8 @@ use crate::analysis::characterization::CameraMatrix;
 use crate::camera::response::SpectralResponse;
 use crate::camera::sensor::{CurveFile, ResponseFiles, Sensor};
 use crate::cfa::FilterArray;
+use crate::color::illuminant::Illuminant;
+use crate::color::upsampling::whole_nm;
 use crate::error::{Error, Result};
 use crate::spectrum::{Curve, Observer};
 use std::path::{Path, PathBuf};
@@ -18,7 +20,7 @@ pub const DATA_VARIABLE: &str = "CYANOMETER_DATA";
 pub const DEFAULT_SENSOR: &str = "kaf-5101ce";
 
 /// Files that every program carries, by their place in `sample_data`.
-const BUILT_IN: [(&str, &[u8]); 7] = [
+const BUILT_IN: [(&str, &[u8]); 8] = [
     ("sensors/kaf-5101ce.yaml", include_bytes!("../../../sample_data/sensors/kaf-5101ce.yaml")),
     ("sensors/kaf5101ce_est_qe_1nm.csv", include_bytes!("../../../sample_data/sensors/kaf5101ce_est_qe_1nm.csv")),
     ("sensors/bg39_1mm.csv", include_bytes!("../../../sample_data/sensors/bg39_1mm.csv")),
@@ -26,6 +28,7 @@ const BUILT_IN: [(&str, &[u8]); 7] = [
     ("illuminants/cie_daylight_1nm.csv", include_bytes!("../../../sample_data/illuminants/cie_daylight_1nm.csv")),
     ("charts/colorchecker.csv", include_bytes!("../../../sample_data/charts/colorchecker.csv")),
     ("charts/colorchecker-2005.csv", include_bytes!("../../../sample_data/charts/colorchecker-2005.csv")),
+    ("illuminants/cie_d65_1nm.csv", include_bytes!("../../../sample_data/illuminants/cie_d65_1nm.csv")),
 ];
 
 /// A sensor with its curves.
@@ -184,6 +187,41 @@ pub fn chart(name: &str) -> Result<(String, Vec<u8>)> {
         )));
     };
     Ok((name.to_owned(), bytes))
+}
+
+/// The relative spectral power of an illuminant, by its name or temperature, or a table of one curve. That of `d65` is the
+/// published table.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for another name, [`Error::Disk`] and [`Error::Format`] for a file that is no such table.
+pub fn load_illuminant(name: &str) -> Result<Curve> {
+    let d65 = "illuminants/cie_d65_1nm.csv";
+    let path = Path::new(name);
+    let curve = match (name, name.parse::<Illuminant>()) {
+        ("d65", _) => SpectralTable::parse(d65, built_in(d65).unwrap_or_default())?.curve(None)?,
+        (_, Ok(light)) => {
+            let daylight = load_daylight()?;
+            let components = |nm| daylight.each_ref().map(|component| component.at(nm));
+            let wavelengths: Vec<f64> = whole_nm().collect();
+            let values = wavelengths.iter().map(|&nm| light.power(nm, components)).collect();
+            Curve::new(wavelengths, values).map_err(|problem| Error::format(name, problem))?
+        }
+        _ if path.extension().is_some() || path.components().count() > 1 => {
+            SpectralTable::parse(name, &read_file(path)?)?.curve(None)?
+        }
+        _ => {
+            let problem = format!(
+                "there is no illuminant `{name}`; known are a, d50, d55, d65, d75, e and temperatures such as 3200K; for others give a table, as CSV"
+            );
+            return Err(Error::Usage(problem));
+        }
+    };
+    let (lowest, highest) = curve.extremes();
+    if lowest < 0.0 || highest <= 0.0 {
+        return Err(Error::format(name, "it is no light: its power is negative somewhere, or zero everywhere"));
+    }
+    Ok(curve)
 }
 
 /// An efficiency or a transmittance is a fraction.

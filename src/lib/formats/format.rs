@@ -4,6 +4,7 @@
 
 use super::tiff::{Directory, TiffFile};
 use crate::camera::noise_profile::NoiseProfile;
+use crate::color::rgb::{Encoding, Primaries};
 use crate::error::Result;
 use crate::frame::Geometry;
 use crate::metadata::Metadata;
@@ -33,6 +34,11 @@ pub trait SampleReader: Send {
     /// are found, they stand in.
     fn own_tags(&self) -> &Metadata;
 
+    /// What the format's own tags say of the colors of R, G and B.
+    fn colors(&self) -> ColorTags {
+        ColorTags::default()
+    }
+
     /// What of the file was passed over, and why.
     fn notes(&self) -> &[String];
 
@@ -49,6 +55,17 @@ pub trait SampleReader: Send {
     /// [`crate::error::Error::Format`] where the file is damaged or cut short, [`crate::error::Error::Disk`] where
     /// reading fails.
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()>;
+}
+
+/// What the tags of a file say of the colors of its R, G and B.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ColorTags {
+    /// Primaries and white.
+    pub primaries: Option<Primaries>,
+    /// How samples, relative to full scale where they are integers, stand for linear light.
+    pub encoding: Option<Encoding>,
+    /// What says more of them and is not read, as in `its color profile (iCCP)`.
+    pub unread: Option<String>,
 }
 
 /// How a sample is stored.
@@ -98,6 +115,20 @@ impl SampleType {
             Self::U32 | Self::I32 | Self::F32 => 4,
             Self::F64 => 8,
         }
+    }
+
+    /// The largest of an unsigned integer of 8 or 16 bits, which a picture's full scale is.
+    pub fn full_scale(self) -> Option<f32> {
+        match self {
+            Self::U8 => Some(255.0),
+            Self::U16 => Some(U16_FULL_SCALE),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a float.
+    pub fn is_float(self) -> bool {
+        matches!(self, Self::F16 | Self::F32 | Self::F64)
     }
 
     /// Whether it is an integer without sign.

@@ -3,7 +3,7 @@
 use super::digest::SamplesDigest;
 use super::dng::{DngReader, RawArea};
 use super::files::{STDIN_NAME, named, open_named, read_file, sidecar_path, spool};
-use super::format::{HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Streaming, U16_FULL_SCALE};
+use super::format::{ColorTags, HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Streaming, U16_FULL_SCALE};
 use super::makers::{MakersReader, Worker};
 use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
@@ -239,6 +239,16 @@ impl FrameReader {
     /// How the file stores its samples, in a word: `u16`, `f32` …; `mixed` where channels differ.
     pub fn stored_as(&self) -> &'static str {
         self.reader.stored_as().map_or("mixed", SampleType::name)
+    }
+
+    /// The type of the stored samples; none where channels differ in it.
+    pub fn sample_type(&self) -> Option<SampleType> {
+        self.reader.stored_as()
+    }
+
+    /// What the file's tags say of its colors.
+    pub fn colors(&self) -> ColorTags {
+        self.reader.colors()
     }
 
     /// Whether the frame has a layer that marks pixels beside the channels that stages see.

@@ -1,12 +1,13 @@
 //! PNG: rows of 8 or 16-bit samples of the pictures that programs store their codes in \[PNG2025].
 
 use super::foreign::png_damage;
-use super::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use super::format::{ColorTags, FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{METADATA_BEGIN, Metadata};
 use crate::units::QuantityKind;
-use png::{BitDepth, ColorType, Info, Limits};
+use png::{BitDepth, ColorType, Info, Limits, ScaledFloat};
 use std::fs::File;
 use std::io::{BufReader, Seek, SeekFrom};
 
@@ -43,6 +44,7 @@ pub struct PngReader {
     stored: SampleType,
     embedded: Option<String>,
     own_tags: Metadata,
+    colors: ColorTags,
     notes: Vec<String>,
 }
 
@@ -75,6 +77,7 @@ impl PngReader {
             stored,
             embedded: embedded(reader.info()),
             own_tags: Metadata::new(QuantityKind::Unspecified),
+            colors: colors(reader.info()),
             notes: notes(reader.info()),
             reader,
         })
@@ -126,6 +129,54 @@ fn embedded(info: &Info<'_>) -> Option<String> {
         chunk.get_text().ok()
     });
     plain.chain(packed).chain(international).flatten().find(|text| text.starts_with(METADATA_BEGIN))
+}
+
+/// What the chunks say of colors: cICP before iCCP before sRGB before gAMA and cHRM \[PNG2025, Sec. 4.3]. Where none does, sRGB
+/// is taken.
+fn colors(info: &Info<'_>) -> ColorTags {
+    let named = |primaries: NamedPrimaries, encoding| ColorTags {
+        primaries: Some(primaries.chromaticities()),
+        encoding: Some(encoding),
+        unread: None,
+    };
+    let unread = |what: String| ColorTags { unread: Some(what), ..ColorTags::default() };
+    if let Some(code) = info.coding_independent_code_points {
+        // Numbers of ITU-T H.273.
+        let primaries = match code.color_primaries {
+            1 => Some(NamedPrimaries::Srgb),
+            9 => Some(NamedPrimaries::Rec2020),
+            12 => Some(NamedPrimaries::DisplayP3),
+            _ => None,
+        };
+        let encoding = match code.transfer_function {
+            8 => Some(Encoding::Linear),
+            13 => Some(Encoding::Srgb),
+            _ => None,
+        };
+        return match (primaries, encoding, code.is_video_full_range_image) {
+            (Some(primaries), Some(encoding), true) => named(primaries, encoding),
+            _ => unread(format!(
+                "its color space (cICP {}-{}-{}-{})",
+                code.color_primaries,
+                code.transfer_function,
+                code.matrix_coefficients,
+                u8::from(code.is_video_full_range_image)
+            )),
+        };
+    }
+    if info.icc_profile.is_some() {
+        return unread("its color profile (iCCP)".into());
+    }
+    if info.srgb.is_some() {
+        return named(NamedPrimaries::Srgb, Encoding::Srgb);
+    }
+    let point = |(x, y): (ScaledFloat, ScaledFloat)| [x, y].map(|value| f64::from(value.into_scaled()) / 1e5);
+    let exponent = info.gama_chunk.map(|gamma| 1e5 / f64::from(gamma.into_scaled()));
+    ColorTags {
+        primaries: info.chrm_chunk.map(|at| [at.red, at.green, at.blue, at.white].map(point)),
+        encoding: Some(exponent.filter(|power| power.is_finite()).map_or(Encoding::Srgb, Encoding::Power)),
+        unread: None,
+    }
 }
 
 /// What the chunks say that no sample is changed by.
@@ -183,6 +234,10 @@ impl SampleReader for PngReader {
         &self.own_tags
     }
 
+    fn colors(&self) -> ColorTags {
+        self.colors.clone()
+    }
+
     fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -212,7 +267,7 @@ impl SampleReader for PngReader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use png::{Encoder, ScaledFloat};
+    use png::Encoder;
     use std::io::Write;
 
     fn encoded(

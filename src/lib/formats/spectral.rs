@@ -45,7 +45,7 @@ impl SpectralChannels {
         if found.is_empty() {
             return Err(frame.refuse(
                 "it holds no spectral radiance: no channel is named like S0.550,000000nm; give a spectrum as CSV or a \
-                 spectral EXR",
+                 spectral EXR (a picture in R, G, B goes into `render-radiance`)",
             ));
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));

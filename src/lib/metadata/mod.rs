@@ -10,7 +10,7 @@ pub use correction::{
 };
 pub use records::{
     AdaptationRecord, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord,
-    PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene,
+    PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene, UpsamplingRecord,
 };
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};

@@ -31,6 +31,24 @@ pub struct Scene {
     /// Largest expected signal of any class in e⁻, where it was worked out for `--expose-to`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub brightest_e: Option<f64>,
+    /// How spectra were made up, where the source is a picture in RGB.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upsampling: Option<UpsamplingRecord>,
+}
+
+/// How the spectra of a picture in RGB were made up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UpsamplingRecord {
+    /// The method: `jakob-hanika-2019`.
+    pub method: String,
+    /// How samples stood for linear light: `linear`, `srgb`, or the power of them that it was.
+    pub encoding: String,
+    /// Chromaticities of the primaries R, G, B and of white.
+    pub primaries: [[f64; 2]; 4],
+    /// The illuminant that lit the scene.
+    pub illuminant: String,
+    /// Luminance of R = G = B = 1 in cd m⁻².
+    pub white_luminance: f64,
 }
 
 impl Scene {
@@ -44,6 +62,7 @@ impl Scene {
             patch: None,
             source_width: None,
             brightest_e: None,
+            upsampling: None,
         }
     }
 

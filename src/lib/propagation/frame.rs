@@ -79,6 +79,7 @@ pub type Predicted<T> = Result<T, Unpredictable>;
 /// #     patch: None,
 /// #     source_width: None,
 /// #     brightest_e: None,
+/// #     upsampling: None,
 /// # });
 /// # let geometry = Geometry::new(640, 480, &["R", "G", "B"]);
 /// # let header = FrameHeader { name: "example".into(), geometry, metadata };

@@ -6,6 +6,7 @@ use crate::analysis::characterization::evaluation::{Filling, SampleExposure};
 use crate::analysis::statistics::Region;
 use crate::camera::optics::Exposure;
 use crate::color::White;
+use crate::color::rgb::{Encoding, Primaries};
 use crate::error::Result;
 use crate::formats::data;
 use crate::formats::headerless::Layout;
@@ -149,7 +150,7 @@ impl Output {
 /// What light falls on which sensor.
 #[derive(Debug, Clone, Args)]
 pub struct Subject {
-    /// Spectrum or library as CSV, or spectral image as EXR; `-` or none for standard input
+    /// Spectrum or library as CSV, spectral image as EXR, or picture in R, G, B; `-` or none for standard input
     #[arg(conflicts_with_all = ["electrons", "dark"])]
     pub input: Option<PathBuf>,
     /// Sensor: a known name, or a file
@@ -237,6 +238,33 @@ pub struct SpectrumChoice {
     pub sample: Option<usize>,
 }
 
+/// How a picture in R, G, B becomes a scene.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
+#[command(next_help_heading = "Pictures in R, G, B")]
+pub struct PictureChoice {
+    /// How its samples stand for light: srgb, linear, or the power of them that it is; by default what the file says, linear
+    /// for floats, srgb for integers
+    #[arg(long, value_name = "srgb|linear|POWER", value_parser = values::encoding)]
+    pub rgb: Option<Encoding>,
+    /// Its primaries: srgb, display-p3, rec2020, adobe-rgb, acescg, aces, or x,y of R, G, B and white; by default what the
+    /// file says, or srgb
+    #[arg(long, value_name = "NAME|X,Y,...", value_parser = values::primaries, allow_hyphen_values = true)]
+    pub primaries: Option<Primaries>,
+    /// The light on the scene: d65, a, e, or a table of relative power (CSV); d65 by default
+    #[arg(long, value_name = "NAME|FILE")]
+    pub illuminant: Option<String>,
+    /// Luminance of R = G = B = 1 in cd/m2; 1000 by default
+    #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
+    pub luminance: Option<f64>,
+}
+
+impl PictureChoice {
+    /// Whether any of it was chosen.
+    pub fn is_given(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
 /// How each sample of a library is exposed.
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
 pub struct SampleExposureChoice {
@@ -298,6 +326,24 @@ impl NoiseChoice {
     /// The noise of the seeds 0.
     pub fn settings(&self) -> NoiseSettings {
         NoiseSettings { without: self.without.clone(), temperature_k: self.temperature_k, ..NoiseSettings::default() }
+    }
+}
+
+/// Which noise of an exposure, or none.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
+pub struct DrawnNoise {
+    /// Which.
+    #[command(flatten)]
+    pub choice: NoiseChoice,
+    /// Leave all sources out: the clean partner of noisy exposures, their mean, dark signal included
+    #[arg(long, conflicts_with = "without")]
+    pub clean: bool,
+}
+
+impl DrawnNoise {
+    /// The noise of the seeds 0.
+    pub fn settings(&self) -> NoiseSettings {
+        NoiseSettings { clean: self.clean, ..self.choice.settings() }
     }
 }
 

@@ -4,6 +4,7 @@ use super::border::Border;
 use crate::analysis::statistics::Region;
 use crate::cfa::CfaPattern;
 use crate::color::illuminant::Illuminant;
+use crate::color::rgb::{Encoding, NamedPrimaries, Primaries};
 use crate::color::{White, chromaticity};
 use crate::names::Named;
 use crate::spectrum::{Observer, WavelengthGrid};
@@ -362,6 +363,40 @@ impl LightColor {
         match self {
             Self::Illuminant(illuminant) => illuminant.white_xy(observer),
             Self::Chromaticity(xy) => xy,
+        }
+    }
+}
+
+/// Reads how samples stand for light: `srgb`, `linear`, or a power of them.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn encoding(text: &str) -> Result<Encoding, String> {
+    match text {
+        "srgb" => Ok(Encoding::Srgb),
+        "linear" => Ok(Encoding::Linear),
+        power => positive(power)
+            .map(Encoding::Power)
+            .map_err(|_| "give srgb, linear, or the power of the samples that light is, such as 2.2".into()),
+    }
+}
+
+/// Reads primaries: a name, or x,y of R, G, B and white.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn primaries(text: &str) -> Result<Primaries, String> {
+    if let Some(known) = NamedPrimaries::named(text) {
+        return Ok(known.chromaticities());
+    }
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref().map(<[f64]>::as_chunks::<2>) {
+        Some(([red, green, blue, white], [])) => Ok([*red, *green, *blue, *white]),
+        _ => {
+            let names: Vec<&str> = NamedPrimaries::ALL.iter().map(|set| set.name()).collect();
+            Err(format!("give one of {}, or x,y of R, G, B and white, eight numbers", names.join(", ")))
         }
     }
 }

@@ -306,6 +306,7 @@ mod tests {
             patch: Some([8, 6]),
             source_width: Some(5),
             brightest_e: None,
+            upsampling: None,
         });
         let geometry = Geometry { origin, ..Geometry::new(width, height, &["R", "G", "B"]) };
         FrameHeader { name: "chart.exr".into(), geometry, metadata }

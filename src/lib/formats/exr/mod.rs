@@ -56,8 +56,7 @@ pub enum ExrCompression {
     Piz,
 }
 
-/// Chromaticities (x, y) of the three primaries and of white.
-pub type Primaries = [[f64; 2]; 4];
+pub use crate::color::rgb::Primaries;
 
 /// Chromaticities that mark XYZ stored as R, G, B: an OpenEXR convention.
 pub const XYZ_PRIMARIES: Primaries = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0 / 3.0, 1.0 / 3.0]];

@@ -5,9 +5,10 @@ use super::blocks::Blocks;
 use super::header::{Contents, read_meta};
 use super::read_ahead::ReadAhead;
 use super::straight::{Offsets, Straight};
+use crate::color::rgb::Encoding;
 use crate::error::{Error, Result};
 use crate::formats::foreign::exr_complaint;
-use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign, Streaming};
+use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, SampleReader, SampleType, Sign, Streaming};
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::Metadata;
 use exr::block::UncompressedBlock;
@@ -278,6 +279,12 @@ impl SampleReader for ExrReader {
 
     fn own_tags(&self) -> &Metadata {
         &self.contents.own_tags
+    }
+
+    /// Samples are linear; without the attribute `chromaticities` the primaries are those of BT.709, by the format's rules.
+    fn colors(&self) -> ColorTags {
+        let primaries = self.contents.tags.primaries;
+        ColorTags { primaries, encoding: Some(Encoding::Linear), unread: None }
     }
 
     fn notes(&self) -> &[String] {

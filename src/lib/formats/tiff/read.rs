@@ -7,7 +7,7 @@ use super::chunk::{Compression, Trouble};
 use super::directory::{TiffFile, begins_so};
 use super::layout::Layout;
 use crate::error::Result;
-use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
 use crate::frame::Geometry;
 use crate::metadata::{METADATA_BEGIN, Metadata};
 use half::f16;
@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use std::fs::File;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
+use tiff::tags::Tag;
 
 /// Decoded bytes that are held at least, where the caller asks for so many: enough work for some threads.
 const DECODED_BYTES: usize = 8 << 20;
@@ -49,6 +50,8 @@ pub struct TiffReader {
     file: TiffFile,
     layout: Layout,
     own_tags: Metadata,
+    /// Whether it carries a color profile.
+    has_profile: bool,
     /// The row that [`SampleReader::read`] gives next.
     next_row: usize,
     /// Rows of a piece: a chunk's rows; or fewer where samples are not compressed, so that any rows can be had.
@@ -75,7 +78,8 @@ impl TiffReader {
             layout.chunk_rows
         };
         let own_tags = capture::read(&mut file, &directory, &mut layout)?;
-        Ok(Self { file, layout, own_tags, next_row: 0, piece_rows, decoded: Vec::new(), held: 0..0 })
+        let has_profile = directory.has(Tag::IccProfile);
+        Ok(Self { file, layout, own_tags, has_profile, next_row: 0, piece_rows, decoded: Vec::new(), held: 0..0 })
     }
 
     /// The texts in the image's tags.
@@ -335,6 +339,11 @@ impl SampleReader for TiffReader {
 
     fn own_tags(&self) -> &Metadata {
         &self.own_tags
+    }
+
+    fn colors(&self) -> ColorTags {
+        let unread = self.has_profile.then(|| "its color profile (ICC)".to_owned());
+        ColorTags { unread, ..ColorTags::default() }
     }
 
     fn notes(&self) -> &[String] {

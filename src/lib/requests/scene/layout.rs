@@ -58,6 +58,7 @@ impl Scene {
             patch: uniform.is_none().then_some(patch),
             source_width,
             brightest_e: *brightest_e,
+            upsampling: found.upsampling.clone(),
         });
         let channels: &[&str] = if self.cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
         let geometry = Geometry::new(size[0], size[1], channels);

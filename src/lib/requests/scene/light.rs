@@ -1,5 +1,6 @@
 //! The light of a scene: expected electrons per pixel of its source, at the exposure for which it was opened.
 
+use super::picture::Picture;
 use crate::camera::response::Camera;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
@@ -23,28 +24,39 @@ pub(super) type Electrons = Vec<[f64; 3]>;
 
 pub(super) enum ImageRows {
     /// As the file is read; the first row was read to judge the sum over wavelengths.
-    Streamed { first: Electrons, others: Box<SpectralImage> },
+    Streamed { first: Electrons, others: Box<SceneImage> },
     /// All rows, read once to find the brightest.
     Kept(Vec<Electrons>),
 }
 
-/// A spectral image whose planes are summed up to signal electrons.
-pub(super) struct SpectralImage {
-    reader: FrameReader,
-    planes: Vec<WeightedPlane>,
+/// How the pixels of an image become signal electrons.
+pub(super) enum Pixels {
+    /// As sums of its planes.
+    Spectral(Vec<WeightedPlane>),
+    /// As colors.
+    Colored(Box<Picture>),
 }
 
-impl SpectralImage {
-    /// An image, as the sums of these planes.
-    pub(super) fn new(reader: FrameReader, planes: Vec<WeightedPlane>) -> Self {
-        Self { reader, planes }
+/// An image whose pixels become signal electrons.
+pub(super) struct SceneImage {
+    reader: FrameReader,
+    pixels: Pixels,
+    /// Rows that were read.
+    rows_read: usize,
+}
+
+impl SceneImage {
+    /// An image, seen so.
+    pub(super) fn new(reader: FrameReader, pixels: Pixels) -> Self {
+        Self { reader, pixels, rows_read: 0 }
     }
 
     /// Gives the electrons of the next `rows` rows to `take`, band by band.
     fn fold(&mut self, rows: usize, mut take: impl FnMut(&Band, Vec<Electrons>)) -> Result<()> {
-        let (planes, name) = (&self.planes, self.reader.header().name.clone());
+        let (pixels, first, name) = (&self.pixels, self.rows_read, self.reader.header().name.clone());
+        self.rows_read += rows;
         fold([&mut self.reader as &mut dyn RowSource], rows, |band| {
-            take(band, electrons(band, planes, &name)?);
+            take(band, pixels.electrons(band, first, &name)?);
             Ok(())
         })
     }
@@ -56,10 +68,25 @@ impl SpectralImage {
         sink: &mut dyn RowSink,
         mut draw: impl FnMut(&Band, Vec<Electrons>, &mut Outlet<'_>) -> Result<()>,
     ) -> Result<()> {
-        let (planes, name) = (&self.planes, self.reader.header().name.clone());
+        let (pixels, first, name) = (&self.pixels, self.rows_read, self.reader.header().name.clone());
+        self.rows_read += rows;
         fold_into([&mut self.reader as &mut dyn RowSource], rows, sink, |band, outlet| {
-            draw(band, electrons(band, planes, &name)?, outlet)
+            draw(band, pixels.electrons(band, first, &name)?, outlet)
         })
+    }
+
+    /// The electrons of the next row.
+    pub(super) fn next_row(&mut self) -> Result<Electrons> {
+        let mut found = None;
+        self.fold(1, |_, rows| found = rows.into_iter().next())?;
+        Ok(found.unwrap_or_default())
+    }
+
+    /// The electrons of a pixel.
+    pub(super) fn electrons_at(&mut self, [x, y]: [usize; 2]) -> Result<[f64; 3]> {
+        let mut found = None;
+        self.fold(y + 1, |_, rows| found = rows.last().map(|row| row[x]))?;
+        Ok(found.unwrap_or_default())
     }
 
     /// The electrons of the next row, and the radiance of its brightest pixel, W cm⁻² sr⁻¹ nm⁻¹.
@@ -86,15 +113,23 @@ impl SpectralImage {
     }
 }
 
-/// The electrons of the rows of a band.
-fn electrons(band: &Band, planes: &[WeightedPlane], name: &str) -> Result<Vec<Electrons>> {
-    let window = band.window::<Any>(0);
-    let of_row = |y: usize| {
-        let mut row = Vec::with_capacity(window.width());
-        weighted_sums(window.all_channels(y), window.width(), planes, |electrons| row.push(electrons));
-        row.into_iter().map(|electrons| checked(electrons, name)).collect()
-    };
-    band.rows().into_par_iter().map(of_row).collect()
+impl Pixels {
+    /// The electrons of the rows of a band; the first that could be in it is row `first` of the image.
+    fn electrons(&self, band: &Band, first: usize, name: &str) -> Result<Vec<Electrons>> {
+        let window = band.window::<Any>(0);
+        let of_row = |y: usize| {
+            let row = match self {
+                Self::Spectral(planes) => {
+                    let mut row = Vec::with_capacity(window.width());
+                    weighted_sums(window.all_channels(y), window.width(), planes, |electrons| row.push(electrons));
+                    row
+                }
+                Self::Colored(picture) => picture.electrons(window.all_channels(y), window.width(), first + y, name)?,
+            };
+            row.into_iter().map(|electrons| checked(electrons, name)).collect()
+        };
+        band.rows().into_par_iter().map(of_row).collect()
+    }
 }
 
 /// The radiance of a pixel, W cm⁻² sr⁻¹ nm⁻¹.
@@ -108,6 +143,11 @@ fn radiance(band: &Band, y: usize, x: usize, spectral: &SpectralChannels) -> Vec
 pub(super) fn brightest(electrons: &[[f64; 3]]) -> usize {
     let largest = |x: usize| electrons[x].iter().copied().fold(0.0, f64::max);
     (0..electrons.len()).max_by(|&a, &b| largest(a).total_cmp(&largest(b)).then(b.cmp(&a))).unwrap_or_default()
+}
+
+/// A complaint of a sample that is not there.
+pub(super) fn no_sample(name: &str, sample: usize, count: usize) -> Error {
+    Error::Usage(format!("{name}: there is no sample {sample}; it has samples 0 to {}", count - 1))
 }
 
 /// Electrons that can be.

@@ -1,9 +1,12 @@
 //! Rendering a scene: from spectra, or electrons given outright, to the frame that a camera expects to collect.
 
+mod illuminated;
 mod layout;
 mod light;
 mod open;
+mod picture;
 mod request;
+mod sums;
 
 pub use request::Scene;
 
@@ -16,11 +19,13 @@ use crate::stages::render::Rendering;
 use crate::stream::{MemoryFrame, RowSink};
 use light::Light;
 use open::Prepared;
+use picture::Losses;
 
 /// A scene that is ready to be drawn.
 pub struct OpenScene {
     rendering: Rendering,
     light: Light,
+    losses: Losses,
     /// What came up.
     pub notes: Vec<Note>,
 }
@@ -51,7 +56,7 @@ impl Scene {
         let prepared = self.prepare()?;
         let rendering = self.rendering(&prepared)?;
         let Prepared { light, found, .. } = prepared;
-        Ok(OpenScene { rendering, light, notes: found.notes })
+        Ok(OpenScene { rendering, light, losses: found.losses, notes: found.notes })
     }
 
     /// Renders the frame into memory.
@@ -61,9 +66,9 @@ impl Scene {
     /// As [`Self::open`], and those of the reader.
     pub fn render(&self) -> Result<(MemoryFrame, Vec<Note>)> {
         let mut open = self.open()?;
-        let notes = std::mem::take(&mut open.notes);
+        let mut notes = std::mem::take(&mut open.notes);
         let mut frame = MemoryFrame::new(open.header().clone(), Vec::new());
-        open.draw(&mut frame, &mut |_| ())?;
+        notes.extend(open.draw(&mut frame, &mut |_| ())?);
         Ok((frame, notes))
     }
 
@@ -76,7 +81,8 @@ impl Scene {
         let Prepared { sensor, exposure, light, found, .. } = self.prepare()?;
         match light {
             Light::Uniform { electrons, .. } => {
-                let (quadrature_error, notes) = (found.metadata.quadrature_error, found.notes);
+                let (quadrature_error, mut notes) = (found.metadata.quadrature_error, found.notes);
+                notes.extend(found.losses.note());
                 Ok(Uniform { sensor, exposure, electrons, quadrature_error, notes })
             }
             Light::Image { source, .. } => {
@@ -97,14 +103,15 @@ impl OpenScene {
         &mut self.rendering.header
     }
 
-    /// Draws the whole frame into a sink; `progress` hears the number of rows that are done.
+    /// Draws the whole frame into a sink, and gives what came up meanwhile; `progress` hears the number of rows that are done.
     ///
     /// # Errors
     ///
     /// Those of reader and sink.
-    pub fn draw(self, sink: &mut dyn RowSink, progress: &mut dyn FnMut(usize)) -> Result<()> {
-        let Self { rendering, light, .. } = self;
-        light.draw(&rendering, sink, progress)
+    pub fn draw(self, sink: &mut dyn RowSink, progress: &mut dyn FnMut(usize)) -> Result<Option<Note>> {
+        let Self { rendering, light, losses, .. } = self;
+        light.draw(&rendering, sink, progress)?;
+        Ok(losses.note())
     }
 }
 

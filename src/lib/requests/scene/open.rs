@@ -1,7 +1,9 @@
 //! Opens the light of a scene, and settles its exposure.
 
-use super::light::{ImageRows, Light, Seen, SpectralImage, brightest, checked};
+use super::light::{ImageRows, Light, Pixels, SceneImage, brightest, checked, no_sample};
+use super::picture;
 use super::request::Scene;
+use super::sums::{Found, Sums};
 use crate::camera::optics::Exposure;
 use crate::camera::readout::ReadOut;
 use crate::camera::response::GridWeights;
@@ -13,15 +15,9 @@ use crate::formats::data::{self, LoadedSensor};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::frame::Geometry;
-use crate::metadata::Metadata;
-use crate::numerics::quadrature::Rule;
 use crate::requests::notes::{self, Note};
-use crate::spectrum::{WavelengthGrid, chart_columns};
+use crate::spectrum::chart_columns;
 use crate::stream::RowSource;
-use crate::units::QuantityKind;
-
-/// Share of a sensor's response beyond the summed wavelengths from which it is told.
-const TOLD_BEYOND: f64 = 1e-3;
 
 /// Error of a sum over wavelengths from which it is a warning.
 const TOLD_ERROR: f64 = 1e-2;
@@ -36,71 +32,6 @@ pub(super) struct Prepared {
     pub(super) found: Found,
 }
 
-/// What comes up while a scene is opened.
-pub(super) struct Found {
-    /// What is left out, and the error of the sum over wavelengths.
-    pub(super) metadata: Metadata,
-    pub(super) notes: Vec<Note>,
-}
-
-/// The sums over wavelengths that turn radiance into electrons.
-struct Sums<'a> {
-    loaded: &'a LoadedSensor,
-    exposure: &'a Exposure,
-    grid: WavelengthGrid,
-    /// Whether a radiance whose samples are closer than the grid's is integrated between them instead.
-    follows: bool,
-    weights: GridWeights,
-}
-
-impl<'a> Sums<'a> {
-    /// Those of a grid that was `chosen`, or of the default.
-    fn on(
-        chosen: Option<WavelengthGrid>,
-        quadrature: Rule,
-        loaded: &'a LoadedSensor,
-        exposure: &'a Exposure,
-    ) -> Result<Self> {
-        let grid = WavelengthGrid { quadrature, ..chosen.unwrap_or_default() };
-        let weights = loaded.response()?.weights_on(&loaded.sensor, exposure, &grid)?;
-        Ok(Self { loaded, exposure, grid, follows: chosen.is_none(), weights })
-    }
-
-    /// The camera for radiances at these wavelengths, those of `name`.
-    fn camera(&self, sampled_nm: &[f64], name: &str, notes: &mut Vec<Note>) -> Result<Seen> {
-        let response = self.loaded.response()?;
-        let (of_sum, uncovered) = self.weights.camera(sampled_nm);
-        let exact = response.weights_between(&self.loaded.sensor, self.exposure, &self.grid, sampled_nm)?;
-        let exact = exact.camera(sampled_nm).0;
-        let is_followed = self.follows && self.grid.is_coarser_than(sampled_nm);
-        let WavelengthGrid { start_nm, end_nm, step_nm, .. } = self.grid;
-        if is_followed {
-            notes.push(Note::Remark(format!(
-                "{name}: its samples are closer than {step_nm} nm: it is integrated between them"
-            )));
-        }
-        let beyond = response.beyond(&self.grid);
-        if beyond > TOLD_BEYOND {
-            notes.push(Note::Warning(format!(
-                "{:.1} % of the response of the sensor {} lies beyond {start_nm} to {end_nm} nm, where nothing is summed; \
-                 --wavelengths sets other ends",
-                100.0 * beyond,
-                self.loaded.sensor.name
-            )));
-        }
-        if uncovered > 1e-6 {
-            notes.push(Note::Warning(format!(
-                "{name}: it covers {} to {} nm; {:.2} % of the sensor's response lies beyond, where its radiance is \
-                 taken as zero",
-                sampled_nm[0],
-                sampled_nm[sampled_nm.len() - 1],
-                100.0 * uncovered
-            )));
-        }
-        Ok(Seen { camera: if is_followed { exact.clone() } else { of_sum }, exact })
-    }
-}
-
 impl Scene {
     /// Loads the sensor, opens the light and settles the exposure.
     pub(super) fn prepare(&self) -> Result<Prepared> {
@@ -110,7 +41,7 @@ impl Scene {
             // The signal is proportional to time: work it out for 1 s, then choose.
             exposure.exposure_s = 1.0;
         }
-        let mut found = Found { metadata: Metadata::new(QuantityKind::ExpectedElectrons), notes: Vec::new() };
+        let mut found = Found::none();
         found.notes.extend(loaded.sensor.doubts().into_iter().chain(self.doubt(exposure)).map(Note::Warning));
         let mut light = match self.level.given() {
             Some(electrons) => {
@@ -119,6 +50,10 @@ impl Scene {
             }
             None => self.open_light(&loaded, &exposure, &mut found)?,
         };
+        if self.picture.is_given() && found.upsampling.is_none() {
+            let problem = "--rgb, --primaries, --illuminant and --luminance are for a picture in R, G, B, which this scene is not";
+            return Err(Error::Usage(problem.into()));
+        }
         let mut brightest_e = None;
         if let Some(fraction) = self.level.expose_to {
             let (kept, brightest) = light.keep_and_find_brightest()?;
@@ -156,6 +91,9 @@ impl Scene {
         let options = InputOptions { path, part: self.part, all_channels: true, ..InputOptions::default() };
         match spectral::open(&options)? {
             Radiances::Table(table) => self.light_of_table(&table, &sums, found),
+            Radiances::Image(reader) if picture::is_one(reader.header()) => {
+                self.light_of_picture(*reader, &sums, found)
+            }
             Radiances::Image(reader) => self.light_of_image(*reader, &sums, found),
         }
     }
@@ -210,7 +148,7 @@ impl Scene {
             found.metadata.leave_out("render-radiance", what, "no class responds to them");
         }
         let Geometry { width, height, .. } = header.geometry;
-        let mut image = SpectralImage::new(reader, planes);
+        let mut image = SceneImage::new(reader, Pixels::Spectral(planes));
         let Some(sample) = self.spectrum.sample else {
             let (first, radiance) = image.first_row(&spectral)?;
             found.metadata.quadrature_error = seen.quadrature_error(&radiance);
@@ -270,8 +208,4 @@ fn inexact([red, green, blue]: [f64; 3]) -> Note {
     } else {
         Note::Remark(text)
     }
-}
-
-fn no_sample(name: &str, sample: usize, count: usize) -> Error {
-    Error::Usage(format!("{name}: there is no sample {sample}; it has samples 0 to {}", count - 1))
 }

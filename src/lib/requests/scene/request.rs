@@ -3,7 +3,7 @@
 use crate::cfa::CfaPattern;
 use crate::names::Named;
 use crate::numerics::quadrature::Rule;
-use crate::requests::options::{ExposureChoice, SignalLevel, SpectrumChoice, Subject, defaults};
+use crate::requests::options::{ExposureChoice, PictureChoice, SignalLevel, SpectrumChoice, Subject, defaults};
 use crate::requests::values;
 use crate::spectrum::WavelengthGrid;
 use clap::Args;
@@ -14,7 +14,7 @@ pub struct Scene {
     /// Light and sensor.
     #[command(flatten)]
     pub subject: Subject,
-    /// Size of the frame in photosites; by default the sensor's, or that of the patches of a spectral image
+    /// Size of the frame in photosites; by default the sensor's, or that of the patches of an image
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = values::size)]
     pub size: Option<[usize; 2]>,
     /// Exposure time and lens.
@@ -38,7 +38,7 @@ pub struct Scene {
     /// Which spectrum of a file.
     #[command(flatten)]
     pub spectrum: SpectrumChoice,
-    /// Photosites that show one pixel of a spectral image, by default 1x1; or one spectrum of a table, to show them all
+    /// Photosites that show one pixel of an image, by default 1x1; or one spectrum of a table, to show them all
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     pub patch: Option<[usize; 2]>,
     /// Render only the plane that the mosaic of this pattern keeps: rggb, bggr, grbg or gbrg
@@ -47,6 +47,9 @@ pub struct Scene {
     /// Part of a multi-part EXR, counted from 0
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub part: usize,
+    /// How a picture becomes a scene.
+    #[command(flatten)]
+    pub picture: PictureChoice,
 }
 
 impl Default for Scene {

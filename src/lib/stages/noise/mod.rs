@@ -129,6 +129,7 @@ impl AddNoise {
         let mut metadata = input.metadata.becoming(QuantityKind::Electrons);
         let mut sources: Vec<Source> =
             Source::ALL.into_iter().filter(|source| !settings.without.contains(source)).collect();
+        // What the noisy frames leave out, the clean one does.
         let read_variance = if sources.contains(&Source::Ron) { readout.read_noise_e.powi(2) } else { 0.0 };
         if dark_e > 0.0 && dark_e * (1.0 + readout.dcnu.powi(2)) < NEGLIGIBLE_DARK * read_variance {
             metadata.leave_out(
@@ -142,6 +143,11 @@ impl AddNoise {
             sources.retain(|source| !matches!(source, Source::Dcsn | Source::Dcnu));
         }
         sources.retain(|source| has_noise(readout, *source));
+        if settings.clean {
+            // No source is drawn that would lift the mean where it is cut at zero.
+            dark_e *= rectified_mean(readout.dcnu);
+            sources.clear();
+        }
         let record = NoiseRecord {
             sources,
             seed: settings.seed,

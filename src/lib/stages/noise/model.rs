@@ -59,6 +59,8 @@ pub struct NoiseSettings {
     pub frame: u32,
     /// Sources to leave out; their means stay.
     pub without: Vec<Source>,
+    /// Whether all are left out, so that the frame is the mean of noisy ones.
+    pub clean: bool,
     /// Temperature in K, the sensor's own where none is given.
     pub temperature_k: Option<f64>,
     /// How to draw Poisson numbers.

@@ -1,0 +1,92 @@
+//! Sums over wavelengths that turn radiance into electrons, and what comes up with them.
+
+use super::light::Seen;
+use super::picture::Losses;
+use crate::camera::optics::Exposure;
+use crate::camera::response::GridWeights;
+use crate::error::Result;
+use crate::formats::data::LoadedSensor;
+use crate::metadata::{Metadata, UpsamplingRecord};
+use crate::numerics::quadrature::Rule;
+use crate::requests::notes::Note;
+use crate::spectrum::WavelengthGrid;
+use crate::units::QuantityKind;
+
+/// Share of a sensor's response beyond the summed wavelengths from which it is told.
+const TOLD_BEYOND: f64 = 1e-3;
+
+/// What comes up while a scene is opened.
+pub(super) struct Found {
+    /// What is left out, and the error of the sum over wavelengths.
+    pub(super) metadata: Metadata,
+    pub(super) notes: Vec<Note>,
+    /// How the spectra of a picture are made up, and what is lost of its colors on the way.
+    pub(super) upsampling: Option<UpsamplingRecord>,
+    pub(super) losses: Losses,
+}
+
+impl Found {
+    /// Nothing yet.
+    pub(super) fn none() -> Self {
+        let metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+        Self { metadata, notes: Vec::new(), upsampling: None, losses: Losses::default() }
+    }
+}
+
+/// The sums over wavelengths that turn radiance into electrons.
+pub(super) struct Sums<'a> {
+    loaded: &'a LoadedSensor,
+    exposure: &'a Exposure,
+    grid: WavelengthGrid,
+    /// Whether a radiance whose samples are closer than the grid's is integrated between them instead.
+    follows: bool,
+    pub(super) weights: GridWeights,
+}
+
+impl<'a> Sums<'a> {
+    /// Those of a grid that was `chosen`, or of the default.
+    pub(super) fn on(
+        chosen: Option<WavelengthGrid>,
+        quadrature: Rule,
+        loaded: &'a LoadedSensor,
+        exposure: &'a Exposure,
+    ) -> Result<Self> {
+        let grid = WavelengthGrid { quadrature, ..chosen.unwrap_or_default() };
+        let weights = loaded.response()?.weights_on(&loaded.sensor, exposure, &grid)?;
+        Ok(Self { loaded, exposure, grid, follows: chosen.is_none(), weights })
+    }
+
+    /// The camera for radiances at these wavelengths, those of `name`.
+    pub(super) fn camera(&self, sampled_nm: &[f64], name: &str, notes: &mut Vec<Note>) -> Result<Seen> {
+        let response = self.loaded.response()?;
+        let (of_sum, uncovered) = self.weights.camera(sampled_nm);
+        let exact = response.weights_between(&self.loaded.sensor, self.exposure, &self.grid, sampled_nm)?;
+        let exact = exact.camera(sampled_nm).0;
+        let is_followed = self.follows && self.grid.is_coarser_than(sampled_nm);
+        let WavelengthGrid { start_nm, end_nm, step_nm, .. } = self.grid;
+        if is_followed {
+            notes.push(Note::Remark(format!(
+                "{name}: its samples are closer than {step_nm} nm: it is integrated between them"
+            )));
+        }
+        let beyond = response.beyond(&self.grid);
+        if beyond > TOLD_BEYOND {
+            notes.push(Note::Warning(format!(
+                "{:.1} % of the response of the sensor {} lies beyond {start_nm} to {end_nm} nm, where nothing is summed; \
+                 --wavelengths sets other ends",
+                100.0 * beyond,
+                self.loaded.sensor.name
+            )));
+        }
+        if uncovered > 1e-6 {
+            notes.push(Note::Warning(format!(
+                "{name}: it covers {} to {} nm; {:.2} % of the sensor's response lies beyond, where its radiance is \
+                 taken as zero",
+                sampled_nm[0],
+                sampled_nm[sampled_nm.len() - 1],
+                100.0 * uncovered
+            )));
+        }
+        Ok(Seen { camera: if is_followed { exact.clone() } else { of_sum }, exact })
+    }
+}
