@@ -290,7 +290,7 @@ fn dark_frames_bring_their_noise_and_take_the_pattern() {
         let found = verdict(&camera, Equations::Exact);
         assert!(found.passed, "{count} dark frames, ECI: {found:?}");
         // As many dark frames as there are not would be caught: a ninth of their noise is 10 % of the variance.
-        corrected.header.metadata.correction.as_mut().unwrap().dark_frames = 20;
+        corrected.header.metadata.correction.as_mut().unwrap().masters[0].average.frames = 20;
         assert!(!verdict(&corrected, Equations::Exact).passed, "{count}");
     }
 }

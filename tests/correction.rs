@@ -5,6 +5,7 @@
 mod support;
 
 use cyanometer::analysis::statistics::{ChannelReport, Saturated, measure};
+use cyanometer::camera::linearity::Linearization;
 use cyanometer::camera::optics::Exposure;
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::CfaPattern;
@@ -21,6 +22,7 @@ use cyanometer::stages::darks::{DarkFrames, DarkSettings};
 use cyanometer::stages::defects::DefectMap;
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stages::flats::FlatFrames;
+use cyanometer::stages::linearize::Linearize;
 use cyanometer::stages::masters::Averaging;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::saturation::{WithMask, with_mask};
@@ -64,7 +66,12 @@ impl Camera {
             ..Default::default()
         };
         let noisy = through(&scene, &AddNoise::new(&scene.header, &settings).unwrap());
-        through(&noisy, &Digitize::new(&noisy.header, &AdcSettings::default()).unwrap())
+        let mut codes = through(&noisy, &Digitize::new(&noisy.header, &AdcSettings::default()).unwrap());
+        if self.readout.linearization.is_some() {
+            let linearize = Linearize::of(&mut codes.header).unwrap();
+            linearize.apply(&mut codes.samples);
+        }
+        codes
     }
 
     fn darks(&self, count: usize, exposure_s: f64, temperature_k: f64) -> Vec<MemoryFrame> {
@@ -140,7 +147,9 @@ impl Chance {
     }
 
     fn whole(&mut self, low: usize, high: usize) -> usize {
-        low + (self.next() * (high + 1 - low) as f64) as usize
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small whole numbers")]
+        let step = (self.next() * (high + 1 - low) as f64) as usize;
+        low + step
     }
 }
 
@@ -157,6 +166,11 @@ fn chain(seed: u64) -> (String, MemoryFrame) {
     readout.bits = 14;
     readout.adu_per_e = chance.between(0.15, 0.3);
     readout.bias_adu = chance.between(200.0, 900.0);
+    // Every third camera is not straight, by up to a twentieth at the top of its codes; numbers of their own leave the others.
+    if seed.is_multiple_of(3) {
+        let [bend, sway] = [(); 2].map(|()| Chance(chance.0 ^ 1).between(-0.05, 0.05) / 16_384.0);
+        readout.linearization = Some(Linearization::polynomial(vec![1.0, bend, sway / 16_384.0]).unwrap());
+    }
     let cfa = (chance.next() < 0.7).then_some(CfaPattern::ALL[chance.whole(0, 3)]);
     let camera = Camera { readout, size: [90, 70], cfa, seed: 1000 * seed, frames: 0.into() };
     let (exposure_s, temperature_k) = (chance.between(0.02, 0.2), chance.between(310.0, 335.0));
@@ -269,17 +283,18 @@ fn wrong_records_are_seen() {
     };
     assert!(largest(&corrected) < 4.5, "{}", largest(&corrected));
     type Change = fn(&mut FrameHeader);
-    let changes: [Change; 4] = [
+    let changes: [(Change, f64); 4] = [
         // A fifth of the variance is that of the flat field.
-        |head| correction(head).flat.as_mut().unwrap().average.frames = 8,
-        |head| correction(head).flat.as_mut().unwrap().average.combine = Combine::Median,
-        |head| correction(head).masters[0].weight = 0.9,
-        |head| correction(head).flat = None,
+        (|head| correction(head).flat.as_mut().unwrap().average.frames = 8, 6.0),
+        // The median of four keeps 0.298 of a variance, their mean 0.25.
+        (|head| correction(head).flat.as_mut().unwrap().average.combine = Combine::Median, 3.5),
+        (|head| correction(head).masters[0].weight = 0.9, 6.0),
+        (|head| correction(head).flat = None, 6.0),
     ];
-    for (index, change) in changes.into_iter().enumerate() {
+    for (index, (change, least)) in changes.into_iter().enumerate() {
         let mut wrong = corrected.clone();
         change(&mut wrong.header);
-        assert!(largest(&wrong) > 6.0, "{index}: {}", largest(&wrong));
+        assert!(largest(&wrong) > least, "{index}: {}", largest(&wrong));
     }
 }
 
@@ -294,23 +309,25 @@ fn demosaicked_frames_have_the_noise_that_is_predicted() {
     let (camera, kit) = strong();
     let corrected = kit.correct(&camera.expose([2000.0, 9000.0, 5000.0], 0.05, 330.0));
     for method in [Method::Bilinear, Method::EffectiveColor, Method::Malvar] {
-        let demosaic = Demosaic::new(&corrected.header, method, Black::Auto, None).unwrap();
+        let mut plane = corrected.header.clone();
+        plane.geometry.channels.truncate(1);
+        let demosaic = Demosaic::new(&plane, method, Black::Auto, None).unwrap();
         let stage = WithSigma::of_demosaicking(demosaic).unwrap();
         let masked = WithMask::new(&stage);
         let mut made = through(&corrected, &masked);
         made.header.metadata.history = corrected.header.metadata.history.clone();
-        for channel in classes(&made).into_iter().take(3) {
+        let mut source = MemoryFrame::new(made.header.clone(), made.samples.clone());
+        let report = measure(&mut source, &[], Saturated::LeftOut, Equations::Exact, None).unwrap();
+        let region = &report.regions[0];
+        for channel in &region.channels[..3] {
             let z = [channel.z_mean.unwrap(), channel.z_std.unwrap()];
             // Six numbers, each beyond 4.5 in one of 150 000 cases; the correlations of neighbors widen that of std.
             assert!(z[0].abs() < 4.5 && z[1].abs() < 9.0, "{method:?}: {channel:?}");
         }
-        let mut source = MemoryFrame::new(made.header.clone(), made.samples.clone());
-        let report = measure(&mut source, &[], Saturated::LeftOut, Equations::Exact, None).unwrap();
-        let region = &report.regions[0];
         assert!(region.corrected > 40 && region.not_finite == 0, "{region:?}");
         for k in 0..3 {
             let (pixel, sigma) = (&region.channels[k], &region.channels[3 + k]);
-            let ratio = sigma.mean.unwrap() / pixel.std.unwrap();
+            let ratio = sigma.mean.unwrap().hypot(sigma.std.unwrap()) / pixel.std.unwrap();
             // Levels of pixels scatter by a tenth, their standard deviations by a twentieth; phases differ by more.
             assert!((ratio - 1.0).abs() < 0.04, "{method:?} {k}: {ratio}");
             assert!(sigma.max.unwrap().is_finite());
@@ -358,8 +375,9 @@ fn defects_are_interpolated_within_their_class() {
     };
     let mut head = FrameHeader { geometry: Geometry::new(20, 16, &["Y"]), ..head };
     head.metadata.scene = None;
-    let ramp =
-        |x: usize, y: usize| (100 + 7 * x + 3 * y) as f32 + 1000.0 * f32::from(u8::from(x % 2 == 0 && y % 2 == 0));
+    let ramp = |x: usize, y: usize| {
+        (100 + 7 * x + 3 * y) as f32 + 1000.0 * f32::from(u8::from(x.is_multiple_of(2) && y.is_multiple_of(2)))
+    };
     let frame = support::frame(head, |x, y, _| ramp(x, y));
     let isolated = [8, 10];
     let around = (4..=12).flat_map(|y| (6..=14).map(move |x| [y, x]));

@@ -186,7 +186,7 @@ fn what_is_no_picture_or_not_said_is_told() {
         ("gray.png", BAD_DATA, "it holds no spectral radiance"),
         ("nan.exr --luminance 1", BAD_DATA, "its pixel 0,1 is [0.1, NaN, 0.3]; no light has such a color"),
         ("xyz.exr", BAD_DATA, "neither spectral radiance nor a picture in R, G, B"),
-        ("rgb.png --illuminant d50", BAD_USAGE, "there is no illuminant `d50`; known are d65, a, e"),
+        ("rgb.png --illuminant f2", BAD_USAGE, "there is no illuminant `f2`; known are a, d50, d55, d65, d75, e and"),
         ("rgb.png --illuminant dark.csv", BAD_DATA, "it is no light"),
         ("rgb.png --primaries 0.3,0.3,0.3,0.3,0.3,0.3,0.3,0.3", BAD_DATA, "its primaries lie on a line"),
         ("rgb.png --primaries bt709", BAD_USAGE, "give one of srgb, display-p3"),

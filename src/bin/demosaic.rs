@@ -58,6 +58,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());
+    session.tell(requests::of_bent_codes(reader.header()).as_slice());
     if arguments.sigma {
         session.drive(reader, &WithSigma::of_demosaicking(stage)?, &arguments.output)?;
     } else {

@@ -174,8 +174,8 @@ fn draw(trial: u32, samples: &mut [f32]) {
 /// let mut samples = [5.0, 4.0, 90.0, 5.0];
 /// assert_eq!(average(Combine::Mean, &mut samples, 3.0), (26.0, 0));
 /// assert_eq!(average(Combine::Median, &mut samples, 3.0), (5.0, 0));
-/// // One of four lies 1.5 standard deviations off at most.
-/// assert_eq!(average(Combine::Clipped, &mut samples, 1.4), (14.0 / 3.0, 1));
+/// // 90 lies 1.99 standard deviations from the median; of what is left, 4 lies 1.73 off.
+/// assert_eq!(average(Combine::Clipped, &mut samples, 1.9), (14.0 / 3.0, 1));
 /// ```
 pub fn average(combine: Combine, samples: &mut [f32], clip: f64) -> (f64, u64) {
     let mean = |samples: &[f32]| samples.iter().map(|sample| f64::from(*sample)).sum::<f64>() / samples.len() as f64;

@@ -1,6 +1,5 @@
-//! Moments of the codes of a converter that is not straight, or of these made straight.
+//! [f64; 4] of the codes of a converter that is not straight, or of these made straight.
 
-use super::reading::Moments;
 use crate::metadata::AdcRecord;
 use crate::numerics::gauss::panel;
 use crate::numerics::normal::cumulative;
@@ -13,12 +12,12 @@ const WIDEST: f64 = 1.5;
 /// Step of a derivative, in standard deviations.
 const STEP: f64 = 0.1;
 
-/// Moments 1 to 4 about `center` of the samples of a normal charge, in e⁻, that is read as codes between `ends`.
+/// [f64; 4] 1 to 4 about `center` of the samples of a normal charge, in e⁻, that is read as codes between `ends`.
 ///
 /// Σ over the edges t between codes of \[g(t + ½) − g(t − ½)] T(t), with g the powers of a code's sample and T the probability
 /// of a charge beyond the edge. Many codes are an integral, less \[(D T)′]/24 − 7 \[(D T)‴]/5760 at its ends, by Euler and Maclaurin. Good to
 /// 3·10⁻⁷ of the charge's own moments.
-pub(super) fn moments(adc: &AdcRecord, ends: Rounding, mean_e: f64, std_e: f64, center: f64) -> Moments {
+pub(super) fn moments(adc: &AdcRecord, ends: Rounding, mean_e: f64, std_e: f64, center: f64) -> [f64; 4] {
     let powers = |code: f64| {
         let x = adc.sample(code) - center;
         [x, x * x, x * x * x, x * x * x * x]
@@ -31,7 +30,7 @@ pub(super) fn moments(adc: &AdcRecord, ends: Rounding, mean_e: f64, std_e: f64, 
     let (first, last) = (code_of(mean_e - reach), code_of(mean_e + reach));
     let mut moments = powers(first);
     let beyond = |edge: f64| cumulative((mean_e - adc.electrons_at(edge)) / std_e);
-    let mut add = |weight: f64, above: Moments, below: Moments| {
+    let mut add = |weight: f64, above: [f64; 4], below: [f64; 4]| {
         for ((moment, above), below) in moments.iter_mut().zip(above).zip(below) {
             *moment += weight * (above - below);
         }
@@ -75,7 +74,7 @@ mod tests {
     use crate::numerics::rounding::partial_moments;
 
     /// The probabilities of all codes one by one.
-    fn reference(adc: &AdcRecord, mean_e: f64, std_e: f64, center: f64) -> Moments {
+    fn reference(adc: &AdcRecord, mean_e: f64, std_e: f64, center: f64) -> [f64; 4] {
         let top = adc.top_code();
         let at = |edge: f64| (adc.electrons_at(edge) - mean_e) / std_e;
         let mut moments = [0.0; 4];

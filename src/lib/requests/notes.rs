@@ -2,7 +2,7 @@
 
 use crate::analysis::statistics::Report;
 use crate::formats::input::FrameReader;
-use crate::metadata::FrameHeader;
+use crate::metadata::{AdcRecord, FrameHeader};
 use crate::stream::RowSource;
 
 /// Something that came up; whoever asked decides what to do with it.
@@ -91,6 +91,23 @@ pub fn of_levels(frame: &FrameHeader) -> Option<Note> {
         return None;
     };
     Some(Note::Warning(format!("{}: {problem}", frame.name)))
+}
+
+/// A warning of codes that are not proportional to charge, of which colors are made all the same.
+pub fn of_bent_codes(frame: &FrameHeader) -> Option<Note> {
+    let metadata = &frame.metadata;
+    let of_sensor = || metadata.sensor.as_ref()?.readout.as_ref().map(AdcRecord::of_readout);
+    let adc = metadata.adc.or_else(of_sensor).filter(AdcRecord::is_bent)?;
+    let codes =
+        (0..=adc.top_code()).map(f64::from).filter(|code| *code > adc.bias_adu + 0.01 * f64::from(adc.top_code()));
+    let straight = AdcRecord { is_linearized: true, ..adc };
+    let change = |code: f64| (straight.sample(code) - adc.bias_adu) / (code - adc.bias_adu) - 1.0;
+    let most = codes.map(change).fold(0.0, |most: f64, change| if change.abs() > most.abs() { change } else { most });
+    Some(Note::Warning(format!(
+        "{}: its codes are not proportional to charge, by up to {:.2} %; `correct-frame --linearize` makes them so",
+        frame.name,
+        100.0 * most
+    )))
 }
 
 /// A warning of a converter whose slope looks like its inverse, electrons per ADU: full well is far from the range of codes,

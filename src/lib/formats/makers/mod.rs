@@ -23,7 +23,7 @@ pub use worker::Worker;
 use std::process::ExitCode;
 
 /// The first argument of a child, followed by what it is given.
-const SERVE: &str = "--decode-for-parent";
+const SERVE: &str = "@decode-for-parent";
 
 /// What to do about a file that is not decoded.
 const INSTEAD: &str = "convert it to DNG, or write its codes as a TIFF with `unprocessed_raw -T` of LibRaw";

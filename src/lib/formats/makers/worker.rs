@@ -49,7 +49,7 @@ impl Worker {
     /// [`Error::Format`] for what is not decoded, [`Error::Disk`] where no child is started.
     pub(super) fn start(self, mut file: File, name: &str, kind: &str) -> Result<(Head, Running)> {
         if !cfg!(feature = "makers-raw") {
-            let build = "build `import-raw` with the feature `makers-raw` (cargo build --features makers-raw)";
+            let build = "build `import-raw` with the feature `makers-raw`";
             return Err(Error::format(
                 name,
                 format!("it is {kind}, and this build reads DNG alone; {build}, or {INSTEAD}"),
