@@ -21,7 +21,7 @@ pub trait Propagating: Stage {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] where what the stage makes has no uncertainty to tell.
+    /// [`crate::error::Error::Usage`] where what the stage makes has no uncertainty to tell.
     fn layers(&self) -> Result<Vec<&'static str>>;
 
     /// Fills the layers of row `y`, one plane after another, from the rows that the stage saw and the three planes that it
@@ -62,7 +62,7 @@ impl WithSigma<ToXyz> {
     ///
     /// # Errors
     ///
-    /// Those of [`PixelNoise::of`]; [`Error::Usage`] for sRGB, a picture.
+    /// Those of [`PixelNoise::of`]; [`crate::error::Error::Usage`] for sRGB, a picture.
     pub fn of_conversion(stage: ToXyz, input: &FrameHeader) -> Result<Self> {
         stage.layers()?;
         Self::new(stage, PixelNoise::of(input)?)

@@ -50,7 +50,7 @@ pub struct Correction {
     #[arg(long, value_name = "FILE", conflicts_with = "black")]
     pub bias: Vec<PathBuf>,
     /// Bring dark signals to the exposure and the temperature of the frame: dark frames alike, else between the nearest two,
-    /// else the nearest, scaled above the bias by exposure and Eq. 6 of [HP2005]
+    /// else the nearest, scaled above the bias by exposure and by Eq. 6 of Haralabidis and Pilinis (2005)
     #[arg(long, requires = "dark")]
     pub scale_dark: bool,
     /// Flat field to divide by, lit evenly; any number. Each class is divided by its share of its own mean

@@ -107,8 +107,8 @@ impl Fit {
     ///
     /// # Errors
     ///
-    /// Those of readers; [`Error::Data`](crate::error::Error::Data) where the matrix is not determined;
-    /// [`Error::Usage`](crate::error::Error::Usage) where the request makes no sense.
+    /// Those of readers; [`Error::Data`] where the matrix is not determined;
+    /// [`Error::Usage`] where the request makes no sense.
     pub fn run(&self) -> Result<Characterization> {
         let exposure = self.exposure.chosen()?;
         self.check_white()?;
