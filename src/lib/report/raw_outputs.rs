@@ -10,6 +10,7 @@ use crate::formats::{register, yaml_writer};
 use crate::metadata::FrameHeader;
 use crate::requests::RawFiles;
 use crate::requests::batch::{Job, jobs};
+use crate::requests::conversion::own_matrix;
 use crate::requests::options::Output;
 use crate::stream::RowSource;
 use clap::Args;
@@ -77,13 +78,17 @@ impl RawOutputs {
 
 fn matrix(reader: &FrameReader) -> Result<String> {
     let raw = reader.header();
-    let Some(matrix) = &raw.metadata.relative_matrix else {
+    if let Some(matrix) = &raw.metadata.relative_matrix {
+        return characterization::matrix(&CameraMatrix::relative(matrix));
+    }
+    // Of a frame of ours the sensor has one.
+    let Ok((matrix, _)) = own_matrix(raw) else {
         return Err(raw.refuse(
             "it tells no matrix: that takes ColorMatrix1 and AsShotNeutral or AsShotWhiteXY (-v tells what is passed over); \
              leave out --write-matrix",
         ));
     };
-    characterization::matrix(&CameraMatrix::relative(matrix))
+    characterization::matrix(&matrix)
 }
 
 /// What a noise profile tells of the read-out, and what it cannot.

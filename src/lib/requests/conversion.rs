@@ -249,7 +249,7 @@ pub(super) fn doubt_of_white(white: White, matrix: &CameraMatrix) -> Option<Note
 /// # Errors
 ///
 /// [`Error::Usage`] where there is none.
-fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
+pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
     let Metadata { sensor, relative_matrix, exposure, .. } = &frame.metadata;
     let measured = sensor.as_ref().and_then(|sensor| Some((sensor.name.clone(), sensor.xyz_from_camera?)));
     match (measured, relative_matrix) {
