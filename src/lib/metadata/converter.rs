@@ -75,9 +75,13 @@ impl AdcRecord {
 
     /// How much the sample of a level of codes rises with the code.
     pub fn sample_slope(&self, code: f64) -> f64 {
-        let curve = self.linearization.filter(|_| self.is_linearized);
+        if self.is_linearized { self.straightening(code) } else { 1.0 }
+    }
+
+    /// How many straight ADU one of the code makes at a level of codes; beyond them as at their ends.
+    fn straightening(&self, code: f64) -> f64 {
         let [from, to] = self.range();
-        curve.map_or(1.0, |curve| curve.slope((code - self.bias_adu).clamp(from, to)))
+        self.linearization.map_or(1.0, |curve| curve.slope((code - self.bias_adu).clamp(from, to)))
     }
 
     /// The sample of a charge, before it is rounded.
@@ -96,19 +100,13 @@ impl AdcRecord {
 
     /// How much the sample of a charge rises with it, in ADU per e⁻.
     pub fn sample_per_e(&self, electrons: f64) -> f64 {
-        match self.linearization.filter(|_| !self.is_linearized) {
-            None => self.adu_per_e,
-            Some(curve) => {
-                let [from, to] = self.range();
-                self.adu_per_e / curve.slope((self.level_at(electrons) - self.bias_adu).clamp(from, to))
-            }
-        }
+        let bend = if self.is_bent() { self.straightening(self.level_at(electrons)) } else { 1.0 };
+        self.adu_per_e / bend
     }
 
     /// The variance of a uniform rounding of the samples at a charge, ADU².
     pub fn rounding_at(&self, electrons: f64) -> f64 {
-        let step = if self.linearization.is_none() { 1.0 } else { self.sample_slope(self.level_at(electrons)) };
-        step * step / 12.0
+        self.sample_slope(self.level_at(electrons)).powi(2) / 12.0
     }
 
     /// The lowest code of a full photosite: the largest, or that of full well (electrons) where it is smaller.

@@ -126,20 +126,14 @@ impl Digitize {
         mut output: Rows<'_, Adu>,
     ) -> Counts {
         let mut counts = Counts::default();
-        if let Some(edges) = &self.bent {
-            for y in output.range() {
-                for channel in 0..input.channels() {
-                    let (charges, codes) = (input.row(y.cast_signed(), channel), output.row(y, channel));
-                    counts = counts.plus(edges.digitize(charges, codes));
-                }
-            }
-            return counts;
-        }
         let clipping = Clipping::of(&self.adc);
         for y in output.range() {
             for channel in 0..input.channels() {
                 let (charges, codes) = (input.row(y.cast_signed(), channel), output.row(y, channel));
-                let of_row = vectors::run_on(instructions, Row { adc: self.adc, clipping, charges, codes });
+                let of_row = match &self.bent {
+                    Some(edges) => edges.digitize(charges, codes),
+                    None => vectors::run_on(instructions, Row { adc: self.adc, clipping, charges, codes }),
+                };
                 counts = counts.plus(of_row);
             }
         }
