@@ -111,11 +111,18 @@ pub const D50_XY: [f64; 2] = [0.3457, 0.3585];
 /// Primaries of sRGB, red, green, blue, and its white [IEC 61966-2-1].
 pub const SRGB_PRIMARIES: [[f64; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], D65_XY];
 
-/// Linear sRGB from XYZ of unit white luminance [IEC 61966-2-1].
+/// Linear sRGB from XYZ of unit white luminance, of the primaries and the white of sRGB exactly; the four decimals of IEC 61966-2-1
+/// leave white at 0.9998, 1.0001, 1.0001.
 const SRGB_FROM_XYZ: Matrix3<f64> = Matrix3::new(
-    3.2406, -1.5372, -0.4986, //
-    -0.9689, 1.8758, 0.0415, //
-    0.0557, -0.2040, 1.0570,
+    3.240_969_941_904_521_3,
+    -1.537_383_177_570_093_5,
+    -0.498_610_760_293_003_3,
+    -0.969_243_636_280_879_8,
+    1.875_967_501_507_720_6,
+    0.041_555_057_407_175_61,
+    0.055_630_079_696_993_61,
+    -0.203_976_958_888_976_57,
+    1.056_971_514_242_878_6,
 );
 
 /// The cone responses of the Bradford transform \[Lam1985].

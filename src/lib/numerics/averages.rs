@@ -5,9 +5,11 @@
 
 use super::gauss::panel;
 use super::normal::{cumulative, density};
+use crate::frame::to_sample;
 use crate::names::{Named, serde_by_name};
 use crate::random::{Run, RunWords, Source};
 use std::cmp::Ordering;
+use std::f64::consts::FRAC_PI_2;
 
 /// How repeated samples are averaged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -64,7 +66,7 @@ impl Kept {
             Combine::Mean => Self::of_mean(count),
             _ if count < 3 => Self::of_mean(count),
             Combine::Median => Self::of_median(count, std_codes),
-            Combine::Clipped => Self::of_clipped(count, clip),
+            Combine::Clipped => Self::of_clipped(count, clip, std_codes),
         }
     }
 
@@ -118,9 +120,10 @@ impl Kept {
         Self { variance: square / weight, rounding: 1.0 - 3.0 * apart / weight, lean: own / weight - 1.0 }
     }
 
-    /// By the variance of its difference from the mean in normal samples that are drawn here, always the same: it is a small
-    /// part of the whole, and known to a few hundredths of itself.
-    fn of_clipped(count: u32, clip: f64) -> Self {
+    /// By the variance of its difference from the mean in normal samples that are drawn here and rounded, always the same: it is a
+    /// small part of the whole, and known to a few hundredths of itself. Where samples are codes, clipping comes to its end
+    /// sooner than where they are not.
+    fn of_clipped(count: u32, clip: f64, std_codes: f64) -> Self {
         let n = f64::from(count);
         // One sample far from all others is √N standard deviations from their median, and none can be farther.
         if clip >= n.sqrt() {
@@ -131,16 +134,33 @@ impl Kept {
         let (mut square, mut kept_square, mut kept) = (0.0, 0.0, 0.0);
         for trial in 0..trials {
             draw(trial, &mut samples);
-            let mean = samples.iter().map(|z| f64::from(*z)).sum::<f64>() / n;
+            let phase = phase(trial);
+            for sample in &mut samples {
+                *sample = to_sample((f64::from(*sample) * std_codes + phase).round());
+            }
+            let mean = samples.iter().map(|code| f64::from(*code)).sum::<f64>() / n;
             let (average, which) = clipped(&mut samples, clip);
             let left = &samples[which];
             square += (average - mean).powi(2);
-            kept_square += left.iter().map(|z| f64::from(*z).powi(2)).sum::<f64>();
+            kept_square += left.iter().map(|code| (f64::from(*code) - phase).powi(2)).sum::<f64>();
             kept += left.len() as f64;
         }
-        let variance = 1.0 / n + square / f64::from(trials);
-        Self { variance, rounding: variance, lean: kept_square / kept - 1.0 }
+        let rounded = std_codes * std_codes + 1.0 / 12.0;
+        let variance = 1.0 / n + square / f64::from(trials) / rounded;
+        Self { variance, rounding: variance, lean: kept_square / kept / rounded - 1.0 }
     }
+}
+
+/// Where in a code the mean of a trial lies: each place as often as any other.
+fn phase(trial: u32) -> f64 {
+    (f64::from(trial) * 0.618_033_988_749_895).fract()
+}
+
+/// Whether what clipping leaves of so many samples hangs on where in a code their mean lies: the limits, which the median and
+/// the standard deviation of the samples make, scatter over less than 0.6 of a code.
+pub fn is_clipped_by_code(count: u32, clip: f64, std_codes: f64) -> bool {
+    let n = f64::from(count);
+    clip < n.sqrt() && std_codes * ((0.5 * clip * clip + FRAC_PI_2) / n).sqrt() < 0.6
 }
 
 /// Fills `samples` with normal numbers, each trial with its own.
@@ -240,7 +260,7 @@ mod tests {
         }
         for count in [2001, 2000] {
             let found = Kept::of(Combine::Median, count, 3.0, 1.0).variance * f64::from(count);
-            assert!((found / std::f64::consts::FRAC_PI_2 - 1.0).abs() < 1e-3, "{found}");
+            assert!((found / FRAC_PI_2 - 1.0).abs() < 1e-3, "{found}");
         }
     }
 
@@ -256,15 +276,17 @@ mod tests {
             (Combine::Clipped, 5, 1.5, 40.0),
             (Combine::Clipped, 12, 2.0, 40.0),
             (Combine::Clipped, 25, 3.0, 40.0),
+            (Combine::Clipped, 30, 1.0, 2.5),
+            (Combine::Clipped, 5, 1.0, 1.0),
+            (Combine::Clipped, 30, 2.0, 2.5),
         ] {
             let mut samples = vec![0.0; count as usize];
             let (mut sum, mut square) = (0.0, 0.0);
             for trial in 0..trials {
                 draw(trial + 100_000, &mut samples);
-                // A phase of the codes that goes through all of them evenly.
-                let phase = (f64::from(trial) * 0.618_033_988_749_895).fract();
+                let phase = phase(trial);
                 for sample in &mut samples {
-                    *sample = crate::frame::to_sample((f64::from(*sample) * std + phase).round());
+                    *sample = to_sample((f64::from(*sample) * std + phase).round());
                 }
                 let off = average(combine, &mut samples, clip).0 - phase;
                 sum += off;

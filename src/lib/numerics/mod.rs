@@ -4,6 +4,7 @@ pub mod averages;
 pub mod distribution;
 pub mod gauss;
 pub mod least_squares;
+pub mod medians;
 pub mod moments;
 pub mod normal;
 pub mod planes;

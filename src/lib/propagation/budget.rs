@@ -112,11 +112,17 @@ impl Photosite {
     /// which is the same in all, stays what the two do not share.
     fn less_dark_budget(&self, adc: &AdcRecord, expected_e: f64) -> Budget {
         let light = self.digitized_budget(adc, expected_e);
-        let of_dark = |dark: &Dark| (dark.weight.powi(2) * dark.kept(), self.of_dark(dark).digitized_budget(adc, 0.0));
-        let darks: Vec<(f64, Budget)> = self.darks.iter().flatten().map(of_dark).collect();
+        let of_dark = |dark: &Dark| {
+            let kept = dark.kept().map(|kept| dark.weight.powi(2) * kept);
+            (kept, self.of_dark(dark).digitized_budget(adc, 0.0))
+        };
+        let darks: Vec<([f64; 2], Budget)> = self.darks.iter().flatten().map(of_dark).collect();
         let mut budget = Cause::ALL.map(|cause| match cause {
             Cause::Dcnu | Cause::ClippedPattern => 0.0,
-            _ => light[cause as usize] + darks.iter().map(|(kept, dark)| kept * dark[cause as usize]).sum::<f64>(),
+            _ => {
+                let kept = |kept: &[f64; 2]| kept[usize::from(cause == Cause::Quantization)];
+                light[cause as usize] + darks.iter().map(|(of, dark)| kept(of) * dark[cause as usize]).sum::<f64>()
+            }
         });
         let left = self.less_dark(adc, expected_e).moments.variance - budget.iter().sum::<f64>();
         let is_left = left.abs() > 1e-9 * (light[Cause::Dcnu as usize] + light[Cause::Prnu as usize]);
@@ -178,7 +184,7 @@ impl Photosite {
             budget[Cause::Quantization as usize] = endless - charge;
             if !law.is_plain(adc) {
                 let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
-                let clipped = self.shared(adc, expected_e, self).light.min(whole) - patterns;
+                let clipped = self.shared(adc, expected_e, None, (self, None)).light.min(whole) - patterns;
                 let further = clipped - budget[Cause::ClippedPattern as usize];
                 let is_told = further.abs() > 1e-9 * patterns;
                 budget[Cause::ClippedPattern as usize] += if is_told { further } else { 0.0 };

@@ -1,10 +1,11 @@
 //! Moments of photosites that were divided by a flat field.
 
-use super::charge::{charge, sensitivity};
+use super::charge::charge;
 use super::masters::{Dark, Drawn};
 use super::moments::Prediction;
 use super::photosite::Photosite;
 use crate::metadata::AdcRecord;
+use crate::numerics::averages::Combine;
 use crate::numerics::gauss::panel;
 use crate::numerics::normal::{cumulative, density};
 
@@ -51,16 +52,18 @@ impl Photosite {
         let (adc, flat) = (self.adc?, self.flat?);
         let light_e = flat.expected_e[class];
         let mut averages = self.darks.iter().chain(&flat.darks).flatten();
+        let is_smooth = |dark: &Dark, expected_e: f64| self.of_dark(dark).is_smooth(dark, &adc, expected_e);
         let is_open = self.is_open(&adc, expected_e)
             && self.of_dark(&flat.frames).is_open(&adc, light_e)
-            && averages.all(|dark| self.of_dark(dark).is_open(&adc, 0.0));
+            && is_smooth(&flat.frames, light_e)
+            && averages.all(|dark| self.of_dark(dark).is_open(&adc, 0.0) && is_smooth(dark, 0.0));
         if !is_open {
             return None;
         }
         let bias = |darks: &[Option<Dark>]| darks.iter().flatten().find(|dark| dark.is_bias).copied();
         let in_both = bias(&self.darks).zip(bias(&flat.darks)).filter(|(a, b)| a.frames == b.frames);
         let [lights, darks] = [self.model.prnu, self.model.dcnu].map(sensitivities);
-        let mut sums = [0.0; 6];
+        let mut sums = [0.0; 7];
         for (&(x, of_x), &(u, of_u)) in lights.iter().flat_map(|x| darks.iter().map(move |u| (x, u))) {
             let site = [x, u];
             let mut above = Drawn::codes(&self.model, &adc, expected_e, site).less(&self.darks, &adc, site);
@@ -84,18 +87,21 @@ impl Photosite {
             let noise = above.variance / (f * f);
             let third = (above.third - above.mean.powi(3) * skew) / f.powi(3)
                 + 6.0 * first * rho * (noise + first * first * rho);
-            for (sum, value) in sums.iter_mut().zip([1.0, first, square, f, third, rho]) {
+            let of_flat = f * f + below.variance;
+            for (sum, value) in sums.iter_mut().zip([1.0, first, square, f, third, above.mean, of_flat]) {
                 *sum += of_x * of_u * value;
             }
         }
         let [weight, sums @ ..] = sums;
-        let [first, square, scale, third, rho] = sums.map(|sum| sum / weight);
+        let [first, square, scale, third, above, of_flat] = sums.map(|sum| sum / weight);
         let mean = first * scale;
         let variance = ((square - first * first) * scale * scale).max(0.0);
-        // The mean of the flat field is that of so many sensitivities, as is that of the frame; its noise is in both too.
-        let off = (sensitivity(self.model.prnu).1 - rho) / flat.photosites[class].max(1.0);
+        // ⟨F⟩ is a mean over as many photosites, the same patterns and the same noise as A/F:
+        // cov(F, A/F) = E A − E F E[A/F].
+        let of_both = 2.0 * scale * first * (above - scale * first);
+        let off = of_both + first * first * (of_flat - scale * scale);
         let prediction = Prediction::of_cumulants(mean, variance, third * scale.powi(3), 0.0);
-        Some(Prediction { common: mean * mean * off, ..prediction })
+        Some(Prediction { common: off / flat.photosites[class].max(1.0), ..prediction })
     }
 
     /// The variance after division by the flat field; where [`Self::divided`] gives none, to first order: that of the codes
@@ -109,6 +115,18 @@ impl Photosite {
         let below = flat.frames.drawn(&adc, flat.expected_e[class], [1.0; 2]).less(&flat.darks, &adc, [1.0; 2]);
         let level = expected_e * adc.adu_per_e;
         (own - (self.model.prnu * level).powi(2)).max(0.0) + below.variance * (level / below.mean).powi(2)
+    }
+
+    /// Whether rounding is a uniform error of an average of such codes: averages, or photosites, scatter.
+    fn is_smooth(&self, average: &Dark, adc: &AdcRecord, expected_e: f64) -> bool {
+        let temporal = average.std_codes(adc, expected_e) * average.kept()[0].sqrt();
+        let Self { model, .. } = self;
+        let patterns = adc.adu_per_e * (model.prnu * expected_e).hypot(model.dcnu * model.dark_e);
+        match average.combine {
+            Combine::Mean => true,
+            Combine::Median => temporal.hypot(patterns) >= LEAST_CODES,
+            Combine::Clipped => !average.is_clipped_by_code(adc, expected_e),
+        }
     }
 
     /// Whether codes are charge and a uniform error: they scatter, and neither full well nor an end of the codes is within 6

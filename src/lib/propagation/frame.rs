@@ -248,6 +248,10 @@ fn subtracted(level: BlackLevel, with_deltas: bool) -> Predicted<f64> {
         .ok_or(Unpredictable::Beyond("the black level that was subtracted differs among photosites"))
 }
 
+/// Why nothing is predicted of a clipped mean of codes of little noise.
+const CLIPPED_BY_CODE: &str = "the noise of the dark or bias frames, over few codes, makes what their clipped mean leaves out hang \
+                               on where in a code their mean lies; use `--combine mean` or `median`";
+
 /// Codes as the converter gave them and charge transfer left them, or as they were corrected.
 fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Predicted<(Photosite, [Prediction; 3])> {
     let metadata = &frame.metadata;
@@ -275,6 +279,10 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
     }
     let corrected = corrected(frame, codes)?;
     let black_adu = subtracted(correction.black_adu, correction.black_deltas)?;
+    let mut averages = corrected.darks.iter().flatten();
+    if averages.any(|dark| corrected.adc.is_some_and(|adc| dark.is_clipped_by_code(&adc, 0.0))) {
+        return Err(Unpredictable::Beyond(CLIPPED_BY_CODE));
+    }
     if corrected.flat.is_none() {
         return Ok((corrected, expected_e.map(|mean| shifted(corrected.moments(mean), -black_adu))));
     }

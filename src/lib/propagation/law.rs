@@ -174,7 +174,7 @@ impl Law {
 
     /// What is predicted of a reading.
     pub fn predict(&self, reading: &Reading) -> Prediction {
-        central(&self.expect(reading), reading.center)
+        Prediction::about(reading.center, &self.expect(reading))
     }
 
     /// The variance that codes without ends would have; none where the ends are out of reach.
@@ -207,14 +207,4 @@ impl Law {
     pub fn reaches(&self, level_e: f64) -> f64 {
         Self { read_noise_e: 0.0, full_well_e: f64::INFINITY, ..*self }.is_read_from(level_e)
     }
-}
-
-/// What is predicted by the moments about a center.
-fn central([m1, m2, m3, m4]: &Moments, center: f64) -> Prediction {
-    let variance = m2 - m1 * m1;
-    // What is left of a difference of squares that are equal to rounding is none.
-    let variance = if variance < 4.0 * f64::EPSILON * m2 { 0.0 } else { variance };
-    let third = m3 - 3.0 * m1 * m2 + 2.0 * m1.powi(3);
-    let fourth = m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4) - 3.0 * variance * variance;
-    Prediction::of_cumulants(center + m1, variance, third, fourth)
 }

@@ -1,8 +1,9 @@
 //! Averages of dark frames, and of flats, as predictions know them.
 
 use super::charge::sensitivity;
+use super::moments::Prediction;
 use crate::metadata::{AdcRecord, AverageRecord, FlatRecord, FrameHeader, MasterKind, MasterRecord, PoissonKind};
-use crate::numerics::averages::{CLIP, Combine, Kept};
+use crate::numerics::averages::{CLIP, Combine, Kept, is_clipped_by_code};
 use crate::stages::noise::NoiseModel;
 use std::sync::{Mutex, PoisonError};
 
@@ -28,13 +29,13 @@ pub struct Dark {
 
 /// What averaging leaves of what is drawn anew in each frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Average {
+struct Average {
     /// How far skewness moves the mean.
-    pub mean: f64,
+    mean: f64,
     /// Variance.
-    pub variance: f64,
+    variance: f64,
     /// Share of the variance that is kept, rounding apart.
-    pub kept: f64,
+    kept: f64,
 }
 
 /// What is asked of averages that take time to work out: how, of how many, clipped where, and at which spread in codes.
@@ -46,9 +47,13 @@ fn kept(combine: Combine, frames: u32, clip: f64, std_codes: f64) -> Kept {
     if combine == Combine::Mean {
         return Kept::of_mean(frames);
     }
-    // The spread matters for the rounding of the median of an even number alone, for which two digits will do.
-    let is_even_median = combine == Combine::Median && frames.is_multiple_of(2);
-    let std_codes = if is_even_median { (std_codes * 20.0).round() / 20.0 } else { 1.0 };
+    // The spread matters where rounding does more than add its error to each: for even medians, for which two digits will do, and
+    // for clipped means, known no better than to a few hundredths.
+    let std_codes = match combine {
+        Combine::Median if frames.is_multiple_of(2) => (std_codes * 20.0).round() / 20.0,
+        Combine::Clipped => ((4.0 * std_codes.clamp(0.1, 16.0).log2()).round() / 4.0).exp2(),
+        _ => 1.0,
+    };
     let asked = (combine, frames, clip.to_bits(), std_codes.to_bits());
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, kept)) = known.iter().find(|(of, _)| *of == asked) {
@@ -89,20 +94,42 @@ impl Dark {
         Some(found)
     }
 
-    /// What the average keeps of the variance of its frames, about.
-    pub(super) fn kept(&self) -> f64 {
-        kept(self.combine, self.frames, self.clip, 10.0).variance
+    /// What the average keeps of the variance of its frames, about, and of that of rounding.
+    pub(super) fn kept(&self) -> [f64; 2] {
+        let kept = kept(self.combine, self.frames, self.clip, 10.0);
+        [kept.variance, kept.rounding]
+    }
+
+    /// Standard deviation, in codes, of what is drawn anew in each of its frames.
+    pub(super) fn std_codes(&self, adc: &AdcRecord, expected_e: f64) -> f64 {
+        let one = Drawn::codes(&self.model, adc, expected_e, [1.0; 2]);
+        let charge = expected_e + self.model.dark_e;
+        (one.variance - adc.rounding_at(charge)).max(0.0).sqrt() / adc.sample_slope(adc.level_at(charge))
+    }
+
+    /// Whether no formula tells what it keeps, as clipping hangs on where in a code the mean lies.
+    pub(super) fn is_clipped_by_code(&self, adc: &AdcRecord, expected_e: f64) -> bool {
+        self.combine == Combine::Clipped && is_clipped_by_code(self.frames, self.clip, self.std_codes(adc, expected_e))
     }
 
     /// What it keeps of samples of such variance, rounding included, and third cumulant about the mean of a photosite.
-    pub(super) fn average(&self, variance: f64, third: f64) -> Average {
+    fn average(&self, variance: f64, third: f64) -> Average {
         let before = (variance - 1.0 / 12.0).max(0.0);
         let kept = kept(self.combine, self.frames, self.clip, before.sqrt());
-        if self.combine == Combine::Mean {
+        // So are few frames of any kind.
+        if kept == Kept::of_mean(self.frames) {
             return Average { mean: 0.0, variance: kept.variance * variance, kept: kept.variance };
         }
         let mean = if before > 0.0 { third / (6.0 * before) * kept.lean } else { 0.0 };
         Average { mean, variance: kept.variance * before + kept.rounding / 12.0, kept: kept.variance }
+    }
+
+    /// The average over the photosites of a frame whose codes have such a prediction, of which their pattern has the variance
+    /// `pattern`, and what is drawn anew the third cumulant `third`.
+    pub(super) fn averaged(&self, code: &Prediction, pattern: f64, third: f64) -> Prediction {
+        let Average { mean, variance, kept } = self.average(code.moments.variance - pattern, third);
+        let (mean, variance) = (code.moments.mean + mean, variance + pattern);
+        Prediction::of_cumulants(mean, variance, kept.powi(2) * code.third, kept.powi(3) * code.fourth())
     }
 
     /// The average at a photosite.

@@ -47,6 +47,16 @@ impl Prediction {
         Self { moments: MeanVariance { mean, variance }, third: of_spread(third), excess_kurtosis, common: 0.0 }
     }
 
+    /// The prediction of a variable with these moments 1 to 4 about a center.
+    pub(super) fn about(center: f64, [m1, m2, m3, m4]: &[f64; 4]) -> Self {
+        let variance = m2 - m1 * m1;
+        // What is left of a difference of squares that are equal to rounding is none.
+        let variance = if variance < 4.0 * f64::EPSILON * m2 { 0.0 } else { variance };
+        let third = m3 - 3.0 * m1 * m2 + 2.0 * m1.powi(3);
+        let fourth = m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4) - 3.0 * variance * variance;
+        Self::of_cumulants(center + m1, variance, third, fourth)
+    }
+
     /// Fourth cumulant.
     pub fn fourth(&self) -> f64 {
         self.excess_kurtosis * self.moments.variance.powi(2)

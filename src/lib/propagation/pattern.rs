@@ -6,10 +6,12 @@
 
 use super::counts::{Charge, Count};
 use super::memory::Memory;
+use super::moments::Prediction;
 use super::node::Law;
-use super::reading::Reading;
+use super::reading::{Asked, Moments, Reading};
 use crate::metadata::PoissonKind;
 use crate::numerics::gauss::panel;
+use crate::numerics::medians::median;
 use crate::numerics::normal::{NearlyNormal, cumulative, density};
 use crate::numerics::rounding::REACH;
 
@@ -22,77 +24,104 @@ pub(super) struct Shared {
     pub dark: f64,
     /// The covariance of the two.
     pub both: f64,
+    /// The law of the dark frames, over exposures and photosites, where they stand for a median.
+    pub median: Option<Prediction>,
+}
+
+/// Codes of frames, or medians of the codes of so many frames that show how codes are rounded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Seen {
+    pub law: Law,
+    pub reading: Reading,
+    pub median_of: Option<u32>,
 }
 
 /// Evaluations up to which counts are gone through one by one.
 const AFFORDABLE: usize = 6_000;
 
+/// The same for medians, which need some of the codes around them.
+const AFFORDABLE_IN_MEDIANS: usize = 60_000;
+
+/// Sensitivities at most that medians are worked out for.
+const MOST_MEDIANS: f64 = 4096.0;
+
 impl Shared {
     /// Of two laws that share the pattern of the dark current.
-    pub fn of((light, light_reading): (&Law, &Reading), (dark, dark_reading): (&Law, &Reading)) -> Self {
-        thread_local! { static KNOWN: Memory<[(Law, Reading); 2], Shared> = const { Memory::new() }; }
-        let asked = [(*light, *light_reading), (*dark, *dark_reading)];
-        KNOWN
-            .with(|known| known.recall(asked, |[light, dark]| Self::work_out((&light.0, &light.1), (&dark.0, &dark.1))))
+    pub fn of(light: Seen, dark: Seen) -> Self {
+        thread_local! { static KNOWN: Memory<[Seen; 2], Shared> = const { Memory::new() }; }
+        KNOWN.with(|known| known.recall([light, dark], |[light, dark]| Self::work_out(light, dark)))
     }
 
-    fn work_out((light, light_reading): (&Law, &Reading), (dark, dark_reading): (&Law, &Reading)) -> Self {
-        let (of_light, of_dark) = (Temporal::of(light, light_reading), Temporal::of(dark, dark_reading));
-        let [xs, ys] = [&light.light, &light.dark].map(|charge| sensitivities(charge, light));
-        let is_light_summed = of_light.evaluations(xs.len() * ys.len()) <= AFFORDABLE;
-        let is_dark_summed = of_dark.evaluations(ys.len()) <= AFFORDABLE;
-        let mut sums = Sums::default();
-        let mut add = |[x, y]: [(f64, f64); 2], dark_mean: f64| {
-            sums.add(x.1 * y.1, of_light.mean(x.0, y.0, is_light_summed), dark_mean);
+    fn work_out(light: &Seen, dark: &Seen) -> Self {
+        let (of_light, of_dark) = (Temporal::of(light), Temporal::of(dark));
+        let (law, is_median) = (&light.law, light.median_of.or(dark.median_of).is_some());
+        let xs = sensitivities(&law.light, of_light.std());
+        let ys = if is_median {
+            let wider = if law.dark.rate > dark.law.dark.rate { law.dark } else { dark.law.dark };
+            sensitivities_of_medians(&wider, of_light.std().min(of_dark.std()))
+        } else {
+            sensitivities(&law.dark, of_light.std())
         };
-        let dark_mean = |y: f64| of_dark.mean(1.0, y, is_dark_summed);
+        let is_light_summed = of_light.evaluations(xs.len() * ys.len()) <= of_light.affordable();
+        let is_dark_summed = of_dark.evaluations(ys.len()) <= of_dark.affordable();
+        let mut sums = Sums::default();
+        let mut add = |[x, y]: [(f64, f64); 2], dark: Moments| {
+            sums.add(x.1 * y.1, of_light.at(x.0, y.0, is_light_summed)[0], dark);
+        };
+        let at_dark = |y: f64| of_dark.at(1.0, y, is_dark_summed);
         if is_light_summed {
             for &y in &ys {
-                let dark_mean = dark_mean(y.0);
-                xs.iter().for_each(|&x| add([x, y], dark_mean));
+                let dark = at_dark(y.0);
+                xs.iter().for_each(|&x| add([x, y], dark));
             }
-            return sums.shared();
+            return sums.shared(dark);
         }
-        let [along_light, along_dark] = [&light.light, &light.dark].map(Axis::of);
+        let [along_light, along_dark] = [&law.light, &law.dark].map(Axis::of);
         // Bends for the dark signal: of most photosites, of those without light, and of dark frames.
         let mut bends = of_light.knees(along_dark, along_light, 1.0, along_light.spread());
         bends.extend(of_light.knees(along_dark, along_light, 0.0, 0.0));
         bends.extend(of_dark.knees(along_dark, along_light, 0.0, 0.0));
-        for y in along_dark.points(&bends) {
-            let dark_mean = dark_mean(y.0);
+        for y in if is_median { ys } else { along_dark.points(&bends) } {
+            let dark = at_dark(y.0);
             let bends = of_light.knees(along_light, along_dark, y.0, 0.0);
-            along_light.points(&bends).into_iter().for_each(|x| add([x, y], dark_mean));
+            along_light.points(&bends).into_iter().for_each(|x| add([x, y], dark));
         }
-        sums.shared()
+        sums.shared(dark)
     }
 
     /// The variance that the pattern gives to a reading of one law.
     pub fn of_one(law: &Law, reading: &Reading) -> f64 {
-        Self::of((law, reading), (law, reading)).light
+        let seen = Seen { law: *law, reading: *reading, median_of: None };
+        Self::of(seen, seen).light
     }
 }
 
-/// Weighted sums of the means of light and of dark frames, their squares, and their product.
+/// Weighted sums of the means of light and of dark frames, their squares, and their product; and of the moments of dark frames.
 #[derive(Debug, Default)]
 struct Sums {
     light: [f64; 2],
     dark: [f64; 2],
     both: f64,
+    moments: Moments,
 }
 
 impl Sums {
-    fn add(&mut self, weight: f64, light: f64, dark: f64) {
+    fn add(&mut self, weight: f64, light: f64, dark: Moments) {
         self.light[0] += weight * light;
         self.light[1] += weight * light * light;
-        self.dark[0] += weight * dark;
-        self.dark[1] += weight * dark * dark;
-        self.both += weight * light * dark;
+        self.dark[0] += weight * dark[0];
+        self.dark[1] += weight * dark[0] * dark[0];
+        self.both += weight * light * dark[0];
+        for (sum, moment) in self.moments.iter_mut().zip(dark) {
+            *sum += weight * moment;
+        }
     }
 
-    fn shared(&self) -> Shared {
+    fn shared(&self, dark: &Seen) -> Shared {
         let variance = |[mean, square]: [f64; 2]| (square - mean * mean).max(0.0);
         let both = self.both - self.light[0] * self.dark[0];
-        Shared { light: variance(self.light), dark: variance(self.dark), both }
+        let median = dark.median_of.map(|_| Prediction::about(dark.reading.center, &self.moments));
+        Shared { light: variance(self.light), dark: variance(self.dark), both, median }
     }
 }
 
@@ -165,15 +194,23 @@ impl Axis {
 const LEAST_WEIGHT: f64 = 1e-17;
 
 /// Sensitivities and their weights, as many as the means over exposures need, which follow them the more steeply the less
-/// temporal noise there is.
-fn sensitivities(charge: &Charge, law: &Law) -> Vec<(f64, f64)> {
+/// temporal noise there is, in e⁻.
+fn sensitivities(charge: &Charge, temporal: f64) -> Vec<(f64, f64)> {
+    sensitivities_by(charge, temporal, 0.02)
+}
+
+/// The same for medians, which follow every edge of the codes.
+fn sensitivities_of_medians(charge: &Charge, temporal: f64) -> Vec<(f64, f64)> {
+    sensitivities_by(charge, temporal, 2.0 * 1.3 * REACH / MOST_MEDIANS)
+}
+
+fn sensitivities_by(charge: &Charge, temporal: f64, narrowest: f64) -> Vec<(f64, f64)> {
     let sigma = charge.pattern;
     if sigma <= 0.0 || charge.rate <= 0.0 {
         return vec![(1.0, 1.0)];
     }
-    let temporal = law.light.shot_std().hypot(law.dark.shot_std()).hypot(law.read_noise_e).max(1e-9);
     let steepness = sigma * charge.rate / temporal;
-    let scale = (1.0 / (1.0 + steepness * steepness).sqrt()).max(0.02);
+    let scale = (1.0 / (1.0 + steepness * steepness).sqrt()).max(narrowest);
     let lowest = (-1.0 / sigma).max(-REACH);
     if lowest <= -REACH {
         let step = scale / 1.3;
@@ -198,10 +235,11 @@ fn sensitivities(charge: &Charge, law: &Law) -> Vec<(f64, f64)> {
     found
 }
 
-/// The means that photosites have over exposures.
+/// The means that photosites have over exposures, or moments of medians.
 struct Temporal<'a> {
     law: &'a Law,
     reading: &'a Reading,
+    median_of: Option<u32>,
     light: Vec<Count>,
     dark: Vec<Count>,
     at_full: f64,
@@ -210,7 +248,7 @@ struct Temporal<'a> {
 }
 
 impl<'a> Temporal<'a> {
-    fn of(law: &'a Law, reading: &'a Reading) -> Self {
+    fn of(Seen { law, reading, median_of }: &'a Seen) -> Self {
         let counts = |charge: &Charge| {
             let mut counts = Charge { pattern: 0.0, ..*charge }.counts(law.read_noise_e.max(1e-3));
             counts.retain(|count| count.weight > 1e-15);
@@ -222,11 +260,24 @@ impl<'a> Temporal<'a> {
         Self {
             law,
             reading,
+            median_of: *median_of,
             light: counts(&law.light),
             dark: counts(&law.dark),
             at_full,
             rounding_at_full: at_full - smooth,
         }
+    }
+
+    /// What a photosite's charge scatters over exposures, or the median of so many, in e⁻.
+    fn std(&self) -> f64 {
+        let law = self.law;
+        let one = law.light.shot_std().hypot(law.dark.shot_std()).hypot(law.read_noise_e).max(1e-9);
+        self.median_of.map_or(one, |count| one / f64::from(count).sqrt())
+    }
+
+    /// Evaluations up to which counts are gone through one by one.
+    fn affordable(&self) -> usize {
+        if self.median_of.is_some() { AFFORDABLE_IN_MEDIANS } else { AFFORDABLE }
     }
 
     /// How often counts are gone through at so many sensitivities.
@@ -255,25 +306,53 @@ impl<'a> Temporal<'a> {
         levels.into_iter().filter(|(level, _)| level.is_finite()).map(knee).filter(is_near).collect()
     }
 
-    fn mean(&self, x: f64, y: f64, is_affordable: bool) -> f64 {
-        if is_affordable { self.sum(x, y) } else { self.edgeworth(x, y) }
+    /// Moments at sensitivities x and y: of the median, or the mean and none else.
+    fn at(&self, x: f64, y: f64, is_affordable: bool) -> Moments {
+        match (self.median_of, self.reading.asked) {
+            (Some(count), Asked::Codes(adc, ends)) => {
+                let beyond = |code: f64| self.reaches(adc.electrons_at(code - 0.5), [x, y], is_affordable);
+                let at_least = |code: f64| match code {
+                    _ if code <= ends.lowest => 1.0,
+                    _ if code > ends.highest => 0.0,
+                    _ => beyond(code),
+                };
+                let expected_e = (x * self.law.light.rate + y * self.law.dark.rate).min(self.law.full_well_e);
+                let near = ends.code(adc.level_at(expected_e));
+                median(count, near, at_least, |code| adc.sample(code) - self.reading.center)
+            }
+            _ if is_affordable => [self.sum(self.reading, self.at_full, x, y), 0.0, 0.0, 0.0],
+            _ => [self.edgeworth(x, y), 0.0, 0.0, 0.0],
+        }
     }
 
-    fn sum(&self, x: f64, y: f64) -> f64 {
+    /// The probability that charge and read noise are no less than a level.
+    fn reaches(&self, level_e: f64, [x, y]: [f64; 2], is_affordable: bool) -> f64 {
+        if !is_affordable {
+            return self.charge(x, y).plus(NearlyNormal::normal(0.0, self.law.read_noise_e.powi(2))).exceeds(level_e);
+        }
+        // Ties go upward.
+        let reading = Reading::beyond(self.law.read_noise_e, level_e - 1e-12 * level_e.abs().max(1.0));
+        let full = self.law.full_well_e;
+        let at_full = if full.is_finite() { reading.at(full, 0.0)[0] } else { 1.0 };
+        self.sum(&reading, at_full, x, y)
+    }
+
+    fn sum(&self, reading: &Reading, at_full: f64, x: f64, y: f64) -> f64 {
         let full = self.law.full_well_e;
         let mut mean = 0.0;
         for dark in &self.dark {
             for light in &self.light {
                 let electrons = x * light.electrons + y * dark.electrons;
                 let variance = (x * light.spread).powi(2) + (y * dark.spread).powi(2);
-                let read = if electrons >= full { self.at_full } else { self.reading.at(electrons, variance)[0] };
+                let read = if electrons >= full { at_full } else { reading.at(electrons, variance)[0] };
                 mean += light.weight * dark.weight * read;
             }
         }
         mean
     }
 
-    fn edgeworth(&self, x: f64, y: f64) -> f64 {
+    /// Cumulants of the charge.
+    fn charge(&self, x: f64, y: f64) -> NearlyNormal {
         let of = |charge: &Charge, factor: f64| {
             let shot = |kind| if charge.shot == Some(kind) { charge.rate } else { 0.0 };
             let counted = shot(PoissonKind::Exact);
@@ -285,7 +364,11 @@ impl<'a> Temporal<'a> {
             };
             variable.scaled(factor)
         };
-        let charge = of(&self.law.light, x).plus(of(&self.law.dark, y));
+        of(&self.law.light, x).plus(of(&self.law.dark, y))
+    }
+
+    fn edgeworth(&self, x: f64, y: f64) -> f64 {
+        let charge = self.charge(x, y);
         let full = self.law.full_well_e;
         let [lower, upper] = self.reading.rails_e();
         let noise = NearlyNormal::normal(0.0, self.law.read_noise_e.powi(2));

@@ -4,10 +4,18 @@ use super::charge::{charge, sensitivity};
 use super::law::Law;
 use super::masters::{Dark, Flat, MOST_DARKS};
 use super::moments::{Equations, Prediction};
-use super::pattern::Shared;
+use super::pattern::{Seen, Shared};
 use super::reading::codes_of;
 use crate::metadata::{AdcRecord, PoissonKind};
+use crate::numerics::averages::Combine;
 use crate::stages::noise::NoiseModel;
+
+/// The standard deviation of a median, in codes, below which it shows how codes are rounded: what else rounding does to a mean is
+/// less than e^(−2π²σ²)/π, 3·10⁻⁴ of a code.
+const VISIBLE: f64 = 0.6;
+
+/// Codes over which photosites scatter so that rounding is a uniform error of theirs.
+const MANY_CODES: f64 = 2.5;
 
 /// What a photosite's samples follow from, but for the light that reaches it.
 ///
@@ -156,15 +164,18 @@ impl Photosite {
         let mut variance = light.moments.variance;
         for (index, (dark, site)) in darks.iter().enumerate() {
             let code = site.adu(adc, 0.0);
-            let shared = self.shared(adc, expected_e, site);
-            let (weight, temporal) = (dark.weight, code.moments.variance - shared.dark);
-            let average = dark.average(temporal, site.temporal_third(adc));
-            mean -= weight * (code.moments.mean + average.mean);
-            third -= weight.powi(3) * average.kept.powi(2) * code.third;
-            fourth += weight.powi(4) * average.kept.powi(3) * code.fourth();
-            variance += weight * weight * (average.variance + shared.dark) - 2.0 * weight * shared.both;
+            let median_of = site.visible_median(dark, adc);
+            let shared = self.shared(adc, expected_e, None, (site, median_of));
+            let weight = dark.weight;
+            let average = shared.median.unwrap_or_else(|| dark.averaged(&code, shared.dark, site.temporal_third(adc)));
+            mean -= weight * average.moments.mean;
+            third -= weight.powi(3) * average.third;
+            fourth += weight.powi(4) * average.fourth();
+            variance += weight * weight * average.moments.variance - 2.0 * weight * shared.both;
             for (other, of_other) in &darks[..index] {
-                variance += 2.0 * weight * other.weight * of_other.shared(adc, 0.0, site).both;
+                let other_median = of_other.visible_median(other, adc);
+                let both = of_other.shared(adc, 0.0, other_median, (site, median_of)).both;
+                variance += 2.0 * weight * other.weight * both;
             }
         }
         Prediction::of_cumulants(mean, variance.max(0.0), third, fourth)
@@ -181,17 +192,31 @@ impl Photosite {
         if is_counted { self.model.dark_e * adc.adu_per_e.powi(3) } else { 0.0 }
     }
 
-    /// What its codes and those of dark frames have of the pattern.
-    pub(super) fn shared(&self, adc: &AdcRecord, expected_e: f64, dark: &Self) -> Shared {
+    /// How many dark frames a median is of that scatters over less than a code, and its photosites over few.
+    pub(super) fn visible_median(&self, dark: &Dark, adc: &AdcRecord) -> Option<u32> {
+        let is_median = self.equations == Equations::Exact && dark.combine == Combine::Median && dark.frames > 2;
+        let is_fine = || dark.std_codes(adc, 0.0) * dark.kept()[0].sqrt() < VISIBLE;
+        (is_median && is_fine() && adc.adu_per_e * self.dark_pattern().sqrt() < MANY_CODES).then_some(dark.frames)
+    }
+
+    /// What its codes, or medians of them, and those of dark frames have of the pattern.
+    pub(super) fn shared(
+        &self,
+        adc: &AdcRecord,
+        expected_e: f64,
+        median_of: Option<u32>,
+        (dark, dark_median_of): (&Self, Option<u32>),
+    ) -> Shared {
         let (law, of_dark) = (Law::of(&self.model, expected_e), Law::of(&dark.model, 0.0));
-        if self.equations == Equations::Paper || (law.is_plain(adc) && of_dark.is_plain(adc)) {
+        let is_plain = law.is_plain(adc) && of_dark.is_plain(adc) && median_of.or(dark_median_of).is_none();
+        if self.equations == Equations::Paper || is_plain {
             let square = adc.adu_per_e * adc.adu_per_e;
             let [own, of_dark] = [self, dark].map(|site| site.dark_pattern() * square);
             let light = self.pattern(self.model.prnu) * expected_e * expected_e * square;
-            return Shared { light: light + own, dark: of_dark, both: (own * of_dark).sqrt() };
+            return Shared { light: light + own, dark: of_dark, both: (own * of_dark).sqrt(), median: None };
         }
-        let [light, dark] = [law, of_dark].map(|law| law.of_codes(adc, codes_of(adc)));
-        Shared::of((&law, &light), (&of_dark, &dark))
+        let seen = |law: Law, median_of| Seen { law, reading: law.of_codes(adc, codes_of(adc)), median_of };
+        Shared::of(seen(law, median_of), seen(of_dark, dark_median_of))
     }
 
     /// Variance of the fixed pattern of the dark current, λ² c₂, in e².

@@ -15,12 +15,15 @@ use crate::numerics::averages::{CLIP, Combine};
 use crate::stages::black::Black;
 use crate::stages::correct::{CorrectFrame, CorrectionSettings};
 use crate::stages::darks::{DarkFrames, DarkSettings};
-use crate::stages::defects::{DefectMap, beyond_chance};
+use crate::stages::defects::{DefectMap, beyond_chance, lost_beyond};
 use crate::stages::flats::FlatFrames;
 use crate::stages::masters::Averaging;
 use crate::stream::Stage;
 use clap::Args;
 use std::path::{Path, PathBuf};
+
+/// The share of a variance that limits may take unsaid.
+const LEAST_LOST: f64 = 1e-3;
 
 /// What is corrected, and by which frames.
 #[derive(Debug, Clone, Args)]
@@ -248,6 +251,14 @@ impl Correction {
             if means.full > 0 {
                 warnings.push(format!("{} photosites of the flats are saturated; they are marked", means.full));
             }
+        }
+        if let Some([share, variance]) = beyond.map(lost_beyond).filter(|[_, variance]| *variance > LEAST_LOST) {
+            warnings.push(format!(
+                "limits of {} standard deviations mark ordinary photosites too, {:.2} % of them; up to {:.1} % of the variance of the frames they are found in goes with them, which no prediction knows",
+                beyond.unwrap_or_default(),
+                100.0 * share,
+                100.0 * variance
+            ));
         }
         let sources =
             darks.iter().flat_map(DarkFrames::frames).chain(flats.iter().flat_map(|(flats, _)| flats.frames()));

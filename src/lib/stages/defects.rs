@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::FrameHeader;
-use crate::numerics::normal::cumulative;
+use crate::numerics::normal::{cumulative, density};
 use crate::stages::saturation::{CORRECTED, DEFECTIVE, SATURATED, bits, with_mask};
 use crate::stages::sites::SiteClasses;
 use crate::stream::{Counts, RowSource, Stage};
@@ -151,6 +151,12 @@ pub fn beyond_chance(samples: u64) -> f64 {
         if cumulative(-middle) > wanted { low = middle } else { high = middle }
     }
     high
+}
+
+/// The share of ordinary samples that lie beyond so many standard deviations, and that of their variance which goes with them.
+pub fn lost_beyond(deviations: f64) -> [f64; 2] {
+    let share = 2.0 * cumulative(-deviations);
+    [share, 2.0 * deviations * density(deviations) / (1.0 - share)]
 }
 
 /// The limits of what is ordinary among the samples of each class: median and median deviation of at most 2¹⁷ of them.
