@@ -46,7 +46,7 @@ pub fn median(count: u32, near: f64, at_least: impl Fn(f64) -> f64, value: impl 
     for low in 0..steps.codes() {
         let mut both = steps.lower(low) - steps.lower(low + 1);
         let own = value(steps.lowest + low as f64);
-        let others = if count % 2 == 0 { low + 1..steps.codes() } else { 0..0 };
+        let others = if count.is_multiple_of(2) { low + 1..steps.codes() } else { 0..0 };
         for high in others {
             let beneath = |high| if low > 0 { apart(low - 1, high) } else { 0.0 };
             let share = apart(low, high) - apart(low, high + 1) - beneath(high) + beneath(high + 1);

@@ -2,6 +2,10 @@
 
 use super::characterization;
 use crate::analysis::characterization::CameraMatrix;
+use crate::camera::noise_profile::ClassReadOut;
+use crate::camera::readout::ReadOut;
+use crate::camera::sensor::{SENSOR_SCHEMA, Sensor};
+use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
 use crate::formats::output::write_text;
@@ -14,7 +18,6 @@ use crate::requests::conversion::own_matrix;
 use crate::requests::options::Output;
 use crate::stream::RowSource;
 use clap::Args;
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Where matrix and read-out of a raw file go, beside the frame.
@@ -23,7 +26,8 @@ pub struct RawOutputs {
     /// Matrix file to write, the camera's own for relative XYZ, for `to-xyz --matrix`; of several raws a name with {stem}
     #[arg(long, value_name = "FILE")]
     pub write_matrix: Option<PathBuf>,
-    /// YAML file to write with what a DNG's own NoiseProfile tells of the read-out: gain, noise at black, saturation
+    /// Sensor file to write with what a DNG's own NoiseProfile tells of the read-out, gain and noise, for `demosaic --sigma
+    /// --sensor` and others
     #[arg(long, value_name = "FILE")]
     pub write_readout: Option<PathBuf>,
 }
@@ -91,29 +95,10 @@ fn matrix(reader: &FrameReader) -> Result<String> {
     characterization::matrix(&matrix)
 }
 
-/// What a noise profile tells of the read-out, and what it cannot.
-#[derive(Debug, Serialize)]
-struct ReadOutDocument {
-    schema: &'static str,
-    method: &'static str,
-    black_level_adu: f64,
-    white_level_adu: f64,
-    classes: Vec<ClassDocument>,
-    not_told: [&'static str; 5],
-}
+/// The temperature that is written where no dark current hangs on it, K.
+const ROOM_K: f64 = 293.15;
 
-/// What it tells of a class.
-#[derive(Debug, Serialize)]
-struct ClassDocument {
-    class: String,
-    slope: f64,
-    offset: f64,
-    adu_per_e: f64,
-    noise_at_black_adu: f64,
-    noise_at_black_e: f64,
-    saturation_e: f64,
-}
-
+/// A sensor file whose read-out is what the noise profile tells; what each class tells is in comments.
 fn read_out(reader: &FrameReader) -> Result<String> {
     let raw = reader.header();
     let refuse = |what: &str| raw.refuse(format!("{what}; leave out --write-readout"));
@@ -121,39 +106,59 @@ fn read_out(reader: &FrameReader) -> Result<String> {
         return Err(refuse("it tells no noise: that takes the NoiseProfile of a DNG (-v tells what is passed over)"));
     };
     let (black, white) = levels(raw)?;
-    let filters = raw.metadata.cfa.map(crate::cfa::FilterArray::filters).unwrap_or_default();
-    let names: Vec<String> =
-        if filters.is_empty() { vec!["Y".into()] } else { filters.iter().map(char::to_string).collect() };
-    if profile.lines.len() > 1 && profile.lines.len() != names.len() {
-        return Err(refuse(&format!(
-            "its NoiseProfile has {} classes, and its filters {}",
-            profile.lines.len(),
-            names.len()
-        )));
+    let cfa = raw.metadata.cfa.unwrap_or(FilterArray::Monochrome);
+    let filters = if cfa == FilterArray::Monochrome { vec!['Y'] } else { cfa.filters() };
+    let count = profile.lines.len();
+    if count > 1 && count != filters.len() {
+        return Err(refuse(&format!("its NoiseProfile has {count} classes, and its filters {}", filters.len())));
     }
-    let class = |(index, class): (usize, String)| {
-        let [slope, offset] = profile.lines[index.min(profile.lines.len() - 1)];
-        let found = profile.read_out(index, white - black)?;
-        Some(ClassDocument {
-            class,
-            slope,
-            offset,
-            adu_per_e: found.adu_per_e,
-            noise_at_black_adu: found.noise_at_black_adu,
-            noise_at_black_e: found.noise_at_black_e,
-            saturation_e: found.saturation_e,
-        })
+    let class = |index| profile.read_out(index, white - black);
+    let classes: Option<Vec<ClassReadOut>> = (0..filters.len()).map(class).collect();
+    let classes = classes.ok_or_else(|| refuse("its NoiseProfile has a class without shot noise"))?;
+    let mean_of = |f: fn(&ClassReadOut) -> f64| classes.iter().map(f).sum::<f64>() / classes.len() as f64;
+    let adu_per_e = mean_of(|class| class.adu_per_e);
+    // Rounding is not read noise.
+    let noise_adu = (mean_of(|class| class.noise_at_black_adu.powi(2)) - 1.0 / 12.0).max(0.0).sqrt();
+    let [width, height] =
+        [raw.geometry.width, raw.geometry.height].map(|extent| u32::try_from(extent).unwrap_or(u32::MAX));
+    let readout = ReadOut {
+        width,
+        height,
+        pixel_pitch_um: None,
+        cfa,
+        full_well_e: (white - black) / adu_per_e,
+        dark_current_na_per_cm2: None,
+        dark_current_e_per_s: Some(0.0),
+        temperature_k: ROOM_K,
+        dcnu: 0.0,
+        prnu: 0.0,
+        read_noise_e: noise_adu / adu_per_e,
+        bits: (1..16).find(|bits| f64::from((1_u32 << bits) - 1) >= white).unwrap_or(16),
+        bias_adu: black,
+        adu_per_e,
+        linearization: None,
     };
-    let classes: Option<Vec<ClassDocument>> = names.into_iter().enumerate().map(class).collect();
-    let document = ReadOutDocument {
-        schema: "cyanometer-readout-profile/1",
-        method: "NoiseProfile of the DNG: variance S x + O of x = (ADU - black) / (white - black); adu_per_e = S (white - black)",
-        black_level_adu: black,
-        white_level_adu: white,
-        classes: classes.ok_or_else(|| refuse("its NoiseProfile has a class without shot noise"))?,
-        not_told: ["full_well_e", "dark_current_e_per_s", "dcnu", "prnu", "temperature_k"],
+    let sensor = Sensor {
+        schema: SENSOR_SCHEMA.into(),
+        name: format!("noise profile of {}", raw.name),
+        description: Some("gain and noise that a raw file tells; full well is what reads white, and non-uniformity, dark current and \
+                           temperature, which it does not tell, count as none".into()),
+        source: Some("NoiseProfile of the DNG: variance S x + O of x = (ADU - black) / (white - black)".into()),
+        readout: Some(readout),
+        response: None,
+        xyz_from_camera: None,
     };
-    yaml_writer::write("the read-out", &document)
+    sensor.check().map_err(|problem| refuse(&format!("its NoiseProfile tells no possible read-out: {problem}")))?;
+    let mut text = "# By class:\n".to_owned();
+    for ((index, filter), class) in filters.iter().enumerate().zip(&classes) {
+        let [slope, offset] = profile.lines[index.min(count - 1)];
+        let ClassReadOut { adu_per_e, noise_at_black_adu, noise_at_black_e, saturation_e } = class;
+        text += &format!(
+            "# {filter}: S {slope:e}, O {offset:e}: {adu_per_e:.6} ADU per e-, {noise_at_black_adu:.4} ADU or {noise_at_black_e:.4} e- at black, \
+             {saturation_e:.1} e- at white\n"
+        );
+    }
+    Ok(text + &yaml_writer::write("the read-out", &sensor)?)
 }
 
 /// The largest black level, from which a DNG counts its range, and the white level.
