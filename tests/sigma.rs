@@ -10,7 +10,7 @@ use cyanometer::cfa::{CfaPattern, Class};
 use cyanometer::color::{Space, White};
 use cyanometer::error::Error;
 use cyanometer::frame::mirror;
-use cyanometer::metadata::{FrameHeader, Scene};
+use cyanometer::metadata::{BlackNoise, FrameHeader, Scene};
 use cyanometer::propagation::pixels::PixelNoise;
 use cyanometer::propagation::{Equations, FramePrediction, Photosite, of_frame};
 use cyanometer::sigma::{COVARIANCE_LAYER, WithSigma};
@@ -338,6 +338,47 @@ fn relative_xyz_are_predicted_as_absolute_ones_are() {
             for j in 0..3 {
                 let [a, b] = found.each_ref().map(|(_, pixels)| pixels.covariance[(i, j)]);
                 assert!((a - b).abs() < 1e-9 * found[1].1.covariance.norm(), "{space:?}: {a} {b}");
+            }
+        }
+    }
+}
+
+/// What rows, columns and sites of 2×2 are off together: each by itself, one after another, goes through the demosaicking of a
+/// level frame, so that its variance is the sum of the squares of what they make of a pixel.
+#[test]
+fn the_noise_of_a_measured_black_level_is_common_to_rows_columns_and_sites() {
+    let scene = expected(WIDTH, HEIGHT, |_, _, _| 9000.0);
+    let level = plane(&scene, 0);
+    let noise = BlackNoise { row_adu2: 3.0, column_adu2: 5.0, site_adu2: 2.0 };
+    for method in [Method::Bilinear, Method::EffectiveColor, Method::Malvar] {
+        let stage = demosaicking(&level, method);
+        let mut header = stage.header().clone();
+        let without = PixelNoise::of(&header).unwrap();
+        header.metadata.black_noise = Some(noise);
+        let with = PixelNoise::of(&header).unwrap();
+        let mut expected = vec![[0.0; 6]; WIDTH * HEIGHT];
+        let mut add = |variance: f64, is_off: &dyn Fn(usize, usize) -> bool| {
+            let mut frame = level.clone();
+            for (index, sample) in frame.samples.iter_mut().enumerate() {
+                *sample = if is_off(index % WIDTH, index / WIDTH) { 1.0 } else { 0.0 };
+            }
+            let raised = through(&frame, &Demosaic::new(&frame.header, method, Black::None, None).unwrap());
+            for (pixel, sums) in expected.iter_mut().enumerate() {
+                let value = |k: usize| f64::from(at(&raised, pixel % WIDTH, pixel / WIDTH, k));
+                for (sum, [k, m]) in sums.iter_mut().zip([[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]]) {
+                    *sum += variance * value(k) * value(m);
+                }
+            }
+        };
+        (0..HEIGHT).for_each(|row| add(noise.row_adu2, &|_, y| y == row));
+        (0..WIDTH).for_each(|column| add(noise.column_adu2, &|x, _| x == column));
+        (0..4).for_each(|site| add(noise.site_adu2, &|x, y| phase(x as i64, y as i64) == site));
+        for (pixel, expected) in expected.iter().enumerate() {
+            let place = [pixel % WIDTH, pixel / WIDTH];
+            let [with, without] = [&with, &without].map(|noise| noise.covariance(place, [4000.0; 3]).0);
+            for ((with, without), expected) in with.iter().zip(without).zip(expected) {
+                // Samples are single precision.
+                assert!((with - without - expected).abs() < 1e-5, "{method:?} {place:?}: {with} {without} {expected}");
             }
         }
     }

@@ -20,9 +20,9 @@ pub trait Named: Copy + Send + Sync + 'static {
         std::iter::once(self.name()).chain(self.other_names().iter().copied())
     }
 
-    /// The value of a name.
+    /// The value of a name, in any case.
     fn named(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|value| value.all_names().any(|known| known == name))
+        Self::ALL.iter().copied().find(|value| value.all_names().any(|known| known.eq_ignore_ascii_case(name)))
     }
 }
 

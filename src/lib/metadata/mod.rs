@@ -9,8 +9,8 @@ pub use correction::{
     AverageRecord, CorrectionRecord, DefectsRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
 };
 pub use records::{
-    AdaptationRecord, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual, NoiseRecord,
-    PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene, UpsamplingRecord,
+    AdaptationRecord, BlackNoise, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
+    NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene, UpsamplingRecord,
 };
 
 use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
@@ -59,6 +59,9 @@ pub struct Metadata {
     /// What each column of the sensor adds to the black level.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub black_by_column: Vec<f64>,
+    /// What the black level is uncertain by, where it was measured in the masked border.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub black_noise: Option<BlackNoise>,
     /// Rectangles of photosites that no light reaches, in the frame or not: X, Y, width and height on the sensor.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masked_areas: Vec<[i64; 4]>,
@@ -136,6 +139,7 @@ impl Metadata {
             black_level_adu: None,
             black_by_row: Vec::new(),
             black_by_column: Vec::new(),
+            black_noise: None,
             masked_areas: Vec::new(),
             white_level_adu: None,
             sensor: None,

@@ -211,6 +211,14 @@ pub fn average(combine: Combine, samples: &mut [f32], clip: f64) -> (f64, u64) {
     (average, (all - kept.len()) as u64)
 }
 
+/// The variance of what clipping leaves of samples, whose order is lost.
+pub fn clipped_variance(samples: &mut [f32], clip: f64) -> f64 {
+    let (mean, kept) = clipped(samples, clip);
+    let left = &samples[kept];
+    let degrees = left.len().saturating_sub(1).max(1) as f64;
+    left.iter().map(|sample| (f64::from(*sample) - mean).powi(2)).sum::<f64>() / degrees
+}
+
 /// The middle of sorted samples.
 fn middle(sorted: &[f32]) -> f64 {
     let half = sorted.len() / 2;

@@ -30,6 +30,8 @@ pub struct PixelNoise {
     rows: Places,
     /// Gains of the pixels of each row class and, within, each column class.
     gains: Vec<PixelGains>,
+    /// The same of what whole rows, columns and sites are off together, and its variances; none where the black level has none.
+    of_black: Option<(Vec<PixelGains>, [f64; 3])>,
     depends_on_hue: bool,
     variances: [LevelVariance; 3],
     /// What no light reads in the frame, in the unit of its samples.
@@ -67,25 +69,51 @@ impl Places {
     }
 }
 
-/// Gains of the variances of the three classes for the six covariances, as polynomials in the pixel's hues: with weights
+/// Gains of three variances, those of the classes or of the black level, for the six covariances, as polynomials in the pixel's hues: with weights
 /// f + ρ h, cov(k, m) = Σ \[f f + ρ_k h f + ρ_m f h + ρ_k ρ_m h h] σ².
 #[derive(Debug, Clone, PartialEq)]
 struct PixelGains([[[f64; 3]; 4]; 6]);
 
 impl PixelGains {
+    /// Those of the classes.
     fn new(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
-        let origin = geometry.origin.map(i64::from);
-        let phase = phase(origin[0] + at[0] as i64, origin[1] + at[1] as i64);
-        let folded = |stencil: &Stencil| stencil.folded(at, [geometry.width, geometry.height]);
-        let [fixed, of_hue] = [table.fixed(phase), table.of_hue(phase)].map(|stencils| stencils.each_ref().map(folded));
+        let phase = phase_at(at, geometry);
         let class = |offset| table.class(phase, offset) as usize;
-        let dot = |a: &Stencil, b: &Stencil| {
+        Self::by(table, at, geometry, |a, b| {
             let mut sums = [0.0; 3];
             for (offset, weight) in a.sites() {
                 sums[class(offset)] += weight * b.at(offset);
             }
             sums
-        };
+        })
+    }
+
+    /// Those of what the photosites of a row, of a column and of a site of 2×2 have in common.
+    fn of_black(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
+        let is_even = |distance: isize| distance & 1 == 0;
+        Self::by(table, at, geometry, |a, b| {
+            let mut sums = [0.0; 3];
+            for ([x, y], weight) in a.sites() {
+                for ([other_x, other_y], other) in b.sites() {
+                    let both = weight * other;
+                    sums[0] += if y == other_y { both } else { 0.0 };
+                    sums[1] += if x == other_x { both } else { 0.0 };
+                    sums[2] += if is_even(x - other_x) && is_even(y - other_y) { both } else { 0.0 };
+                }
+            }
+            sums
+        })
+    }
+
+    fn by(
+        table: &WeightTable,
+        at: [usize; 2],
+        geometry: &Geometry,
+        dot: impl Fn(&Stencil, &Stencil) -> [f64; 3],
+    ) -> Self {
+        let phase = phase_at(at, geometry);
+        let folded = |stencil: &Stencil| stencil.folded(at, [geometry.width, geometry.height]);
+        let [fixed, of_hue] = [table.fixed(phase), table.of_hue(phase)].map(|stencils| stencils.each_ref().map(folded));
         Self(PAIRS.map(|[k, m]| {
             [
                 dot(&fixed[k], &fixed[m]),
@@ -107,6 +135,11 @@ impl PixelGains {
         }
         covariance
     }
+}
+
+fn phase_at(at: [usize; 2], geometry: &Geometry) -> usize {
+    let origin = geometry.origin.map(i64::from);
+    phase(origin[0] + at[0] as i64, origin[1] + at[1] as i64)
 }
 
 /// Variance of a photosite against its level above black, linear between equally spaced levels.
@@ -189,14 +222,16 @@ impl PixelNoise {
         let table = WeightTable::of(method, record.cfa);
         let columns = Places::new(frame.geometry.width, method.reach());
         let rows = Places::new(frame.geometry.height, method.reach());
-        let gains = rows
-            .examples
-            .iter()
-            .flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]))
-            .map(|at| PixelGains::new(table, at, &frame.geometry))
-            .collect();
+        let gains = |gains: fn(&WeightTable, [usize; 2], &Geometry) -> PixelGains| -> Vec<PixelGains> {
+            let places = rows.examples.iter().flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]));
+            places.map(|at| gains(table, at, &frame.geometry)).collect()
+        };
+        let of_black = metadata
+            .black_noise
+            .map(|noise| (gains(PixelGains::of_black), [noise.row_adu2, noise.column_adu2, noise.site_adu2]));
+        let gains = gains(PixelGains::new);
         let variances = LevelVariance::of_classes(&photosite, largest);
-        Ok(Self { columns, rows, gains, depends_on_hue: table.depends_on_hue(), variances, black })
+        Ok(Self { columns, rows, gains, of_black, depends_on_hue: table.depends_on_hue(), variances, black })
     }
 
     /// The covariance of the pixel in column `x` and row `y` of the frame, whose samples are `rgb`; and whether
@@ -205,11 +240,19 @@ impl PixelNoise {
     /// Where smooth hue transition divides by a green that is lost in noise, the covariance is that of the hue which
     /// green would make at its noise, and says only that it is large.
     pub fn covariance(&self, [x, y]: [usize; 2], rgb: [f64; 3]) -> (Covariance, bool) {
-        let gains = &self.gains[self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x)];
+        let kind = self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x);
+        let all = |variances: [f64; 3], hues: Option<[f64; 3]>| {
+            let mut covariance = self.gains[kind].covariance(variances, hues);
+            if let Some((gains, of_black)) = &self.of_black {
+                let more = gains[kind].covariance(*of_black, hues);
+                covariance.iter_mut().zip(more).for_each(|(covariance, more)| *covariance += more);
+            }
+            covariance
+        };
         let level = rgb.map(|sample| sample - self.black);
         let variances = [0, 1, 2].map(|class| self.variances[class].at(level[class]));
         if !self.depends_on_hue {
-            return (gains.covariance(variances, None), true);
+            return (all(variances, None), true);
         }
         let green = level[Class::Green as usize];
         let first_order = smooth_hue::FirstOrder::of(level, variances);
@@ -219,7 +262,7 @@ impl PixelNoise {
             let hue = level.max(0.0) / divisor;
             if hue.is_finite() { hue } else { 1.0 }
         });
-        (gains.covariance(variances, Some(hues)), first_order.holds)
+        (all(variances, Some(hues)), first_order.holds)
     }
 }
 

@@ -4,8 +4,8 @@ use crate::camera::levels::BlackLevel;
 use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::frame::Geometry;
-use crate::metadata::FrameHeader;
-use crate::numerics::averages::{Combine, average};
+use crate::metadata::{BlackNoise, FrameHeader};
+use crate::numerics::averages::{Combine, average, clipped_variance};
 use crate::stream::RowSource;
 use std::path::Path;
 
@@ -71,7 +71,18 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     if sites.iter().any(Vec::is_empty) {
         return Err(frame.refuse("not all of its 2x2 sites have masked photosites"));
     }
+    let counts = sites.each_ref().map(Vec::len);
+    let scatter =
+        sites.each_ref().map(|of_site| clipped_variance(&mut of_site.clone(), CLIP)).iter().sum::<f64>() / 4.0;
     let levels = sites.map(|mut of_site| average(Combine::Clipped, &mut of_site, CLIP).0);
+    // Of a mean of so many, the fewest that one has.
+    let of_mean = |fewest: Option<usize>| fewest.map_or(0.0, |count| scatter / count.max(1) as f64);
+    let fewest = |lines: &[Vec<(usize, f32)>]| lines.iter().map(Vec::len).min();
+    frame.metadata.black_noise = Some(BlackNoise {
+        site_adu2: of_mean(counts.into_iter().min()),
+        row_adu2: of_mean(fewest(&rows).filter(|_| border == Border::Rows)),
+        column_adu2: of_mean(fewest(&columns).filter(|_| border == Border::Columns)),
+    });
     let off = |of_line: &[(usize, f32)]| {
         let mut off: Vec<f32> =
             of_line.iter().map(|(site, sample)| sample - crate::frame::to_sample(levels[*site])).collect();

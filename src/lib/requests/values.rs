@@ -10,7 +10,9 @@ use crate::names::Named;
 use crate::spectrum::{Observer, WavelengthGrid};
 use crate::stages::black::Black;
 use crate::units::{self, RadianceUnit};
-use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Arg, Command};
+use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -21,8 +23,30 @@ pub fn choice<T: Named>() -> impl TypedValueParser<Value = T> {
 
 /// A parser for one of these values by its names.
 pub fn one_of<T: Named>(values: &'static [T]) -> impl TypedValueParser<Value = T> {
-    PossibleValuesParser::new(values.iter().flat_map(|value| value.all_names()))
+    AnyCase(PossibleValuesParser::new(values.iter().flat_map(|value| value.all_names())))
         .try_map(|name| T::named(&name).ok_or("no value has this name"))
+}
+
+/// A parser for names that takes them in any case.
+#[derive(Clone)]
+struct AnyCase(PossibleValuesParser);
+
+impl TypedValueParser for AnyCase {
+    type Value = String;
+
+    fn parse_ref(&self, command: &Command, arg: Option<&Arg>, value: &OsStr) -> Result<String, clap::Error> {
+        let known = self
+            .possible_values()
+            .and_then(|mut values| values.find(|known| value.eq_ignore_ascii_case(known.get_name())));
+        match known {
+            Some(known) => Ok(known.get_name().to_owned()),
+            None => self.0.parse_ref(command, arg, value),
+        }
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        self.0.possible_values()
+    }
 }
 
 /// A parser for the name of an EXR file to write; other names without an extension may be devices.
