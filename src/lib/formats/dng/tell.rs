@@ -19,6 +19,8 @@ const VERSION: [u8; 4] = [1, 4, 0, 0];
 const BACKWARD_OF_INTEGERS: [u8; 4] = [1, 1, 0, 0];
 /// Floats came with this.
 const BACKWARD_OF_FLOATS: [u8; 4] = [1, 4, 0, 0];
+/// The version of Exif that tells of time and f-number.
+const EXIF_VERSION: &[u8; 4] = b"0232";
 /// sRGB among the color spaces of previews.
 const SRGB: u32 = 2;
 /// What cameras are called whose sensor has no name, and who made them.
@@ -31,6 +33,8 @@ pub(super) struct Told {
     pub raw: Vec<ExtraTag>,
     /// Those of the first directory, which holds the picture.
     pub first: Vec<ExtraTag>,
+    /// Those of Exif.
+    pub exif: Vec<ExtraTag>,
     /// What the plane is.
     pub photometric: u16,
     /// The picture, without rows yet.
@@ -71,6 +75,7 @@ impl Told {
         Ok(Self {
             raw,
             first: of_file(metadata, samples, color.as_ref()),
+            exif: of_exposure(metadata),
             photometric: if cfa == FilterArray::Monochrome { LINEAR_RAW } else { CFA },
             preview: Preview::new(geometry, cfa, black, range, color),
         })
@@ -164,7 +169,7 @@ fn noise_profile(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<E
     Some(tags::NOISE_PROFILE.with(TagValue::Doubles(profile.repeat(planes))))
 }
 
-/// What holds for the whole file: version, camera, colors, exposure.
+/// What holds for the whole file: version, camera, colors.
 fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor>) -> Vec<ExtraTag> {
     let backward = if samples == TiffSamples::U16 { BACKWARD_OF_INTEGERS } else { BACKWARD_OF_FLOATS };
     let model = camera_name(metadata);
@@ -185,16 +190,16 @@ fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor
             tags::AS_SHOT_NEUTRAL.with(TagValue::Ratios(color.neutral.map(ratio).to_vec())),
         ]);
     }
-    if let Some(exposure) = metadata.exposure {
-        let settings = [(tags::EXPOSURE_TIME, exposure.exposure_s), (tags::F_NUMBER, exposure.f_number)];
-        let ratios = settings.map(|(tag, value)| (tag, ratio(value)));
-        found.extend(
-            ratios
-                .into_iter()
-                .filter(|(_, [above, _])| *above > 0)
-                .map(|(tag, ratio)| tag.with(TagValue::Ratios(vec![ratio]))),
-        );
-    }
+    found
+}
+
+/// The exposure; no tags where it is unknown.
+fn of_exposure(metadata: &Metadata) -> Vec<ExtraTag> {
+    let Some(exposure) = metadata.exposure else { return Vec::new() };
+    let settings = [(tags::EXPOSURE_TIME, exposure.exposure_s), (tags::F_NUMBER, exposure.f_number)];
+    let ratios = settings.map(|(tag, value)| (tag, ratio(value))).into_iter().filter(|(_, [above, _])| *above > 0);
+    let mut found = vec![tags::EXIF_VERSION.with(TagValue::Undefined(EXIF_VERSION.to_vec()))];
+    found.extend(ratios.map(|(tag, ratio)| tag.with(TagValue::Ratios(vec![ratio]))));
     found
 }
 
