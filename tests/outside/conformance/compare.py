@@ -197,12 +197,13 @@ def exiftool_warnings(paths):
     return sorted(set(lines))
 
 
-BANDS = [0, 0.003, 0.03, 0.3, 1]
+# Signals that are taken together, and all of them.
+RANGES = [(0, 0.003), (0.003, 0.03), (0.03, 0.3), (0.3, 1), (0, 1)]
 
 
 def noise(truth, path):
-    """Variance of the stored samples beside the NoiseProfile, over signals: pairs of classes' levels are pooled. Rows of lower and
-    upper signal, ratio of measured to told variance, its standard error, photosites."""
+    """Variance of the stored samples over that of the NoiseProfile, class by class and patch by patch: for each range of signals its
+    ends, the mean ratio, the standard error of that, √(2/n), and the degrees of freedom n."""
     found = tags.Tags(path)
     (width,), (height,) = found.value(tags.WIDTH), found.value(tags.LENGTH)
     samples = np.frombuffer(found.samples(), "<u2").reshape(height, width).astype(float)
@@ -226,9 +227,20 @@ def noise(truth, path):
                 degrees.append(values.size - 1)
     signals, ratios, degrees = map(np.array, (signals, ratios, degrees))
     rows = []
-    for low, high in [*zip(BANDS, BANDS[1:]), (0, 1)]:
+    for low, high in RANGES:
         inside = (signals >= low) & (signals < high)
         if inside.any():
-            pooled = np.average(ratios[inside], weights=degrees[inside])
-            rows.append((low, high, pooled, np.sqrt(2 / degrees[inside].sum()), int(degrees[inside].sum())))
+            count = degrees[inside].sum()
+            rows.append((low, high, np.average(ratios[inside], weights=degrees[inside]), np.sqrt(2 / count), int(count)))
+    return rows
+
+
+def pooled(noises):
+    """Such rows of all files together."""
+    rows = []
+    for low, high in RANGES:
+        found = [row for rows in noises.values() for row in rows if row[:2] == (low, high)]
+        if found:
+            count = sum(row[4] for row in found)
+            rows.append((low, high, sum(row[2] * row[4] for row in found) / count, np.sqrt(2 / count), count))
     return rows

@@ -232,7 +232,7 @@ HotPixelFilter=false
 DeadPixelFilter=false
 
 [RAW Bayer]
-Method=amaze
+Method=fast
 Border=4
 """
 

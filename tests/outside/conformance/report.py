@@ -3,7 +3,7 @@
 import csv
 import json
 
-from .compare import DARK, TOLERANCE, is_neutral
+from .compare import DARK, RANGES, TOLERANCE, is_neutral, pooled
 
 OVEREXPOSED = {"ramp-14": "white level the last code", "ramp-white": "white level below"}
 
@@ -78,11 +78,12 @@ def markdown(names, versions, results, files, differences, warnings, noises):
             "**NoiseProfile.** Variance of the samples over that which the tag tells, by signal (0 black, 1 white), with its standard"
             " error."
         )
-        heads = [f"{low:g} to {high:g}" for low, high in [(0, 0.003), (0.003, 0.03), (0.03, 0.3), (0.3, 1), (0, 1)]]
+        heads = [f"{low:g} to {high:g}" for low, high in RANGES]
         rows = []
         for file, found in noises.items():
             cells = {f"{low:g} to {high:g}": f"{ratio:.3f} ± {error:.3f}" for low, high, ratio, error, _ in found}
             rows.append([f"`{file}`", *(cells.get(head, "") for head in heads)])
+        rows.append(["all", *(f"{ratio:.3f} ± {error:.3f}" for *_, ratio, error, _ in pooled(noises))])
         parts.append(table(["file", *heads], rows))
     return "\n\n".join(parts) + "\n"
 
