@@ -134,6 +134,8 @@ TAGS = {
     "ColorMatrix1": tags.COLOR_MATRIX,
     "AsShotNeutral": tags.NEUTRAL,
     "NoiseProfile": tags.NOISE_PROFILE,
+    "ExposureTime": tags.EXPOSURE_TIME,
+    "FNumber": tags.F_NUMBER,
 }
 
 

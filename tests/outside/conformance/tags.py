@@ -8,17 +8,19 @@ LETTERS = {1: "B", 3: "H", 4: "I", 5: "I", 7: "B", 10: "i", 12: "d"}
 DESCRIPTION, SUB_IFDS, STRIPS, CFA_PATTERN, BLACK_LEVEL, WHITE_LEVEL = 270, 330, 273, 33422, 50714, 50717
 CROP_ORIGIN, CROP_SIZE, COLOR_MATRIX, NEUTRAL, ACTIVE_AREA = 50719, 50720, 50721, 50728, 50829
 NOISE_PROFILE, DIGEST, WIDTH, LENGTH = 51041, 51111, 256, 257
+EXIF, EXPOSURE_TIME, F_NUMBER = 34665, 33434, 33437
 
 
 class Tags:
-    """The directories of a little-endian file: the first, and that of the raw image below it."""
+    """The directories of a little-endian file: the first, and those of the raw image and of Exif below it."""
 
     def __init__(self, path):
         self.path = path
         self.bytes = bytearray(path.read_bytes())
         (place,) = struct.unpack_from("<I", self.bytes, 4)
         self.entries = self.directory(place)
-        self.entries |= self.directory(self.value(SUB_IFDS)[0])
+        for tag in (SUB_IFDS, EXIF):
+            self.entries |= self.directory(self.value(tag)[0])
 
     def directory(self, place):
         """Type, number of values and place of the value of each tag."""
