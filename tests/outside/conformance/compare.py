@@ -31,6 +31,8 @@ class Found:
     # Largest deviation of X, Y or Z as a share of the truth, in which patch, beyond what noise explains.
     deviation: float = float("nan")
     patch: str = ""
+    # Root mean square of errors in standard errors, of the same patches of noisy files: 1 where noise explains them.
+    z_rms: float = float("nan")
     # Largest error of darker patches, as a share of white.
     dark_error: float = float("nan")
     # Chromaticity of what is overexposed in all classes.
@@ -91,6 +93,7 @@ def compare(converter, truth, path, pixels=None):
     region = next(region for region in truth.regions() if region)
     errors = standard_errors(truth, region) * truth.file.noisy
     result.deviation = result.dark_error = 0.0
+    z_scores = []
     for index, mean in enumerate(found):
         if mean is None:
             continue
@@ -103,9 +106,14 @@ def compare(converter, truth, path, pixels=None):
         beyond = np.maximum(np.abs(off) - STANDARD_ERRORS * errors[index], 0)
         if wanted[index].min() < DARK:
             result.dark_error = max(result.dark_error, beyond.max())
-        elif (beyond / wanted[index]).max() >= result.deviation:
+            continue
+        if truth.file.noisy:
+            z_scores.extend(off / errors[index])
+        if (beyond / wanted[index]).max() >= result.deviation:
             result.deviation = float((beyond / wanted[index]).max())
             result.patch = truth.names[index]
+    if z_scores:
+        result.z_rms = float(np.sqrt(np.mean(np.square(z_scores))))
     return result
 
 

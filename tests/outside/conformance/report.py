@@ -12,7 +12,8 @@ def percent(result):
     """The deviation in a cell; bold where it is more than it may be."""
     if result.problem:
         return "refused"
-    text = f"{100 * result.deviation:.3f}" if result.deviation > 0 else "noise"
+    within_noise = result.deviation == 0 and result.z_rms == result.z_rms
+    text = f"z {result.z_rms:.2f}" if within_noise else f"{100 * result.deviation:.3f}"
     return text if result.is_right else f"**{text}**"
 
 
@@ -31,7 +32,8 @@ def markdown(names, versions, results, files, differences, warnings, noises):
 
     parts.append(
         f"**Colors.** Largest deviation of X, Y or Z of a patch's mean from the truth, in per cent of it, over patches of {DARK:.0%} of white"
-        f" and more; bold above {TOLERANCE:.0%}. *noise*: within four standard errors."
+        f" and more; bold above {TOLERANCE:.0%}. Of noisy files all are within four standard errors where *z* stands: the root mean square"
+        " of errors in standard errors, about 1 by noise alone."
     )
     rows = [[f"`{file.name}`", file.about, *(percent(results[file.name, name]) for name in there)] for file in files]
     parts.append(table(["file", "", *there], rows))
@@ -112,10 +114,10 @@ def write(directory, page, results, noises, versions):
         for result in results.values():
             for name, *numbers in result.patches:
                 lines.writerow([result.converter, result.file, name, *(f"{number:.7g}" for number in numbers)])
-    keys = ("converter", "file", "problem", "shown", "deviation", "patch", "dark_error", "overexposed_xy")
+    keys = ("converter", "file", "problem", "shown", "deviation", "patch", "z_rms", "dark_error", "overexposed_xy")
     files = [{key: getattr(result, key) for key in keys} | {"is_right": result.is_right} for result in results.values()]
     for file in files:
-        for key in ("deviation", "dark_error"):
+        for key in ("deviation", "z_rms", "dark_error"):
             file[key] = None if file[key] != file[key] else float(file[key])
         file["overexposed_xy"] = [float(number) for number in file["overexposed_xy"]]
         file["is_right"] = bool(file["is_right"])
