@@ -85,6 +85,13 @@ class Conformance(ProgramCase):
                 self.assertLess(error, 0.05 / 3)
                 self.assertLess(abs(ratio - 1), min(0.05, 4 * error))
 
+    def test_floats_have_a_digest_too(self):
+        ((_, _, path),) = self.make("chart-noisy")
+        self.run_program(["correct-frame", path, "--black", "auto", "-q", "-o", "floats.dng"])
+        found = tags.Tags(self.directory / "floats.dng")
+        samples = found.samples("<f4")
+        self.assertEqual(compare.digest(samples), bytes(found.value(tags.DIGEST)))
+
     def test_what_is_wrong_is_seen(self):
         """A white level 2 % off, samples changed, and a neutral of another light."""
         ((file, truth, path),) = self.make("chart-grbg")
@@ -101,7 +108,7 @@ class Conformance(ProgramCase):
         changed.write(self.directory / "changed.dng")
         self.assertFalse(compare.compare(converter, truth, self.directory / "changed.dng").is_right)
         changed = tags.Tags(path)
-        changed.samples()[1000] ^= 1
+        changed.samples()[3, 100] ^= 1
         changed.write(self.directory / "changed.dng")
         self.assertEqual(compare.wrong_tags(self.directory / "changed.dng", expected), ["NewRawImageDigest is that of other samples"])
 

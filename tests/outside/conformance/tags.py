@@ -2,6 +2,8 @@
 
 import struct
 
+import numpy as np
+
 SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 7: 1, 10: 8, 12: 8}
 LETTERS = {1: "B", 3: "H", 4: "I", 5: "I", 7: "B", 10: "i", 12: "d"}
 
@@ -49,10 +51,10 @@ class Tags:
         assert len(values) == len(self.raw(tag)), tag
         struct.pack_into(f"<{len(values)}{LETTERS[kind]}", self.bytes, place, *values)
 
-    def samples(self):
-        """The raw image's bytes, in one strip or several that follow each other."""
-        start = self.value(STRIPS)[0]
-        return memoryview(self.bytes)[start : start + 2 * self.value(WIDTH)[0] * self.value(LENGTH)[0]]
+    def samples(self, kind="<u2"):
+        """The raw image, uncompressed, in one strip or several that follow each other; what is changed there is changed here."""
+        (width,), (height,), (start, *_) = self.value(WIDTH), self.value(LENGTH), self.value(STRIPS)
+        return np.frombuffer(self.bytes, kind, width * height, start).reshape(height, width)
 
     def forget_metadata(self):
         """Makes the metadata of ours a text that nobody knows, so that the tags alone count."""
