@@ -7,7 +7,7 @@ import numpy as np
 from conformance import build, compare, converters, tags
 from programs import BINARIES, ProgramCase
 
-CHARTS = ["chart-grbg", "chart-odd", "chart-white", "chart-masked", "chart-12", "sky-14"]
+CHARTS = ["chart-grbg", "chart-odd", "chart-white", "chart-masked", "chart-12", "ramp-full", "sky-14"]
 LEVELS = ["chart-sites", "chart-fraction", "chart-masked-odd"]
 NOISY = ["chart-noisy", "ramp-12-noisy", "ramp-14-noisy", "ramp-16-noisy"]
 

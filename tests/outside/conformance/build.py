@@ -38,6 +38,8 @@ class File:
     sites: tuple = (0, 0, 0, 0)
     # White level, if it is not the last code.
     white: int = 0
+    # Full well, where it lies below the last code, e⁻.
+    full_well_e: float = 0
     # Masked photosites: left, top, right, bottom.
     masked: tuple = (0, 0, 0, 0)
     # What converters show of the active area: X, Y, width and height.
@@ -45,11 +47,13 @@ class File:
 
     @property
     def camera(self):
-        return CAMERAS[self.bits]
+        camera = CAMERAS[self.bits]
+        return dataclasses.replace(camera, full_well_e=self.full_well_e) if self.full_well_e else camera
 
     @property
     def white_level(self):
-        return self.white or 2**self.bits - 1
+        camera = self.camera
+        return self.white or min(2**self.bits - 1, int(camera.bias + camera.adu_per_e * camera.full_well_e))
 
     @property
     def blacks(self):
@@ -84,6 +88,7 @@ FILES = [
     File("chart-noisy", "noise", noisy=True),
     File("ramp-14", "grays from black to twice the white", scene="ramp"),
     File("ramp-white", "the same, white level 9000 of 16383", scene="ramp", white=9000),
+    File("ramp-full", "the same, full well at code 12512 of 16383", scene="ramp", full_well_e=24000),
     *(File(f"ramp-{bits}-noisy", f"grays, noise, {bits} bits", scene="ramp", bits=bits, noisy=True) for bits in (12, 14, 16)),
     File("sky-14", "skies", scene="sky"),
     File("sky-14-noisy", "skies, noise", scene="sky", noisy=True),

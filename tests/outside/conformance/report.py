@@ -5,7 +5,7 @@ import json
 
 from .compare import DARK, RANGES, TOLERANCE, is_neutral, pooled
 
-OVEREXPOSED = {"ramp-14": "white level the last code", "ramp-white": "white level below"}
+OVEREXPOSED = ("ramp-14", "ramp-white", "ramp-full")
 
 
 def percent(result):

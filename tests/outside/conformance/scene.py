@@ -23,6 +23,8 @@ F_NUMBER = 8.0
 SHAPES = np.array([[0.55, 0.0825, -0.066], [-0.2, 1.0, 0.06], [0.0, 0.0, 0.6]])
 # Largest quantum efficiency of a class.
 PEAK_EFFICIENCY = 0.5
+# Full well that no code reaches, e⁻.
+NO_FULL_WELL = 1e6
 # Luminance of a perfect diffuser in the scene's light.
 WHITE_CD_PER_M2 = 1000.0
 
@@ -58,11 +60,11 @@ class Camera:
     adu_per_e: float
     bias: int
     read_noise_e: float
-    full_well_e: float = 1e6
+    full_well_e: float = NO_FULL_WELL
 
     @property
     def name(self):
-        return f"conformance-{self.bits}"
+        return f"conformance-{self.bits}" + ("" if self.full_well_e == NO_FULL_WELL else "-full")
 
     @property
     def electrons_per_xyz(self):

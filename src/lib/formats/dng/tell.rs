@@ -12,6 +12,7 @@ use crate::formats::tiff::{ExtraTag, TagValue, TiffSamples};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::propagation::linear::LinearNoise;
 use crate::stages::noise::NoiseModel;
+use crate::stages::saturation::FullLevels;
 
 /// The version that is written, and the oldest that readers of integers and of floats must know.
 const VERSION: [u8; 4] = [1, 4, 0, 0];
@@ -54,7 +55,7 @@ impl Told {
         let black = header.black_levels()?;
         let highest =
             black.as_ref().map_or(0.0, |black| black.largest([geometry.width, geometry.height], |_, _| None)[0]);
-        let white = white(header, samples)?;
+        let white = white(header, samples, highest)?;
         if f64::from(white) <= highest {
             return Err(Error::format(
                 name,
@@ -83,9 +84,13 @@ impl Told {
 }
 
 /// The largest code, rounded down: the tag holds whole numbers, and a saturated sample shall be so. Of classes that differ the
-/// largest, so that no sample is clipped. Integers need none: it is the largest that 16 bits hold \[DNG2023, WhiteLevel].
-fn white(header: &FrameHeader, samples: TiffSamples) -> Result<u32> {
-    match (header.metadata.white_level_adu.map(WhiteLevel::largest), samples) {
+/// largest, so that no sample is clipped. The tag is the code of a saturated photosite: where full well lies below the last code,
+/// but not at the `highest` black level, that counts. Integers need none: it is the largest that 16 bits hold
+/// \[DNG2023, WhiteLevel].
+fn white(header: &FrameHeader, samples: TiffSamples, highest: f64) -> Result<u32> {
+    let full = FullLevels::of(header).map(|full| full.classes().map(f64::from).into_iter().fold(0.0, f64::max));
+    let largest = header.metadata.white_level_adu.map(WhiteLevel::largest);
+    match (largest.map(|white| full.filter(|full| full.floor() > highest).unwrap_or(white)), samples) {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
