@@ -285,8 +285,8 @@ def make_all(directory, run, files=FILES):
     """Makes the files; gives what is in each by its name."""
     directory.mkdir(parents=True, exist_ok=True)
     made, index = {}, []
-    for seed, file in enumerate(files):
-        made[file.name], about = make(file, directory, run, seed)
+    for file in files:
+        made[file.name], about = make(file, directory, run, FILES.index(file))
         index.append(about)
     for name in ("light.exr", "light.exr.yaml", "charge.exr", "charge.exr.yaml"):
         (directory / name).unlink()
