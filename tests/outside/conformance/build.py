@@ -211,7 +211,7 @@ def expected_tags(file, truth):
 
 
 def make(file, directory, run, seed):
-    """Makes a file and what belongs to it by `run`, which runs a program; gives what is in it."""
+    """Makes a file and what belongs to it by `run`, which runs a program in the directory; gives what is in it."""
     truth = Truth(file)
     radiance = directory / f"{file.scene}.exr"
     if not radiance.exists():
@@ -221,11 +221,11 @@ def make(file, directory, run, seed):
     sensor = file.camera.write(directory)
     codes = directory / f"{file.name}.dng"
     patch = ["--patch", f"{PATCH}x{PATCH}", "--cfa", file.pattern, "-q"]
-    light = ["--exposure", repr(truth.exposure_s), "--f-number", F_NUMBER, "--sensor", sensor]
-    run(["render-radiance", radiance, *patch, *light, "-o", "light.exr"])
+    light = ["--exposure", repr(truth.exposure_s), "--f-number", F_NUMBER, "--sensor", sensor.name]
+    run(["render-radiance", radiance.name, *patch, *light, "-o", "light.exr"])
     run(["add-noise", "light.exr", "-q", *(["--seed", seed] if file.noisy else ["--clean"]), "-o", "charge.exr"])
     crop = ["--crop", ",".join(map(str, file.crop))] if file.crop else []
-    run(["digitize", "charge.exr", "-q", *crop, "-o", codes])
+    run(["digitize", "charge.exr", "-q", *crop, "-o", codes.name])
     if any(file.sites) or file.white or any(file.masked):
         change(file, truth, codes, run)
     truth.write(directory / f"{file.name}.csv")
@@ -254,7 +254,7 @@ def change(file, truth, path, run):
     metadata.write_text("\n".join(lines) + "\n", encoding="utf-8")
     plain = directory_of(path, "plain.dng")
     write_plain(plain, samples)
-    run(["import-raw", plain, "--metadata", metadata, "-q", "-o", path])
+    run(["import-raw", plain.name, "--metadata", metadata.name, "-q", "-o", path.name])
     for extra in (metadata, plain):
         extra.unlink()
     if any(file.masked):
