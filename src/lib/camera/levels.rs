@@ -104,6 +104,13 @@ impl WhiteLevel {
         self.classes().into_iter().fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// What signals of all classes are shares of, above a black level: the same for all, as their charge counts alike. Where black
+    /// differs among photosites, it is the largest that limits it \[DNG2023, ch. 5, Mapping Raw Values to Linear Reference
+    /// Values].
+    pub fn range_above(self, black: f64) -> f64 {
+        self.classes().into_iter().fold(f64::INFINITY, f64::min) - black
+    }
+
     /// What is left of it once `blacks` of R, G and B are subtracted.
     #[must_use]
     pub fn less(self, blacks: [f64; 3]) -> Self {

@@ -262,7 +262,7 @@ fn reference_white(
     Ok(luminance.map(|luminance| settings.white.xyz(luminance)))
 }
 
-/// White level less black level of R, G and B.
+/// White level less black level, for R, G and B.
 fn range(input: &FrameHeader, black: f64) -> Result<[f64; 3]> {
     let Some(white) = input.metadata.white_level_adu else {
         return Err(input.refuse(
@@ -270,9 +270,9 @@ fn range(input: &FrameHeader, black: f64) -> Result<[f64; 3]> {
              matrix for absolute XYZ",
         ));
     };
-    let range = white.less([black; 3]).classes();
-    if range.iter().all(|range| *range > 0.0 && range.is_finite()) {
-        return Ok(range);
+    let range = white.range_above(black);
+    if range > 0.0 && range.is_finite() {
+        return Ok([range; 3]);
     }
     Err(input.refuse(format!(
         "its white level, {}, is not above its black level, {black}; relative XYZ are counted between them",

@@ -69,7 +69,7 @@ pub struct ChartReader {
     origin: [i32; 2],
     black: BlackLevels,
     full: [f32; 3],
-    range: [f64; 3],
+    range: f64,
     width: usize,
     next_row: usize,
     sums: Vec<[Sums; 3]>,
@@ -99,8 +99,8 @@ impl ChartReader {
         };
         let [width, height] = [frame.geometry.width, frame.geometry.height];
         let highest = black.largest([width, height], |_, _| None)[0];
-        let range = white.less([highest; 3]).classes();
-        if !range.iter().all(|range| *range > 0.0 && range.is_finite()) {
+        let range = white.range_above(highest);
+        if !(range > 0.0 && range.is_finite()) {
             return Err(frame.refuse("its white level is not above its black level; signals are counted between them"));
         }
         let inside = |[x, y]: [f64; 2]| x >= 0.0 && y >= 0.0 && x < width as f64 && y < height as f64;
@@ -129,7 +129,7 @@ impl ChartReader {
                     continue;
                 };
                 let class = classes[x % 2] as usize;
-                let value = (f64::from(*sample) - black.at(x)) / self.range[class];
+                let value = (f64::from(*sample) - black.at(x)) / self.range;
                 let sums = &mut self.sums[patch][class];
                 sums.saturated += u64::from(sample.is_nan() || *sample >= self.full[class]);
                 sums.add(value);

@@ -8,6 +8,7 @@
 mod area;
 mod color;
 mod describe;
+mod digest;
 mod image;
 mod levels;
 mod noise;

@@ -62,8 +62,10 @@ pub(super) const UNIQUE_CAMERA_MODEL: DngTag = DngTag(50708, "UniqueCameraModel"
 pub(super) const DEFAULT_SCALE: DngTag = DngTag(50718, "DefaultScale");
 pub(super) const COLOR_MATRIX_1: DngTag = DngTag(50721, "ColorMatrix1");
 pub(super) const CALIBRATION_ILLUMINANT_1: DngTag = DngTag(50778, "CalibrationIlluminant1");
+pub(super) const EXIF_VERSION: DngTag = DngTag(36864, "ExifVersion");
 pub(super) const PREVIEW_COLOR_SPACE: DngTag = DngTag(50970, "PreviewColorSpace");
 pub(super) const NOISE_PROFILE: DngTag = DngTag(51041, "NoiseProfile");
+pub(super) const NEW_RAW_IMAGE_DIGEST: DngTag = DngTag(51111, "NewRawImageDigest");
 
 impl DngTag {
     /// The tag with a value, to be written.

@@ -12,6 +12,7 @@ use crate::formats::tiff::{ExtraTag, TagValue, TiffSamples};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::propagation::linear::LinearNoise;
 use crate::stages::noise::NoiseModel;
+use crate::stages::saturation::FullLevels;
 
 /// The version that is written, and the oldest that readers of integers and of floats must know.
 const VERSION: [u8; 4] = [1, 4, 0, 0];
@@ -19,6 +20,8 @@ const VERSION: [u8; 4] = [1, 4, 0, 0];
 const BACKWARD_OF_INTEGERS: [u8; 4] = [1, 1, 0, 0];
 /// Floats came with this.
 const BACKWARD_OF_FLOATS: [u8; 4] = [1, 4, 0, 0];
+/// The version of Exif that tells of time and f-number.
+const EXIF_VERSION: &[u8; 4] = b"0232";
 /// sRGB among the color spaces of previews.
 const SRGB: u32 = 2;
 /// What cameras are called whose sensor has no name, and who made them.
@@ -31,6 +34,8 @@ pub(super) struct Told {
     pub raw: Vec<ExtraTag>,
     /// Those of the first directory, which holds the picture.
     pub first: Vec<ExtraTag>,
+    /// Those of Exif.
+    pub exif: Vec<ExtraTag>,
     /// What the plane is.
     pub photometric: u16,
     /// The picture, without rows yet.
@@ -50,7 +55,7 @@ impl Told {
         let black = header.black_levels()?;
         let highest =
             black.as_ref().map_or(0.0, |black| black.largest([geometry.width, geometry.height], |_, _| None)[0]);
-        let white = white(header, samples)?;
+        let white = white(header, samples, highest)?;
         if f64::from(white) <= highest {
             return Err(Error::format(
                 name,
@@ -71,6 +76,7 @@ impl Told {
         Ok(Self {
             raw,
             first: of_file(metadata, samples, color.as_ref()),
+            exif: of_exposure(metadata),
             photometric: if cfa == FilterArray::Monochrome { LINEAR_RAW } else { CFA },
             preview: Preview::new(geometry, cfa, black, range, color),
         })
@@ -78,9 +84,13 @@ impl Told {
 }
 
 /// The largest code, rounded down: the tag holds whole numbers, and a saturated sample shall be so. Of classes that differ the
-/// largest, so that no sample is clipped. Integers need none: it is the largest that 16 bits hold \[DNG2023, WhiteLevel].
-fn white(header: &FrameHeader, samples: TiffSamples) -> Result<u32> {
-    match (header.metadata.white_level_adu.map(WhiteLevel::largest), samples) {
+/// largest, so that no sample is clipped. The tag is the code of a saturated photosite: where full well lies below the last code,
+/// but not at the `highest` black level, that counts. Integers need none: it is the largest that 16 bits hold
+/// \[DNG2023, WhiteLevel].
+fn white(header: &FrameHeader, samples: TiffSamples, highest: f64) -> Result<u32> {
+    let full = FullLevels::of(header).map(|full| full.classes().map(f64::from).into_iter().fold(0.0, f64::max));
+    let largest = header.metadata.white_level_adu.map(WhiteLevel::largest);
+    match (largest.map(|white| full.filter(|full| full.floor() > highest).unwrap_or(white)), samples) {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -164,7 +174,7 @@ fn noise_profile(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<E
     Some(tags::NOISE_PROFILE.with(TagValue::Doubles(profile.repeat(planes))))
 }
 
-/// What holds for the whole file: version, camera, colors, exposure.
+/// What holds for the whole file: version, camera, colors.
 fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor>) -> Vec<ExtraTag> {
     let backward = if samples == TiffSamples::U16 { BACKWARD_OF_INTEGERS } else { BACKWARD_OF_FLOATS };
     let model = camera_name(metadata);
@@ -185,16 +195,16 @@ fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor
             tags::AS_SHOT_NEUTRAL.with(TagValue::Ratios(color.neutral.map(ratio).to_vec())),
         ]);
     }
-    if let Some(exposure) = metadata.exposure {
-        let settings = [(tags::EXPOSURE_TIME, exposure.exposure_s), (tags::F_NUMBER, exposure.f_number)];
-        let ratios = settings.map(|(tag, value)| (tag, ratio(value)));
-        found.extend(
-            ratios
-                .into_iter()
-                .filter(|(_, [above, _])| *above > 0)
-                .map(|(tag, ratio)| tag.with(TagValue::Ratios(vec![ratio]))),
-        );
-    }
+    found
+}
+
+/// The exposure; no tags where it is unknown.
+fn of_exposure(metadata: &Metadata) -> Vec<ExtraTag> {
+    let Some(exposure) = metadata.exposure else { return Vec::new() };
+    let settings = [(tags::EXPOSURE_TIME, exposure.exposure_s), (tags::F_NUMBER, exposure.f_number)];
+    let ratios = settings.map(|(tag, value)| (tag, ratio(value))).into_iter().filter(|(_, [above, _])| *above > 0);
+    let mut found = vec![tags::EXIF_VERSION.with(TagValue::Undefined(EXIF_VERSION.to_vec()))];
+    found.extend(ratios.map(|(tag, ratio)| tag.with(TagValue::Ratios(vec![ratio]))));
     found
 }
 

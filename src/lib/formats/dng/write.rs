@@ -1,9 +1,13 @@
 //! Writing rows.
 
+use super::digest::RawDigest;
 use super::preview::Preview;
+use super::tags;
 use super::tell::Told;
 use crate::error::{Error, Result};
-use crate::formats::tiff::{ExtraTag, FirstImage, TiffCompression, TiffSamples, TiffSettings, TiffTags, TiffWriter};
+use crate::formats::tiff::{
+    ExtraTag, FirstImage, TagValue, TiffCompression, TiffSamples, TiffSettings, TiffTags, TiffWriter,
+};
 use crate::metadata::FrameHeader;
 use crate::units::QuantityKind;
 use std::io::{Seek, Write};
@@ -49,7 +53,9 @@ pub struct DngWriter<W: Write + Seek> {
     name: String,
     samples: TiffSamples,
     preview: Preview,
+    digest: RawDigest,
     first: Vec<ExtraTag>,
+    exif: Vec<ExtraTag>,
     texts: [String; 2],
 }
 
@@ -70,14 +76,15 @@ impl<W: Write + Seek> DngWriter<W> {
         compression: TiffCompression,
         [description, software]: [String; 2],
     ) -> Result<Self> {
-        let Told { raw, first, photometric, preview } = Told::of(header, name, samples)?;
+        let Told { raw, first, exif, photometric, preview } = Told::of(header, name, samples)?;
         let settings = TiffSettings { samples, scale: 1.0, compression, tags: TiffTags::default(), extra: raw };
         let mut tiff = TiffWriter::create(output, name, &header.geometry, settings)?;
         if tiff.is_big() {
             return Err(Error::format(name, "a DNG holds up to 4 GiB, and this frame might pass that; write a TIFF"));
         }
         tiff.set_photometric(photometric);
-        Ok(Self { tiff, name: name.into(), samples, preview, first, texts: [description, software] })
+        let digest = RawDigest::new(header.geometry.width, samples);
+        Ok(Self { tiff, name: name.into(), samples, preview, digest, first, exif, texts: [description, software] })
     }
 
     /// Takes the next rows, as many as there are in `samples`.
@@ -100,6 +107,7 @@ impl<W: Write + Seek> DngWriter<W> {
             )));
         }
         self.preview.take(samples);
+        self.digest.take(samples);
         self.tiff.write_rows(samples)
     }
 
@@ -111,7 +119,9 @@ impl<W: Write + Seek> DngWriter<W> {
     pub fn finish(self) -> Result<W> {
         let size = self.preview.sides.map(|side| u16::try_from(side).unwrap_or(u16::MAX));
         let [description, software] = self.texts;
-        let first = FirstImage { size, rgb: self.preview.finish(), description, software, extra: self.first };
+        let mut extra = self.first;
+        extra.push(tags::NEW_RAW_IMAGE_DIGEST.with(TagValue::Bytes(self.digest.finish().to_vec())));
+        let first = FirstImage { size, rgb: self.preview.finish(), description, software, extra, exif: self.exif };
         Ok(self.tiff.finish_below(&first)?.0)
     }
 }

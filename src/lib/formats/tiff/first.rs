@@ -17,6 +17,8 @@ pub(in crate::formats) struct FirstImage {
     pub software: String,
     /// Tags besides.
     pub extra: Vec<ExtraTag>,
+    /// Those of Exif, in a directory of their own; there is none where these are none.
+    pub exif: Vec<ExtraTag>,
 }
 
 impl FirstImage {

@@ -45,7 +45,7 @@ pub enum TiffSamples {
 
 impl TiffSamples {
     /// Bytes of a sample.
-    fn bytes(self) -> usize {
+    pub(in crate::formats) fn bytes(self) -> usize {
         match self {
             Self::U16 => 2,
             Self::F32 => 4,

@@ -190,6 +190,11 @@ impl<W: Write + Seek> TiffWriter<W> {
         let pixels = self.position;
         self.put(&first.rgb)?;
         let mut fields = first.fields(&self.name)?;
+        let exif = tags::fields(&first.exif, &self.name)?;
+        if !exif.is_empty() {
+            let place = self.put_directory(exif)?;
+            fields.push(self.offsets(Tag::ExifDirectory, std::iter::once(place)));
+        }
         fields.push(self.offsets(Tag::StripOffsets, std::iter::once(pixels)));
         fields.push(self.offsets(Tag::SubIfd, std::iter::once(below)));
         fields.sort_by_key(|field| field.tag.to_u16());

@@ -266,7 +266,7 @@ impl ChartFit {
         let exposure_s_sr = exposure.exposure_s_sr();
         let black = frame.uniform_black_adu()?;
         let white = frame.metadata.white_level_adu.ok_or_else(|| frame.missing("white_level_adu"))?;
-        Ok(white.less([black; 3]).classes().map(|range| luminance * exposure_s_sr / range))
+        Ok([luminance * exposure_s_sr / white.range_above(black); 3])
     }
 }
 
