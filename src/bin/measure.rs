@@ -47,7 +47,7 @@ struct Arguments {
     #[arg(long)]
     check: bool,
     /// Chance of a false alarm that --check accepts, all tests together
-    #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = values::fraction)]
+    #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = values::fraction, requires = "check")]
     level: f64,
     /// File for the report; by default standard output
     #[arg(short, long, value_name = "FILE")]

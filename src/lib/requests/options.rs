@@ -228,13 +228,13 @@ impl SignalLevel {
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 pub struct SpectrumChoice {
     /// Unit of the radiance, such as "W m-2 sr-1 nm-1"; by default what the file says, or W cm-2 sr-1 nm-1
-    #[arg(long, value_name = "UNIT", value_parser = values::radiance_unit)]
+    #[arg(long, value_name = "UNIT", value_parser = values::radiance_unit, conflicts_with_all = ["electrons", "dark"])]
     pub radiance_unit: Option<RadianceUnit>,
     /// Column of the spectrum in a table
-    #[arg(long, value_name = "NAME", conflicts_with = "sample")]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["sample", "electrons", "dark"])]
     pub column: Option<String>,
     /// One spectrum of a library, counted from 0 (pixels row by row)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with_all = ["electrons", "dark"])]
     pub sample: Option<usize>,
 }
 

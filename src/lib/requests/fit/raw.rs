@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Args)]
 pub struct RawMatrix {
     /// DNG whose own matrix is wanted, for the light of --illuminant or --temperature, or else that of the exposure
-    #[arg(long, value_name = "FRAME.dng", conflicts_with_all = ["chart", "patches", "luminance", "no_misfit"])]
+    #[arg(long, value_name = "FRAME.dng", conflicts_with_all = ["chart", "patches", "reference", "reference_light", "luminance", "no_misfit"])]
     pub from_raw: Option<PathBuf>,
     /// Which of its matrices: color, to XYZ under the light itself, or forward, to XYZ adapted to D50
     #[arg(long, value_name = "NAME", default_value = OwnMatrix::default().name(), value_parser = values::choice::<OwnMatrix>(), requires = "from_raw")]
