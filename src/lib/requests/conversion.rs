@@ -209,10 +209,10 @@ impl Conversion {
     /// What may not be meant about a matrix and a frame.
     fn doubts(&self, matrix: &CameraMatrix, frame: &FrameHeader) -> Vec<Note> {
         let mut notes = Vec::new();
-        if let (Some(file), Some(of_matrix), Some(sensor)) = (&self.matrix, &matrix.sensor, &frame.metadata.sensor)
-            && *of_matrix != sensor.name
+        let mut known = frame.metadata.camera_names().peekable();
+        if let (Some(file), Some(of_matrix), Some(of_frame)) = (&self.matrix, &matrix.sensor, known.peek().copied())
+            && known.all(|name| !name.eq_ignore_ascii_case(of_matrix))
         {
-            let of_frame = &sensor.name;
             let shown = file.display();
             let text = format!("{shown} was fitted for the sensor {of_matrix}, but the frame comes from {of_frame}");
             notes.push(Note::Warning(text));
@@ -253,7 +253,7 @@ pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
         }
         (_, Some(relative)) => {
             let note = format!("{}: no --matrix is named; XYZ are relative, by {}", frame.name, relative.method);
-            Ok((CameraMatrix::relative(relative), Note::Remark(note)))
+            Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Remark(note)))
         }
         (_, None) => {
             let problem = format!("{}: neither its sensor nor its raw file tells a matrix", frame.name);

@@ -10,8 +10,12 @@ use crate::cfa::{FILTERS, FilterArray};
 use crate::error::{Error, Result};
 use crate::formats::tiff::{Directory, TiffFile};
 use crate::metadata::Metadata;
+use crate::text::visible;
 use crate::units::QuantityKind;
 use tiff::tags::Tag;
+
+/// Longest name of a camera, bytes.
+const LONGEST_NAME: usize = 128;
 
 /// What is known of the frame, with notes on what is passed over.
 ///
@@ -41,6 +45,10 @@ pub(super) fn describe(
         }
         found => found?,
     };
+    // No sample depends on it either.
+    let model = file.text(&image.first, tags::UNIQUE_CAMERA_MODEL.tag()).unwrap_or_default();
+    metadata.camera =
+        model.map(|model| visible(model.trim()).into_owned()).filter(|model| (1..=LONGEST_NAME).contains(&model.len()));
     metadata.relative_matrix = color::relative_matrix(file, image, notes)?;
     if levels.table.is_some() {
         notes.push("samples are made linear by its LinearizationTable".into());

@@ -247,7 +247,7 @@ impl ChartFit {
         let unit = if self.luminance.is_some() { MATRIX_UNIT } else { RELATIVE_MATRIX_UNIT };
         Ok(CameraMatrix {
             method: Some(format!("chart, total least squares; XYZ in the light {}", expected.light)),
-            sensor: seen.frame.as_ref().and_then(|frame| Some(frame.metadata.sensor.as_ref()?.name.clone())),
+            sensor: seen.frame.as_ref().and_then(|frame| frame.metadata.camera_names().next().map(str::to_owned)),
             white_xy: Some(chromaticity(expected.white)),
             condition: Some(found.condition),
             rank: Some(3),
