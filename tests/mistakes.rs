@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 102] = [
+const MISTAKES: [(&str, i32, &str); 103] = [
     (
         "digitize noisy.exr -o x.dng",
         BAD_DATA,
@@ -198,6 +198,11 @@ const MISTAKES: [(&str, i32, &str); 102] = [
         "to-xyz rgb.exr --matrix matrix.yaml --exposure 1",
         BAD_USAGE,
         "rgb.exr: the exposure time in s is 0.033 by its metadata, which --metadata FILE can replace; leave out --exposure",
+    ),
+    (
+        "to-xyz rgb.exr --matrix matrix.yaml --space lab --white 90,95,100 --white-luminance 95",
+        BAD_USAGE,
+        "a white of X,Y,Z has its luminance already; leave out --white-luminance",
     ),
     (
         "to-xyz rgb.exr --matrix matrix.yaml --adaptation cat16",

@@ -239,3 +239,57 @@ fn write(shop: &Workshop, name: &str, header: &FrameHeader, samples: &[f32]) {
     writer.write(samples).unwrap();
     writer.finish(Counts::default()).unwrap();
 }
+
+#[test]
+fn a_matrix_of_another_camera_is_told() {
+    let shop = Workshop::with_frames();
+    let matrix = "schema: cyanometer-matrix/1\nsensor: Maker A1\nunit: relative XYZ per (white level - black level)\nxyz_from_camera: \
+                  [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n";
+    fs::write(shop.path("a1.yaml"), matrix).unwrap();
+    let of_camera = |camera: &str| {
+        let text = format!(
+            "schema: cyanometer/1\nquantity: adu\nblack_level_adu: 0\nwhite_level_adu: 4095\ndemosaic: {{method: bi, cfa: rggb, black: \
+             100}}\ncamera: {camera}\n"
+        );
+        fs::write(shop.path("rgb.yaml"), text).unwrap();
+        said(&shop, "to-xyz rgb.exr --metadata rgb.yaml --matrix a1.yaml -o out.exr", 0)
+    };
+    assert_eq!(of_camera("MAKER A1"), "");
+    assert_eq!(
+        of_camera("Maker B2"),
+        "to-xyz: warning: a1.yaml was fitted for the sensor Maker A1, but the frame comes from Maker B2\n"
+    );
+}
+
+#[test]
+fn pictures_that_are_no_raws_and_no_scenes_are_told() {
+    let shop = Workshop::new();
+    fs::write(shop.path("a.jpg"), [[0xFF, 0xD8, 0xFF, 0xE0].as_slice(), &[0; 600]].concat()).unwrap();
+    fs::copy(shop.path("a.jpg"), shop.path("b.jpg")).unwrap();
+    let complaint = said(&shop, "import-raw a.jpg b.jpg -o {stem}.exr", BAD_DATA);
+    let lines: Vec<&str> = complaint.lines().collect();
+    assert!(lines[0].contains("for measurements give the camera's raw file"), "{complaint}");
+    assert_eq!(lines[2], "import-raw: 2 of 2 inputs failed");
+    let gray = FrameHeader {
+        name: "gray".into(),
+        geometry: Geometry::new(2, 2, &["Y"]),
+        metadata: Metadata::new(QuantityKind::Unspecified),
+    };
+    write(&shop, "gray.exr", &gray, &[0.5; 4]);
+    let complaint = said(&shop, "render-radiance gray.exr -o out.exr", BAD_DATA);
+    assert!(complaint.contains("of a gray picture store the plane three times, as R, G and B"), "{complaint}");
+}
+
+#[test]
+fn a_sensor_has_one_linearization() {
+    let shop = Workshop::new();
+    let sensor = "schema: cyanometer-sensor/2\nname: two-curves\nreadout: {width: 8, height: 8, full_well_e: 30000, \
+                  dark_current_e_per_s: 0.5, temperature_k: 293, dcnu: 0.1, prnu: 0.006, read_noise_e: 3, bits: 14, bias_adu: 512, \
+                  adu_per_e: 0.4, linearization: {polynomial: [1.0], codes: [0, 1], linear: [0, 1]}}\n";
+    fs::write(shop.path("s.yaml"), sensor).unwrap();
+    let complaint = said(&shop, "render-radiance --dark --size 2x2 --sensor s.yaml -o out.exr", BAD_DATA);
+    assert!(
+        complaint.contains("a linearization is `polynomial`, or `codes` and `linear`, but not both"),
+        "{complaint}"
+    );
+}

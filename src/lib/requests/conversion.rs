@@ -92,6 +92,7 @@ impl Conversion {
     /// Those of [`apply_black`], [`SaidExposure::apply`] and [`ToXyz::new`]; [`Error::Usage`] where there is no matrix, or no
     /// light of the scene to adapt from.
     pub fn stage(&self, matrix: Option<CameraMatrix>, frame: &mut FrameHeader) -> Result<(ToXyz, Vec<Note>)> {
+        self.white.check()?;
         if let Some(black) = self.black {
             apply_black(frame, black)?;
         }
@@ -140,6 +141,7 @@ impl Conversion {
         if reader.header().metadata.quantity != QuantityKind::Xyz {
             return Ok(None);
         }
+        self.white.check()?;
         let name = reader.header().name.clone();
         let of_cameras: [(&'static [&'static str], bool); 5] = [
             (&["matrix"], self.matrix.is_some()),

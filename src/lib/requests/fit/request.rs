@@ -154,6 +154,7 @@ impl Fit {
 
     /// Refuses a white that cannot be.
     pub(super) fn check_white(&self) -> Result<()> {
+        self.white.check()?;
         match self.white.white {
             White::Absolute(white) if !white.iter().all(|value| *value > 0.0) => {
                 let [x, y, z] = white;

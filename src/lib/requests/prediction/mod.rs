@@ -321,6 +321,7 @@ impl NoisePrediction {
                 _ => Ok(None),
             };
         };
+        self.white.check()?;
         let matrix = data::load_matrix(path)?;
         if let Some(of_matrix) = matrix.sensor.as_ref().filter(|name| **name != sensor.name) {
             let text = format!("{} was fitted for the sensor {of_matrix}, not {}", path.display(), sensor.name);
