@@ -154,15 +154,16 @@ const ORDER: &[Advice] = &[
     ),
     advice(
         "correct-frame codes.exr -o out.exr",
-        "give --black, --dark or --cte",
+        "give --black, --dark, --bias, --flat, --defects, --linearize or --cte",
         &[
             "correct-frame codes.exr --black auto -o out.exr",
             "correct-frame codes.exr --metadata silent.yaml --black 1757 --cte 0.9999 -o out.exr",
             "correct-frame codes.exr --dark dark.exr -o out.exr",
+            "correct-frame codes.exr --bias dark.exr -o out.exr",
         ],
     ),
     advice(
-        "correct-frame codes.exr --dark codes.exr -o out.exr",
+        "correct-frame codes.exr --dark lit.exr -o out.exr",
         "as `render-radiance --dark` renders it",
         &[
             "render-radiance --dark --size 8x6 -o d0.exr",
@@ -381,6 +382,7 @@ fn shop() -> Workshop {
     shop.run("mosaic noisy.exr -o electrons.exr", &[]);
     shop.run("mosaic rgb.exr -o again.exr", &[]);
     shop.pipe("render-radiance --dark --size 8x6 | add-noise | digitize -o dark.exr");
+    fs::copy(shop.path("codes.exr"), shop.path("lit.exr")).unwrap();
     let color = "to-xyz rgb.exr --matrix matrix.yaml";
     shop.run(&format!("{color} --space lab -o lab.tiff"), &[]);
     shop.run(&format!("{color} --space srgb -o srgb.tiff"), &[]);

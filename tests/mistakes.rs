@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 91] = [
+const MISTAKES: [(&str, i32, &str); 103] = [
     (
         "digitize noisy.exr -o x.dng",
         BAD_DATA,
@@ -121,7 +121,11 @@ const MISTAKES: [(&str, i32, &str); 91] = [
         BAD_USAGE,
         "`1.1` is no value for --cte <X>: give a fraction above 0 and at most 1; see `add-noise --help`",
     ),
-    ("correct-frame codes.exr", BAD_USAGE, "there is nothing to correct; give --black, --dark or --cte"),
+    (
+        "correct-frame codes.exr",
+        BAD_USAGE,
+        "there is nothing to correct; give --black, --dark, --bias, --flat, --defects, --linearize or --cte",
+    ),
     (
         "correct-frame noisy.exr --cte 0.9",
         BAD_DATA,
@@ -153,6 +157,68 @@ const MISTAKES: [(&str, i32, &str); 91] = [
         "--dark <FILE> and --black <auto|none|N|border|rows|columns> exclude each other; see `correct-frame --help`",
     ),
     ("correct-frame codes.exr --dark missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
+    (
+        "correct-frame plane.exr --dark plane.exr",
+        BAD_USAGE,
+        "plane.exr: it is given as the frame itself and as a dark frame; its noise would count as that of two exposures; name \
+         another file",
+    ),
+    (
+        "correct-frame codes.exr --flat plane.exr --flat ./plane.exr --black auto",
+        BAD_USAGE,
+        "./plane.exr: it is given twice as a flat; its noise would count as that of two exposures; name another file",
+    ),
+    (
+        "correct-frame codes.exr --dark plane.exr --clip 4",
+        BAD_USAGE,
+        "only `--combine clipped` leaves samples out; leave out --clip",
+    ),
+    (
+        "correct-frame codes.exr --black auto --combine median",
+        BAD_USAGE,
+        "--dark <FILE> or --bias <FILE> or --flat <FILE> is missing, without which an option that is given has no effect; see \
+         `correct-frame --help`",
+    ),
+    (
+        "correct-frame plane.exr --black auto --defects plane.exr",
+        BAD_DATA,
+        "plane.exr: 48 of its 48 samples are not 0, and would be defective photosites; a map is 0 where photosites are good",
+    ),
+    (
+        "measure codes.exr --level 0.01",
+        BAD_USAGE,
+        "--check is missing, without which an option that is given has no effect; see `measure --help`",
+    ),
+    (
+        "demosaic plane.exr --pattern bggr",
+        BAD_USAGE,
+        "plane.exr: the filter array is rggb by its metadata, which --metadata FILE can replace; leave out --pattern",
+    ),
+    (
+        "to-xyz rgb.exr --matrix matrix.yaml --exposure 1",
+        BAD_USAGE,
+        "rgb.exr: the exposure time in s is 0.033 by its metadata, which --metadata FILE can replace; leave out --exposure",
+    ),
+    (
+        "to-xyz rgb.exr --matrix matrix.yaml --space lab --white 90,95,100 --white-luminance 95",
+        BAD_USAGE,
+        "a white of X,Y,Z has its luminance already; leave out --white-luminance",
+    ),
+    (
+        "to-xyz rgb.exr --matrix matrix.yaml --adaptation cat16",
+        BAD_USAGE,
+        "--adapt-to <LIGHT> is missing, without which an option that is given has no effect; see `to-xyz --help`",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr --seed 3",
+        BAD_USAGE,
+        "--evaluate <LIBRARY> is missing, without which an option that is given has no effect; see `fit-matrix --help`",
+    ),
+    (
+        "render-radiance --dark --focal-length 20",
+        BAD_USAGE,
+        "--vignetting is missing, without which an option that is given has no effect; see `render-radiance --help`",
+    ),
     ("digitize codes.exr", BAD_DATA, "codes.exr: it holds three planes of ADU: it is digitized already"),
     ("digitize noisy.exr --bits 20", BAD_USAGE, "a converter of 20 bits is impossible here; give 1 to 16"),
     (
@@ -367,14 +433,14 @@ const MISTAKES: [(&str, i32, &str); 91] = [
         "`picture.jpg` is no value for --output <FILE.png>: end the name in .png; see `preview --help`",
     ),
     (
-        "correct-frame codes.exr --dark codes.exr",
+        "correct-frame codes.exr --dark lit.exr",
         BAD_DATA,
-        "codes.exr: its scene, --electrons, was lit; a dark frame is taken without light, as `render-radiance --dark` renders it",
+        "lit.exr: its scene, --electrons, was lit; a dark frame is taken without light, as `render-radiance --dark` renders it",
     ),
     (
         "to-xyz rgb.exr --matrix matrix.yaml --black 5",
         BAD_USAGE,
-        "rgb.exr: its metadata state another black level than 5; leave out --black",
+        "rgb.exr: the black level is 0 by its metadata, which --metadata FILE can replace; leave out --black",
     ),
     (
         "add-noise expected.exr --temperature -20",
@@ -394,6 +460,7 @@ fn mistakes_are_answered_in_one_line() {
     fs::write(shop.path("relative.yaml"), matrix("relative XYZ per (white level - black level)")).unwrap();
     fs::write(shop.path("unit.yaml"), matrix("nits")).unwrap();
     shop.run("to-xyz rgb.exr --matrix relative.yaml -o relative.exr", &[]);
+    fs::copy(shop.path("codes.exr"), shop.path("lit.exr")).unwrap();
     let files = shop.files();
     for (line, status, complaint) in MISTAKES {
         let output = shop.attempt(line, &[]);

@@ -25,18 +25,18 @@ struct Arguments {
     #[command(flatten)]
     input: DescribedInput,
     /// Seed of the temporal noise
-    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>)]
+    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>, conflicts_with = "clean")]
     seed: u64,
     /// Seed of the fixed patterns: another number, another sensor
-    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>)]
+    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>, conflicts_with = "clean")]
     sensor_seed: u64,
     /// Number of the exposure: another number, other temporal noise
-    #[arg(long, default_value_t = 0, value_parser = values::whole::<u32>)]
+    #[arg(long, default_value_t = 0, value_parser = values::whole::<u32>, conflicts_with = "clean")]
     frame: u32,
     #[command(flatten)]
     noise: options::DrawnNoise,
     /// How Poisson numbers are drawn: exact, or gaussian to see what that approximation costs
-    #[arg(long, default_value = PoissonKind::default().name(), value_parser = values::choice::<PoissonKind>())]
+    #[arg(long, default_value = PoissonKind::default().name(), value_parser = values::choice::<PoissonKind>(), conflicts_with = "clean")]
     poisson: PoissonKind,
     /// Charge transfer efficiency: the share of a packet that each move to the output takes along, above 0 and at most 1;
     /// by default transfer is left out

@@ -68,6 +68,6 @@ fn run(Arguments { pair, map, output, output_format, .. }: &Arguments, session: 
     }
     output::write_text(output.as_deref(), &report::difference(&report, *output_format)?)?;
     session.tell(Note::not_finite(report.not_finite).as_slice());
-    comparison.frames().for_each(|frame| session.tell(requests::of_marks(frame).as_slice()));
+    comparison.frames().for_each(|frame| session.tell(&requests::of_marks(frame)));
     Ok(())
 }

@@ -41,7 +41,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     arguments.correction.check(&arguments.input)?;
     let mut reader = arguments.described.open(&arguments.input.options())?;
     session.tell(&arguments.correction.prepare(&mut reader)?);
-    let mut correction = arguments.correction.open(reader.header_mut(), &arguments.input)?;
+    let mut correction = arguments.correction.open(reader.header_mut(), &arguments.input, &arguments.described)?;
     let header = correction.stage.header_mut();
     session.sign(header);
     propagation::note(header, Equations::Exact);

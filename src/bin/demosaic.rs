@@ -6,7 +6,8 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::names::Named;
 use cyanometer::propagation::pixels::dim_green_below;
-use cyanometer::requests::{self, described::Described, options, values};
+use cyanometer::requests::described::{self, Described};
+use cyanometer::requests::{self, options, values};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
@@ -33,7 +34,7 @@ struct Arguments {
     /// Black level to remove: auto (from the metadata), none, or a number in the unit of the samples
     #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = values::black)]
     black: Black,
-    /// Pattern of a plane that carries none, or another than it carries: rggb, bggr, grbg or gbrg
+    /// Pattern of a plane that carries none: rggb, bggr, grbg or gbrg
     #[arg(long, value_parser = values::pattern)]
     pattern: Option<CfaPattern>,
     /// Add a layer with the standard deviation of each pixel, from the sensor's noise model at the pixel's own level
@@ -55,7 +56,9 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = arguments.described.open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
+    arguments.pattern.map_or(Ok(()), |pattern| described::check_pattern(reader.header(), pattern))?;
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
+    session.tell(described::doubt_of_black(reader.header(), arguments.black).as_slice());
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());
     session.tell(requests::of_bent_codes(reader.header()).as_slice());

@@ -43,11 +43,12 @@ struct Arguments {
     /// Equations to predict by: exact, or those of the paper
     #[arg(long, default_value = Equations::default().name(), value_parser = values::choice::<Equations>())]
     equations: Equations,
-    /// Test every prediction, and exit with status 1 when one does not hold
+    /// Test every prediction, and exit with status 1 when one does not hold, which the report says (`passed`), or when nothing
+    /// can be checked, of which there is no report
     #[arg(long)]
     check: bool,
     /// Chance of a false alarm that --check accepts, all tests together
-    #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = values::fraction)]
+    #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = values::fraction, requires = "check")]
     level: f64,
     /// File for the report; by default standard output
     #[arg(short, long, value_name = "FILE")]

@@ -61,6 +61,6 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     session.report_reader(&reader);
     let settings = PictureSettings { region: arguments.region, zoom: arguments.zoom, range: arguments.range };
     write_png(&mut reader, &settings, &arguments.output)?;
-    session.tell(requests::of_marks(&reader).as_slice());
+    session.tell(&requests::of_marks(&reader));
     Ok(())
 }

@@ -52,6 +52,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let holds_layers = output.options().holds_layers()?;
     if let Some(mut stage) = conversion.stage_of_xyz(&mut reader, arguments.sigma, holds_layers)? {
+        session.tell(conversion.doubt_of_xyz(reader.header()).as_slice());
         session.sign(stage.header_mut());
         return session.drive(reader, &stage, output).map(drop);
     }

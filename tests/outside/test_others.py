@@ -48,14 +48,13 @@ class Others(ProgramCase):
                 cfa = self.frame(["mosaic", *words, "--pattern", "grbg", *options], stdin=stdin)
                 self.same_planes(cfa, {"Y": mosaic(three, "grbg")})
 
-    def check_plane(self, path, plane, options=()):
+    def check_plane(self, path, plane, options=(), pattern="rggb"):
         """All samples of a plane: at the sites of one class a demosaicked plane has those of the file."""
         self.check(path, {"Y": plane}, options)
-        for pattern in ("rggb",):
-            words = [*BI, "--black", "0", "--pattern", pattern]
-            for stdin in (b"", (self.directory / path).read_bytes()):
-                three = self.frame([*words, *([] if stdin else [path]), *options], stdin=stdin)
-                self.same_planes({"Y": mosaic(three, pattern)}, {"Y": plane.astype(np.float32)})
+        words = [*BI, "--black", "0", "--pattern", pattern]
+        for stdin in (b"", (self.directory / path).read_bytes()):
+            three = self.frame([*words, *([] if stdin else [path]), *options], stdin=stdin)
+            self.same_planes({"Y": mosaic(three, pattern)}, {"Y": plane.astype(np.float32)})
 
     def refused(self, command, *mentions, status=BAD_DATA):
         done = self.attempt(command)
@@ -84,7 +83,8 @@ class Tiff(Others):
         for photometric in ("cfa", "minisblack"):
             for compression in (None, "zlib"):
                 self.write("cfa.tif", codes, photometric=photometric, compression=compression)
-                self.check_plane("cfa.tif", codes)
+                self.check_plane("cfa.tif", codes, pattern="grbg")
+                self.refused([*BI, "cfa.tif", "--pattern", "rggb"], "grbg by its metadata", status=BAD_USAGE)
                 plain = self.frame([*BI, "cfa.tif", "--black", "0", "--pattern", "grbg"])
                 self.same_planes(self.frame([*BI, "cfa.tif", "--black", "0"]), plain)
                 self.refused([*BI, "cfa.tif"], "`black_level_adu`", "--black")

@@ -26,12 +26,36 @@ pub struct Linearization(&'static Curve);
 
 /// A curve as files have it, in ADU above the bias.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "a linearization is `polynomial`, or `codes` and `linear`")]
+#[serde(untagged, try_from = "Keys")]
 enum Curve {
     /// c₁ x + c₂ x² + …
     Polynomial { polynomial: Vec<f64> },
     /// Straight between points, and on beyond the first and the last.
     Table { codes: Vec<f64>, linear: Vec<f64> },
+}
+
+/// What files may have of a curve.
+#[derive(Deserialize)]
+#[serde(expecting = "a linearization is `polynomial`, or `codes` and `linear`")]
+struct Keys {
+    polynomial: Option<Vec<f64>>,
+    codes: Option<Vec<f64>>,
+    linear: Option<Vec<f64>>,
+}
+
+impl TryFrom<Keys> for Curve {
+    type Error = &'static str;
+
+    fn try_from(keys: Keys) -> Result<Self, Self::Error> {
+        match keys {
+            Keys { polynomial: Some(polynomial), codes: None, linear: None } => Ok(Self::Polynomial { polynomial }),
+            Keys { polynomial: None, codes: Some(codes), linear: Some(linear) } => Ok(Self::Table { codes, linear }),
+            Keys { polynomial: Some(_), .. } => {
+                Err("a linearization is `polynomial`, or `codes` and `linear`, but not both; leave one of them out")
+            }
+            Keys { .. } => Err("a linearization is `polynomial`, or `codes` and `linear`"),
+        }
+    }
 }
 
 /// Most coefficients of a polynomial.

@@ -71,7 +71,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         Ok(arguments) => arguments,
         Err(error) if !error.use_stderr() => return show(program, || error.print()),
         Err(error) => {
-            complain(program, &usage::one_line(program, &error));
+            complain(program, &usage::one_line(program, &error, &A::command()));
             return ExitCode::from(2);
         }
     };
@@ -183,7 +183,8 @@ impl Session {
         }
         let summary = |done: usize| format!("{done} of {} inputs", inputs.len());
         if failed > 0 {
-            return Err(Error::Data(format!("{} failed; the others are done", summary(failed))));
+            let others = if failed < inputs.len() { "; the others are done" } else { "" };
+            return Err(Error::Data(format!("{} failed{others}", summary(failed))));
         }
         self.note(&format!("{} are done", summary(inputs.len())));
         Ok(())

@@ -2,10 +2,11 @@
 //!
 //! It tells what is wrong by kind and context; of its text only the first line of what has no kind here is taken.
 
+use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// clap's complaint in one line.
-pub(super) fn one_line(program: &str, error: &clap::Error) -> String {
+/// clap's complaint in one line about the arguments of `command`.
+pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command) -> String {
     let context = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.clone()),
         Some(ContextValue::Strings(texts)) => Some(texts.join(", ")),
@@ -29,7 +30,12 @@ pub(super) fn one_line(program: &str, error: &clap::Error) -> String {
             let reason = std::error::Error::source(error).map_or(String::new(), |source| format!(": {source}"));
             format!("`{value}` is no value for {argument}{reason}")
         }
-        ErrorKind::MissingRequiredArgument => format!("{argument} is missing"),
+        ErrorKind::MissingRequiredArgument if is_always_needed(&argument, command) => format!("{argument} is missing"),
+        ErrorKind::MissingRequiredArgument => {
+            let any = argument.trim_start_matches('<').replace(">>", ">").replace('|', " or ");
+            let any = if argument.starts_with("<--") { any } else { argument };
+            format!("{any} is missing, without which an option that is given has no effect")
+        }
         ErrorKind::ArgumentConflict => {
             let other = context(ContextKind::PriorArg).unwrap_or_default();
             if argument == other || other.is_empty() {
@@ -46,10 +52,17 @@ pub(super) fn one_line(program: &str, error: &clap::Error) -> String {
     format!("{problem}; see `{program} --help`")
 }
 
+/// Whether an argument, as clap shows it, is needed whatever options are given: of options those that are declared so.
+fn is_always_needed(shown: &str, command: &Command) -> bool {
+    let named = |long: &str| shown == format!("--{long}") || shown.starts_with(&format!("--{long} "));
+    let option = command.get_arguments().find(|argument| argument.get_long().is_some_and(named));
+    option.map_or(!shown.starts_with("<--"), clap::Arg::is_required_set)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::{Arg, ArgAction, Command};
+    use clap::{Arg, ArgAction, ArgGroup};
 
     fn command() -> Command {
         Command::new("measure")
@@ -60,6 +73,9 @@ mod tests {
             .arg(Arg::new("dark").long("dark").action(ArgAction::SetTrue).conflicts_with("seed"))
             .arg(Arg::new("level").long("level").num_args(1).require_equals(true))
             .arg(Arg::new("output").long("output").required(true))
+            .arg(Arg::new("clip").long("clip").action(ArgAction::SetTrue).requires("dark"))
+            .arg(Arg::new("kappa").long("kappa").action(ArgAction::SetTrue).requires("any"))
+            .group(ArgGroup::new("any").args(["seed", "method"]).multiple(true))
     }
 
     #[test]
@@ -77,12 +93,17 @@ mod tests {
             ("a", "--output <output> is missing"),
             ("--output a --output b", "--output <output> is given twice"),
             ("--output a --dark --seed 1", "--dark and --seed <seed> exclude each other"),
+            ("--output a --clip", "--dark is missing, without which an option that is given has no effect"),
+            (
+                "--output a --kappa",
+                "--seed <seed> or --method <method> is missing, without which an option that is given has no effect",
+            ),
             ("--output a --size 1", "2 values required for '--size <size> <size>' but 1 was provided"),
             ("--output a --level 1", "equal sign is needed when assigning values to '--level=<level>'"),
         ] {
             let words = std::iter::once("measure").chain(line.split(' '));
             let error = command().try_get_matches_from(words).unwrap_err();
-            assert_eq!(one_line("measure", &error), format!("{wanted}; see `measure --help`"), "{line}");
+            assert_eq!(one_line("measure", &error, &command()), format!("{wanted}; see `measure --help`"), "{line}");
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Geometry, THREE_PLANES};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::stages::linearize::Linearize;
-use crate::stages::saturation::{MASK_LAYER, with_mask};
+use crate::stages::saturation::{MASK_BITS, MASK_LAYER, bits, with_mask};
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use std::fs::File;
@@ -94,8 +94,8 @@ pub struct FrameReader {
     /// The place of the layer of marks among the stored channels, where stages do not see it.
     mask: Option<usize>,
     keeps_mask: bool,
-    /// Pixels that the layer has marked so far, where stages do not see it.
-    marked: u64,
+    /// Pixels that the layer has marked so far, by [`MASK_BITS`], where stages do not see it.
+    marked: [u64; MASK_BITS.len()],
     /// The first channel that is kept; the others follow it.
     first_channel: usize,
     /// Column and row of the stored frame that are kept first.
@@ -214,7 +214,7 @@ impl FrameReader {
             notes,
             mask,
             keeps_mask: false,
-            marked: 0,
+            marked: [0; MASK_BITS.len()],
             first_channel,
             corner,
             has_begun: false,
@@ -277,9 +277,9 @@ impl FrameReader {
         is_there
     }
 
-    /// Pixels among those read so far that were made of saturated samples, as the frame's layer of marks says; of one that is
-    /// handed on ([`Self::keep_mask`]) none are counted here.
-    pub fn marked(&self) -> u64 {
+    /// Pixels among those read so far that the frame's layer of marks tells, by [`MASK_BITS`]; of one that is handed on
+    /// ([`Self::keep_mask`]) none are counted here.
+    pub fn marked(&self) -> [u64; MASK_BITS.len()] {
         self.marked
     }
 
@@ -372,7 +372,10 @@ impl RowSource for FrameReader {
                 if let Some(mask) = mask {
                     samples.extend_from_slice(plane(mask));
                 } else if let Some(mask) = self.mask {
-                    self.marked += plane(mask).iter().filter(|mark| **mark != 0.0).count() as u64;
+                    for mark in plane(mask).iter().map(|mark| bits(*mark)) {
+                        let counts = self.marked.iter_mut().zip(MASK_BITS);
+                        counts.for_each(|(count, (bit, _))| *count += u64::from(mark & bit != 0));
+                    }
                 }
             }
         }
@@ -625,7 +628,8 @@ mod tests {
         });
         let path = Some(written(directory.path(), &["R", "G", "B", MASK_LAYER], &metadata));
         let options = InputOptions { path, crop: Some(CROP), ..InputOptions::default() };
-        assert_eq!(read(&options).unwrap().0.marked(), 8);
+        // 332 to 335 and 432 to 435: each bit is set in half of them.
+        assert_eq!(read(&options).unwrap().0.marked(), [4; 4]);
         let mut reader = FrameReader::open(&options).unwrap();
         reader.keep_mask();
         let mut samples = Vec::new();

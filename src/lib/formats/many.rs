@@ -57,6 +57,11 @@ impl OneOfMany {
         all.into_iter().enumerate().map(open).collect()
     }
 
+    /// Its head, to which what a user says of it may be added.
+    pub fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.header
+    }
+
     /// What a careful user should know of it.
     pub fn notes(&self) -> &[String] {
         &self.notes

@@ -6,6 +6,7 @@ pub mod csv;
 pub mod data;
 pub mod digest;
 pub mod dng;
+pub mod exposure;
 pub mod exr;
 pub mod files;
 pub mod fits;

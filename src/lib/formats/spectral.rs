@@ -43,10 +43,14 @@ impl SpectralChannels {
             .filter_map(|(place, name)| channel_wavelength_nm(name).map(|nm| (nm, place)))
             .collect();
         if found.is_empty() {
-            return Err(frame.refuse(
+            let hint = match frame.geometry.channels.len() {
+                1 => "; of a gray picture store the plane three times, as R, G and B, for `render-radiance`",
+                _ => " (a picture in R, G, B goes into `render-radiance`)",
+            };
+            return Err(frame.refuse(format!(
                 "it holds no spectral radiance: no channel is named like S0.550,000000nm; give a spectrum as CSV or a \
-                 spectral EXR (a picture in R, G, B goes into `render-radiance`)",
-            ));
+                 spectral EXR{hint}"
+            )));
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (wavelength_nm, channels): (Vec<f64>, Vec<usize>) = found.into_iter().unzip();

@@ -49,7 +49,10 @@ pub const IIQ: FrameFormat = raw("a Phase One IIQ", |head| {
 pub const JPEG: FrameFormat = FrameFormat {
     name: "a JPEG",
     sign: Sign::Bytes(|head| head.starts_with(&[0xFF, 0xD8, 0xFF])),
-    reading: Reading::NotYet("convert it first, for example with `oiiotool in.jpg -o out.tif`"),
+    reading: Reading::NotYet(
+        "for measurements give the camera's raw file, which a JPEG was developed from; for a picture as a scene convert it, for \
+         example with `oiiotool in.jpg -o out.tif`",
+    ),
 };
 
 /// Compressions of their own: Sony's, Nikon's and Pentax's.

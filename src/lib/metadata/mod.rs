@@ -72,6 +72,9 @@ pub struct Metadata {
     /// The sensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<Sensor>,
+    /// The camera, as its raw file calls it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
     /// Exposure time and lens.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
@@ -143,6 +146,7 @@ impl Metadata {
             masked_areas: Vec::new(),
             white_level_adu: None,
             sensor: None,
+            camera: None,
             exposure: None,
             relative_matrix: None,
             scene: None,
@@ -179,6 +183,11 @@ impl Metadata {
     /// Whether its colors are on the scale of relative XYZ.
     pub fn is_relative(&self) -> bool {
         self.color.as_ref().is_some_and(ColorRecord::is_relative)
+    }
+
+    /// What its camera is called: by its sensor, and by its raw file.
+    pub fn camera_names(&self) -> impl Iterator<Item = &str> {
+        self.sensor.iter().map(|sensor| sensor.name.as_str()).chain(self.camera.as_deref())
     }
 
     /// The black level in ADU; none where none is known, or where it differs among photosites.

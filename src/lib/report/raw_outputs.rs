@@ -83,7 +83,7 @@ impl RawOutputs {
 fn matrix(reader: &FrameReader) -> Result<String> {
     let raw = reader.header();
     if let Some(matrix) = &raw.metadata.relative_matrix {
-        return characterization::matrix(&CameraMatrix::relative(matrix));
+        return characterization::matrix(&CameraMatrix::relative(matrix, raw.metadata.camera.as_deref()));
     }
     // Of a frame of ours the sensor has one.
     let Ok((matrix, _)) = own_matrix(raw) else {

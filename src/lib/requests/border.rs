@@ -1,5 +1,6 @@
 //! The black level as the masked border of a frame has it: photosites beside the active area, which no light reaches.
 
+use super::notes::Note;
 use crate::camera::levels::BlackLevel;
 use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
@@ -23,13 +24,13 @@ pub enum Border {
 /// Standard deviations beyond which photosites of the border do not count: hot ones, and those that light leaks into.
 const CLIP: f64 = 4.0;
 
-/// Reads a frame for the black level that its border has, and notes it in `frame`, the same frame's head.
+/// Reads a frame for the black level that its border has, and notes it in `frame`, the same frame's head; says what it is.
 ///
 /// # Errors
 ///
 /// [`Error::Usage`] for a frame that cannot be read twice; [`Error::Format`] for one of several planes, or whose metadata know no
 /// masked photosites, or none beside each row or column; those of the reader.
-pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Border) -> Result<()> {
+pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Border) -> Result<Note> {
     let is_file = options.path.as_deref().is_some_and(|path| path != Path::new("-"));
     if !is_file {
         return Err(Error::Usage("a frame whose border tells its black level is read twice; name a file".into()));
@@ -74,6 +75,7 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     let counts = sites.each_ref().map(Vec::len);
     let scatter =
         sites.each_ref().map(|of_site| clipped_variance(&mut of_site.clone(), CLIP)).iter().sum::<f64>() / 4.0;
+    let count: usize = counts.iter().sum();
     let levels = sites.map(|mut of_site| average(Combine::Clipped, &mut of_site, CLIP).0);
     // Of a mean of so many, the fewest that one has.
     let of_mean = |fewest: Option<usize>| fewest.map_or(0.0, |count| scatter / count.max(1) as f64);
@@ -103,6 +105,27 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     let level = BlackLevel::Sites(levels);
     let metadata = &mut frame.metadata;
     metadata.set_black_adu(Some(level.uniform().map_or(level, BlackLevel::from)));
+    let lines = match border {
+        Border::Whole => String::new(),
+        Border::Rows => format!("; rows are off by {}", range_of(&by_row[first_of(origin[1])..])),
+        Border::Columns => format!("; columns are off by {}", range_of(&by_column[first_of(origin[0])..])),
+    };
     (metadata.black_by_row, metadata.black_by_column) = (by_row, by_column);
-    Ok(())
+    let [a, b, c, d] = levels;
+    Ok(Note::Remark(format!(
+        "{}: the {count} photosites of its border read {a:.3}, {b:.3}, {c:.3} and {d:.3} ADU at the 2x2 sites, row by row{lines}",
+        frame.name
+    )))
+}
+
+/// Where the lines of a frame begin among those of the sensor, none of which come before its corner.
+fn first_of(origin: i32) -> usize {
+    usize::try_from(origin).unwrap_or_default()
+}
+
+/// The smallest and the largest of some numbers of ADU, in words.
+fn range_of(off: &[f64]) -> String {
+    let [low, high] =
+        off.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], off| [low.min(*off), high.max(*off)]);
+    format!("{low:.3} to {high:.3} ADU")
 }

@@ -1,5 +1,6 @@
 //! Comparing colors: of images, or given as numbers.
 
+use super::conversion::doubt_of_white;
 use super::notes::{self, Note};
 use super::values;
 use crate::analysis::comparison::{Comparison, ComparisonSettings, Side};
@@ -8,6 +9,9 @@ use crate::error::Result;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::pipe;
 use crate::formats::register::check_inputs;
+use crate::metadata::Metadata;
+use crate::stream::RowSource;
+use crate::units::RELATIVE_UNIT;
 use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use std::ffi::OsString;
@@ -112,6 +116,9 @@ impl ColorPair {
             let text = "both are L*a*b* already; --white and --white-luminance have no effect";
             notes.push(Note::Warning(text.into()));
         }
+        let is_relative = |metadata: &Metadata| metadata.is_relative() || metadata.unit == RELATIVE_UNIT;
+        let is_relative = comparison.frames().any(|frame| is_relative(&frame.header().metadata));
+        notes.extend(white.and_then(|white| doubt_of_white(white, is_relative)));
         notes.extend(comparison.frames().flat_map(notes::of_reader));
         Ok((comparison, notes))
     }

@@ -1,5 +1,6 @@
 //! Turning camera frames into colors, by a matrix file or the matrix that comes with the frame; and XYZ into other spaces.
 
+use super::described::{SaidExposure, apply_black};
 use super::notes::Note;
 use super::options::{Output, WhiteChoice};
 use super::values::{self, LightColor};
@@ -16,7 +17,7 @@ use crate::names::Named;
 use crate::stages::from_xyz::{Adapting, COVARIANCE_LAYER, FromXyz, XyzSettings, layers_of, scene_white};
 use crate::stages::to_xyz::{ColorSettings, ToXyz};
 use crate::stream::RowSource;
-use crate::units::QuantityKind;
+use crate::units::{QuantityKind, RELATIVE_UNIT};
 use clap::Args;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -48,7 +49,7 @@ pub struct Conversion {
     #[arg(long, value_name = "LIGHT", value_parser = values::light, requires = "adapt_to")]
     pub scene_white: Option<LightColor>,
     /// Transform of the adaptation
-    #[arg(long, value_name = "NAME", default_value = Adaptation::default().name(), value_parser = values::choice::<Adaptation>())]
+    #[arg(long, value_name = "NAME", default_value = Adaptation::default().name(), value_parser = values::choice::<Adaptation>(), requires = "adapt_to")]
     pub adaptation: Adaptation,
     /// The white of L\*a\*b\* and sRGB.
     #[command(flatten)]
@@ -88,25 +89,16 @@ impl Conversion {
     ///
     /// # Errors
     ///
-    /// Those of [`Exposure::checked`] and [`ToXyz::new`]; [`Error::Usage`] for another black level than the metadata state,
-    /// and where there is no matrix, or no light of the scene to adapt from.
+    /// Those of [`apply_black`], [`SaidExposure::apply`] and [`ToXyz::new`]; [`Error::Usage`] where there is no matrix, or no
+    /// light of the scene to adapt from.
     pub fn stage(&self, matrix: Option<CameraMatrix>, frame: &mut FrameHeader) -> Result<(ToXyz, Vec<Note>)> {
+        self.white.check()?;
         if let Some(black) = self.black {
-            if frame.black_levels()?.is_some_and(|known| known.uniform() != Some(black)) {
-                let problem = format!("{}: its metadata state another black level than {black}", frame.name);
-                return Err(Error::Usage(problem).leave_out(&["black"]));
-            }
-            frame.metadata.set_black_adu(Some(black.into()));
+            apply_black(frame, black)?;
         }
-        let metadata = &mut frame.metadata;
-        let known = metadata.exposure;
-        let exposure_s = self.exposure_s.or(known.map(|e| e.exposure_s));
-        let f_number = self.f_number.or(known.map(|e| e.f_number));
-        let lens_transmittance = self.lens_transmittance.or(known.map(|e| e.lens_transmittance)).unwrap_or(1.0);
-        if let Some((exposure_s, f_number)) = exposure_s.zip(f_number) {
-            metadata.exposure = Some(Exposure { exposure_s, f_number, lens_transmittance }.checked()?);
-        }
-        let long = metadata.exposure.and_then(Exposure::doubt).filter(|_| self.exposure_s.is_some());
+        let Self { exposure_s, f_number, lens_transmittance, .. } = *self;
+        SaidExposure { exposure_s, f_number, lens_transmittance }.apply(frame)?;
+        let long = frame.metadata.exposure.and_then(Exposure::doubt).filter(|_| self.exposure_s.is_some());
         let mut notes: Vec<Note> = long.map(Note::Warning).into_iter().collect();
         let matrix = match matrix {
             Some(matrix) => matrix,
@@ -149,6 +141,7 @@ impl Conversion {
         if reader.header().metadata.quantity != QuantityKind::Xyz {
             return Ok(None);
         }
+        self.white.check()?;
         let name = reader.header().name.clone();
         let of_cameras: [(&'static [&'static str], bool); 5] = [
             (&["matrix"], self.matrix.is_some()),
@@ -218,27 +211,30 @@ impl Conversion {
     /// What may not be meant about a matrix and a frame.
     fn doubts(&self, matrix: &CameraMatrix, frame: &FrameHeader) -> Vec<Note> {
         let mut notes = Vec::new();
-        if let (Some(file), Some(of_matrix), Some(sensor)) = (&self.matrix, &matrix.sensor, &frame.metadata.sensor)
-            && *of_matrix != sensor.name
+        let mut known = frame.metadata.camera_names().peekable();
+        if let (Some(file), Some(of_matrix), Some(of_frame)) = (&self.matrix, &matrix.sensor, known.peek().copied())
+            && known.all(|name| !name.eq_ignore_ascii_case(of_matrix))
         {
-            let of_frame = &sensor.name;
             let shown = file.display();
             let text = format!("{shown} was fitted for the sensor {of_matrix}, but the frame comes from {of_frame}");
             notes.push(Note::Warning(text));
         }
-        notes.extend(doubt_of_white(self.white.white, matrix));
+        notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
         notes
+    }
+
+    /// What may not be meant about a frame of XYZ.
+    pub fn doubt_of_xyz(&self, frame: &FrameHeader) -> Option<Note> {
+        doubt_of_white(self.white.white, frame.metadata.unit == RELATIVE_UNIT)
     }
 }
 
-/// A warning of a white that is too bright to be meant on the scale of relative XYZ.
-pub(super) fn doubt_of_white(white: White, matrix: &CameraMatrix) -> Option<Note> {
+/// A warning of a white that is too bright to be meant on the scale of XYZ that are relative.
+pub(super) fn doubt_of_white(white: White, is_relative: bool) -> Option<Note> {
     match white {
-        White::Absolute([_, luminance, _]) if matrix.is_relative() && luminance > BRIGHT_WHITE => {
-            Some(Note::Warning(format!(
-                "the white has Y = {luminance}, but XYZ are relative: Y = 1 is the white by which the camera saturates"
-            )))
-        }
+        White::Absolute([_, luminance, _]) if is_relative && luminance > BRIGHT_WHITE => Some(Note::Warning(format!(
+            "the white has Y = {luminance}, but XYZ are relative: Y = 1 is the white by which the camera saturates"
+        ))),
         _ => None,
     }
 }
@@ -259,7 +255,7 @@ pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
         }
         (_, Some(relative)) => {
             let note = format!("{}: no --matrix is named; XYZ are relative, by {}", frame.name, relative.method);
-            Ok((CameraMatrix::relative(relative), Note::Remark(note)))
+            Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Remark(note)))
         }
         (_, None) => {
             let problem = format!("{}: neither its sensor nor its raw file tells a matrix", frame.name);

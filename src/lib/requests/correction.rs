@@ -1,6 +1,8 @@
 //! Corrections of a frame of codes before demosaicking.
 
 use super::border::measure_black;
+use super::described::{Described, doubt_of_black};
+use super::independence::{Company, Role, check_files};
 use super::notes::Note;
 use super::options::{Input, SensorChoice};
 use super::values::{self, BlackChoice};
@@ -18,8 +20,8 @@ use crate::stages::darks::{DarkFrames, DarkSettings};
 use crate::stages::defects::{DefectMap, beyond_chance, lost_beyond};
 use crate::stages::flats::FlatFrames;
 use crate::stages::masters::Averaging;
-use crate::stream::Stage;
-use clap::Args;
+use crate::stream::{RowSource, Stage};
+use clap::{ArgGroup, Args};
 use std::path::{Path, PathBuf};
 
 /// The share of a variance that limits may take unsaid.
@@ -27,6 +29,7 @@ const LEAST_LOST: f64 = 1e-3;
 
 /// What is corrected, and by which frames.
 #[derive(Debug, Clone, Args)]
+#[command(group = ArgGroup::new("averaged").args(["dark", "bias", "flat"]).multiple(true))]
 pub struct Correction {
     /// Make codes proportional to charge first, those of darks, bias frames and flats too, by the `linearization` of the sensor
     #[arg(long)]
@@ -63,12 +66,12 @@ pub struct Correction {
     #[arg(long, value_name = "FILE", requires = "flat")]
     pub flat_dark: Vec<PathBuf>,
     /// How frames of a kind are averaged: mean, median, or clipped, the mean without outliers
-    #[arg(long, default_value = "mean", value_parser = values::choice::<Combine>())]
+    #[arg(long, default_value = "mean", value_parser = values::choice::<Combine>(), requires = "averaged")]
     pub combine: Combine,
     /// Standard deviations from the median beyond which `clipped` leaves samples out, again and again; of N samples none
-    /// lies farther off than the root of N
-    #[arg(long, default_value_t = CLIP, value_name = "KAPPA", value_parser = values::positive)]
-    pub clip: f64,
+    /// lies farther off than the root of N; by default 3
+    #[arg(long, value_name = "KAPPA", value_parser = values::positive)]
+    pub clip: Option<f64>,
     /// Defective photosites to interpolate: a frame that is not zero there, or a list (.txt, .csv) of column,row on the sensor
     #[arg(long, value_name = "FILE")]
     pub defects: Option<PathBuf>,
@@ -92,13 +95,47 @@ pub struct OpenCorrection {
     pub notes: Vec<Note>,
 }
 
+/// The frame that is corrected, where it comes from, and what is said of it.
+struct Light<'a> {
+    frame: &'a FrameHeader,
+    input: &'a Input,
+    described: &'a Described,
+}
+
+impl Light<'_> {
+    /// A complaint about an exposure that a frame beside this one does not tell, which no option supplies.
+    fn in_its_own(&self, error: Error) -> Error {
+        match error {
+            Error::MissingKey { file, key: "exposure" } if file != self.frame.name => {
+                let problem =
+                    format!("the metadata has no `exposure`; write it into {file}.yaml, as --metadata-template shows");
+                Error::format(&file, problem)
+            }
+            other => other,
+        }
+    }
+}
+
 impl Correction {
-    /// Makes sure that files can be read as often as they must.
+    /// Makes sure that options have an effect, that no frame stands for two, and that files can be read as often as they must.
     ///
     /// # Errors
     ///
     /// [`Error::Usage`].
     pub fn check(&self, input: &Input) -> Result<()> {
+        if self.clip.is_some() && self.combine != Combine::Clipped {
+            let problem = "only `--combine clipped` leaves samples out";
+            return Err(Error::Usage(problem.into()).leave_out(&["clip"]));
+        }
+        let kinds = [
+            (Role::Dark, &self.dark),
+            (Role::Bias, &self.bias),
+            (Role::Flat, &self.flat),
+            (Role::FlatDark, &self.flat_dark),
+        ];
+        let files = kinds.into_iter().flat_map(|(role, paths)| paths.iter().map(move |path| (role, path.as_path())));
+        let light = input.input.as_deref().map(|path| (Role::Light, path));
+        check_files(&light.into_iter().chain(files).collect::<Vec<_>>())?;
         let lists = [&self.dark, &self.bias, &self.flat, &self.flat_dark];
         let once = lists.into_iter().flatten().chain(&self.defects).map(PathBuf::as_path);
         check_inputs(once.map(Some).chain([input.input.as_deref()]))?;
@@ -148,7 +185,7 @@ impl Correction {
     }
 
     fn settings(&self) -> DarkSettings {
-        let averaging = Averaging { combine: self.combine, clip: self.clip };
+        let averaging = Averaging { combine: self.combine, clip: self.clip.unwrap_or(CLIP) };
         DarkSettings { averaging, is_scaled: self.scale_dark }
     }
 
@@ -165,12 +202,29 @@ impl Correction {
         OneOfMany::open_all(options, others)
     }
 
-    fn darks(&self, frame: &FrameHeader, input: &Input) -> Result<Option<DarkFrames<OneOfMany>>> {
-        let linearize = self.linearizing(frame);
-        let frames = |paths: &[PathBuf]| self.open_frames(paths, input, &linearize);
+    /// Opens frames of a kind, which join `company`; those that do not say their array or white level have what is said of
+    /// the frame.
+    fn frames(&self, role: Role, light: &Light, company: &mut Company) -> Result<Vec<OneOfMany>> {
+        let paths = match role {
+            Role::Light => return Ok(Vec::new()),
+            Role::Dark => &self.dark,
+            Role::Bias => &self.bias,
+            Role::Flat => &self.flat,
+            Role::FlatDark => &self.flat_dark,
+        };
+        let mut frames = self.open_frames(paths, light.input, &self.linearizing(light.frame))?;
+        for frame in &mut frames {
+            light.described.apply_beside(frame.header_mut())?;
+        }
+        company.add(role, frames.iter().map(OneOfMany::header));
+        Ok(frames)
+    }
+
+    fn darks(&self, light: &Light, company: &mut Company) -> Result<Option<DarkFrames<OneOfMany>>> {
         // Bias frames beside darks that are not scaled may be those of flats.
-        let biases = if self.is_bias_of_flats() { Vec::new() } else { frames(&self.bias)? };
-        DarkFrames::matched(frame, frames(&self.dark)?, biases, self.settings())
+        let biases = if self.is_bias_of_flats() { Vec::new() } else { self.frames(Role::Bias, light, company)? };
+        let darks = self.frames(Role::Dark, light, company)?;
+        DarkFrames::matched(light.frame, darks, biases, self.settings()).map_err(|error| light.in_its_own(error))
     }
 
     /// How the codes of frames beside `frame` are read.
@@ -185,18 +239,25 @@ impl Correction {
         !self.dark.is_empty() && !self.scale_dark && !self.flat.is_empty() && self.flat_dark.is_empty()
     }
 
-    fn flats(&self, frame: &FrameHeader, input: &Input) -> Result<Option<FlatFrames<OneOfMany>>> {
-        let linearize = self.linearizing(frame);
-        let frames = |paths: &[PathBuf]| self.open_frames(paths, input, &linearize);
+    fn flats(&self, light: &Light, company: &mut Company) -> Result<Option<FlatFrames<OneOfMany>>> {
         let is_scaled = self.scale_dark && !self.flat_dark.is_empty();
         let needs_bias = self.flat_dark.is_empty() || is_scaled;
-        let biases = if needs_bias { frames(&self.bias)? } else { Vec::new() };
-        let black = match self.black(frame) {
+        let biases = if needs_bias { self.frames(Role::Bias, light, company)? } else { Vec::new() };
+        let darks = self.frames(Role::FlatDark, light, company)?;
+        let flats = self.frames(Role::Flat, light, company)?;
+        let black = match self.black(light.frame) {
             Black::Level(level) => Some(crate::camera::levels::BlackLevels::uniform_at(level)),
             _ => None,
         };
         let settings = DarkSettings { is_scaled, ..self.settings() };
-        FlatFrames::of(frame, frames(&self.flat)?, [frames(&self.flat_dark)?, biases], black, settings, self.cte)
+        let found = FlatFrames::of(light.frame, flats, [darks, biases], black, settings, self.cte);
+        found.map_err(|error| match error {
+            // Beside frames that come off there is no --black.
+            Error::MissingKey { file, key: "black_level_adu" } if !self.dark.is_empty() => {
+                Error::format(&file, "nothing tells what no light reads in it").give(&["flat_dark", "bias"])
+            }
+            other => light.in_its_own(other),
+        })
     }
 
     fn map(&self, frame: &FrameHeader, input: &Input) -> Result<Option<DefectMap<OneOfMany>>> {
@@ -213,17 +274,23 @@ impl Correction {
     }
 
     /// Opens what `frame` is corrected by, and reads flats, and frames in which defects are found, for what they are on the
-    /// whole.
+    /// whole. `described` is what a user says of the frame.
     ///
     /// # Errors
     ///
-    /// Those of the frames and of [`CorrectFrame::new`]; [`Error::Usage`] for what makes no sense.
-    pub fn open(&self, frame: &mut FrameHeader, input: &Input) -> Result<OpenCorrection> {
-        if let BlackChoice::Border(border) = self.black_choice {
-            measure_black(frame, &input.options(), border)?;
+    /// Those of the frames, of [`Company::check`] and of [`CorrectFrame::new`]; [`Error::Usage`] for what makes no sense.
+    pub fn open(&self, frame: &mut FrameHeader, input: &Input, described: &Described) -> Result<OpenCorrection> {
+        let mut notes = Vec::new();
+        match self.black_choice {
+            BlackChoice::Border(border) => notes.push(measure_black(frame, &input.options(), border)?),
+            BlackChoice::Known(black) => notes.extend(doubt_of_black(frame, black)),
         }
         let frame = &*frame;
-        let darks = self.darks(frame, input)?;
+        let light = &Light { frame, input, described };
+        let mut company = Company::default();
+        company.add(Role::Light, [frame]);
+        let again = &mut Company::default();
+        let darks = self.darks(light, &mut company)?;
         let is_more = !self.flat.is_empty() || self.defects.is_some() || self.linearize;
         if !self.flat.is_empty() && darks.is_none() && self.black(frame) == Black::None {
             let problem = "a flat field divides what is above black, which must come off first";
@@ -234,18 +301,19 @@ impl Correction {
         let geometry = &frame.geometry;
         let samples = (geometry.row_samples() * geometry.height) as u64;
         let beyond = self.find_defects.map(|given| given.unwrap_or_else(|| beyond_chance(samples)));
-        let dark_limits = match beyond.zip(self.darks(frame, input).transpose()) {
+        let flats = self.flats(light, &mut company)?;
+        let mut warnings = [stage.warnings(), &company.check()?].concat();
+        let dark_limits = match beyond.zip(self.darks(light, again).transpose()) {
             Some((beyond, darks)) => Some(darks?.survey(beyond)?),
             None => None,
         };
-        let flats = match self.flats(frame, input)? {
+        let flats = match flats {
             Some(flats) => {
                 let means = flats.survey(beyond)?;
-                self.flats(frame, input)?.map(|flats| (flats, means))
+                self.flats(light, again)?.map(|flats| (flats, means))
             }
             None => None,
         };
-        let mut warnings: Vec<String> = stage.warnings().to_vec();
         if let Some((flats, means)) = &flats {
             warnings.extend_from_slice(flats.warnings());
             if means.full > 0 {
@@ -279,7 +347,9 @@ impl Correction {
         });
         stage.note_further(flats.as_ref().map(|(flats, means)| flats.record(means)), defects);
         let map = self.map(frame, input)?;
-        let notes = warnings.into_iter().map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)).collect();
+        let list = self.defects.as_deref().map(|path| path.display().to_string()).unwrap_or_default();
+        warnings.extend(map.as_ref().and_then(|map| map.doubt(&list, frame)));
+        notes.extend(warnings.into_iter().map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)));
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
         Ok(OpenCorrection { stage, corrections, notes })
     }
@@ -288,7 +358,7 @@ impl Correction {
 impl OpenCorrection {
     /// What was found while the frame was corrected.
     pub fn findings(&self) -> Vec<Note> {
-        let Corrections { darks, dark_limits, flats, found, .. } = &self.corrections;
+        let Corrections { darks, dark_limits, flats, map, found } = &self.corrections;
         let clipped =
             darks.as_ref().map_or(0, DarkFrames::clipped) + flats.as_ref().map_or(0, |(flats, _)| flats.clipped());
         let [off, unstable, dead] = found;
@@ -300,7 +370,8 @@ impl OpenCorrection {
                 )
             }),
         ];
-        said.into_iter().flatten().map(Note::Remark).collect()
+        let doubt = map.as_ref().and_then(DefectMap::finding).map(Note::Warning);
+        said.into_iter().flatten().map(Note::Remark).chain(doubt).collect()
     }
 
     /// The head of the frame that is made.

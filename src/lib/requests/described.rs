@@ -1,12 +1,15 @@
 //! What a user says of a frame that does not say it itself.
 
+use super::notes::Note;
 use super::options::Input;
 use super::values;
+use crate::camera::levels::BlackLevel;
 use crate::camera::optics::Exposure;
-use crate::cfa::FilterArray;
+use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::metadata::{FrameHeader, Metadata};
+use crate::stages::black::Black;
 use crate::units::QuantityKind;
 use clap::Args;
 
@@ -107,29 +110,120 @@ impl Described {
             agree(frame, "white level", known.map(|known| in_words(&known.classes())), &["white"])?;
             frame.metadata.white_level_adu = Some(white.into());
         }
+        let Self { exposure_s, f_number, .. } = *self;
+        SaidExposure { exposure_s, f_number, lens_transmittance: None }.apply(frame)
+    }
+}
+
+/// What is said of an exposure.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SaidExposure {
+    /// Exposure time in s.
+    pub exposure_s: Option<f64>,
+    /// Relative aperture.
+    pub f_number: Option<f64>,
+    /// Transmittance of the lens, 0 to 1. Of frames that were not rendered it is 1 in metadata where it is not known, and may
+    /// be another.
+    pub lens_transmittance: Option<f64>,
+}
+
+impl SaidExposure {
+    /// Puts what is said into the metadata of a frame.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where the metadata say another thing, for a part of an exposure without the others, and for impossible
+    /// ones.
+    pub fn apply(self, frame: &mut FrameHeader) -> Result<()> {
+        if self == Self::default() {
+            return Ok(());
+        }
         let known = frame.metadata.exposure;
         let other = |said: Option<f64>, known: Option<f64>| {
             let differs = |known: &f64| said.is_some_and(|said| (said / known - 1.0).abs() > SAME_EXPOSURE);
             known.filter(differs).map(|known| known.to_string())
         };
         let [time, f_number] = [known.map(|known| known.exposure_s), known.map(|known| known.f_number)];
+        let is_stated = |passed: &f64| *passed != 1.0 || frame.metadata.scene.is_some();
+        let passed = known.map(|known| known.lens_transmittance).filter(is_stated);
         agree(frame, "exposure time in s", other(self.exposure_s, time), &["exposure"])?;
         agree(frame, "f-number", other(self.f_number, f_number), &["f_number"])?;
-        let said = self.exposure_s.is_some() || self.f_number.is_some();
+        agree(frame, "transmittance of the lens", other(self.lens_transmittance, passed), &["lens_transmittance"])?;
         let [exposure_s, f_number] = [time.or(self.exposure_s), f_number.or(self.f_number)];
-        let lens_transmittance = known.map_or(1.0, |exposure| exposure.lens_transmittance);
-        match exposure_s.zip(f_number) {
-            Some((exposure_s, f_number)) if said => {
-                frame.metadata.exposure = Some(Exposure { exposure_s, f_number, lens_transmittance }.checked()?);
-            }
-            None if said => {
-                let other = if self.f_number.is_none() { &["f_number"] } else { &["exposure"] };
-                let problem = format!("{}: an exposure is a time and an f-number, and one is not known", frame.name);
-                return Err(Error::Usage(problem).give(other));
-            }
-            _ => {}
-        }
+        let lens_transmittance = passed.or(self.lens_transmittance).unwrap_or(1.0);
+        let Some((exposure_s, f_number)) = exposure_s.zip(f_number) else {
+            let missing: &[_] = match (exposure_s, f_number) {
+                (None, None) => &["exposure", "f_number"],
+                (Some(_), _) => &["f_number"],
+                _ => &["exposure"],
+            };
+            let problem = format!("{}: an exposure is a time and an f-number, and one is not known", frame.name);
+            return Err(Error::Usage(problem).give(missing));
+        };
+        frame.metadata.exposure = Some(Exposure { exposure_s, f_number, lens_transmittance }.checked()?);
         Ok(())
+    }
+}
+
+/// Puts a black level into the metadata of a frame.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where the metadata say another.
+pub fn apply_black(frame: &mut FrameHeader, black: f64) -> Result<()> {
+    let known = frame.black_levels()?.filter(|known| known.uniform() != Some(black));
+    agree(frame, "black level", known.map(|known| in_words(&known.level().sites())), &["black"])?;
+    frame.metadata.set_black_adu(Some(black.into()));
+    Ok(())
+}
+
+/// Makes sure that a pattern is that of the plane, where its metadata name one.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_pattern(frame: &FrameHeader, pattern: CfaPattern) -> Result<()> {
+    let known = frame.metadata.cfa.filter(|known| known.bayer() != Some(pattern));
+    agree(frame, "filter array", known.map(|known| known.to_string()), &["pattern"])
+}
+
+/// A warning of a level to subtract that is not what the metadata say of no light.
+pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Option<Note> {
+    let Black::Level(level) = black else { return None };
+    let levels = match frame.metadata.quantity {
+        QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
+            frame.metadata.dark_signal_e.map(|level| [level; 4])
+        }
+        _ => frame.metadata.black_level_adu.map(BlackLevel::sites),
+    }?;
+    let [low, high] = levels.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], at| [l.min(*at), h.max(*at)]);
+    // A level that is rounded, or one for four sites, is meant.
+    let is_near = (low.floor()..=high.ceil()).contains(&level);
+    (!is_near).then(|| {
+        Note::Warning(format!(
+            "{}: --black {level} is not the black level of its metadata, {}, which --black auto takes",
+            frame.name,
+            in_words(&levels)
+        ))
+    })
+}
+
+impl Described {
+    /// Puts the array and the white level that are said of a frame into the metadata of one beside it, of the same camera,
+    /// where they do not say.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::apply`].
+    pub fn apply_beside(&self, frame: &mut FrameHeader) -> Result<()> {
+        let (metadata, is_plane) = (&frame.metadata, frame.geometry.channels.len() == 1);
+        let are_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
+        let said = Self {
+            cfa: self.cfa.filter(|_| metadata.cfa.is_none() && is_plane),
+            white_level_adu: self.white_level_adu.filter(|_| metadata.white_level_adu.is_none() && are_codes),
+            ..Self::default()
+        };
+        said.apply(frame)
     }
 }
 
@@ -154,9 +248,7 @@ impl DescribedWithBlack {
         self.described.apply(frame)?;
         if let Some(black) = self.black_level_adu {
             check_codes(frame, &["black"])?;
-            let known = frame.black_levels()?.filter(|known| known.uniform() != Some(black));
-            agree(frame, "black level", known.map(|known| in_words(&known.level().sites())), &["black"])?;
-            frame.metadata.set_black_adu(Some(black.into()));
+            apply_black(frame, black)?;
         }
         Ok(())
     }
@@ -197,7 +289,6 @@ fn in_words(levels: &[f64]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::levels::BlackLevel;
     use crate::frame::Geometry;
 
     fn frame(quantity: QuantityKind, channels: &[&str]) -> FrameHeader {

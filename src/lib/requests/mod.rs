@@ -23,6 +23,7 @@ pub mod conversion;
 pub mod correction;
 pub mod described;
 pub mod fit;
+pub mod independence;
 pub mod options;
 pub mod prediction;
 pub mod values;

@@ -29,12 +29,17 @@ impl Note {
     }
 }
 
-/// A warning of pixels that a frame marks as made of saturated samples, if those read were any.
-pub fn of_marks(reader: &FrameReader) -> Option<Note> {
-    let (name, pixels) = (&reader.header().name, reader.marked());
-    let text =
-        || format!("{name}: {pixels} of the pixels read were made of saturated samples; they are taken as they are");
-    (pixels > 0).then(|| Note::Warning(text()))
+/// Warnings of pixels that a frame marks, by what for, if those read were any.
+pub fn of_marks(reader: &FrameReader) -> Vec<Note> {
+    let name = &reader.header().name;
+    let [saturated, defective, corrected, beyond] = reader.marked();
+    let kinds = [
+        (saturated, "were made of saturated samples"),
+        (defective.max(corrected), "are, or used, defective photosites"),
+        (beyond, "are beyond the model of a correction"),
+    ];
+    let text = |(pixels, what)| format!("{name}: {pixels} of the pixels read {what}; they are taken as they are");
+    kinds.into_iter().filter(|(pixels, _)| *pixels > 0).map(text).map(Note::Warning).collect()
 }
 
 /// What came up among statistics.

@@ -7,7 +7,7 @@ use crate::analysis::statistics::Region;
 use crate::camera::optics::Exposure;
 use crate::color::White;
 use crate::color::rgb::{Encoding, Primaries};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::formats::data;
 use crate::formats::headerless::Layout;
 use crate::formats::input::{FrameReader, InputOptions};
@@ -228,13 +228,13 @@ impl SignalLevel {
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 pub struct SpectrumChoice {
     /// Unit of the radiance, such as "W m-2 sr-1 nm-1"; by default what the file says, or W cm-2 sr-1 nm-1
-    #[arg(long, value_name = "UNIT", value_parser = values::radiance_unit)]
+    #[arg(long, value_name = "UNIT", value_parser = values::radiance_unit, conflicts_with_all = ["electrons", "dark"])]
     pub radiance_unit: Option<RadianceUnit>,
     /// Column of the spectrum in a table
-    #[arg(long, value_name = "NAME", conflicts_with = "sample")]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["sample", "electrons", "dark"])]
     pub column: Option<String>,
     /// One spectrum of a library, counted from 0 (pixels row by row)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with_all = ["electrons", "dark"])]
     pub sample: Option<usize>,
 }
 
@@ -356,4 +356,20 @@ pub struct WhiteChoice {
     /// Luminance of the white d65, d50 or e in cd/m2; by default that at which the camera saturates
     #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
     pub white_luminance: Option<f64>,
+}
+
+impl WhiteChoice {
+    /// Makes sure that a luminance is given to a white that has none of its own.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`].
+    pub fn check(&self) -> Result<()> {
+        match self.white {
+            White::Absolute(_) if self.white_luminance.is_some() => {
+                Err(Error::Usage("a white of X,Y,Z has its luminance already".into()).leave_out(&["white_luminance"]))
+            }
+            _ => Ok(()),
+        }
+    }
 }

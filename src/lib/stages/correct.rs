@@ -81,7 +81,15 @@ impl CorrectFrame {
         let known_black = input.black_levels()?;
         let levels = match black {
             Black::None if darks.is_none() && cte.is_none() && !is_more => {
-                return Err(Error::Usage("there is nothing to correct".into()).give(&["black", "dark", "cte"]));
+                return Err(Error::Usage("there is nothing to correct".into()).give(&[
+                    "black",
+                    "dark",
+                    "bias",
+                    "flat",
+                    "defects",
+                    "linearize",
+                    "cte",
+                ]));
             }
             Black::None => BlackLevels::uniform_at(0.0),
             _ if darks.is_some() => {

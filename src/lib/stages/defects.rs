@@ -1,7 +1,7 @@
 //! Defective photosites: told by a map, found among dark frames and flats, and interpolated within their class.
 
 use crate::error::{Error, Result};
-use crate::frame::{Rows, Window, to_sample};
+use crate::frame::{Geometry, Rows, Window, to_sample};
 use crate::metadata::FrameHeader;
 use crate::numerics::normal::{cumulative, density};
 use crate::stages::saturation::{CORRECTED, DEFECTIVE, SATURATED, bits, with_mask};
@@ -12,11 +12,14 @@ use std::collections::BTreeSet;
 
 /// Defective photosites that a user knows.
 pub enum DefectMap<S> {
-    /// A frame of the same size whose samples are not zero there.
-    Frame(S),
-    /// Columns and rows of the frame, in rows.
+    /// A frame of the same size whose samples are not zero there, and how many were not so far.
+    Frame(S, usize),
+    /// Columns and rows of the frame, in rows, and what may not be meant about them.
     List(BTreeSet<[usize; 2]>),
 }
+
+/// A frame whose samples are not zero at more than one photosite in so many is no map of defects.
+const MOST_IN: usize = 2;
 
 impl<S: RowSource> DefectMap<S> {
     /// A frame as a map of `frame`.
@@ -35,10 +38,11 @@ impl<S: RowSource> DefectMap<S> {
                 size(theirs.width, theirs.height)
             )));
         }
-        Ok(Self::Frame(map))
+        Ok(Self::Frame(map, 0))
     }
 
-    /// A list of columns and rows on the sensor, `x,y` in each line; what follows `#` does not count.
+    /// A list of columns and rows on the sensor, `x,y` in each line; what follows `#` does not count, nor do photosites that a
+    /// crop leaves out.
     ///
     /// # Errors
     ///
@@ -73,11 +77,42 @@ impl<S: RowSource> DefectMap<S> {
         Ok(Self::List(found))
     }
 
+    /// A warning of a list, `name`, of which nothing is in `frame`.
+    pub fn doubt(&self, name: &str, frame: &FrameHeader) -> Option<String> {
+        let Self::List(found) = self else { return None };
+        let Geometry { width, height, origin: [left, top], .. } = frame.geometry;
+        found.is_empty().then(|| {
+            format!(
+                "{name}: no photosite that it lists is in {}, whose {width}x{height} begin at column {left}, row {top} of the sensor",
+                frame.name
+            )
+        })
+    }
+
+    /// A warning of a frame that marked nothing, once all its rows are read.
+    pub fn finding(&self) -> Option<String> {
+        let Self::Frame(map, 0) = self else { return None };
+        Some(format!("{}: it is 0 everywhere, and marks no photosite as defective", map.header().name))
+    }
+
+    /// Makes sure, once the last row is read, that a frame is a map.
+    fn check_share(&self, rows_read: usize) -> Result<()> {
+        let Self::Frame(map, marked) = self else { return Ok(()) };
+        let Geometry { width, height, .. } = map.header().geometry;
+        if rows_read < height || marked * MOST_IN <= width * height {
+            return Ok(());
+        }
+        Err(map.header().refuse(format!(
+            "{marked} of its {} samples are not 0, and would be defective photosites; a map is 0 where photosites are good",
+            width * height
+        )))
+    }
+
     /// Marks the photosites of the rows from `first` on in the last channel of `samples`.
     fn mark(&mut self, [first, rows, width]: [usize; 3], samples: &mut [f32], buffer: &mut Vec<f32>) -> Result<()> {
         let row_samples = samples.len() / rows.max(1);
         match self {
-            Self::Frame(map) => {
+            Self::Frame(map, marked) => {
                 let of_map = map.header().geometry.row_samples();
                 buffer.clear();
                 map.read(rows, buffer)?;
@@ -85,6 +120,7 @@ impl<S: RowSource> DefectMap<S> {
                     let marks = &mut row[row_samples - width..];
                     for (mark, _) in marks.iter_mut().zip(&map[..width]).filter(|(_, sample)| **sample != 0.0) {
                         add(mark, DEFECTIVE);
+                        *marked += 1;
                     }
                 }
             }
@@ -128,7 +164,7 @@ impl<S: RowSource> RowSource for Mapped<'_, S> {
     }
 
     fn may_wait(&self) -> bool {
-        let waits = if let DefectMap::Frame(map) = &*self.map { map.may_wait() } else { false };
+        let waits = if let DefectMap::Frame(map, _) = &*self.map { map.may_wait() } else { false };
         waits || self.frame.may_wait()
     }
 
@@ -138,7 +174,7 @@ impl<S: RowSource> RowSource for Mapped<'_, S> {
         let width = self.frame.header().geometry.width;
         self.map.mark([self.rows_read, rows, width], &mut samples[start..], &mut self.buffer)?;
         self.rows_read += rows;
-        Ok(())
+        self.map.check_share(self.rows_read)
     }
 }
 

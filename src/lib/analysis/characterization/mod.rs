@@ -76,8 +76,9 @@ pub struct CameraMatrix {
 
 impl CameraMatrix {
     /// That of a raw file, for relative XYZ.
-    pub fn relative(matrix: &RelativeMatrix) -> Self {
+    pub fn relative(matrix: &RelativeMatrix, camera: Option<&str>) -> Self {
         Self {
+            sensor: camera.map(str::to_owned),
             method: Some(matrix.method.clone()),
             white_xy: Some(matrix.white_xy),
             ..Self::bare(RELATIVE_MATRIX_UNIT, matrix.xyz_from_camera)

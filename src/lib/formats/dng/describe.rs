@@ -8,10 +8,15 @@ use super::tags;
 use crate::camera::optics::Exposure;
 use crate::cfa::{FILTERS, FilterArray};
 use crate::error::{Error, Result};
+use crate::formats::exposure;
 use crate::formats::tiff::{Directory, TiffFile};
 use crate::metadata::Metadata;
+use crate::text::visible;
 use crate::units::QuantityKind;
 use tiff::tags::Tag;
+
+/// Longest name of a camera, bytes.
+const LONGEST_NAME: usize = 128;
 
 /// What is known of the frame, with notes on what is passed over.
 ///
@@ -33,7 +38,7 @@ pub(super) fn describe(
     metadata.black_by_row.clone_from(&levels.black_by_row);
     metadata.black_by_column.clone_from(&levels.black_by_column);
     metadata.white_level_adu = Some(levels.white.into());
-    metadata.exposure = match exposure(file, &image.first, notes) {
+    metadata.exposure = match told_exposure(file, &image.first, notes) {
         // No sample depends on it.
         Err(Error::Format { problem, .. }) => {
             notes.push(format!("its exposure is passed over: {problem}"));
@@ -41,6 +46,10 @@ pub(super) fn describe(
         }
         found => found?,
     };
+    // No sample depends on it either.
+    let model = file.text(&image.first, tags::UNIQUE_CAMERA_MODEL.tag()).unwrap_or_default();
+    metadata.camera =
+        model.map(|model| visible(model.trim()).into_owned()).filter(|model| (1..=LONGEST_NAME).contains(&model.len()));
     metadata.relative_matrix = color::relative_matrix(file, image, notes)?;
     if levels.table.is_some() {
         notes.push("samples are made linear by its LinearizationTable".into());
@@ -123,7 +132,7 @@ fn filters(file: &mut TiffFile, image: &RawImage, active: Rectangle) -> Result<F
 }
 
 /// Exposure time and f-number, where both are known.
-fn exposure(file: &mut TiffFile, first: &Directory, notes: &mut Vec<String>) -> Result<Option<Exposure>> {
+fn told_exposure(file: &mut TiffFile, first: &Directory, notes: &mut Vec<String>) -> Result<Option<Exposure>> {
     let below = match tags::EXIF.one(file, first)? {
         Some(offset) => Some(file.directory_below(offset as u64)?),
         None => None,
@@ -144,28 +153,11 @@ pub(in crate::formats) fn exposure_of(
     f_number: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Option<Exposure> {
-    let (exposure_s, f_number) = match (exposure_s, f_number) {
-        (Some(time), Some(aperture)) => (time, aperture),
-        (None, None) => return None,
-        (Some(time), None) => {
-            notes.push(format!("its exposure of {time} s is passed over: it does not tell the f-number"));
-            return None;
-        }
-        (None, Some(aperture)) => {
-            notes.push(format!("its f-number {aperture} is passed over: it does not tell the exposure time"));
-            return None;
-        }
-    };
-    match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
-        Ok(exposure) => {
-            notes.push("its lens is taken to lose no light: the file does not tell the transmittance".into());
-            Some(exposure)
-        }
-        Err(problem) => {
-            notes.push(format!("its exposure is passed over: {problem}"));
-            None
-        }
+    let found = exposure::of_parts(exposure_s, f_number, ["ExposureTime", "FNumber"], notes);
+    if found.is_some() {
+        notes.push("its lens is taken to lose no light: the file does not tell the transmittance".into());
     }
+    found
 }
 
 /// The text of the first directory's ImageDescription.

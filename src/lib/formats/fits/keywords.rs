@@ -3,7 +3,9 @@
 use super::header::{Header, whole};
 use crate::camera::optics::Exposure;
 use crate::cfa::FilterArray;
+use crate::formats::exposure;
 use crate::metadata::Metadata;
+use crate::text::visible;
 use crate::units::QuantityKind;
 
 /// Microseconds in a second.
@@ -49,7 +51,8 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     };
     let mut metadata = Metadata::new(if is_adu { QuantityKind::Adu } else { QuantityKind::Unspecified });
     metadata.cfa = cfa;
-    metadata.exposure = exposure(header, &mut notes);
+    metadata.camera = header.text("INSTRUME").map(|camera| visible(camera).into_owned());
+    metadata.exposure = told_exposure(header, &mut notes);
     pass_over(header, &mut notes);
     Told { metadata, is_bottom_up, notes }
 }
@@ -88,27 +91,12 @@ fn filters(header: &Header, channels: usize, notes: &mut Vec<String>) -> Option<
 }
 
 /// Exposure time and f-number, which count together; the transmittance of the lens, which no keyword has, is 1.
-fn exposure(header: &Header, notes: &mut Vec<String>) -> Option<Exposure> {
+fn told_exposure(header: &Header, notes: &mut Vec<String>) -> Option<Exposure> {
     let seconds = header.number("EXPTIME").or_else(|| header.number("EXPOSURE"));
     let exposure_s = seconds.or_else(|| Some(header.number("EXPOINUS")? / US_PER_S));
     let ratio = || Some(header.number("FOCALLEN")? / header.number("APTDIA").filter(|diameter| *diameter > 0.0)?);
     let f_number = ratio().filter(|number| *number > 0.0).or_else(|| header.number("FOCRATIO"));
-    match (exposure_s, f_number) {
-        (Some(exposure_s), Some(f_number)) => {
-            match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
-                Ok(exposure) => return Some(exposure),
-                Err(error) => notes.push(format!("its exposure is passed over: {error}")),
-            }
-        }
-        (Some(exposure_s), None) => notes.push(format!(
-            "its exposure time of {exposure_s} s is passed over: it has no f-number (FOCALLEN and APTDIA, or FOCRATIO)"
-        )),
-        (None, Some(f_number)) => {
-            notes.push(format!("its f-number of {f_number} is passed over: it has no exposure time (EXPTIME)"));
-        }
-        (None, None) => {}
-    }
-    None
+    exposure::of_parts(exposure_s, f_number, ["EXPTIME", "FOCALLEN and APTDIA, or FOCRATIO"], notes)
 }
 
 /// Notes what a user may want to write into metadata or a sensor file, and what has no agreed meaning.

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::formats::data::load_observer;
 use crate::formats::dng::{RawArea, Rectangle, exposure_of, temperature_k};
 use crate::metadata::{Metadata, RelativeMatrix};
+use crate::text::visible;
 use crate::units::QuantityKind;
 use nalgebra::Matrix3;
 
@@ -61,6 +62,7 @@ pub(super) fn describe(head: &Head, name: &str, part: RawArea) -> Result<Describ
     let area = area(head, part, &mut notes).map_err(refuse)?;
     let mut metadata = Metadata::new(QuantityKind::Adu);
     metadata.cfa = Some(cfa);
+    metadata.camera = Some(visible(&head.camera).into_owned());
     metadata.black_level_adu = Some(black);
     metadata.white_level_adu = Some(white.into());
     let positive = |number: Option<f64>| number.filter(|number| *number > 0.0 && number.is_finite());

@@ -8,6 +8,7 @@ use crate::camera::levels::{BlackLevel, WhiteLevel};
 use crate::camera::optics::Exposure;
 use crate::cfa::{FILTERS, FilterArray};
 use crate::error::Result;
+use crate::formats::exposure;
 use crate::formats::format::SampleType;
 use crate::metadata::Metadata;
 use crate::units::QuantityKind;
@@ -45,7 +46,7 @@ const MOST_SITES: u64 = 64;
 pub(super) fn read(file: &mut TiffFile, directory: &Directory, layout: &mut Layout) -> Result<Metadata> {
     let mut metadata = Metadata::new(QuantityKind::Unspecified);
     let notes = &mut layout.notes;
-    metadata.exposure = passed_over(exposure(file, directory, notes), "its exposure", notes)?;
+    metadata.exposure = passed_over(told_exposure(file, directory, notes), "its exposure", notes)?;
     let is_cfa = [CFA_DIMENSIONS, CFA_PATTERN].iter().any(|tag| directory.has(*tag))
         || passed_over(file.one(directory, Tag::PhotometricInterpretation), "its color", notes)?
             == Some(PHOTOMETRIC_CFA);
@@ -75,7 +76,7 @@ fn is_integer(stored: SampleType) -> bool {
 }
 
 /// Exposure time and f-number, which count together; the transmittance of the lens, which no tag has, is 1.
-fn exposure(file: &mut TiffFile, directory: &Directory, notes: &mut Vec<String>) -> Result<Option<Exposure>> {
+fn told_exposure(file: &mut TiffFile, directory: &Directory, notes: &mut Vec<String>) -> Result<Option<Exposure>> {
     let below = passed_over(file.below(directory, EXIF), "its Exif", notes)?;
     let mut found = [None; 2];
     for directory in [Some(directory), below.as_ref()].into_iter().flatten() {
@@ -85,19 +86,7 @@ fn exposure(file: &mut TiffFile, directory: &Directory, notes: &mut Vec<String>)
             }
         }
     }
-    let exposure = match found {
-        [Some(exposure_s), Some(f_number)] => Exposure { exposure_s, f_number, lens_transmittance: 1.0 },
-        [Some(exposure_s), None] => {
-            notes.push(format!("its exposure time of {exposure_s} s is passed over: it has no f-number"));
-            return Ok(None);
-        }
-        [None, Some(f_number)] => {
-            notes.push(format!("its f-number of {f_number} is passed over: it has no exposure time"));
-            return Ok(None);
-        }
-        [None, None] => return Ok(None),
-    };
-    exposure.checked().map(Some).map_err(|error| file.problem(error.to_string()))
+    Ok(exposure::of_parts(found[0], found[1], ["ExposureTime", "FNumber"], notes))
 }
 
 /// Left and top of the active area; [0, 0] where none is named.
@@ -274,11 +263,11 @@ mod tests {
             (vec![(50717, TagValue::Longs(vec![0]))], "its white level is passed over: it is no single number above 0"),
             (
                 vec![(33434, TagValue::Ratios(vec![[1, 8]]))],
-                "its exposure time of 0.125 s is passed over: it has no f-number",
+                "its exposure time of 0.125 s is passed over: it has no f-number (FNumber)",
             ),
             (
                 vec![(33437, TagValue::Ratios(vec![[8, 1]]))],
-                "its f-number of 8 is passed over: it has no exposure time",
+                "its f-number of 8 is passed over: it has no exposure time (ExposureTime)",
             ),
             (
                 vec![(33434, TagValue::Ratios(vec![[1, 8]])), (33437, TagValue::Ratios(vec![[0, 1]]))],

@@ -55,6 +55,9 @@ pub struct ChartFit {
     /// Luminance in cd/m2 of a perfect diffuser in the light of the chart, for a matrix to absolute XYZ
     #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
     pub luminance: Option<f64>,
+    /// YAML file whose metadata replace those that come with the frame of the chart
+    #[arg(long, value_name = "FILE", requires = "chart")]
+    pub metadata: Option<PathBuf>,
     /// Let the noise of the patches alone weigh them: no error of references and matrix is estimated beside it
     #[arg(long)]
     pub no_misfit: bool,
@@ -86,6 +89,16 @@ struct Seen {
     uneven: Vec<usize>,
 }
 
+/// What a camera read of the patches of a chart if it is turned.
+struct Turned {
+    corners: [[f64; 2]; 4],
+    seen: Seen,
+}
+
+/// So many times smaller residuals tell that a chart is turned: those of charts as they are given are some hundredths of white,
+/// and those of charts that are turned several times as large.
+const MUCH_BETTER: f64 = 2.0;
+
 /// Colors of patches in a light.
 struct Expected {
     names: Vec<String>,
@@ -108,14 +121,25 @@ impl ChartFit {
     /// Those of readers and of [`fit`]; [`Error::Usage`] where patches and reference do not go together, or the light of
     /// reflectances is missing.
     pub fn run(&self) -> Result<Option<ChartFound>> {
-        let seen = match (&self.chart, self.corners, &self.patches) {
-            (Some(frame), Some(corners), _) => see_frame(frame, corners)?,
-            (_, _, Some(table)) => self.see_table(table)?,
+        let (seen, turned) = match (&self.chart, self.corners, &self.patches) {
+            (Some(frame), Some(corners), _) => see_frame(&self.options_of(frame), corners)?,
+            (_, _, Some(table)) => (self.see_table(table)?, Vec::new()),
             _ => return Ok(None),
         };
         let reference = load_reference(&self.reference)?;
         let expected = self.expected(&reference)?;
         let patches = matched(&seen, &expected, &reference)?;
+        for Turned { corners, seen: turned } in &turned {
+            let gain = residual(&patches) / residual(&matched(turned, &expected, &reference)?);
+            if gain > MUCH_BETTER {
+                return Err(Error::Usage(format!(
+                    "{}: --corners begin at another patch than dark skin: turned, the chart fits its colors {gain:.1} times \
+                     better; give --corners {}",
+                    seen.source,
+                    corners.as_flattened().iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+                )));
+            }
+        }
         let misfit = if self.no_misfit { Misfit::None } else { Misfit::Estimated };
         let found = fit(&patches, misfit)?;
         let Some(judgment) = judge(&found, &patches, expected.white) else {
@@ -125,6 +149,11 @@ impl ChartFit {
         notes.extend(doubts(&seen, &expected, &found));
         let matrix = self.matrix(&seen, &expected, &reference, &patches, &found)?;
         Ok(Some(ChartFound { matrix, judgment, notes }))
+    }
+
+    /// How the frame of the chart is opened.
+    fn options_of(&self, frame: &Path) -> InputOptions {
+        InputOptions { path: Some(frame.to_owned()), metadata: self.metadata.clone(), ..InputOptions::default() }
     }
 
     /// Means of a table.
@@ -218,7 +247,7 @@ impl ChartFit {
         let unit = if self.luminance.is_some() { MATRIX_UNIT } else { RELATIVE_MATRIX_UNIT };
         Ok(CameraMatrix {
             method: Some(format!("chart, total least squares; XYZ in the light {}", expected.light)),
-            sensor: seen.frame.as_ref().and_then(|frame| Some(frame.metadata.sensor.as_ref()?.name.clone())),
+            sensor: seen.frame.as_ref().and_then(|frame| frame.metadata.camera_names().next().map(str::to_owned)),
             white_xy: Some(chromaticity(expected.white)),
             condition: Some(found.condition),
             rank: Some(3),
@@ -261,7 +290,7 @@ impl ChartFit {
         };
         let Some(exposure) = frame.metadata.exposure else {
             let problem = "its metadata have no `exposure`, which absolute XYZ take";
-            return Err(frame.refuse(problem).leave_out(&["luminance"]));
+            return Err(frame.refuse(problem).give(&["metadata"]));
         };
         let exposure_s_sr = exposure.exposure_s_sr();
         let black = frame.uniform_black_adu()?;
@@ -270,12 +299,24 @@ impl ChartFit {
     }
 }
 
-/// Means of the patches in a frame.
-fn see_frame(path: &Path, corners: [[f64; 2]; 4]) -> Result<Seen> {
-    let mut reader = FrameReader::open(&InputOptions { path: Some(path.to_owned()), ..InputOptions::default() })?;
+/// Root of the mean squared residual of patches by the matrix that fits them best; infinite where there is none.
+fn residual(patches: &[Patch]) -> f64 {
+    let Ok(found) = fit(patches, Misfit::Estimated) else { return f64::INFINITY };
+    let squares = patches.iter().map(|patch| patch.residual(&found.xyz_from_camera).norm_squared());
+    (squares.sum::<f64>() / patches.len() as f64).sqrt()
+}
+
+/// Means of the patches in a frame, and those that there would be if the corners were given from another on.
+fn see_frame(options: &InputOptions, corners: [[f64; 2]; 4]) -> Result<(Seen, Vec<Turned>)> {
+    let mut reader = FrameReader::open(options)?;
     let frame = reader.header().clone();
-    let grid = Grid::new(corners).map_err(|problem| Error::Usage(format!("--corners: {problem}")))?;
-    let mut chart = ChartReader::new(&frame, grid)?;
+    let mut charts = Vec::new();
+    for turns in 0..corners.len() {
+        let mut corners = corners;
+        corners.rotate_left(turns);
+        let grid = Grid::new(corners).map_err(|problem| Error::Usage(format!("--corners: {problem}")))?;
+        charts.push((corners, ChartReader::new(&frame, grid)?));
+    }
     let height = frame.geometry.height;
     let step = frame.geometry.band_rows(frame.geometry.step_rows(reader.natural_rows()), 1);
     let (mut rows, mut done) = (Vec::new(), 0);
@@ -283,15 +324,24 @@ fn see_frame(path: &Path, corners: [[f64; 2]; 4]) -> Result<Seen> {
         rows.clear();
         let count = step.min(height - done);
         reader.read(count, &mut rows)?;
-        chart.take(&rows);
+        charts.iter_mut().for_each(|(_, chart)| chart.take(&rows));
         done += count;
     }
+    let mut all = charts.into_iter().map(|(corners, chart)| (corners, chart.finish()));
+    let read = all.next().map_or(Ok(Vec::new()), |(_, read)| read).map_err(|problem| frame.refuse(problem))?;
+    let turned =
+        all.filter_map(|(corners, read)| Some(Turned { corners, seen: seen_in(&frame, &read.ok()?, Vec::new()) }));
+    let turned = turned.collect();
     let mut notes = super::super::notes::of_reader(&reader);
-    let read = chart.finish().map_err(|problem| frame.refuse(problem))?;
-    let full = read.iter().enumerate().filter(|(_, patch)| patch.saturated > 0);
     let least = read.iter().flat_map(|patch| patch.count).min().unwrap_or(0);
     notes.push(Note::Remark(format!("{}: {least} photosites or more of each class in a patch", frame.name)));
-    Ok(Seen {
+    Ok((seen_in(&frame, &read, notes), turned))
+}
+
+/// What was read of the patches of a chart in a frame.
+fn seen_in(frame: &FrameHeader, read: &[ReadPatch], notes: Vec<Note>) -> Seen {
+    let full = read.iter().enumerate().filter(|(_, patch)| patch.saturated > 0);
+    Seen {
         source: frame.name.clone(),
         names: None,
         left_out: full.map(|(index, patch)| (index, format!("{} photosites are saturated", patch.saturated))).collect(),
@@ -301,9 +351,9 @@ fn see_frame(path: &Path, corners: [[f64; 2]; 4]) -> Result<Seen> {
             .iter()
             .map(|patch: &ReadPatch| Matrix3::from_diagonal(&Vector3::from(patch.variance)))
             .collect(),
-        frame: Some(frame),
+        frame: Some(frame.clone()),
         notes,
-    })
+    }
 }
 
 /// A name as it is compared: small letters and digits alone.

@@ -32,6 +32,11 @@ use training::Plan;
 #[command(mut_arg("chart", |chart| chart.conflicts_with_all(Fit::ids())))]
 #[command(mut_arg("patches", |patches| patches.conflicts_with_all(Fit::ids())))]
 #[command(mut_arg("from_raw", |from_raw| from_raw.conflicts_with_all(Fit::ids())))]
+#[command(mut_args(|option| match option.get_id().as_str() {
+    "reference" | "reference_light" | "luminance" | "no_misfit" => option.conflicts_with_all(Fit::ids()),
+    "illuminant" | "temperature" => option.conflicts_with_all(Fit::ids()),
+    _ => option,
+}))]
 #[command(mut_arg("library", |library| {
     library.required(false).required_unless_present_any(["chart", "patches", "from_raw"])
 }))]

@@ -7,8 +7,10 @@ use crate::error::{Error, Result};
 use crate::formats::chart::Light;
 use crate::formats::data;
 use crate::formats::dng::{OwnMatrix, own_matrix};
+use crate::formats::input::{FrameReader, InputOptions};
 use crate::names::Named;
 use crate::requests::values;
+use crate::stream::RowSource;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -16,7 +18,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Args)]
 pub struct RawMatrix {
     /// DNG whose own matrix is wanted, for the light of --illuminant or --temperature, or else that of the exposure
-    #[arg(long, value_name = "FRAME.dng", conflicts_with_all = ["chart", "patches", "luminance", "no_misfit"])]
+    #[arg(long, value_name = "FRAME.dng", conflicts_with_all = ["chart", "patches", "reference", "reference_light", "luminance", "no_misfit"])]
     pub from_raw: Option<PathBuf>,
     /// Which of its matrices: color, to XYZ under the light itself, or forward, to XYZ adapted to D50
     #[arg(long, value_name = "NAME", default_value = OwnMatrix::default().name(), value_parser = values::choice::<OwnMatrix>(), requires = "from_raw")]
@@ -45,6 +47,9 @@ impl RawMatrix {
         let found = own_matrix(path, named, self.own_matrix)?;
         let [x, y] = found.white_xy;
         let note = Note::Remark(format!("{}: {}; its white has x {x:.4}, y {y:.4}", path.display(), found.method));
-        Ok(Some((CameraMatrix::relative(&found), vec![note])))
+        let options = InputOptions { path: Some(path.clone()), ..InputOptions::default() };
+        // A file may tell a matrix whose samples are not read.
+        let camera = FrameReader::open(&options).ok().and_then(|reader| reader.header().metadata.camera.clone());
+        Ok(Some((CameraMatrix::relative(&found, camera.as_deref()), vec![note])))
     }
 }

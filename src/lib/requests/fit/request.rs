@@ -11,11 +11,12 @@ use crate::requests::values;
 use crate::stages::demosaic::Method;
 use crate::stages::noise::NoiseSettings;
 use crate::units::RadianceUnit;
-use clap::Args;
+use clap::{ArgGroup, Args};
 use std::path::PathBuf;
 
 /// What is to be fitted and evaluated, and how.
 #[derive(Debug, Clone, Args)]
+#[command(group = ArgGroup::new("noisy").args(["evaluate", "noise_weight"]).multiple(true))]
 #[command(mut_arg("white_luminance", |option| option.help(
     "Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates, by the sensor file's matrix"
 )))]
@@ -61,25 +62,25 @@ pub struct Fit {
     #[command(flatten)]
     pub exposure: SampleExposureChoice,
     /// Demosaicking method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
-    #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>())]
+    #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>(), requires = "noisy")]
     pub demosaic: Method,
     /// Pixels of each sample
-    #[arg(long, default_value = "20x16", value_name = "WxH", value_parser = values::patch)]
+    #[arg(long, default_value = "20x16", value_name = "WxH", value_parser = values::patch, requires = "evaluate")]
     pub patch: [usize; 2],
     /// Subtract the mean of so many dark frames rather than the black level
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000), requires = "noisy")]
     pub dark_frames: u32,
     /// Seed of the noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, requires = "evaluate", conflicts_with = "noise_free")]
     pub seed: u64,
     /// Seed of the sensor's fixed patterns
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, requires = "evaluate", conflicts_with = "noise_free")]
     pub sensor_seed: u64,
     /// Noise sources to leave out, between commas: dcsn, dcnu, ssn, prnu, ron
-    #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = values::choice::<Source>())]
+    #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = values::choice::<Source>(), requires = "noisy")]
     pub without: Vec<Source>,
     /// Evaluate without noise only
-    #[arg(long)]
+    #[arg(long, requires = "evaluate", conflicts_with = "patch")]
     pub noise_free: bool,
     /// The white of L\*a\*b\*.
     #[command(flatten)]
@@ -153,6 +154,7 @@ impl Fit {
 
     /// Refuses a white that cannot be.
     pub(super) fn check_white(&self) -> Result<()> {
+        self.white.check()?;
         match self.white.white {
             White::Absolute(white) if !white.iter().all(|value| *value > 0.0) => {
                 let [x, y, z] = white;

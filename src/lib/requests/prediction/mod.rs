@@ -40,6 +40,8 @@ use sweep::uncertainty;
 }))]
 #[command(mut_arg("electrons", |option| option.help("Expected electrons of R,G,B")))]
 #[command(mut_arg("sample", |option| option.help("One spectrum of a library, counted from 0")))]
+#[command(mut_arg("white", |option| option.requires("matrix")))]
+#[command(mut_arg("white_luminance", |option| option.requires("matrix")))]
 pub struct NoisePrediction {
     /// Light and sensor.
     #[command(flatten)]
@@ -319,12 +321,13 @@ impl NoisePrediction {
                 _ => Ok(None),
             };
         };
+        self.white.check()?;
         let matrix = data::load_matrix(path)?;
         if let Some(of_matrix) = matrix.sensor.as_ref().filter(|name| **name != sensor.name) {
             let text = format!("{} was fitted for the sensor {of_matrix}, not {}", path.display(), sensor.name);
             notes.push(Note::Warning(text));
         }
-        notes.extend(doubt_of_white(self.white.white, &matrix));
+        notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
         Ok(Some(ColorSettings {
             is_relative: matrix.is_relative(),
             xyz_from_camera: matrix.xyz_from_camera,

@@ -21,7 +21,7 @@ pub struct Scene {
     #[command(flatten)]
     pub exposure: ExposureChoice,
     /// Focal length in mm, for --vignetting
-    #[arg(id = "focal-length", long, value_name = "MM", default_value_t = 50.0, value_parser = values::positive)]
+    #[arg(id = "focal-length", long, value_name = "MM", default_value_t = 50.0, value_parser = values::positive, requires = "vignetting")]
     pub focal_length_mm: f64,
     /// Darken the frame away from its center by the fourth power of the cosine
     #[arg(long)]
@@ -30,10 +30,10 @@ pub struct Scene {
     #[command(flatten)]
     pub level: SignalLevel,
     /// Wavelengths to sum over, in nm; by default 360:830:1, or all of a spectrum's own between these where any are closer
-    #[arg(long, value_name = "START:END:STEP", value_parser = values::wavelengths)]
+    #[arg(long, value_name = "START:END:STEP", value_parser = values::wavelengths, conflicts_with_all = ["electrons", "dark"])]
     pub wavelengths: Option<WavelengthGrid>,
     /// Rule of summation
-    #[arg(long, default_value = Rule::default().name(), value_parser = values::choice::<Rule>())]
+    #[arg(long, default_value = Rule::default().name(), value_parser = values::choice::<Rule>(), conflicts_with_all = ["electrons", "dark"])]
     pub quadrature: Rule,
     /// Which spectrum of a file.
     #[command(flatten)]

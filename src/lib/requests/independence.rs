@@ -1,0 +1,249 @@
+//! Whether frames that count as independent are: noise that stands in two of them counts as if it were drawn twice.
+
+use crate::error::{Error, Result};
+use crate::formats::places::place;
+use crate::metadata::{FrameHeader, NoiseRecord};
+use crate::random::Source;
+use std::path::Path;
+
+/// What a frame is taken for beside others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The frame that is corrected.
+    Light,
+    /// A dark frame.
+    Dark,
+    /// A bias frame.
+    Bias,
+    /// A flat field.
+    Flat,
+    /// A dark frame of the flats.
+    FlatDark,
+}
+
+impl Role {
+    fn in_words(self) -> &'static str {
+        match self {
+            Self::Light => "the frame itself",
+            Self::Dark => "a dark frame",
+            Self::Bias => "a bias frame",
+            Self::Flat => "a flat",
+            Self::FlatDark => "a dark frame of the flats",
+        }
+    }
+
+    /// Whether frames of both may be the same: what comes off a frame may come off the flats too.
+    fn may_be(self, other: Self) -> bool {
+        let comes_off = |role| matches!(role, Self::Dark | Self::Bias);
+        self != other && (comes_off(self) && other == Self::FlatDark || self == Self::FlatDark && comes_off(other))
+    }
+}
+
+/// Makes sure that no file is given twice where that would count as two frames.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_files(files: &[(Role, &Path)]) -> Result<()> {
+    let places: Vec<_> = files.iter().map(|(role, path)| (*role, place(Some(path)), path)).collect();
+    for (index, (role, its, path)) in places.iter().enumerate().filter(|(_, (_, its, _))| its.is_some()) {
+        let twice = places[..index].iter().find(|(other, place, _)| place == its && !other.may_be(*role));
+        if let Some((other, ..)) = twice {
+            let (path, role, other) = (path.display(), role.in_words(), other.in_words());
+            let as_what = if role == other { format!("twice as {role}") } else { format!("as {other} and as {role}") };
+            return Err(Error::Usage(format!(
+                "{path}: it is given {as_what}; its noise would count as that of two exposures; name another file"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Frames that are used beside each other.
+#[derive(Debug, Clone, Default)]
+pub struct Company(Vec<(Role, FrameHeader)>);
+
+impl Company {
+    /// Adds frames; those that are in it already do not count again.
+    pub fn add<'a>(&mut self, role: Role, frames: impl IntoIterator<Item = &'a FrameHeader>) {
+        for frame in frames {
+            if !self.0.iter().any(|(its, known)| *its == role && known.name == frame.name) {
+                self.0.push((role, frame.clone()));
+            }
+        }
+    }
+
+    /// Makes sure that frames have noise of their own, as far as metadata tell; gives warnings of those that share some with
+    /// a frame of another kind, and of bias frames that are exposed for long.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for frames of one kind with the same noise, and for frames of two kinds with the same samples.
+    pub fn check(&self) -> Result<Vec<String>> {
+        let mut warnings = Vec::new();
+        for (index, (role, frame)) in self.0.iter().enumerate() {
+            for (other_role, other) in self.0[..index].iter().filter(|(other, _)| !other.may_be(*role)) {
+                let (name, its) = (&frame.name, &other.name);
+                if are_copies(frame, other) {
+                    return Err(frame.refuse(format!(
+                        "its samples are those of {its}, by the digests of both; copies of one exposure do not count as two"
+                    )));
+                }
+                let Some(noise) = shared_noise(frame, other) else { continue };
+                let NoiseRecord { seed, frame: number, .. } = noise;
+                if role == other_role {
+                    return Err(frame.refuse(format!(
+                        "its noise is that of {its}, of seed {seed} and frame {number}, and does not average out; draw it \
+                         with another `add-noise --frame`"
+                    )));
+                }
+                warnings.push(format!(
+                    "{name}: its noise is in part that of {its}, of seed {seed} and frame {number}, and predictions take the two \
+                     for independent; draw one of them with another `add-noise --frame`"
+                ));
+            }
+        }
+        warnings.extend(self.long_biases());
+        Ok(warnings)
+    }
+
+    /// A warning for each bias frame that is exposed for longer than a frame from which it comes off.
+    fn long_biases(&self) -> impl Iterator<Item = String> {
+        let exposure_s = |frame: &FrameHeader| frame.metadata.exposure.map(|exposure| exposure.exposure_s);
+        let biases = self.0.iter().filter(|(role, _)| *role == Role::Bias);
+        biases.filter_map(move |(_, bias)| {
+            let its = exposure_s(bias)?;
+            let others = self.0.iter().filter(|(role, _)| *role != Role::Bias);
+            let (other, shorter) = others
+                .filter_map(|(_, other)| Some((other, exposure_s(other)?)))
+                .find(|(_, exposure_s)| its > exposure_s * (1.0 + SAME_EXPOSURE))?;
+            Some(format!(
+                "{}: its exposure is {its} s, longer than that of {}, {shorter} s; a bias frame has next to none, and its dark \
+                 signal comes off too",
+                bias.name, other.name
+            ))
+        })
+    }
+}
+
+/// Exposures that differ by no more than this are the same, written with other digits.
+const SAME_EXPOSURE: f64 = 1e-6;
+
+/// Sources that every exposure draws anew.
+const TEMPORAL: [Source; 3] = [Source::Dcsn, Source::Ssn, Source::Ron];
+
+/// Whether noise that an exposure draws anew may be in a frame; not in one that was simulated without.
+fn is_noisy(frame: &FrameHeader) -> bool {
+    let metadata = &frame.metadata;
+    match &metadata.noise {
+        Some(noise) => noise.sources.iter().any(|source| TEMPORAL.contains(source)),
+        None => metadata.scene.is_none(),
+    }
+}
+
+/// Whether two frames have the same noisy samples, as their sidecars tell.
+fn are_copies(a: &FrameHeader, b: &FrameHeader) -> bool {
+    let digest = |frame: &FrameHeader| frame.metadata.samples.as_ref().map(|samples| samples.digest.clone());
+    digest(a).is_some() && digest(a) == digest(b) && is_noisy(a) && is_noisy(b)
+}
+
+/// The noise that was drawn in both of two frames.
+fn shared_noise<'a>(a: &'a FrameHeader, b: &FrameHeader) -> Option<&'a NoiseRecord> {
+    let (a, b) = (a.metadata.noise.as_ref()?, b.metadata.noise.as_ref()?);
+    let is_in = |noise: &NoiseRecord, source: Source| noise.sources.contains(&source);
+    let is_shared = TEMPORAL.into_iter().any(|source| is_in(a, source) && is_in(b, source));
+    ((a.seed, a.sensor_seed, a.frame) == (b.seed, b.sensor_seed, b.frame) && is_shared).then_some(a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::optics::Exposure;
+    use crate::frame::Geometry;
+    use crate::metadata::{Metadata, PoissonKind, SamplesRecord};
+    use crate::stream::Counts;
+    use crate::units::QuantityKind;
+
+    fn frame(name: &str, seed: u64, number: u32, sources: &[Source]) -> FrameHeader {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.noise = Some(NoiseRecord {
+            sources: sources.to_vec(),
+            seed,
+            sensor_seed: 0,
+            frame: number,
+            temperature_k: 293.0,
+            dark_e: 1.0,
+            poisson: PoissonKind::Exact,
+            cte: None,
+        });
+        FrameHeader { name: name.into(), geometry: Geometry::new(4, 4, &["Y"]), metadata }
+    }
+
+    fn checked(frames: &[(Role, FrameHeader)]) -> Result<Vec<String>> {
+        let mut company = Company::default();
+        frames.iter().for_each(|(role, frame)| company.add(*role, [frame]));
+        company.check()
+    }
+
+    #[test]
+    fn noise_counts_once() {
+        let [a, b, c] = [(7, 0), (7, 1), (7, 0)].map(|(seed, number)| frame("x", seed, number, &Source::ALL));
+        let named = |frame: &FrameHeader, name: &str| FrameHeader { name: name.into(), ..frame.clone() };
+        let (a, b, c) = (named(&a, "a"), named(&b, "b"), named(&c, "c"));
+        assert!(checked(&[(Role::Dark, a.clone()), (Role::Dark, b.clone())]).unwrap().is_empty());
+        let twice = checked(&[(Role::Dark, a.clone()), (Role::Dark, c.clone())]).unwrap_err().to_string();
+        assert!(twice.starts_with("c: its noise is that of a, of seed 7 and frame 0"), "{twice}");
+        let of_light = checked(&[(Role::Light, a.clone()), (Role::Dark, b.clone()), (Role::Dark, c.clone())]).unwrap();
+        assert!(of_light.len() == 1 && of_light[0].starts_with("c: its noise is in part that of a"), "{of_light:?}");
+        // What comes off a frame may come off the flats.
+        assert!(checked(&[(Role::Dark, a.clone()), (Role::FlatDark, c.clone())]).unwrap().is_empty());
+        // Fixed patterns are meant to be the same; sources of which one frame has none are not shared.
+        let [fixed, read, shot] = [Source::Prnu, Source::Ron, Source::Ssn].map(|source| frame("y", 7, 0, &[source]));
+        assert!(checked(&[(Role::Dark, fixed.clone()), (Role::Dark, named(&fixed, "z"))]).unwrap().is_empty());
+        assert!(checked(&[(Role::Light, read), (Role::Dark, shot)]).unwrap().is_empty());
+    }
+
+    #[test]
+    fn copies_are_told_by_their_digests() {
+        let with_digest = |name: &str, sources: &[Source], number| {
+            let mut frame = frame(name, 1, number, sources);
+            let record: SamplesRecord = Counts::default().record("blake3:01".into());
+            frame.metadata.samples = Some(record);
+            frame
+        };
+        let copies =
+            |sources: &[Source]| [0, 1].map(|number| (Role::Flat, with_digest(&number.to_string(), sources, number)));
+        let error = checked(&copies(&[Source::Ron])).unwrap_err().to_string();
+        assert!(error.starts_with("1: its samples are those of 0, by the digests of both"), "{error}");
+        // Exposures without noise are alike.
+        assert!(checked(&copies(&[])).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_long_bias_is_told() {
+        let exposed = |name: &str, number, exposure_s| {
+            let mut frame = frame(name, 1, number, &Source::ALL);
+            frame.metadata.exposure = Some(Exposure { exposure_s, f_number: 8.0, lens_transmittance: 1.0 });
+            frame
+        };
+        let of = |bias_s| {
+            let frames = [(Role::Light, exposed("light", 0, 0.5)), (Role::Bias, exposed("bias", 1, bias_s))];
+            checked(&frames).unwrap()
+        };
+        assert!(of(0.5).is_empty() && of(0.001).is_empty());
+        assert!(of(0.6)[0].starts_with("bias: its exposure is 0.6 s, longer than that of light, 0.5 s"));
+    }
+
+    #[test]
+    fn a_file_is_one_exposure() {
+        let [a, b] = ["a.exr", "./a.exr"].map(Path::new);
+        let said = |files: &[(Role, &Path)]| check_files(files).map_err(|error| error.to_string());
+        assert_eq!(said(&[(Role::Dark, a), (Role::FlatDark, b)]), Ok(()));
+        let twice = said(&[(Role::Dark, a), (Role::Dark, b)]).unwrap_err();
+        assert!(twice.starts_with("./a.exr: it is given twice as a dark frame; its noise would count"), "{twice}");
+        let itself = said(&[(Role::Light, a), (Role::Dark, a)]).unwrap_err();
+        assert!(itself.starts_with("a.exr: it is given as the frame itself and as a dark frame;"), "{itself}");
+        // The standard input is no file.
+        assert_eq!(said(&[(Role::Light, Path::new("-")), (Role::Dark, Path::new("-"))]), Ok(()));
+    }
+}

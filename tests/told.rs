@@ -1,0 +1,298 @@
+//! What programs tell of frames that do not go together, of descriptions that contradict them, and of charts that are turned.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::formats::chart::load_reference;
+use cyanometer::formats::output::{FrameWriter, OutputOptions};
+use cyanometer::frame::{Geometry, to_sample};
+use cyanometer::metadata::{FrameHeader, HistoryEntry, Metadata};
+use cyanometer::stream::{Counts, RowSink};
+use cyanometer::units::QuantityKind;
+use nalgebra::{Matrix3, Vector3};
+use std::fs;
+use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
+
+/// What a command says that ends with `status`.
+#[track_caller]
+fn said(shop: &Workshop, line: &str, status: i32) -> String {
+    let output = shop.attempt(line, &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(status), "{line}: {said}");
+    said
+}
+
+/// A light frame, dark frames and a bias frame, each an exposure of its own but for `same`, which has the number of the light.
+fn exposed() -> Workshop {
+    let shop = Workshop::new();
+    shop.run("render-radiance --electrons 1000,2000,3000 --size 16x12 --cfa rggb -o scene.exr", &[]);
+    shop.run("render-radiance --dark --size 16x12 --cfa rggb -o unlit.exr", &[]);
+    shop.run("render-radiance --dark --exposure 2 --size 16x12 --cfa rggb -o long.exr", &[]);
+    for (scene, frame, name) in [
+        ("scene", 0, "light"),
+        ("unlit", 0, "same"),
+        ("unlit", 1, "dark"),
+        ("unlit", 2, "other"),
+        ("long", 3, "bias"),
+        ("scene", 4, "flat"),
+    ] {
+        shop.pipe(&format!("add-noise {scene}.exr --seed 5 --frame {frame} | digitize -o {name}.exr"));
+    }
+    fs::copy(shop.path("dark.exr"), shop.path("copy.exr")).unwrap();
+    fs::copy(shop.path("dark.exr.yaml"), shop.path("copy.exr.yaml")).unwrap();
+    shop
+}
+
+#[test]
+fn noise_that_stands_in_two_frames_is_told() {
+    let shop = exposed();
+    let correct = |rest: &str, status| said(&shop, &format!("correct-frame light.exr {rest} -o out.exr"), status);
+    assert_eq!(correct("--dark dark.exr --dark other.exr", 0), "");
+    // What comes off a frame may come off its flats.
+    assert_eq!(correct("--dark dark.exr --flat flat.exr --flat-dark dark.exr", 0), "");
+    assert_eq!(
+        correct("--dark dark.exr --dark copy.exr", BAD_DATA),
+        "correct-frame: copy.exr: its samples are those of dark.exr, by the digests of both; copies of one exposure do not count as \
+         two\n"
+    );
+    // Without its sidecar a copy is told by the seed and the number of its exposure.
+    fs::remove_file(shop.path("copy.exr.yaml")).unwrap();
+    let twice = "its noise is that of dark.exr, of seed 5 and frame 1, and does not average out; draw it with another `add-noise \
+                 --frame`\n";
+    for rest in ["--dark dark.exr --dark copy.exr", "--bias dark.exr --bias copy.exr"] {
+        assert_eq!(correct(rest, BAD_DATA), format!("correct-frame: copy.exr: {twice}"));
+    }
+    assert_eq!(
+        correct("--dark same.exr", 0),
+        "correct-frame: warning: same.exr: its noise is in part that of light.exr, of seed 5 and frame 0, and predictions take the \
+         two for independent; draw one of them with another `add-noise --frame`\n"
+    );
+}
+
+#[test]
+fn a_bias_that_is_exposed_for_long_is_told() {
+    assert_eq!(
+        said(&exposed(), "correct-frame light.exr --bias bias.exr -o out.exr", 0),
+        "correct-frame: warning: bias.exr: its exposure is 2 s, longer than that of light.exr, 0.033 s; a bias frame has next to \
+         none, and its dark signal comes off too\n"
+    );
+}
+
+#[test]
+fn maps_that_mark_nothing_are_told() {
+    let shop = exposed();
+    let correct =
+        |map: &str| said(&shop, &format!("correct-frame light.exr --black auto --defects {map} -o out.exr"), 0);
+    fs::write(shop.path("within.txt"), "15,11\n").unwrap();
+    fs::write(shop.path("beyond.txt"), "16,11\n2000,3\n").unwrap();
+    assert!(correct("within.txt").starts_with("correct-frame: warning: 1 defective photosites were interpolated"));
+    assert_eq!(
+        correct("beyond.txt"),
+        "correct-frame: warning: beyond.txt: no photosite that it lists is in light.exr, whose 16x12 begin at column 0, row 0 of \
+         the sensor\n"
+    );
+    let zero = FrameHeader {
+        name: "zero".into(),
+        geometry: Geometry::new(16, 12, &["Y"]),
+        metadata: Metadata::new(QuantityKind::Unspecified),
+    };
+    write(&shop, "zero.exr", &zero, &[0.0; 16 * 12]);
+    let warning = "correct-frame: warning: zero.exr: it is 0 everywhere, and marks no photosite as defective\n";
+    assert_eq!(correct("zero.exr"), warning);
+}
+
+#[test]
+fn a_black_level_that_is_not_that_of_the_metadata_is_told() {
+    let shop = exposed();
+    for line in ["correct-frame light.exr -o out.exr", "demosaic light.exr -o out.exr"] {
+        let program = line.split(' ').next().unwrap();
+        assert_eq!(said(&shop, &format!("{line} --black 1757"), 0), "", "a level may be rounded");
+        let warning = said(&shop, &format!("{line} --black 1700"), 0);
+        let begin =
+            format!("{program}: warning: light.exr: --black 1700 is not the black level of its metadata, 1757.30");
+        assert!(warning.starts_with(&begin) && warning.ends_with(", which --black auto takes\n"), "{warning}");
+    }
+}
+
+/// Frames without metadata: the array and the white level that are said of one hold for those beside it too, and advice names
+/// options that there are.
+#[test]
+fn frames_beside_a_plain_one_are_as_it_is_described() {
+    let shop = Workshop::new();
+    for (name, level) in [("light", 900_u16), ("dark", 100), ("flat", 700)] {
+        let codes: Vec<u8> = (0..48_u16).flat_map(|k| (level + k % 3).to_le_bytes()).collect();
+        fs::write(shop.path(&format!("{name}.raw")), codes).unwrap();
+    }
+    let correct = |rest: &str, status| {
+        said(
+            &shop,
+            &format!("correct-frame light.raw --raw 8x6:u16le --cfa rggb --white 4095 {rest} -o out.exr"),
+            status,
+        )
+    };
+    let on_trust =
+        "correct-frame: warning: dark.raw: the metadata do not tell whether it is a dark frame of the sensor that took";
+    assert_eq!(correct("--dark dark.raw", 0), format!("{on_trust} light.raw\n"));
+    assert!(correct("--bias dark.raw --flat flat.raw", 0).starts_with(on_trust));
+    assert_eq!(
+        correct("--dark dark.raw --flat flat.raw", BAD_DATA),
+        "correct-frame: flat.raw: nothing tells what no light reads in it; give --flat-dark or --bias\n"
+    );
+    assert_eq!(
+        correct("--dark dark.raw --scale-dark --exposure 1 --f-number 8", BAD_DATA),
+        "correct-frame: dark.raw: the metadata has no `exposure`; write it into dark.raw.yaml, as --metadata-template shows\n"
+    );
+}
+
+#[test]
+fn relative_xyz_have_no_bright_white() {
+    let shop = Workshop::new();
+    shop.write_colors("xyz.exr", QuantityKind::Xyz, &[[0.2, 0.3, 0.4]]);
+    let text = "schema: cyanometer/1\nquantity: xyz\nunit: relative\n";
+    fs::write(shop.path("relative.yaml"), text).unwrap();
+    let line = "to-xyz xyz.exr --metadata relative.yaml --space lab -o out.exr --white";
+    assert_eq!(said(&shop, &format!("{line} 0.95,1,1.09"), 0), "");
+    let warning = said(&shop, &format!("{line} 95,100,109"), 0);
+    assert!(warning.starts_with("to-xyz: warning: the white has Y = 100, but XYZ are relative"), "{warning}");
+    fs::copy(shop.path("relative.yaml"), shop.path("xyz.exr.yaml")).unwrap();
+    let warning = said(&shop, "color-difference xyz.exr 0.2,0.3,0.5 --white 95,100,109", 0);
+    assert!(warning.starts_with("color-difference: warning: the white has Y = 100, but XYZ are relative"), "{warning}");
+}
+
+/// Marks of all kinds are counted, each by itself.
+#[test]
+fn marks_are_told_by_kind() {
+    let shop = Workshop::new();
+    let mut metadata = Metadata::new(QuantityKind::Adu);
+    metadata.history.push(HistoryEntry { program: "test".into(), version: "1".into(), arguments: Vec::new() });
+    let geometry = Geometry::new(6, 1, &["Y", "mask"]);
+    let header = FrameHeader { name: "marked".into(), geometry, metadata };
+    write(&shop, "marked.exr", &header, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0, 1.0, 2.0, 6.0, 9.0, 8.0]);
+    let begin = "preview: warning: marked.exr: ";
+    let expected = [
+        "2 of the pixels read were made of saturated samples",
+        "2 of the pixels read are, or used, defective photosites",
+        "2 of the pixels read are beyond the model of a correction",
+    ]
+    .map(|text| format!("{begin}{text}; they are taken as they are\n"));
+    assert_eq!(said(&shop, "preview marked.exr -o out.png", 0), expected.concat());
+}
+
+/// A chart of 24 patches as a camera with this matrix reads it, with some scatter.
+fn chart(shop: &Workshop) {
+    const SIDE: usize = 40;
+    let white = [0.9642, 1.0, 0.8249];
+    let colors = load_reference("colorchecker").unwrap().colors_in(white).unwrap();
+    let xyz_from_camera = Matrix3::new(0.9, 0.1, 0.2, 0.3, 0.7, -0.1, 0.0, -0.2, 1.1);
+    let camera_from_xyz = xyz_from_camera.try_inverse().unwrap();
+    let mut metadata = Metadata::new(QuantityKind::Adu);
+    metadata.cfa = Some("rggb".parse().unwrap());
+    metadata.black_level_adu = Some(100.0.into());
+    metadata.white_level_adu = Some(4100.0.into());
+    let geometry = Geometry::new(6 * SIDE, 4 * SIDE, &["Y"]);
+    let header = FrameHeader { name: "chart".into(), geometry, metadata };
+    let (mut samples, mut state) = (Vec::new(), 1_u64);
+    // Words of SplitMix64, as shares of 1.
+    let mut chance = || {
+        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mixed = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        (mixed ^ (mixed >> 31)) as f64 / u64::MAX as f64
+    };
+    for y in 0..4 * SIDE {
+        for x in 0..6 * SIDE {
+            let signal = camera_from_xyz * Vector3::from(colors[y / SIDE * 6 + x / SIDE]);
+            let class = [0, 1, 1, 2][y % 2 * 2 + x % 2];
+            samples.push(to_sample(100.0 + 2000.0 * signal[class] + 4.0 * chance() - 2.0));
+        }
+    }
+    write(shop, "chart.exr", &header, &samples);
+}
+
+#[test]
+fn a_chart_that_is_turned_is_told() {
+    let shop = Workshop::new();
+    chart(&shop);
+    let corners = ["20,20", "220,20", "220,140", "20,140"];
+    let from = |first: usize| (0..4).map(|k| corners[(first + k) % 4]).collect::<Vec<_>>().join(",");
+    shop.run(&format!("fit-matrix --chart chart.exr --corners {} -o m.yaml", from(0)), &[]);
+    for first in 1..4 {
+        let complaint = said(&shop, &format!("fit-matrix --chart chart.exr --corners {}", from(first)), BAD_USAGE);
+        let begin = "fit-matrix: chart.exr: --corners begin at another patch than dark skin: turned, the chart fits its colors ";
+        let end = format!(" times better; give --corners {}\n", from(0));
+        assert!(complaint.starts_with(begin) && complaint.ends_with(&end), "{complaint}");
+    }
+    // Absolute XYZ take an exposure, which metadata can supply.
+    let absolute = format!("fit-matrix --chart chart.exr --luminance 100 -o m.yaml --corners {}", from(0));
+    assert_eq!(
+        said(&shop, &absolute, BAD_DATA),
+        "fit-matrix: chart.exr: its metadata have no `exposure`, which absolute XYZ take; give --metadata\n"
+    );
+    let text = "schema: cyanometer/1\nquantity: adu\ncfa: rggb\nblack_level_adu: 100\nwhite_level_adu: 4100\nexposure: {exposure_s: \
+                0.01, f_number: 8, lens_transmittance: 1}\n";
+    fs::write(shop.path("chart.yaml"), text).unwrap();
+    shop.run(&format!("{absolute} --metadata chart.yaml"), &[]);
+}
+
+/// Writes a frame.
+fn write(shop: &Workshop, name: &str, header: &FrameHeader, samples: &[f32]) {
+    let options = OutputOptions { path: Some(shop.path(name)), ..OutputOptions::default() };
+    let mut writer = FrameWriter::create(&options, header).unwrap();
+    writer.write(samples).unwrap();
+    writer.finish(Counts::default()).unwrap();
+}
+
+#[test]
+fn a_matrix_of_another_camera_is_told() {
+    let shop = Workshop::with_frames();
+    let matrix = "schema: cyanometer-matrix/1\nsensor: Maker A1\nunit: relative XYZ per (white level - black level)\nxyz_from_camera: \
+                  [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n";
+    fs::write(shop.path("a1.yaml"), matrix).unwrap();
+    let of_camera = |camera: &str| {
+        let text = format!(
+            "schema: cyanometer/1\nquantity: adu\nblack_level_adu: 0\nwhite_level_adu: 4095\ndemosaic: {{method: bi, cfa: rggb, black: \
+             100}}\ncamera: {camera}\n"
+        );
+        fs::write(shop.path("rgb.yaml"), text).unwrap();
+        said(&shop, "to-xyz rgb.exr --metadata rgb.yaml --matrix a1.yaml -o out.exr", 0)
+    };
+    assert_eq!(of_camera("MAKER A1"), "");
+    assert_eq!(
+        of_camera("Maker B2"),
+        "to-xyz: warning: a1.yaml was fitted for the sensor Maker A1, but the frame comes from Maker B2\n"
+    );
+}
+
+#[test]
+fn pictures_that_are_no_raws_and_no_scenes_are_told() {
+    let shop = Workshop::new();
+    fs::write(shop.path("a.jpg"), [[0xFF, 0xD8, 0xFF, 0xE0].as_slice(), &[0; 600]].concat()).unwrap();
+    fs::copy(shop.path("a.jpg"), shop.path("b.jpg")).unwrap();
+    let complaint = said(&shop, "import-raw a.jpg b.jpg -o {stem}.exr", BAD_DATA);
+    let lines: Vec<&str> = complaint.lines().collect();
+    assert!(lines[0].contains("for measurements give the camera's raw file"), "{complaint}");
+    assert_eq!(lines[2], "import-raw: 2 of 2 inputs failed");
+    let gray = FrameHeader {
+        name: "gray".into(),
+        geometry: Geometry::new(2, 2, &["Y"]),
+        metadata: Metadata::new(QuantityKind::Unspecified),
+    };
+    write(&shop, "gray.exr", &gray, &[0.5; 4]);
+    let complaint = said(&shop, "render-radiance gray.exr -o out.exr", BAD_DATA);
+    assert!(complaint.contains("of a gray picture store the plane three times, as R, G and B"), "{complaint}");
+}
+
+#[test]
+fn a_sensor_has_one_linearization() {
+    let shop = Workshop::new();
+    let sensor = "schema: cyanometer-sensor/2\nname: two-curves\nreadout: {width: 8, height: 8, full_well_e: 30000, \
+                  dark_current_e_per_s: 0.5, temperature_k: 293, dcnu: 0.1, prnu: 0.006, read_noise_e: 3, bits: 14, bias_adu: 512, \
+                  adu_per_e: 0.4, linearization: {polynomial: [1.0], codes: [0, 1], linear: [0, 1]}}\n";
+    fs::write(shop.path("s.yaml"), sensor).unwrap();
+    let complaint = said(&shop, "render-radiance --dark --size 2x2 --sensor s.yaml -o out.exr", BAD_DATA);
+    assert!(
+        complaint.contains("a linearization is `polynomial`, or `codes` and `linear`, but not both"),
+        "{complaint}"
+    );
+}
