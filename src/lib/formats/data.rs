@@ -78,7 +78,7 @@ pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
         let bytes = read_file(path)?;
         (Place::Directory(path.parent().map(Path::to_owned).unwrap_or_default()), name.to_owned(), bytes)
     } else {
-        let file = format!("sensors/{name}.yaml");
+        let file = format!("sensors/{}.yaml", name.to_ascii_lowercase());
         match find(&file)? {
             Some((Place::Directory(directory), bytes)) => {
                 (Place::Directory(directory.join("sensors")), directory.join(file).display().to_string(), bytes)
@@ -180,7 +180,7 @@ pub fn chart(name: &str) -> Result<(String, Vec<u8>)> {
     if path.components().count() > 1 || path.extension().is_some_and(|end| !end.is_empty()) {
         return Ok((name.to_owned(), read_file(path)?));
     }
-    let Some((_, bytes)) = find(&format!("charts/{name}.csv"))? else {
+    let Some((_, bytes)) = find(&format!("charts/{}.csv", name.to_ascii_lowercase()))? else {
         return Err(Error::Usage(format!(
             "there is no chart `{name}`; known are colorchecker (made from November 2014 on) and colorchecker-2005 (made \
              before); for a table of your own give its path, ending in .csv"

@@ -124,7 +124,7 @@ impl Photosite {
                 light[cause as usize] + darks.iter().map(|(of, dark)| kept(of) * dark[cause as usize]).sum::<f64>()
             }
         });
-        let left = self.less_dark(adc, expected_e).moments.variance - budget.iter().sum::<f64>();
+        let left = self.less_dark(adc, expected_e, true).moments.variance - budget.iter().sum::<f64>();
         let is_left = left.abs() > 1e-9 * (light[Cause::Dcnu as usize] + light[Cause::Prnu as usize]);
         budget[Cause::ClippedPattern as usize] = if is_left { left } else { 0.0 };
         budget
@@ -184,7 +184,7 @@ impl Photosite {
             budget[Cause::Quantization as usize] = endless - charge;
             if !law.is_plain(adc) {
                 let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
-                let clipped = self.shared(adc, expected_e, None, (self, None)).light.min(whole) - patterns;
+                let clipped = self.shared(adc, (expected_e, None), (self, None), false).light.min(whole) - patterns;
                 let further = clipped - budget[Cause::ClippedPattern as usize];
                 let is_told = further.abs() > 1e-9 * patterns;
                 budget[Cause::ClippedPattern as usize] += if is_told { further } else { 0.0 };

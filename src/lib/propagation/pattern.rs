@@ -34,16 +34,21 @@ pub(super) struct Seen {
     pub law: Law,
     pub reading: Reading,
     pub median_of: Option<u32>,
+    /// Whether it shows in the means of photosites how codes are rounded.
+    pub is_fine: bool,
 }
 
 /// Evaluations up to which counts are gone through one by one.
 const AFFORDABLE: usize = 6_000;
 
-/// The same for medians, which need some of the codes around them.
-const AFFORDABLE_IN_MEDIANS: usize = 60_000;
+/// The same where rounding shows.
+const AFFORDABLE_IF_FINE: usize = 150_000;
 
-/// Sensitivities at most that medians are worked out for.
-const MOST_MEDIANS: f64 = 4096.0;
+/// Sensitivities at most where rounding shows.
+const MOST_IF_FINE: f64 = 4096.0;
+
+/// Counts of a smaller read noise are told apart by this, in e⁻.
+const LEAST_NOISE_E: f64 = 0.1;
 
 impl Shared {
     /// Of two laws that share the pattern of the dark current.
@@ -54,11 +59,11 @@ impl Shared {
 
     fn work_out(light: &Seen, dark: &Seen) -> Self {
         let (of_light, of_dark) = (Temporal::of(light), Temporal::of(dark));
-        let (law, is_median) = (&light.law, light.median_of.or(dark.median_of).is_some());
+        let (law, is_fine) = (&light.law, light.is_fine || dark.is_fine);
         let xs = sensitivities(&law.light, of_light.std());
-        let ys = if is_median {
+        let ys = if is_fine {
             let wider = if law.dark.rate > dark.law.dark.rate { law.dark } else { dark.law.dark };
-            sensitivities_of_medians(&wider, of_light.std().min(of_dark.std()))
+            fine_sensitivities(&wider, of_light.finest().min(of_dark.finest()))
         } else {
             sensitivities(&law.dark, of_light.std())
         };
@@ -81,7 +86,7 @@ impl Shared {
         let mut bends = of_light.knees(along_dark, along_light, 1.0, along_light.spread());
         bends.extend(of_light.knees(along_dark, along_light, 0.0, 0.0));
         bends.extend(of_dark.knees(along_dark, along_light, 0.0, 0.0));
-        for y in if is_median { ys } else { along_dark.points(&bends) } {
+        for y in if is_fine { ys } else { along_dark.points(&bends) } {
             let dark = at_dark(y.0);
             let bends = of_light.knees(along_light, along_dark, y.0, 0.0);
             along_light.points(&bends).into_iter().for_each(|x| add([x, y], dark));
@@ -91,7 +96,7 @@ impl Shared {
 
     /// The variance that the pattern gives to a reading of one law.
     pub fn of_one(law: &Law, reading: &Reading) -> f64 {
-        let seen = Seen { law: *law, reading: *reading, median_of: None };
+        let seen = Seen { law: *law, reading: *reading, median_of: None, is_fine: false };
         Self::of(seen, seen).light
     }
 }
@@ -199,9 +204,9 @@ fn sensitivities(charge: &Charge, temporal: f64) -> Vec<(f64, f64)> {
     sensitivities_by(charge, temporal, 0.02)
 }
 
-/// The same for medians, which follow every edge of the codes.
-fn sensitivities_of_medians(charge: &Charge, temporal: f64) -> Vec<(f64, f64)> {
-    sensitivities_by(charge, temporal, 2.0 * 1.3 * REACH / MOST_MEDIANS)
+/// The same of means that follow every edge of the codes.
+fn fine_sensitivities(charge: &Charge, temporal: f64) -> Vec<(f64, f64)> {
+    sensitivities_by(charge, temporal, 2.0 * 1.3 * REACH / MOST_IF_FINE)
 }
 
 fn sensitivities_by(charge: &Charge, temporal: f64, narrowest: f64) -> Vec<(f64, f64)> {
@@ -240,6 +245,7 @@ struct Temporal<'a> {
     law: &'a Law,
     reading: &'a Reading,
     median_of: Option<u32>,
+    is_fine: bool,
     light: Vec<Count>,
     dark: Vec<Count>,
     at_full: f64,
@@ -248,7 +254,7 @@ struct Temporal<'a> {
 }
 
 impl<'a> Temporal<'a> {
-    fn of(Seen { law, reading, median_of }: &'a Seen) -> Self {
+    fn of(Seen { law, reading, median_of, is_fine }: &'a Seen) -> Self {
         let counts = |charge: &Charge| {
             let mut counts = Charge { pattern: 0.0, ..*charge }.counts(law.read_noise_e.max(1e-3));
             counts.retain(|count| count.weight > 1e-15);
@@ -261,6 +267,7 @@ impl<'a> Temporal<'a> {
             law,
             reading,
             median_of: *median_of,
+            is_fine: *is_fine,
             light: counts(&law.light),
             dark: counts(&law.dark),
             at_full,
@@ -275,9 +282,15 @@ impl<'a> Temporal<'a> {
         self.median_of.map_or(one, |count| one / f64::from(count).sqrt())
     }
 
+    /// What the mean of a photosite changes over as its sensitivity does, in e⁻: each count moves beyond an edge by itself.
+    fn finest(&self) -> f64 {
+        let is_counted = [self.law.light, self.law.dark].iter().any(|charge| charge.shot == Some(PoissonKind::Exact));
+        if is_counted { self.std().min(self.law.read_noise_e.max(LEAST_NOISE_E)) } else { self.std() }
+    }
+
     /// Evaluations up to which counts are gone through one by one.
     fn affordable(&self) -> usize {
-        if self.median_of.is_some() { AFFORDABLE_IN_MEDIANS } else { AFFORDABLE }
+        if self.is_fine { AFFORDABLE_IF_FINE } else { AFFORDABLE }
     }
 
     /// How often counts are gone through at so many sensitivities.
@@ -378,7 +391,9 @@ impl<'a> Temporal<'a> {
         let whole = charge.plus(noise);
         let mirrored = NearlyNormal { mean: -whole.mean, third: -whole.third, ..whole };
         mean += above(mirrored, -lower);
-        let offset = self.reading.smooth_at(mean)[0];
+        // Where it shows, rounding is that of a normal law.
+        let shows = self.is_fine && self.reading.is_free_at(mean, whole.variance);
+        let offset = if shows { self.reading.at(mean, charge.variance) } else { self.reading.smooth_at(mean) }[0];
         if is_full { offset + self.rounding_at_full * charge.exceeds(full) } else { offset }
     }
 }

@@ -17,6 +17,10 @@ const VISIBLE: f64 = 0.6;
 /// Codes over which photosites scatter so that rounding is a uniform error of theirs.
 const MANY_CODES: f64 = 2.5;
 
+/// The standard deviation, in codes, of what is drawn anew in two frames beyond which their roundings have nothing in common:
+/// e^(−2π²σ²) of the little that they have, 2·10⁻⁴.
+const VISIBLE_IN_BOTH: f64 = 0.65;
+
 /// What a photosite's samples follow from, but for the light that reaches it.
 ///
 /// # Examples
@@ -102,7 +106,7 @@ impl Photosite {
     pub fn moments(&self, expected_e: f64) -> Prediction {
         match self.adc {
             None => self.electrons(expected_e),
-            Some(adc) if self.darks[0].is_some() => self.less_dark(&adc, expected_e),
+            Some(adc) if self.darks[0].is_some() => self.less_dark(&adc, expected_e, true),
             Some(adc) => self.adu(&adc, expected_e),
         }
     }
@@ -157,28 +161,37 @@ impl Photosite {
     /// term is that of what these means leave of each other: light and dark frames share the pattern of the dark current,
     /// and everything else is drawn anew. Where nothing is clipped it is that of light, and of the dose of dark current
     /// that is left.
-    pub(super) fn less_dark(&self, adc: &AdcRecord, expected_e: f64) -> Prediction {
+    ///
+    /// Where the level is known to less than a code, it does not tell how codes are rounded (`shows_codes`).
+    pub(super) fn less_dark(&self, adc: &AdcRecord, expected_e: f64, shows_codes: bool) -> Prediction {
         let light = self.adu(adc, expected_e);
         let darks: Vec<(&Dark, Self)> = self.darks.iter().flatten().map(|dark| (dark, self.of_dark(dark))).collect();
         let (mut mean, mut third, mut fourth) = (light.moments.mean, light.third, light.fourth());
         let mut variance = light.moments.variance;
+        let mut apart = variance;
         for (index, (dark, site)) in darks.iter().enumerate() {
             let code = site.adu(adc, 0.0);
-            let median_of = site.visible_median(dark, adc);
-            let shared = self.shared(adc, expected_e, None, (site, median_of));
+            let median_of = site.visible_median(dark, adc).filter(|_| shows_codes);
+            let is_fine = shows_codes && self.rounds_as(adc, expected_e, dark, site);
+            let shared = self.shared(adc, (expected_e, None), (site, median_of), is_fine);
             let weight = dark.weight;
             let average = shared.median.unwrap_or_else(|| dark.averaged(&code, shared.dark, site.temporal_third(adc)));
             mean -= weight * average.moments.mean;
             third -= weight.powi(3) * average.third;
             fourth += weight.powi(4) * average.fourth();
             variance += weight * weight * average.moments.variance - 2.0 * weight * shared.both;
+            apart += weight * weight * average.moments.variance;
             for (other, of_other) in &darks[..index] {
-                let other_median = of_other.visible_median(other, adc);
-                let both = of_other.shared(adc, 0.0, other_median, (site, median_of)).both;
+                let other_median = of_other.visible_median(other, adc).filter(|_| shows_codes);
+                let is_fine = shows_codes && of_other.rounds_as(adc, 0.0, dark, site);
+                let both = of_other.shared(adc, (0.0, other_median), (site, median_of), is_fine).both;
                 variance += 2.0 * weight * other.weight * both;
             }
         }
-        Prediction::of_cumulants(mean, variance.max(0.0), third, fourth)
+        let variance = variance.max(0.0);
+        // Patterns that cancel take what is flat in their law with them.
+        let left = if fourth < 0.0 { (variance / apart).powi(2) } else { 1.0 };
+        Prediction::of_cumulants(mean, variance, third, fourth * left)
     }
 
     /// Photosites of dark frames.
@@ -199,23 +212,36 @@ impl Photosite {
         (is_median && is_fine() && adc.adu_per_e * self.dark_pattern().sqrt() < MANY_CODES).then_some(dark.frames)
     }
 
-    /// What its codes, or medians of them, and those of dark frames have of the pattern.
+    /// Whether roundings of its codes and of those of dark frames have something in common: neither scatters over codes from
+    /// exposure to exposure, nor does light from photosite to photosite.
+    fn rounds_as(&self, adc: &AdcRecord, expected_e: f64, dark: &Dark, of_dark: &Self) -> bool {
+        let own = Dark::mean_of(self.model, 1).std_codes(adc, expected_e);
+        let light = adc.adu_per_e * self.pattern(self.model.prnu).sqrt() * expected_e;
+        self.equations == Equations::Exact
+            && of_dark.model.dark_e * of_dark.model.dcnu > 0.0
+            && own.hypot(dark.std_codes(adc, 0.0)) < VISIBLE_IN_BOTH
+            && light < MANY_CODES / 2.0
+    }
+
+    /// What its codes, or medians of them, and those of dark frames have of the pattern; `is_fine` where it shows in the means of
+    /// photosites how codes are rounded.
     pub(super) fn shared(
         &self,
         adc: &AdcRecord,
-        expected_e: f64,
-        median_of: Option<u32>,
+        (expected_e, median_of): (f64, Option<u32>),
         (dark, dark_median_of): (&Self, Option<u32>),
+        is_fine: bool,
     ) -> Shared {
         let (law, of_dark) = (Law::of(&self.model, expected_e), Law::of(&dark.model, 0.0));
-        let is_plain = law.is_plain(adc) && of_dark.is_plain(adc) && median_of.or(dark_median_of).is_none();
+        let is_fine = is_fine || median_of.or(dark_median_of).is_some();
+        let is_plain = law.is_plain(adc) && of_dark.is_plain(adc) && !is_fine;
         if self.equations == Equations::Paper || is_plain {
             let square = adc.adu_per_e * adc.adu_per_e;
             let [own, of_dark] = [self, dark].map(|site| site.dark_pattern() * square);
             let light = self.pattern(self.model.prnu) * expected_e * expected_e * square;
             return Shared { light: light + own, dark: of_dark, both: (own * of_dark).sqrt(), median: None };
         }
-        let seen = |law: Law, median_of| Seen { law, reading: law.of_codes(adc, codes_of(adc)), median_of };
+        let seen = |law: Law, median_of| Seen { law, reading: law.of_codes(adc, codes_of(adc)), median_of, is_fine };
         Shared::of(seen(law, median_of), seen(of_dark, dark_median_of))
     }
 

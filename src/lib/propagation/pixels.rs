@@ -176,11 +176,16 @@ impl LevelVariance {
             if photosite.flat.is_some() {
                 return photosite.variance_divided(class, expected_e);
             }
-            let slope = photosite.adc.map_or(1.0, |adc| adc.sample_per_e(photosite.model.dark_e + expected_e));
+            let Some(adc) = photosite.adc else { return photosite.moments(expected_e).moments.variance };
+            if photosite.darks[0].is_some() {
+                return photosite.less_dark(&adc, expected_e, false).moments.variance;
+            }
+            let electrons = photosite.model.dark_e + expected_e;
+            let slope = adc.sample_per_e(electrons);
             let charge = charge::charge(&photosite.model, expected_e).variance + photosite.model.read_noise_e.powi(2);
             // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
-            if photosite.adc.is_some() && photosite.darks[0].is_none() && charge.sqrt() * slope < 0.5 {
-                charge * slope * slope + 1.0 / 12.0
+            if charge.sqrt() * slope < 0.5 * adc.sample_slope(adc.level_at(electrons)) {
+                charge * slope * slope + adc.rounding_at(electrons)
             } else {
                 photosite.moments(expected_e).moments.variance
             }

@@ -4,7 +4,7 @@ use super::notes::Note;
 use crate::camera::levels::BlackLevel;
 use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
-use crate::frame::Geometry;
+use crate::frame::{Geometry, to_sample};
 use crate::metadata::{BlackNoise, FrameHeader};
 use crate::numerics::averages::{Combine, average, clipped_variance};
 use crate::stream::RowSource;
@@ -48,10 +48,15 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     let Geometry { width, height, origin, .. } = frame.geometry.clone();
     let [x0, y0] = origin.map(i64::from);
     let mut sites: [Vec<f32>; 4] = Default::default();
-    let mut rows = vec![Vec::new(); height];
-    let mut columns = vec![Vec::new(); width];
+    // The whole border is one line.
+    let count = match border {
+        Border::Whole => 1,
+        Border::Rows => height,
+        Border::Columns => width,
+    };
+    let mut lines = vec![Vec::new(); count];
     let mut samples = Vec::new();
-    for (y, of_row) in rows.iter_mut().enumerate() {
+    for y in 0..height {
         samples.clear();
         reader.read(1, &mut samples)?;
         for (x, sample) in samples[..width].iter().enumerate().filter(|(_, sample)| sample.is_finite()) {
@@ -61,11 +66,12 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
             }) {
                 let site = usize::from(place[1] & 1 != 0) * 2 + usize::from(place[0] & 1 != 0);
                 sites[site].push(*sample);
-                match border {
-                    Border::Whole => {}
-                    Border::Rows => of_row.push((site, *sample)),
-                    Border::Columns => columns[x].push((site, *sample)),
-                }
+                let line = match border {
+                    Border::Whole => 0,
+                    Border::Rows => y,
+                    Border::Columns => x,
+                };
+                lines[line].push((site, *sample));
             }
         }
     }
@@ -73,37 +79,31 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
         return Err(frame.refuse("not all of its 2x2 sites have masked photosites"));
     }
     let counts = sites.each_ref().map(Vec::len);
-    let scatter =
-        sites.each_ref().map(|of_site| clipped_variance(&mut of_site.clone(), CLIP)).iter().sum::<f64>() / 4.0;
-    let count: usize = counts.iter().sum();
     let levels = sites.map(|mut of_site| average(Combine::Clipped, &mut of_site, CLIP).0);
-    // Of a mean of so many, the fewest that one has.
-    let of_mean = |fewest: Option<usize>| fewest.map_or(0.0, |count| scatter / count.max(1) as f64);
-    let fewest = |lines: &[Vec<(usize, f32)>]| lines.iter().map(Vec::len).min();
-    frame.metadata.black_noise = Some(BlackNoise {
-        site_adu2: of_mean(counts.into_iter().min()),
-        row_adu2: of_mean(fewest(&rows).filter(|_| border == Border::Rows)),
-        column_adu2: of_mean(fewest(&columns).filter(|_| border == Border::Columns)),
-    });
-    let off = |of_line: &[(usize, f32)]| {
-        let mut off: Vec<f32> =
-            of_line.iter().map(|(site, sample)| sample - crate::frame::to_sample(levels[*site])).collect();
-        (!off.is_empty()).then(|| average(Combine::Clipped, &mut off, CLIP).0)
+    let above = |of_line: &[(usize, f32)], off: f64| -> Vec<f32> {
+        of_line.iter().map(|(site, sample)| to_sample(f64::from(*sample) - levels[*site] - off)).collect()
     };
+    let off = |of_line: &Vec<(usize, f32)>| match border {
+        Border::Whole => Some(0.0),
+        _ => (!of_line.is_empty()).then(|| average(Combine::Clipped, &mut above(of_line, 0.0), CLIP).0),
+    };
+    let offs: Vec<Option<f64>> = lines.iter().map(off).collect();
+    let noise = noise(border, counts, &lines, |line| above(&lines[line], offs[line].unwrap_or_default()));
     // Counted from the sensor's corner.
-    let deltas = |lines: &[Vec<(usize, f32)>], first: i32, what: &str| {
-        let found: Option<Vec<f64>> = lines.iter().map(|of_line| off(of_line)).collect();
+    let deltas = |first: i32, what: &str| {
+        let found: Option<Vec<f64>> = offs.iter().copied().collect();
         let found = found.ok_or_else(|| frame.refuse(format!("not all of its {what} have masked photosites")))?;
         let first = usize::try_from(first).map_err(|_| frame.refuse("it begins before the sensor's corner"))?;
         Ok::<_, Error>([vec![0.0; first], found].concat())
     };
     let (by_row, by_column) = match border {
         Border::Whole => (Vec::new(), Vec::new()),
-        Border::Rows => (deltas(&rows, origin[1], "rows")?, Vec::new()),
-        Border::Columns => (Vec::new(), deltas(&columns, origin[0], "columns")?),
+        Border::Rows => (deltas(origin[1], "rows")?, Vec::new()),
+        Border::Columns => (Vec::new(), deltas(origin[0], "columns")?),
     };
     let level = BlackLevel::Sites(levels);
     let metadata = &mut frame.metadata;
+    metadata.black_noise = Some(noise);
     metadata.set_black_adu(Some(level.uniform().map_or(level, BlackLevel::from)));
     let lines = match border {
         Border::Whole => String::new(),
@@ -113,9 +113,35 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     (metadata.black_by_row, metadata.black_by_column) = (by_row, by_column);
     let [a, b, c, d] = levels;
     Ok(Note::Remark(format!(
-        "{}: the {count} photosites of its border read {a:.3}, {b:.3}, {c:.3} and {d:.3} ADU at the 2x2 sites, row by row{lines}",
-        frame.name
+        "{}: the {} photosites of its border read {a:.3}, {b:.3}, {c:.3} and {d:.3} ADU at the 2x2 sites, row by row{lines}",
+        frame.name,
+        counts.iter().sum::<usize>()
     )))
+}
+
+/// What such a black level is uncertain by: samples scatter about the level of their site and what their line is off, which is
+/// none of it.
+fn noise(
+    border: Border,
+    of_sites: [usize; 4],
+    lines: &[Vec<(usize, f32)>],
+    left_of: impl Fn(usize) -> Vec<f32>,
+) -> BlackNoise {
+    let mut left: Vec<f32> = (0..lines.len()).flat_map(left_of).collect();
+    let told = lines.iter().filter(|of_line| !of_line.is_empty()).count();
+    let degrees = left.len().saturating_sub(told).max(1) as f64 / left.len().max(1) as f64;
+    let scatter = clipped_variance(&mut left, CLIP) / degrees;
+    // Of a mean of so many, the fewest that one has.
+    let of_mean = |count: usize| scatter / count.max(1) as f64;
+    let of_lines = |kind: Border| {
+        let fewest = lines.iter().map(Vec::len).min().filter(|_| border == kind);
+        fewest.map_or(0.0, of_mean)
+    };
+    BlackNoise {
+        site_adu2: of_mean(of_sites.into_iter().min().unwrap_or_default()),
+        row_adu2: of_lines(Border::Rows),
+        column_adu2: of_lines(Border::Columns),
+    }
 }
 
 /// Where the lines of a frame begin among those of the sensor, none of which come before its corner.

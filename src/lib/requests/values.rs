@@ -292,7 +292,7 @@ pub fn kelvin(text: &str) -> Result<f64, String> {
 ///
 /// What is expected, in words.
 pub fn black(text: &str) -> Result<Black, String> {
-    match text {
+    match text.to_ascii_lowercase().as_str() {
         "auto" => Ok(Black::Auto),
         "none" => Ok(Black::None),
         level => number(level).map(Black::Level).map_err(|_| "give auto, none or a number".into()),
@@ -305,7 +305,7 @@ pub fn black(text: &str) -> Result<Black, String> {
 ///
 /// What is expected, in words.
 pub fn black_or_border(text: &str) -> Result<BlackChoice, String> {
-    match text {
+    match text.to_ascii_lowercase().as_str() {
         "border" => Ok(BlackChoice::Border(Border::Whole)),
         "rows" => Ok(BlackChoice::Border(Border::Rows)),
         "columns" => Ok(BlackChoice::Border(Border::Columns)),
@@ -343,7 +343,7 @@ pub fn region(text: &str) -> Result<Region, String> {
 ///
 /// What is expected, in words.
 pub fn white(text: &str) -> Result<White, String> {
-    match text {
+    match text.to_ascii_lowercase().as_str() {
         "d65" => Ok(White::D65),
         "d50" => Ok(White::D50),
         "e" => Ok(White::EqualEnergy),
@@ -397,7 +397,7 @@ impl LightColor {
 ///
 /// What is expected, in words.
 pub fn encoding(text: &str) -> Result<Encoding, String> {
-    match text {
+    match text.to_ascii_lowercase().as_str() {
         "srgb" => Ok(Encoding::Srgb),
         "linear" => Ok(Encoding::Linear),
         power => positive(power)

@@ -268,6 +268,8 @@ def change(file, truth, path, run):
             ratios = np.array(found.raw(tags.BLACK_LEVEL)).reshape(2, 2, 2)
             found.put(tags.BLACK_LEVEL, np.roll(ratios, (-top, -left), (0, 1)).ravel().tolist())
         found.write()
+        # It describes the image before it had a border.
+        (path.parent / f"{path.name}.yaml").unlink()
 
 
 def directory_of(path, name):

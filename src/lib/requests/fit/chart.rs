@@ -23,6 +23,9 @@ use clap::Args;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::path::{Path, PathBuf};
 
+/// Share of white by which the references of a chart and what no matrix does are never off.
+const MOST_MISFIT: f64 = 0.1;
+
 /// A chart, as a frame or as a table, the colors that it has, and the light on it.
 #[derive(Debug, Clone, Args)]
 pub struct ChartFit {
@@ -142,6 +145,13 @@ impl ChartFit {
         }
         let misfit = if self.no_misfit { Misfit::None } else { Misfit::Estimated };
         let found = fit(&patches, misfit)?;
+        if found.misfit > MOST_MISFIT {
+            return Err(Error::Data(format!(
+                "{}: the matrix misses the colors of the chart by {:.2} of white, which those of a chart are never off by; check \
+                 --corners (dark skin, bluish green, black, white) or the order of the patches",
+                seen.source, found.misfit
+            )));
+        }
         let Some(judgment) = judge(&found, &patches, expected.white) else {
             return Err(Error::Data("the matrix gives colors that are not finite".into()));
         };

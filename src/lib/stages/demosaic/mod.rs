@@ -82,8 +82,7 @@ impl Demosaic {
         if input.geometry.channels.len() != 1 {
             let hint = match metadata.quantity {
                 QuantityKind::Unspecified => {
-                    " (where one of its channels is such a plane, take that alone, for example with `oiiotool in.exr --ch R -o \
-                     out.exr`)"
+                    " (where one of its channels is such a plane, take that alone, for example with `--channel R`)"
                 }
                 _ => "",
             };
