@@ -1,9 +1,12 @@
 //! The command line: start, complain, exit; what a program says beside its output.
 
 mod advice;
+pub mod demo;
+mod documents;
 mod general;
 mod history;
 mod memory;
+pub mod programs;
 mod signals;
 mod usage;
 
@@ -63,13 +66,17 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         ArgAction::Set | ArgAction::Append if !argument.is_positional() => argument.allow_negative_numbers(true),
         _ => argument,
     });
+    if let Some(text) = documents::asked_for(std::env::args_os().skip(1), &command) {
+        let text = text.map_err(Error::Usage);
+        return ended(program, text.and_then(|text| show(|| std::io::stdout().write_all(&text))));
+    }
     if asks_for_template(&command) {
-        return show(program, || std::io::stdout().write_all(METADATA_TEMPLATE.as_bytes()));
+        return ended(program, show(|| std::io::stdout().write_all(METADATA_TEMPLATE.as_bytes())));
     }
     let parsed = command.try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
     let arguments = match parsed {
         Ok(arguments) => arguments,
-        Err(error) if !error.use_stderr() => return show(program, || error.print()),
+        Err(error) if !error.use_stderr() => return ended(program, show(|| error.print())),
         Err(error) => {
             complain(program, &usage::one_line(program, &error));
             return ExitCode::from(2);
@@ -96,17 +103,19 @@ fn asks_for_template(command: &Command) -> bool {
     long.is_some_and(|long| std::env::args_os().skip(1).take_while(|word| word != "--").any(|word| *word == *long))
 }
 
-/// Writes what was asked for instead of a frame, as help; a closed pipe is no error.
-fn show(program: &str, print: impl FnOnce() -> std::io::Result<()>) -> ExitCode {
-    let printed = standard::open_stdout().and_then(|_| {
-        let printed = print().and_then(|()| std::io::stdout().flush());
-        printed.map_err(|e| Error::disk(STDOUT_NAME, "write", e))
-    });
-    match printed {
+/// Writes what was asked for instead of a frame, as help.
+fn show(print: impl FnOnce() -> std::io::Result<()>) -> Result<()> {
+    standard::open_stdout()?;
+    print().and_then(|()| std::io::stdout().flush()).map_err(|e| Error::disk(STDOUT_NAME, "write", e))
+}
+
+/// The status after something that was shown; a closed pipe is no error.
+fn ended(program: &str, shown: Result<()>) -> ExitCode {
+    match shown {
         Ok(()) | Err(Error::ClosedPipe) => ExitCode::SUCCESS,
         Err(error) => {
             complain(program, &error.to_string());
-            ExitCode::FAILURE
+            ExitCode::from(error.exit_status())
         }
     }
 }
