@@ -73,7 +73,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     if asks_for_template(&command) {
         return ended(program, show(|| std::io::stdout().write_all(METADATA_TEMPLATE.as_bytes())));
     }
-    let parsed = command.try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
+    let parsed = command.version(version(program)).try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
     let arguments = match parsed {
         Ok(arguments) => arguments,
         Err(error) if !error.use_stderr() => return ended(program, show(|| error.print())),
@@ -94,6 +94,15 @@ pub fn start<A: CommandFactory + FromArgMatches>(
             ExitCode::from(error.exit_status())
         }
     }
+}
+
+/// What `--version` says behind the name of a program: the project, its version, and the commit that the build was told in
+/// `CYANOMETER_COMMIT`. To look for it in every build would cost a new one after each commit.
+fn version(program: &str) -> &'static str {
+    let project = if program == env!("CARGO_PKG_NAME") { "" } else { concat!("(", env!("CARGO_PKG_NAME"), ") ") };
+    let commit = option_env!("CYANOMETER_COMMIT").filter(|commit| !commit.is_empty());
+    let commit = commit.map_or(String::new(), |commit| format!(" ({commit})"));
+    String::leak(format!("{project}{}{commit}", env!("CARGO_PKG_VERSION")))
 }
 
 /// Whether a template of metadata is wanted, whatever else the program would need.
