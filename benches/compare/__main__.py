@@ -89,7 +89,7 @@ def versions():
     describe = ["git", "describe", "--always", "--dirty"]
     revision = subprocess.run(describe, capture_output=True, text=True, cwd=measuring.ROOT)
     rust = subprocess.run(["rustc", "--version"], check=True, capture_output=True, text=True).stdout
-    lines = [f"cyanometer {ours.split()[-1]} ({revision.stdout.strip() or 'no revision'}), {' '.join(rust.split()[:2])}"]
+    lines = [f"cyanometer {ours.split()[2]} ({revision.stdout.strip() or 'no revision'}), {' '.join(rust.split()[:2])}"]
     found = []
     for package in PACKAGES:
         try:

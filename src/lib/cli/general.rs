@@ -30,7 +30,7 @@ impl Named for ProgressWhen {
 }
 
 /// How the program runs and talks.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct General {
     /// Threads to use; by default one where frames come or go through a pipe, as each program of a pipeline has its own, and
     /// otherwise all. The result does not depend on it

@@ -1,9 +1,12 @@
 //! The command line: start, complain, exit; what a program says beside its output.
 
 mod advice;
+pub mod demo;
+mod documents;
 mod general;
 mod history;
 mod memory;
+pub mod programs;
 mod signals;
 mod usage;
 
@@ -63,13 +66,17 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         ArgAction::Set | ArgAction::Append if !argument.is_positional() => argument.allow_negative_numbers(true),
         _ => argument,
     });
-    if asks_for_template(&command) {
-        return show(program, || std::io::stdout().write_all(METADATA_TEMPLATE.as_bytes()));
+    if let Some(text) = documents::asked_for(std::env::args_os().skip(1), &command) {
+        let text = text.map_err(Error::Usage);
+        return ended(program, text.and_then(|text| show(|| std::io::stdout().write_all(&text))));
     }
-    let parsed = command.try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
+    if asks_for_template(&command) {
+        return ended(program, show(|| std::io::stdout().write_all(METADATA_TEMPLATE.as_bytes())));
+    }
+    let parsed = command.version(version(program)).try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
     let arguments = match parsed {
         Ok(arguments) => arguments,
-        Err(error) if !error.use_stderr() => return show(program, || error.print()),
+        Err(error) if !error.use_stderr() => return ended(program, show(|| error.print())),
         Err(error) => {
             complain(program, &usage::one_line(program, &error, &A::command()));
             return ExitCode::from(2);
@@ -89,6 +96,15 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     }
 }
 
+/// What `--version` says behind the name of a program: the project, its version, and the commit that the build was told in
+/// `CYANOMETER_COMMIT`. To look for it in every build would cost a new one after each commit.
+fn version(program: &str) -> &'static str {
+    let project = if program == env!("CARGO_PKG_NAME") { "" } else { concat!("(", env!("CARGO_PKG_NAME"), ") ") };
+    let commit = option_env!("CYANOMETER_COMMIT").filter(|commit| !commit.is_empty());
+    let commit = commit.map_or(String::new(), |commit| format!(" ({commit})"));
+    String::leak(format!("{project}{}{commit}", env!("CARGO_PKG_VERSION")))
+}
+
 /// Whether a template of metadata is wanted, whatever else the program would need.
 fn asks_for_template(command: &Command) -> bool {
     let option = command.get_arguments().find(|argument| argument.get_id() == "metadata_template");
@@ -96,17 +112,19 @@ fn asks_for_template(command: &Command) -> bool {
     long.is_some_and(|long| std::env::args_os().skip(1).take_while(|word| word != "--").any(|word| *word == *long))
 }
 
-/// Writes what was asked for instead of a frame, as help; a closed pipe is no error.
-fn show(program: &str, print: impl FnOnce() -> std::io::Result<()>) -> ExitCode {
-    let printed = standard::open_stdout().and_then(|_| {
-        let printed = print().and_then(|()| std::io::stdout().flush());
-        printed.map_err(|e| Error::disk(STDOUT_NAME, "write", e))
-    });
-    match printed {
+/// Writes what was asked for instead of a frame, as help.
+fn show(print: impl FnOnce() -> std::io::Result<()>) -> Result<()> {
+    standard::open_stdout()?;
+    print().and_then(|()| std::io::stdout().flush()).map_err(|e| Error::disk(STDOUT_NAME, "write", e))
+}
+
+/// The status after something that was shown; a closed pipe is no error.
+fn ended(program: &str, shown: Result<()>) -> ExitCode {
+    match shown {
         Ok(()) | Err(Error::ClosedPipe) => ExitCode::SUCCESS,
         Err(error) => {
             complain(program, &error.to_string());
-            ExitCode::FAILURE
+            ExitCode::from(error.exit_status())
         }
     }
 }

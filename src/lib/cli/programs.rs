@@ -1,0 +1,88 @@
+//! The other programs, which stand beside the one that runs: their names, what each says of itself, and how they are run.
+
+use super::documents::SUMMARY;
+use super::{complain, show};
+use crate::error::{Error, Result};
+use std::ffi::OsStr;
+use std::io::Write;
+use std::os::unix::process::CommandExt;
+use std::path::PathBuf;
+use std::process::{Command, ExitCode, Stdio};
+
+/// All programs but the front door, about in the order in which a frame meets them.
+pub const PROGRAMS: [&str; 13] = [
+    "render-radiance",
+    "add-noise",
+    "digitize",
+    "mosaic",
+    "import-raw",
+    "correct-frame",
+    "demosaic",
+    "fit-matrix",
+    "to-xyz",
+    "measure",
+    "predict-noise",
+    "color-difference",
+    "preview",
+];
+/// What the front door does itself.
+pub const DEMO: &str = "demo";
+
+/// Behind the list of programs.
+const USUAL: &str = "
+The usual pipeline:
+  fit-matrix skies.exr -o matrix.yaml
+  render-radiance sky.csv | add-noise --seed 7 | digitize | mosaic | demosaic | to-xyz --matrix matrix.yaml -o xyz.exr
+
+`cyanometer demo` runs it on skies that it carries; `PROGRAM --help` tells what each takes, as `cyanometer PROGRAM --help` does.
+";
+
+/// Where a program stands: beside the one that runs.
+pub(super) fn beside(program: &str) -> Result<PathBuf> {
+    let this = std::env::current_exe().map_err(|e| Error::disk(program, "find", e))?;
+    Ok(this.with_file_name(program))
+}
+
+/// Becomes the program that the first word names, where there is one; the words behind it are its own. Where it cannot be
+/// started, that is said, and the status to exit with is given.
+///
+/// Called first of all, so that the program finds all as the shell gave it.
+pub fn hand_over(front: &'static str) -> Option<ExitCode> {
+    let mut words = std::env::args_os().skip(1);
+    let program = words.next()?;
+    let program = PROGRAMS.into_iter().find(|known| OsStr::new(known) == program)?;
+    let error = become_program(program, words);
+    complain(front, &error.to_string());
+    Some(ExitCode::from(error.exit_status()))
+}
+
+/// Gives the process to a program; comes back where that is impossible.
+pub fn become_program(program: &str, words: impl IntoIterator<Item: AsRef<OsStr>>) -> Error {
+    match beside(program) {
+        Ok(path) => Error::disk(&path.display().to_string(), "run", Command::new(&path).args(words).exec()),
+        Err(error) => error,
+    }
+}
+
+/// Lists the programs, each with what it says of itself.
+///
+/// # Errors
+///
+/// [`Error::Disk`] where the list cannot be written.
+pub fn list() -> Result<()> {
+    let width = PROGRAMS.iter().map(|program| program.len()).max().unwrap_or_default();
+    let mut text = String::new();
+    for program in PROGRAMS {
+        text.push_str(&format!("  {program:width$}  {}\n", summary(program)));
+    }
+    text.push_str(USUAL);
+    show(|| std::io::stdout().write_all(text.as_bytes()))
+}
+
+/// What a program says of itself in a line.
+fn summary(program: &str) -> String {
+    let ask = |path: PathBuf| Command::new(path).arg(SUMMARY).stdin(Stdio::null()).stderr(Stdio::null()).output().ok();
+    let said = beside(program).ok().and_then(ask).filter(|done| done.status.success());
+    let said = said.map(|done| String::from_utf8_lossy(&done.stdout).trim_end().to_owned());
+    said.unwrap_or_else(|| "(it is not beside this program, or does not run)".to_owned())
+}

@@ -1,0 +1,133 @@
+//! The front door, and what every program says of itself: its line in the list, its manual page, its completions.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::cli::programs::PROGRAMS;
+use support::workshop::{BAD_DATA, BAD_USAGE, Workshop, path_of, programs};
+
+const FRONT: &str = "cyanometer";
+
+fn text(shop: &Workshop, line: &str) -> String {
+    String::from_utf8(shop.run(line, &[])).unwrap()
+}
+
+/// The long options that a program's help lists, without those of clap.
+fn options(shop: &Workshop, program: &str) -> Vec<String> {
+    let help = text(shop, &format!("{program} --help"));
+    let longs = help.lines().filter_map(|line| {
+        let line = line.trim_start();
+        let line = if line.starts_with('-') { line } else { return None };
+        let (_, long) = line.split_once("--")?;
+        Some(long.split(|c: char| !(c.is_ascii_alphanumeric() || c == '-')).next()?.to_owned())
+    });
+    longs.filter(|long| !["help", "version"].contains(&long.as_str())).collect()
+}
+
+#[test]
+fn the_list_holds_every_program_in_its_own_words() {
+    let shop = Workshop::new();
+    let mut known: Vec<&str> = PROGRAMS.into_iter().chain([FRONT]).collect();
+    known.sort_unstable();
+    assert_eq!(known, programs(), "PROGRAMS in src/lib/cli/programs.rs and src/bin differ");
+    let list = text(&shop, FRONT);
+    for program in PROGRAMS {
+        let help = text(&shop, &format!("{program} --help"));
+        let about = help.split("\n\n").next().unwrap().replace('\n', " ");
+        let line = list.lines().find(|line| line.starts_with(&format!("  {program} "))).unwrap();
+        assert!(about.len() > 20 && line.ends_with(&format!("  {about}")), "{line}\n{about}");
+    }
+    assert!(shop.files().is_empty());
+}
+
+#[test]
+fn every_program_has_a_manual_page_and_completions_with_its_options() {
+    let shop = Workshop::new();
+    for program in programs() {
+        let options = options(&shop, &program);
+        assert!(program == FRONT || options.len() > 3, "{program}: {options:?}");
+        let manual = text(&shop, &format!("{program} --manual"));
+        let about = text(&shop, &format!("{program} --summary"));
+        let plain = manual.replace("\\*(Aq", "'").replace('\\', "");
+        assert!(plain.contains(&format!("{program} - {about}")), "{program}: {manual}");
+        for shell in ["bash", "zsh", "fish"] {
+            let script = text(&shop, &format!("{program} --completions {shell}"));
+            assert!(script.contains(&program), "{program}: {shell}");
+            for option in &options {
+                // fish has the names without their hyphens.
+                let name = if shell == "fish" { format!("-l {option}") } else { format!("--{option}") };
+                assert!(script.contains(&name), "{program}: no {name} for {shell}");
+            }
+        }
+        for option in &options {
+            assert!(plain.contains(&format!("--{option}")), "{program}: no --{option} in its manual page");
+        }
+        let refused = shop.attempt(&format!("{program} --completions tcsh"), &[]);
+        assert_eq!(refused.status.code(), Some(BAD_USAGE), "{program}");
+    }
+}
+
+/// The names of programs are completed behind `cyanometer`.
+#[test]
+fn the_front_door_completes_the_programs() {
+    let shop = Workshop::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = text(&shop, &format!("{FRONT} --completions {shell}"));
+        for program in PROGRAMS {
+            // The crate that writes them completes no positional arguments in fish.
+            assert!(shell == "fish" || script.contains(program), "{shell}: {program}");
+        }
+    }
+}
+
+#[test]
+fn the_front_door_runs_a_program_with_its_own_arguments_status_and_history() {
+    let shop = Workshop::new();
+    let electrons = "render-radiance --electrons 100,200,300 --size 8x6";
+    let made = shop.run(&format!("{FRONT} {electrons}"), &[]);
+    assert_eq!(made, shop.run(electrons, &[]));
+    assert_eq!(text(&shop, &format!("{FRONT} measure --help")), text(&shop, "measure --help"));
+    assert_eq!(shop.run(&format!("{FRONT} -- {electrons}"), &[]), made);
+    for (line, status, said) in [
+        ("measure missing.exr", BAD_DATA, "measure: missing.exr: cannot open"),
+        ("measure --colour", BAD_USAGE, "measure: unknown option"),
+        ("meassure", BAD_USAGE, "did you mean `measure`?"),
+        ("demo a b", BAD_USAGE, "cyanometer: demo takes one directory"),
+    ] {
+        let done = shop.attempt(&format!("{FRONT} {line}"), &[]);
+        let complaint = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(status), "{line}: {complaint}");
+        assert!(complaint.contains(said) && complaint.lines().count() == 1, "{line}: {complaint}");
+    }
+}
+
+/// A program that is not installed is missed, and nothing of the same name is looked for elsewhere.
+#[test]
+fn only_programs_beside_the_front_door_run() {
+    let shop = Workshop::new();
+    std::fs::copy(path_of(FRONT), shop.path(FRONT)).unwrap();
+    let alone = |arguments: &[&str]| std::process::Command::new(shop.path(FRONT)).args(arguments).output().unwrap();
+    let done = alone(&["measure", "a.exr"]);
+    let complaint = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert_eq!(done.status.code(), Some(BAD_DATA), "{complaint}");
+    assert!(complaint.contains("measure: cannot run: no such file"), "{complaint}");
+    let list = String::from_utf8(alone(&[]).stdout).unwrap();
+    assert_eq!(list.matches("not beside this program").count(), PROGRAMS.len(), "{list}");
+}
+
+#[test]
+fn the_demo_runs_in_an_empty_directory() {
+    let shop = Workshop::new();
+    let told = text(&shop, &format!("{FRONT} demo"));
+    let commands = told.lines().filter(|line| line.starts_with("$ ")).count();
+    assert!(commands > 8 && told.contains("pred. mean"), "{told}");
+    for file in ["7-view.png", "4-mosaic.png", "6-xyz.exr", "6-xyz.exr.yaml", "matrix.yaml"] {
+        assert!(!shop.bytes(&format!("cyanometer-demo/{file}")).is_empty());
+    }
+    assert_eq!(shop.files(), ["cyanometer-demo"]);
+    // What lies there already is nobody's to overwrite.
+    let again = shop.attempt(&format!("{FRONT} demo"), &[]);
+    assert_eq!(again.status.code(), Some(BAD_USAGE));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("name a directory that is empty or new"));
+}
