@@ -296,3 +296,33 @@ fn a_sensor_has_one_linearization() {
         "{complaint}"
     );
 }
+
+#[test]
+fn descriptions_that_a_sensor_contradicts_are_told() {
+    let shop = exposed();
+    let bytes: Vec<u8> = (0..16 * 12_u16).flat_map(|i| (1800 + i).to_le_bytes()).collect();
+    fs::write(shop.path("plain.raw"), bytes).unwrap();
+    let demosaic = |rest: &str, status| {
+        let line = format!("demosaic plain.raw --raw 16x12:u16le --sensor kaf-5101ce {rest} -o rgb.exr");
+        said(&shop, &line, status)
+    };
+    assert_eq!(demosaic("--black 1753 --cfa rggb --white 4095", 0), "");
+    assert_eq!(
+        demosaic("--black 1753 --cfa bggr --white 16383", 0),
+        "demosaic: plain.raw: it has a Bayer filter array, bggr, and sensor kaf-5101ce has a Bayer filter array, rggb\n\
+         demosaic: plain.raw: its white level, 16383 ADU, is beyond the last code of sensor kaf-5101ce, 4095\n"
+    );
+    let schema = "schema: cyanometer/1\nquantity: adu\n";
+    for (key, meant) in [("white_levl_adu: 4095", "white_level_adu"), ("CFA: rggb", "cfa"), ("exposur: 1", "exposure")]
+    {
+        fs::write(shop.path("own.yaml"), format!("{schema}{key}\n")).unwrap();
+        let written = key.split(':').next().unwrap();
+        assert_eq!(
+            demosaic("--metadata own.yaml", BAD_DATA),
+            format!("demosaic: own.yaml: unknown key `{written}`; did you mean `{meant}`?\n")
+        );
+    }
+    // What looks like none of ours is kept.
+    fs::write(shop.path("own.yaml"), format!("{schema}observer: nobody\ncfa: rggb\nblack_level_adu: 1753\n")).unwrap();
+    assert_eq!(demosaic("--metadata own.yaml", 0), "");
+}

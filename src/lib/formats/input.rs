@@ -488,7 +488,9 @@ fn find_metadata(
         yaml::parse_metadata(&shown, &text)
     };
     if let Some(path) = &options.metadata {
-        return Ok((from_file(path)?, None));
+        let metadata = from_file(path)?;
+        yaml::check_misspelt(&path.display().to_string(), &metadata)?;
+        return Ok((metadata, None));
     }
     if let Some(sidecar) = path.map(sidecar_path).filter(|sidecar| sidecar.is_file()) {
         return Ok((from_file(&sidecar)?, Some(sidecar.display().to_string())));

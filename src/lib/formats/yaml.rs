@@ -120,6 +120,24 @@ fn check_keys(name: &str, raw: &Mapping, fields: Keys, parts: &[(&str, Keys)]) -
     Err(Error::format(name, format!("unknown key `{key}`{nearest}")))
 }
 
+/// Refuses unknown keys of metadata that a user wrote where they look like known ones. Other unknown keys are kept.
+///
+/// # Errors
+///
+/// [`Error::Format`] naming both.
+pub fn check_misspelt(name: &str, metadata: &Metadata) -> Result<()> {
+    let known = field_names::<Metadata>();
+    for key in metadata.unknown.keys().filter_map(Value::as_str) {
+        let typed = key.to_lowercase();
+        let distance = |known: &str| strsim::damerau_levenshtein(known, &typed);
+        let nearest = known.iter().map(|known| (distance(known), known)).min();
+        if let Some((_, nearest)) = nearest.filter(|(distance, known)| *distance <= (known.len() / 4).min(2)) {
+            return Err(Error::format(name, format!("unknown key `{key}`; did you mean `{nearest}`?")));
+        }
+    }
+    Ok(())
+}
+
 /// [`parse_strict`] of a document with parts, each of which has keys of its own.
 fn parse_parts<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8], parts: &[(&str, Keys)]) -> Result<T> {
     let text = checked_text(name, bytes)?;

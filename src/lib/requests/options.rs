@@ -4,7 +4,9 @@ use super::notes::Note;
 use super::values;
 use crate::analysis::characterization::evaluation::{Filling, SampleExposure};
 use crate::analysis::statistics::Region;
+use crate::camera::levels::WhiteLevel;
 use crate::camera::optics::Exposure;
+use crate::camera::sensor::Sensor;
 use crate::color::White;
 use crate::color::rgb::{Encoding, Primaries};
 use crate::error::{Error, Result};
@@ -13,10 +15,11 @@ use crate::formats::headerless::Layout;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::formats::pipe;
+use crate::metadata::FrameHeader;
 use crate::names::Named;
 use crate::random::Source;
 use crate::stages::noise::NoiseSettings;
-use crate::units::{RadianceUnit, kelvin};
+use crate::units::{QuantityKind, RadianceUnit, kelvin};
 use clap::{Args, Command};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -94,10 +97,32 @@ impl SensorChoice {
     pub fn apply(&self, reader: &mut FrameReader) -> Result<Vec<Note>> {
         let Some(sensor) = &self.sensor else { return Ok(Vec::new()) };
         let loaded = data::load_sensor(sensor)?.sensor;
-        let doubts = loaded.doubts();
+        let doubts = loaded.doubts().into_iter().chain(contradictions(reader.header_mut(), &loaded));
+        let notes = doubts.map(Note::Warning).collect();
         reader.header_mut().metadata.sensor = Some(loaded);
-        Ok(doubts.into_iter().map(Note::Warning).collect())
+        Ok(notes)
     }
+}
+
+/// What a frame says of itself that the read-out of a sensor does not.
+fn contradictions(frame: &FrameHeader, sensor: &Sensor) -> Vec<String> {
+    let Some(readout) = &sensor.readout else { return Vec::new() };
+    let FrameHeader { name, metadata, .. } = frame;
+    let is_codes = metadata.quantity == QuantityKind::Adu;
+    let last_code = f64::from((1_u32 << readout.bits) - 1);
+    let mut found = Vec::new();
+    if let Some(cfa) = metadata.cfa.filter(|cfa| *cfa != readout.cfa) {
+        found.push(format!("it has {}, and sensor {} has {}", cfa.in_words(), sensor.name, readout.cfa.in_words()));
+    }
+    if let Some(white) =
+        metadata.white_level_adu.map(WhiteLevel::largest).filter(|white| is_codes && *white > last_code)
+    {
+        found.push(format!(
+            "its white level, {white} ADU, is beyond the last code of sensor {}, {last_code}",
+            sensor.name
+        ));
+    }
+    found.into_iter().map(|what| format!("{name}: {what}")).collect()
 }
 
 /// A frame to write.
