@@ -309,8 +309,8 @@ fn descriptions_that_a_sensor_contradicts_are_told() {
     assert_eq!(demosaic("--black 1753 --cfa rggb --white 4095", 0), "");
     assert_eq!(
         demosaic("--black 1753 --cfa bggr --white 16383", 0),
-        "demosaic: plain.raw: it has a Bayer filter array, bggr, and sensor kaf-5101ce has a Bayer filter array, rggb\n\
-         demosaic: plain.raw: its white level, 16383 ADU, is beyond the last code of sensor kaf-5101ce, 4095\n"
+        "demosaic: warning: plain.raw: it has a Bayer filter array, bggr, and sensor kaf-5101ce has a Bayer filter array, rggb\n\
+         demosaic: warning: plain.raw: its white level, 16383 ADU, is beyond the last code of sensor kaf-5101ce, 4095\n"
     );
     let schema = "schema: cyanometer/1\nquantity: adu\n";
     for (key, meant) in [("white_levl_adu: 4095", "white_level_adu"), ("CFA: rggb", "cfa"), ("exposur: 1", "exposure")]
