@@ -13,6 +13,7 @@ import tifffile
 from scipy.ndimage import maximum_filter
 from scipy.optimize import minimize_scalar
 
+from conformance.converters import linear_xyz
 from programs import ProgramCase, read_planes, read_table, sample_data
 from test_raw import RATIO, SHORT, beside, scene, write_dng
 
@@ -222,16 +223,7 @@ class Relative(ProgramCase):
         )
         gains = 1 / (color_matrix @ xyz_from_srgb).sum(1)
         with rawpy.imread(str(path)) as raw:
-            theirs = raw.postprocess(
-                output_color=rawpy.ColorSpace.XYZ,
-                gamma=(1, 1),
-                no_auto_bright=True,
-                adjust_maximum_thr=0.0,
-                user_wb=[gains[0], gains[1], gains[2], gains[1]],
-                output_bps=16,
-                demosaic_algorithm=rawpy.DemosaicAlgorithm.LINEAR,
-                user_flip=0,
-            ).astype(float)
+            theirs = linear_xyz(raw, user_wb=[gains[0], gains[1], gains[2], gains[1]]).astype(float)
             dark = maximum_filter(raw.raw_image_visible < raw.black_level_per_channel[0], 3)
         self.assertEqual(ours.shape, theirs.shape)
         ours, theirs, dark = (pixels[2:-2, 2:-2] for pixels in (ours, theirs, dark))

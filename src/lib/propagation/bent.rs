@@ -1,4 +1,4 @@
-//! [f64; 4] of the codes of a converter that is not straight, or of these made straight.
+//! Moments of the codes of a converter that is not straight, or of these made straight.
 
 use crate::metadata::AdcRecord;
 use crate::numerics::gauss::panel;
@@ -12,7 +12,7 @@ const WIDEST: f64 = 1.5;
 /// Step of a derivative, in standard deviations.
 const STEP: f64 = 0.1;
 
-/// [f64; 4] 1 to 4 about `center` of the samples of a normal charge, in e⁻, that is read as codes between `ends`.
+/// Moments 1 to 4 about `center` of the samples of a normal charge, in e⁻, that is read as codes between `ends`.
 ///
 /// Σ over the edges t between codes of \[g(t + ½) − g(t − ½)] T(t), with g the powers of a code's sample and T the probability
 /// of a charge beyond the edge. Many codes are an integral, less \[(D T)′]/24 − 7 \[(D T)‴]/5760 at its ends, by Euler and Maclaurin. Good to

@@ -162,7 +162,7 @@ impl Photosite {
     /// and everything else is drawn anew. Where nothing is clipped it is that of light, and of the dose of dark current
     /// that is left.
     ///
-    /// Where the level is known to less than a code, it does not tell how codes are rounded (`shows_codes`).
+    /// How codes are rounded counts where `shows_codes`; a level that is not known to a fraction of a code does not tell it.
     pub(super) fn less_dark(&self, adc: &AdcRecord, expected_e: f64, shows_codes: bool) -> Prediction {
         let light = self.adu(adc, expected_e);
         let darks: Vec<(&Dark, Self)> = self.darks.iter().flatten().map(|dark| (dark, self.of_dark(dark))).collect();

@@ -69,8 +69,8 @@ impl Places {
     }
 }
 
-/// Gains of three variances, those of the classes or of the black level, for the six covariances, as polynomials in the pixel's hues: with weights
-/// f + ρ h, cov(k, m) = Σ \[f f + ρ_k h f + ρ_m f h + ρ_k ρ_m h h] σ².
+/// Gains of three variances, those of the classes or of the black level, for the six covariances, as polynomials in the pixel's
+/// hues: with weights f + ρ h, cov(k, m) = Σ \[f f + ρ_k h f + ρ_m f h + ρ_k ρ_m h h] σ².
 #[derive(Debug, Clone, PartialEq)]
 struct PixelGains([[[f64; 3]; 4]; 6]);
 

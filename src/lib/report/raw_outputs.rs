@@ -98,6 +98,10 @@ fn matrix(reader: &FrameReader) -> Result<String> {
 /// The temperature that is written where no dark current hangs on it, K.
 const ROOM_K: f64 = 293.15;
 
+/// What such a sensor file says of itself.
+const DESCRIPTION: &str = "gain and noise that a raw file tells; full well is what reads white, and non-uniformity, dark current \
+                           and temperature, which it does not tell, count as none";
+
 /// A sensor file whose read-out is what the noise profile tells; what each class tells is in comments.
 fn read_out(reader: &FrameReader) -> Result<String> {
     let raw = reader.header();
@@ -141,8 +145,7 @@ fn read_out(reader: &FrameReader) -> Result<String> {
     let sensor = Sensor {
         schema: SENSOR_SCHEMA.into(),
         name: format!("noise profile of {}", raw.name),
-        description: Some("gain and noise that a raw file tells; full well is what reads white, and non-uniformity, dark current and \
-                           temperature, which it does not tell, count as none".into()),
+        description: Some(DESCRIPTION.into()),
         source: Some("NoiseProfile of the DNG: variance S x + O of x = (ADU - black) / (white - black)".into()),
         readout: Some(readout),
         response: None,
@@ -154,8 +157,8 @@ fn read_out(reader: &FrameReader) -> Result<String> {
         let [slope, offset] = profile.lines[index.min(count - 1)];
         let ClassReadOut { adu_per_e, noise_at_black_adu, noise_at_black_e, saturation_e } = class;
         text += &format!(
-            "# {filter}: S {slope:e}, O {offset:e}: {adu_per_e:.6} ADU per e-, {noise_at_black_adu:.4} ADU or {noise_at_black_e:.4} e- at black, \
-             {saturation_e:.1} e- at white\n"
+            "# {filter}: S {slope:e}, O {offset:e}: {adu_per_e:.6} ADU per e-, {noise_at_black_adu:.4} ADU or \
+             {noise_at_black_e:.4} e- at black, {saturation_e:.1} e- at white\n"
         );
     }
     Ok(text + &yaml_writer::write("the read-out", &sensor)?)

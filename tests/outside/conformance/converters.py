@@ -27,6 +27,20 @@ class Refused(Exception):
     """A converter did not take a file."""
 
 
+def linear_xyz(raw, **white):
+    """X, Y, Z of LibRaw in 16 bits, in proportion to light, with such a white balance."""
+    return raw.postprocess(
+        output_color=rawpy.ColorSpace.XYZ,
+        gamma=(1, 1),
+        no_auto_bright=True,
+        adjust_maximum_thr=0.0,
+        output_bps=16,
+        demosaic_algorithm=rawpy.DemosaicAlgorithm.LINEAR,
+        user_flip=0,
+        **white,
+    )
+
+
 def call(command, cwd):
     """Runs a command that should succeed; gives what it says."""
     command = [str(word) for word in command]
@@ -141,16 +155,7 @@ class LibRaw(Converter):
     def develop(self, path, directory):
         try:
             with rawpy.imread(str(path)) as raw:
-                pixels = raw.postprocess(
-                    output_color=rawpy.ColorSpace.XYZ,
-                    gamma=(1, 1),
-                    no_auto_bright=True,
-                    adjust_maximum_thr=0.0,
-                    use_camera_wb=True,
-                    output_bps=16,
-                    demosaic_algorithm=rawpy.DemosaicAlgorithm.LINEAR,
-                    user_flip=0,
-                )
+                pixels = linear_xyz(raw, use_camera_wb=True)
         except rawpy.LibRawError as error:
             raise Refused(str(error)) from error
         return pixels / 65535
