@@ -265,7 +265,8 @@ const COMPLAINTS: [(&str, &str); 20] = [
     ),
     (
         "add-noise rates-plane.exr --metadata ./x-trans-rates.yaml --sensor ./parts.yaml",
-        "rates-plane.exr: its sensor has an X-Trans filter array; only Bayer arrays are given noise",
+        "warning: rates-plane.exr: it has an X-Trans filter array, and sensor small has a Bayer filter array, gbrg\n\
+         add-noise: rates-plane.exr: its sensor has an X-Trans filter array; only Bayer arrays are given noise",
     ),
     (
         "demosaic codes.exr --metadata ./sites.yaml --black 3",
