@@ -51,17 +51,16 @@ pub struct Masking {
 
 impl Masking {
     /// What is needed between frames: `is_masked` where the layer comes with `input`, `holds_layers` where what is made can
-    /// have it. A picture to look at has none; nor have demosaicked frames whose scene does not say that they need it, unless
-    /// their uncertainty is told too: their marked pixels are counted.
+    /// have it. A picture to look at has none; nor have demosaicked frames of a uniform scene whose law says that next to
+    /// nothing is saturated, unless their uncertainty is told too.
     pub fn of(input: &FrameHeader, is_masked: bool, output: &FrameHeader, holds_layers: bool) -> Self {
         let need = Need::of(input, is_masked, output);
         let is_wanted = match need {
             Need::Needless | Need::Counted(_) => false,
             Need::Carried => true,
-            // Three planes get the layer where it is sure to be needed, or where others tell how uncertain they are.
             Need::Made(_) => {
                 let has_layers = output.geometry.channels.len() > 3;
-                output.metadata.demosaic.is_none() || has_layers || saturation::expected(output).is_some()
+                output.metadata.demosaic.is_none() || has_layers || !saturation::is_negligible(output)
             }
         };
         Self { need, is_kept: is_wanted && holds_layers && output.metadata.quantity != QuantityKind::Srgb }

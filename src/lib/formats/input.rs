@@ -5,6 +5,7 @@ use super::dng::{DngReader, RawArea};
 use super::files::{STDIN_NAME, named, open_named, read_file, sidecar_path, spool};
 use super::format::{ColorTags, HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Streaming, U16_FULL_SCALE};
 use super::makers::{MakersReader, Worker};
+use super::viewable::{Scaling, is_scale};
 use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
 use crate::camera::noise_profile::NoiseProfile;
@@ -87,6 +88,8 @@ pub struct FrameReader {
     check: Option<DigestCheck>,
     mismatch: Option<String>,
     buffer: Vec<f32>,
+    /// What stored samples were multiplied with for viewers.
+    scaling: Option<Scaling>,
     /// What stored samples are divided by: sRGB in 16 bits runs to 65535.
     divisor: Option<f32>,
     linearize: Option<Linearize>,
@@ -170,8 +173,9 @@ impl FrameReader {
     /// A frame of what a reader gives.
     fn of(reader: Box<dyn SampleReader>, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
-        let (metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
+        let (mut metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
         let stored = reader.geometry();
+        let scaling = take_scaling(reader.as_ref(), &mut metadata, name)?;
         let (first_channel, geometry) = match &options.channel {
             Some(channel) => take_channel(stored, channel, name)?,
             None => (0, keep_planes(stored, options.all_channels, metadata.quantity)),
@@ -209,6 +213,7 @@ impl FrameReader {
             check: check.filter(|_| options.crop.is_none()),
             mismatch: None,
             buffer: Vec::new(),
+            scaling,
             divisor,
             linearize,
             notes,
@@ -357,6 +362,9 @@ impl RowSource for FrameReader {
         let into: &mut Vec<f32> = if direct { samples } else { &mut buffer };
         into.truncate(start);
         self.reader.read(rows, into)?;
+        if let Some(scaling) = &self.scaling {
+            scaling.undo(&mut into[start..]);
+        }
         if let Some(check) = &mut self.check {
             check.digest.update_rows(&into[start..], self.reader.geometry());
         }
@@ -499,6 +507,23 @@ fn find_metadata(
         return Ok((yaml::parse_metadata(name, text)?, None));
     }
     Ok((reader.own_tags().clone(), None))
+}
+
+/// What stored samples were multiplied with, which the metadata no longer say then. What the file itself says of it counts:
+/// metadata beside it may have been made for another.
+///
+/// # Errors
+///
+/// [`Error::Format`] for what is no power of two.
+fn take_scaling(reader: &dyn SampleReader, metadata: &mut Metadata, name: &str) -> Result<Option<Scaling>> {
+    let beside = metadata.sample_scale.take();
+    let embedded = reader.embedded().and_then(|text| yaml::parse_metadata(name, text).ok());
+    let scale = embedded.map_or(beside, |embedded| embedded.sample_scale).unwrap_or(1.0);
+    if !is_scale(scale) {
+        let problem = format!("its `sample_scale`, {scale}, is no power of two, as 0.25 and 16 are");
+        return Err(Error::format(name, problem));
+    }
+    Ok(Scaling::of(reader.geometry().width, &reader.geometry().channels, scale))
 }
 
 /// One channel alone, as the plane Y, and its place among those that are stored.

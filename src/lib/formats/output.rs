@@ -2,15 +2,17 @@
 
 use super::atomic::{AtomicFile, Target};
 use super::digest::SamplesDigest;
-use super::dng::DngWriter;
+use super::dng::{self, DngWriter};
 use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMARIES};
 use super::format::U16_FULL_SCALE;
+use super::icc;
 use super::places::{STDOUT_NAME, named, sidecar_path};
 use super::standard::open_stdout;
 use super::storing::Encoding;
-use super::tiff::{TiffSamples, TiffSettings, TiffTags, TiffWriter};
+use super::tiff::{ExtraTag, TagValue, TiffSamples, TiffSettings, TiffTags, TiffWriter};
+use super::viewable::{Scaling, check_lossless};
 use super::yaml;
-use crate::color::{self, SRGB_PRIMARIES};
+use crate::color::{self, D65_XY, SRGB_PRIMARIES};
 use crate::error::{Error, Result};
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
@@ -56,6 +58,8 @@ pub struct FrameWriter {
     /// The digest of what a reader will get, and the sidecar; only for named files.
     record: Option<(SamplesDigest, AtomicFile)>,
     encoding: Encoding,
+    scaling: Option<Scaling>,
+    scaled: Vec<f32>,
     stored: Vec<f32>,
 }
 
@@ -74,6 +78,10 @@ impl FrameWriter {
     /// read; [`Error::Disk`].
     pub fn create(options: &OutputOptions, header: &FrameHeader) -> Result<Self> {
         let encoding = options.encoding(header)?;
+        let sample_scale = options.scale(header, encoding)?;
+        let mut header = header.clone();
+        header.metadata.sample_scale = (sample_scale != 1.0).then_some(sample_scale);
+        let header = &header;
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
         let target = Target::open(options.path.as_deref(), needs_seek)?;
         let name = target.name().to_owned();
@@ -91,7 +99,11 @@ impl FrameWriter {
             Encoding::Tiff(samples, compression) => {
                 let scale = u16_scale(header.metadata.quantity, samples);
                 let tags = TiffTags { description: Some(description), software: Some(software) };
-                let settings = TiffSettings { samples, scale, compression, tags, extra: Vec::new() };
+                let full = if samples == TiffSamples::U16 { f64::from(U16_FULL_SCALE) } else { 1.0 };
+                let profile = icc::profile(header, sample_scale, full)?.map(TagValue::Undefined);
+                let extra = profile.into_iter().map(|value| ExtraTag { number: ICC_PROFILE, value }).collect();
+                let exif = dng::of_exposure(&header.metadata);
+                let settings = TiffSettings { samples, scale, compression, tags, extra, exif };
                 Encoder::Tiff(Box::new(TiffWriter::create(target, &name, geometry, settings)?))
             }
             Encoding::Dng(samples, compression) => {
@@ -99,7 +111,9 @@ impl FrameWriter {
                 Encoder::Dng(Box::new(DngWriter::create(target, &name, header, samples, compression, texts)?))
             }
         };
-        Ok(Self { encoder, header: header.clone(), name, record, encoding, stored: Vec::new() })
+        let scaling = Scaling::of(geometry.width, &geometry.channels, sample_scale);
+        let (scaled, stored) = (Vec::new(), Vec::new());
+        Ok(Self { encoder, header: header.clone(), name, record, encoding, scaling, scaled, stored })
     }
 
     /// Ends the frame: gives a named file its name, and writes its sidecar. Gives the number of samples that 16 bits could
@@ -160,12 +174,41 @@ fn native_tags(header: &FrameHeader) -> ExrTags {
     ExrTags {
         exposure_s: metadata.exposure.map(|e| e.exposure_s),
         f_number: metadata.exposure.map(|e| e.f_number),
-        // Absolute XYZ: (1, 1, 1) has Y = 1 cd m⁻². Of relative ones no luminance is known.
-        white_luminance: (metadata.quantity == QuantityKind::Xyz && metadata.unit != RELATIVE_UNIT).then_some(1.0),
+        // Absolute XYZ: unscaled (1, 1, 1) has Y = 1 cd m⁻². Of relative ones no luminance is known.
+        white_luminance: (metadata.quantity == QuantityKind::Xyz && metadata.unit != RELATIVE_UNIT)
+            .then(|| metadata.sample_scale.unwrap_or(1.0).recip()),
+        neutral_xy: match metadata.quantity {
+            QuantityKind::Xyz => metadata.color.as_ref().and_then(|color| color.white).map(color::chromaticity),
+            QuantityKind::LinearSrgb => Some(D65_XY),
+            _ => None,
+        },
+        interop_id: interop_id(header).map(str::to_owned),
         primaries,
         ..ExrTags::default()
     }
 }
+
+/// The name of the color space [CIF2025]; none of spaces that have none, as that of a camera.
+fn interop_id(header: &FrameHeader) -> Option<&'static str> {
+    match header.metadata.quantity {
+        QuantityKind::LinearSrgb => Some("lin_rec709_scene"),
+        QuantityKind::Xyz => {
+            let [x, y] = color::chromaticity(header.metadata.color.as_ref()?.white?);
+            let is_d65 = [x - D65_XY[0], y - D65_XY[1]].iter().all(|off| off.abs() < 1e-4);
+            is_d65.then_some("lin_ciexyzd65_scene")
+        }
+        QuantityKind::Electrons | QuantityKind::ExpectedElectrons | QuantityKind::Adu
+            if header.metadata.cfa.is_some() =>
+        {
+            Some("data")
+        }
+        QuantityKind::ColorDifference => Some("data"),
+        _ => None,
+    }
+}
+
+/// The tag of ICC profiles in TIFF.
+const ICC_PROFILE: u16 = 34675;
 
 /// What f16 rounds to infinity, from halfway between the largest f16 and the next power of two on.
 const F16_OVERFLOW: f32 = 65520.0;
@@ -177,37 +220,64 @@ fn u16_scale(quantity: QuantityKind, samples: TiffSamples) -> f32 {
 
 impl RowSink for FrameWriter {
     fn write(&mut self, samples: &[f32]) -> Result<()> {
+        let mut scaled = std::mem::take(&mut self.scaled);
+        let to_store = match &self.scaling {
+            None => samples,
+            Some(scaling) => {
+                scaled.clear();
+                scaled.extend_from_slice(samples);
+                scaling.apply(&mut scaled);
+                self.check_scaled(scaling, samples, &scaled)?;
+                &scaled
+            }
+        };
+        self.check_f16(to_store)?;
+        self.update_digest(samples, to_store);
+        self.encode(to_store)?;
+        self.scaled = scaled;
+        Ok(())
+    }
+}
+
+impl FrameWriter {
+    /// Refuses samples that are not what they were once they are scaled back; f16 rounds them all the same.
+    fn check_scaled(&self, scaling: &Scaling, samples: &[f32], scaled: &[f32]) -> Result<()> {
+        match self.encoding {
+            Encoding::Exr(ExrSamples::F16, _) => Ok(()),
+            Encoding::Tiff(TiffSamples::U16, _) => check_lossless(&self.name, scaling, samples, scaled, U16_FULL_SCALE),
+            _ => check_lossless(&self.name, scaling, samples, scaled, f32::INFINITY),
+        }
+    }
+
+    fn check_f16(&self, to_store: &[f32]) -> Result<()> {
         let overflows = |sample: &&f32| (F16_OVERFLOW..f32::INFINITY).contains(&sample.abs());
-        if matches!(self.encoding, Encoding::Exr(ExrSamples::F16, _))
-            && let Some(sample) = samples.iter().find(overflows)
-        {
-            return Err(Error::Data(format!(
+        match to_store.iter().find(overflows) {
+            Some(sample) if matches!(self.encoding, Encoding::Exr(ExrSamples::F16, _)) => Err(Error::Data(format!(
                 "{}: the sample {sample} would become infinite as f16, which ends at 65504; write f32",
                 self.name
-            )));
+            ))),
+            _ => Ok(()),
         }
-        if let Some((digest, _)) = &mut self.record {
-            // The digest is that of the samples as a reader will get them.
-            let scale = match self.encoding {
-                Encoding::Exr(ExrSamples::F16, _) => None,
-                Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) => {
-                    Some(u16_scale(self.header.metadata.quantity, TiffSamples::U16))
-                }
-                _ => {
-                    digest.update_rows(samples, &self.header.geometry);
-                    return self.encode(samples);
-                }
-            };
-            self.stored.clear();
-            self.stored.extend(samples.iter().map(|&sample| match scale {
-                None => f16::from_f32(sample).to_f32(),
-                Some(scale) => {
-                    to_sample(f64::from((sample * scale).round_ties_even().clamp(0.0, U16_FULL_SCALE)).max(0.0))
-                }
-            }));
-            digest.update_rows(&self.stored, &self.header.geometry);
+    }
+
+    /// Adds rows to the digest of the samples as a reader will get them.
+    fn update_digest(&mut self, samples: &[f32], to_store: &[f32]) {
+        let Some((digest, _)) = &mut self.record else { return };
+        let stored = &mut self.stored;
+        stored.clear();
+        match self.encoding {
+            Encoding::Exr(ExrSamples::F16, _) => {
+                stored.extend(to_store.iter().map(|&sample| f16::from_f32(sample).to_f32()));
+                self.scaling.iter().for_each(|scaling| scaling.undo(stored));
+            }
+            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) => {
+                let scale = u16_scale(self.header.metadata.quantity, TiffSamples::U16);
+                let rounded = |sample: f32| (sample * scale).round_ties_even().clamp(0.0, U16_FULL_SCALE);
+                stored.extend(samples.iter().map(|&sample| to_sample(f64::from(rounded(sample)).max(0.0))));
+            }
+            _ => return digest.update_rows(samples, &self.header.geometry),
         }
-        self.encode(samples)
+        digest.update_rows(stored, &self.header.geometry);
     }
 }
 

@@ -4,6 +4,7 @@ use super::dng;
 use super::exr::{ExrCompression, ExrSamples};
 use super::places::{STDOUT_NAME, named};
 use super::tiff::{TiffCompression, TiffSamples};
+use super::viewable;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::names::Named;
@@ -108,6 +109,8 @@ pub struct OutputOptions {
     pub compression: Option<CompressionKind>,
     /// Sample type; by quantity where none is given.
     pub samples: Option<SampleKind>,
+    /// Whether samples are scaled so that viewers show them.
+    pub is_viewable: bool,
 }
 
 /// How a frame is encoded, once all options are settled.
@@ -148,6 +151,9 @@ impl OutputOptions {
                 let samples = tiff_samples("TIFF", self.samples.unwrap_or(default), fits_u16, quantity)?;
                 Ok(Encoding::Tiff(samples, tiff_compression(compression)?))
             }
+            Format::Dng if self.is_viewable => {
+                Err(Error::Usage("a DNG tells converters its white level; leave --viewable out".into()))
+            }
             Format::Dng => {
                 let place = named(self.path.as_deref()).map(|path| path.display().to_string());
                 dng::check_frame(header, &place.unwrap_or_else(|| STDOUT_NAME.into()))?;
@@ -156,6 +162,16 @@ impl OutputOptions {
                 Ok(Encoding::Dng(samples, dng_compression(compression, samples)?))
             }
         }
+    }
+
+    /// What stored samples are multiplied with.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`viewable::scale_of`].
+    pub(super) fn scale(&self, header: &FrameHeader, encoding: Encoding) -> Result<f64> {
+        let fills_u16 = matches!(encoding, Encoding::Tiff(TiffSamples::U16, _));
+        if self.is_viewable { viewable::scale_of(header, fills_u16) } else { Ok(1.0) }
     }
 
     /// Whether the file has names for layers beside the samples.

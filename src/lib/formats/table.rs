@@ -139,6 +139,7 @@ mod tests {
             compression: TiffCompression::None,
             tags: TiffTags::default(),
             extra,
+            exif: Vec::new(),
         };
         let geometry = Geometry::new(4, 2, &["Y"]);
         let mut writer = TiffWriter::create(Cursor::new(Vec::new()), "out.tif", &geometry, settings).unwrap();

@@ -122,6 +122,10 @@ pub struct Metadata {
     /// The programs that made the frame, first to last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub history: Vec<HistoryEntry>,
+    /// What stored samples were multiplied with, a power of two, so that viewers show them; readers undo it. Covariances were
+    /// by its square, and marks not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample_scale: Option<f64>,
     /// What is known only after the last row; in sidecars alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub samples: Option<SamplesRecord>,
@@ -162,6 +166,7 @@ impl Metadata {
             mask_bits: Vec::new(),
             left_out: Vec::new(),
             history: Vec::new(),
+            sample_scale: None,
             samples: None,
             unknown: Mapping::new(),
         }

@@ -68,11 +68,19 @@ const TOLD: f64 = 1e-12;
 /// What is expected of the samples of R, G and B, or of all pixels that are made of several; none where next to nothing is
 /// saturated, or nothing is known.
 pub fn expected(frame: &FrameHeader) -> Option<[f64; 3]> {
-    let shares = match frame.metadata.demosaic {
+    known(frame).filter(|shares| shares.iter().any(|share| *share > TOLD))
+}
+
+/// Whether the law of a uniform scene says that next to nothing is saturated.
+pub fn is_negligible(frame: &FrameHeader) -> bool {
+    known(frame).is_some() && expected(frame).is_none()
+}
+
+fn known(frame: &FrameHeader) -> Option<[f64; 3]> {
+    match frame.metadata.demosaic {
         None => shares(frame),
         Some(_) => share_of_pixels(frame).map(|share| [share; 3]),
-    };
-    shares.filter(|shares| shares.iter().any(|share| *share > TOLD))
+    }
 }
 
 fn used(method: Method, pattern: CfaPattern, shares: [f64; 3]) -> f64 {

@@ -142,6 +142,10 @@ pub struct Output {
     /// DNG
     #[arg(long, value_name = "TYPE", value_parser = values::choice::<SampleKind>())]
     pub sample_type: Option<SampleKind>,
+    /// Scale samples by a power of two so that image viewers show them: what is white comes into the upper half of 0 to 1 (EXR,
+    /// TIFF of floats) or of 16 bits. Programs of this toolchain undo it to the bit
+    #[arg(long)]
+    pub viewable: bool,
 }
 
 impl Output {
@@ -168,6 +172,7 @@ impl Output {
             format: self.format,
             compression: self.compression,
             samples: self.sample_type,
+            is_viewable: self.viewable,
         }
     }
 }

@@ -32,4 +32,5 @@ pub(super) use color::temperature_k;
 pub use color::{OwnMatrix, own_matrix};
 pub(super) use describe::exposure_of;
 pub use read::{DngReader, FORMAT};
+pub(super) use tell::of_exposure;
 pub use write::{DngWriter, check_frame};

@@ -198,8 +198,8 @@ fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor
     found
 }
 
-/// The exposure; no tags where it is unknown.
-fn of_exposure(metadata: &Metadata) -> Vec<ExtraTag> {
+/// The exposure, as Exif has it; no tags where it is unknown.
+pub(in crate::formats) fn of_exposure(metadata: &Metadata) -> Vec<ExtraTag> {
     let Some(exposure) = metadata.exposure else { return Vec::new() };
     let settings = [(tags::EXPOSURE_TIME, exposure.exposure_s), (tags::F_NUMBER, exposure.f_number)];
     let ratios = settings.map(|(tag, value)| (tag, ratio(value))).into_iter().filter(|(_, [above, _])| *above > 0);

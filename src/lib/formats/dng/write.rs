@@ -77,7 +77,8 @@ impl<W: Write + Seek> DngWriter<W> {
         [description, software]: [String; 2],
     ) -> Result<Self> {
         let Told { raw, first, exif, photometric, preview } = Told::of(header, name, samples)?;
-        let settings = TiffSettings { samples, scale: 1.0, compression, tags: TiffTags::default(), extra: raw };
+        let settings =
+            TiffSettings { samples, scale: 1.0, compression, tags: TiffTags::default(), extra: raw, exif: Vec::new() };
         let mut tiff = TiffWriter::create(output, name, &header.geometry, settings)?;
         if tiff.is_big() {
             return Err(Error::format(name, "a DNG holds up to 4 GiB, and this frame might pass that; write a TIFF"));

@@ -159,6 +159,8 @@ fn read_tags(header: &Header) -> ExrTags {
         exposure_s: own.exposure.map(f64::from),
         f_number: own.aperture.map(f64::from),
         white_luminance: own.white_luminance.map(f64::from),
+        neutral_xy: own.adopted_neutral.map(point),
+        interop_id: None,
         primaries: header
             .shared_attributes
             .chromaticities

@@ -18,6 +18,8 @@ pub use write::{ExrWriter, TablePatch, patch_table};
 
 /// The string attribute that holds the metadata.
 const METADATA_ATTRIBUTE: &str = "cyanometer";
+/// The attribute that names the color space.
+const INTEROP_ATTRIBUTE: &str = "colorInteropID";
 /// Blocks smaller than this are read 32 at a time, larger ones two, to save memory; blocks to be written are gathered up to
 /// this, or one that is larger.
 const PARALLEL_BLOCK_BYTES: usize = 4 << 20;
@@ -74,6 +76,10 @@ pub struct ExrTags {
     pub f_number: Option<f64>,
     /// `whiteLuminance` in cd m⁻².
     pub white_luminance: Option<f64>,
+    /// `adoptedNeutral`: the chromaticity that counts as neutral.
+    pub neutral_xy: Option<[f64; 2]>,
+    /// `colorInteropID`: the color space by a name of the Color Interop Forum.
+    pub interop_id: Option<String>,
     /// `chromaticities`.
     pub primaries: Option<Primaries>,
     /// `emissiveUnits` of a spectral image.

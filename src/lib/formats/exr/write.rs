@@ -2,7 +2,7 @@
 
 use super::straight::encode;
 use super::write_behind::WriteBehind;
-use super::{ExrCompression, ExrSamples, ExrTags, METADATA_ATTRIBUTE, PARALLEL_BLOCK_BYTES};
+use super::{ExrCompression, ExrSamples, ExrTags, INTEROP_ATTRIBUTE, METADATA_ATTRIBUTE, PARALLEL_BLOCK_BYTES};
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, to_sample};
 use exr::block::UncompressedBlock;
@@ -279,17 +279,21 @@ fn file_header(
 
 /// The attributes of a part, and those of the whole file.
 fn attributes(tags: &ExrTags, origin: Vec2<i32>, size: Vec2<usize>) -> (LayerAttributes, ImageAttributes) {
+    let point = |[x, y]: [f64; 2]| Vec2(to_sample(x), to_sample(y));
     let mut own = LayerAttributes { layer_position: origin, ..LayerAttributes::default() };
     own.software_name = tags.software.as_ref().map(text);
     own.exposure = tags.exposure_s.map(to_sample);
     own.aperture = tags.f_number.map(to_sample);
     own.white_luminance = tags.white_luminance.map(to_sample);
-    // The crate keeps other attributes in a hash map; one entry alone has the same order in every run.
+    own.adopted_neutral = tags.neutral_xy.map(point);
+    // The crate keeps other attributes in hash maps; one entry alone in each has the same order in every run.
     if let Some(metadata) = &tags.metadata {
         own.other.insert(Text::new_or_panic(METADATA_ATTRIBUTE), AttributeValue::Text(text(metadata)));
     }
     let mut shared = ImageAttributes::new(IntegerBounds::new(origin, size));
-    let point = |[x, y]: [f64; 2]| Vec2(to_sample(x), to_sample(y));
+    if let Some(name) = &tags.interop_id {
+        shared.other.insert(Text::new_or_panic(INTEROP_ATTRIBUTE), AttributeValue::Text(text(name)));
+    }
     shared.chromaticities = tags.primaries.map(|[red, green, blue, white]| Chromaticities {
         red: point(red),
         green: point(green),

@@ -171,7 +171,7 @@ mod tests {
     fn told(geometry: &Geometry, samples: TiffSamples, tags: &[(u16, TagValue)]) -> (Metadata, Vec<String>) {
         let extra = tags.iter().map(|(number, value)| ExtraTag { number: *number, value: value.clone() }).collect();
         let (compression, tags) = (TiffCompression::None, TiffTags::default());
-        let settings = TiffSettings { samples, scale: 1.0, compression, tags, extra };
+        let settings = TiffSettings { samples, scale: 1.0, compression, tags, extra, exif: Vec::new() };
         let mut writer = TiffWriter::create(Cursor::new(Vec::new()), "out.tif", geometry, settings).unwrap();
         writer.write_rows(&vec![7.0; geometry.row_samples() * geometry.height]).unwrap();
         let mut file = tempfile::tempfile().unwrap();

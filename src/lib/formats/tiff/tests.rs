@@ -40,7 +40,7 @@ fn frame(width: usize, height: usize, channels: usize) -> Geometry {
 }
 
 fn settings(samples: TiffSamples, compression: TiffCompression, tags: &TiffTags) -> TiffSettings {
-    TiffSettings { samples, scale: 1.0, compression, tags: tags.clone(), extra: Vec::new() }
+    TiffSettings { samples, scale: 1.0, compression, tags: tags.clone(), extra: Vec::new(), exif: Vec::new() }
 }
 
 fn write(

@@ -31,6 +31,8 @@ pub struct TiffSettings {
     pub tags: TiffTags,
     /// Tags besides those that the writer sets.
     pub extra: Vec<ExtraTag>,
+    /// Those of Exif, in a directory of their own; there is none where these are none.
+    pub exif: Vec<ExtraTag>,
 }
 
 /// Writes rows as a TIFF file: little-endian, interleaved strips, the directory at the end.
@@ -170,7 +172,9 @@ impl<W: Write + Seek> TiffWriter<W> {
     /// When rows are missing, or the disk refuses.
     pub fn finish(mut self) -> Result<(W, u64)> {
         self.write_rest()?;
-        let fields = self.fields();
+        let mut fields = self.fields();
+        fields.extend(self.put_exif(&self.settings.exif.clone())?);
+        fields.sort_by_key(|field| field.tag.to_u16());
         let directory = self.put_directory(fields)?;
         self.begin_with(directory)?;
         Ok((self.output, self.unfit))
@@ -190,17 +194,23 @@ impl<W: Write + Seek> TiffWriter<W> {
         let pixels = self.position;
         self.put(&first.rgb)?;
         let mut fields = first.fields(&self.name)?;
-        let exif = tags::fields(&first.exif, &self.name)?;
-        if !exif.is_empty() {
-            let place = self.put_directory(exif)?;
-            fields.push(self.offsets(Tag::ExifDirectory, std::iter::once(place)));
-        }
+        fields.extend(self.put_exif(&first.exif)?);
         fields.push(self.offsets(Tag::StripOffsets, std::iter::once(pixels)));
         fields.push(self.offsets(Tag::SubIfd, std::iter::once(below)));
         fields.sort_by_key(|field| field.tag.to_u16());
         let directory = self.put_directory(fields)?;
         self.begin_with(directory)?;
         Ok((self.output, self.unfit))
+    }
+
+    /// Writes the directory of Exif; gives the field that leads to it, where there are tags.
+    fn put_exif(&mut self, exif: &[ExtraTag]) -> Result<Option<Field>> {
+        let fields = tags::fields(exif, &self.name)?;
+        if fields.is_empty() {
+            return Ok(None);
+        }
+        let place = self.put_directory(fields)?;
+        Ok(Some(self.offsets(Tag::ExifDirectory, std::iter::once(place))))
     }
 
     /// Writes the rows that are left.

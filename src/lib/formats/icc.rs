@@ -1,0 +1,108 @@
+//! ICC profiles of TIFF files: which color three samples are, for programs that manage color \[ICC2022].
+//!
+//! Each is a matrix behind straight lines: v = (s − b) / (w − b) of sample s, black level b and white level w, and
+//! XYZ under D50 = A M diag(w − b) v / Y, M to XYZ, Y that of white, A the adaptation from the light's white by Bradford.
+
+use crate::color::adaptation::Adaptation;
+use crate::color::{self, D50_XY, D65_XY, SRGB_PRIMARIES};
+use crate::error::{Error, Result};
+use crate::metadata::FrameHeader;
+use crate::units::QuantityKind;
+use moxcms::{ColorDateTime, ColorProfile, LocalizableString, Matrix3d, ProfileText, ToneReprCurve, Xyzd};
+use nalgebra::{Matrix3, Vector3};
+
+/// Slopes of the lines that 16 bits behind the point still tell to 1 in 10³, and more than which no file has.
+const SLOPES: std::ops::Range<f64> = 1.0 / 64.0..65_536.0;
+
+/// What the samples of three planes are.
+struct Light {
+    words: &'static str,
+    /// Relative XYZ of v, Y = 1 for white.
+    xyz_from_shares: Matrix3<f64>,
+    /// Samples of no light and of white.
+    range: [[f64; 2]; 3],
+    white_xy: [f64; 2],
+}
+
+/// The profile of a frame whose samples are stored times `scale`, as shares of `full`; none of what is not three planes of
+/// known color, or is stored so that viewers would show black or white alone.
+///
+/// # Errors
+///
+/// [`Error::Data`] where the crate does not write the profile.
+pub(super) fn profile(frame: &FrameHeader, scale: f64, full: f64) -> Result<Option<Vec<u8>>> {
+    if !frame.has_three_planes() {
+        return Ok(None);
+    }
+    let mut profile = ColorProfile::new_srgb();
+    if frame.metadata.quantity != QuantityKind::Srgb {
+        let Some(light) = Light::of(frame) else { return Ok(None) };
+        let lines = light.range.map(|[black, white]| {
+            let slope = full / scale / (white - black);
+            [slope, -black / (white - black)]
+        });
+        if !lines.iter().all(|[slope, _]| SLOPES.contains(slope)) {
+            return Ok(None);
+        }
+        let Ok(adapt) = Adaptation::Bradford.between(light.white_xy, D50_XY) else { return Ok(None) };
+        light.describe(&mut profile, &adapt, lines);
+    }
+    // Files of the same frame have the same bytes.
+    profile.creation_date_time =
+        ColorDateTime { year: 2000, month: 1, day_of_the_month: 1, hours: 0, minutes: 0, seconds: 0 };
+    let encoded = profile.encode();
+    encoded.map(Some).map_err(|error| Error::Data(format!("{}: no ICC profile can be made: {error}", frame.name)))
+}
+
+impl Light {
+    fn of(frame: &FrameHeader) -> Option<Self> {
+        let metadata = &frame.metadata;
+        match metadata.quantity {
+            QuantityKind::LinearSrgb => Some(Self {
+                words: "linear sRGB",
+                xyz_from_shares: color::rgb::xyz_from_rgb(&SRGB_PRIMARIES, color::xyz_of_chromaticity(D65_XY, 1.0))?,
+                range: [[0.0, 1.0]; 3],
+                white_xy: D65_XY,
+            }),
+            QuantityKind::Xyz => {
+                let white = metadata.color.as_ref()?.white?;
+                Some(Self {
+                    words: "CIE XYZ",
+                    xyz_from_shares: Matrix3::identity(),
+                    range: [[0.0, white[1]]; 3],
+                    white_xy: color::chromaticity(white),
+                })
+            }
+            QuantityKind::Adu if metadata.cfa.is_none() => Self::of_camera(frame),
+            _ => None,
+        }
+    }
+
+    /// Sensor RGB by the frame's own matrix, or that of its sensor, under whose light nothing is known but D65.
+    fn of_camera(frame: &FrameHeader) -> Option<Self> {
+        let metadata = &frame.metadata;
+        let (matrix, white_xy) = match (&metadata.relative_matrix, &metadata.sensor) {
+            (Some(relative), _) => (relative.xyz_from_camera, relative.white_xy),
+            (None, sensor) => (sensor.as_ref()?.xyz_from_camera?, D65_XY),
+        };
+        let black = metadata.uniform_black_adu().unwrap_or(0.0);
+        let range = metadata.white_level_adu?.classes().map(|white| [black, white]);
+        let signals = Vector3::from(range.map(|[black, white]| white - black));
+        let xyz_from_camera = color::matrix(&matrix) * Matrix3::from_diagonal(&signals);
+        let white = xyz_from_camera.column_sum();
+        let is_sound = white.y > 0.0 && white.y.is_finite() && signals.min() > 0.0;
+        is_sound.then(|| Self { words: "sensor RGB", xyz_from_shares: xyz_from_camera / white.y, range, white_xy })
+    }
+
+    fn describe(&self, profile: &mut ColorProfile, adapt: &Matrix3<f64>, lines: [[f64; 2]; 3]) {
+        let colorants = adapt * self.xyz_from_shares;
+        let colorant = |j: usize| Xyzd { x: colorants[(0, j)], y: colorants[(1, j)], z: colorants[(2, j)] };
+        [profile.red_colorant, profile.green_colorant, profile.blue_colorant] = [0, 1, 2].map(colorant);
+        #[expect(clippy::cast_possible_truncation, reason = "the profile holds 16 bits behind the point")]
+        let curves = lines.map(|[slope, black]| Some(ToneReprCurve::Parametric(vec![1.0, slope as f32, black as f32])));
+        [profile.red_trc, profile.green_trc, profile.blue_trc] = curves;
+        profile.chromatic_adaptation = Some(Matrix3d { v: color::rows_of(adapt) });
+        let text = LocalizableString::new("en".into(), "US".into(), format!("cyanometer {}", self.words));
+        profile.description = Some(ProfileText::Localizable(vec![text]));
+    }
+}

@@ -1,0 +1,135 @@
+//! Frames scaled for viewers: what they hold, and that our programs read from them what they do from others, to the bit.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::stream::RowSource;
+use std::fs;
+use std::path::Path;
+use support::workshop::Workshop;
+
+const MATRIX: &str = "\
+schema: cyanometer-matrix/1
+sensor: kaf-5101ce
+method: sky-rad-ls
+unit: cd m-2 per (ADU s-1 sr-1)
+xyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], [3.7e-4, 3.1e-4, -2.6e-5], [1.0e-4, -1.6e-4, 5.3e-4]]
+";
+
+/// A pipeline, each command on the file of the one before it, and the greatest sample that its file may hold by right: white.
+const STAGES: [(&str, &str, f64); 6] = [
+    ("render-radiance SAMPLES/skies/sky912.exr --patch 6x5 --expose-to 0.75", "rates.exr", 1.0),
+    ("add-noise rates.exr --seed 7", "noisy.exr", 1.0),
+    ("digitize noisy.exr", "codes.tiff", 65_536.0),
+    ("mosaic codes.tiff", "plane.tiff", 65_536.0),
+    ("demosaic plane.tiff --sigma --method eci", "rgb.exr", 1.0),
+    ("to-xyz rgb.exr --matrix matrix.yaml --sigma --white-luminance 40000", "xyz.exr", 1.0),
+];
+
+fn set_up() -> Workshop {
+    let bench = Workshop::new();
+    fs::write(bench.path("matrix.yaml"), MATRIX).unwrap();
+    bench
+}
+
+/// The samples that a program of ours reads, all channels.
+fn samples(path: &Path) -> Vec<u32> {
+    let options = InputOptions { path: Some(path.into()), all_channels: true, ..InputOptions::default() };
+    let mut reader = FrameReader::open(&options).unwrap();
+    let mut samples = Vec::new();
+    for _ in 0..reader.header().geometry.height {
+        reader.read(1, &mut samples).unwrap();
+    }
+    assert_eq!(reader.mismatch(), None);
+    assert_eq!(reader.header().metadata.sample_scale, None);
+    samples.into_iter().map(f32::to_bits).collect()
+}
+
+/// What is stored: the same read without what the metadata say of scales.
+fn stored(path: &Path) -> Vec<f32> {
+    let bytes = fs::read(path).unwrap();
+    let place = bytes.windows(13).position(|window| window == b"sample_scale:").unwrap();
+    let mut renamed = bytes.clone();
+    renamed[place..place + 13].copy_from_slice(b"sample_shape:");
+    let copy = path.with_file_name(format!("bare-{}", path.file_name().unwrap().to_str().unwrap()));
+    fs::write(&copy, renamed).unwrap();
+    let mut reader = FrameReader::open(&InputOptions { path: Some(copy), ..InputOptions::default() }).unwrap();
+    let mut samples = Vec::new();
+    for _ in 0..reader.header().geometry.height {
+        reader.read(1, &mut samples).unwrap();
+    }
+    samples
+}
+
+/// A scale at every stage, none, and one at every other: the samples that are read are the same, and what is stored fills the
+/// range up to white by more than half of what the scene does: 0.75 of full well.
+#[test]
+fn a_pipeline_of_scaled_frames_has_the_samples_of_one_of_unscaled_ones() {
+    let plain = set_up();
+    let scaled = set_up();
+    let mixed = set_up();
+    for (index, (command, file, white)) in STAGES.into_iter().enumerate() {
+        plain.run(&format!("{command} -o {file}"), &[]);
+        scaled.run(&format!("{command} --viewable -o {file}"), &[]);
+        mixed.run(&format!("{command}{} -o {file}", if index % 2 == 0 { " --viewable" } else { "" }), &[]);
+        let expected = samples(&plain.path(file));
+        assert_eq!(expected, samples(&scaled.path(file)), "{file}");
+        assert_eq!(expected, samples(&mixed.path(file)), "{file}");
+        let highest = stored(&scaled.path(file)).into_iter().fold(0.0, f32::max);
+        assert!((0.3..=1.0).contains(&(f64::from(highest) / white)), "{file}: {highest}");
+        let digest = |bench: &Workshop| {
+            let text = fs::read_to_string(bench.path(&format!("{file}.yaml"))).unwrap();
+            text.lines().find(|line| line.contains("digest: ")).unwrap().to_owned()
+        };
+        assert_eq!(digest(&plain), digest(&scaled), "{file}");
+    }
+}
+
+#[test]
+fn pipes_and_half_floats_are_scaled_too() {
+    let bench = set_up();
+    bench.run("render-radiance --electrons 3000,5000,7000 --size 32x24 -o rates.exr", &[]);
+    bench.run("add-noise rates.exr --seed 7 --viewable --sample-type f16 -o half.exr", &[]);
+    bench.run("add-noise rates.exr --seed 7 --sample-type f16 -o plain.exr", &[]);
+    // Powers of two do not change what f16 rounds to.
+    assert_eq!(samples(&bench.path("half.exr")), samples(&bench.path("plain.exr")));
+    bench.run("digitize plain.exr --viewable --compression deflate -o a.tiff", &[]);
+    bench.run("digitize half.exr --viewable --format tiff --compression lzw -o b.tiff", &[]);
+    assert_eq!(samples(&bench.path("a.tiff")), samples(&bench.path("b.tiff")));
+}
+
+/// What lies beside a file may be of another: what the file says of itself counts.
+#[test]
+fn the_scale_is_that_of_the_file_itself() {
+    let bench = set_up();
+    bench.run("render-radiance --electrons 3000,5000,7000 --size 32x24 -o rates.exr", &[]);
+    bench.run("digitize rates.exr -o codes.tiff", &[]);
+    bench.run("digitize rates.exr --viewable -o shown.tiff", &[]);
+    let expected = samples(&bench.path("codes.tiff"));
+    fs::copy(bench.path("codes.tiff.yaml"), bench.path("shown.tiff.yaml")).unwrap();
+    assert_eq!(samples(&bench.path("shown.tiff")), expected);
+    fs::remove_file(bench.path("shown.tiff.yaml")).unwrap();
+    assert_eq!(samples(&bench.path("shown.tiff")), expected);
+}
+
+#[test]
+fn what_cannot_be_scaled_is_refused() {
+    let bench = set_up();
+    bench.run("render-radiance --electrons 3000,5000,7000 --size 32x24 -o rates.exr", &[]);
+    bench.run("digitize rates.exr -o codes.exr", &[]);
+    bench.run("mosaic codes.exr -o plane.exr", &[]);
+    bench.run("demosaic plane.exr -o rgb.exr", &[]);
+    for (line, complaint) in [
+        ("mosaic codes.exr --viewable -o plane.dng", "a DNG tells converters its white level; leave --viewable out"),
+        (
+            "to-xyz rgb.exr --matrix matrix.yaml --space lab --white d65 --white-luminance 9000 --viewable -o lab.exr",
+            "is no light that viewers show",
+        ),
+    ] {
+        let output = bench.attempt(line, &[]);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && told.contains(complaint), "{line}: {told}");
+    }
+}
