@@ -4,15 +4,22 @@
 //! XYZ under D50 = A M diag(w − b) v / Y, M to XYZ, Y that of white, A the adaptation from the light's white by Bradford.
 
 use crate::color::adaptation::Adaptation;
-use crate::color::{self, D50_XY, D65_XY, SRGB_PRIMARIES};
+use crate::color::{self, D65_XY, SRGB_PRIMARIES};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::units::QuantityKind;
-use moxcms::{ColorDateTime, ColorProfile, LocalizableString, Matrix3d, ProfileText, ToneReprCurve, Xyzd};
+use moxcms::{ColorProfile, LocalizableString, Matrix3d, ProfileText, ToneReprCurve, Xyzd};
 use nalgebra::{Matrix3, Vector3};
 
 /// Slopes of the lines that 16 bits behind the point still tell to 1 in 10³, and more than which no file has.
 const SLOPES: std::ops::Range<f64> = 1.0 / 64.0..65_536.0;
+
+/// The white of the profile connection space \[ICC2022, 7.2.16].
+const D50: [f64; 3] = [0.9642, 1.0, 0.8249];
+/// Where a profile has the time at which it was made, and the day on which the specification was published: year, month, day,
+/// hour, minute, second in two bytes each.
+const DATE_PLACE: std::ops::Range<usize> = 24..36;
+const DATE: [u8; 12] = [0x07, 0xe6, 0, 5, 0, 1, 0, 0, 0, 0, 0, 0];
 
 /// What the samples of three planes are.
 struct Light {
@@ -35,6 +42,8 @@ pub(super) fn profile(frame: &FrameHeader, scale: f64, full: f64) -> Result<Opti
         return Ok(None);
     }
     let mut profile = ColorProfile::new_srgb();
+    profile.description = Some(text("sRGB"));
+    profile.copyright = Some(text("No copyright, use freely"));
     if frame.metadata.quantity != QuantityKind::Srgb {
         let Some(light) = Light::of(frame) else { return Ok(None) };
         let lines = light.range.map(|[black, white]| {
@@ -44,14 +53,18 @@ pub(super) fn profile(frame: &FrameHeader, scale: f64, full: f64) -> Result<Opti
         if !lines.iter().all(|[slope, _]| SLOPES.contains(slope)) {
             return Ok(None);
         }
-        let Ok(adapt) = Adaptation::Bradford.between(light.white_xy, D50_XY) else { return Ok(None) };
+        let Ok(adapt) = Adaptation::Bradford.between(light.white_xy, color::chromaticity(D50)) else { return Ok(None) };
         light.describe(&mut profile, &adapt, lines);
     }
-    // Files of the same frame have the same bytes.
-    profile.creation_date_time =
-        ColorDateTime { year: 2000, month: 1, day_of_the_month: 1, hours: 0, minutes: 0, seconds: 0 };
+    let [x, y, z] = D50;
+    profile.white_point = Xyzd { x, y, z };
+    profile.media_white_point = Some(profile.white_point);
     let encoded = profile.encode();
-    encoded.map(Some).map_err(|error| Error::Data(format!("{}: no ICC profile can be made: {error}", frame.name)))
+    let mut bytes =
+        encoded.map_err(|error| Error::Data(format!("{}: no ICC profile can be made: {error}", frame.name)))?;
+    // The crate puts the time in; files of the same frame have the same bytes.
+    bytes.get_mut(DATE_PLACE).ok_or_else(|| Error::Data("an ICC profile is too short".into()))?.copy_from_slice(&DATE);
+    Ok(Some(bytes))
 }
 
 impl Light {
@@ -102,7 +115,46 @@ impl Light {
         let curves = lines.map(|[slope, black]| Some(ToneReprCurve::Parametric(vec![1.0, slope as f32, black as f32])));
         [profile.red_trc, profile.green_trc, profile.blue_trc] = curves;
         profile.chromatic_adaptation = Some(Matrix3d { v: color::rows_of(adapt) });
-        let text = LocalizableString::new("en".into(), "US".into(), format!("cyanometer {}", self.words));
-        profile.description = Some(ProfileText::Localizable(vec![text]));
+        profile.description = Some(text(self.words));
+    }
+}
+
+/// A text of an even number of letters: the crate sets one tag right behind another, and each has to begin at a multiple of four
+/// bytes \[ICC2022, 7.3.1].
+fn text(words: &str) -> ProfileText {
+    let padding = if words.encode_utf16().count() % 2 == 1 { " " } else { "" };
+    let text = LocalizableString::new("en".into(), "US".into(), format!("{words}{padding}"));
+    ProfileText::Localizable(vec![text])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+
+    /// libpng refuses others, and with them the picture.
+    #[test]
+    fn tags_begin_at_multiples_of_four() {
+        for quantity in [QuantityKind::Srgb, QuantityKind::LinearSrgb] {
+            let (geometry, metadata) = (Geometry::new(1, 1, &["R", "G", "B"]), Metadata::new(quantity));
+            let frame = FrameHeader { name: "frame".into(), geometry, metadata };
+            let bytes = profile(&frame, 1.0, 1.0).unwrap().unwrap();
+            let number = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+            assert_eq!(number(0), bytes.len());
+            let tags = (0..number(128)).map(|tag| 132 + 12 * tag);
+            assert!(tags.clone().all(|tag| number(tag + 4).is_multiple_of(4)));
+            assert!(tags.clone().all(|tag| number(tag + 4) + number(tag + 8) <= bytes.len()));
+            assert_eq!(bytes, profile(&frame, 1.0, 1.0).unwrap().unwrap());
+            // The sum of the colorants is the white of the connection space, to the 16 bits behind the point.
+            let colorants = [b"rXYZ", b"gXYZ", b"bXYZ"].map(|name| {
+                let tag = tags.clone().find(|tag| bytes[*tag..*tag + 4] == name[..]).unwrap();
+                [8, 12, 16].map(|place| f64::from(number(number(tag + 4) + place) as u32 as i32) / 65_536.0)
+            });
+            for (axis, white) in D50.into_iter().enumerate() {
+                let sum: f64 = colorants.iter().map(|colorant| colorant[axis]).sum();
+                assert!((sum - white).abs() < 3e-4, "{quantity}: {axis}: {sum}");
+            }
+        }
     }
 }

@@ -175,6 +175,7 @@ impl Shade {
                     }
                     (black, white.largest())
                 }
+                QuantityKind::LinearSrgb => (0.0, 1.0),
                 QuantityKind::Unspecified => (lowest.min(0.0), highest),
                 other => {
                     return Err(frame

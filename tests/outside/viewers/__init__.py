@@ -1,0 +1,1 @@
+"""What image viewers show of frames at each stage, beside what `preview` shows."""

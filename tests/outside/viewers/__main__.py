@@ -1,0 +1,78 @@
+"""Makes frames of every stage, opens each in the viewers that are installed, and says what they show. See docs/viewers.md."""
+
+import argparse
+import pathlib
+import sys
+
+import numpy as np
+
+from conformance.__main__ import BEGIN, END
+from conformance.converters import Refused, call
+
+from . import frames
+from .viewers import VIEWERS
+
+# Mean distance of patches, as a share of full scale, up to which two pictures are the same: two of 8 bits' 255 levels for
+# rounding and dithering, and what converters' own working spaces lose.
+SAME = 3 / 255
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="viewers", description=__doc__)
+    parser.add_argument("directory", nargs="?", type=pathlib.Path, default=pathlib.Path("viewers-output"))
+    parser.add_argument("--document", metavar="FILE", type=pathlib.Path, help="page whose table is replaced")
+    settings = parser.parse_args()
+    directory = settings.directory.resolve()
+    directory.mkdir(parents=True, exist_ok=True)
+    viewers = [viewer for viewer in VIEWERS if viewer.version()]
+    for viewer in VIEWERS:
+        if viewer not in viewers:
+            print(f"{viewer.name} is not installed, and left out", file=sys.stderr)
+    made = frames.make_all(directory)
+    rows = [(frame, [shown(viewer, frame, directory) for viewer in viewers]) for frame in made]
+    page = table(viewers, rows)
+    (directory / "table.md").write_text(page, encoding="utf-8")
+    print(page)
+    if settings.document:
+        text = settings.document.read_text(encoding="utf-8")
+        before, after = text.split(BEGIN)[0], text.split(END)[1]
+        settings.document.write_text(before + BEGIN + "\n" + page + "\n" + END + after, encoding="utf-8")
+
+
+def shown(viewer, frame, directory):
+    """What a viewer shows of a frame, in words."""
+    if frame.path.suffix[1:] not in viewer.formats:
+        return "–"
+    picture = directory / f"{frame.path.stem}-{frame.path.suffix[1:]}-{viewer.name}.png"
+    picture.unlink(missing_ok=True)
+    try:
+        call(viewer.command(frame.path, picture), directory)
+    except Refused as refused:
+        print(f"{viewer.name}, {frame.path.name}: {refused}", file=sys.stderr)
+    if not picture.exists():
+        return "refused"
+    seen = frames.patches_of_file(directory, picture.name)
+    if seen.shape != frame.readings["as preview"].shape:
+        return "another size"
+    if seen.mean() < 0.07 and seen.max() < 0.1:
+        return "black"
+    if seen.mean() > 0.97:
+        return "white"
+    distances = {name: float(np.abs(seen - reading).mean()) for name, reading in frame.readings.items()}
+    nearest = min(distances, key=distances.get)
+    if distances[nearest] < SAME:
+        return nearest
+    return f"other ({nearest} {distances[nearest]:.3f})"
+
+
+def table(viewers, rows):
+    heads = ["frame", *(f"{viewer.name} {viewer.version()}" for viewer in viewers)]
+    lines = ["| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
+    for frame, cells in rows:
+        name = f"{frame.words}, {frame.path.suffix[1:].upper()}{', `--viewable`' if frame.viewable else ''}"
+        lines.append("| " + " | ".join([name, *cells]) + " |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()
