@@ -32,7 +32,20 @@ pub fn exr_complaint(name: &str, error: &ExrError) -> Error {
 
 /// What the crate `csv` complains of: rows of different lengths, bytes that are no text.
 pub fn csv_complaint(name: &str, error: &csv::Error) -> Error {
-    Error::format(name, format!("it is not a CSV table: {error}"))
+    let problem = match error.kind() {
+        csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
+            let line = pos.as_ref().map_or(0, csv::Position::line);
+            let cells = if *len == 1 { "cell" } else { "cells" };
+            let hint = if len > expected_len {
+                "; part columns by semicolons or tabs where commas are those of decimals"
+            } else {
+                ""
+            };
+            format!("line {line} has {len} {cells}, the rows above it have {expected_len}{hint}")
+        }
+        _ => format!("it is not a CSV table: {error}"),
+    };
+    Error::format(name, problem)
 }
 
 /// What the crate `serde_yaml` complains of while it reads: what is no YAML, or not that of the type.
@@ -132,16 +145,8 @@ mod tests {
     #[test]
     fn csv_says_where_a_table_is_none() {
         let refused = |bytes: &[u8]| SpectralTable::parse("t.csv", bytes).unwrap_err().to_string();
-        assert_eq!(
-            refused(b"nm,L\n400,1\n410\n"),
-            "t.csv: it is not a CSV table: CSV error: record 2 (line: 3, byte: 11): found record with 1 fields, but the \
-             previous record has 2 fields"
-        );
-        assert_eq!(
-            refused(b"nm,L\n400,\xFF\n"),
-            "t.csv: it is not a CSV table: CSV parse error: record 1 (line 2, field: 1, byte: 5): invalid utf-8: invalid \
-             UTF-8 in field 1 near byte index 0"
-        );
+        assert_eq!(refused(b"nm,L\n400,1\n410\n"), "t.csv: line 3 has 1 cell, the rows above it have 2");
+        assert_eq!(refused(b"nm,L\n400,\xFF\n"), "t.csv: line 2, column 2: `\u{FF}` is no number");
     }
 
     #[derive(Debug, Serialize, Deserialize)]

@@ -64,6 +64,11 @@ impl SpectralChannels {
         let (unit, warning) = radiance_unit::settle(says, unit)?;
         Ok(Self { channels, wavelength_nm, unit, warning })
     }
+
+    /// What a sample of 1 is in W cm⁻² sr⁻¹ nm⁻¹, by channel.
+    pub fn factors(&self) -> Vec<f64> {
+        self.wavelength_nm.iter().map(|nm| self.unit.in_w_per_cm2_sr_nm(*nm)).collect()
+    }
 }
 
 /// A source of radiances: a table, or an image.
@@ -112,9 +117,9 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
     let library = match open(&options)? {
         Radiances::Image(mut reader) => {
             let spectral = SpectralChannels::of(reader.header(), unit)?;
+            let factors = spectral.factors();
             warnings.extend(spectral.warning);
             let geometry = reader.header().geometry.clone();
-            let factor = spectral.unit.in_w_per_cm2_sr_nm();
             // A header may declare any size: memory is taken as rows come.
             let mut radiance = Vec::new();
             fold([&mut *reader as &mut dyn RowSource], geometry.height, |band| {
@@ -122,8 +127,9 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
                 for y in band.rows() {
                     let lines: Vec<&[f32]> =
                         spectral.channels.iter().map(|&channel| window.row(y.cast_signed(), channel)).collect();
-                    let pixels = (0..geometry.width).flat_map(|x| lines.iter().map(move |line| line[x]));
-                    radiance.extend(pixels.map(|sample| f64::from(sample) * factor));
+                    for x in 0..geometry.width {
+                        radiance.extend(lines.iter().zip(&factors).map(|(line, factor)| f64::from(line[x]) * factor));
+                    }
                 }
                 Ok(())
             })?;
@@ -136,7 +142,10 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
             let mut radiance = table.values.clone();
             for (index, mut curve) in radiance.rows_mut().into_iter().enumerate() {
                 let (unit, warning) = table.radiance_unit(index, unit)?;
-                curve *= unit.in_w_per_cm2_sr_nm();
+                curve
+                    .iter_mut()
+                    .zip(&table.wavelength_nm)
+                    .for_each(|(value, nm)| *value *= unit.in_w_per_cm2_sr_nm(*nm));
                 warnings.extend(warning.into_iter().filter(|_| index == 0));
             }
             let columns = chart_columns(radiance.nrows());
