@@ -1,4 +1,5 @@
-//! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` \[Fichet2021].
+//! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` \[Fichet2021], or by bins of
+//! wavelength, as in `400.00-410.00nm`.
 
 use super::csv::SpectralTable;
 use super::files::{named, open_named, read_table, spool};
@@ -8,7 +9,7 @@ use super::radiance_unit::{self, FileSays};
 use super::table;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
-use crate::spectrum::{SpectralLibrary, channel_wavelength_nm, chart_columns, check_wavelengths};
+use crate::spectrum::{SpectralLibrary, channel_bin_nm, channel_wavelength_nm, chart_columns, check_wavelengths};
 use crate::stream::{RowSource, fold};
 use crate::units::{Any, OtherUnit, RadianceUnit, Stated, unit_of_heading};
 use ndarray::Array2;
@@ -59,6 +60,13 @@ impl SpectralChannels {
         // What is no unit at all is none of radiance.
         let unknown = || Stated::Other { text: stated.to_owned(), kind: OtherUnit::Unknown };
         let heading = (!stated.is_empty()).then(|| unit_of_heading(stated).unwrap_or_else(unknown));
+        if stated.is_empty()
+            && unit.is_none()
+            && frame.geometry.channels.iter().any(|name| channel_bin_nm(name).is_some())
+        {
+            let problem = "its channels are bins of wavelength, and it does not say the unit of its radiance";
+            return Err(frame.refuse(problem).give(&["radiance_unit"]));
+        }
         let place = "in the attribute `emissiveUnits`, as `W.m^-2.sr^-1.nm^-1`";
         let says = FileSays { name: &frame.name, heading: heading.as_ref(), remarks: &[], place };
         let (unit, warning) = radiance_unit::settle(says, unit)?;
