@@ -175,3 +175,46 @@ fn negative(name: &str, radiance: &Array2<f64>) -> Option<String> {
     let all = radiance.nrows();
     (samples > 0).then(|| format!("{name}: {samples} of {all} samples have radiances below 0, which no light is"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+    use crate::units::QuantityKind;
+
+    /// What becomes of channels in a unit, and another that a user gives.
+    fn seen(channels: &[&str], unit: &str, given: Option<RadianceUnit>) -> Result<SpectralChannels> {
+        let mut metadata = Metadata::new(QuantityKind::SpectralRadiance);
+        metadata.unit = unit.into();
+        let frame = FrameHeader { name: "a.exr".into(), geometry: Geometry::new(2, 2, channels), metadata };
+        SpectralChannels::of(&frame, given)
+    }
+
+    #[test]
+    fn channels_are_found_by_wavelength() {
+        let names = ["R", "G", "B", "S0.500,000nm", "S0.400,000nm", "S1.400,000nm"];
+        let found = seen(&names, "W.m^-2.sr^-1.nm^-1", None).unwrap();
+        assert_eq!((found.channels, found.wavelength_nm), (vec![4, 3], vec![400.0, 500.0]));
+        let per_wavenumber = seen(&names, "W/(m2 sr cm-1)", None).unwrap();
+        // 10⁷/λ² cm⁻¹ per nm: 62.5 at 400 nm, 40 at 500 nm.
+        for (factor, wanted) in per_wavenumber.factors().into_iter().zip([62.5e-4, 40e-4]) {
+            assert!((factor / wanted - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn bins_have_their_centers_and_no_unit_of_their_own() {
+        let names = ["400.00-410.00nm", "410.00-420.00nm"];
+        let refused = seen(&names, "", None).unwrap_err().to_string();
+        let wanted = "a.exr: its channels are bins of wavelength, and it does not say the unit of its radiance; give `radiance_unit`";
+        assert_eq!(refused, wanted);
+        let found = seen(&names, "", Some(RadianceUnit::USUAL[1])).unwrap();
+        assert_eq!(found.wavelength_nm, [405.0, 415.0]);
+        let refused = seen(&["S0.400,0nm"], "W.m^-2", None).unwrap_err().to_string();
+        assert!(
+            refused.contains("give `radiance_unit`") || refused.contains("spectral radiances are wanted"),
+            "{refused}"
+        );
+    }
+}

@@ -90,10 +90,10 @@ pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
 pub fn of_levels(frame: &FrameHeader) -> Option<Note> {
     let metadata = &frame.metadata;
     let (black, white) = (metadata.uniform_black_adu()?, metadata.white_level_adu?.largest());
-    let problem = if black >= white {
-        format!("its black level, {black} ADU, is not below its white level, {white} ADU: no sample tells of light")
-    } else if white <= 0.0 {
+    let problem = if white < 0.0 {
         format!("what is subtracted exceeds its white level by {} ADU: no sample is above 0", -white)
+    } else if black >= white {
+        format!("its black level, {black} ADU, is not below its white level, {white} ADU: no sample tells of light")
     } else {
         return None;
     };

@@ -91,7 +91,7 @@ impl<S: RowSource> DefectMap<S> {
             (inside, outside) => {
                 let all = inside + outside;
                 Some(format!(
-                    "{name}: {outside} of the {all} photosites that it lists are outside {whose}; they do not count"
+                    "{name}: it lists {all} photosites, {outside} of them outside {whose}; these do not count"
                 ))
             }
         }

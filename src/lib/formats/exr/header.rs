@@ -221,3 +221,22 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
     });
     order
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What pbrt-v4 writes is per nm, as the layout has it; without the layout nobody knows.
+    #[test]
+    fn emission_of_the_spectral_layout_is_per_nm() {
+        let unit = |layout: Option<&str>, unit: &str| {
+            let (emissive_units, spectral_layout) = (Some(unit.into()), layout.map(Into::into));
+            emissive_unit(&ExrTags { emissive_units, spectral_layout, ..ExrTags::default() })
+        };
+        assert_eq!(unit(Some("1.0"), "W.m^-2.sr^-1"), "W.m^-2.sr^-1.nm^-1");
+        assert_eq!(unit(Some("1.0"), "W.m^-2.sr^-1.nm^-1"), "W.m^-2.sr^-1.nm^-1");
+        assert_eq!(unit(Some("1.0"), "W.m^-2"), "W.m^-2");
+        assert_eq!(unit(Some("2.0"), "W.m^-2.sr^-1"), "W.m^-2.sr^-1");
+        assert_eq!(unit(None, "W.m^-2.sr^-1"), "W.m^-2.sr^-1");
+    }
+}
