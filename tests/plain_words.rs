@@ -11,7 +11,7 @@ use support::TREE;
 use support::workshop::Workshop;
 
 /// What no user should have to know.
-const FOREIGN: [&str; 22] = [
+const FOREIGN: [&str; 23] = [
     "invalid type",
     "invalid value",
     "invalid length",
@@ -34,6 +34,7 @@ const FOREIGN: [&str; 22] = [
     "invalid digit",
     "invalid float literal",
     "deserializ",
+    "duplicate entry",
 ];
 
 /// What stands where something else belongs.

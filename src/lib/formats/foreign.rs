@@ -65,13 +65,15 @@ pub fn yaml_problem(error: &serde_yaml::Error) -> String {
 
 /// A complaint of the crate `serde` in our words: a path of keys, what does not fit its type, and the place. None for another.
 fn misfit(text: &str) -> Option<String> {
-    const KINDS: [&str; 7] = [
+    const KINDS: [&str; 9] = [
         "invalid type: ",
         "invalid value: ",
         "invalid length ",
         "missing field ",
         "unknown variant ",
         "duplicate field ",
+        "duplicate entry with key ",
+        "untagged and internally tagged enums do not support enum input",
         "data did not match any variant",
     ];
     let (begin, kind) = KINDS.iter().filter_map(|kind| Some((text.find(kind)?, *kind))).min()?;
@@ -85,6 +87,8 @@ fn misfit(text: &str) -> Option<String> {
     let (found, expected) = what.split_once(", expected ").unwrap_or((what, ""));
     Some(match kind {
         "missing field " => format!("{key} has no {what}{place}"),
+        "duplicate entry with key " => format!("{key} has `{}` twice{place}", what.trim_matches('"')),
+        other if other.starts_with("untagged") => format!("{key} is a tagged value, which has no meaning here{place}"),
         "duplicate field " => format!("{key} has {what} twice{place}"),
         "unknown variant " if expected.is_empty() => format!("{key} is {found}, which is none of its names{place}"),
         "unknown variant " => {
