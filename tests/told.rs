@@ -86,7 +86,7 @@ fn maps_that_mark_nothing_are_told() {
         |map: &str| said(&shop, &format!("correct-frame light.exr --black auto --defects {map} -o out.exr"), 0);
     fs::write(shop.path("within.txt"), "15,11\n").unwrap();
     fs::write(shop.path("beyond.txt"), "16,11\n2000,3\n").unwrap();
-    assert!(correct("within.txt").starts_with("correct-frame: warning: 1 defective photosites were interpolated"));
+    assert!(correct("within.txt").starts_with("correct-frame: warning: 1 defective photosite was interpolated"));
     assert_eq!(
         correct("beyond.txt"),
         "correct-frame: warning: beyond.txt: no photosite that it lists is in light.exr, whose 16x12 begin at column 0, row 0 of \
