@@ -534,7 +534,7 @@ fn images_without_metadata_are_what_space_says() {
     let output = shop.attempt("color-difference 50,0,0 a.exr --space lab --map map.exr --output-format json", &[]);
     assert_eq!(
         String::from_utf8_lossy(&output.stderr),
-        "color-difference: warning: 1 pixels are NaN or infinite; they are left out of the statistics\n"
+        "color-difference: warning: 1 pixel is NaN or infinite; it is left out of the statistics\n"
     );
     assert!(output.status.success());
     let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -173,7 +173,7 @@ fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
             "unknown key `read_noise`; did you mean `read_noise_e`?",
         ),
         (&FLAT.to_owned(), "sensor/1", "sensor/2", "unknown key `width`; did you mean `readout.width`?"),
-        (&FLAT.to_owned(), "cfa: gbrg", "cfa: monochrome", "it is not as expected: cfa: unknown variant `monochrome`"),
+        (&FLAT.to_owned(), "cfa: gbrg", "cfa: monochrome", "`cfa` is `monochrome`; known are"),
         (&parts, "cfa: gbrg", "cfa: rgbw", "readout.cfa: `rgbw` is no filter array; one is rggb"),
         (&parts, "bits: 14", "bits: 0", "`bits` is 0; it must be 1 to 16"),
         (&parts, "width: 12", "width: wide", "readout.width: invalid type"),
@@ -406,7 +406,7 @@ fn old_metadata_get_the_parts_of_their_sensor() {
     let complaint =
         |right: &str, wrong: &str| parse_metadata("old", &OLD_METADATA.replace(right, wrong)).unwrap_err().to_string();
     assert!(complaint("  bits: 12", "  bits: 40").contains("in `sensor`, `bits` is 40"));
-    assert!(complaint("  bits: 12\n", "").contains("in `sensor`, it is not as expected: missing field `bits`"));
+    assert!(complaint("  bits: 12\n", "").contains("in `sensor`, it has no `bits`"));
 }
 
 /// A sidecar of the first release beside a frame of today.

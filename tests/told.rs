@@ -86,7 +86,11 @@ fn maps_that_mark_nothing_are_told() {
         |map: &str| said(&shop, &format!("correct-frame light.exr --black auto --defects {map} -o out.exr"), 0);
     fs::write(shop.path("within.txt"), "15,11\n").unwrap();
     fs::write(shop.path("beyond.txt"), "16,11\n2000,3\n").unwrap();
-    assert!(correct("within.txt").starts_with("correct-frame: warning: 1 defective photosites were interpolated"));
+    fs::write(shop.path("part.txt"), "x,y\n15,11\n2000,3\n").unwrap();
+    assert!(
+        correct("part.txt").contains("part.txt: it lists 2 photosites, 1 of them outside light.exr, whose 16x12 begin")
+    );
+    assert!(correct("within.txt").starts_with("correct-frame: warning: 1 defective photosite was interpolated"));
     assert_eq!(
         correct("beyond.txt"),
         "correct-frame: warning: beyond.txt: no photosite that it lists is in light.exr, whose 16x12 begin at column 0, row 0 of \

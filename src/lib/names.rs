@@ -26,6 +26,20 @@ pub trait Named: Copy + Send + Sync + 'static {
     }
 }
 
+/// The known name that is nearest to one that is typed, by letters that are added, left out, changed or swapped, the first of
+/// several; none where all are farther than `farthest` allows a known name to be.
+pub fn nearest<'a>(
+    typed: &str,
+    known: impl IntoIterator<Item = &'a str>,
+    farthest: impl Fn(&str) -> usize,
+) -> Option<&'a str> {
+    let distances = known.into_iter().map(|known| (strsim::damerau_levenshtein(known, typed), known));
+    distances
+        .min_by_key(|(distance, _)| *distance)
+        .filter(|(distance, known)| *distance <= farthest(known))
+        .map(|(_, known)| known)
+}
+
 /// Reads a value that a file holds by its name.
 ///
 /// # Errors

@@ -160,10 +160,29 @@ fn neighbors(table: &[f64], wavelength_nm: f64) -> Option<[(usize, f64); 2]> {
     Some([(above - 1, 1.0 - share), (above, share)])
 }
 
-/// The wavelength in nm that a channel's name states, as in `S0.550,000000nm` \[Fichet2021]; none for channels of another kind.
+/// The wavelength in nm that a channel's name states, as in `S0.550,000000nm` \[Fichet2021], or the center of its bin, as in
+/// `400.00-410.00nm` (Mitsuba 0.6); none for channels of another kind.
 pub fn channel_wavelength_nm(channel: &str) -> Option<f64> {
+    let is_wavelength = |nm: &f64| *nm > 0.0 && nm.is_finite();
+    if let Some([begin, end]) = channel_bin_nm(channel) {
+        return Some(f64::midpoint(begin, end));
+    }
     let number = channel.strip_prefix("S0.")?.strip_suffix("nm")?;
-    number.replace(',', ".").parse().ok().filter(|nm: &f64| *nm > 0.0 && nm.is_finite())
+    number.replace(',', ".").parse().ok().filter(is_wavelength)
+}
+
+/// Where the bin in nm that a channel's name states begins and ends, as in `400.00-410.00nm`, perhaps behind a layer's name.
+pub fn channel_bin_nm(channel: &str) -> Option<[f64; 2]> {
+    let (begin, end) = channel.strip_suffix("nm")?.split_once('-')?;
+    // Each number has a point of its own; what stands before it is the layer.
+    let begin = begin.rsplit('.').nth(1).map_or(begin, |_| {
+        let point = begin.rfind('.').unwrap_or_default();
+        begin[..point].rfind('.').map_or(begin, |layer| &begin[layer + 1..])
+    });
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
+    let number = |text: &str| text.parse::<f64>().ok().filter(|_| is_number(text));
+    let bin = [number(begin)?, number(end)?];
+    (0.0 < bin[0] && bin[0] < bin[1] && bin[1].is_finite()).then_some(bin)
 }
 
 /// Weights on a radiance's own samples that give a sum over another grid.
@@ -266,7 +285,11 @@ mod tests {
     fn channel_names_state_wavelengths() {
         assert_eq!(channel_wavelength_nm("S0.550,000000nm"), Some(550.0));
         assert_eq!(channel_wavelength_nm("S0.550.5nm"), Some(550.5));
-        for other in ["R", "S1.550,0nm", "S0.nm", "S0.-1nm", "T.550,0nm"] {
+        assert_eq!(channel_wavelength_nm("400.00-410.00nm"), Some(405.0));
+        assert_eq!(channel_wavelength_nm("direct.400.00-410.00nm"), Some(405.0));
+        for other in
+            ["R", "S1.550,0nm", "S0.nm", "S0.-1nm", "T.550,0nm", "410.00-400.00nm", "-410.00nm", "a-bnm", "x.1-nm"]
+        {
             assert_eq!(channel_wavelength_nm(other), None);
         }
     }

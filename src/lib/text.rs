@@ -24,6 +24,37 @@ pub fn one_line(message: &str) -> String {
     escaped(&shortened(&whole, MESSAGE), |_| false).into_owned()
 }
 
+/// A count before a sentence about several things, such as `photosites were clipped`; of one it is in the singular.
+pub fn counted(count: u64, what: &str) -> String {
+    /// Whole words, each of which counts where it stands first among those of its line.
+    const SINGULAR: [&[(&str, &str)]; 2] = [
+        &[
+            ("samples", "sample"),
+            ("pixels", "pixel"),
+            ("photosites", "photosite"),
+            ("signals", "signal"),
+            ("values", "value"),
+            ("colors", "color"),
+        ],
+        &[("are", "is"), ("were", "was"), ("have", "has"), ("had", "had")],
+    ];
+    if count != 1 {
+        return format!("{count} {what}");
+    }
+    let mut words: Vec<&str> = what.split(' ').collect();
+    for forms in SINGULAR {
+        let first = words
+            .iter()
+            .enumerate()
+            .find_map(|(place, word)| forms.iter().find(|(several, _)| several == word).map(|(_, one)| (place, *one)));
+        if let Some((place, one)) = first {
+            words[place] = one;
+        }
+    }
+    let one = words.join(" ").replace("their ", "its ").replace(" they are", " it is").replace(" they lie", " it lies");
+    format!("1 {}", one.replace("that it is large", "that they are large"))
+}
+
 /// Escapes what steers a terminal, directions of writing included, but for what is `plain`.
 fn escaped(text: &str, plain: impl Fn(char) -> bool) -> Cow<'_, str> {
     let steers = |c: char| {
@@ -60,6 +91,30 @@ mod tests {
             "\\u{1b}[2J\\u{9b}1m\\u{7f}\\r\\u{202e}x\\u{2028}"
         );
         assert_eq!(one_line("a\tb\nµ"), "a\\tb\\nµ");
+    }
+
+    #[test]
+    fn one_thing_is_in_the_singular() {
+        assert_eq!(counted(2, "photosites were clipped"), "2 photosites were clipped");
+        for (what, one) in [
+            ("photosites were clipped at full well", "1 photosite was clipped at full well"),
+            ("samples are saturated, at full well", "1 sample is saturated, at full well"),
+            (
+                "pixels were made of samples: their values are wrong",
+                "1 pixel was made of samples: its values are wrong",
+            ),
+            (
+                "defective photosites were interpolated, and marked",
+                "1 defective photosite was interpolated, and marked",
+            ),
+            ("pixels are NaN; they are left out", "1 pixel is NaN; it is left out"),
+            (
+                "colors have no temperature, which is NaN: they lie more than 0.05 from black bodies",
+                "1 color has no temperature, which is NaN: it lies more than 0.05 from black bodies",
+            ),
+        ] {
+            assert_eq!(counted(1, what), one);
+        }
     }
 
     #[test]

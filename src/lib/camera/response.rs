@@ -155,10 +155,11 @@ impl Camera {
         self.weights.each_ref().map(|weights| weights.iter().zip(radiance).map(|(w, l)| w * l).collect())
     }
 
-    /// The planes of a spectral image that this camera sees, `channels` the place of each wavelength and `factor` the W
-    /// cm⁻² sr⁻¹ nm⁻¹ of a sample of 1. Planes to which no class responds are left out: they would add zeros.
-    pub fn planes(&self, channels: &[usize], factor: f64) -> Vec<WeightedPlane> {
-        let weights = (0..channels.len()).map(|i| self.weights.each_ref().map(|class| class[i] * factor));
+    /// The planes of a spectral image that this camera sees, `channels` the place of each wavelength and `factors` the W
+    /// cm⁻² sr⁻¹ nm⁻¹ of a sample of 1 there. Planes to which no class responds are left out: they would add zeros.
+    pub fn planes(&self, channels: &[usize], factors: &[f64]) -> Vec<WeightedPlane> {
+        let weights =
+            factors.iter().enumerate().map(|(i, factor)| self.weights.each_ref().map(|class| class[i] * factor));
         let planes = channels.iter().zip(weights).map(|(&plane, weights)| WeightedPlane { plane, weights });
         planes.filter(|plane| plane.weights != [0.0; 3]).collect()
     }

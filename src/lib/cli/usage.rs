@@ -2,6 +2,7 @@
 //!
 //! It tells what is wrong by kind and context; of its text only the first line of what has no kind here is taken.
 
+use crate::formats::foreign::number_complaint;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
@@ -27,7 +28,8 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command) ->
             format!("`{value}` is no value for {argument}{choices}{hint}")
         }
         ErrorKind::ValueValidation => {
-            let reason = std::error::Error::source(error).map_or(String::new(), |source| format!(": {source}"));
+            let reason = std::error::Error::source(error)
+                .map_or(String::new(), |source| format!(": {}", number_complaint(&source.to_string())));
             format!("`{value}` is no value for {argument}{reason}")
         }
         ErrorKind::MissingRequiredArgument if is_always_needed(&argument, command) => format!("{argument} is missing"),
@@ -88,8 +90,8 @@ mod tests {
                 "--output a --method ecii",
                 "`ecii` is no value for --method <method>; it is one of bi, eci; did you mean `eci`?",
             ),
-            ("--output a --seed x", "`x` is no value for --seed <seed>: invalid digit found in string"),
-            ("--output a --seed 256", "`256` is no value for --seed <seed>: 256 is not in 0..=255"),
+            ("--output a --seed x", "`x` is no value for --seed <seed>: a whole number is wanted"),
+            ("--output a --seed 256", "`256` is no value for --seed <seed>: it lies within 0 and 255"),
             ("a", "--output <output> is missing"),
             ("--output a --output b", "--output <output> is given twice"),
             ("--output a --dark --seed 1", "--dark and --seed <seed> exclude each other"),

@@ -192,7 +192,7 @@ impl Light {
             }
             Err(_) => {
                 let table = SpectralTable::parse(text, &read_file(Path::new(text))?)?;
-                let curve = table.curve(None)?;
+                let curve = table.light()?;
                 if curve.extremes().0 < 0.0 || curve.extremes().1 <= 0.0 {
                     return Err(Error::format(
                         text,

@@ -1,9 +1,10 @@
 //! Tables of spectra as CSV, plain or gzipped.
 //!
-//! Lines that start with `#` are comments; commas, semicolons or tabs part the cells. Two layouts are read: a column of wavelengths and one column per curve, or one
-//! row per spectrum under a header of wavelengths. Units stand in the header, in a row of their own below it, or in
-//! comments; wavelengths without a unit are in nm.
+//! Two layouts are read: a column of wavelengths and one column per curve, or one row per spectrum under a header of
+//! wavelengths. Units stand in the header, in a row of their own below it, or in comments; wavelengths without a unit are in
+//! nm. What parts cells and what is a comment, [`delimited`] tells.
 
+use super::delimited::{self, Separator, decimal, number};
 use super::foreign::csv_complaint;
 use super::radiance_unit::{self, FileSays};
 use crate::error::{Error, Result};
@@ -11,7 +12,7 @@ use crate::spectrum::{Curve, SHORTEST_NM, check_wavelengths};
 use crate::units::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
 use csv::StringRecord;
 use flate2::read::GzDecoder;
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 use std::borrow::Cow;
 use std::io::Read;
 
@@ -31,8 +32,8 @@ const MAX_COLUMNS: usize = 1 << 20;
 ///
 /// [`Error::Format`] for what is no CSV table.
 pub fn columns(name: &str, bytes: &[u8]) -> Result<Vec<String>> {
-    check_cells(name, bytes)?;
-    let mut reader = reader(bytes, true);
+    let text = Text::of(name, bytes, false)?;
+    let mut reader = text.reader(true);
     let headers = reader.headers().map_err(|error| csv_complaint(name, &error))?;
     Ok(headers.iter().take(MAX_COLUMNS).map(ToOwned::to_owned).collect())
 }
@@ -44,8 +45,8 @@ pub fn columns(name: &str, bytes: &[u8]) -> Result<Vec<String>> {
 /// [`Error::Format`] for what is no CSV table, or has no such column, naming those that there are.
 pub fn text_column(name: &str, bytes: &[u8], column: &str) -> Result<Vec<String>> {
     let not_csv = |error: csv::Error| csv_complaint(name, &error);
-    check_cells(name, bytes)?;
-    let mut reader = reader(bytes, true);
+    let text = Text::of(name, bytes, false)?;
+    let mut reader = text.reader(true);
     let headers = reader.headers().map_err(not_csv)?;
     let place = headers.iter().position(|header| header == column).ok_or_else(|| {
         let known: Vec<&str> = headers.iter().collect();
@@ -68,6 +69,8 @@ pub struct SpectralTable {
     headings: Vec<Option<Stated>>,
     /// What comments say about units.
     remarks: Vec<Stated>,
+    /// Whether its wavelengths were given as wavenumbers.
+    by_wavenumber: bool,
 }
 
 impl SpectralTable {
@@ -79,11 +82,11 @@ impl SpectralTable {
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self> {
         let refuse = |problem: &str| Err(Error::format(name, problem));
         let bytes = unpacked(name, bytes)?;
-        if bytes.contains(&0) {
+        let text = Text::of(name, &bytes, true)?;
+        if text.decoded.contains('\0') {
             return refuse("it is not a CSV table but a binary file");
         }
-        check_cells(name, &bytes)?;
-        let mut reader = reader(&bytes, false);
+        let mut reader = text.reader(false);
         let mut first = StringRecord::new();
         if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, &e))? {
             return refuse("it holds no rows");
@@ -91,8 +94,14 @@ impl SpectralTable {
         if first.len() > MAX_COLUMNS {
             return Err(Error::format(name, format!("it has more than {MAX_COLUMNS} columns; no table has")));
         }
-        let has_header = number(&first[0]).is_none();
-        let by_rows = has_header && first.len() > 2 && first.iter().skip(1).all(|cell| number(cell).is_some());
+        if text.is_ambiguous(&first) {
+            return refuse(
+                "its commas part columns or decimals, nobody can tell which; part its columns by semicolons, tabs or blanks, or \
+                 give it a header",
+            );
+        }
+        let has_header = numeric(&first[0]).is_none();
+        let by_rows = has_header && first.len() > 2 && first.iter().skip(1).all(|cell| numeric(cell).is_some());
         let below = if has_header && !by_rows { record_below(name, &mut reader)? } else { None };
         let (units, at_hand) = match below {
             Some(record) if is_units(&record) => (Some(record), None),
@@ -105,7 +114,7 @@ impl SpectralTable {
         }
         let values = numbers.slice(ndarray::s![.., 1..]);
         let (mut wavelength_nm, columns, values) = if by_rows {
-            (first.iter().skip(1).filter_map(number).collect(), labels, values.to_owned())
+            (first.iter().skip(1).filter_map(numeric).collect(), labels, values.to_owned())
         } else {
             let columns = match has_header {
                 true => first.iter().skip(1).map(ToOwned::to_owned).collect(),
@@ -113,7 +122,7 @@ impl SpectralTable {
             };
             (numbers.column(0).to_vec(), columns, values.t().to_owned())
         };
-        let comments = Comments::of(&bytes);
+        let comments = Comments::of(&text.decoded);
         let headings = headings(&columns, units.as_ref(), by_rows.then_some(&first[0]));
         let is_of_radiance = |cell: &str| {
             let unknown = |stated: &Stated| matches!(stated, Stated::Other { kind: OtherUnit::Unknown, .. });
@@ -123,10 +132,13 @@ impl SpectralTable {
         let unit = wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength);
         let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
         wavelength_nm.iter_mut().for_each(|wavelength: &mut f64| *wavelength = unit.nm(*wavelength));
-        check_wavelengths(&wavelength_nm)
+        let (wavelength_nm, values) = sorted(wavelength_nm, values);
+        check_unlike(&wavelength_nm)
+            .and_then(|()| check_wavelengths(&wavelength_nm))
             .and_then(|()| check_likely(&wavelength_nm))
             .map_err(|problem| Error::format(name, problem))?;
-        Ok(Self { name: name.into(), wavelength_nm, columns, values, headings, remarks: comments.units })
+        let by_wavenumber = unit == WavelengthUnit::PerCentimeter;
+        Ok(Self { name: name.into(), wavelength_nm, columns, values, headings, remarks: comments.units, by_wavenumber })
     }
 
     /// The file as messages call it.
@@ -166,7 +178,26 @@ impl SpectralTable {
     pub fn radiance_unit(&self, index: usize, given: Option<RadianceUnit>) -> Result<(RadianceUnit, Option<String>)> {
         let heading = self.headings.get(index).and_then(Option::as_ref);
         let place = "in the heading, as in `radiance (W m-2 sr-1 nm-1)`";
+        if self.by_wavenumber && heading.is_none() && self.remarks.is_empty() && given.is_none() {
+            let problem = "it is by wavenumber and does not say whether its radiance is per nm or per cm-1";
+            return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
+        }
         radiance_unit::settle(FileSays { name: &self.name, heading, remarks: &self.remarks, place }, given)
+    }
+
+    /// The first column as the relative power of a light, per interval of wavelength.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] where it is by wavenumber, or for values that make no curve.
+    pub fn light(&self) -> Result<Curve> {
+        if self.by_wavenumber {
+            return Err(Error::format(
+                &self.name,
+                "a light by wavenumber is not read; give its power per nm by wavelength",
+            ));
+        }
+        self.curve(None)
     }
 
     /// A warning of values below zero in a curve of radiances, if there are any.
@@ -191,13 +222,13 @@ struct Comments {
 
 impl Comments {
     /// Those of a table.
-    fn of(bytes: &[u8]) -> Self {
+    fn of(text: &str) -> Self {
         let mut found = Self::default();
-        let bytes = without_mark(bytes);
-        for line in bytes.split(|byte| *byte == b'\n').filter(|line| line.starts_with(b"#")).take(MAX_COMMENTS) {
-            let line = String::from_utf8_lossy(line);
-            found.units.extend(units_in(&line));
-            let mut clauses = line.split([',', ';']).filter(|clause| clause.to_lowercase().contains("wavelength"));
+        for line in delimited::comments(text).take(MAX_COMMENTS) {
+            found.units.extend(units_in(line));
+            let counts =
+                |clause: &&str| ["wavelength", "wavenumber"].iter().any(|word| clause.to_lowercase().contains(word));
+            let mut clauses = line.split([',', ';']).filter(counts);
             let unit = clauses.find_map(|clause| WavelengthUnit::of_heading(clause.trim()).ok().flatten());
             found.wavelength = found.wavelength.or(unit);
         }
@@ -217,7 +248,7 @@ fn record_below(name: &str, reader: &mut csv::Reader<&[u8]>) -> Result<Option<St
 
 /// Whether a record below the header holds units.
 fn is_units(record: &StringRecord) -> bool {
-    record.iter().all(|cell| number(cell).is_none())
+    record.iter().all(|cell| numeric(cell).is_none())
         && !matches!(WavelengthUnit::of_heading(record.get(0).unwrap_or_default()), Ok(None))
 }
 
@@ -239,6 +270,29 @@ fn wavelength_unit(heading: Option<&str>) -> std::result::Result<Option<Waveleng
     })
 }
 
+/// A finite number with a decimal point or a decimal comma, if it is one.
+fn numeric(cell: &str) -> Option<f64> {
+    number(cell).or_else(|| decimal(cell))
+}
+
+/// Wavelengths in ascending order, and the curves over them.
+fn sorted(wavelength_nm: Vec<f64>, values: Array2<f64>) -> (Vec<f64>, Array2<f64>) {
+    if wavelength_nm.is_sorted() {
+        return (wavelength_nm, values);
+    }
+    let mut order: Vec<usize> = (0..wavelength_nm.len()).collect();
+    order.sort_by(|a, b| wavelength_nm[*a].total_cmp(&wavelength_nm[*b]));
+    (order.iter().map(|place| wavelength_nm[*place]).collect(), values.select(Axis(1), &order))
+}
+
+/// Refuses a wavelength that stands twice among ascending ones.
+fn check_unlike(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
+    match wavelength_nm.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => Err(format!("the wavelength {} nm stands there twice; leave out one", pair[0])),
+        None => Ok(()),
+    }
+}
+
 /// Above this all wavelengths look like angstroms or wavenumbers, in nm: no silicon responds.
 const LONGEST_NM: f64 = 2000.0;
 
@@ -252,7 +306,7 @@ fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
     }
     if *first > LONGEST_NM {
         return Err(format!(
-            "{range}, which looks like angstroms or wavenumbers; {name} `wavelength_angstrom`, or give nm"
+            "{range}, which looks like angstroms or wavenumbers; {name} `wavelength_angstrom` or `wavenumber_cm-1`"
         ));
     }
     Ok(())
@@ -273,6 +327,7 @@ impl Cells {
         let (mut numbers, mut labels, mut rows, mut width) = (Vec::new(), Vec::new(), 0, 0);
         let mut record = first.cloned().unwrap_or_default();
         let mut at_hand = first.is_some();
+        let [mut has_points, mut has_commas] = [false; 2];
         // One row at a time: as text a table takes many times the memory of its numbers.
         while std::mem::take(&mut at_hand) || reader.read_record(&mut record).map_err(|e| csv_complaint(name, &e))? {
             let line = record.position().map_or(0, csv::Position::line);
@@ -284,24 +339,21 @@ impl Cells {
                 labels.push(record[0].to_owned());
             }
             for (column, text) in record.iter().enumerate() {
-                numbers.push(match number(text) {
+                has_points |= text.contains('.') && number(text).is_some();
+                has_commas |= decimal(text).is_some();
+                numbers.push(match numeric(text) {
                     Some(value) => value,
                     // The label of a row need not be a number.
                     None if by_rows && column == 0 => 0.0,
                     None => {
                         let shown: String = text.chars().take(20).collect();
-                        let hint = if number(&text.replacen(',', ".", 1)).is_some() {
-                            "; write decimals with a point"
-                        } else {
-                            ""
-                        };
-                        return Err(refuse(format!(
-                            "line {line}, column {}: `{shown}` is no number{hint}",
-                            column + 1
-                        )));
+                        return Err(refuse(format!("line {line}, column {}: `{shown}` is no number", column + 1)));
                     }
                 });
             }
+        }
+        if has_points && has_commas {
+            return Err(refuse("its numbers have decimal points and decimal commas; write all with a point".into()));
         }
         let numbers =
             Array2::from_shape_vec((rows, width), numbers).map_err(|_| refuse("its rows differ in length".into()))?;
@@ -309,41 +361,50 @@ impl Cells {
     }
 }
 
-/// Refuses a table of too many cells, before any of them is told apart: each row is held as a whole.
-fn check_cells(name: &str, bytes: &[u8]) -> Result<()> {
-    let separator = separator(bytes);
-    let separators = bytes.iter().filter(|byte| **byte == separator).count();
-    if separators < MAX_CELLS {
-        return Ok(());
+/// A table as text.
+struct Text<'a> {
+    decoded: Cow<'a, str>,
+    /// Its rows in the form that readers take, where they are in another.
+    plain: Option<String>,
+    separator: Separator,
+}
+
+impl<'a> Text<'a> {
+    /// The text of a table; `is_of_numbers` where separators behind the last cell of a row mean nothing.
+    fn of(name: &str, bytes: &'a [u8], is_of_numbers: bool) -> Result<Self> {
+        let decoded = delimited::decoded(name, bytes)?;
+        let separator = Separator::of(&decoded);
+        let plain = delimited::plain(name, &decoded, separator, is_of_numbers)?;
+        let text = Self { decoded, plain, separator };
+        // Before any cell is told apart: each row is held as a whole.
+        let separators = text.rows().bytes().filter(|byte| *byte == separator.byte()).count();
+        if separators < MAX_CELLS {
+            return Ok(text);
+        }
+        Err(Error::format(name, format!("it has more than {MAX_CELLS} numbers; no table has")))
     }
-    Err(Error::format(name, format!("it has more than {MAX_CELLS} numbers; no table has")))
-}
 
-/// A reader of CSV that knows our comments; a byte order mark is passed over.
-fn reader(bytes: &[u8], has_headers: bool) -> csv::Reader<&[u8]> {
-    csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .delimiter(separator(bytes))
-        .has_headers(has_headers)
-        .trim(csv::Trim::All)
-        .from_reader(without_mark(bytes))
-}
+    fn rows(&self) -> &str {
+        self.plain.as_deref().unwrap_or(&self.decoded)
+    }
 
-/// What parts the cells: the first of comma, semicolon and tab that the first line which is no comment has.
-fn separator(bytes: &[u8]) -> u8 {
-    let is_row = |line: &&[u8]| !line.starts_with(b"#") && !line.trim_ascii().is_empty();
-    let first = without_mark(bytes).split(|byte| *byte == b'\n').find(is_row).unwrap_or_default();
-    *b",;\t".iter().find(|separator| first.contains(separator)).unwrap_or(&b',')
-}
+    /// A reader of its rows.
+    fn reader(&self, has_headers: bool) -> csv::Reader<&[u8]> {
+        csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .delimiter(self.separator.byte())
+            .has_headers(has_headers)
+            .trim(csv::Trim::All)
+            .from_reader(self.rows().as_bytes())
+    }
 
-/// Bytes without a byte order mark.
-fn without_mark(bytes: &[u8]) -> &[u8] {
-    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
-}
-
-/// A finite number, if it is one.
-fn number(text: &str) -> Option<f64> {
-    text.parse().ok().filter(|value: &f64| value.is_finite())
+    /// Whether commas may be those of decimals as well as part columns: without a header, and with no other mark of decimals.
+    fn is_ambiguous(&self, first: &StringRecord) -> bool {
+        self.separator == Separator::Byte(b',')
+            && first.len() > 2
+            && first.iter().all(|cell| cell.bytes().all(|byte| byte.is_ascii_digit()))
+            && !self.rows().lines().any(|line| !line.starts_with('#') && line.contains('.'))
+    }
 }
 
 /// The bytes of a table that may be gzipped.
@@ -390,16 +451,100 @@ mod tests {
         }
     }
 
+    /// The same table as people and programs write it.
+    #[test]
+    fn tables_are_read_as_people_have_them() {
+        let values = ndarray::array![[0.5, 1.25, 3.0]];
+        let utf16 = |unit: fn(u16) -> [u8; 2], text: &str| {
+            [&unit(0xFEFF)[..], &text.encode_utf16().flat_map(unit).collect::<Vec<u8>>()].concat()
+        };
+        let text = "nm;L\r\n400;0,5\r\n410;1,25\r\n420;3\r\n";
+        let mut tables: Vec<Vec<u8>> = vec![utf16(u16::to_le_bytes, text), utf16(u16::to_be_bytes, text)];
+        tables.extend(
+            [
+                text,
+                "nm\tL\n400,0\t0,5\n410,0\t1,25\n420,0\t3,0\n",
+                "\"400,0\",\"0,5\"\n\"410,0\",\"1,25\"\n\"420,0\",\"3,0\"\n",
+                "wavelength (nm, vacuum)\tL\n400\t0,5\n410\t1,25\n420\t3\n",
+                "  400.000  5.000000e-01 \n  410.000  1.250000e+00 \n  420.000  3.000000e+00 \n",
+                "  400,000  5,0e-01\n  410,000  1,25\n  420,000  3,0\n",
+                " WAVELENGTH (nm)   TOTAL RAD\n 400.  0.5D+00\n 410.  0.125D+01\n 420.  3.0D0\n",
+                "lambda [nm] L [W/(m2 sr nm)]\n400 0.5\n410 1.25\n420 3\n",
+                "# a, b\n; c; d\n% e\n// f\n! g\n  # h\n400 0.5\n\n410 1.25\n420 3\n",
+                "nm,L,\n400,0.5,\n410,1.25,\n420,3,\n,,\n",
+                "nm,\n400,0.5\n410,1.25\n420,3\n",
+                "nm;L;;\n400;0,5;;\n410;1,25;;\n420;3;;\n",
+                "id;400;410;420\nsky;0,5;1,25;3\n",
+                ";400;410;420\nsky;0,5;1,25;3\n",
+                "nm,L\r400,0.5\r410,1.25\r420,3\r",
+                "nm,L\n420,3\n410,1.25\n400,0.5\n",
+                "id,410,420,400\nx,1.25,3,0.5\n",
+                "angstrom L\n4100 1.25\n4000 0.5\n4200 3\n",
+                "nu_cm-1 L\n25000 0.5\n24390.243902439024 1.25\n23809.52380952381 3\n",
+                "% wavenumber in cm-1\n25000 0.5\n24390.243902439024 1.25\n23809.52380952381 3\n",
+            ]
+            .map(|text| text.as_bytes().to_vec()),
+        );
+        for bytes in tables {
+            let table = SpectralTable::parse("a", &bytes).unwrap();
+            let shown = String::from_utf8_lossy(&bytes);
+            assert_eq!(table.values, values, "{shown}");
+            // 10⁷ divided by a rounded wavenumber.
+            let near = |(a, b): (&f64, f64)| (a - b).abs() < 1e-12 * b;
+            assert!(table.wavelength_nm.iter().zip([400.0, 410.0, 420.0]).all(near), "{shown}: {table:?}");
+        }
+        let latin1 = SpectralTable::parse("a", b"nm,L (\xB5W/cm\xB2/sr/nm)\n400,1\n").unwrap();
+        assert_eq!(latin1.radiance_unit(0, None).unwrap().0, RadianceUnit::USUAL[4]);
+    }
+
+    /// Planck's law per wavenumber, 2hc²ν³/(exp(hcν/kT) − 1), becomes that per wavelength, 2hc²/λ⁵/(exp(hc/λkT) − 1).
+    #[test]
+    fn radiances_per_wavenumber_become_those_per_wavelength() {
+        use crate::units::{BOLTZMANN_J_PER_K, LIGHT_M_PER_S, PLANCK_J_S};
+        let (h, c) = (PLANCK_J_S, LIGHT_M_PER_S);
+        let denominator = |per_m: f64| (h * c * per_m / (BOLTZMANN_J_PER_K * 5800.0)).exp_m1();
+        let mut text = "wavenumber (cm-1),L (mW/(m2 sr cm-1))\n".to_owned();
+        for per_cm in [25_000.0, 20_000.0, 12_500.0] {
+            let per_m: f64 = per_cm * 100.0;
+            // In W m⁻² sr⁻¹ per m⁻¹; 1 cm⁻¹ is 100 m⁻¹, 1 W 1000 mW.
+            let radiance = 2.0 * h * c * c * per_m.powi(3) / denominator(per_m) * 100.0 * 1e3;
+            text += &format!("{per_cm},{radiance:e}\n");
+        }
+        let table = SpectralTable::parse("a", text.as_bytes()).unwrap();
+        assert_eq!(table.wavelength_nm, [400.0, 500.0, 800.0]);
+        let (unit, warning) = table.radiance_unit(0, None).unwrap();
+        assert_eq!((unit.to_string().as_str(), warning), ("mW m-2 sr-1 / cm-1", None));
+        for (value, nm) in table.values.row(0).iter().zip(&table.wavelength_nm) {
+            let meters = nm * 1e-9;
+            // W m⁻² sr⁻¹ per m is 10⁻¹³ W cm⁻² sr⁻¹ nm⁻¹.
+            let wanted = 2.0 * h * c * c / meters.powi(5) / denominator(1.0 / meters) * 1e-13;
+            let found = value * unit.in_w_per_cm2_sr_nm(*nm);
+            assert!((found / wanted - 1.0).abs() < 1e-12, "{nm}: {found} {wanted}");
+        }
+        let silent = SpectralTable::parse("a", b"nu (cm-1),L\n20000,1\n25000,1\n").unwrap();
+        let refused = silent.radiance_unit(0, None).unwrap_err().to_string();
+        assert!(refused.contains("whether its radiance is per nm or per cm-1; give `radiance_unit`"), "{refused}");
+        assert!(silent.light().unwrap_err().to_string().contains("a light by wavenumber is not read"));
+    }
+
     #[test]
     fn complaints_name_the_place() {
         let complaint = |text: &str| SpectralTable::parse("t.csv", text.as_bytes()).unwrap_err().to_string();
         assert_eq!(complaint("nm,L\n400,1\n410,x\n"), "t.csv: line 3, column 2: `x` is no number");
-        assert!(complaint("nm,L\n410,1\n400,2\n").contains("must ascend"));
+        assert_eq!(
+            complaint("nm,L\n410,1\n400,2\n410,3\n"),
+            "t.csv: the wavelength 410 nm stands there twice; leave out one"
+        );
         assert!(complaint("nm,L\n400,nan\n").contains("`nan` is no number"));
         assert!(complaint("").contains("no rows"));
-        assert!(complaint("nm,L\n400,1\n410\n").contains("not a CSV table"));
-        let decimal = "t.csv: line 2, column 2: `1,5` is no number; write decimals with a point";
-        assert_eq!(complaint("nm;L\n400;1,5\n"), decimal);
+        assert_eq!(complaint("nm,L\n400,1\n410\n"), "t.csv: line 3 has 1 cell, the rows above it have 2");
+        let marks = "part columns by semicolons or tabs where commas are those of decimals";
+        let wanted = format!("t.csv: line 2 has 3 cells, the rows above it have 2; {marks}");
+        assert_eq!(complaint("nm,L\n400,1,5\n"), wanted);
+        assert!(complaint("400,1,5\n410,2,5\n").contains("its commas part columns or decimals, nobody can tell which"));
+        assert!(complaint("nm;L\n400.5;1,5\n").contains("decimal points and decimal commas"));
+        assert!(complaint("a b c\n400 1\n410 2\n").contains("line 1: 3 words stand above 2 columns"));
+        assert!(complaint("FREQ,L\n14000,1\n").contains("holds frequencies"));
     }
 
     #[test]
@@ -467,7 +612,7 @@ mod tests {
         let complaint = |text: &str| SpectralTable::parse("t", text.as_bytes()).unwrap_err().to_string();
         assert!(complaint("wavelength,L\n0.4,1\n0.7,2\n").contains("0.4 to 0.7 nm, which looks like micrometers"));
         assert!(complaint("wavelength,L\n4000,1\n7000,2\n").contains("looks like angstroms or wavenumbers"));
-        assert!(complaint("nu (cm-1),L\n14000,1\n25000,2\n").contains("holds wavenumbers"));
+        assert!(complaint("nu,L\n14000,1\n25000,2\n").contains("`wavenumber_cm-1`"));
         let table = SpectralTable::parse("t", b"nm,a,b\n400,1,1\n500,1,-2\n").unwrap();
         assert_eq!(table.negative(0), None);
         assert_eq!(table.negative(1).unwrap(), "t: `b`: 1 of 2 radiances are below 0, down to -2, which no light is");

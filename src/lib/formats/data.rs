@@ -208,7 +208,7 @@ pub fn load_illuminant(name: &str) -> Result<Curve> {
             Curve::new(wavelengths, values).map_err(|problem| Error::format(name, problem))?
         }
         _ if path.extension().is_some() || path.components().count() > 1 => {
-            SpectralTable::parse(name, &read_file(path)?)?.curve(None)?
+            SpectralTable::parse(name, &read_file(path)?)?.light()?
         }
         _ => {
             let problem = format!(

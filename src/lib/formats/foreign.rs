@@ -32,12 +32,131 @@ pub fn exr_complaint(name: &str, error: &ExrError) -> Error {
 
 /// What the crate `csv` complains of: rows of different lengths, bytes that are no text.
 pub fn csv_complaint(name: &str, error: &csv::Error) -> Error {
-    Error::format(name, format!("it is not a CSV table: {error}"))
+    let problem = match error.kind() {
+        csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
+            let line = pos.as_ref().map_or(0, csv::Position::line);
+            let cells = if *len == 1 { "cell" } else { "cells" };
+            let hint = if len > expected_len {
+                "; part columns by semicolons or tabs where commas are those of decimals"
+            } else {
+                ""
+            };
+            format!("line {line} has {len} {cells}, the rows above it have {expected_len}{hint}")
+        }
+        _ => format!("it is not a CSV table: {error}"),
+    };
+    Error::format(name, problem)
 }
 
 /// What the crate `serde_yaml` complains of while it reads: what is no YAML, or not that of the type.
 pub fn yaml_complaint(name: &str, error: &serde_yaml::Error) -> Error {
-    Error::format(name, format!("it is not as expected: {error}"))
+    Error::format(name, yaml_problem(error))
+}
+
+/// The same without the name of the file.
+pub fn yaml_problem(error: &serde_yaml::Error) -> String {
+    let text = error.to_string();
+    match misfit(&text) {
+        Some(problem) => problem,
+        None if text.contains("more than one document") => "it holds more than one document; leave one".into(),
+        None => format!("it is not as expected: {text}"),
+    }
+}
+
+/// A complaint of the crate `serde` in our words: a path of keys, what does not fit its type, and the place. None for another.
+fn misfit(text: &str) -> Option<String> {
+    const KINDS: [&str; 9] = [
+        "invalid type: ",
+        "invalid value: ",
+        "invalid length ",
+        "missing field ",
+        "unknown variant ",
+        "duplicate field ",
+        "duplicate entry with key ",
+        "untagged and internally tagged enums do not support enum input",
+        "data did not match any variant",
+    ];
+    let (begin, kind) = KINDS.iter().filter_map(|kind| Some((text.find(kind)?, *kind))).min()?;
+    let path = text[..begin].trim_end_matches(": ");
+    let (what, place) = match text.rfind(" at line ") {
+        Some(place) if place > begin => (&text[begin + kind.len()..place], &text[place + " at ".len()..]),
+        _ => (text.get(begin + kind.len()..).unwrap_or_default(), ""),
+    };
+    let key = if path.is_empty() || path == "." { "it".to_owned() } else { format!("`{path}`") };
+    let place = if place.is_empty() { String::new() } else { format!(" ({})", place.replace(" column", ", column")) };
+    let (found, expected) = what.split_once(", expected ").unwrap_or((what, ""));
+    Some(match kind {
+        "missing field " => format!("{key} has no {what}{place}"),
+        "duplicate entry with key " => format!("{key} has `{}` twice{place}", what.trim_matches('"')),
+        other if other.starts_with("untagged") => format!("{key} is a tagged value, which has no meaning here{place}"),
+        "duplicate field " => format!("{key} has {what} twice{place}"),
+        "unknown variant " if expected.is_empty() => format!("{key} is {found}, which is none of its names{place}"),
+        "unknown variant " => {
+            let names = expected.trim_start_matches("one of ");
+            format!("{key} is {found}; known are {names}{place}")
+        }
+        "invalid length " => format!("{key} has {found} entries, not {}{place}", wanted(expected)),
+        "data did not match any variant" => format!("{key} has none of the forms that are read{place}"),
+        _ => format!("{key} is {}, not {}{place}", given(found), wanted(expected)),
+    })
+}
+
+/// What `serde` found, in our words.
+fn given(found: &str) -> String {
+    if let Some(quoted) = found.strip_prefix("string \"").and_then(|text| text.strip_suffix('"')) {
+        return format!("`{quoted}`");
+    }
+    match found {
+        "sequence" => "a list".into(),
+        "map" => "a list of keys and values".into(),
+        "unit value" | "null" | "Option value" => "empty".into(),
+        other => match other.split_once('`') {
+            Some((_, value)) => format!("`{value}"),
+            None if other.contains("variant") => "a tagged value".into(),
+            None => other.into(),
+        },
+    }
+}
+
+/// What `serde` expected, in our words.
+fn wanted(expected: &str) -> String {
+    let count = || expected.rsplit(' ').next().filter(|last| last.parse::<u32>().is_ok());
+    match expected {
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0 on".into(),
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".into(),
+        "f32" | "f64" => "a number".into(),
+        "a string" | "string" | "a borrowed string" => "text".into(),
+        "a boolean" | "bool" => "true or false".into(),
+        "a sequence" | "sequence" => "a list".into(),
+        "map" | "a map" => "a list of keys and values".into(),
+        other if other.starts_with("struct") => "a list of keys and values".into(),
+        other if ["an array", "a tuple", "tuple"].iter().any(|begin| other.starts_with(begin)) => {
+            count().map_or("a list".into(), |count| format!("a list of {count}"))
+        }
+        other if other.contains("enum") || other.contains("variant") || other.contains("tag") => {
+            "one of the forms that are read".into()
+        }
+        other => other.into(),
+    }
+}
+
+/// What the standard library complains of where a text is no number, in our words; other complaints as they are.
+pub fn number_complaint(complaint: &str) -> String {
+    match complaint {
+        "invalid digit found in string" => "a whole number is wanted".into(),
+        "invalid float literal" => "a number is wanted".into(),
+        "cannot parse integer from empty string" | "cannot parse float from empty string" => "it is empty".into(),
+        "number too large to fit in target type" => "it is too large".into(),
+        "number too small to fit in target type" => "it is too small".into(),
+        other => match other.split_once(" is not in ").and_then(|(_, range)| range.split_once("..")) {
+            Some((low, high)) => match high.strip_prefix('=') {
+                Some("") | None if high.trim_start_matches('=').is_empty() => format!("it is {low} at least"),
+                Some(high) => format!("it lies within {low} and {high}"),
+                None => format!("it lies within {low} and {high}, which is too large"),
+            },
+            None => other.into(),
+        },
+    }
 }
 
 /// What the crate `image` complains of while it writes a PNG.
@@ -132,16 +251,8 @@ mod tests {
     #[test]
     fn csv_says_where_a_table_is_none() {
         let refused = |bytes: &[u8]| SpectralTable::parse("t.csv", bytes).unwrap_err().to_string();
-        assert_eq!(
-            refused(b"nm,L\n400,1\n410\n"),
-            "t.csv: it is not a CSV table: CSV error: record 2 (line: 3, byte: 11): found record with 1 fields, but the \
-             previous record has 2 fields"
-        );
-        assert_eq!(
-            refused(b"nm,L\n400,\xFF\n"),
-            "t.csv: it is not a CSV table: CSV parse error: record 1 (line 2, field: 1, byte: 5): invalid utf-8: invalid \
-             UTF-8 in field 1 near byte index 0"
-        );
+        assert_eq!(refused(b"nm,L\n400,1\n410\n"), "t.csv: line 3 has 1 cell, the rows above it have 2");
+        assert_eq!(refused(b"nm,L\n400,\xFF\n"), "t.csv: line 2, column 2: `\u{FF}` is no number");
     }
 
     #[derive(Debug, Serialize, Deserialize)]
@@ -153,12 +264,18 @@ mod tests {
     fn yaml_says_where_a_document_is_none() {
         let refused = |text: &str| parse_strict::<Sensor>("s.yaml", text.as_bytes()).unwrap_err().to_string();
         for (text, wanted) in [
-            ("bits: many\n", "bits: invalid type: string \"many\", expected u32 at line 1 column 7"),
-            ("bits: 12\n---\nbits: 14\n", "deserializing from YAML containing more than one document is not supported"),
-            ("{}\n", "missing field `bits`"),
-            ("bits: [\n", "did not find expected node content at line 2 column 1, while parsing a flow node"),
+            ("bits: many\n", "`bits` is `many`, not a whole number from 0 on (line 1, column 7)"),
+            ("bits: -1\n", "`bits` is `-1`, not a whole number from 0 on (line 1, column 7)"),
+            ("bits: [1]\n", "`bits` is a list, not a whole number from 0 on (line 1, column 7)"),
+            ("bits: {a: 1}\n", "`bits` is a list of keys and values, not a whole number from 0 on (line 1, column 7)"),
+            ("bits: 12\n---\nbits: 14\n", "it holds more than one document; leave one"),
+            ("{}\n", "it has no `bits`"),
+            (
+                "bits: [\n",
+                "it is not as expected: did not find expected node content at line 2 column 1, while parsing a flow node",
+            ),
         ] {
-            assert_eq!(refused(text), format!("s.yaml: it is not as expected: {wanted}"));
+            assert_eq!(refused(text), format!("s.yaml: {wanted}"));
         }
     }
 

@@ -4,6 +4,7 @@ pub mod atomic;
 pub mod chart;
 pub mod csv;
 pub mod data;
+mod delimited;
 pub mod digest;
 pub mod dng;
 pub mod exposure;

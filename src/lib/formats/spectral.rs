@@ -1,4 +1,5 @@
-//! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` \[Fichet2021].
+//! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` \[Fichet2021], or by bins of
+//! wavelength, as in `400.00-410.00nm`.
 
 use super::csv::SpectralTable;
 use super::files::{named, open_named, read_table, spool};
@@ -8,7 +9,7 @@ use super::radiance_unit::{self, FileSays};
 use super::table;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
-use crate::spectrum::{SpectralLibrary, channel_wavelength_nm, chart_columns, check_wavelengths};
+use crate::spectrum::{SpectralLibrary, channel_bin_nm, channel_wavelength_nm, chart_columns, check_wavelengths};
 use crate::stream::{RowSource, fold};
 use crate::units::{Any, OtherUnit, RadianceUnit, Stated, unit_of_heading};
 use ndarray::Array2;
@@ -59,10 +60,22 @@ impl SpectralChannels {
         // What is no unit at all is none of radiance.
         let unknown = || Stated::Other { text: stated.to_owned(), kind: OtherUnit::Unknown };
         let heading = (!stated.is_empty()).then(|| unit_of_heading(stated).unwrap_or_else(unknown));
+        if stated.is_empty()
+            && unit.is_none()
+            && frame.geometry.channels.iter().any(|name| channel_bin_nm(name).is_some())
+        {
+            let problem = "its channels are bins of wavelength, and it does not say the unit of its radiance";
+            return Err(frame.refuse(problem).give(&["radiance_unit"]));
+        }
         let place = "in the attribute `emissiveUnits`, as `W.m^-2.sr^-1.nm^-1`";
         let says = FileSays { name: &frame.name, heading: heading.as_ref(), remarks: &[], place };
         let (unit, warning) = radiance_unit::settle(says, unit)?;
         Ok(Self { channels, wavelength_nm, unit, warning })
+    }
+
+    /// What a sample of 1 is in W cm⁻² sr⁻¹ nm⁻¹, by channel.
+    pub fn factors(&self) -> Vec<f64> {
+        self.wavelength_nm.iter().map(|nm| self.unit.in_w_per_cm2_sr_nm(*nm)).collect()
     }
 }
 
@@ -112,9 +125,9 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
     let library = match open(&options)? {
         Radiances::Image(mut reader) => {
             let spectral = SpectralChannels::of(reader.header(), unit)?;
+            let factors = spectral.factors();
             warnings.extend(spectral.warning);
             let geometry = reader.header().geometry.clone();
-            let factor = spectral.unit.in_w_per_cm2_sr_nm();
             // A header may declare any size: memory is taken as rows come.
             let mut radiance = Vec::new();
             fold([&mut *reader as &mut dyn RowSource], geometry.height, |band| {
@@ -122,8 +135,9 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
                 for y in band.rows() {
                     let lines: Vec<&[f32]> =
                         spectral.channels.iter().map(|&channel| window.row(y.cast_signed(), channel)).collect();
-                    let pixels = (0..geometry.width).flat_map(|x| lines.iter().map(move |line| line[x]));
-                    radiance.extend(pixels.map(|sample| f64::from(sample) * factor));
+                    for x in 0..geometry.width {
+                        radiance.extend(lines.iter().zip(&factors).map(|(line, factor)| f64::from(line[x]) * factor));
+                    }
                 }
                 Ok(())
             })?;
@@ -136,7 +150,10 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
             let mut radiance = table.values.clone();
             for (index, mut curve) in radiance.rows_mut().into_iter().enumerate() {
                 let (unit, warning) = table.radiance_unit(index, unit)?;
-                curve *= unit.in_w_per_cm2_sr_nm();
+                curve
+                    .iter_mut()
+                    .zip(&table.wavelength_nm)
+                    .for_each(|(value, nm)| *value *= unit.in_w_per_cm2_sr_nm(*nm));
                 warnings.extend(warning.into_iter().filter(|_| index == 0));
             }
             let columns = chart_columns(radiance.nrows());
@@ -157,4 +174,47 @@ fn negative(name: &str, radiance: &Array2<f64>) -> Option<String> {
     let samples = radiance.rows().into_iter().filter(|sample| sample.iter().any(|value| *value < 0.0)).count();
     let all = radiance.nrows();
     (samples > 0).then(|| format!("{name}: {samples} of {all} samples have radiances below 0, which no light is"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+    use crate::units::QuantityKind;
+
+    /// What becomes of channels in a unit, and another that a user gives.
+    fn seen(channels: &[&str], unit: &str, given: Option<RadianceUnit>) -> Result<SpectralChannels> {
+        let mut metadata = Metadata::new(QuantityKind::SpectralRadiance);
+        metadata.unit = unit.into();
+        let frame = FrameHeader { name: "a.exr".into(), geometry: Geometry::new(2, 2, channels), metadata };
+        SpectralChannels::of(&frame, given)
+    }
+
+    #[test]
+    fn channels_are_found_by_wavelength() {
+        let names = ["R", "G", "B", "S0.500,000nm", "S0.400,000nm", "S1.400,000nm"];
+        let found = seen(&names, "W.m^-2.sr^-1.nm^-1", None).unwrap();
+        assert_eq!((found.channels, found.wavelength_nm), (vec![4, 3], vec![400.0, 500.0]));
+        let per_wavenumber = seen(&names, "W/(m2 sr cm-1)", None).unwrap();
+        // 10⁷/λ² cm⁻¹ per nm: 62.5 at 400 nm, 40 at 500 nm.
+        for (factor, wanted) in per_wavenumber.factors().into_iter().zip([62.5e-4, 40e-4]) {
+            assert!((factor / wanted - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn bins_have_their_centers_and_no_unit_of_their_own() {
+        let names = ["400.00-410.00nm", "410.00-420.00nm"];
+        let refused = seen(&names, "", None).unwrap_err().to_string();
+        let wanted = "a.exr: its channels are bins of wavelength, and it does not say the unit of its radiance; give `radiance_unit`";
+        assert_eq!(refused, wanted);
+        let found = seen(&names, "", Some(RadianceUnit::USUAL[1])).unwrap();
+        assert_eq!(found.wavelength_nm, [405.0, 415.0]);
+        let refused = seen(&["S0.400,0nm"], "W.m^-2", None).unwrap_err().to_string();
+        assert!(
+            refused.contains("give `radiance_unit`") || refused.contains("spectral radiances are wanted"),
+            "{refused}"
+        );
+    }
 }

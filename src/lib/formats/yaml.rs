@@ -1,11 +1,12 @@
 //! YAML, read with limits: metadata, sensors and matrices all come through here.
 
-use super::foreign::yaml_complaint;
+use super::foreign::{yaml_complaint, yaml_problem};
 use super::{yaml_guard, yaml_writer};
 use crate::camera::readout::ReadOut;
 use crate::camera::sensor::{FLAT_SENSOR_SCHEMA, FlatSensor, ResponseFiles, SENSOR_SCHEMA, Sensor};
 use crate::error::{Error, Result};
 use crate::metadata::{METADATA_SCHEMA, Metadata};
+use crate::names::nearest;
 use serde::Serialize;
 use serde::de::{DeserializeOwned, Deserializer, Visitor, value};
 use serde_yaml::{Mapping, Value};
@@ -104,19 +105,17 @@ fn check_keys(name: &str, raw: &Mapping, fields: Keys, parts: &[(&str, Keys)]) -
     let inside = parts.iter().filter_map(|(part, _)| Some((part, raw.get(*part)?.as_mapping()?)));
     let inside = inside.flat_map(|(part, keys)| keys.keys().map(move |key| format!("{part}.{}", spelled(key))));
     let Some(key) = raw.keys().map(spelled).chain(inside).find(|key| !known.contains(key)) else { return Ok(()) };
-    let split =
-        |path: &str| path.rsplit_once('.').map_or((String::new(), path.to_owned()), |(a, b)| (a.into(), b.into()));
-    let (part, last) = split(&key);
-    let distance = |known: &String| {
-        let (known_part, known_last): (String, String) = split(known);
-        (strsim::damerau_levenshtein(&known_last, &last), known_part != part)
-    };
-    let nearest = known
-        .iter()
-        .map(|known| (distance(known), known))
-        .min()
-        .filter(|((distance, _), _)| *distance <= last.len().div_ceil(2))
-        .map_or(String::new(), |(_, known)| format!("; did you mean `{known}`?"));
+    let last = |path: &'_ str| path.rsplit('.').next().unwrap_or_default().to_owned();
+    let typed = last(&key);
+    // A key of the same part comes first, where another is as near.
+    let part = &key[..key.len() - typed.len()];
+    let (same, other): (Vec<&String>, Vec<&String>) =
+        known.iter().partition(|known| known.strip_suffix(&last(known)) == Some(part));
+    let ordered: Vec<&String> = same.into_iter().chain(other).collect();
+    let names: Vec<String> = ordered.iter().map(|known| last(known)).collect();
+    let found = nearest(&typed, names.iter().map(String::as_str), |_| typed.len().div_ceil(2));
+    let place = found.and_then(|found| names.iter().position(|name| name == found));
+    let nearest = place.map_or(String::new(), |place| format!("; did you mean `{}`?", ordered[place]));
     Err(Error::format(name, format!("unknown key `{key}`{nearest}")))
 }
 
@@ -129,9 +128,7 @@ pub fn check_misspelt(name: &str, metadata: &Metadata) -> Result<()> {
     let known = field_names::<Metadata>();
     for key in metadata.unknown.keys().filter_map(Value::as_str) {
         let typed = key.to_lowercase();
-        let distance = |known: &str| strsim::damerau_levenshtein(known, &typed);
-        let nearest = known.iter().map(|known| (distance(known), known)).min();
-        if let Some((_, nearest)) = nearest.filter(|(distance, known)| *distance <= (known.len() / 4).min(2)) {
+        if let Some(nearest) = nearest(&typed, known.iter().copied(), |known| (known.len() / 4).min(2)) {
             return Err(Error::format(name, format!("unknown key `{key}`; did you mean `{nearest}`?")));
         }
     }
@@ -166,7 +163,7 @@ pub fn parse_metadata(name: &str, text: &str) -> Result<Metadata> {
     let mut raw = parse_raw(name, text)?;
     let mut text = std::borrow::Cow::from(text);
     if let Some(sensor) = raw.get("sensor").and_then(Value::as_mapping).filter(|sensor| is_flat(sensor)) {
-        let wrong = |error| Error::format(name, format!("in `sensor`, it is not as expected: {error}"));
+        let wrong = |error| Error::format(name, format!("in `sensor`, {}", yaml_problem(&error)));
         let sensor = regrouped(sensor).map_err(wrong)?;
         raw.insert("sensor".into(), sensor.into());
         text = serde_yaml::to_string(&raw).map_err(wrong)?.into();

@@ -283,7 +283,7 @@ impl Correction {
         let mut notes = Vec::new();
         match self.black_choice {
             BlackChoice::Border(border) => notes.push(measure_black(frame, &input.options(), border)?),
-            BlackChoice::Known(black) => notes.extend(doubt_of_black(frame, black)),
+            BlackChoice::Known(black) => notes.extend(doubt_of_black(frame, black)?),
         }
         let frame = &*frame;
         let light = &Light { frame, input, described };

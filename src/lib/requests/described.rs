@@ -188,8 +188,22 @@ pub fn check_pattern(frame: &FrameHeader, pattern: CfaPattern) -> Result<()> {
 }
 
 /// A warning of a level to subtract that is not what the metadata say of no light.
-pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Option<Note> {
-    let Black::Level(level) = black else { return None };
+///
+/// # Errors
+///
+/// [`Error::Usage`] for one that is not below the white level, where the metadata say nothing of no light.
+pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>> {
+    let Black::Level(level) = black else { return Ok(None) };
+    let white = frame.metadata.white_level_adu.map(|white| white.largest());
+    if let Some(white) = white.filter(|white| level >= *white && frame.metadata.black_level_adu.is_none()) {
+        let problem = format!("{}: --black {level} is not below the white level, {white} ADU", frame.name);
+        return Err(Error::Usage(problem).change(&["black", "white"]));
+    }
+    Ok(other_black(frame, level))
+}
+
+/// A warning of a level to subtract that the metadata contradict.
+fn other_black(frame: &FrameHeader, level: f64) -> Option<Note> {
     let levels = match frame.metadata.quantity {
         QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
             frame.metadata.dark_signal_e.map(|level| [level; 4])

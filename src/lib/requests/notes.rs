@@ -4,6 +4,7 @@ use crate::analysis::statistics::Report;
 use crate::formats::input::FrameReader;
 use crate::metadata::{AdcRecord, FrameHeader};
 use crate::stream::RowSource;
+use crate::text::counted;
 
 /// Something that came up; whoever asked decides what to do with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,7 +25,7 @@ impl Note {
 
     /// A warning of pixels that are left out of statistics; none where there are none.
     pub fn not_finite(pixels: u64) -> Option<Self> {
-        let text = || format!("{pixels} pixels are NaN or infinite; they are left out of the statistics");
+        let text = || counted(pixels, "pixels are NaN or infinite; they are left out of the statistics");
         (pixels > 0).then(|| Self::Warning(text()))
     }
 }
@@ -48,20 +49,21 @@ pub fn of_statistics(report: &Report) -> Vec<Note> {
     let pixels: u64 = report.regions.iter().map(|region| region.saturated).sum();
     let saturated = match report.regions.iter().any(|region| region.leaves_saturated_out) {
         _ if pixels == 0 => None,
-        true => Some(format!(
-            "{pixels} pixels were made of saturated samples; they are left out of the statistics, so that these are of the \
-             darker part alone (--keep-saturated keeps them in)"
+        true => Some(counted(
+            pixels,
+            "pixels were made of saturated samples; they are left out of the statistics, so that these are of the darker part \
+             alone (--keep-saturated keeps them in)",
         )),
-        false => Some(format!(
-            "{pixels} samples are saturated; the statistics hold for what was recorded, not for the light"
-        )),
+        false => {
+            Some(counted(pixels, "samples are saturated; the statistics hold for what was recorded, not for the light"))
+        }
     };
     let defective: u64 = report.regions.iter().map(|region| region.defective.max(region.corrected)).sum();
     let defective = (defective > 0)
-        .then(|| format!("{defective} pixels are, or used, defective photosites; they are left out of the statistics"));
+        .then(|| counted(defective, "pixels are, or used, defective photosites; they are left out of the statistics"));
     let beyond: u64 = report.regions.iter().map(|region| region.beyond_model).sum();
     let beyond = (beyond > 0)
-        .then(|| format!("{beyond} pixels are beyond the model of a correction; they are left out of the statistics"));
+        .then(|| counted(beyond, "pixels are beyond the model of a correction; they are left out of the statistics"));
     let marked = saturated.into_iter().chain(defective).chain(beyond).map(Note::Warning);
     Note::not_finite(not_finite).into_iter().chain(marked).collect()
 }
@@ -88,10 +90,10 @@ pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
 pub fn of_levels(frame: &FrameHeader) -> Option<Note> {
     let metadata = &frame.metadata;
     let (black, white) = (metadata.uniform_black_adu()?, metadata.white_level_adu?.largest());
-    let problem = if black >= white {
-        format!("its black level, {black} ADU, is not below its white level, {white} ADU: no sample tells of light")
-    } else if white <= 0.0 {
+    let problem = if white < 0.0 {
         format!("what is subtracted exceeds its white level by {} ADU: no sample is above 0", -white)
+    } else if black >= white {
+        format!("its black level, {black} ADU, is not below its white level, {white} ADU: no sample tells of light")
     } else {
         return None;
     };

@@ -14,8 +14,8 @@ use std::collections::BTreeSet;
 pub enum DefectMap<S> {
     /// A frame of the same size whose samples are not zero there, and how many were not so far.
     Frame(S, usize),
-    /// Columns and rows of the frame, in rows, and what may not be meant about them.
-    List(BTreeSet<[usize; 2]>),
+    /// Columns and rows of the frame, in rows, and how many that are listed lie outside it.
+    List(BTreeSet<[usize; 2]>, usize),
 }
 
 /// A frame whose samples are not zero at more than one photosite in so many is no map of defects.
@@ -41,17 +41,18 @@ impl<S: RowSource> DefectMap<S> {
         Ok(Self::Frame(map, 0))
     }
 
-    /// A list of columns and rows on the sensor, `x,y` in each line; what follows `#` does not count, nor do photosites that a
-    /// crop leaves out.
+    /// A list of columns and rows on the sensor, `x,y` in each line; what follows `#` does not count, nor do names of columns in
+    /// the first line and photosites that a crop leaves out.
     ///
     /// # Errors
     ///
     /// [`Error::Format`] naming the line that is none.
     pub fn of_list(text: &str, name: &str, frame: &FrameHeader) -> Result<Self> {
-        let mut found = BTreeSet::new();
+        let (mut found, mut outside) = (BTreeSet::new(), BTreeSet::new());
+        let mut may_be_header = true;
         for (number, line) in text.lines().enumerate() {
             let line = line.split('#').next().unwrap_or_default().trim();
-            if line.is_empty() {
+            if line.is_empty() || std::mem::take(&mut may_be_header) && is_header(line) {
                 continue;
             }
             let place = line.split_once([',', ' ', '\t', ';']).and_then(|(x, y)| {
@@ -72,21 +73,28 @@ impl<S: RowSource> DefectMap<S> {
             // Those of the sensor that a crop leaves out do not count.
             if let Some((x, y)) = of_frame(x, 0, frame.geometry.width).zip(of_frame(y, 1, frame.geometry.height)) {
                 found.insert([y, x]);
+            } else {
+                outside.insert([y, x]);
             }
         }
-        Ok(Self::List(found))
+        Ok(Self::List(found, outside.len()))
     }
 
-    /// A warning of a list, `name`, of which nothing is in `frame`.
+    /// A warning of a list, `name`, of which nothing is in `frame`, or not all.
     pub fn doubt(&self, name: &str, frame: &FrameHeader) -> Option<String> {
-        let Self::List(found) = self else { return None };
+        let Self::List(found, outside) = self else { return None };
         let Geometry { width, height, origin: [left, top], .. } = frame.geometry;
-        found.is_empty().then(|| {
-            format!(
-                "{name}: no photosite that it lists is in {}, whose {width}x{height} begin at column {left}, row {top} of the sensor",
-                frame.name
-            )
-        })
+        let whose = format!("{}, whose {width}x{height} begin at column {left}, row {top} of the sensor", frame.name);
+        match (found.len(), outside) {
+            (0, _) => Some(format!("{name}: no photosite that it lists is in {whose}")),
+            (_, 0) => None,
+            (inside, outside) => {
+                let all = inside + outside;
+                Some(format!(
+                    "{name}: it lists {all} photosites, {outside} of them outside {whose}; these do not count"
+                ))
+            }
+        }
     }
 
     /// A warning of a frame that marked nothing, once all its rows are read.
@@ -124,7 +132,7 @@ impl<S: RowSource> DefectMap<S> {
                     }
                 }
             }
-            Self::List(list) => {
+            Self::List(list, _) => {
                 for [y, x] in list.range([first, 0]..[first + rows, 0]) {
                     add(&mut samples[(y - first + 1) * row_samples - width + x], DEFECTIVE);
                 }
@@ -132,6 +140,12 @@ impl<S: RowSource> DefectMap<S> {
         }
         Ok(())
     }
+}
+
+/// Whether a line names columns: words alone, as in `x,y` or `column row`.
+fn is_header(line: &str) -> bool {
+    let mut words = line.split([',', ' ', '\t', ';']).filter(|word| !word.is_empty());
+    words.all(|word| word.trim_matches('"').chars().all(|c| c.is_alphabetic() || c == '_'))
 }
 
 /// Adds bits to a mark.

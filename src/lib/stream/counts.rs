@@ -1,6 +1,7 @@
 //! What is counted while samples pass.
 
 use crate::metadata::SamplesRecord;
+use crate::text::counted;
 
 /// What a stage counts while samples pass.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -92,7 +93,7 @@ impl Counts {
                 "pixels were made of saturated samples: their values are wrong, and their uncertainty, which --sigma tells, is \
                  infinite",
             ),
-            (self.defective - self.corrected.min(self.defective), "defective photosites have no good neighbor of their class and stay as they are"),
+            (self.defective - self.corrected.min(self.defective), "defective photosites were not interpolated: no neighbor of their class is good"),
             (self.corrected, "defective photosites were interpolated from others of their class, and marked"),
             (
                 self.marked_pixels,
@@ -126,7 +127,7 @@ impl Counts {
         ]
         .into_iter()
         .filter(|(count, _)| *count > 0)
-        .map(|(count, what)| format!("{count} {what}"))
+        .map(|(count, what)| counted(count, what))
         .collect()
     }
 }

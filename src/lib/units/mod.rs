@@ -27,6 +27,8 @@ pub const BOLTZMANN_EV_PER_K: f64 = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C;
 pub const LUMINOUS_EFFICACY_LM_PER_W: f64 = 683.0;
 /// Meters in a nanometer.
 pub const M_PER_NM: f64 = 1e-9;
+/// Nanometers in a centimeter.
+pub const NM_PER_CM: f64 = 1e7;
 /// Centimeters in a micrometer.
 pub const CM_PER_UM: f64 = 1e-4;
 /// Millimeters in a micrometer.

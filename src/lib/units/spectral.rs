@@ -37,14 +37,19 @@ impl RadianceUnit {
         Self { power: Power::Microwatt, ..Self::W_PER_CM2_SR_NM },
     ];
 
-    /// What one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    pub fn in_w_per_cm2_sr_nm(self) -> f64 {
+    /// What one such unit is in W cm⁻² sr⁻¹ nm⁻¹ at a wavelength, which matters where it is per wavenumber: L(λ) = L(ν)·|dν/dλ|.
+    pub fn in_w_per_cm2_sr_nm(self, wavelength_nm: f64) -> f64 {
         let in_cm2 = match self.area {
             Length::Meter => 1e4,
             Length::Millimeter => 1e-2,
             _ => 1.0,
         };
-        self.power.in_w() / self.wavelength.in_nm() / in_cm2
+        self.power.in_w() / self.wavelength.in_nm(wavelength_nm) / in_cm2
+    }
+
+    /// Whether it is per interval of wavenumber.
+    pub fn is_per_wavenumber(self) -> bool {
+        self.wavelength == WavelengthUnit::PerCentimeter
     }
 
     /// Reads a unit that is all of a text.
@@ -62,7 +67,9 @@ impl RadianceUnit {
 
 impl fmt::Display for RadianceUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {}-2 sr-1 {}-1", self.power.symbol(), self.area.symbol(), self.wavelength.symbol())
+        let interval = self.wavelength.symbol();
+        let interval = if self.is_per_wavenumber() { format!("/ {interval}") } else { format!("{interval}-1") };
+        write!(f, "{} {}-2 sr-1 {interval}", self.power.symbol(), self.area.symbol())
     }
 }
 
@@ -87,7 +94,7 @@ pub enum OtherUnit {
     Irradiance,
     /// Photons instead of energy.
     Photons,
-    /// Per interval of frequency or wavenumber.
+    /// Per interval of frequency, or of what may be wavenumber.
     PerFrequency,
     /// Radiance over all wavelengths.
     AllWavelengths,
@@ -253,7 +260,7 @@ fn units_among(tokens: &[Token]) -> Vec<Found> {
 fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
     let [mut is_divided, mut is_square] = [false; 2];
     let (mut power, mut photons, mut others) = (None, false, false);
-    let (mut per_sr, mut per_frequency) = (0, false);
+    let (mut per_sr, mut per_frequency, mut per_wavenumber) = (0, false, false);
     let mut lengths: Vec<(Length, i32)> = Vec::new();
     for token in tokens {
         let Token::Factor { word, exponent } = token else {
@@ -264,6 +271,10 @@ fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
         let squared = if std::mem::take(&mut is_square) { 2 } else { 1 };
         let exponent = match *exponent {
             // `mW/(m2 sr cm-1)`: an interval of wavenumber.
+            Some(-1) if is_divided && base(word) == Some(Base::Length(Length::Centimeter)) => {
+                per_wavenumber = true;
+                continue;
+            }
             Some(negative) if negative < 0 && is_divided => {
                 per_frequency |= matches!(base(word), Some(Base::Length(_)));
                 others = true;
@@ -304,6 +315,10 @@ fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
     let is_area = |length| matches!(length, Length::Millimeter | Length::Centimeter | Length::Meter);
     let power = power.ok_or(OtherUnit::Unknown)?;
     match (per_sr, lengths.as_slice()) {
+        (-1, [(area, -2)]) if per_wavenumber && is_area(*area) => {
+            Ok(RadianceUnit { power, area: *area, wavelength: WavelengthUnit::PerCentimeter })
+        }
+        _ if per_wavenumber => Err(OtherUnit::PerFrequency),
         (-1, [(area, -2), (length, -1)]) if is_area(*area) => {
             Ok(RadianceUnit { power, area: *area, wavelength: wavelength(*length)? })
         }
@@ -321,7 +336,7 @@ mod tests {
     use super::*;
 
     /// Spellings, and what one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    const RADIANCES: [(&str, f64); 39] = [
+    const RADIANCES: [(&str, f64); 44] = [
         ("W cm-2 sr-1 nm-1", 1.0),
         ("W m-2 sr-1 nm-1", 1e-4),
         ("W.m^-2.sr^-1.nm^-1", 1e-4),
@@ -361,6 +376,12 @@ mod tests {
         ("W/cm2/sr/A", 10.0),
         ("W mm-2 sr-1 nm-1", 100.0),
         ("W m-3 sr-1", 1e-13),
+        // At 500 nm 1 cm⁻¹ is 0.025 nm, the wavenumber being 20 000 cm⁻¹.
+        ("W cm-2 sr-1 / cm-1", 40.0),
+        ("W/(cm2 sr cm-1)", 40.0),
+        ("W cm^-2 sr^-1 (cm^-1)^-1", 40.0),
+        ("mW/(m^2 sr cm^-1)", 4e-6),
+        ("mW m⁻² sr⁻¹ / cm⁻¹", 4e-6),
     ];
 
     #[test]
@@ -369,7 +390,7 @@ mod tests {
             for shown in [text.to_owned(), format!("radiance ({text})"), format!("sky1 [{text}]"), format!("L, {text}")]
             {
                 let read = match unit_of_heading(&shown) {
-                    Some(Stated::Radiance(unit)) => unit.in_w_per_cm2_sr_nm(),
+                    Some(Stated::Radiance(unit)) => unit.in_w_per_cm2_sr_nm(500.0),
                     other => panic!("{shown}: {other:?}"),
                 };
                 assert!((read / factor - 1.0).abs() < 1e-15, "{shown}: {read}");
@@ -397,7 +418,7 @@ mod tests {
             ("µmol/m2/s", Photons),
             ("quanta/s/cm2/sr/nm", Photons),
             ("photon_radiance", Photons),
-            ("mW/(m^2 sr cm^-1)", PerFrequency),
+            ("mW/(m^2 cm^-1)", PerFrequency),
             ("W m-2 sr-1 cm-1", PerFrequency),
             ("W m-2 sr-1 Hz-1", PerFrequency),
             ("W m-2 sr-1", AllWavelengths),

@@ -109,12 +109,13 @@ pub(super) fn tokens(text: &str) -> Vec<Token> {
                 plain.push_str(&digit.to_string());
             }
             '^' | '{' | '}' | '$' => {}
-            '*' | '·' | '⋅' | '×' | '•' | '.' | '_' | '(' | ')' | '[' | ']' | '"' => plain.push(' '),
+            '*' | '·' | '⋅' | '×' | '•' | '.' | '_' | '[' | ']' | '"' => plain.push(' '),
             '/' => plain.push_str(" / "),
             ':' | ';' | ',' | '=' | '<' | '>' => plain.push_str(" | "),
             other => plain.push(other),
         }
     }
+    let plain = plain.replace("(cm-1)-1", " / cm-1 ").replace(['(', ')'], " ");
     plain.split_whitespace().flat_map(pieces).collect()
 }
 

@@ -1,5 +1,6 @@
 //! Units of wavelength.
 
+use super::NM_PER_CM;
 use super::spelling::{Base, Length, Token, base, tokens};
 
 /// The unit in which a file gives wavelengths.
@@ -13,6 +14,8 @@ pub enum WavelengthUnit {
     Angstrom,
     /// m.
     Meter,
+    /// cm⁻¹: wavenumbers instead, of which wavelengths in vacuum follow.
+    PerCentimeter,
 }
 
 impl WavelengthUnit {
@@ -22,16 +25,18 @@ impl WavelengthUnit {
             Self::Micrometer => Length::Micrometer.symbol(),
             Self::Angstrom => Length::Angstrom.symbol(),
             Self::Meter => Length::Meter.symbol(),
+            Self::PerCentimeter => "cm-1",
         }
     }
 
-    /// What one such unit is in nm.
-    pub(super) fn in_nm(self) -> f64 {
+    /// What an interval of one such unit at a wavelength in nm is in nm: of wavenumbers |dλ/dν| = λ²/10⁷.
+    pub(super) fn in_nm(self, wavelength_nm: f64) -> f64 {
         match self {
             Self::Nanometer => 1.0,
             Self::Micrometer => 1e3,
             Self::Angstrom => 0.1,
             Self::Meter => 1e9,
+            Self::PerCentimeter => wavelength_nm * wavelength_nm / NM_PER_CM,
         }
     }
 
@@ -39,11 +44,15 @@ impl WavelengthUnit {
     pub fn nm(self, value: f64) -> f64 {
         /// Parts of a nanometer that are told apart.
         const PARTS: f64 = 1e6;
-        if self == Self::Nanometer { value } else { (value * self.in_nm() * PARTS).round() / PARTS }
+        match self {
+            Self::Nanometer => value,
+            Self::PerCentimeter => NM_PER_CM / value,
+            _ => (value * self.in_nm(1.0) * PARTS).round() / PARTS,
+        }
     }
 
-    /// The unit that the heading of a column of wavelengths ends with: `wavelength (nm)`, `lambda_um`; none where it names
-    /// none.
+    /// The unit that the heading of a column of wavelengths ends with: `wavelength (nm)`, `lambda_um`, `nu (cm-1)`; none where
+    /// it names none.
     ///
     /// # Errors
     ///
@@ -51,17 +60,24 @@ impl WavelengthUnit {
     pub fn of_heading(heading: &str) -> Result<Option<Self>, &'static str> {
         let tokens = tokens(heading);
         let words = || tokens.iter().filter_map(Token::lower);
-        if words().any(|word| word.starts_with("wavenumber")) || heading.contains("1/cm") {
-            return Err("wavenumbers");
+        let is_per_cm = |token: &Token| {
+            let length = |word: &str| base(word) == Some(Base::Length(Length::Centimeter));
+            matches!(token, Token::Factor { word, exponent: Some(-1) } if length(word))
+        };
+        if heading.contains("1/cm") || tokens.last().is_some_and(is_per_cm) {
+            return Ok(Some(Self::PerCentimeter));
         }
-        if words().any(|word| matches!(word.as_str(), "hz" | "thz" | "frequency")) {
+        if words().any(|word| word.starts_with("wavenumber")) {
+            return Err("wavenumbers without the unit cm-1");
+        }
+        if words().any(|word| matches!(word.as_str(), "hz" | "thz" | "freq" | "frequency")) {
             return Err("frequencies");
         }
         if words().any(|word| matches!(word.as_str(), "ev" | "energy")) {
             return Err("energies of photons");
         }
         Ok(match tokens.last() {
-            Some(Token::Factor { exponent: Some(-1), .. }) => return Err("wavenumbers"),
+            Some(Token::Factor { exponent: Some(-1), .. }) => return Err("wavenumbers without the unit cm-1"),
             // A single letter alone is a name.
             Some(Token::Factor { word, exponent: None }) if word.len() > 1 || tokens.len() > 1 => match base(word) {
                 Some(Base::Length(Length::Nanometer)) => Some(Self::Nanometer),
@@ -92,16 +108,22 @@ mod tests {
             ("Å", Some(WavelengthUnit::Angstrom)),
             ("Wavelength, Angstrom", Some(WavelengthUnit::Angstrom)),
             ("wavelength (m)", Some(WavelengthUnit::Meter)),
+            ("nu (cm-1)", Some(WavelengthUnit::PerCentimeter)),
+            ("k [cm^-1]", Some(WavelengthUnit::PerCentimeter)),
+            ("wavenumber_cm-1", Some(WavelengthUnit::PerCentimeter)),
+            ("1/cm", Some(WavelengthUnit::PerCentimeter)),
             ("wavelength", None),
             ("A", None),
             ("id", None),
         ] {
             assert_eq!(WavelengthUnit::of_heading(heading), Ok(unit), "{heading}");
         }
-        for heading in ["wavenumber", "nu (cm-1)", "k [cm^-1]", "1/cm", "frequency (THz)", "energy_eV"] {
+        for heading in ["wavenumber", "wavenumber (um-1)", "frequency (THz)", "FREQ", "energy_eV"] {
             assert!(WavelengthUnit::of_heading(heading).is_err(), "{heading}");
         }
         assert_eq!(WavelengthUnit::Micrometer.nm(0.57), 570.0);
         assert_eq!(WavelengthUnit::Angstrom.nm(5550.0), 555.0);
+        // The sodium D2 line in vacuum, NIST ASD: 589.158 nm, 16 973.37 cm⁻¹.
+        assert!((WavelengthUnit::PerCentimeter.nm(16_973.37) - 589.158).abs() < 5e-4);
     }
 }

@@ -106,7 +106,7 @@ fn own_tags(tags: &ExrTags, geometry: &Geometry, notes: &mut Vec<String>) -> Met
         _ => QuantityKind::Unspecified,
     });
     if is_spectral {
-        metadata.unit = tags.emissive_units.clone().unwrap_or_default();
+        metadata.unit = emissive_unit(tags);
     }
     if let Some((exposure_s, f_number)) = tags.exposure_s.zip(tags.f_number) {
         match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
@@ -115,6 +115,14 @@ fn own_tags(tags: &ExrTags, geometry: &Geometry, notes: &mut Vec<String>) -> Met
         }
     }
     metadata
+}
+
+/// The unit of a spectral image. In layout 1.0 \[Fichet2021] emission is per nm, whether `emissiveUnits` say so or not: the
+/// authors' programs and pbrt-v4 write `W.m^-2.sr^-1`.
+fn emissive_unit(tags: &ExrTags) -> String {
+    let unit = tags.emissive_units.as_deref().unwrap_or_default().trim();
+    let is_short = tags.spectral_layout.as_deref() == Some("1.0") && unit == "W.m^-2.sr^-1";
+    if is_short { format!("{unit}.nm^-1") } else { unit.to_owned() }
 }
 
 /// Refuses parts that are of a kind that is not read, naming it.
@@ -166,6 +174,7 @@ fn read_tags(header: &Header) -> ExrTags {
             .chromaticities
             .map(|c| [point(c.red), point(c.green), point(c.blue), point(c.white)]),
         emissive_units: other("emissiveUnits"),
+        spectral_layout: other("spectralLayoutVersion"),
     }
 }
 
@@ -213,4 +222,23 @@ fn canonical_order(names: &[String]) -> Vec<usize> {
         )
     });
     order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What pbrt-v4 writes is per nm, as the layout has it; without the layout nobody knows.
+    #[test]
+    fn emission_of_the_spectral_layout_is_per_nm() {
+        let unit = |layout: Option<&str>, unit: &str| {
+            let (emissive_units, spectral_layout) = (Some(unit.into()), layout.map(Into::into));
+            emissive_unit(&ExrTags { emissive_units, spectral_layout, ..ExrTags::default() })
+        };
+        assert_eq!(unit(Some("1.0"), "W.m^-2.sr^-1"), "W.m^-2.sr^-1.nm^-1");
+        assert_eq!(unit(Some("1.0"), "W.m^-2.sr^-1.nm^-1"), "W.m^-2.sr^-1.nm^-1");
+        assert_eq!(unit(Some("1.0"), "W.m^-2"), "W.m^-2");
+        assert_eq!(unit(Some("2.0"), "W.m^-2.sr^-1"), "W.m^-2.sr^-1");
+        assert_eq!(unit(None, "W.m^-2.sr^-1"), "W.m^-2.sr^-1");
+    }
 }

@@ -84,4 +84,6 @@ pub struct ExrTags {
     pub primaries: Option<Primaries>,
     /// `emissiveUnits` of a spectral image.
     pub emissive_units: Option<String>,
+    /// `spectralLayoutVersion` of a spectral image.
+    pub spectral_layout: Option<String>,
 }

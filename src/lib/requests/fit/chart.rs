@@ -30,7 +30,7 @@ const MOST_MISFIT: f64 = 0.1;
 #[derive(Debug, Clone, Args)]
 pub struct ChartFit {
     /// Frame of a ColorChecker, a CFA plane of ADU such as a DNG: fit the matrix to its 24 patches
-    #[arg(long, value_name = "FRAME", requires = "corners", conflicts_with = "patches")]
+    #[arg(long, value_name = "FRAME", conflicts_with = "patches")]
     pub chart: Option<PathBuf>,
     /// Centers of the corner patches in pixels from the frame's first sample: dark skin, bluish green, black, white
     #[arg(long, value_name = "X,Y,X,Y,X,Y,X,Y", value_parser = values::corners, requires = "chart", allow_hyphen_values = true)]
@@ -125,6 +125,13 @@ impl ChartFit {
     /// reflectances is missing.
     pub fn run(&self) -> Result<Option<ChartFound>> {
         let (seen, turned) = match (&self.chart, self.corners, &self.patches) {
+            (Some(_), None, _) => {
+                return Err(Error::Usage(
+                    "--chart needs --corners X,Y,X,Y,X,Y,X,Y, which tell where the chart is: column and row of the centers of dark \
+                     skin, bluish green, black and white, in pixels from the frame's first sample"
+                        .into(),
+                ));
+            }
             (Some(frame), Some(corners), _) => see_frame(&self.options_of(frame), corners)?,
             (_, _, Some(table)) => (self.see_table(table)?, Vec::new()),
             _ => return Ok(None),

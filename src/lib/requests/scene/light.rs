@@ -134,9 +134,9 @@ impl Pixels {
 
 /// The radiance of a pixel, W cm⁻² sr⁻¹ nm⁻¹.
 fn radiance(band: &Band, y: usize, x: usize, spectral: &SpectralChannels) -> Vec<f64> {
-    let (window, factor) = (band.window::<Any>(0), spectral.unit.in_w_per_cm2_sr_nm());
+    let window = band.window::<Any>(0);
     let sample = |&channel: &usize| f64::from(window.row(y.cast_signed(), channel)[x]);
-    spectral.channels.iter().map(|channel| sample(channel) * factor).collect()
+    spectral.channels.iter().zip(spectral.factors()).map(|(channel, factor)| sample(channel) * factor).collect()
 }
 
 /// The place of the brightest of some pixels.

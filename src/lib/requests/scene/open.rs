@@ -105,7 +105,8 @@ impl Scene {
         let given = self.spectrum.radiance_unit;
         let radiance_of = |index: usize| -> Result<Vec<f64>> {
             let (unit, _) = table.radiance_unit(index, given)?;
-            Ok(table.values.row(index).iter().map(|value| value * unit.in_w_per_cm2_sr_nm()).collect())
+            let samples = table.values.row(index).into_iter().zip(&table.wavelength_nm);
+            Ok(samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).collect())
         };
         let electrons_of = |index: usize| checked(seen.camera.electrons(&radiance_of(index)?), &name);
         let warn = |index: usize, notes: &mut Vec<Note>| -> Result<()> {
@@ -141,7 +142,7 @@ impl Scene {
         let spectral = SpectralChannels::of(&header, self.spectrum.radiance_unit)?;
         found.notes.extend(spectral.warning.clone().map(Note::Warning));
         let seen = sums.camera(&spectral.wavelength_nm, &header.name, &mut found.notes)?;
-        let planes = seen.camera.planes(&spectral.channels, spectral.unit.in_w_per_cm2_sr_nm());
+        let planes = seen.camera.planes(&spectral.channels, &spectral.factors());
         let all = spectral.channels.len();
         if planes.len() < all {
             let what = format!("{} of {all} spectral planes", all - planes.len());

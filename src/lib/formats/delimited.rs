@@ -1,0 +1,194 @@
+//! Tables as text: encodings, comments, and what parts the cells, brought to one form.
+//!
+//! Cells are parted by commas, semicolons, tabs or blanks; what parts them is what makes numbers of the cells of the first rows.
+//! Lines that begin with `#`, `;`, `%`, `!` or `//` are comments.
+
+use crate::error::{Error, Result};
+use std::borrow::Cow;
+
+/// So many rows are looked at for what parts their cells.
+const ROWS_LOOKED_AT: usize = 16;
+/// What may part cells, the likeliest first: a comma may be that of decimals, a blank that of words.
+const SEPARATORS: [Separator; 4] =
+    [Separator::Byte(b'\t'), Separator::Byte(b';'), Separator::Byte(b','), Separator::Blanks];
+
+/// What parts the cells of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Separator {
+    /// One character.
+    Byte(u8),
+    /// Blanks, any number of them.
+    Blanks,
+}
+
+impl Separator {
+    /// What parts the cells of `text`: what makes two or more cells of the last of its first rows, all but the first of them
+    /// numbers; where nothing does, the first of comma, semicolon and tab that the first row has.
+    pub fn of(text: &str) -> Self {
+        let rows: Vec<&str> = rows(text).take(ROWS_LOOKED_AT).collect();
+        let makes_numbers = |separator: &&Self| {
+            let cells: Vec<&str> = rows.last().map(|row| separator.cells(row)).unwrap_or_default();
+            let is_number =
+                |cell: &&str| number(cell).is_some() || **separator != Self::Byte(b',') && decimal(cell).is_some();
+            let filled = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+            filled > 1 && cells[1..filled].iter().all(is_number)
+        };
+        let first = rows.first().unwrap_or(&"").as_bytes();
+        let in_first = || b",;\t".iter().find(|separator| first.contains(separator));
+        SEPARATORS.iter().find(makes_numbers).copied().unwrap_or_else(|| Self::Byte(*in_first().unwrap_or(&b',')))
+    }
+
+    fn cells(self, row: &str) -> Vec<&str> {
+        match self {
+            Self::Byte(separator) => row.split(char::from(separator)).map(str::trim).collect(),
+            Self::Blanks => row.split_whitespace().collect(),
+        }
+    }
+
+    /// The character that parts the cells of [`plain`] text.
+    pub fn byte(self) -> u8 {
+        match self {
+            Self::Byte(separator) => separator,
+            Self::Blanks => b'\t',
+        }
+    }
+}
+
+/// A finite number with a decimal point, if it is one; its exponent may be written with a `D`, as Fortran does.
+pub fn number(cell: &str) -> Option<f64> {
+    let is_finite = |value: &f64| value.is_finite();
+    cell.parse().ok().filter(is_finite).or_else(|| {
+        let is_fortran =
+            cell.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) && cell.contains(['D', 'd']);
+        is_fortran.then(|| cell.replacen(['D', 'd'], "e", 1).parse().ok().filter(is_finite)).flatten()
+    })
+}
+
+/// A finite number with a decimal comma, if it is one.
+pub fn decimal(cell: &str) -> Option<f64> {
+    let has_one = cell.bytes().filter(|byte| *byte == b',').count() == 1 && !cell.contains('.');
+    has_one.then(|| number(&cell.replacen(',', ".", 1))).flatten()
+}
+
+/// The text of a file, without its byte order mark: UTF-8, UTF-16, or else Latin-1, of which numbers and most units are the same.
+///
+/// # Errors
+///
+/// [`Error::Format`] for UTF-16 that is damaged.
+pub fn decoded<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>> {
+    let utf16 = |unit: fn([u8; 2]) -> u16| {
+        let (pairs, odd) = bytes[2..].as_chunks();
+        let text = char::decode_utf16(pairs.iter().map(|pair| unit(*pair))).collect::<std::result::Result<String, _>>();
+        let text = text.ok().filter(|_| odd.is_empty());
+        text.ok_or_else(|| Error::format(name, "it is UTF-16 text, but damaged; save it as UTF-8"))
+    };
+    let text: Cow<'a, str> = match bytes {
+        [0xFF, 0xFE, ..] => utf16(u16::from_le_bytes)?.into(),
+        [0xFE, 0xFF, ..] => utf16(u16::from_be_bytes)?.into(),
+        _ => match std::str::from_utf8(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)) {
+            Ok(text) => text.into(),
+            Err(_) => bytes.iter().copied().map(char::from).collect::<String>().into(),
+        },
+    };
+    let has_old_ends = text.contains('\r') && !text.contains('\n');
+    Ok(if has_old_ends { text.replace('\r', "\n").into() } else { text })
+}
+
+/// What stands in a comment, if a line is one. Numbers behind semicolons are a row without a label where `row`, the first
+/// that is none, has as many.
+fn comment<'a>(line: &'a str, row: Option<&str>) -> Option<&'a str> {
+    let line = line.trim_start();
+    let semicolons = |text: &str| text.bytes().filter(|byte| *byte == b';').count();
+    let is_row = || {
+        let are_numbers =
+            line.split(';').skip(1).all(|cell| number(cell.trim()).or_else(|| decimal(cell.trim())).is_some());
+        semicolons(line) > 1 && row.is_some_and(|row| semicolons(row) == semicolons(line)) && are_numbers
+    };
+    let marked = line.strip_prefix("//").or_else(|| line.strip_prefix(['#', '%', '!']));
+    marked.or_else(|| line.strip_prefix(';').filter(|_| !is_row()))
+}
+
+/// Lines that are neither empty nor marked as comments.
+fn rows(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter(|line| !line.trim().is_empty() && comment(line, None).is_none())
+}
+
+/// The comments of a text, without their marks.
+pub fn comments(text: &str) -> impl Iterator<Item = &str> {
+    let row = rows(text).next();
+    text.lines().filter_map(move |line| comment(line, row))
+}
+
+/// The rows of a text, each in its line, as a reader of CSV takes them: comments emptied, cells parted by blanks now parted by
+/// tabs, and, where `trims` and rows end with separators, without these; none where it is so already.
+///
+/// # Errors
+///
+/// [`Error::Format`] for a line of words over columns that are parted by blanks where it is not clear which is whose.
+pub fn plain(name: &str, text: &str, separator: Separator, trims: bool) -> Result<Option<String>> {
+    let row = rows(text).next();
+    let last = rows(text).take(ROWS_LOOKED_AT).last().unwrap_or_default();
+    let ends_so = |line: &str| line.trim_end_matches([' ', '\r']).as_bytes().last() == Some(&separator.byte());
+    let trims = trims && ends_so(last);
+    let is_plain = |line: &str| line.starts_with('#') || comment(line, row).is_none() && !(trims && ends_so(line));
+    if matches!(separator, Separator::Byte(_)) && text.lines().all(is_plain) {
+        return Ok(None);
+    }
+    let width = separator.cells(last).len();
+    let mut plain = String::with_capacity(text.len());
+    for (index, line) in text.lines().enumerate() {
+        if comment(line, row).is_none() {
+            match separator {
+                Separator::Byte(byte) if trims => plain.push_str(line.trim_end_matches([' ', '\r', char::from(byte)])),
+                Separator::Byte(_) => plain.push_str(line),
+                Separator::Blanks => push_cells(&mut plain, line, width).map_err(|words| {
+                    let problem = format!(
+                        "line {}: {words} words stand above {width} columns that are parted by blanks; part all cells by tabs, \
+                         commas or semicolons",
+                        index + 1
+                    );
+                    Error::format(name, problem)
+                })?,
+            }
+        }
+        plain.push('\n');
+    }
+    Ok(Some(plain))
+}
+
+/// Adds the cells of a line that are parted by blanks, tabs between them. Words are parted so that there are `width` of them:
+/// by two blanks or more, or each with what stands in brackets behind it. Otherwise it gives how many there are.
+fn push_cells(plain: &mut String, line: &str, width: usize) -> std::result::Result<(), usize> {
+    let cells: Vec<&str> = line.split_whitespace().collect();
+    let are_numbers = cells.iter().skip(1).all(|cell| number(cell).or_else(|| decimal(cell)).is_some());
+    if cells.is_empty() || are_numbers && cells.len() > 1 {
+        plain.push_str(&cells.join("\t"));
+        return Ok(());
+    }
+    let apart: Vec<&str> = line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).collect();
+    let named = bracketed(line);
+    let cells = [apart, named].into_iter().find(|cells| cells.len() == width).ok_or(cells.len())?;
+    plain.push_str(&cells.join("\t"));
+    Ok(())
+}
+
+/// The words of a line, each with what stands in brackets behind it.
+fn bracketed(line: &str) -> Vec<&str> {
+    let (mut cells, mut begin, mut depth, mut before) = (Vec::new(), 0, 0_usize, ' ');
+    for (place, character) in line.char_indices() {
+        let starts = before.is_whitespace() && !character.is_whitespace() && !"([".contains(character);
+        if depth == 0 && starts {
+            cells.push(line[begin..place].trim());
+            begin = place;
+        }
+        match character {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        before = character;
+    }
+    cells.push(line[begin..].trim());
+    cells.retain(|cell| !cell.is_empty());
+    cells
+}
