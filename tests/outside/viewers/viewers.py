@@ -54,7 +54,8 @@ def gimp_script(frame, out):
     """What the window shows: colors by the embedded profile in sRGB of 8 bits."""
     return (
         f'(let* ((image (car (gimp-file-load RUN-NONINTERACTIVE "{frame}" "{frame}"))))'
-        f'(gimp-image-convert-color-profile-from-file image "file://{out.parent / PROFILE}" 1 TRUE)'
+        "(if (= (car (gimp-image-base-type image)) RGB)"
+        f'(gimp-image-convert-color-profile-from-file image "file://{out.parent / PROFILE}" 1 TRUE))'
         "(gimp-image-convert-precision image 150)"
         "(gimp-image-flatten image)"
         f'(file-png-save RUN-NONINTERACTIVE image (car (gimp-image-get-active-drawable image)) "{out}" "{out}" 0 9 0 0 0 0 0))'
