@@ -25,6 +25,7 @@ pub mod described;
 pub mod fit;
 pub mod independence;
 pub mod options;
+pub mod picture;
 pub mod prediction;
 pub mod values;
 
