@@ -12,7 +12,8 @@ use support::workshop::{BAD_USAGE, Workshop};
 use support::{frame, header};
 
 fn drawn(frame: &MemoryFrame, regions: &[Region]) -> (Report, Portrait) {
-    measure_with_portrait(&mut frame.clone(), regions, Saturated::LeftOut, Equations::Exact, None).unwrap()
+    measure_with_portrait(&mut frame.clone(), regions, Saturated::LeftOut, Equations::Exact, None)
+        .expect("a frame is measured")
 }
 
 /// Autocorrelations, means of columns and rows, and the law of frames of 200 × 160 are as predicted, at all stages.

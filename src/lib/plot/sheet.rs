@@ -13,6 +13,8 @@ const PLAIN_SIDE: f64 = 640.0;
 /// Lengths at that size: white about a picture, the distance of lines, and the bar.
 const MARGIN: f64 = 12.0;
 const LINE: f64 = 17.0;
+/// What stands above a bar: a line, and room to its topmost number.
+const TITLE: f64 = 25.0;
 const BAR_GAP: f64 = 12.0;
 const BAR_WIDTH: f64 = 16.0;
 const LEAST_BAR: f64 = 80.0;
@@ -164,10 +166,10 @@ impl<'a> Block<'a> {
         let name = name.iter().map(|line| size.width(line).min(size.of(LEAST_NAME))).fold(0.0, f64::max);
         let caption = words.iter().map(|line| size.width(line)).fold(name, f64::max);
         let width = (columns + beside).max(title).max(caption);
-        let lines = tile.caption.len() + usize::from(bar.is_some());
+        let above = if bar.is_some() { size.of(TITLE) } else { 0.0 };
         let below = tile.bar.as_ref().and_then(|bar| bar.missing.as_ref()).map_or(0.0, |_| size.of(LINE));
         let of_bar = bar.as_ref().map_or(0.0, |bar| bar.pixels.size[1] as f64 + below + size.of(0.5 * LINE));
-        let height = rows.max(of_bar) + size.of(LINE) * lines as f64;
+        let height = above + rows.max(of_bar) + size.of(LINE) * tile.caption.len() as f64;
         Self { tile, size, width: width.ceil(), height: height.ceil(), bar }
     }
 
@@ -179,17 +181,16 @@ impl<'a> Block<'a> {
         width: f64,
     ) {
         let (size, picture) = (self.size, &self.tile.picture);
-        let mut top = top;
+        let (mut top, bottom) = (top, top + self.height);
         if let (Some(bar), Some(meaning)) = (&self.bar, &self.tile.bar) {
-            top = (top + size.of(LINE)).round();
+            top = (top + size.of(TITLE)).round();
             let right = left + (picture.size[0] as f64 + bar.width).max(size.width(&meaning.label));
-            size.write(drawing, &meaning.label, [right, top - size.of(5.0)], Anchor::End);
+            size.write(drawing, &meaning.label, [right, top - size.of(0.9 * TEXT)], Anchor::End);
             let beside = left + picture.size[0] as f64 + size.of(BAR_GAP).round();
             bar.draw(drawing, pasted, meaning, [beside, top], size);
         }
         paste_framed(drawing, pasted, picture, [left, top], size);
-        let first =
-            top + self.height - size.of(LINE) * (self.tile.caption.len() + usize::from(self.bar.is_some())) as f64;
+        let first = bottom - size.of(LINE) * self.tile.caption.len() as f64;
         for (index, line) in self.tile.caption.iter().enumerate() {
             let baseline = first + size.of(LINE * (index as f64 + 0.85));
             size.write(drawing, &size.shortened(line, width), [left, baseline], Anchor::Start);

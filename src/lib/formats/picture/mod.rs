@@ -17,6 +17,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use planes::Choice;
 use reduce::{Reduced, Reduction, Tally};
+pub use shade::Range;
 use shade::Shade;
 use std::io::Write;
 use std::path::Path;
@@ -26,19 +27,6 @@ const MAX_PIXELS: usize = 64 << 20;
 
 /// The color of what is no number, in false color: none of the ramp is like it.
 const MISSING: [u8; 3] = [0xcc, 0x79, 0xa7];
-
-/// Which samples become black and which white, or the ends of the false colors.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Range {
-    /// What no light reads, and the most that the stage can hold.
-    Full,
-    /// In each plane by itself, from so many standard deviations below its mean to as many above.
-    Deviations(f64),
-    /// In each plane by itself, from the sample that this share of all is below to another such one.
-    Shares(f64, f64),
-    /// From one value to another, in the unit of the samples.
-    Values(f64, f64),
-}
 
 /// What of a frame to show, and how.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,6 +1,5 @@
 //! From samples to gray and color.
 
-use super::Range;
 use super::reduce::Reduced;
 use crate::color::{linear_srgb_from_xyz, srgb_decode, srgb_encode};
 use crate::error::{Error, Result};
@@ -8,6 +7,19 @@ use crate::metadata::FrameHeader;
 use crate::units::QuantityKind;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+
+/// Which samples become black and which white, or the ends of the false colors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Range {
+    /// What no light reads, and the most that the stage can hold.
+    Full,
+    /// In each plane by itself, from so many standard deviations below its mean to as many above.
+    Deviations(f64),
+    /// In each plane by itself, from the sample that this share of all is below to another such one.
+    Shares(f64, f64),
+    /// From one value to another, in the unit of the samples.
+    Values(f64, f64),
+}
 
 /// From samples to display values.
 pub(super) enum Shade {
