@@ -125,7 +125,7 @@ fn a_figure_has_its_panels_and_what_it_cannot_be_is_told() {
     for (line, wanted, missing) in [
         (
             "measure noisy.exr",
-            &["predicted: normal", "mean − predicted / e⁻", "distance along y", "/ e⁻"][..],
+            &["predicted: normal", "mean − predicted mean / e⁻", "distance along y", "/ e⁻"][..],
             "ellipse",
         ),
         ("measure codes.exr", &["predicted: normal, rounded", "share per ADU"], "95 %"),
