@@ -349,7 +349,10 @@ fn a_library_is_too_large_to_choose_from() {
 fn one_plane_of_xyz_is_no_picture() {
     let shop = Workshop::with_frames();
     let said = refused(&shop, "preview plane.exr --metadata xyz.exr.yaml -o out.png", "plane.exr");
-    assert_eq!(said, "preview: plane.exr: a single plane of XYZ is no picture; give --range LOW,HIGH\n");
+    assert_eq!(
+        said,
+        "preview: plane.exr: a single plane of XYZ is no picture; give --range LOW,HIGH, or --false-color\n"
+    );
     assert!(
         bounded(&shop, "preview plane.exr --metadata xyz.exr.yaml --range 0,1 -o out.png", "plane.exr")
             .status

@@ -10,7 +10,7 @@ use cyanometer::camera::levels::{BlackLevel, WhiteLevel};
 use cyanometer::cfa::{CfaPattern, Class, FilterArray};
 use cyanometer::color::{Space, White};
 use cyanometer::error::Result;
-use cyanometer::formats::picture::{PictureSettings, Range, write_png};
+use cyanometer::formats::picture::{PictureSettings, write_png};
 use cyanometer::formats::yaml::{parse_metadata, write_metadata};
 use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::metadata::{FrameHeader, Metadata, Scene};
@@ -411,7 +411,7 @@ fn pictures_know_levels_by_site_and_class() {
     let mut three = frame(head, |x, _, channel| if x == 0 { 10.0 } else { [100.0, 200.0, 300.0][channel] });
     three.header.metadata.black_level_adu = Some(BlackLevel::Sites([10.0, 20.0, 30.0, 40.0]));
     three.header.metadata.white_level_adu = Some(WhiteLevel::Classes([100.0, 200.0, 300.0]));
-    let settings = PictureSettings { region: None, zoom: 1, range: Range::Full };
+    let settings = PictureSettings::default();
     write_png(&mut three, &settings, &path).unwrap();
     let shown = image::open(&path).unwrap().to_rgb8();
     assert_eq!((shown.get_pixel(0, 0).0, shown.get_pixel(1, 0).0), ([0; 3], [255; 3]));

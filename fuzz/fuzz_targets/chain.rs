@@ -126,7 +126,7 @@ fn look_at(frame: &MemoryFrame) {
         drop(patches::measure(&mut again(), size, Saturated::LeftOut, Equations::Exact));
     }
     for range in [Range::Full, Range::Deviations(2.0)] {
-        let settings = PictureSettings { region: None, zoom: 1, range };
+        let settings = PictureSettings { range: Some(range), ..PictureSettings::default() };
         drop(write_png(&mut again(), &settings, Path::new("/dev/null")));
     }
     let options = OutputOptions { path: Some("/dev/null".into()), ..OutputOptions::default() };

@@ -1,14 +1,11 @@
 //! `measure`: statistics of a frame beside what propagation predicts.
 
 use clap::Parser;
-use cyanometer::analysis::statistics::{Region, Saturated, measure, patches};
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::{output, register};
-use cyanometer::names::Named;
-use cyanometer::propagation::Equations;
+use cyanometer::formats::{output, plots, register};
 use cyanometer::report::{self, ReportFormat};
-use cyanometer::requests::{self, described::DescribedInput, values};
+use cyanometer::requests::{self, described::DescribedInput, measurement::Measurement, values};
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -27,29 +24,11 @@ static MEMORY: cli::Memory = cli::Memory;
 struct Arguments {
     #[command(flatten)]
     input: DescribedInput,
-    /// Rectangle X,Y,W,H in pixels; may be given more than once; by default the whole frame
-    #[arg(long, value_name = "X,Y,W,H", value_parser = values::region, allow_hyphen_values = true)]
-    region: Vec<Region>,
-    /// Measure each patch of a chart, as --patch of render-radiance draws them or as WxH says, less the rim that
-    /// demosaicking mixes
-    #[arg(long, value_name = "WxH", num_args = 0..=1, require_equals = true, value_parser = values::size, conflicts_with_all = ["region", "check"])]
-    patches: Option<Option<[usize; 2]>>,
-    /// Keep pixels in the statistics that were made of saturated samples
-    #[arg(long)]
-    keep_saturated: bool,
+    #[command(flatten)]
+    measurement: Measurement,
     /// Form of the report
     #[arg(long, default_value = "text", value_parser = values::choice::<ReportFormat>())]
     output_format: ReportFormat,
-    /// Equations to predict by: exact, or those of the paper
-    #[arg(long, default_value = Equations::default().name(), value_parser = values::choice::<Equations>())]
-    equations: Equations,
-    /// Test every prediction, and exit with status 1 when one does not hold, which the report says (`passed`), or when nothing
-    /// can be checked, of which there is no report
-    #[arg(long)]
-    check: bool,
-    /// Chance of a false alarm that --check accepts, all tests together
-    #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = values::fraction, requires = "check")]
-    level: f64,
     /// File for the report; by default standard output
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -63,15 +42,14 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    register::announce(&[arguments.output.as_deref()])?;
+    let Measurement { plot, .. } = &arguments.measurement;
+    register::announce(&[arguments.output.as_deref(), plot.as_deref()])?;
     let mut reader = arguments.input.open_all()?;
     session.report_reader(&reader);
-    let level = arguments.check.then_some(arguments.level);
-    let saturated = if arguments.keep_saturated { Saturated::Kept } else { Saturated::LeftOut };
-    let report = match arguments.patches {
-        Some(size) => patches::measure(&mut reader, size, saturated, arguments.equations)?,
-        None => measure(&mut reader, &arguments.region, saturated, arguments.equations, level)?,
-    };
+    let (report, portrait) = arguments.measurement.of(&mut reader)?;
+    if let (Some(path), Some(portrait)) = (plot, &portrait) {
+        plots::write_plot(path, &report::portrait(portrait, &report.regions[0]))?;
+    }
     let text = report::render(&report, arguments.output_format)?;
     output::write_text(arguments.output.as_deref(), &text)?;
     session.tell(&requests::of_statistics(&report));

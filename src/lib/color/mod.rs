@@ -7,6 +7,7 @@ pub mod difference;
 pub mod illuminant;
 pub mod locus;
 pub mod luv;
+pub mod ramp;
 pub mod rgb;
 pub mod temperature;
 pub mod upsampling;

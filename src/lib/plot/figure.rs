@@ -19,6 +19,8 @@ pub enum Arrangement {
     Stacked,
     /// One beside the other.
     SideBySide,
+    /// Two beside each other, row by row; of an odd number the first is as wide as two.
+    Pairs,
 }
 
 /// Two axes and what is shown between them.

@@ -15,26 +15,36 @@ pub(super) fn draw(plot: &Plot) -> Drawing {
         (_, 1) => (1, 900.0, 600.0 - title_height - MARGIN),
         (Arrangement::Stacked, _) => (1, 900.0, 400.0),
         (Arrangement::SideBySide, _) => (count, 640.0, 500.0),
+        (Arrangement::Pairs, _) => (2, 480.0, 350.0),
     };
-    let rows = count.div_ceil(columns);
+    // The first panel of an odd number takes two places.
+    let is_wide = |index: usize| plot.arrangement == Arrangement::Pairs && count > 1 && count % 2 == 1 && index == 0;
+    let rows = (count + usize::from(is_wide(0))).div_ceil(columns);
     let width = cell_width * columns as f64;
     let height = title_height + MARGIN + cell_height * rows as f64;
     let mut drawing = Drawing::new(width, height, &plot.title);
     write(&mut drawing, &plot.title, [0.5 * width, MARGIN + TITLE], TITLE, Anchor::Middle);
 
-    let rooms: Vec<Room> = plot.panels.iter().map(|panel| Room::new(panel, cell_width, cell_height)).collect();
+    let width_of = |index: usize| if is_wide(index) { 2.0 * cell_width } else { cell_width };
+    let panels = plot.panels.iter().enumerate();
+    let rooms: Vec<Room> = panels.map(|(index, panel)| Room::new(panel, width_of(index), cell_height)).collect();
     let widest = rooms.iter().map(|room| room.left).fold(0.0, f64::max);
     let tallest = rooms.iter().map(|room| room.top).fold(0.0, f64::max);
     for (index, (panel, room)) in plot.panels.iter().zip(&rooms).enumerate() {
-        let (column, row) = (index % columns, index / columns);
+        let place = if is_wide(0) && index > 0 { index + 1 } else { index };
+        let (column, row) = (place % columns, place / columns);
         let cell = Rect {
             left: column as f64 * cell_width,
             top: title_height + MARGIN + row as f64 * cell_height,
-            width: cell_width,
+            width: width_of(index),
             height: cell_height,
         };
         // Edges of panels that share a row or a column are aligned.
-        let (left, top) = if columns == 1 { (widest, room.top) } else { (room.left, tallest) };
+        let (left, top) = match plot.arrangement {
+            Arrangement::Pairs => (widest, tallest),
+            _ if columns == 1 => (widest, room.top),
+            _ => (room.left, tallest),
+        };
         Pane::new(panel, room, cell, left, top).draw(&mut drawing);
     }
     drawing

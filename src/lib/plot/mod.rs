@@ -21,6 +21,8 @@
 //! Several [`Panel`]s stand below or beside each other with their edges aligned. What only one figure needs (arrows, circles,
 //! words beside points, a small diagram in a corner) is made of [`Note`]s: lines, circles and words at values of the axes.
 //!
+//! [`sheet()`] lays pictures of pixels out in a grid, with scale bars and captions.
+//!
 //! Both files hold the same drawing. A PNG needs no font of the system: a part of DejaVu Sans is embedded (its license and
 //! how it was cut are in `assets/fonts`).
 //!
@@ -51,12 +53,14 @@ mod pane;
 mod png;
 mod room;
 mod ruler;
+mod sheet;
 mod style;
 mod svg;
 
 use crate::error::Result;
 pub use figure::{Anchor, Arrangement, Axis, Color, Marks, Note, Panel, Plot, ReferenceLine, Region, Scale, Series};
 pub use ruler::power_of_ten;
+pub use sheet::{Pixels, ScaleBar, Tile, sheet};
 
 impl Plot {
     /// The plot as an SVG document. Its text is text, in DejaVu Sans or what the viewer has instead.

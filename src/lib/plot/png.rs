@@ -29,7 +29,7 @@ fn failed(problem: &str) -> Error {
 }
 
 /// `None` when the canvas is too large.
-fn painted(drawing: &Drawing) -> Option<Pixmap> {
+pub(super) fn painted(drawing: &Drawing) -> Option<Pixmap> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the layout makes small sizes")]
     let (width, height) = (drawing.width.ceil() as u32, drawing.height.ceil() as u32);
     let mut canvas = Pixmap::new(width, height)?;

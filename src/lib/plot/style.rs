@@ -22,7 +22,7 @@ pub(super) const TICK: f64 = 5.0;
 /// The width of what the legend shows of a series.
 pub(super) const SWATCH: f64 = 30.0;
 
-const TEXT_RGB: [u8; 3] = [0x22; 3];
+pub(super) const TEXT_RGB: [u8; 3] = [0x22; 3];
 pub(super) const FRAME: Stroke = Stroke { ink: Ink { rgb: [0x44; 3], opacity: 1.0 }, width: 1.0, dashes: &[] };
 pub(super) const GRID: Stroke = Stroke { ink: Ink { rgb: [0; 3], opacity: 0.14 }, width: 1.0, dashes: &[] };
 pub(super) const MINOR_GRID: Stroke = Stroke { ink: Ink { rgb: [0; 3], opacity: 0.05 }, width: 1.0, dashes: &[] };

@@ -6,12 +6,14 @@ pub mod chart;
 mod difference;
 mod matrix_text;
 mod photon_transfer;
+mod portrait;
 mod prediction;
 mod raw_outputs;
 mod trade_off;
 
 pub use difference::difference;
 pub use photon_transfer::photon_transfer;
+pub use portrait::portrait;
 pub use prediction::{BudgetOutputs, prediction};
 pub use raw_outputs::RawOutputs;
 pub use trade_off::trade_off;

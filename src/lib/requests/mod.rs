@@ -24,7 +24,9 @@ pub mod correction;
 pub mod described;
 pub mod fit;
 pub mod independence;
+pub mod measurement;
 pub mod options;
+pub mod picture;
 pub mod prediction;
 pub mod values;
 

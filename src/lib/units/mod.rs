@@ -106,6 +106,25 @@ impl QuantityKind {
 /// Unit of relative XYZ: Y = 1 for the white by which the first class of a camera reaches its white level.
 pub const RELATIVE_UNIT: &str = "relative";
 
+/// A unit in ASCII as it is printed: cd m⁻² of `cd m-2`, e⁻ of `e-`.
+pub fn typeset(unit: &str) -> String {
+    let mut raised = false;
+    let raise = |c: char| {
+        raised = match c {
+            '-' => true,
+            digit => raised && digit.is_ascii_digit(),
+        };
+        match (c, raised) {
+            ('-', _) => '⁻',
+            (digit @ '0'..='9', true) => {
+                ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][digit as usize - '0' as usize]
+            }
+            (other, _) => other,
+        }
+    };
+    unit.chars().map(raise).collect()
+}
+
 impl fmt::Display for QuantityKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -4,6 +4,7 @@ use super::assessment::Assessment;
 use super::check::Verdict;
 use super::laws::Samplings;
 use super::levels::Levels;
+use super::portrait::{Portrait, Sitting};
 use super::region::Region;
 use super::report::{RegionReport, Report, coverage};
 use super::tally::{Tally, tallies};
@@ -28,6 +29,39 @@ pub fn measure(
     equations: Equations,
     level: Option<f64>,
 ) -> Result<Report> {
+    Ok(measure_all(source, regions, saturated, equations, level, false)?.0)
+}
+
+/// As [`measure`], and what a figure of the region shows, the whole frame where none is named.
+///
+/// # Errors
+///
+/// Those of [`measure`], and [`Error::Usage`] for more than one region.
+pub fn measure_with_portrait(
+    source: &mut dyn RowSource,
+    regions: &[Region],
+    saturated: Saturated,
+    equations: Equations,
+    level: Option<f64>,
+) -> Result<(Report, Portrait)> {
+    if regions.len() > 1 {
+        return Err(
+            Error::Usage(format!("{}: a plot shows one region; name one", source.header().name)).leave_out(&["plot"])
+        );
+    }
+    let (report, portrait) = measure_all(source, regions, saturated, equations, level, true)?;
+    let portrait = portrait.ok_or_else(|| Error::Data("no portrait was made".into()))?;
+    Ok((report, portrait))
+}
+
+fn measure_all(
+    source: &mut dyn RowSource,
+    regions: &[Region],
+    saturated: Saturated,
+    equations: Equations,
+    level: Option<f64>,
+    is_drawn: bool,
+) -> Result<(Report, Option<Portrait>)> {
     let whole = [Region::whole(source.header())];
     let regions = if regions.is_empty() { &whole } else { regions };
     for region in regions {
@@ -44,7 +78,11 @@ pub fn measure(
             samplings.of(mixture, &frame, *region);
         }
     }
-    let tallies = tallies(&mut watch, regions, &levels)?;
+    let mut portrait = is_drawn.then(|| Portrait::new(&frame, regions[0], prediction.as_ref().ok()));
+    let tallies = match &mut portrait {
+        Some(portrait) => tallies(&mut Sitting::new(&mut watch, portrait), regions, &levels)?,
+        None => tallies(&mut watch, regions, &levels)?,
+    };
     let (counts, left_out) = watch.seen();
     if level.is_some() && frame.metadata.is_transferred() {
         return Err(Error::Data(format!(
@@ -60,11 +98,14 @@ pub fn measure(
         ))
         .give(&["keep_saturated"]));
     }
+    let is_fair = |marks: &Marks| marks.beyond_model + if left_out { marks.saturated } else { 0 } == 0;
+    if !is_fair(&counts[0]) {
+        portrait.iter_mut().for_each(Portrait::forget_predictions);
+    }
     let report = |((region, tally), marks): ((&Region, &Tally), &Marks)| {
         let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, *region);
         // What is left where pixels are left out by their values follows no formula; those of defects are any.
-        let by_value = marks.beyond_model + if left_out { marks.saturated } else { 0 };
-        let prediction = prediction.as_ref().ok().filter(|_| by_value == 0);
+        let prediction = prediction.as_ref().ok().filter(|_| is_fair(marks));
         let assessment = Assessment::new(tally, &frame, prediction, sampling);
         let tests = if level.is_some() { assessment.tests() } else { Vec::new() };
         RegionReport { tests, ..assessment.report(&frame, *region, &levels).with_marks(*marks, left_out) }
@@ -75,7 +116,7 @@ pub fn measure(
         let regions = report.regions.iter().map(|region| (&region.tests[..], region.not_finite));
         report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted)?);
     }
-    Ok(report)
+    Ok((report, portrait))
 }
 
 #[cfg(test)]

@@ -10,12 +10,13 @@ mod laws;
 mod levels;
 mod measure;
 pub mod patches;
+pub mod portrait;
 mod region;
 mod report;
 mod tally;
 mod watch;
 
-pub use measure::measure;
+pub use measure::{measure, measure_with_portrait};
 pub use region::Region;
 pub use report::{ChannelReport, RegionReport, Report};
 pub use watch::Saturated;

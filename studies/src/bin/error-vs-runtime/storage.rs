@@ -189,9 +189,9 @@ fn judge(
             let path = directory.join(format!("{groups}-{group}-{}.{end}", compression.name()));
             let options = OutputOptions {
                 path: Some(path.clone()),
-                format: None,
                 compression: Some(compression),
                 samples: Some(kind),
+                ..OutputOptions::default()
             };
             write(frame, &options)?;
             let stored = read(&path)?;

@@ -1,0 +1,491 @@
+//! What a figure of a region shows beside its moments: histograms, profiles, autocorrelations and some of its pixels, each beside
+//! what is predicted of it.
+
+use super::region::Region;
+use crate::cfa::{Class, FilterArray};
+use crate::error::Result;
+use crate::metadata::FrameHeader;
+use crate::propagation::{FramePrediction, PixelMoments, gains};
+use crate::stream::RowSource;
+use crate::units::QuantityKind;
+use std::collections::{BTreeMap, VecDeque};
+
+/// Lags of the autocorrelation, in pixels, or in periods of a filter array.
+pub const LAGS: usize = 8;
+/// Profiles have at most so many points; each is the mean of as many rows or columns as it takes.
+const MOST_POINTS: usize = 250;
+/// Histograms have at most so many bins at a time.
+const MOST_BINS: usize = 4096;
+/// So many pixels, evenly spread, are kept as they are.
+const KEPT_PIXELS: usize = 500;
+/// Of more channels the first are shown.
+const MOST_CHANNELS: usize = 3;
+
+/// What a region looks like.
+#[derive(Debug, Clone)]
+pub struct Portrait {
+    /// Where it lies.
+    pub region: Region,
+    /// What the samples are.
+    pub quantity: QuantityKind,
+    /// Their unit.
+    pub unit: String,
+    /// What the frame holds, in words.
+    pub holds: String,
+    /// Each class of a CFA plane, or each of the first channels.
+    pub groups: Vec<Likeness>,
+    /// Pixels of the first three channels, evenly spread.
+    pub pixels: Vec<[f64; 3]>,
+    /// Whether all samples are whole numbers.
+    pub is_whole: bool,
+    frame: FrameHeader,
+    /// Columns and rows after which classes repeat themselves.
+    period: [usize; 2],
+    /// The group of each site of a period, row by row, of a CFA plane.
+    classes: Option<Vec<Option<usize>>>,
+    above: VecDeque<Vec<Line>>,
+}
+
+/// What a channel or a class looks like.
+#[derive(Debug, Clone)]
+pub struct Likeness {
+    /// Its name.
+    pub name: String,
+    /// Samples by value.
+    pub histogram: Histogram,
+    /// Means of columns, and of rows, from the region's corner on.
+    pub profiles: [Profile; 2],
+    /// Correlations along x, and along y.
+    pub correlations: [Vec<Correlation>; 2],
+    /// What is predicted; none where nothing is.
+    pub predicted: Option<Foreseen>,
+    /// What deviations are counted from.
+    center: Option<f64>,
+    deviations: Pairs,
+    products: [Vec<Pairs>; 2],
+}
+
+/// What is predicted of a channel or a class.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Foreseen {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviations of the normal laws that samples are of, in equal shares: one, or one for each phase of the array.
+    pub stds: Vec<f64>,
+    /// Standard deviation of a point of each profile; none where neighbors hang together in ways that are not followed.
+    pub profile_std: Option<[f64; 2]>,
+    /// Correlations along x, and along y, at each lag; none as before.
+    pub correlations: Option<[Vec<f64>; 2]>,
+}
+
+/// Numbers of samples in bins of one width.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Histogram {
+    /// Width of a bin; bin k begins at k widths, less half of one of whole numbers.
+    pub width: f64,
+    /// Where bins begin: −½ of whole numbers, which lie in the middle of theirs.
+    pub shift: f64,
+    /// Samples in each.
+    pub counts: BTreeMap<i64, u64>,
+}
+
+/// Means along one direction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// Rows or columns that make one point.
+    pub step: usize,
+    sums: Vec<(f64, u64)>,
+}
+
+/// A correlation of samples so far apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Correlation {
+    /// Pixels from one to the other.
+    pub lag: usize,
+    /// The correlation; none where there are no pairs, or the samples are all the same.
+    pub value: Option<f64>,
+    /// Its standard error where samples are independent: 1/√n of n pairs.
+    pub error: f64,
+}
+
+/// Sums over pairs of deviations.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Pairs {
+    count: u64,
+    first: f64,
+    second: f64,
+    product: f64,
+}
+
+/// Samples of one group in one row, as deviations, NaN where they do not count.
+#[derive(Debug, Clone)]
+struct Line {
+    group: usize,
+    deviations: Vec<f32>,
+}
+
+impl Portrait {
+    /// Of a region that nothing was seen of yet, and what is predicted of it.
+    pub(super) fn new(frame: &FrameHeader, region: Region, prediction: Option<&FramePrediction>) -> Self {
+        let array =
+            frame.metadata.cfa.filter(|array| frame.geometry.channels.len() == 1 && !array.filters().is_empty());
+        let period = array.map_or([1, 1], FilterArray::period);
+        let [x0, y0] = [0, 1].map(|axis| i64::from(frame.geometry.origin[axis]) + [region.x, region.y][axis] as i64);
+        let site = |array: FilterArray, place: usize| {
+            let class = array.class(x0 + (place % period[0]) as i64, y0 + (place / period[0]) as i64);
+            class.map(|class| class as usize)
+        };
+        let classes = array.map(|array| (0..period[0] * period[1]).map(|place| site(array, place)).collect::<Vec<_>>());
+        let names: Vec<String> = match &classes {
+            Some(_) => Class::ALL.map(|class| class.letter().to_owned()).to_vec(),
+            None => {
+                let shown = frame.geometry.channels.len().min(MOST_CHANNELS);
+                (0..shown).map(|index| frame.channel_name(index).to_owned()).collect()
+            }
+        };
+        let steps = [0, 1].map(|axis| {
+            let length = [region.width, region.height][axis];
+            length.div_ceil(MOST_POINTS).next_multiple_of(period[axis])
+        });
+        let share = |index: usize| match &classes {
+            Some(sites) => sites.iter().filter(|site| **site == Some(index)).count() as f64 / sites.len() as f64,
+            None => 1.0,
+        };
+        let size = [region.width, region.height];
+        let foreseen = |index: usize| {
+            let prediction = prediction.filter(|_| names.len() == 3)?;
+            Some(Foreseen::of(prediction, index, share(index), steps, size, frame.metadata.is_transferred()))
+        };
+        let is_codes = frame.metadata.quantity == QuantityKind::Adu;
+        let groups = names.iter().enumerate();
+        let groups = groups.map(|(index, name)| Likeness::new(name, size, steps, is_codes, foreseen(index))).collect();
+        Self {
+            region,
+            quantity: frame.metadata.quantity,
+            unit: frame.metadata.unit.clone(),
+            holds: frame.holds(),
+            groups,
+            pixels: Vec::new(),
+            is_whole: is_codes,
+            frame: frame.clone(),
+            period,
+            classes,
+            above: VecDeque::new(),
+        }
+    }
+
+    /// The name of the frame.
+    pub fn name(&self) -> &str {
+        &self.frame.name
+    }
+
+    /// Forgets what was predicted, which does not hold for what is left where pixels are left out by their values.
+    pub(super) fn forget_predictions(&mut self) {
+        self.groups.iter_mut().for_each(|group| group.predicted = None);
+    }
+
+    /// Takes in row `y` of the frame, of all channels.
+    fn add_row(&mut self, y: usize, row: &[f32]) {
+        let Region { x, y: top, width, height } = self.region;
+        if !(top..top + height).contains(&y) {
+            return;
+        }
+        let (y, frame_width) = (y - top, self.frame.geometry.width);
+        let channels = if self.classes.is_some() { 1 } else { self.groups.len() };
+        let line = |channel: usize| &row[channel * frame_width + x..][..width];
+        let mut lines = Vec::new();
+        for channel in 0..channels {
+            for offset in 0..self.period[0] {
+                let of_site = |sites: &Vec<Option<usize>>| sites[y % self.period[1] * self.period[0] + offset];
+                let Some(group) = self.classes.as_ref().map_or(Some(channel), of_site) else { continue };
+                let samples: Vec<f32> = line(channel).iter().skip(offset).step_by(self.period[0]).copied().collect();
+                self.is_whole &= samples.iter().all(|sample| !sample.is_finite() || sample.fract() == 0.0);
+                let deviations = self.groups[group].take(&samples, y, offset, self.period[0]);
+                lines.push(Line { group, deviations });
+            }
+        }
+        for line in &lines {
+            self.groups[line.group].pair(0, &line.deviations, None);
+        }
+        for lag in 1..=LAGS {
+            let Some(above) = (lag * self.period[1]).checked_sub(1).and_then(|back| self.above.get(back)) else {
+                continue;
+            };
+            for (line, above) in lines.iter().zip(above) {
+                self.groups[line.group].pair(lag, &above.deviations, Some(&line.deviations));
+            }
+        }
+        self.above.push_front(lines);
+        self.above.truncate(LAGS * self.period[1]);
+        self.keep_pixels(y, line);
+    }
+
+    /// Keeps some pixels of the row.
+    fn keep_pixels<'a>(&mut self, y: usize, line: impl Fn(usize) -> &'a [f32]) {
+        if self.groups.len() < 3 || self.classes.is_some() {
+            return;
+        }
+        let Region { width, height, .. } = self.region;
+        // Odd, so that all phases of a filter array come.
+        let stride = (width * height).div_ceil(KEPT_PIXELS) | 1;
+        let first = (y * width).next_multiple_of(stride) - y * width;
+        let lines = [line(0), line(1), line(2)];
+        for x in (first..width).step_by(stride) {
+            self.pixels.push(lines.map(|line| f64::from(line[x])));
+        }
+    }
+
+    /// Works out what needs all rows.
+    fn finish(&mut self) {
+        for group in &mut self.groups {
+            let variance = group.deviations.covariance();
+            for axis in 0..2 {
+                let period = self.period[axis];
+                let of = |(index, pairs): (usize, &Pairs)| Correlation {
+                    lag: (index + 1) * period,
+                    value: (pairs.count > 0 && variance > 0.0).then(|| pairs.covariance() / variance),
+                    error: 1.0 / (pairs.count as f64).sqrt(),
+                };
+                group.correlations[axis] = group.products[axis].iter().enumerate().map(of).collect();
+            }
+        }
+    }
+}
+
+impl Foreseen {
+    /// Of a channel or a class of which photosites have this share, whose profiles are of points of so many rows and columns.
+    fn of(
+        prediction: &FramePrediction,
+        index: usize,
+        share: f64,
+        steps: [usize; 2],
+        size: [usize; 2],
+        is_moved: bool,
+    ) -> Self {
+        // A point of the profile along x is of some columns, as high as the region; along y of some rows, as wide.
+        let patches = [[steps[0].min(size[0]), size[1]], [size[0], steps[1].min(size[1])]];
+        let foreseen = match prediction {
+            FramePrediction::Planes(classes) => {
+                let class = &classes[index];
+                let variance = class.moments.variance;
+                let mean_std =
+                    |[columns, rows]: [usize; 2]| (variance / (share * (columns * rows) as f64) + class.common).sqrt();
+                Self {
+                    mean: class.moments.mean,
+                    stds: vec![variance.max(0.0).sqrt()],
+                    profile_std: Some(patches.map(mean_std)),
+                    correlations: Some([vec![0.0; LAGS], vec![0.0; LAGS]]),
+                }
+            }
+            FramePrediction::Pixels(mixture) => Self::of_pixels(mixture, index, patches),
+        };
+        if is_moved { Self { profile_std: None, correlations: None, ..foreseen } } else { foreseen }
+    }
+
+    fn of_pixels(mixture: &PixelMoments, index: usize, patches: [[usize; 2]; 2]) -> Self {
+        let PixelMoments { weights, sites, .. } = mixture;
+        let variances = sites.map(|site| site.moments.variance);
+        let of = |gains: gains::Gains| gains.covariance(variances)[(index, index)];
+        let whole = of(gains::mean_pixel(weights));
+        let beyond = (mixture.covariance[(index, index)] - whole).max(0.0);
+        let common = sites.map(|site| site.common);
+        let common: f64 = (0..3).map(|class| mixture.from_camera[(index, class)].powi(2) * common[class]).sum();
+        let correlation = |lag: [isize; 2]| {
+            let phases = [0, 1, 2, 3].map(|phase| of(gains::autocovariance(weights, phase, lag)));
+            phases.iter().sum::<f64>() / (4.0 * whole)
+        };
+        let lags = || (1..=LAGS).map(usize::cast_signed);
+        Self {
+            mean: mixture.mean[index],
+            stds: [0, 1, 2, 3].map(|phase| (of(gains::pixel(weights, phase)) + beyond).max(0.0).sqrt()).to_vec(),
+            profile_std: Some(
+                patches.map(|patch| (of(gains::mean_patch_mean(weights, patch)) + common).max(0.0).sqrt()),
+            ),
+            correlations: Some([
+                lags().map(|lag| correlation([lag, 0])).collect(),
+                lags().map(|lag| correlation([0, lag])).collect(),
+            ]),
+        }
+    }
+}
+
+impl Likeness {
+    fn new(name: &str, size: [usize; 2], steps: [usize; 2], is_codes: bool, predicted: Option<Foreseen>) -> Self {
+        let profile =
+            |axis: usize| Profile { step: steps[axis], sums: vec![(0.0, 0); size[axis].div_ceil(steps[axis])] };
+        Self {
+            name: name.to_owned(),
+            histogram: Histogram {
+                width: if is_codes { 1.0 } else { 0.0 },
+                shift: if is_codes { -0.5 } else { 0.0 },
+                counts: BTreeMap::new(),
+            },
+            profiles: [profile(0), profile(1)],
+            correlations: [Vec::new(), Vec::new()],
+            predicted,
+            center: None,
+            deviations: Pairs::default(),
+            products: [vec![Pairs::default(); LAGS], vec![Pairs::default(); LAGS]],
+        }
+    }
+
+    /// Mean of the samples seen.
+    pub fn mean(&self) -> Option<f64> {
+        let Pairs { count, first, .. } = self.deviations;
+        self.center.filter(|_| count > 0).map(|center| center + first / count as f64)
+    }
+
+    /// Standard deviation of the samples seen.
+    pub fn std(&self) -> Option<f64> {
+        (self.deviations.count > 1).then(|| self.deviations.covariance().max(0.0).sqrt())
+    }
+
+    /// Takes in samples of row `y`, whose columns are `offset` and every `stride` from there on, and gives their deviations.
+    fn take(&mut self, samples: &[f32], y: usize, offset: usize, stride: usize) -> Vec<f32> {
+        let finite = || samples.iter().copied().filter(|sample| sample.is_finite());
+        self.center = self.center.or_else(|| finite().next().map(f64::from));
+        let center = self.center.unwrap_or_default();
+        self.histogram.add(finite().map(f64::from));
+        let [columns, rows] = &mut self.profiles;
+        for (place, sample) in samples.iter().enumerate().filter(|(_, sample)| sample.is_finite()) {
+            columns.add(offset + place * stride, f64::from(*sample));
+            rows.add(y, f64::from(*sample));
+        }
+        let deviations: Vec<f32> =
+            samples.iter().map(|sample| crate::frame::to_sample(f64::from(*sample) - center)).collect();
+        self.deviations.add(&deviations, &deviations);
+        deviations
+    }
+
+    /// Takes in the pairs along x of a line (lag 0), or those of two lines that are `lag` apart along y.
+    fn pair(&mut self, lag: usize, first: &[f32], second: Option<&[f32]>) {
+        match second {
+            Some(second) => self.products[1][lag - 1].add(first, second),
+            None => {
+                for (lag, pairs) in (1..).zip(&mut self.products[0]) {
+                    pairs.add(first, first.get(lag..).unwrap_or_default());
+                }
+            }
+        }
+    }
+}
+
+impl Pairs {
+    fn add(&mut self, first: &[f32], second: &[f32]) {
+        for (a, b) in first.iter().zip(second) {
+            let (a, b) = (f64::from(*a), f64::from(*b));
+            if a.is_finite() && b.is_finite() {
+                self.count += 1;
+                self.first += a;
+                self.second += b;
+                self.product += a * b;
+            }
+        }
+    }
+
+    fn covariance(&self) -> f64 {
+        let n = self.count as f64;
+        self.product / n - self.first / n * (self.second / n)
+    }
+}
+
+impl Histogram {
+    /// Takes in finite samples; the first tell the width of bins, which doubles when they become too many.
+    fn add(&mut self, samples: impl Iterator<Item = f64> + Clone) {
+        if self.width == 0.0 {
+            let [low, high] =
+                samples.clone().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+            if low > high {
+                return;
+            }
+            // A power of two, so that halves of bins meet exactly; at least what a sample can tell.
+            let finest = (high.abs().max(low.abs()) * f64::from(f32::EPSILON)).max(f64::from(f32::MIN_POSITIVE));
+            self.width = ((high - low) / 256.0).max(finest).log2().floor().exp2();
+        }
+        for sample in samples {
+            #[expect(clippy::cast_possible_truncation, reason = "a bin; casts saturate")]
+            let bin = (sample / self.width - self.shift).floor() as i64;
+            *self.counts.entry(bin).or_default() += 1;
+            while self.counts.len() > MOST_BINS {
+                *self = self.merged(2);
+            }
+        }
+    }
+
+    /// The same with bins so many times as wide.
+    #[must_use]
+    pub fn merged(&self, times: i64) -> Self {
+        let mut counts = BTreeMap::new();
+        for (bin, count) in &self.counts {
+            *counts.entry(bin.div_euclid(times)).or_default() += count;
+        }
+        Self { width: self.width * times as f64, shift: self.shift / times as f64, counts }
+    }
+
+    /// Where a bin begins.
+    pub fn begin(&self, bin: i64) -> f64 {
+        (bin as f64 + self.shift) * self.width
+    }
+
+    /// Samples in all bins.
+    pub fn total(&self) -> u64 {
+        self.counts.values().sum()
+    }
+}
+
+impl Profile {
+    fn add(&mut self, place: usize, sample: f64) {
+        let (sum, count) = &mut self.sums[place / self.step];
+        *sum += sample;
+        *count += 1;
+    }
+
+    /// The middle of each point's rows or columns, and their mean; those without samples are left out.
+    pub fn points(&self) -> impl Iterator<Item = [f64; 2]> {
+        let seen = self.sums.iter().enumerate().filter(|(_, (_, count))| *count > 0);
+        seen.map(|(place, (sum, count))| {
+            [(place * self.step) as f64 + 0.5 * (self.step - 1) as f64, sum / *count as f64]
+        })
+    }
+}
+
+/// A source whose rows a portrait is made of as they pass.
+pub(super) struct Sitting<'a> {
+    pub source: &'a mut dyn RowSource,
+    pub portrait: &'a mut Portrait,
+    row: usize,
+}
+
+impl<'a> Sitting<'a> {
+    pub fn new(source: &'a mut dyn RowSource, portrait: &'a mut Portrait) -> Self {
+        Self { source, portrait, row: 0 }
+    }
+}
+
+impl RowSource for Sitting<'_> {
+    fn header(&self) -> &FrameHeader {
+        self.source.header()
+    }
+
+    fn natural_rows(&self) -> usize {
+        self.source.natural_rows()
+    }
+
+    fn may_wait(&self) -> bool {
+        self.source.may_wait()
+    }
+
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        let start = samples.len();
+        self.source.read(rows, samples)?;
+        let row_samples = self.source.header().geometry.row_samples();
+        for row in samples[start..].chunks_exact(row_samples) {
+            self.portrait.add_row(self.row, row);
+            self.row += 1;
+        }
+        if self.row == self.source.header().geometry.height {
+            self.portrait.finish();
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,225 @@
+//! Pictures for people: 8-bit PNG of any frame, one quantity in false color with its scale, several frames on one sheet.
+
+mod planes;
+mod reduce;
+mod shade;
+
+use super::atomic::Target;
+use super::foreign::png_complaint;
+use crate::analysis::statistics::Region;
+use crate::color::ramp::ramp;
+use crate::error::{Error, Result};
+use crate::metadata::FrameHeader;
+use crate::numerics::moments::Moments;
+use crate::plot::{Pixels, ScaleBar, Tile, sheet};
+use crate::stream::RowSource;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use planes::Choice;
+use reduce::{Reduced, Reduction, Tally};
+pub use shade::Range;
+use shade::Shade;
+use std::io::Write;
+use std::path::Path;
+
+/// A picture may have this many pixels: it is held in memory.
+const MAX_PIXELS: usize = 64 << 20;
+
+/// The color of what is no number, in false color: none of the ramp is like it.
+const MISSING: [u8; 3] = [0xcc, 0x79, 0xa7];
+
+/// What of a frame to show, and how.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PictureSettings {
+    /// The part of the frame; all of it where there is none.
+    pub region: Option<Region>,
+    /// Every pixel becomes a square of so many; 0 is as 1.
+    pub zoom: usize,
+    /// The picture is at most so many pixels wide and high; each is then the mean of a square of samples.
+    pub fit: Option<usize>,
+    /// The channel, layer or class that is shown alone.
+    pub plane: Option<String>,
+    /// Whether a plane is shown in false color, with a scale.
+    pub false_color: bool,
+    /// What is black and what is white; the full range of the stage where there is none, in false color all that is shown.
+    pub range: Option<Range>,
+}
+
+/// Reads a frame and writes it as a PNG.
+///
+/// Electrons and ADU are shown plane by plane, R as red and so on, with the sRGB curve; XYZ in its colors under the
+/// white that its metadata name; sRGB as it is. In false color numbers run along [`ramp`], and a bar says which is which.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for a region outside the frame, a plane that is not there, a picture too large, or an output that is a terminal
+/// or a file that is read; [`Error::Format`] for quantities that are no picture; those of the reader; [`Error::Disk`].
+pub fn write_png(source: &mut dyn RowSource, settings: &PictureSettings, path: &Path) -> Result<()> {
+    let shown = Shown::of(source, settings)?;
+    match shown.bar {
+        None => encode(&shown.bytes, shown.size, shown.samples_per_pixel, path),
+        Some(_) => write_sheet(vec![shown.tile(Vec::new())], 1, path),
+    }
+}
+
+/// Writes pictures with their bars and captions in a grid of so many columns.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where the sheet is too large, or the output a terminal or a file that is read; [`Error::Disk`].
+pub fn write_sheet(tiles: Vec<Tile>, columns: usize, path: &Path) -> Result<()> {
+    let pixels: usize = tiles.iter().map(|tile| tile.picture.rgb.len() / 3).fold(0, usize::saturating_add);
+    if pixels > MAX_PIXELS {
+        return Err(Error::Usage(format!("a sheet of {pixels} pixels is too large; make its pictures smaller"))
+            .change(&["fit"]));
+    }
+    let Pixels { size, rgb } = sheet(&tiles, columns)?;
+    drop(tiles);
+    encode(&rgb, size, 3, path)
+}
+
+/// Reads a frame for a sheet: a small picture with the name of the frame, what it holds, and mean and standard deviation of its
+/// samples, plane by plane or class by class.
+///
+/// A frame that makes no picture as it is shows its luminance, its lightness or its first plane in false color.
+///
+/// # Errors
+///
+/// As of [`write_png`].
+pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Result<Tile> {
+    let frame = source.header().clone();
+    let mut settings = settings.clone();
+    if settings.zoom <= 1 {
+        settings.fit = settings.fit.or(Some(THUMBNAIL));
+    }
+    let is_told = settings.plane.is_some() || settings.false_color;
+    let choice = if is_told || shade::is_picture(&frame, settings.range) {
+        Choice::of(&frame, settings.plane.as_deref(), settings.false_color)?
+    } else {
+        settings.false_color = true;
+        Choice::leading(&frame)
+    };
+    let reduction = reduction(&frame, &settings, &choice)?;
+    let region = settings.region.unwrap_or(Region::whole(&frame));
+    let mut tally = Tally::new(&frame, region, &choice);
+    let reduced = Reduced::read(source, &reduction, &choice, Some(&mut tally))?;
+    let mut caption = vec![frame.name.clone(), planes::stage(&frame, &choice, [region.width, region.height])];
+    caption.extend(tally.groups.iter().map(|(name, moments)| seen(name, moments)));
+    Ok(Shown::paint(&frame, &settings, &choice, &reduced)?.tile(caption))
+}
+
+/// The side of a small picture.
+const THUMBNAIL: usize = 320;
+
+/// What is said of the samples of a plane.
+fn seen(name: &str, moments: &Moments) -> String {
+    let left_out = match moments.not_finite {
+        0 => String::new(),
+        count => format!(", {count} not finite"),
+    };
+    match moments.std(0) {
+        Some(std) => {
+            format!("{name}: mean {}, std {}{left_out}", planes::rounded(moments.mean[0]), planes::rounded(std))
+        }
+        None if moments.count == 1 => format!("{name}: {}{left_out}", planes::rounded(moments.mean[0])),
+        None => format!("{name}: no number{left_out}"),
+    }
+}
+
+/// A picture in memory.
+struct Shown {
+    size: [usize; 2],
+    /// 1 of gray, 3 of R, G and B.
+    samples_per_pixel: usize,
+    bytes: Vec<u8>,
+    bar: Option<ScaleBar>,
+}
+
+impl Shown {
+    fn of(source: &mut dyn RowSource, settings: &PictureSettings) -> Result<Self> {
+        let frame = source.header().clone();
+        let choice = Choice::of(&frame, settings.plane.as_deref(), settings.false_color)?;
+        let reduction = reduction(&frame, settings, &choice)?;
+        let reduced = Reduced::read(source, &reduction, &choice, None)?;
+        Self::paint(&frame, settings, &choice, &reduced)
+    }
+
+    fn paint(frame: &FrameHeader, settings: &PictureSettings, choice: &Choice, reduced: &Reduced) -> Result<Self> {
+        let zoom = settings.zoom.max(1);
+        let size = reduced.size.map(|side| side * zoom);
+        if settings.false_color {
+            let range = settings.range.unwrap_or(Range::Shares(0.0, 1.0));
+            let (low, high) = shade::one_range(frame, range, reduced)?;
+            let colors = ramp();
+            let bytes = zoomed(&reduced.in_false_color((low, high), &colors, MISSING), reduced.size, 3, zoom);
+            let missing = reduced.samples.iter().any(|sample| !sample.is_finite());
+            let missing = missing.then(|| (MISSING, "not finite".to_owned()));
+            let bar = ScaleBar { label: choice.label(frame), range: (low, high), colors, missing };
+            return Ok(Self { size, samples_per_pixel: 3, bytes, bar: Some(bar) });
+        }
+        let shade = Shade::new(frame, settings.range.unwrap_or(Range::Full), reduced)?;
+        let planes = reduced.planes;
+        Ok(Self {
+            size,
+            samples_per_pixel: planes,
+            bytes: zoomed(&shade.bytes(reduced), reduced.size, planes, zoom),
+            bar: None,
+        })
+    }
+
+    fn tile(self, caption: Vec<String>) -> Tile {
+        let rgb = match self.samples_per_pixel {
+            1 => self.bytes.iter().flat_map(|gray| [*gray; 3]).collect(),
+            _ => self.bytes,
+        };
+        Tile { picture: Pixels { size: self.size, rgb }, bar: self.bar, caption }
+    }
+}
+
+/// Which samples make a pixel, and how large the picture becomes.
+fn reduction(frame: &FrameHeader, settings: &PictureSettings, choice: &Choice) -> Result<Reduction> {
+    let region = settings.region.unwrap_or(Region::whole(frame));
+    region.check(frame)?;
+    let reduction = Reduction::new(frame, region, settings.fit, choice);
+    let size = reduction.size().map(|side| side.saturating_mul(settings.zoom.max(1)));
+    if size[0].checked_mul(size[1]).is_none_or(|pixels| pixels > MAX_PIXELS) {
+        return Err(Error::Usage(format!(
+            "{}: a picture of {}x{} is too large; show a part of it with --region, or all of it smaller with --fit",
+            frame.name, size[0], size[1]
+        )));
+    }
+    Ok(reduction)
+}
+
+/// The bytes of a picture each of whose pixels becomes a square of `zoom` by `zoom`.
+fn zoomed(bytes: &[u8], [columns, _]: [usize; 2], planes: usize, zoom: usize) -> Vec<u8> {
+    if zoom == 1 {
+        return bytes.to_vec();
+    }
+    let mut made = Vec::with_capacity(bytes.len() * zoom * zoom);
+    for row in bytes.chunks_exact(columns * planes) {
+        let start = made.len();
+        for pixel in row.chunks_exact(planes) {
+            for _ in 0..zoom {
+                made.extend_from_slice(pixel);
+            }
+        }
+        for _ in 1..zoom {
+            made.extend_from_within(start..start + columns * zoom * planes);
+        }
+    }
+    made
+}
+
+/// Writes the bytes of a picture as a PNG.
+fn encode(bytes: &[u8], size: [usize; 2], planes: usize, path: &Path) -> Result<()> {
+    let mut file = Target::open(Some(path), false)?;
+    let name = file.name().to_owned();
+    let color = if planes == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
+    let [width, height] = size.map(|length| u32::try_from(length).unwrap_or(u32::MAX));
+    PngEncoder::new_with_quality(&mut file, CompressionType::Default, FilterType::Adaptive)
+        .write_image(bytes, width, height, color)
+        .map_err(|error| png_complaint(&name, error))?;
+    file.flush().map_err(|e| Error::disk(&name, "write", e))?;
+    file.commit()
+}

@@ -1,0 +1,271 @@
+//! Which planes of a frame a picture shows, and what they are called.
+
+use crate::analysis::comparison::MAP_CHANNELS;
+use crate::error::{Error, Result};
+use crate::frame::bare_name;
+use crate::metadata::FrameHeader;
+use crate::stages::saturation::MASK_LAYER;
+use crate::units::{QuantityKind, typeset};
+
+/// What of a frame is shown.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Choice {
+    /// Places of its channels: one, or the three of a picture in color.
+    pub channels: Vec<usize>,
+    /// The letter of the filter whose photosites alone are shown.
+    pub filter: Option<char>,
+}
+
+impl Choice {
+    /// The plane of a name: a channel as reports or files call it, or a class of a CFA plane. Without a name, a single plane or the
+    /// three of R, G and B (or what was made of them).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for a name that is none of the frame's, which are listed; [`Error::Format`] for what makes no picture.
+    pub fn of(frame: &FrameHeader, name: Option<&str>, is_one: bool) -> Result<Self> {
+        let channels = &frame.geometry.channels;
+        let all = |channels: &[usize]| Self { channels: channels.to_vec(), filter: None };
+        let Some(name) = name else {
+            return match channels.len() {
+                1 => Ok(all(&[0])),
+                n if is_one => Err(Error::Usage(format!(
+                    "{}: it holds {}; false color shows one of its {n} planes; say with --plane which: {}",
+                    frame.name,
+                    frame.holds(),
+                    known(frame)
+                ))),
+                3 if frame.has_three_planes() => Ok(all(&[0, 1, 2])),
+                _ => Err(frame.refuse(format!(
+                    "it holds {}, which makes no picture; show one with --plane, of {}",
+                    frame.holds(),
+                    known(frame)
+                ))),
+            };
+        };
+        let filter = filters(frame).into_iter().find(|filter| name == filter.to_string());
+        if filter.is_some() {
+            return Ok(Self { channels: vec![0], filter });
+        }
+        let place = (0..channels.len())
+            .find(|place| plane_name(frame, *place) == name)
+            .or_else(|| channels.iter().position(|channel| channel == name));
+        place
+            .map(|place| all(&[place]))
+            .ok_or_else(|| Error::Usage(format!("{}: there is no plane `{name}`; it has {}", frame.name, known(frame))))
+    }
+
+    /// The plane that says most of a frame, for one that is no picture as it is: its luminance or lightness, or the first.
+    pub fn leading(frame: &FrameHeader) -> Self {
+        let place = |name: &str| (0..frame.geometry.channels.len()).find(|place| plane_name(frame, *place) == name);
+        let place = place("Y").or_else(|| place("L")).unwrap_or(0);
+        Self { channels: vec![place], filter: None }
+    }
+
+    /// What reports call the channels that are shown.
+    pub fn names(&self, frame: &FrameHeader) -> Vec<String> {
+        self.channels.iter().map(|place| plane_name(frame, *place)).collect()
+    }
+
+    /// The letters of the filters whose photosites are shown, of a CFA plane.
+    pub fn filters(&self, frame: &FrameHeader) -> Vec<char> {
+        self.filter.map_or_else(|| filters(frame), |filter| vec![filter])
+    }
+
+    /// What stands beside the scale of a single plane: the quantity and its unit.
+    pub fn label(&self, frame: &FrameHeader) -> String {
+        let [place] = self.channels[..] else { return typeset(&frame.metadata.unit) };
+        let quantity = match (quantity(frame, place), self.filter) {
+            (words, None) => words,
+            (words, Some(filter)) => format!("{words}, class {filter}"),
+        };
+        match unit(frame, place) {
+            unit if unit.is_empty() => quantity,
+            unit => format!("{quantity} / {unit}"),
+        }
+    }
+}
+
+/// The letters of the filters before a single plane; none of other frames.
+fn filters(frame: &FrameHeader) -> Vec<char> {
+    match frame.metadata.cfa {
+        Some(array) if frame.geometry.channels.len() == 1 => array.filters(),
+        _ => Vec::new(),
+    }
+}
+
+/// The names of planes, as many as one reads.
+fn known(frame: &FrameHeader) -> String {
+    const SHOWN: usize = 16;
+    let channels = 0..frame.geometry.channels.len();
+    let classes = filters(frame).into_iter().map(String::from);
+    let names: Vec<String> = channels.map(|place| plane_name(frame, place)).chain(classes).take(SHOWN + 1).collect();
+    let more = if names.len() > SHOWN { ", …" } else { "" };
+    names[..names.len().min(SHOWN)].join(", ") + more
+}
+
+/// What a channel is called, a layer by what it belongs to: `sigma.Y` where file have `sigma.G`.
+fn plane_name(frame: &FrameHeader, place: usize) -> String {
+    let channel = &frame.geometry.channels[place];
+    match channel.strip_prefix(SIGMA) {
+        Some(base) => format!("{SIGMA}{}", base_name(frame, base)),
+        None => frame.channel_name(place).to_owned(),
+    }
+}
+
+/// What begins the name of a layer of standard deviations.
+const SIGMA: &str = "sigma.";
+/// What begins the name of a layer of covariances.
+const COVARIANCE: &str = "covariance.";
+
+/// What reports call the channel that a layer belongs to.
+fn base_name<'a>(frame: &'a FrameHeader, base: &'a str) -> &'a str {
+    let place = frame.geometry.channels.iter().position(|channel| channel == base);
+    place.map_or(base, |place| frame.channel_name(place))
+}
+
+/// What the numbers of a channel are, in words.
+fn quantity(frame: &FrameHeader, place: usize) -> String {
+    let channel = &frame.geometry.channels[place];
+    let name = plane_name(frame, place);
+    if let Some(base) = name.strip_prefix(SIGMA) {
+        return format!("standard deviation of {base}");
+    }
+    if let Some(pair) = name.strip_prefix(COVARIANCE) {
+        return format!("covariance of {pair}");
+    }
+    if channel == MASK_LAYER {
+        return "mask, sum of bits".into();
+    }
+    let formulas = ["ΔE2000", "ΔE*ab", "ΔE94", "ΔE*ab in JND"];
+    if let Some(formula) = MAP_CHANNELS.iter().position(|formula| formula == channel) {
+        return formulas[formula].into();
+    }
+    match frame.metadata.quantity {
+        QuantityKind::ExpectedElectrons
+        | QuantityKind::Electrons
+        | QuantityKind::Adu
+        | QuantityKind::SpectralRadiance => {
+            let words = match frame.metadata.quantity {
+                QuantityKind::Adu => "codes".to_owned(),
+                other => other.to_string(),
+            };
+            if frame.geometry.channels.len() == 1 { words } else { format!("{words}, {name}") }
+        }
+        QuantityKind::Unspecified => format!("samples {name}"),
+        QuantityKind::Lab | QuantityKind::Luv if name != "mask" => format!("{name}*"),
+        _ => name,
+    }
+}
+
+/// The unit of a channel; empty where it is 1 or not known.
+fn unit(frame: &FrameHeader, place: usize) -> String {
+    let channel = &frame.geometry.channels[place];
+    let unit = &frame.metadata.unit;
+    if channel == MASK_LAYER || frame.metadata.quantity == QuantityKind::ColorDifference {
+        return String::new();
+    }
+    let base = channel.strip_prefix(SIGMA).unwrap_or(channel);
+    let units: Vec<&str> = unit.split(", ").collect();
+    let own = match frame.geometry.channels.iter().position(|known| bare_name(known) == base) {
+        Some(place) if units.len() > 1 => units.get(place).copied().unwrap_or_default(),
+        _ => unit,
+    };
+    match typeset(own) {
+        plain if ["1", "unspecified"].contains(&plain.as_str()) => String::new(),
+        unit if channel.starts_with(COVARIANCE) && unit == "relative" => "relative²".into(),
+        unit if channel.starts_with(COVARIANCE) => format!("({unit})²"),
+        unit => unit,
+    }
+}
+
+/// What of a frame is shown, with its unit, and how many pixels of it.
+pub(super) fn stage(frame: &FrameHeader, choice: &Choice, [width, height]: [usize; 2]) -> String {
+    if choice.channels.len() < frame.geometry.channels.len() {
+        return format!("{}, {width} × {height}", choice.label(frame));
+    }
+    let unit = typeset(&frame.metadata.unit);
+    let says_nothing = ["1", "ADU", "unspecified"].contains(&unit.as_str());
+    let unit = if says_nothing { String::new() } else { format!(" / {unit}") };
+    format!("{}{unit}, {width} × {height}", frame.holds())
+}
+
+/// A number in five digits.
+pub(super) fn rounded(value: f64) -> String {
+    const DIGITS: i32 = 5;
+    #[expect(clippy::cast_possible_truncation, reason = "logarithms of doubles are within ±324")]
+    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    if (-4..7).contains(&magnitude) {
+        format!("{value:.*}", usize::try_from(DIGITS - 1 - magnitude).unwrap_or(0)).replace('-', "−")
+    } else {
+        format!("{value:.4e}").replace('-', "−")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
+
+    fn frame(quantity: QuantityKind, channels: &[&str]) -> FrameHeader {
+        let geometry = Geometry::new(4, 4, channels);
+        FrameHeader { name: "f".into(), geometry, metadata: Metadata::new(quantity) }
+    }
+
+    #[test]
+    fn planes_are_found_by_the_names_of_reports_files_and_classes() {
+        let xyz = frame(QuantityKind::Xyz, &["R", "G", "B", "covariance.XX", "sigma.R", "sigma.G", "mask"]);
+        let find = |frame: &FrameHeader, name| {
+            Choice::of(frame, Some(name), true).map(|choice| (choice.channels[0], choice.filter))
+        };
+        for (name, place) in [("Y", 1), ("G", 1), ("sigma.Y", 5), ("sigma.G", 5), ("mask", 6), ("covariance.XX", 3)] {
+            assert_eq!(find(&xyz, name).unwrap(), (place, None), "{name}");
+        }
+        let complaint = find(&xyz, "sigma").unwrap_err().to_string();
+        assert_eq!(complaint, "f: there is no plane `sigma`; it has X, Y, Z, covariance.XX, sigma.X, sigma.Y, mask");
+        let mut plane = frame(QuantityKind::Adu, &["Y"]);
+        plane.metadata.cfa = Some("rggb".parse().unwrap());
+        assert_eq!(find(&plane, "G").unwrap(), (0, Some('G')));
+        assert_eq!(find(&plane, "Y").unwrap(), (0, None));
+        let complaint = find(&plane, "C").unwrap_err().to_string();
+        assert_eq!(complaint, "f: there is no plane `C`; it has Y, R, G, B");
+    }
+
+    #[test]
+    fn scales_say_quantity_and_unit() {
+        let label = |quantity, channels: &[&str], name| {
+            let frame = frame(quantity, channels);
+            Choice::of(&frame, Some(name), true).unwrap().label(&frame)
+        };
+        let three = ["R", "G", "B", "covariance.XX", "sigma.G", "sigma.B", "mask"];
+        for (quantity, name, wanted) in [
+            (QuantityKind::Xyz, "Y", "Y / cd m⁻²"),
+            (QuantityKind::Xyz, "sigma.Y", "standard deviation of Y / cd m⁻²"),
+            (QuantityKind::Xyz, "covariance.XX", "covariance of XX / (cd m⁻²)²"),
+            (QuantityKind::Xyz, "mask", "mask, sum of bits"),
+            (QuantityKind::Electrons, "G", "electrons, G / e⁻"),
+            (QuantityKind::Adu, "sigma.G", "standard deviation of G / ADU"),
+            (QuantityKind::Xyy, "x", "x"),
+            (QuantityKind::Xyy, "sigma.Y", "standard deviation of Y / cd m⁻²"),
+            (QuantityKind::Cct, "CCT", "CCT / K"),
+            (QuantityKind::Lab, "a", "a*"),
+        ] {
+            assert_eq!(label(quantity, &three, name), wanted);
+        }
+        assert_eq!(label(QuantityKind::ColorDifference, &MAP_CHANNELS, "delta_e_76"), "ΔE*ab");
+        for (number, wanted) in
+            [(0.0, "0.0000"), (2730.123, "2730.1"), (-0.001_234_56, "−0.0012346"), (1e9, "1.0000e9")]
+        {
+            assert_eq!(rounded(number), wanted);
+        }
+        let frame = frame(QuantityKind::Xyy, &["R", "G", "B"]);
+        let (all, one) = (Choice::of(&frame, None, false).unwrap(), Choice::leading(&frame));
+        assert_eq!(stage(&frame, &all, [4, 3]), "three planes of xyY / 1, 1, cd m⁻², 4 × 3");
+        assert_eq!(
+            (stage(&frame, &one, [4, 3]).as_str(), one.names(&frame)),
+            ("Y / cd m⁻², 4 × 3", vec!["Y".to_owned()])
+        );
+        assert_eq!(typeset("W cm-2 sr-1 nm-1"), "W cm⁻² sr⁻¹ nm⁻¹");
+    }
+}

@@ -1,0 +1,237 @@
+//! From samples to gray and color.
+
+use super::reduce::Reduced;
+use crate::color::{linear_srgb_from_xyz, srgb_decode, srgb_encode};
+use crate::error::{Error, Result};
+use crate::metadata::FrameHeader;
+use crate::units::QuantityKind;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Which samples become black and which white, or the ends of the false colors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Range {
+    /// What no light reads, and the most that the stage can hold.
+    Full,
+    /// In each plane by itself, from so many standard deviations below its mean to as many above.
+    Deviations(f64),
+    /// In each plane by itself, from the sample that this share of all is below to another such one.
+    Shares(f64, f64),
+    /// From one value to another, in the unit of the samples.
+    Values(f64, f64),
+}
+
+/// From samples to display values.
+pub(super) enum Shade {
+    /// Each plane by itself, from its black to its white.
+    Planes(Vec<(f64, f64)>),
+    /// XYZ through the matrix to linear sRGB.
+    Xyz(nalgebra::Matrix3<f64>),
+    /// Encoded already.
+    Encoded,
+}
+
+impl Shade {
+    /// How the pixels of a picture are shown.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for a range that shows nothing; [`Error::Format`] for quantities that are no picture.
+    pub fn new(frame: &FrameHeader, range: Range, reduced: &Reduced) -> Result<Self> {
+        let metadata = &frame.metadata;
+        let planes = 0..reduced.planes;
+        let none = || frame.refuse("none of its pixels has a number that is finite; there is nothing to show");
+        let extremes = || {
+            planes
+                .clone()
+                .map(|plane| reduced.moments(plane))
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], plane| {
+                    [low.min(plane.min[0]), high.max(plane.max[0])]
+                })
+        };
+        let (low, high) = match range {
+            Range::Values(low, high) => (low, high),
+            Range::Deviations(count) => {
+                let about = |plane| {
+                    let moments = reduced.moments(plane);
+                    let spread = count * moments.std(0).unwrap_or(0.0);
+                    (moments.mean[0] - spread, moments.mean[0] + spread)
+                };
+                return Self::planes(frame, planes.map(about).collect());
+            }
+            Range::Shares(low, high) => {
+                let between = |plane| reduced.quantiles(plane, [low, high]).map(|[low, high]| (low, high));
+                return Self::planes(frame, planes.map(between).collect::<Option<_>>().ok_or_else(none)?);
+            }
+            Range::Full => {
+                match metadata.quantity {
+                    QuantityKind::Srgb => return Ok(Self::Encoded),
+                    QuantityKind::Xyz if reduced.planes != 3 => {
+                        return Err(frame
+                            .refuse("a single plane of XYZ is no picture; give --range LOW,HIGH, or --false-color"));
+                    }
+                    QuantityKind::Xyz => {
+                        let white = metadata.color.as_ref().and_then(|color| color.white);
+                        let white = white.ok_or_else(|| {
+                            frame.refuse(
+                                "the metadata name no white; give --range LOW,HIGH, or make it anew with `to-xyz \
+                             --white-luminance CD_PER_M2`",
+                            )
+                        })?;
+                        return Ok(Self::Xyz(linear_srgb_from_xyz(white)));
+                    }
+                    QuantityKind::ExpectedElectrons | QuantityKind::Electrons => {
+                        let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+                        let full = readout.map_or_else(|| extremes()[1], |readout| readout.full_well_e);
+                        (metadata.dark_signal_e.unwrap_or(0.0), full)
+                    }
+                    QuantityKind::Adu => {
+                        let black = frame.black_levels()?.map_or(0.0, |black| black.smallest());
+                        let white = metadata.white_level_adu.unwrap_or_else(|| extremes()[1].into());
+                        if reduced.planes == 3 {
+                            return Self::planes(frame, white.classes().map(|white| (black, white)).to_vec());
+                        }
+                        (black, white.largest())
+                    }
+                    QuantityKind::LinearSrgb => (0.0, 1.0),
+                    QuantityKind::Unspecified => {
+                        let [lowest, highest] = extremes();
+                        (lowest.min(0.0), highest)
+                    }
+                    other => {
+                        return Err(frame
+                        .refuse(format!("{other} is no picture; give --range LOW,HIGH, or show one plane with --plane and --false-color")));
+                    }
+                }
+            }
+        };
+        Self::planes(frame, vec![(low, high); reduced.planes])
+    }
+
+    fn planes(frame: &FrameHeader, ranges: Vec<(f64, f64)>) -> Result<Self> {
+        match ranges.iter().find(|(low, high)| !(low < high && (high - low).is_finite())) {
+            None => Ok(Self::Planes(ranges)),
+            Some((low, high)) => Err(Error::Usage(format!(
+                "{}: a range from {low} to {high} shows nothing; give another with --range",
+                frame.name
+            ))),
+        }
+    }
+
+    /// The bytes of a picture, pixel by pixel.
+    pub fn bytes(&self, reduced: &Reduced) -> Vec<u8> {
+        let (columns, planes) = (reduced.size[0], reduced.planes);
+        let curve = Curve::new();
+        let mut bytes = vec![0; reduced.samples.len()];
+        let rows = bytes.par_chunks_exact_mut(columns * planes).zip(reduced.samples.par_chunks_exact(columns * planes));
+        rows.for_each(|(bytes, row)| {
+            let sample = |plane: usize, x: usize| f64::from(row[plane * columns + x]);
+            match self {
+                Self::Encoded => {
+                    for (place, byte) in bytes.iter_mut().enumerate() {
+                        *byte = code(sample(place % planes, place / planes));
+                    }
+                }
+                Self::Planes(ranges) => {
+                    for (place, byte) in bytes.iter_mut().enumerate() {
+                        let (low, high) = ranges[place % planes];
+                        *byte = curve.code((sample(place % planes, place / planes) - low) / (high - low));
+                    }
+                }
+                Self::Xyz(matrix) => {
+                    for (x, pixel) in bytes.chunks_exact_mut(3).enumerate() {
+                        let linear = matrix * Vector3::from_fn(|plane, _| sample(plane, x));
+                        pixel.iter_mut().zip(&linear).for_each(|(byte, value)| *byte = curve.code(*value));
+                    }
+                }
+            }
+        });
+        bytes
+    }
+}
+
+/// The code of a value of 0 to 1; 0 of NaN.
+fn code(value: f64) -> u8 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a byte")]
+    let code = (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+    code
+}
+
+/// The curve of sRGB in 8 bits, by the linear values at which its codes change.
+struct Curve {
+    begins: [f64; 255],
+    /// Codes of the beginnings of equal steps, where to look.
+    near: Vec<u8>,
+}
+
+impl Curve {
+    /// Steps of the table: the curve rises by less than one code in each.
+    const STEPS: usize = 4096;
+
+    fn new() -> Self {
+        let begins = std::array::from_fn(|code| srgb_decode((code as f64 + 0.5) / 255.0));
+        let near = (0..=Self::STEPS).map(|step| code(srgb_encode(step as f64 / Self::STEPS as f64))).collect();
+        Self { begins, near }
+    }
+
+    /// The code of linear light; what is NaN is shown as black.
+    fn code(&self, value: f64) -> u8 {
+        let value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the number of steps")]
+        let near = self.near[(value * Self::STEPS as f64) as usize];
+        let rises = self.begins.get(usize::from(near)).is_some_and(|begin| value >= *begin);
+        near + u8::from(rises)
+    }
+}
+
+/// Whether a frame can be shown as it is.
+pub(super) fn is_picture(frame: &FrameHeader, range: Option<Range>) -> bool {
+    let is_one = frame.geometry.channels.len() == 1;
+    if !(is_one || frame.has_three_planes()) {
+        return false;
+    }
+    match frame.metadata.quantity {
+        _ if range.is_some_and(|range| range != Range::Full) => true,
+        QuantityKind::Xyz => !is_one && frame.metadata.color.as_ref().is_some_and(|color| color.white.is_some()),
+        QuantityKind::Srgb
+        | QuantityKind::ExpectedElectrons
+        | QuantityKind::Electrons
+        | QuantityKind::Adu
+        | QuantityKind::LinearSrgb
+        | QuantityKind::Unspecified => true,
+        _ => false,
+    }
+}
+
+/// The ends of the numbers of a single plane; of one that is the same everywhere, half of it to both sides.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for a range that shows nothing; [`Error::Format`] where no pixel has a number.
+pub(super) fn one_range(frame: &FrameHeader, range: Range, reduced: &Reduced) -> Result<(f64, f64)> {
+    if let (Range::Shares(..), Some([low, high])) = (range, reduced.quantiles(0, [0.0, 1.0]))
+        && low == high
+    {
+        let room = if low == 0.0 { 1.0 } else { 0.5 * low.abs() };
+        return Ok((low - room, low + room));
+    }
+    match Shade::new(frame, range, reduced)? {
+        Shade::Planes(ranges) => Ok(ranges[0]),
+        Shade::Encoded | Shade::Xyz(_) => Ok((0.0, 1.0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_gives_the_codes_of_the_curve() {
+        let curve = Curve::new();
+        for step in 0..=100_000 {
+            let value = f64::from(step) / 1e5;
+            assert_eq!(curve.code(value), code(srgb_encode(value)), "{value}");
+        }
+        assert_eq!([f64::NAN, -1.0, f64::INFINITY, f64::NEG_INFINITY].map(|value| curve.code(value)), [0, 0, 255, 0]);
+    }
+}

@@ -1,0 +1,63 @@
+//! Statistics of a frame beside what propagation predicts.
+
+use super::values;
+use crate::analysis::statistics::portrait::Portrait;
+use crate::analysis::statistics::{Region, Report, Saturated, measure, measure_with_portrait, patches};
+use crate::error::Result;
+use crate::formats::plots::PlotFormat;
+use crate::names::Named;
+use crate::propagation::Equations;
+use crate::stream::RowSource;
+use clap::Args;
+use std::path::PathBuf;
+
+/// What to measure of a frame, and what to make of it.
+#[derive(Debug, Clone, Args)]
+pub struct Measurement {
+    /// Rectangle X,Y,W,H in pixels; may be given more than once; by default the whole frame
+    #[arg(long, value_name = "X,Y,W,H", value_parser = values::region, allow_hyphen_values = true)]
+    region: Vec<Region>,
+    /// Measure each patch of a chart, as --patch of render-radiance draws them or as WxH says, less the rim that
+    /// demosaicking mixes
+    #[arg(long, value_name = "WxH", num_args = 0..=1, require_equals = true, value_parser = values::size, conflicts_with_all = ["region", "check", "plot"])]
+    patches: Option<Option<[usize; 2]>>,
+    /// Keep pixels in the statistics that were made of saturated samples
+    #[arg(long)]
+    keep_saturated: bool,
+    /// Equations to predict by: exact, or those of the paper
+    #[arg(long, default_value = Equations::default().name(), value_parser = values::choice::<Equations>())]
+    equations: Equations,
+    /// Test every prediction, and exit with status 1 when one does not hold, which the report says (`passed`), or when nothing
+    /// can be checked, of which there is no report
+    #[arg(long)]
+    check: bool,
+    /// Chance of a false alarm that --check accepts, all tests together
+    #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = values::fraction, requires = "check")]
+    level: f64,
+    /// Draw the region as an SVG or PNG file: histogram with the predicted law over it, means of columns and rows with the predicted
+    /// band of one standard deviation, autocorrelation beside the predicted, of XYZ chromaticities with the ellipses of the measured
+    /// and of the predicted covariance
+    #[arg(long, value_name = "FILE.svg|png")]
+    pub plot: Option<PathBuf>,
+}
+
+impl Measurement {
+    /// Measures a frame; what a figure shows comes with the report where one is wanted.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`](crate::error::Error::Usage) for a plot of another format or of several regions; those of [`measure`].
+    pub fn of(&self, source: &mut dyn RowSource) -> Result<(Report, Option<Portrait>)> {
+        let level = self.check.then_some(self.level);
+        let saturated = if self.keep_saturated { Saturated::Kept } else { Saturated::LeftOut };
+        match (self.patches, &self.plot) {
+            (Some(size), _) => Ok((patches::measure(source, size, saturated, self.equations)?, None)),
+            (None, None) => Ok((measure(source, &self.region, saturated, self.equations, level)?, None)),
+            (None, Some(path)) => {
+                PlotFormat::of_path(path)?;
+                let (report, portrait) = measure_with_portrait(source, &self.region, saturated, self.equations, level)?;
+                Ok((report, Some(portrait)))
+            }
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Frames shown as pictures.
+
+use super::described::DescribedInput;
+use super::values;
+use crate::analysis::statistics::Region;
+use crate::error::{Error, Result};
+use crate::formats::input::FrameReader;
+use crate::formats::picture::{PictureSettings, Range};
+use crate::formats::places::named;
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
+use std::path::PathBuf;
+
+/// Frames to show, all of which are described alike.
+#[derive(Debug, Clone, Args)]
+pub struct ShownFrames {
+    /// The first.
+    #[command(flatten)]
+    pub first: DescribedInput,
+    /// More frames: a sheet of all, in this order, each with its name, what it holds, mean and standard deviation
+    #[arg(value_name = "INPUTS")]
+    more: Vec<PathBuf>,
+    /// Columns of the sheet; by default about as many as rows
+    #[arg(long, value_name = "N", requires = "more", value_parser = RangedU64ValueParser::<usize>::new().range(1..=64))]
+    columns: Option<usize>,
+}
+
+impl ShownFrames {
+    /// Each frame by itself.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where the standard input is one of several.
+    pub fn each(&self) -> Result<Vec<DescribedInput>> {
+        let first = self.first.frame.input.as_deref();
+        if !self.more.is_empty()
+            && self.more.iter().map(|path| Some(path.as_path())).chain([first]).any(|path| named(path).is_none())
+        {
+            return Err(Error::Usage("the standard input cannot be one of several inputs; name a file".into()));
+        }
+        let other = |path: &PathBuf| {
+            let mut input = self.first.clone();
+            input.frame.input = Some(path.clone());
+            input
+        };
+        Ok(std::iter::once(self.first.clone()).chain(self.more.iter().map(other)).collect())
+    }
+
+    /// The columns of a sheet; none where a single frame is shown by itself.
+    pub fn columns(&self) -> Option<usize> {
+        let count = self.more.len() + 1;
+        let square = (1..).find(|columns| columns * columns >= count);
+        if count > 1 { self.columns.or(square) } else { None }
+    }
+}
+
+/// What of a frame to show, and how.
+#[derive(Debug, Clone, Args)]
+pub struct PictureOptions {
+    /// Rectangle X,Y,W,H in pixels to show; by default the whole frame
+    #[arg(long, value_name = "X,Y,W,H", value_parser = values::region)]
+    region: Option<Region>,
+    /// Show one plane alone: a channel or a layer by the name that `measure` gives it, such as Y of XYZ or sigma.Y, or a class
+    /// of a CFA plane, R, G or B, by the means of its photosites in each period of the array
+    #[arg(long, value_name = "NAME", conflicts_with = "channel")]
+    plane: Option<String>,
+    /// Show one plane in colors from dark blue to yellow, equal steps of which look equal, beside a bar with its numbers
+    #[arg(long)]
+    false_color: bool,
+    /// Show every pixel as a square of N x N
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=64))]
+    zoom: usize,
+    /// Make the picture at most N pixels wide and high: each is the mean of a square of samples, in linear light, of whole
+    /// periods of a filter array
+    #[arg(long, value_name = "N", conflicts_with = "zoom", value_parser = RangedU64ValueParser::<usize>::new().range(16..=8192))]
+    fit: Option<usize>,
+    /// What is black and what is white, or the ends of the false colors: full, LOW,HIGH in the unit of the samples, LOW%,HIGH%
+    /// of the pixels of each plane, or so many standard deviations about the mean of each plane, as in 4sigma; by default full,
+    /// in false color 0%,100%
+    #[arg(long, value_name = "full|LOW,HIGH|LOW%,HIGH%|Nsigma", value_parser = range, allow_hyphen_values = true)]
+    range: Option<Range>,
+}
+
+fn range(text: &str) -> std::result::Result<Range, String> {
+    let wrong = || {
+        "give full, LOW,HIGH, shares of the pixels such as 1%,99%, or a number of standard deviations such as 4sigma"
+            .to_owned()
+    };
+    if text == "full" {
+        return Ok(Range::Full);
+    }
+    if let Some(count) = text.strip_suffix("sigma") {
+        return values::positive(count).map(Range::Deviations).map_err(|_| wrong());
+    }
+    let (low, high) = text.split_once(',').ok_or_else(wrong)?;
+    let number = |text: &str| values::number(text).map_err(|_| wrong());
+    match (low.strip_suffix('%'), high.strip_suffix('%')) {
+        (Some(low), Some(high)) => {
+            let shares = [number(low)?, number(high)?].map(|per_cent| per_cent / 100.0);
+            let is_right = 0.0 <= shares[0] && shares[0] < shares[1] && shares[1] <= 1.0;
+            is_right.then_some(Range::Shares(shares[0], shares[1])).ok_or_else(wrong)
+        }
+        (None, None) => Ok(Range::Values(number(low)?, number(high)?)),
+        _ => Err(wrong()),
+    }
+}
+
+impl PictureOptions {
+    /// Opens a frame with the channels that are to be shown.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`DescribedInput::open`].
+    pub fn open(&self, input: &DescribedInput) -> Result<FrameReader> {
+        if self.plane.is_some() { input.open_all() } else { input.open() }
+    }
+
+    /// What is to be shown.
+    pub fn settings(&self) -> PictureSettings {
+        let Self { region, plane, false_color, zoom, fit, range } = self.clone();
+        PictureSettings { region, zoom, fit, plane, false_color, range }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_read_and_nothing_else() {
+        for (text, wanted) in [
+            ("full", Range::Full),
+            ("-3,4e2", Range::Values(-3.0, 400.0)),
+            ("1%,99.5%", Range::Shares(0.01, 0.995)),
+            ("0%,100%", Range::Shares(0.0, 1.0)),
+            ("2.5sigma", Range::Deviations(2.5)),
+        ] {
+            assert_eq!(range(text), Ok(wanted), "{text}");
+        }
+        for text in ["", "1", "1%,9", "9%,1%", "-1%,5%", "5%,101%", "nan,1", "0sigma", "5%,5%"] {
+            assert!(range(text).is_err(), "{text}");
+        }
+    }
+}

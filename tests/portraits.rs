@@ -1,0 +1,157 @@
+//! What figures of frames show: beside the prediction, and beside sums of a few lines.
+
+mod support;
+
+use cyanometer::analysis::statistics::portrait::{LAGS, Portrait};
+use cyanometer::analysis::statistics::{Region, Report, Saturated, measure_with_portrait};
+use cyanometer::frame::Geometry;
+use cyanometer::propagation::Equations;
+use cyanometer::stream::MemoryFrame;
+use cyanometer::units::QuantityKind;
+use support::workshop::{BAD_USAGE, Workshop};
+use support::{frame, header};
+
+fn drawn(frame: &MemoryFrame, regions: &[Region]) -> (Report, Portrait) {
+    measure_with_portrait(&mut frame.clone(), regions, Saturated::LeftOut, Equations::Exact, None)
+        .expect("a frame is measured")
+}
+
+/// Autocorrelations, means of columns and rows, and the law of frames of 200 × 160 are as predicted, at all stages.
+///
+/// A correlation of n pairs has a standard error of at most √(Σ ρ²/n) over all lags, both axes together; Σ ρ² is below 6 for ECI and
+/// XYZ of it. 5 standard errors: 0.07 of 32 000 pixels, 0.06 of 8000 independent samples. Squares of so many points of a profile, over
+/// their variance, are 1 within 5·√(2·2.5/points), as neighbors of demosaicked pixels hang together.
+#[test]
+fn frames_look_as_predicted() {
+    let shop = Workshop::new();
+    shop.run("fit-matrix SAMPLES/skies/sky912.exr -o matrix.yaml", &[]);
+    shop.run("render-radiance --electrons 8000,12000,20000 --size 200x160 -o expected.exr", &[]);
+    shop.run("add-noise expected.exr --seed 5 -o noisy.exr", &[]);
+    shop.run("digitize noisy.exr -o codes.exr", &[]);
+    shop.run("mosaic codes.exr -o plane.exr", &[]);
+    shop.run("demosaic plane.exr --method eci -o rgb.exr", &[]);
+    shop.run("to-xyz rgb.exr --matrix matrix.yaml -o xyz.exr", &[]);
+    for name in ["noisy.exr", "codes.exr", "plane.exr", "rgb.exr", "xyz.exr"] {
+        let (report, portrait) = drawn(&shop.frame(name), &[]);
+        let region = &report.regions[0];
+        let reports = if region.classes.is_empty() { &region.channels } else { &region.classes };
+        assert_eq!(portrait.groups.len(), 3, "{name}");
+        assert_eq!(portrait.is_whole, ["codes.exr", "plane.exr"].contains(&name));
+        let mut largest = 0.0_f64;
+        for (group, report) in portrait.groups.iter().zip(reports) {
+            assert_eq!(group.name, report.name);
+            assert_eq!(group.histogram.total(), report.count);
+            let (mean, std) = (group.mean().unwrap(), group.std().unwrap());
+            assert!((mean - report.mean.unwrap()).abs() < 1e-9 * mean, "{name}: {mean}");
+            assert!((std / report.std.unwrap() - 1.0).abs() < 1e-4, "{name}: {std}");
+            let foreseen = group.predicted.as_ref().unwrap();
+            assert_eq!(foreseen.mean, report.predicted_mean.unwrap());
+            let of_phases = foreseen.stds.iter().map(|std| std * std).sum::<f64>() / foreseen.stds.len() as f64;
+            assert!((of_phases.sqrt() / report.predicted_std.unwrap() - 1.0).abs() < 1e-9, "{name}");
+            for axis in 0..2 {
+                let predicted = &foreseen.correlations.as_ref().unwrap()[axis];
+                assert_eq!(predicted.len(), LAGS);
+                for (one, predicted) in group.correlations[axis].iter().zip(predicted) {
+                    let value = one.value.unwrap();
+                    assert!(
+                        (value - predicted).abs() < 0.07,
+                        "{name} {} lag {}: {value}, not {predicted}",
+                        group.name,
+                        one.lag
+                    );
+                    largest = largest.max(value.abs());
+                }
+                let std = foreseen.profile_std.unwrap()[axis];
+                let squares: Vec<f64> =
+                    group.profiles[axis].points().map(|[_, mean]| ((mean - foreseen.mean) / std).powi(2)).collect();
+                let ratio = squares.iter().sum::<f64>() / squares.len() as f64;
+                let tolerance = 5.0 * (5.0 / squares.len() as f64).sqrt();
+                assert!((ratio - 1.0).abs() < tolerance.min(0.9), "{name} {} axis {axis}: {ratio}", group.name);
+            }
+        }
+        // Demosaicked neighbors hang together, others do not.
+        assert_eq!(largest > 0.2, ["rgb.exr", "xyz.exr"].contains(&name), "{name}: {largest}");
+    }
+}
+
+/// Sums of a few lines: a pattern of two columns, one sample that is not finite, a region that begins off the corner.
+#[test]
+fn profiles_correlations_and_bins_are_those_of_plain_sums() {
+    let head = header(QuantityKind::Electrons, Geometry::new(12, 9, &["R", "G", "B"]));
+    let value = |x: usize, y: usize, channel: usize| match (x, y) {
+        (5, 4) => f32::NAN,
+        _ => (10 * channel + 3 * (x % 2)) as f32 + ((x * 7 + y * 5) % 11) as f32 / 4.0,
+    };
+    let region = Region { x: 3, y: 2, width: 8, height: 6 };
+    let (_, portrait) = drawn(&frame(head, value), &[region]);
+    for (channel, group) in portrait.groups.iter().enumerate() {
+        let sample = |x: usize, y: usize| f64::from(value(x + 3, y + 2, channel));
+        let finite = |values: Vec<f64>| -> Vec<f64> { values.into_iter().filter(|value| value.is_finite()).collect() };
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let all = finite((0..6).flat_map(|y| (0..8).map(move |x| (x, y))).map(|(x, y)| sample(x, y)).collect());
+        assert_eq!((all.len() as u64, group.histogram.total()), (47, 47));
+        for (bin, count) in &group.histogram.counts {
+            let (from, to) = (group.histogram.begin(*bin), group.histogram.begin(bin + 1));
+            assert_eq!(all.iter().filter(|value| (from..to).contains(*value)).count() as u64, *count);
+        }
+        let columns: Vec<[f64; 2]> = group.profiles[0].points().collect();
+        for (x, [at, seen]) in columns.into_iter().enumerate() {
+            let wanted = mean(&finite((0..6).map(|y| sample(x, y)).collect()));
+            assert!(at == x as f64 && (seen - wanted).abs() < 1e-12, "{x}: {seen}");
+        }
+        let variance = mean(&all.iter().map(|value| (value - mean(&all)).powi(2)).collect::<Vec<_>>());
+        for (axis, lag) in [(0, 1), (0, 2), (1, 1), (1, 3)] {
+            let (dx, dy) = [(lag, 0), (0, lag)][axis];
+            let pairs: Vec<(f64, f64)> = (0..6 - dy)
+                .flat_map(|y| (0..8 - dx).map(move |x| (x, y)))
+                .map(|(x, y)| (sample(x, y), sample(x + dx, y + dy)))
+                .filter(|(a, b)| a.is_finite() && b.is_finite())
+                .collect();
+            let [a, b] = [pairs.iter().map(|p| p.0).collect::<Vec<_>>(), pairs.iter().map(|p| p.1).collect()];
+            let covariance = mean(&pairs.iter().map(|(x, y)| (x - mean(&a)) * (y - mean(&b))).collect::<Vec<_>>());
+            let seen = group.correlations[axis][lag - 1];
+            assert!((seen.value.unwrap() - covariance / variance).abs() < 1e-6, "axis {axis}, lag {lag}: {seen:?}");
+        }
+    }
+}
+
+#[test]
+fn a_figure_has_its_panels_and_what_it_cannot_be_is_told() {
+    let shop = Workshop::with_frames();
+    let text = |line: &str| {
+        shop.run(&format!("{line} --plot plot.svg"), &[]);
+        String::from_utf8(shop.bytes("plot.svg")).unwrap()
+    };
+    for (line, wanted, missing) in [
+        (
+            "measure noisy.exr",
+            &["predicted: normal", "mean − predicted mean / e⁻", "distance along y", "/ e⁻"][..],
+            "ellipse",
+        ),
+        ("measure codes.exr", &["predicted: normal, rounded", "share per ADU"], "95 %"),
+        ("measure plane.exr", &["a CFA plane of ADU", "row, 2 together", "predicted ±σ of a mean"], "95 %"),
+        ("measure rgb.exr", &["predicted: normal by phase"], "95 %"),
+        ("measure xyz.exr", &["measured, 95 %", "predicted, 95 %", "cd m⁻²"], "rounded"),
+        ("measure expected.exr --region 1,1,5,4", &["5 × 4"], "rounded"),
+    ] {
+        let svg = text(line);
+        assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{line}");
+        for words in wanted {
+            assert!(svg.contains(words), "{line}: no {words}");
+        }
+        assert!(!svg.contains(missing), "{line}: {missing}");
+    }
+    shop.run("measure xyz.exr --plot plot.png -o report.txt", &[]);
+    assert!(shop.bytes("plot.png").starts_with(b"\x89PNG"));
+    // The report is the same with a plot.
+    assert_eq!(shop.bytes("report.txt"), shop.run("measure xyz.exr", &[]));
+    for line in [
+        "measure xyz.exr --plot plot.pdf",
+        "measure xyz.exr --plot x.svg --region 0,0,2,2 --region 1,1,2,2",
+        "measure xyz.exr --plot x.svg --patches=2x2",
+        "measure xyz.exr --plot xyz.exr",
+    ] {
+        assert_eq!(shop.attempt(line, &[]).status.code(), Some(BAD_USAGE), "{line}");
+    }
+    assert!(!shop.path("x.svg").exists());
+}

@@ -1,0 +1,146 @@
+//! What `preview` shows, looked at pixel by pixel.
+
+mod support;
+
+use cyanometer::color::ramp::ramp;
+use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
+
+/// A picture that `preview` made.
+struct Picture {
+    width: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+impl Picture {
+    fn read(shop: &Workshop, name: &str) -> Self {
+        let picture = image::load_from_memory(&shop.bytes(name)).expect("preview writes pictures").into_rgb8();
+        Self { width: picture.width() as usize, pixels: picture.into_raw().as_chunks::<3>().0.to_vec() }
+    }
+
+    fn height(&self) -> usize {
+        self.pixels.len() / self.width
+    }
+}
+
+/// One row of 256 numbers: each is a color of its own, the lowest the first of the ramp.
+#[test]
+fn false_colors_run_along_the_ramp_from_the_lowest_number_to_the_highest() {
+    let shop = Workshop::new();
+    let row: Vec<u8> = (0..=255_u16).flat_map(|code| (1000 + 2 * code).to_le_bytes()).collect();
+    std::fs::write(shop.path("row.bin"), &row).unwrap();
+    shop.run("preview --raw 256x1:u16le row.bin --false-color -o whole.png", &[]);
+    shop.run("preview --raw 256x1:u16le row.bin --false-color --range 1000,1254 -o low.png", &[]);
+    shop.run("preview --raw 256x1:u16le row.bin --false-color --range 20%,80% -o middle.png", &[]);
+    let ramp = ramp();
+    let line = |name: &str| {
+        let picture = Picture::read(&shop, name);
+        // Below a line of words: the corner is that of the picture.
+        let corner = picture.width * (12 + 25) + 12;
+        picture.pixels[corner..corner + 256].to_vec()
+    };
+    assert_eq!(line("whole.png"), ramp);
+    // 1254 is the 127th of the numbers: places are 255/127 apart.
+    let low = line("low.png");
+    assert!(low[127..].iter().all(|color| *color == ramp[255]) && low[0] == ramp[0] && low[64] == ramp[129]);
+    // Ranks 51 and 204 of 0 to 255.
+    let middle = line("middle.png");
+    assert!(
+        middle[..=51].iter().all(|color| *color == ramp[0]) && middle[204..].iter().all(|color| *color == ramp[255])
+    );
+    // (1256 − 1102)/306 · 255 = 128.3
+    assert_eq!(middle[128], ramp[128]);
+}
+
+/// Squares of a filter array are whole periods, so that a uniform scene makes one gray, that of the mean of its photosites.
+#[test]
+fn fitted_pictures_are_exact_means() {
+    let shop = Workshop::new();
+    shop.run("render-radiance --electrons 3000,9000,15000 --size 160x104 -o three.exr", &[]);
+    shop.run("mosaic three.exr -o plane.exr", &[]);
+    shop.run("preview plane.exr --fit 60 --range 0,18000 -o plane.png", &[]);
+    let picture = Picture::read(&shop, "plane.png");
+    assert_eq!((picture.width, picture.height()), (40, 26));
+    // Half of the range in linear light is code 188 of sRGB: 255 (1.055 · 0.5^(1/2.4) − 0.055) = 187.5.
+    assert!(picture.pixels.iter().all(|pixel| *pixel == [188; 3]), "{:?}", picture.pixels[0]);
+    shop.run("preview three.exr --fit 60 --range 0,18000 -o three.png", &[]);
+    let picture = Picture::read(&shop, "three.png");
+    assert_eq!((picture.width, picture.height()), (54, 35));
+    assert!(picture.pixels.iter().all(|pixel| pixel[0] < pixel[1] && pixel[1] == 188 && pixel[1] < pixel[2]));
+}
+
+#[test]
+fn planes_that_are_not_there_are_told() {
+    let shop = Workshop::with_frames();
+    for (line, status, said) in [
+        ("preview xyz.exr --plane Q -o a.png", BAD_USAGE, "xyz.exr: there is no plane `Q`; it has X, Y, Z"),
+        ("preview plane.exr --plane C -o a.png", BAD_USAGE, "plane.exr: there is no plane `C`; it has Y, R, G, B"),
+        ("preview rgb.exr --false-color -o a.png", BAD_USAGE, "say with --plane which: R, G, B"),
+        ("preview xyz.exr --plane Y -o a.png", BAD_DATA, "give --range LOW,HIGH, or --false-color"),
+        ("preview rgb.exr --range 9%,1% -o a.png", BAD_USAGE, "shares of the pixels such as 1%,99%"),
+        ("preview rgb.exr --fit 4 -o a.png", BAD_USAGE, "--fit"),
+        ("preview rgb.exr --fit 40 --zoom 2 -o a.png", BAD_USAGE, "--zoom"),
+    ] {
+        let output = shop.attempt(line, &[]);
+        let complaint = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(status) && complaint.contains(said), "{line}: {complaint}");
+    }
+    shop.run("preview xyz.exr --plane Y --range 0,100 -o gray.png", &[]);
+    assert_eq!((Picture::read(&shop, "gray.png").width, Picture::read(&shop, "gray.png").height()), (8, 6));
+}
+
+/// What is no number has a color that no number has, and the scale names it.
+#[test]
+fn what_is_not_finite_is_seen() {
+    let shop = Workshop::new();
+    let row: Vec<u8> = [1.0_f32, f32::NAN, 3.0, f32::INFINITY].iter().flat_map(|sample| sample.to_le_bytes()).collect();
+    std::fs::write(shop.path("row.bin"), &row).unwrap();
+    shop.run("preview --raw 4x1:f32le row.bin --false-color -o a.png", &[]);
+    let picture = Picture::read(&shop, "a.png");
+    let corner = picture.width * (12 + 25) + 12;
+    let ramp = ramp();
+    assert_eq!(picture.pixels[corner..corner + 4], [ramp[0], [0xcc, 0x79, 0xa7], ramp[255], [0xcc, 0x79, 0xa7]]);
+    std::fs::write(shop.path("none.bin"), f32::NAN.to_le_bytes()).unwrap();
+    let output = shop.attempt("preview --raw 1x1:f32le none.bin --false-color -o a.png", &[]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("there is nothing to show"));
+    // A constant has a scale, too.
+    std::fs::write(shop.path("one.bin"), 7.0_f32.to_le_bytes()).unwrap();
+    shop.run("preview --raw 1x1:f32le one.bin --false-color -o a.png", &[]);
+}
+
+/// A sheet holds the picture of each frame, in the order given; a frame of several scenes is told apart by its gray.
+#[test]
+fn a_sheet_shows_frames_in_their_order() {
+    let shop = Workshop::new();
+    for (name, code) in [("a", 60_u8), ("b", 120), ("c", 180)] {
+        std::fs::write(shop.path(&format!("{name}.bin")), [code; 40 * 30]).unwrap();
+    }
+    let files = "a.bin b.bin c.bin";
+    shop.run(&format!("preview --raw 40x30:u8 --range 0,255 --columns 3 {files} -o row.png"), &[]);
+    let gray = |picture: &Picture| -> Vec<[u8; 3]> {
+        // The middle of the pictures, 15 below the margin.
+        let row = &picture.pixels[picture.width * 27..][..picture.width];
+        let mut seen: Vec<[u8; 3]> =
+            row.chunk_by(|a, b| a == b).filter(|run| run.len() == 40).map(|run| run[0]).collect();
+        seen.retain(|pixel| *pixel != [255; 3]);
+        seen
+    };
+    let grays = gray(&Picture::read(&shop, "row.png"));
+    assert_eq!(grays.len(), 3);
+    assert!(grays.is_sorted_by(|a, b| a[0] < b[0]));
+    shop.run("preview --raw 40x30:u8 --range 0,255 --columns 3 c.bin a.bin b.bin -o other.png", &[]);
+    assert_eq!(gray(&Picture::read(&shop, "other.png")), [grays[2], grays[0], grays[1]]);
+    let output = shop.attempt("preview --raw 40x30:u8 a.bin - -o x.png", &[]);
+    assert_eq!(output.status.code(), Some(BAD_USAGE));
+    let output = shop.attempt("preview --raw 40x30:u8 a.bin missing.bin -o x.png", &[]);
+    assert!(output.status.code() == Some(BAD_DATA) && !shop.path("x.png").exists());
+}
+
+/// Frames that are no picture are shown by one plane; all stages make one sheet.
+#[test]
+fn all_stages_make_a_sheet() {
+    let shop = Workshop::with_frames();
+    shop.run("to-xyz rgb.exr --matrix matrix.yaml --space lab -o lab.exr", &[]);
+    shop.run("color-difference xyz.exr xyz.exr --map map.exr", &[]);
+    shop.run("preview expected.exr noisy.exr codes.exr plane.exr rgb.exr xyz.exr lab.exr map.exr -o sheet.png", &[]);
+    shop.run("preview xyz.exr lab.exr --region 1,1,4,3 --zoom 8 -o part.png", &[]);
+}
