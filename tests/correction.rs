@@ -108,7 +108,7 @@ impl Kit {
             CorrectFrame::of(&frame.header, &settings, darks.as_ref().map(DarkFrames::stack), true).unwrap();
         let flats = flats().map(|surveyed| (flats().unwrap(), surveyed.survey(None).unwrap()));
         stage.note_further(flats.as_ref().map(|(flats, means)| flats.record(means)), None);
-        let map = Some(DefectMap::List(self.defects.clone()));
+        let map = Some(DefectMap::List(self.defects.clone(), 0));
         let mut corrections = Corrections { darks, dark_limits: None, flats, map, found: [0; 3] };
         let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
         let mut made = MemoryFrame::new(with_mask(stage.header().clone()), Vec::new());

@@ -89,7 +89,7 @@ fn wavelengths_that_no_class_responds_to_add_nothing() {
     // The same of the planes of a spectral image.
     let (camera, _) = kept.camera(&all_nm);
     let channels: Vec<usize> = (0..all_nm.len()).collect();
-    let planes = camera.planes(&channels, 1.0);
+    let planes = camera.planes(&channels, &vec![1.0; channels.len()]);
     assert_eq!(planes.len(), kept.wavelengths_nm.len());
     let width = 37;
     let samples: Vec<f32> = (0..all_nm.len() * width).map(|i| 1e-6 * scatter(i, i / width, 0)).collect();

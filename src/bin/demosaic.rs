@@ -57,8 +57,8 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = arguments.described.open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     arguments.pattern.map_or(Ok(()), |pattern| described::check_pattern(reader.header(), pattern))?;
-    session.tell(described::doubt_of_black(reader.header(), arguments.black)?.as_slice());
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
+    session.tell(described::doubt_of_black(reader.header(), arguments.black)?.as_slice());
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());
     session.tell(requests::of_bent_codes(reader.header()).as_slice());

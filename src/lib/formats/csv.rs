@@ -91,9 +91,6 @@ impl SpectralTable {
         if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, &e))? {
             return refuse("it holds no rows");
         }
-        if first.len() > MAX_COLUMNS {
-            return Err(Error::format(name, format!("it has more than {MAX_COLUMNS} columns; no table has")));
-        }
         if text.is_ambiguous(&first) {
             return refuse(
                 "its commas part columns or decimals, nobody can tell which; part its columns by semicolons, tabs or blanks, or \
@@ -373,15 +370,11 @@ impl<'a> Text<'a> {
     /// The text of a table; `is_of_numbers` where separators behind the last cell of a row mean nothing.
     fn of(name: &str, bytes: &'a [u8], is_of_numbers: bool) -> Result<Self> {
         let decoded = delimited::decoded(name, bytes)?;
+        // Before any cell is told apart: each row is held as a whole.
+        check_size(name, &decoded)?;
         let separator = Separator::of(&decoded);
         let plain = delimited::plain(name, &decoded, separator, is_of_numbers)?;
-        let text = Self { decoded, plain, separator };
-        // Before any cell is told apart: each row is held as a whole.
-        let separators = text.rows().bytes().filter(|byte| *byte == separator.byte()).count();
-        if separators < MAX_CELLS {
-            return Ok(text);
-        }
-        Err(Error::format(name, format!("it has more than {MAX_CELLS} numbers; no table has")))
+        Ok(Self { decoded, plain, separator })
     }
 
     fn rows(&self) -> &str {
@@ -405,6 +398,26 @@ impl<'a> Text<'a> {
             && first.iter().all(|cell| cell.bytes().all(|byte| byte.is_ascii_digit()))
             && !self.rows().lines().any(|line| !line.starts_with('#') && line.contains('.'))
     }
+}
+
+/// Refuses a text of more cells, or of more in a line, than any table has, whatever parts them.
+fn check_size(name: &str, text: &str) -> Result<()> {
+    let mut all = 0;
+    let mut widest = 0;
+    for line in text.lines().map(str::as_bytes) {
+        let parted_by = |mark: u8| line.iter().filter(|byte| **byte == mark).count();
+        let blanks = line.windows(2).filter(|pair| pair[0] == b' ' && pair[1] != b' ').count();
+        let cells = b",;\t".map(parted_by).into_iter().fold(blanks, usize::max);
+        all += cells;
+        widest = widest.max(cells);
+    }
+    if all >= MAX_CELLS {
+        return Err(Error::format(name, format!("it has more than {MAX_CELLS} numbers; no table has")));
+    }
+    if widest >= MAX_COLUMNS {
+        return Err(Error::format(name, format!("it has more than {MAX_COLUMNS} columns; no table has")));
+    }
+    Ok(())
 }
 
 /// The bytes of a table that may be gzipped.

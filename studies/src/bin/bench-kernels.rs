@@ -158,7 +158,7 @@ fn spectral(width: usize, height: usize) -> Result<Workload> {
     let (camera, _) = weights.camera(&wavelengths_nm);
     let bands = wavelengths_nm.len();
     let samples = spectral_samples(width, height, bands);
-    let planes = camera.planes(&(0..bands).collect::<Vec<usize>>(), 1.0);
+    let planes = camera.planes(&(0..bands).collect::<Vec<usize>>(), &vec![1.0; bands]);
     let mut output = Vec::with_capacity(width * height);
     Ok(Box::new(move || {
         output.clear();
