@@ -2,7 +2,7 @@
 //!
 //! Two layouts are read: a column of wavelengths and one column per curve, or one row per spectrum under a header of
 //! wavelengths. Units stand in the header, in a row of their own below it, or in comments; wavelengths without a unit are in
-//! nm. What parts cells and what is a comment, [`delimited`] tells.
+//! nm. What parts cells and what is a comment, `delimited` tells.
 
 use super::delimited::{self, Separator, decimal, number};
 use super::foreign::csv_complaint;

@@ -140,7 +140,8 @@ mod tests {
             let (geometry, metadata) = (Geometry::new(1, 1, &["R", "G", "B"]), Metadata::new(quantity));
             let frame = FrameHeader { name: "frame".into(), geometry, metadata };
             let bytes = profile(&frame, 1.0, 1.0).unwrap().unwrap();
-            let number = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+            let word = |at: usize| <[u8; 4]>::try_from(&bytes[at..at + 4]).unwrap();
+            let number = |at: usize| u32::from_be_bytes(word(at)) as usize;
             assert_eq!(number(0), bytes.len());
             let tags = (0..number(128)).map(|tag| 132 + 12 * tag);
             assert!(tags.clone().all(|tag| number(tag + 4).is_multiple_of(4)));
@@ -149,7 +150,7 @@ mod tests {
             // The sum of the colorants is the white of the connection space, to the 16 bits behind the point.
             let colorants = [b"rXYZ", b"gXYZ", b"bXYZ"].map(|name| {
                 let tag = tags.clone().find(|tag| bytes[*tag..*tag + 4] == name[..]).unwrap();
-                [8, 12, 16].map(|place| f64::from(number(number(tag + 4) + place) as u32 as i32) / 65_536.0)
+                [8, 12, 16].map(|place| f64::from(i32::from_be_bytes(word(number(tag + 4) + place))) / 65_536.0)
             });
             for (axis, white) in D50.into_iter().enumerate() {
                 let sum: f64 = colorants.iter().map(|colorant| colorant[axis]).sum();

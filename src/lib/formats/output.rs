@@ -188,7 +188,7 @@ fn native_tags(header: &FrameHeader) -> ExrTags {
     }
 }
 
-/// The name of the color space [CIF2025]; none of spaces that have none, as that of a camera.
+/// The name of the color space \[CIF2025]; none of spaces that have none, as that of a camera.
 fn interop_id(header: &FrameHeader) -> Option<&'static str> {
     match header.metadata.quantity {
         QuantityKind::LinearSrgb => Some("lin_rec709_scene"),
