@@ -214,6 +214,10 @@ fn region_text(region: &RegionReport, out: &mut String) {
             columns.push(std::iter::once(heading.to_owned()).chain(texts).collect());
         }
     }
+    if columns.len() == 1 {
+        out.push_str("no statistics: no pixel is left to count\n");
+        return;
+    }
     table(&columns, out);
     if region.channels.len() > 1
         && region.channels.len() <= 6
