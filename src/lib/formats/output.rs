@@ -10,7 +10,7 @@ use super::places::{STDOUT_NAME, named, sidecar_path};
 use super::standard::open_stdout;
 use super::storing::Encoding;
 use super::tiff::{ExtraTag, TagValue, TiffSamples, TiffSettings, TiffTags, TiffWriter};
-use super::viewable::{Scaling, check_lossless};
+use super::viewable::{self, Scaling, check_lossless};
 use super::yaml;
 use crate::color::{self, D65_XY, SRGB_PRIMARIES};
 use crate::error::{Error, Result};
@@ -240,10 +240,21 @@ impl RowSink for FrameWriter {
 }
 
 impl FrameWriter {
-    /// Refuses samples that are not what they were once they are scaled back; f16 rounds them all the same.
+    /// Refuses samples that are not what they were, or what f16 makes of them, once they are scaled back.
     fn check_scaled(&self, scaling: &Scaling, samples: &[f32], scaled: &[f32]) -> Result<()> {
         match self.encoding {
-            Encoding::Exr(ExrSamples::F16, _) => Ok(()),
+            // What f16 makes of samples is the same at every scale, but for the smallest, and for what overflows unscaled.
+            Encoding::Exr(ExrSamples::F16, _) => {
+                let half = |sample: &f32| f16::from_f32(*sample).to_f32();
+                let rounded: Vec<f32> = samples.iter().map(half).collect();
+                let mut stored: Vec<f32> = scaled.iter().map(half).collect();
+                scaling.undo(&mut stored);
+                let differs = |(plain, stored): &(&f32, &f32)| plain.is_finite() && plain != stored;
+                match rounded.iter().zip(&stored).find(differs) {
+                    None => Ok(()),
+                    Some((sample, _)) => Err(viewable::lost(&self.name, *sample)),
+                }
+            }
             Encoding::Tiff(TiffSamples::U16, _) => check_lossless(&self.name, scaling, samples, scaled, U16_FULL_SCALE),
             _ => check_lossless(&self.name, scaling, samples, scaled, f32::INFINITY),
         }

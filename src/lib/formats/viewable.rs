@@ -114,10 +114,15 @@ pub(super) fn check_lossless(name: &str, scaling: &Scaling, samples: &[f32], sca
     };
     match samples.iter().zip(&back).zip(scaled).find(differs) {
         None => Ok(()),
-        Some(((sample, _), _)) => Err(Error::Data(format!(
-            "{name}: the sample {sample} does not survive scaling for viewers; write it without --viewable"
-        ))),
+        Some(((sample, _), _)) => Err(lost(name, *sample)),
     }
+}
+
+/// The complaint of a sample that scaling changes.
+pub(super) fn lost(name: &str, sample: f32) -> Error {
+    Error::Data(format!(
+        "{name}: the sample {sample} would not be the same once it is scaled back; write f32, or leave --viewable out"
+    ))
 }
 
 #[cfg(test)]
