@@ -330,3 +330,39 @@ fn descriptions_that_a_sensor_contradicts_are_told() {
     fs::write(shop.path("own.yaml"), format!("{schema}observer: nobody\ncfa: rggb\nblack_level_adu: 1753\n")).unwrap();
     assert_eq!(demosaic("--metadata own.yaml", 0), "");
 }
+
+/// A TIFF has no layer of marks; its sidecar knows how many there would be.
+#[test]
+fn saturated_pixels_that_nothing_marks_are_told() {
+    let shop = Workshop::with_frames();
+    let bright = "render-radiance --electrons 3000,5000,90000 --size 8x6 --cfa rggb -o bright.exr";
+    for line in [
+        bright,
+        "add-noise bright.exr -o noisy.exr",
+        "digitize noisy.exr -o plane.exr",
+        "demosaic plane.exr -o rgb.exr",
+    ] {
+        assert!(shop.attempt(&format!("{line} --quiet"), &[]).status.success(), "{line}");
+    }
+    for (file, is_told) in [("xyz.tiff", true), ("xyz.exr", false)] {
+        let line = format!("to-xyz rgb.exr --matrix matrix.yaml --quiet -o {file}");
+        assert!(shop.attempt(&line, &[]).status.success());
+        let heard = said(&shop, &format!("measure {file}"), 0);
+        let told = "48 of its pixels were made of saturated samples, by its sidecar, and nothing marks which";
+        assert_eq!(heard.contains(told), is_told, "{heard}");
+    }
+}
+
+#[test]
+fn a_comment_that_contradicts_the_heading_is_told() {
+    let shop = Workshop::new();
+    let table = "# unit: W m-2 sr-1 nm-1\nnm,radiance (mW m-2 sr-1 nm-1)\n360,10\n830,10\n";
+    fs::write(shop.path("two.csv"), table).unwrap();
+    let line = "render-radiance two.csv --size 2x2 -o out.exr";
+    assert_eq!(
+        said(&shop, line, 0),
+        "render-radiance: warning: two.csv: its heading says mW m-2 sr-1 nm-1, which counts, and a comment W m-2 sr-1 nm-1; \
+         say which with --radiance-unit\n"
+    );
+    assert_eq!(said(&shop, &format!("{line} --radiance-unit mW/m2/sr/nm"), 0), "");
+}

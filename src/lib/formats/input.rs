@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Geometry, THREE_PLANES};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::stages::linearize::Linearize;
-use crate::stages::saturation::{MASK_BITS, MASK_LAYER, bits, with_mask};
+use crate::stages::saturation::{MASK_BITS, MASK_LAYER, bits, samples_tell, with_mask};
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use std::fs::File;
@@ -197,6 +197,7 @@ impl FrameReader {
         let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
         let mut header = FrameHeader { name: name.into(), geometry, metadata };
+        doubt_of_marks(&header, stored);
         let corner = options.crop.map_or(Ok([0, 0]), |crop| cut(&mut header, crop))?;
         let linearize = match &options.linearize {
             Linearizing::No => None,
@@ -395,6 +396,18 @@ impl RowSource for FrameReader {
         self.rows_read += rows;
         self.check_digest();
         Ok(())
+    }
+}
+
+/// A warning that pixels were made of saturated samples, where neither their level nor a layer tells which: TIFF has none.
+fn doubt_of_marks(header: &FrameHeader, stored: &Geometry) {
+    let is_told = samples_tell(header) || stored.channels.iter().any(|channel| channel == MASK_LAYER);
+    let saturated = header.metadata.samples.as_ref().and_then(|samples| samples.saturated);
+    if let Some(count) = saturated.filter(|count| *count > 0 && !is_told) {
+        register::doubt(format!(
+            "{}: {count} of its pixels were made of saturated samples, by its sidecar, and nothing marks which; EXR would",
+            header.name
+        ));
     }
 }
 

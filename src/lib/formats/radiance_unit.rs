@@ -26,7 +26,17 @@ pub fn settle(says: FileSays<'_>, given: Option<RadianceUnit>) -> Result<(Radian
     let FileSays { name, heading, remarks, place } = says;
     let is_in = |text: &str, kind: &str| format!("its values are in `{text}`, {kind}");
     match heading {
-        Some(Stated::Radiance(unit)) => agreed(name, *unit, given).map(|unit| (unit, None)),
+        Some(Stated::Radiance(unit)) => {
+            let unit = agreed(name, *unit, given)?;
+            let other = remarks.iter().find_map(|remark| match remark {
+                Stated::Radiance(other) if *other != unit => Some(other),
+                _ => None,
+            });
+            let warned = other.filter(|_| given.is_none()).map(|other| {
+                format!("{name}: its heading says {unit}, which counts, and a comment {other}; say which with --radiance-unit")
+            });
+            Ok((unit, warned))
+        }
         Some(Stated::Other { text, kind }) if kind.is_another_quantity() => {
             let problem = is_in(text, kind.in_words());
             Err(Error::format(
