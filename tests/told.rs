@@ -366,3 +366,32 @@ fn a_comment_that_contradicts_the_heading_is_told() {
     );
     assert_eq!(said(&shop, &format!("{line} --radiance-unit mW/m2/sr/nm"), 0), "");
 }
+
+/// Sidecars that somebody edited: a key that is misspelt, and what contradicts itself.
+#[test]
+fn edited_sidecars_are_told_of() {
+    let shop = Workshop::with_frames();
+    let sidecar = fs::read_to_string(shop.path("codes.exr.yaml")).unwrap();
+    let edits: [(&str, &str, &str); 3] = [
+        ("white_level_adu", "white_levl_adu", "unknown key `white_levl_adu`; did you mean `white_level_adu`?"),
+        ("unit: ADU", "unit: e-", "its unit is `e-`, but that of its quantity, ADU, is `ADU`"),
+        ("black_level_adu:", "black_level_adu: 0 # ", "its black level, 0 ADU, is below the bias of its converter, "),
+    ];
+    assert_eq!(said(&shop, "measure codes.exr", 0), "");
+    for (old, new, told) in edits {
+        assert!(sidecar.contains(old), "{sidecar}");
+        fs::write(shop.path("codes.exr.yaml"), sidecar.replace(old, new)).unwrap();
+        let heard = said(&shop, "measure codes.exr", 0);
+        assert!(heard.contains(&format!("measure: warning: codes.exr.yaml: {told}")), "{heard}");
+    }
+}
+
+/// f16 has 11 binary digits, codes of 14 bits have more.
+#[test]
+fn codes_that_f16_rounds_are_told() {
+    let shop = Workshop::with_frames();
+    let heard = said(&shop, "mosaic codes.exr --sample-type f16 -o half.exr", 0);
+    let told =
+        "f16 holds codes to 2048 as they are, and rounds those above, by steps of 2 at the white level, 4095 ADU; f32";
+    assert!(heard.contains(told), "{heard}");
+}

@@ -510,16 +510,26 @@ fn find_metadata(
     };
     if let Some(path) = &options.metadata {
         let metadata = from_file(path)?;
-        yaml::check_misspelt(&path.display().to_string(), &metadata)?;
+        let shown = path.display().to_string();
+        yaml::check_misspelt(&shown, &metadata)?;
+        doubt_of_metadata(&shown, metadata.contradictions());
         return Ok((metadata, None));
     }
     if let Some(sidecar) = path.map(sidecar_path).filter(|sidecar| sidecar.is_file()) {
-        return Ok((from_file(&sidecar)?, Some(sidecar.display().to_string())));
+        let (metadata, shown) = (from_file(&sidecar)?, sidecar.display().to_string());
+        // Another version may have written it: what is unknown is kept.
+        doubt_of_metadata(&shown, yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()));
+        return Ok((metadata, Some(shown)));
     }
     if let Some(text) = reader.embedded() {
         return Ok((yaml::parse_metadata(name, text)?, None));
     }
     Ok((reader.own_tags().clone(), None))
+}
+
+/// Warnings of what a file of metadata says.
+fn doubt_of_metadata(name: &str, problems: impl IntoIterator<Item = String>) {
+    problems.into_iter().for_each(|problem| register::doubt(format!("{name}: {problem}")));
 }
 
 /// What stored samples were multiplied with, which the metadata no longer say then. What the file itself says of it counts:

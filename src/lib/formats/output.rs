@@ -7,6 +7,7 @@ use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMA
 use super::format::U16_FULL_SCALE;
 use super::icc;
 use super::places::{STDOUT_NAME, named, sidecar_path};
+use super::register;
 use super::standard::open_stdout;
 use super::storing::Encoding;
 use super::tiff::{ExtraTag, TagValue, TiffSamples, TiffSettings, TiffTags, TiffWriter};
@@ -85,6 +86,9 @@ impl FrameWriter {
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
         let target = Target::open(options.path.as_deref(), needs_seek)?;
         let name = target.name().to_owned();
+        if matches!(encoding, Encoding::Exr(ExrSamples::F16, _)) {
+            doubt_of_codes(&name, header);
+        }
         let sidecar = target.named_file().map(|path| AtomicFile::create(&sidecar_path(path))).transpose()?;
         let record = sidecar.map(|sidecar| (SamplesDigest::new(), sidecar));
         let description = yaml::write_metadata(&header.metadata)?;
@@ -209,6 +213,22 @@ fn interop_id(header: &FrameHeader) -> Option<&'static str> {
 
 /// The tag of ICC profiles in TIFF.
 const ICC_PROFILE: u16 = 34675;
+
+/// A warning of codes that f16 rounds: it counts by ones to 2048, by twos to 4096 and so on.
+fn doubt_of_codes(name: &str, header: &FrameHeader) {
+    let white = header.metadata.white_level_adu.map(|white| white.largest());
+    let rounded = white.filter(|white| header.metadata.quantity == QuantityKind::Adu && *white > LARGEST_EXACT_F16);
+    if let Some(white) = rounded {
+        let step = 2_f64.powf((white / LARGEST_EXACT_F16).log2().ceil());
+        register::doubt(format!(
+            "{name}: f16 holds codes to {LARGEST_EXACT_F16} as they are, and rounds those above, by steps of {step} at the \
+             white level, {white} ADU; f32 keeps all"
+        ));
+    }
+}
+
+/// The largest whole number below which f16 has all.
+const LARGEST_EXACT_F16: f64 = 2048.0;
 
 /// What f16 rounds to infinity, from halfway between the largest f16 and the next power of two on.
 const F16_OVERFLOW: f32 = 65520.0;

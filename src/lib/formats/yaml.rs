@@ -125,14 +125,17 @@ fn check_keys(name: &str, raw: &Mapping, fields: Keys, parts: &[(&str, Keys)]) -
 ///
 /// [`Error::Format`] naming both.
 pub fn check_misspelt(name: &str, metadata: &Metadata) -> Result<()> {
+    misspelt(metadata).map_or(Ok(()), |problem| Err(Error::format(name, problem)))
+}
+
+/// The first unknown key of metadata that looks like a known one.
+pub fn misspelt(metadata: &Metadata) -> Option<String> {
     let known = field_names::<Metadata>();
-    for key in metadata.unknown.keys().filter_map(Value::as_str) {
+    metadata.unknown.keys().filter_map(Value::as_str).find_map(|key| {
         let typed = key.to_lowercase();
-        if let Some(nearest) = nearest(&typed, known.iter().copied(), |known| (known.len() / 4).min(2)) {
-            return Err(Error::format(name, format!("unknown key `{key}`; did you mean `{nearest}`?")));
-        }
-    }
-    Ok(())
+        let nearest = nearest(&typed, known.iter().copied(), |known| (known.len() / 4).min(2))?;
+        Some(format!("unknown key `{key}`; did you mean `{nearest}`?"))
+    })
 }
 
 /// [`parse_strict`] of a document with parts, each of which has keys of its own.

@@ -218,6 +218,28 @@ impl Metadata {
         self.exposure.and_then(Exposure::doubt).into_iter().chain(of_levels).chain(of_sensor).collect()
     }
 
+    /// What it says of the same thing in two ways that do not agree: a warning each.
+    pub fn contradictions(&self) -> Vec<String> {
+        let mut known = QuantityKind::ALL.into_iter().filter(|kind| *kind != QuantityKind::Unspecified);
+        let is_of_another = known.any(|kind| kind.unit() == self.unit);
+        let unit = (is_of_another && self.unit != self.quantity.unit()).then(|| {
+            format!(
+                "its unit is `{}`, but that of its quantity, {}, is `{}`",
+                self.unit,
+                self.quantity,
+                self.quantity.unit()
+            )
+        });
+        let of_sensor = || self.sensor.as_ref()?.readout.as_ref().map(|readout| readout.bias_adu);
+        let are_codes = self.quantity == QuantityKind::Adu && self.correction.is_none() && self.demosaic.is_none();
+        let bias = self.adc.map(|adc| adc.bias_adu).or_else(of_sensor).filter(|_| are_codes);
+        let black = self.black_level_adu.map(|level| level.sites().into_iter().fold(f64::INFINITY, f64::min));
+        let level = black.zip(bias).filter(|(black, bias)| *black < bias - 1.0).map(|(black, bias)| {
+            format!("its black level, {black} ADU, is below the bias of its converter, {bias} ADU")
+        });
+        unit.into_iter().chain(level).collect()
+    }
+
     /// Sets a black level that no row or column adds to.
     pub fn set_black_adu(&mut self, level: Option<BlackLevel>) {
         self.black_level_adu = level;

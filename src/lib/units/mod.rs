@@ -78,6 +78,23 @@ pub enum QuantityKind {
 }
 
 impl QuantityKind {
+    /// All of them.
+    pub const ALL: [Self; 13] = [
+        Self::Unspecified,
+        Self::SpectralRadiance,
+        Self::ExpectedElectrons,
+        Self::Electrons,
+        Self::Adu,
+        Self::Xyz,
+        Self::Xyy,
+        Self::Lab,
+        Self::Luv,
+        Self::Cct,
+        Self::Srgb,
+        Self::LinearSrgb,
+        Self::ColorDifference,
+    ];
+
     /// The unit of the samples, in ASCII.
     pub fn unit(self) -> &'static str {
         match self {
