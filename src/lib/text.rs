@@ -35,6 +35,7 @@ pub fn counted(count: u64, what: &str) -> String {
             ("signals", "signal"),
             ("values", "value"),
             ("colors", "color"),
+            ("bytes", "byte"),
         ],
         &[("are", "is"), ("were", "was"), ("have", "has"), ("had", "had")],
     ];

@@ -37,10 +37,12 @@ The usual pipeline:
 `cyanometer demo` runs it on skies that it carries; `PROGRAM --help` tells what each takes, as `cyanometer PROGRAM --help` does.
 ";
 
-/// Where a program stands: beside the one that runs.
+/// Where a program stands: beside the one that runs; as `cyanometer-PROGRAM` where a system keeps its plain name for any
+/// package's (Debian's alternatives).
 pub(super) fn beside(program: &str) -> Result<PathBuf> {
     let this = std::env::current_exe().map_err(|e| Error::disk(program, "find", e))?;
-    Ok(this.with_file_name(program))
+    let own = this.with_file_name(format!("{}-{program}", env!("CARGO_PKG_NAME")));
+    Ok(if own.is_file() { own } else { this.with_file_name(program) })
 }
 
 /// Becomes the program that the first word names, where there is one; the words behind it are its own. Where it cannot be

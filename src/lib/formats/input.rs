@@ -16,6 +16,7 @@ use crate::metadata::{FrameHeader, Metadata};
 use crate::stages::linearize::Linearize;
 use crate::stages::saturation::{MASK_BITS, MASK_LAYER, bits, samples_tell, with_mask};
 use crate::stream::RowSource;
+use crate::text::counted;
 use crate::units::QuantityKind;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -473,7 +474,7 @@ fn head_of(input: &mut File, name: &str) -> Result<Vec<u8>> {
 fn readers_of(head: &[u8], name: &str) -> Result<Readers> {
     table::by_head(head, name)?.ok_or_else(|| {
         let hint = if head.len() < 8 {
-            format!("; it has {} bytes and no more", head.len())
+            format!("; it has {} and no more", counted(head.len() as u64, "bytes"))
         } else if is_text(head) {
             "; it looks like text (a spectrum goes into `render-radiance`)".into()
         } else {
