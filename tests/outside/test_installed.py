@@ -77,7 +77,7 @@ class Packaged(BuiltCase):
     """An archive, and the package of Debian where cargo-deb is at hand."""
 
     def package(self, kind):
-        # A copy of the tree, as its commit is: target/package of the checkout is left alone.
+        # A copy of the tree, as its commit is: target/dist of the checkout is left alone.
         tree = self.directory / f"tree-{kind}"
         listed = run("git", "-C", ROOT, "ls-files", "--cached", "--others", "--exclude-standard").splitlines()
         for name in listed:
@@ -86,7 +86,7 @@ class Packaged(BuiltCase):
                 shutil.copy2(ROOT / name, tree / name)
         environment = dict(os.environ, CARGO_TARGET_DIR=str(ROOT / "target"), SOURCE_DATE_EPOCH="1700000000")
         run(tree / "scripts/package", kind, "--built", self.built, env=environment, cwd=tree)
-        return tree / "target/package"
+        return tree / "target/dist"
 
     def test_the_archive_holds_programs_and_every_licence(self):
         made = self.package("archive")

@@ -30,6 +30,7 @@ def first_of(*programs):
     return next((program for program in programs if shutil.which(program)), programs[-1])
 
 
+IMAGEJ = "/usr/share/java/ij.jar"
 MAGICK = first_of("magick", "convert-im6.q16", "convert")
 
 VIEWERS = [
@@ -47,7 +48,20 @@ VIEWERS = [
     Viewer("GIMP", "gimp-console-2.10",
            lambda frame, out: ["gimp-console-2.10", "-i", "-d", "-f", "-b", gimp_script(frame, out), "-b", "(gimp-quit 0)"],
            ["--version"], r"version ([\d.]+)"),
+    # Its version stands in the name of what is behind the link.
+    Viewer("ImageJ", "readlink", lambda frame, out: ["xvfb-run", "-a", "java", "-cp", IMAGEJ, "ij.ImageJ", "-batch",
+                                                     imagej_macro(out), f"{frame}|{out}"],
+           ["-f", IMAGEJ], r"ij-([\d.]+[a-z]?)\.jar", ("tiff",)),
 ]
+
+
+def imagej_macro(out):
+    """The file of a macro that writes what the window shows: three planes together, from their least sample to their largest."""
+    macro = out.parent / "show.ijm"
+    macro.write_text(
+        'words = split(getArgument(), "|"); open(words[0]); if (is("composite")) Stack.setDisplayMode("composite");'
+        'run("RGB Color"); saveAs("PNG", words[1]);\n', encoding="utf-8")
+    return macro
 
 
 def gimp_script(frame, out):
