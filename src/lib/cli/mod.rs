@@ -3,7 +3,9 @@
 mod advice;
 pub mod demo;
 mod documents;
+pub mod examples;
 mod general;
+mod help;
 mod history;
 mod memory;
 pub mod programs;
@@ -30,7 +32,7 @@ use crate::stages::darks::DarkFrames;
 use crate::stages::saturation::with_mask;
 use crate::stream::{Counts, RowSource, Stage};
 use crate::text::one_line;
-use clap::{ArgAction, Command, CommandFactory, FromArgMatches};
+use clap::{Command, CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -61,11 +63,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     memory::complain_as(program);
     signals::tidy_up_first();
     register::keep();
-    // `-1` is a value, of which the option says what is wrong.
-    let command = A::command().name(program).bin_name(program).mut_args(|argument| match argument.get_action() {
-        ArgAction::Set | ArgAction::Append if !argument.is_positional() => argument.allow_negative_numbers(true),
-        _ => argument,
-    });
+    let command = help::arranged(program, &A::command());
     if let Some(text) = documents::asked_for(std::env::args_os().skip(1), &command) {
         let text = text.map_err(Error::Usage);
         return ended(program, text.and_then(|text| show(|| std::io::stdout().write_all(&text))));

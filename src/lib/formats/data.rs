@@ -199,7 +199,9 @@ pub fn load_illuminant(name: &str) -> Result<Curve> {
     let d65 = "illuminants/cie_d65_1nm.csv";
     let path = Path::new(name);
     let curve = match (name, name.parse::<Illuminant>()) {
-        ("d65", _) => SpectralTable::parse(d65, built_in(d65).unwrap_or_default())?.curve(None)?,
+        (name, _) if name.eq_ignore_ascii_case("d65") => {
+            SpectralTable::parse(d65, built_in(d65).unwrap_or_default())?.curve(None)?
+        }
         (_, Ok(light)) => {
             let daylight = load_daylight()?;
             let components = |nm| daylight.each_ref().map(|component| component.at(nm));
