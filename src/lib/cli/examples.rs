@@ -96,7 +96,7 @@ pub const EXAMPLES: [(&str, &[Example]); 14] = [
             example("Sensor RGB, with a standard deviation for each pixel", "demosaic --sigma plane.tiff -o rgb.exr"),
             example(
                 "Another program's plane, which says neither pattern nor black level",
-                "demosaic --method mhc --cfa rggb --black 64 foreign.tiff -o rgb2.exr",
+                "demosaic --method mhc --cfa rggb --black 64 foreign.png -o rgb2.exr",
             ),
         ],
     ),
