@@ -12,8 +12,9 @@ use support::workshop::{BAD_USAGE, Workshop, path_of, programs};
 
 /// What the examples name and no example makes: dark frames, another program's plane, a second raw file, frames to compare.
 const SET_UP: &str = "
+time=$(sed -n 's/.*exposure_s: *//p' plane.tiff.yaml | head -n 1)
 for i in 1 2; do
-  render-radiance --dark --size 640x480 | add-noise --frame $i | digitize | mosaic -o d$i.exr
+  render-radiance --dark --exposure $time --size 640x480 | add-noise --frame $i | digitize | mosaic -o d$i.exr
 done
 cp plane.dng plane2.dng
 
@@ -169,7 +170,7 @@ fn a_filter_array_has_one_option_by_two_names() {
     for program in ["add-noise", "digitize", "correct-frame", "demosaic", "measure"] {
         for option in ["--cfa gbrg", "--pattern gbrg", "--cfa gbrg --pattern GBRG"] {
             let made = if program == "measure" { "-o report.txt" } else { "-o made.exr" };
-            let input = if ["add-noise", "measure"].contains(&program) { "one.exr" } else { "codes.exr" };
+            let input = if ["add-noise", "digitize", "measure"].contains(&program) { "one.exr" } else { "codes.exr" };
             shop.pipe("add-noise one.exr | digitize -o codes.exr");
             shop.run(&format!("{program} {input} {option} {made}"), &[]);
         }

@@ -89,7 +89,9 @@ pub(super) fn arranged(program: &'static str, command: &Command) -> Command {
             if takes_values && !argument.is_positional() { argument.allow_negative_numbers(true) } else { argument };
         argument.help_heading(place.map(|place| GROUPS[place].0))
     });
-    let mut made = Command::new(program).bin_name(program).disable_help_flag(true).disable_version_flag(true);
+    let version = env!("CARGO_PKG_VERSION");
+    let mut made =
+        Command::new(program).bin_name(program).version(version).disable_help_flag(true).disable_version_flag(true);
     if let Some(about) = command.get_about() {
         made = made.about(about.clone());
     }
