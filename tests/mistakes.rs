@@ -386,7 +386,7 @@ const MISTAKES: [(&str, i32, &str); 103] = [
     (
         "fit-matrix SAMPLES/skies/sky912.exr --white-sample 3",
         BAD_USAGE,
-        "sky-rad-ls keeps no sample exact; leave out --white-sample, or choose another --method",
+        "sky-rad-ls keeps no sample exact; leave out --white-sample, or choose another --regression",
     ),
     (
         "fit-matrix SAMPLES/skies/sky912.exr --method max-ign-sppls --train 20",

@@ -5,13 +5,15 @@
 mod support;
 
 use cyanometer::analysis::characterization::CameraMatrix;
-use cyanometer::formats::yaml::{parse_metadata, parse_sensor, parse_strict};
+use cyanometer::formats::keys::KeyPage;
+use cyanometer::formats::yaml::{parse_matrix, parse_metadata, parse_sensor, parse_strict};
 use cyanometer::metadata::METADATA_TEMPLATE;
+use cyanometer::names::Named;
 use support::TREE;
-use support::workshop::Workshop;
+use support::workshop::{BAD_DATA, Workshop};
 
 /// What no user should have to know.
-const FOREIGN: [&str; 23] = [
+const FOREIGN: [&str; 31] = [
     "invalid type",
     "invalid value",
     "invalid length",
@@ -35,6 +37,35 @@ const FOREIGN: [&str; 23] = [
     "invalid float literal",
     "deserializ",
     "duplicate entry",
+    "did not find",
+    "mapping values",
+    "while parsing",
+    "while scanning",
+    "cannot start any token",
+    "end of stream",
+    "expected one of",
+    "recursion limit",
+];
+
+/// Lines that are no YAML, or none that is meant.
+const NO_YAML: [&str; 17] = [
+    "key value",
+    "\tkey: 1",
+    "key: 'x",
+    "key: \"x",
+    "key: [1",
+    "key: {a: 1",
+    "key: @x",
+    "key: `x`",
+    "key: a: b",
+    "- 1",
+    "key: \"\\q\"",
+    "key: *x",
+    "key: - 1",
+    "%TAG",
+    "key: 'a' b",
+    "<<: 1",
+    "key: ]",
 ];
 
 /// What stands where something else belongs.
@@ -103,6 +134,65 @@ fn damaged_files_are_refused_in_plain_words() {
         check(parse_strict::<CameraMatrix>("x.yaml", text.as_bytes()).err().map(|error| error.to_string()), &text);
     }
     assert!(refused > 300, "{refused}");
+}
+
+#[test]
+fn what_is_no_yaml_is_refused_in_plain_words() {
+    let mut refused = 0;
+    for page in KeyPage::ALL {
+        let lines: Vec<&str> = page.template().lines().collect();
+        for index in 0..lines.len() {
+            for wrong in NO_YAML {
+                let mut lines = lines.clone();
+                lines[index] = wrong;
+                let text = lines.join("\n");
+                let complaint = match page {
+                    KeyPage::Sensor => parse_sensor("s.yaml", text.as_bytes()).err(),
+                    KeyPage::Matrix => parse_matrix("m.yaml", text.as_bytes()).err(),
+                    KeyPage::Metadata => parse_metadata("f.yaml", &text).err(),
+                };
+                if let Some(complaint) = complaint {
+                    is_plain(&complaint.to_string(), &text);
+                    refused += 1;
+                }
+            }
+        }
+    }
+    assert!(refused > 500, "{refused}");
+}
+
+#[test]
+fn files_in_place_of_others_are_called_by_their_kind() {
+    let shop = Workshop::new();
+    for page in ["sensor", "matrix"] {
+        let text = shop.run(&format!("cyanometer template {page}"), &[]);
+        std::fs::write(shop.path(&format!("{page}.yaml")), text).unwrap();
+    }
+    let sensor = String::from_utf8(shop.bytes("sensor.yaml")).unwrap();
+    let curves = sensor.replace("# response:", "response:").replace("#   quantum_efficiency", "  quantum_efficiency");
+    std::fs::write(shop.path("curves.yaml"), curves).unwrap();
+    std::fs::write(shop.path("factor.csv"), "wavelength (nm),radiance x1000 [W m-2 sr-1 nm-1]\n400,1\n700,1\n")
+        .unwrap();
+    for (line, wanted) in [
+        (
+            "predict-noise --electrons 1,2,3 --sensor matrix.yaml",
+            "matrix.yaml: it is a matrix file, for --matrix; a sensor file",
+        ),
+        (
+            "predict-noise --electrons 1,2,3 --matrix sensor.yaml",
+            "sensor.yaml: it is a sensor file, for --sensor; a matrix file",
+        ),
+        (
+            "predict-noise --electrons 1,2,3 --sensor curves.yaml",
+            "curves.yaml: it names a file that is not read: qe.csv: cannot open",
+        ),
+        ("render-radiance factor.csv -o no.exr", "`radiance x1000 [W m-2 sr-1 nm-1]`, a radiance beside a factor"),
+    ] {
+        let done = shop.attempt(line, &[]);
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.code() == Some(BAD_DATA) && said.contains(wanted), "{line}: {said}");
+        is_plain(&said, line);
+    }
 }
 
 #[test]

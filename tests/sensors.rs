@@ -256,7 +256,7 @@ const COMPLAINTS: [(&str, &str); 20] = [
     ),
     (
         "mosaic mono.exr",
-        "mono.exr: its sensor has no color filters (monochrome); mosaics are made of Bayer arrays alone, such as --pattern \
+        "mono.exr: its sensor has no color filters (monochrome); mosaics are made of Bayer arrays alone, such as --cfa \
          rggb",
     ),
     (

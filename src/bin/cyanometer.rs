@@ -1,7 +1,7 @@
 //! `cyanometer`: the front door to the other programs.
 
 use clap::Parser;
-use cyanometer::cli::{self, demo, programs};
+use cyanometer::cli::{self, demo, pages, programs};
 use cyanometer::error::{Error, Result};
 use std::ffi::OsString;
 use std::path::Path;
@@ -10,18 +10,24 @@ use std::process::ExitCode;
 #[global_allocator]
 static MEMORY: cli::Memory = cli::Memory;
 
-/// List the programs, run one of them, or run a demonstration
+/// List the programs, run one of them, or tell what is known by name and what files hold
 ///
 /// Without arguments the programs are listed, each with what it does. The name of a program runs it with the arguments behind the
-/// name. `demo` runs the chain on skies that this program carries and shows each command; the directory that takes the files may
-/// be named, and is `cyanometer-demo` otherwise.
+/// name.
+///
+/// `demo [DIRECTORY]` runs the chain on skies that this program carries and shows each command; the directory that takes the
+/// files is `cyanometer-demo` unless it is named.
+///
+/// `list [sensors|matrices|observers|spectra|illuminants|charts]` tells which are known, where they were found, and what each is.
+///
+/// `keys [sensor|matrix|metadata]` describes all keys of such files; `template sensor|matrix|metadata` prints one to begin with.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
-    /// Program to run
-    #[arg(value_parser = programs::PROGRAMS.into_iter().chain([programs::DEMO]).collect::<Vec<_>>())]
+    /// Program to run, or what to do
+    #[arg(value_parser = programs::PROGRAMS.into_iter().chain(programs::OWN).collect::<Vec<_>>())]
     program: Option<String>,
-    /// Arguments of the program; of demo, a directory that is empty or new
+    /// Arguments of the program
     arguments: Vec<OsString>,
 }
 
@@ -34,9 +40,12 @@ fn main() -> ExitCode {
 fn run(Arguments { program, arguments }: &Arguments) -> Result<()> {
     match (program.as_deref(), &arguments[..]) {
         (None, _) => programs::list(),
-        (Some(programs::DEMO), []) => demo::run(Path::new("cyanometer-demo")),
-        (Some(programs::DEMO), [directory]) => demo::run(Path::new(directory)),
-        (Some(programs::DEMO), _) => Err(Error::Usage("demo takes one directory".into())),
+        (Some("demo"), []) => demo::run(Path::new("cyanometer-demo")),
+        (Some("demo"), [directory]) => demo::run(Path::new(directory)),
+        (Some("demo"), _) => Err(Error::Usage("demo takes one directory".into())),
+        (Some("list"), words) => pages::list(words),
+        (Some("keys"), words) => pages::keys(words),
+        (Some("template"), words) => pages::template(words),
         (Some(program), words) => Err(programs::become_program(program, words)),
     }
 }

@@ -1,7 +1,6 @@
 //! `demosaic`: sensor RGB from a CFA plane.
 
 use clap::Parser;
-use cyanometer::cfa::CfaPattern;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::names::Named;
@@ -29,14 +28,11 @@ struct Arguments {
     #[command(flatten)]
     described: Described,
     /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
-    #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>())]
+    #[arg(long, default_value = Method::default().name(), value_parser = values::demosaicking())]
     method: Method,
     /// Black level to remove: auto (from the metadata), none, or a number in the unit of the samples
     #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = values::black)]
     black: Black,
-    /// Pattern of a plane that carries none: rggb, bggr, grbg or gbrg
-    #[arg(long, value_parser = values::pattern)]
-    pattern: Option<CfaPattern>,
     /// Add a layer with the standard deviation of each pixel, from the sensor's noise model at the pixel's own level
     #[arg(long)]
     sigma: bool,
@@ -56,8 +52,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut reader = arguments.described.open(&arguments.input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
-    arguments.pattern.map_or(Ok(()), |pattern| described::check_pattern(reader.header(), pattern))?;
-    let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, arguments.pattern)?;
+    let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, None)?;
     session.tell(described::doubt_of_black(reader.header(), arguments.black)?.as_slice());
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());

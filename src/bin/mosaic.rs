@@ -1,7 +1,7 @@
 //! `mosaic`: one CFA plane from three.
 
 use clap::Parser;
-use cyanometer::cfa::CfaPattern;
+use cyanometer::cfa::FilterArray;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::requests::{described::DescribedInput, options, values};
@@ -18,12 +18,13 @@ static MEMORY: cli::Memory = cli::Memory;
 /// the mosaic is made, so making it first saves two thirds of the work.
 #[derive(Parser)]
 #[command(version)]
+#[command(mut_arg("cfa", |option| option.value_parser(values::bayer).help(
+    "Pattern to make, at the sensor's corner: rggb, bggr, grbg or gbrg; by default the sensor's, or rggb"
+)))]
+#[command(mut_arg("pattern", |option| option.value_parser(values::bayer)))]
 struct Arguments {
     #[command(flatten)]
     input: DescribedInput,
-    /// Pattern at the sensor's corner: rggb, bggr, grbg or gbrg; by default the sensor's, or rggb
-    #[arg(long, value_parser = values::pattern)]
-    pattern: Option<CfaPattern>,
     #[command(flatten)]
     output: options::Output,
     #[command(flatten)]
@@ -36,8 +37,8 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let reader = arguments.input.open()?;
-    let mut stage = Mosaic::new(reader.header(), arguments.pattern)?;
+    let (reader, array) = arguments.input.open_planes()?;
+    let mut stage = Mosaic::new(reader.header(), array.and_then(FilterArray::bayer))?;
     session.sign(stage.header_mut());
     session.drive(reader, &stage, &arguments.output)?;
     Ok(())

@@ -225,7 +225,7 @@ class Stages(Errors):
 
     def test_plane_without_a_pattern(self):
         write_planes(self.path("plane.tif"), {"Y": np.ones((6, 6), np.uint16)}, "u16")
-        self.refused(["demosaic", "plane.tif", "--black", "none"], (1, 2), "plane.tif", "--pattern")
+        self.refused(["demosaic", "plane.tif", "--black", "none"], (1, 2), "plane.tif", "--cfa")
 
 
 class SmallFrames(Errors):

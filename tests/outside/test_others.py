@@ -118,7 +118,7 @@ class Tiff(Others):
         self.refused([*BI, "x.tif", "--black", "0"], "an X-Trans filter array")
         self.write("unknown.tif", codes, b"\0\1\1\x09")
         self.assertIn("its color filter array is passed over", self.told("unknown.tif"))
-        self.refused([*BI, "unknown.tif", "--black", "0"], "`cfa`", "--pattern")
+        self.refused([*BI, "unknown.tif", "--black", "0"], "`cfa`", "--cfa")
 
 
 class Png(Others):

@@ -4,7 +4,7 @@ use crate::error::Error;
 use clap::Command;
 
 /// What supplies a key that metadata lack, the better choice first; it counts where the program has all its options.
-const SUPPLIES: [(&str, &str); 13] = [
+const SUPPLIES: [(&str, &str); 12] = [
     ("sensor", "--sensor NAME|FILE, or all of --bits, --bias and --slope"),
     ("sensor.readout", "a sensor that has it, --sensor NAME|FILE"),
     ("sensor.response", "a sensor that has it, --sensor NAME|FILE"),
@@ -15,7 +15,6 @@ const SUPPLIES: [(&str, &str); 13] = [
     ("black_level_adu", "--black N, 0 where it is off already"),
     ("dark_signal_e", "--black N, 0 where it is off already"),
     ("adc", "--black N, or --black auto where the level is known"),
-    ("cfa", "--pattern rggb|bggr|grbg|gbrg"),
     ("cfa", "--cfa PATTERN"),
     ("color.white", "--white-luminance CD_PER_M2"),
 ];

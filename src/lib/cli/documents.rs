@@ -1,6 +1,7 @@
 //! What is made of a program's definition of its arguments, and printed instead of running: its manual page, completions for
 //! shells, its line in a list of programs.
 
+use super::examples;
 use clap::Command;
 use clap_complete::Shell;
 use clap_mangen::Man;
@@ -35,7 +36,10 @@ fn manual(command: &Command) -> io::Result<Vec<u8>> {
     let project = env!("CARGO_PKG_NAME");
     let mut page = Vec::new();
     let source = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
+    // Examples are a section of their own.
+    let command = command.clone().after_long_help(None::<&str>);
     Man::new(command.clone()).source(source).manual(project).render(&mut page)?;
+    page.extend(examples::roff(command.get_name()).bytes());
     if command.get_name() != project {
         page.extend(format!(".SH \"SEE ALSO\"\n\\fB{project}\\fR(1)\n").bytes());
     }

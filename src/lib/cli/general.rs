@@ -32,8 +32,7 @@ impl Named for ProgressWhen {
 /// How the program runs and talks.
 #[derive(Debug, Clone, Default, Args)]
 pub struct General {
-    /// Threads to use; by default one where frames come or go through a pipe, as each program of a pipeline has its own, and
-    /// otherwise all. The result does not depend on it
+    /// Threads to use; by default all, and one where frames come or go through a pipe. The result does not depend on it
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
     /// Whether frames come or go through a pipe.
@@ -48,6 +47,9 @@ pub struct General {
     /// Progress bar on standard error
     #[arg(long, value_name = "WHEN", default_value = ProgressWhen::default().name(), value_parser = values::choice::<ProgressWhen>())]
     pub progress: ProgressWhen,
+    /// Print all keys of sensor files, matrix files and metadata, with units; `cyanometer template` prints files to begin with
+    #[arg(long)]
+    pub describe_keys: bool,
 }
 
 impl General {

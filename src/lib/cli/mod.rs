@@ -3,9 +3,12 @@
 mod advice;
 pub mod demo;
 mod documents;
+pub mod examples;
 mod general;
+mod help;
 mod history;
 mod memory;
+pub mod pages;
 pub mod programs;
 mod signals;
 mod usage;
@@ -19,7 +22,7 @@ use crate::formats::atomic::remove_pending_now;
 use crate::formats::input::FrameReader;
 use crate::formats::output::FrameWriter;
 use crate::formats::places::STDOUT_NAME;
-use crate::formats::{register, standard};
+use crate::formats::{keys, register, standard};
 use crate::masking::Masking;
 use crate::metadata::{FrameHeader, METADATA_TEMPLATE};
 use crate::numerics::vectors::Instructions;
@@ -30,7 +33,7 @@ use crate::stages::darks::DarkFrames;
 use crate::stages::saturation::with_mask;
 use crate::stream::{Counts, RowSource, Stage};
 use crate::text::one_line;
-use clap::{ArgAction, Command, CommandFactory, FromArgMatches};
+use clap::{Command, CommandFactory, FromArgMatches};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -61,17 +64,15 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     memory::complain_as(program);
     signals::tidy_up_first();
     register::keep();
-    // `-1` is a value, of which the option says what is wrong.
-    let command = A::command().name(program).bin_name(program).mut_args(|argument| match argument.get_action() {
-        ArgAction::Set | ArgAction::Append if !argument.is_positional() => argument.allow_negative_numbers(true),
-        _ => argument,
-    });
+    let command = help::arranged(program, &A::command());
     if let Some(text) = documents::asked_for(std::env::args_os().skip(1), &command) {
         let text = text.map_err(Error::Usage);
         return ended(program, text.and_then(|text| show(|| std::io::stdout().write_all(&text))));
     }
-    if asks_for_template(&command) {
-        return ended(program, show(|| std::io::stdout().write_all(METADATA_TEMPLATE.as_bytes())));
+    for (option, text) in [("metadata_template", METADATA_TEMPLATE), ("describe_keys", &keys::tables())] {
+        if asks_for(option, &command) {
+            return ended(program, show(|| std::io::stdout().write_all(text.as_bytes())));
+        }
     }
     let parsed = command.version(version(program)).try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
     let arguments = match parsed {
@@ -105,9 +106,9 @@ fn version(program: &str) -> &'static str {
     String::leak(format!("{project}{}{commit}", env!("CARGO_PKG_VERSION")))
 }
 
-/// Whether a template of metadata is wanted, whatever else the program would need.
-fn asks_for_template(command: &Command) -> bool {
-    let option = command.get_arguments().find(|argument| argument.get_id() == "metadata_template");
+/// Whether a text is wanted that an option prints, whatever else the program would need.
+fn asks_for(id: &str, command: &Command) -> bool {
+    let option = command.get_arguments().find(|argument| argument.get_id() == id);
     let long = option.and_then(|option| option.get_long()).map(|long| format!("--{long}"));
     long.is_some_and(|long| std::env::args_os().skip(1).take_while(|word| word != "--").any(|word| *word == *long))
 }

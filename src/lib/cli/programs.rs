@@ -25,8 +25,8 @@ pub const PROGRAMS: [&str; 13] = [
     "color-difference",
     "preview",
 ];
-/// What the front door does itself.
-pub const DEMO: &str = "demo";
+/// What the front door does itself: a demonstration, and pages.
+pub const OWN: [&str; 4] = ["demo", "list", "keys", "template"];
 
 /// Behind the list of programs.
 const USUAL: &str = "
@@ -34,7 +34,9 @@ The usual pipeline:
   fit-matrix skies.exr -o matrix.yaml
   render-radiance sky.csv | add-noise --seed 7 | digitize | mosaic | demosaic | to-xyz --matrix matrix.yaml -o xyz.exr
 
-`cyanometer demo` runs it on skies that it carries; `PROGRAM --help` tells what each takes, as `cyanometer PROGRAM --help` does.
+`cyanometer demo` runs it on skies that it carries; `cyanometer list` tells which sensors, spectra, lights and charts are known,
+`cyanometer keys` what sensor files, matrix files and metadata may hold, and `cyanometer template sensor|matrix|metadata` prints
+such a file to begin with. `PROGRAM --help` tells what each takes, as `cyanometer PROGRAM --help` does, with examples.
 ";
 
 /// Where a program stands: beside the one that runs; as `cyanometer-PROGRAM` where a system keeps its plain name for any

@@ -35,7 +35,8 @@ pub enum Illuminant {
 }
 
 impl Illuminant {
-    const NAMED: [(&'static str, Self); 6] = [
+    /// Those that have a name.
+    pub const NAMED: [(&'static str, Self); 6] = [
         ("a", Self::A),
         ("d50", Self::D50),
         ("d55", Self::D55),

@@ -20,7 +20,7 @@ pub const DATA_VARIABLE: &str = "CYANOMETER_DATA";
 pub const DEFAULT_SENSOR: &str = "kaf-5101ce";
 
 /// Files that every program carries, by their place in `sample_data`.
-const BUILT_IN: [(&str, &[u8]); 8] = [
+pub(super) const BUILT_IN: [(&str, &[u8]); 8] = [
     ("sensors/kaf-5101ce.yaml", include_bytes!("../../../sample_data/sensors/kaf-5101ce.yaml")),
     ("sensors/kaf5101ce_est_qe_1nm.csv", include_bytes!("../../../sample_data/sensors/kaf5101ce_est_qe_1nm.csv")),
     ("sensors/bg39_1mm.csv", include_bytes!("../../../sample_data/sensors/bg39_1mm.csv")),
@@ -86,7 +86,7 @@ pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
             Some((Place::BuiltIn, bytes)) => (Place::BuiltIn, format!("sensor {name}"), bytes),
             None => {
                 return Err(Error::Usage(format!(
-                    "there is no sensor `{name}`; known are {}; for a file of your own give its path, ending in .yaml",
+                    "there is no sensor `{name}`; known are {} (`cyanometer list`); for a file of your own give its path, ending in .yaml",
                     known_sensors().join(", ")
                 )));
             }
@@ -143,7 +143,7 @@ fn load_curves(
 /// [`Error::Disk`] and [`Error::Format`].
 pub fn load_matrix(path: &Path) -> Result<CameraMatrix> {
     let shown = path.display().to_string();
-    let matrix: CameraMatrix = yaml::parse_strict(&shown, &read_file(path)?)?;
+    let matrix = yaml::parse_matrix(&shown, &read_file(path)?)?;
     matrix.check().map_err(|problem| Error::format(&shown, problem))?;
     Ok(matrix)
 }
@@ -199,7 +199,9 @@ pub fn load_illuminant(name: &str) -> Result<Curve> {
     let d65 = "illuminants/cie_d65_1nm.csv";
     let path = Path::new(name);
     let curve = match (name, name.parse::<Illuminant>()) {
-        ("d65", _) => SpectralTable::parse(d65, built_in(d65).unwrap_or_default())?.curve(None)?,
+        (name, _) if name.eq_ignore_ascii_case("d65") => {
+            SpectralTable::parse(d65, built_in(d65).unwrap_or_default())?.curve(None)?
+        }
         (_, Ok(light)) => {
             let daylight = load_daylight()?;
             let components = |nm| daylight.each_ref().map(|component| component.at(nm));
@@ -248,7 +250,9 @@ fn read_beside(place: &Place, sensor: &str, file: &str) -> Result<(String, Vec<u
             if std::fs::metadata(&path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
                 return Err(Error::format(&shown, "it is no file but a pipe or a device; a table must be a file"));
             }
-            Ok((shown, read_file(&path)?))
+            let bytes = read_file(&path)
+                .map_err(|error| Error::format(sensor, format!("it names a file that is not read: {error}")))?;
+            Ok((shown, bytes))
         }
         Place::BuiltIn => match built_in(&format!("sensors/{file}")) {
             Some(bytes) => Ok((file.to_owned(), bytes.to_vec())),
@@ -262,7 +266,7 @@ fn built_in(file: &str) -> Option<&'static [u8]> {
 }
 
 /// Directories that may hold data files, first to last.
-fn directories() -> Vec<PathBuf> {
+pub(super) fn directories() -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> =
         std::env::var_os(DATA_VARIABLE).map(|list| std::env::split_paths(&list).collect()).unwrap_or_default();
     if let Ok(program) = std::env::current_exe() {

@@ -59,8 +59,71 @@ pub fn yaml_problem(error: &serde_yaml::Error) -> String {
     match misfit(&text) {
         Some(problem) => problem,
         None if text.contains("more than one document") => "it holds more than one document; leave one".into(),
-        None => format!("it is not as expected: {text}"),
+        None => not_yaml(&text).unwrap_or_else(|| format!("it is not as expected: {text}")),
     }
+}
+
+/// A complaint about what is no YAML at all, in our words, with the place; none for another.
+fn not_yaml(text: &str) -> Option<String> {
+    /// What the parser says, what it means, and whether the place is that where the thing began.
+    const MEANINGS: [(&str, &str, bool); 13] = [
+        (
+            "mapping values are not allowed",
+            "a colon and a blank stand within a value, or a key is indented more than those above it; put the value in quotes, or indent keys alike",
+            false,
+        ),
+        (
+            "did not find expected key",
+            "a key and a colon are wanted; keys side by side are indented alike, and a value with quotes in it stands wholly in quotes",
+            false,
+        ),
+        ("did not find expected ',' or ']'", "a list in brackets lacks a comma or its `]`", true),
+        ("did not find expected ',' or '}'", "keys in braces lack a comma or their `}`", true),
+        ("did not find expected '-' indicator", "an entry of the list, which begins with `- `, is wanted", false),
+        ("could not find expected ':'", "a key lacks its colon", false),
+        ("did not find expected node content", "a value is missing, or brackets are not closed", false),
+        (
+            "cannot start any token",
+            "a tab, or a value that begins with a character such as @, % or `; indent by blanks, and put the value in quotes",
+            false,
+        ),
+        ("tab character", "a tab; indent by blanks", false),
+        ("unexpected end of stream", "a quote that is not closed", true),
+        (
+            "block sequence entries are not allowed",
+            "an entry of a list stands where none can; begin it on a line of its own",
+            false,
+        ),
+        ("unknown escape character", "a backslash within double quotes; use single quotes", false),
+        ("EOF while parsing", "it ends where something is wanted", false),
+    ];
+    const SIGNS: [&str; 13] = [
+        "did not find ",
+        "could not find ",
+        "found ",
+        "mapping ",
+        "block ",
+        "while ",
+        "control characters",
+        "invalid ",
+        "incomplete ",
+        "unknown anchor",
+        "recursion limit",
+        "repetition limit",
+        "expected a mapping",
+    ];
+    let known = MEANINGS.iter().find(|(said, ..)| text.contains(said));
+    if known.is_none() && !SIGNS.iter().any(|sign| text.starts_with(sign)) {
+        return None;
+    }
+    let places = text.match_indices(" at line ").map(|(at, begin)| {
+        let place = &text[at + begin.len()..];
+        place.split(',').next().unwrap_or_default().replace(" column ", ", column ")
+    });
+    let places: Vec<String> = places.collect();
+    let place = if known.is_some_and(|(.., is_begin)| *is_begin) { places.last() } else { places.first() };
+    let place = place.map_or(String::new(), |place| format!(" (line {place})"));
+    Some(format!("it is no valid YAML{}{place}", known.map_or(String::new(), |(_, meaning, _)| format!(": {meaning}"))))
 }
 
 /// A complaint of the crate `serde` in our words: a path of keys, what does not fit its type, and the place. None for another.
@@ -270,10 +333,15 @@ mod tests {
             ("bits: {a: 1}\n", "`bits` is a list of keys and values, not a whole number from 0 on (line 1, column 7)"),
             ("bits: 12\n---\nbits: 14\n", "it holds more than one document; leave one"),
             ("{}\n", "it has no `bits`"),
+            ("bits: [\n", "it is no valid YAML: a value is missing, or brackets are not closed (line 2, column 1)"),
+            ("bits: [12\n", "it is no valid YAML: a list in brackets lacks a comma or its `]` (line 1, column 7)"),
+            ("bits: \"12\n", "it is no valid YAML: a quote that is not closed (line 1, column 7)"),
             (
-                "bits: [\n",
-                "it is not as expected: did not find expected node content at line 2 column 1, while parsing a flow node",
+                "bits: a: 12\n",
+                "it is no valid YAML: a colon and a blank stand within a value, or a key is indented more than those above it; put \
+                 the value in quotes, or indent keys alike (line 1, column 8)",
             ),
+            ("bits: 12\nwidth 3\n", "it is no valid YAML: a key lacks its colon (line 3, column 1)"),
         ] {
             assert_eq!(refused(text), format!("s.yaml: {wanted}"));
         }

@@ -16,6 +16,8 @@ pub mod format;
 pub mod headerless;
 mod icc;
 pub mod input;
+pub mod inventory;
+pub mod keys;
 mod ljpeg;
 pub mod makers;
 pub mod many;

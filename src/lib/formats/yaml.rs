@@ -1,12 +1,14 @@
 //! YAML, read with limits: metadata, sensors and matrices all come through here.
 
 use super::foreign::{yaml_complaint, yaml_problem};
+use super::keys::KeyPage;
 use super::{yaml_guard, yaml_writer};
+use crate::analysis::characterization::{CameraMatrix, MATRIX_SCHEMA};
 use crate::camera::readout::ReadOut;
 use crate::camera::sensor::{FLAT_SENSOR_SCHEMA, FlatSensor, ResponseFiles, SENSOR_SCHEMA, Sensor};
 use crate::error::{Error, Result};
 use crate::metadata::{METADATA_SCHEMA, Metadata};
-use crate::names::nearest;
+use crate::names::{Named, nearest};
 use serde::Serialize;
 use serde::de::{DeserializeOwned, Deserializer, Visitor, value};
 use serde_yaml::{Mapping, Value};
@@ -56,6 +58,7 @@ pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -
 /// As [`parse_strict`].
 pub fn parse_sensor(name: &str, bytes: &[u8]) -> Result<Sensor> {
     let raw = parse_raw(name, checked_text(name, bytes)?)?;
+    check_schema(name, &raw, KeyPage::Sensor)?;
     if !is_flat(&raw) {
         let schema = raw.get("schema").and_then(Value::as_str);
         if let Some(other) = schema.filter(|schema| *schema != SENSOR_SCHEMA) {
@@ -70,13 +73,53 @@ pub fn parse_sensor(name: &str, bytes: &[u8]) -> Result<Sensor> {
     parse_strict::<FlatSensor>(name, bytes).map(Sensor::from)
 }
 
+/// Reads a matrix file; unknown keys are errors as for [`parse_strict`].
+///
+/// # Errors
+///
+/// As [`parse_strict`], and for files of another kind.
+pub fn parse_matrix(name: &str, bytes: &[u8]) -> Result<CameraMatrix> {
+    check_schema(name, &parse_raw(name, checked_text(name, bytes)?)?, KeyPage::Matrix)?;
+    parse_strict(name, bytes)
+}
+
+/// Makes sure that a file says what it is, and that it is nothing else of ours.
+fn check_schema(name: &str, raw: &Mapping, wanted: KeyPage) -> Result<()> {
+    /// What schemas begin with, and what is wanted there.
+    const KINDS: [(KeyPage, &str, &str, &str); 3] = [
+        (KeyPage::Sensor, "cyanometer-sensor/", "a sensor file, for --sensor", SENSOR_SCHEMA),
+        (KeyPage::Matrix, "cyanometer-matrix/", "a matrix file, for --matrix", MATRIX_SCHEMA),
+        (KeyPage::Metadata, "cyanometer/", "the metadata of a frame, for --metadata", METADATA_SCHEMA),
+    ];
+    let [(.., kind, schema)] = KINDS.iter().filter(|(page, ..)| *page == wanted).collect::<Vec<_>>()[..] else {
+        return Ok(());
+    };
+    let kind = kind.split(',').next().unwrap_or_default();
+    match raw.get("schema") {
+        None | Some(Value::Null) => Err(Error::format(
+            name,
+            format!(
+                "it has no `schema`; {kind} begins with `schema: {schema}`, as `cyanometer template {}` shows",
+                wanted.name()
+            ),
+        )),
+        Some(found) => {
+            let is_of = |begin: &str| found.as_str().is_some_and(|found| found.starts_with(begin));
+            let other = KINDS.iter().find(|(page, begin, ..)| *page != wanted && is_of(begin));
+            other.map_or(Ok(()), |(_, _, other, _)| {
+                Err(Error::format(name, format!("it is {other}; {kind} is wanted here")))
+            })
+        }
+    }
+}
+
 /// The parts of a sensor and their keys.
 fn sensor_parts() -> [(&'static str, Keys); 2] {
     [("readout", field_names::<ReadOut>()), ("response", field_names::<ResponseFiles>())]
 }
 
 /// Names of keys.
-type Keys = &'static [&'static str];
+pub(super) type Keys = &'static [&'static str];
 
 /// Whether a sensor has all its keys side by side.
 fn is_flat(sensor: &Mapping) -> bool {
@@ -164,6 +207,7 @@ fn parse_parts<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8], parts:
 pub fn parse_metadata(name: &str, text: &str) -> Result<Metadata> {
     let text = checked_text(name, text.as_bytes())?;
     let mut raw = parse_raw(name, text)?;
+    check_schema(name, &raw, KeyPage::Metadata)?;
     let mut text = std::borrow::Cow::from(text);
     if let Some(sensor) = raw.get("sensor").and_then(Value::as_mapping).filter(|sensor| is_flat(sensor)) {
         let wrong = |error| Error::format(name, format!("in `sensor`, {}", yaml_problem(&error)));
@@ -265,7 +309,7 @@ fn merge(into: &mut Mapping, unknown: &Mapping) {
 }
 
 /// The names of a struct's fields, as its derived `Deserialize` asks for them.
-fn field_names<T: DeserializeOwned>() -> Keys {
+pub(super) fn field_names<T: DeserializeOwned>() -> Keys {
     struct Ask<'a>(&'a mut &'static [&'static str]);
     impl<'de> Deserializer<'de> for Ask<'_> {
         type Error = value::Error;

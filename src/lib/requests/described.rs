@@ -5,13 +5,14 @@ use super::options::Input;
 use super::values;
 use crate::camera::levels::BlackLevel;
 use crate::camera::optics::Exposure;
-use crate::cfa::{CfaPattern, FilterArray};
+use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::stages::black::Black;
 use crate::units::QuantityKind;
 use clap::Args;
+use std::fmt::Display;
 
 /// Exposures that differ by no more than this are the same, written with other digits.
 const SAME_EXPOSURE: f64 = 1e-6;
@@ -22,6 +23,9 @@ pub struct Described {
     /// Filter array of a single plane: rggb, bggr, grbg, gbrg, monochrome, or its period as 4x4:RRGGRRGGGGBBGGBB
     #[arg(long, value_name = "PATTERN", value_parser = str::parse::<FilterArray>)]
     pub cfa: Option<FilterArray>,
+    /// The same by its other name.
+    #[arg(long, hide = true, value_name = "PATTERN", value_parser = str::parse::<FilterArray>)]
+    pub pattern: Option<FilterArray>,
     /// White level: the largest code, on the scale of the samples
     #[arg(long = "white", value_name = "N", value_parser = values::number)]
     pub white_level_adu: Option<f64>,
@@ -65,6 +69,17 @@ impl DescribedInput {
         self.described.open(&self.frame.options())
     }
 
+    /// The same of planes without an array; the array that is named, which is none of theirs, comes beside them.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`DescribedWithBlack::open`] and [`either`].
+    pub fn open_planes(&self) -> Result<(FrameReader, Option<FilterArray>)> {
+        let Self { frame, mut described } = self.clone();
+        let array = either(described.described.cfa.take(), described.described.pattern.take())?;
+        Ok((described.open(&frame.options())?, array))
+    }
+
     /// The same with all channels.
     ///
     /// # Errors
@@ -94,13 +109,15 @@ impl Described {
     /// [`Error::Usage`] where the metadata say another thing, for an array of a frame that has several planes, for levels of
     /// what is not ADU, for an exposure time or an f-number without the other, and for impossible ones.
     pub fn apply(&self, frame: &mut FrameHeader) -> Result<()> {
-        if let Some(cfa) = self.cfa {
+        if let Some(cfa) = either(self.cfa, self.pattern)? {
+            // Advice is about the name that was used.
+            let option: &[_] = if self.cfa.is_some() { &["cfa"] } else { &["pattern"] };
             if frame.geometry.channels.len() != 1 {
                 let problem = format!("{}: it holds {}; a filter array stands before one", frame.name, frame.holds());
-                return Err(Error::Usage(problem).leave_out(&["cfa"]));
+                return Err(Error::Usage(problem).leave_out(option));
             }
             let known = frame.metadata.cfa.filter(|known| *known != cfa);
-            agree(frame, "filter array", known.map(|known| known.to_string()), &["cfa"])?;
+            agree(frame, "filter array", known.map(|known| known.to_string()), option)?;
             frame.metadata.cfa = Some(cfa);
             as_codes(&mut frame.metadata);
         }
@@ -177,14 +194,20 @@ pub fn apply_black(frame: &mut FrameHeader, black: f64) -> Result<()> {
     Ok(())
 }
 
-/// Makes sure that a pattern is that of the plane, where its metadata name one.
+/// A filter array by the option `cfa`, or by `pattern`, which means the same.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`].
-pub fn check_pattern(frame: &FrameHeader, pattern: CfaPattern) -> Result<()> {
-    let known = frame.metadata.cfa.filter(|known| known.bayer() != Some(pattern));
-    agree(frame, "filter array", known.map(|known| known.to_string()), &["pattern"])
+/// [`Error::Usage`] where both are given and differ.
+pub fn either<T: PartialEq + Copy + Display>(cfa: Option<T>, pattern: Option<T>) -> Result<Option<T>> {
+    match (cfa, pattern) {
+        (Some(cfa), Some(pattern)) if cfa != pattern => {
+            let problem =
+                format!("two filter arrays are named, {cfa} by --cfa and {pattern} by --pattern, which are one option");
+            Err(Error::Usage(problem).leave_out(&["pattern"]))
+        }
+        _ => Ok(cfa.or(pattern)),
+    }
 }
 
 /// A warning of a level to subtract that is not what the metadata say of no light.
@@ -233,7 +256,7 @@ impl Described {
         let (metadata, is_plane) = (&frame.metadata, frame.geometry.channels.len() == 1);
         let are_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
         let said = Self {
-            cfa: self.cfa.filter(|_| metadata.cfa.is_none() && is_plane),
+            cfa: self.cfa.or(self.pattern).filter(|_| metadata.cfa.is_none() && is_plane),
             white_level_adu: self.white_level_adu.filter(|_| metadata.white_level_adu.is_none() && are_codes),
             ..Self::default()
         };
@@ -317,6 +340,7 @@ mod tests {
         assert_eq!(plane, frame(QuantityKind::Unspecified, &["Y"]));
         let said = Described {
             cfa: Some("gbrg".parse().unwrap()),
+            pattern: None,
             white_level_adu: Some(4095.0),
             exposure_s: Some(0.5),
             f_number: Some(4.0),

@@ -270,7 +270,6 @@ pub struct SpectrumChoice {
 
 /// How a picture in R, G, B becomes a scene.
 #[derive(Debug, Clone, Default, PartialEq, Args)]
-#[command(next_help_heading = "Pictures in R, G, B")]
 pub struct PictureChoice {
     /// How its samples stand for light: srgb, linear, or the power of them that it is; by default what the file says, linear
     /// for floats, srgb for integers

@@ -86,6 +86,7 @@ fn range(text: &str) -> std::result::Result<Range, String> {
         "give full, LOW,HIGH, shares of the pixels such as 1%,99%, or a number of standard deviations such as 4sigma"
             .to_owned()
     };
+    let text = &text.to_ascii_lowercase();
     if text == "full" {
         return Ok(Range::Full);
     }

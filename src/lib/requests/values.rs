@@ -1,16 +1,18 @@
 //! How values of options are read.
 
 use super::border::Border;
+use crate::analysis::characterization::regression::Regression;
 use crate::analysis::statistics::Region;
-use crate::cfa::CfaPattern;
+use crate::cfa::{CfaPattern, FilterArray};
 use crate::color::illuminant::Illuminant;
 use crate::color::rgb::{Encoding, NamedPrimaries, Primaries};
 use crate::color::{White, chromaticity};
 use crate::names::Named;
 use crate::spectrum::{Observer, WavelengthGrid};
 use crate::stages::black::Black;
+use crate::stages::demosaic::Method;
 use crate::units::{self, RadianceUnit};
-use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 use clap::{Arg, Command};
 use std::ffi::OsStr;
 use std::path::PathBuf;
@@ -23,13 +25,41 @@ pub fn choice<T: Named>() -> impl TypedValueParser<Value = T> {
 
 /// A parser for one of these values by its names.
 pub fn one_of<T: Named>(values: &'static [T]) -> impl TypedValueParser<Value = T> {
-    AnyCase(PossibleValuesParser::new(values.iter().flat_map(|value| value.all_names())))
-        .try_map(|name| T::named(&name).ok_or("no value has this name"))
+    named_of(values, |_| None)
+}
+
+/// A parser for a demosaicking method; the name of a regression is told from others.
+pub fn demosaicking() -> impl TypedValueParser<Value = Method> {
+    named_of(Method::ALL.as_slice(), |name| {
+        Regression::named(name)
+            .map(|_| "that is a regression, `--regression` of fit-matrix; here a demosaicking method is wanted")
+    })
+}
+
+/// A parser for a regression; the name of a demosaicking method is told from others.
+pub fn regression() -> impl TypedValueParser<Value = Regression> {
+    named_of(Regression::ALL.as_slice(), |name| {
+        Method::named(name)
+            .map(|_| "that is a demosaicking method; here a regression is wanted, and --demosaic takes the method")
+    })
+}
+
+/// A parser for one of these values; `elsewhere` says of other names what they are.
+fn named_of<T: Named>(
+    values: &'static [T],
+    elsewhere: fn(&str) -> Option<&'static str>,
+) -> impl TypedValueParser<Value = T> {
+    let names = PossibleValuesParser::new(values.iter().flat_map(|value| value.all_names()));
+    AnyCase { names, elsewhere }.try_map(|name| T::named(&name).ok_or("no value has this name"))
 }
 
 /// A parser for names that takes them in any case.
 #[derive(Clone)]
-struct AnyCase(PossibleValuesParser);
+struct AnyCase {
+    names: PossibleValuesParser,
+    /// What a name is that belongs to another option.
+    elsewhere: fn(&str) -> Option<&'static str>,
+}
 
 impl TypedValueParser for AnyCase {
     type Value = String;
@@ -40,12 +70,26 @@ impl TypedValueParser for AnyCase {
             .and_then(|mut values| values.find(|known| value.eq_ignore_ascii_case(known.get_name())));
         match known {
             Some(known) => Ok(known.get_name().to_owned()),
-            None => self.0.parse_ref(command, arg, value),
+            None => match value.to_str().and_then(self.elsewhere) {
+                Some(meant) => {
+                    let said = format!("{meant}; known here are {}", self.listed());
+                    let refusing = StringValueParser::new().try_map(move |_| Err::<String, _>(said.clone()));
+                    refusing.parse_ref(command, arg, value)
+                }
+                None => self.names.parse_ref(command, arg, value),
+            },
         }
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
-        self.0.possible_values()
+        self.names.possible_values()
+    }
+}
+
+impl AnyCase {
+    fn listed(&self) -> String {
+        let names = self.possible_values().into_iter().flatten();
+        names.map(|name| name.get_name().to_owned()).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -446,6 +490,15 @@ pub fn place(text: &str) -> Result<[i64; 2], String> {
 /// What is expected, in words.
 pub fn pattern(text: &str) -> Result<CfaPattern, String> {
     text.parse()
+}
+
+/// The same among filter arrays of any kind.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn bayer(text: &str) -> Result<FilterArray, String> {
+    pattern(text).map(FilterArray::from)
 }
 
 /// Reads a unit of spectral radiance.

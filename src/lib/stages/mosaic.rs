@@ -75,7 +75,7 @@ impl Mosaic {
             (None, None) => CfaPattern::Rggb,
             (None, Some(array)) => array.bayer().ok_or_else(|| {
                 let problem = format!("its sensor has {}; mosaics are made of Bayer arrays alone", array.in_words());
-                input.refuse(format!("{problem}, such as --pattern rggb"))
+                input.refuse(format!("{problem}, such as --cfa rggb"))
             })?,
         };
         let mut metadata = input.metadata.becoming(input.metadata.quantity);

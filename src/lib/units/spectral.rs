@@ -100,6 +100,8 @@ pub enum OtherUnit {
     AllWavelengths,
     /// With a number before it.
     Scaled,
+    /// A radiance beside which a factor stands.
+    BesideFactor,
     /// None that is known.
     Unknown,
 }
@@ -113,6 +115,9 @@ impl OtherUnit {
             Self::PerFrequency => "per interval of frequency or wavenumber, not of wavelength",
             Self::AllWavelengths => "a radiance over all wavelengths, which has no nm-1",
             Self::Scaled => "a unit with a number before it",
+            Self::BesideFactor => {
+                "a radiance beside a factor that may be in the values already or not; say what they are in as they stand"
+            }
             Self::Unknown => "no unit of spectral radiance that is known",
         }
     }
@@ -125,12 +130,23 @@ impl OtherUnit {
 
 /// The units of radiance, or of what may be taken for it, that a text names, first to last.
 pub fn units_in(text: &str) -> Vec<Stated> {
-    units_among(&tokens(text)).into_iter().map(|found| found.says).collect()
+    let tokens = tokens(text);
+    units_among(&tokens).into_iter().map(|found| found.written_in(text, &tokens)).collect()
 }
 
 /// What the heading of a column says about the unit of its numbers; a name such as `irradiance` counts where there is no
 /// unit, and what stands in brackets where it looks like one.
 pub fn unit_of_heading(heading: &str) -> Option<Stated> {
+    // What stands before brackets that hold a unit is none of it.
+    if let Some(text) = in_last_brackets(heading) {
+        let outside = heading.replace(text, "");
+        let tokens = tokens(text);
+        if let [found] = units_among(&tokens).as_slice()
+            && matches!(found.says, Stated::Radiance(_))
+        {
+            return Some(beside_factor(heading, &outside).unwrap_or_else(|| found.says.clone()));
+        }
+    }
     let tokens = tokens(heading);
     let named = |kind| Some(Stated::Other { text: heading.to_owned(), kind });
     let in_words = || {
@@ -145,7 +161,15 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
         let text = bracketed.filter(|text| looks_like_a_unit(text))?;
         Some(Stated::Other { text: text.to_owned(), kind: OtherUnit::Unknown })
     };
-    let found = units_among(&tokens).pop().map(|found| found.says).map(|says| match (says, bracketed) {
+    let found = units_among(&tokens).pop().map(|found| {
+        let written = as_written(heading, &tokens[found.begin..found.end]);
+        let outside = written.map_or_else(|| heading.to_owned(), |unit| heading.replacen(unit, "", 1));
+        match &found.says {
+            Stated::Radiance(_) => beside_factor(heading, &outside).unwrap_or_else(|| found.says.clone()),
+            Stated::Other { .. } => found.written_in(heading, &tokens),
+        }
+    });
+    let found = found.map(|says| match (says, bracketed) {
         // Part of a unit is none: `(W/m2/xy/nm)`.
         (Stated::Other { kind: OtherUnit::Irradiance | OtherUnit::AllWavelengths, .. }, Some(text))
             if self::tokens(text).iter().any(Token::is_strange) =>
@@ -157,7 +181,52 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
     found.or_else(in_words).or_else(in_brackets)
 }
 
-/// What stands in the last brackets of a heading.
+/// Tokens as a text.
+fn shown(tokens: &[Token]) -> String {
+    tokens.iter().map(Token::shown).collect::<Vec<_>>().join(" ")
+}
+
+/// What is said where a factor stands beside the unit of a heading; nothing where none does. `outside` is the heading without
+/// the unit.
+fn beside_factor(heading: &str, outside: &str) -> Option<Stated> {
+    const IN_WORDS: [&str; 7] = ["log", "log10", "ln", "times", "scaled", "multiplied", "divided"];
+    let lower = outside.to_lowercase().replace(['×', '*', '·'], " * ");
+    let mut words =
+        lower.split(|c: char| !(c.is_alphanumeric() || "^*.+-".contains(c))).filter(|word| !word.is_empty());
+    let is_power = |text: &str| {
+        let digits = text.strip_prefix("10").unwrap_or_default();
+        digits.starts_with('^') || digits.starts_with('-') || digits.starts_with('⁻')
+    };
+    let is_exponential = |text: &str| {
+        text.starts_with(|c: char| c.is_ascii_digit()) && text.contains('e') && text.parse::<f64>().is_ok()
+    };
+    let is_large = |text: &str| is_power(text) || text.parse::<f64>().is_ok_and(|factor| factor >= 10.0);
+    let mut after_sign = false;
+    let is_factor = words.any(|word| {
+        let number = word.trim_start_matches(['x', '*']);
+        let is_signed = number.len() < word.len() || after_sign;
+        after_sign = number.is_empty();
+        IN_WORDS.contains(&word) || is_power(number) || is_exponential(number) || is_signed && is_large(number)
+    });
+    is_factor.then(|| Stated::Other { text: heading.trim().to_owned(), kind: OtherUnit::BesideFactor })
+}
+
+/// What stands in the last brackets of a heading, brackets in them included.
+fn in_last_brackets(heading: &str) -> Option<&str> {
+    let close = heading.rfind([')', ']'])?;
+    let mut depth = 0;
+    for (at, c) in heading[..close].char_indices().rev() {
+        match c {
+            ')' | ']' => depth += 1,
+            '(' | '[' if depth > 0 => depth -= 1,
+            '(' | '[' => return Some(heading[at + 1..close].trim()),
+            _ => {}
+        }
+    }
+    None
+}
+
+/// What stands between the first and the last bracket of a heading.
 fn in_brackets(heading: &str) -> Option<&str> {
     let [open, close] = [heading.find(['(', '[']), heading.rfind([')', ']'])].map(Option::unwrap_or_default);
     heading.get(open + 1..close).map(str::trim).filter(|text| !text.is_empty())
@@ -215,6 +284,35 @@ struct Found {
     says: Stated,
 }
 
+impl Found {
+    /// What it says, another unit than of radiance as it is written in a text of these pieces.
+    fn written_in(&self, text: &str, tokens: &[Token]) -> Stated {
+        match &self.says {
+            Stated::Other { kind, text: plain } => {
+                let written = as_written(text, &tokens[self.begin..self.end]).unwrap_or(plain);
+                Stated::Other { text: written.to_owned(), kind: *kind }
+            }
+            radiance => radiance.clone(),
+        }
+    }
+}
+
+/// The shortest part of a text, between blanks and brackets, that has these pieces.
+fn as_written<'a>(text: &'a str, pieces: &[Token]) -> Option<&'a str> {
+    /// Longer texts are not looked through.
+    const MOST_BYTES: usize = 200;
+    if text.len() > MOST_BYTES {
+        return None;
+    }
+    let is_edge = |c: char| c.is_whitespace() || "([,:;=)]".contains(c);
+    let edges = text.char_indices().filter(|(_, c)| is_edge(*c));
+    let cuts: Vec<usize> =
+        [0].into_iter().chain(edges.flat_map(|(at, c)| [at, at + c.len_utf8()])).chain([text.len()]).collect();
+    let parts = cuts.iter().flat_map(|from| cuts.iter().filter_map(|to| text.get(*from..*to)));
+    let is_closed = |part: &&str| part.matches('(').count() == part.matches(')').count();
+    parts.map(str::trim).filter(is_closed).filter(|part| tokens(part) == pieces).min_by_key(|part| part.len())
+}
+
 /// The units among pieces: each a power (or photons, or energy) and what it is divided by; before it stand factors with
 /// negative powers alone.
 fn units_among(tokens: &[Token]) -> Vec<Found> {
@@ -242,15 +340,26 @@ fn units_among(tokens: &[Token]) -> Vec<Found> {
             end += 1;
         }
         if end - begin > 1 {
-            let is_scaled = begin > 0 && matches!(tokens[begin - 1], Token::Number(_));
-            let from = if is_scaled { begin - 1 } else { begin };
-            let text = tokens[from..end].iter().map(Token::shown).collect::<Vec<_>>().join(" ");
-            let says = match (is_scaled, product(&tokens[begin..end])) {
-                (false, Ok(unit)) => Stated::Radiance(unit),
-                (true, Ok(_)) => Stated::Other { text, kind: OtherUnit::Scaled },
+            let number = |place: usize| match &tokens[place] {
+                Token::Number(number) => Some(number.as_str()),
+                _ => None,
+            };
+            let scale = (begin > 0).then(|| number(begin - 1)).flatten();
+            // Two numbers are no scale.
+            let is_one = begin < 2 || number(begin - 2).is_none();
+            let from = if scale.is_some() { begin - 1 } else { begin };
+            let text = shown(&tokens[from..end]);
+            let scaled = |unit: RadianceUnit, scale: &str| {
+                unit.power.times(scale).filter(|_| is_one).map(|power| RadianceUnit { power, ..unit })
+            };
+            let says = match (scale, product(&tokens[begin..end])) {
+                (None, Ok(unit)) => Stated::Radiance(unit),
+                (Some(scale), Ok(unit)) => {
+                    scaled(unit, scale).map_or(Stated::Other { text, kind: OtherUnit::Scaled }, Stated::Radiance)
+                }
                 (_, Err(kind)) => Stated::Other { text, kind },
             };
-            found.push(Found { begin, end, says });
+            found.push(Found { begin: from, end, says });
         }
     }
     found
@@ -308,9 +417,10 @@ fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
         Length::Nanometer => Ok(WavelengthUnit::Nanometer),
         Length::Micrometer => Ok(WavelengthUnit::Micrometer),
         Length::Angstrom => Ok(WavelengthUnit::Angstrom),
+        Length::Meter => Ok(WavelengthUnit::Meter),
         // Whoever writes so may mean wavenumbers.
         Length::Centimeter => Err(OtherUnit::PerFrequency),
-        Length::Millimeter | Length::Meter => Err(OtherUnit::Unknown),
+        Length::Millimeter => Err(OtherUnit::Unknown),
     };
     let is_area = |length| matches!(length, Length::Millimeter | Length::Centimeter | Length::Meter);
     let power = power.ok_or(OtherUnit::Unknown)?;
@@ -336,7 +446,7 @@ mod tests {
     use super::*;
 
     /// Spellings, and what one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    const RADIANCES: [(&str, f64); 44] = [
+    const RADIANCES: [(&str, f64); 55] = [
         ("W cm-2 sr-1 nm-1", 1.0),
         ("W m-2 sr-1 nm-1", 1e-4),
         ("W.m^-2.sr^-1.nm^-1", 1e-4),
@@ -376,6 +486,17 @@ mod tests {
         ("W/cm2/sr/A", 10.0),
         ("W mm-2 sr-1 nm-1", 100.0),
         ("W m-3 sr-1", 1e-13),
+        ("W m-2 sr-1 m-1", 1e-13),
+        ("W/(m2 sr m)", 1e-13),
+        ("W cm-2 sr-1 m-1", 1e-9),
+        ("W/cm2/sr/m", 1e-9),
+        ("m-1 W cm-2 sr-1", 1e-9),
+        ("10^-3 W m-2 sr-1 nm-1", 1e-7),
+        ("10⁻³ W m⁻² sr⁻¹ nm⁻¹", 1e-7),
+        ("10**-3 W/(m**2 sr nm)", 1e-7),
+        ("1e-6 W cm-2 sr-1 nm-1", 1e-6),
+        ("0.001 W m-2 sr-1 nm-1", 1e-7),
+        ("1E3 uW cm-2 sr-1 nm-1", 1e-3),
         // At 500 nm 1 cm⁻¹ is 0.025 nm, the wavenumber being 20 000 cm⁻¹.
         ("W cm-2 sr-1 / cm-1", 40.0),
         ("W/(cm2 sr cm-1)", 40.0),
@@ -404,6 +525,46 @@ mod tests {
     }
 
     #[test]
+    fn a_factor_beside_the_unit_is_told() {
+        const UNIT: &str = "W m-2 sr-1 nm-1";
+        for heading in [
+            format!("radiance x1000 [{UNIT}]"),
+            format!("radiance [{UNIT}] x1000"),
+            format!("radiance × 1000 ({UNIT})"),
+            format!("radiance*1e3 ({UNIT})"),
+            format!("1e3 * radiance ({UNIT})"),
+            format!("L 10^-3 ({UNIT})"),
+            format!("L x 10⁻³ ({UNIT})"),
+            format!("log10 radiance ({UNIT})"),
+            format!("radiance, scaled by 100 ({UNIT})"),
+            format!("radiance x1000, {UNIT}"),
+        ] {
+            let wanted = Stated::Other { text: heading.clone(), kind: OtherUnit::BesideFactor };
+            assert_eq!(unit_of_heading(&heading), Some(wanted));
+        }
+        for name in ["sky 30", "sky1", "x1", "sza 45 az 90", "site 3.5", "2024-05-01", "(a) 12:30", "L_e", "12e"] {
+            let heading = format!("{name} [{UNIT}]");
+            assert_eq!(unit_of_heading(&heading), RadianceUnit::parse(UNIT).map(Stated::Radiance), "{heading}");
+        }
+    }
+
+    #[test]
+    fn other_units_are_quoted_as_they_are_written() {
+        for (heading, written) in [
+            ("E [W/m2/nm]", "W/m2/nm"),
+            ("E, W·m⁻²·nm⁻¹", "W·m⁻²·nm⁻¹"),
+            ("L (µmol m⁻² s⁻¹ sr⁻¹ nm⁻¹)", "µmol m⁻² s⁻¹ sr⁻¹ nm⁻¹"),
+            ("L (100 W/(m² sr nm))", "100 W/(m² sr nm)"),
+        ] {
+            assert!(
+                matches!(unit_of_heading(heading), Some(Stated::Other { text, .. }) if text == written),
+                "{:?}",
+                unit_of_heading(heading)
+            );
+        }
+    }
+
+    #[test]
     fn other_units_are_told_from_radiances() {
         use OtherUnit::{AllWavelengths, Irradiance, PerFrequency, Photons, Scaled, Unknown};
         for (text, kind) in [
@@ -423,8 +584,10 @@ mod tests {
             ("W m-2 sr-1 Hz-1", PerFrequency),
             ("W m-2 sr-1", AllWavelengths),
             ("W.m^-2.sr^-1", AllWavelengths),
-            ("10^-3 W m-2 sr-1 nm-1", Scaled),
-            ("radiance (1e-6 W cm-2 sr-1 nm-1)", Scaled),
+            ("10^-4 W m-2 sr-1 nm-1", Scaled),
+            ("radiance (100 W cm-2 sr-1 nm-1)", Scaled),
+            ("radiance (1000 W m-2 sr-1 nm-1)", Scaled),
+            ("3 × 10⁻³ W m⁻² sr⁻¹ nm⁻¹", Scaled),
             ("erg s-1 cm-2 sr-1 A-1", Unknown),
             ("W sr-1 nm-1", Unknown),
             ("radiance (MW m-2 sr-1 nm-1)", Unknown),

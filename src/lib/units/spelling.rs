@@ -11,6 +11,18 @@ pub(super) enum Power {
 }
 
 impl Power {
+    const ALL: [Self; 5] = [Self::Kilowatt, Self::Watt, Self::Milliwatt, Self::Microwatt, Self::Nanowatt];
+
+    /// The unit that is a power of ten of this one, written as `1e-3`, `10-3` or `0.001`; none for other numbers, of which
+    /// nobody knows whether they are a factor.
+    pub(super) fn times(self, number: &str) -> Option<Self> {
+        /// Powers of ten differ by more than what rounding makes of them.
+        const ROUNDING: f64 = 1e-9;
+        let is_scale = number.contains(['e', 'E']) || number.starts_with("0.");
+        let factor: f64 = number.parse().ok().filter(|_| is_scale)?;
+        Self::ALL.into_iter().find(|unit| (unit.in_w() / (self.in_w() * factor) - 1.0).abs() < ROUNDING)
+    }
+
     pub(super) fn symbol(self) -> &'static str {
         match self {
             Self::Kilowatt => "kW",
@@ -99,15 +111,24 @@ impl Token {
 /// Takes a text to pieces, every spelling of powers and products to one.
 pub(super) fn tokens(text: &str) -> Vec<Token> {
     let mut plain = String::with_capacity(text.len());
-    for character in text.replace("**", "").chars() {
+    // Powers of ten are numbers, `10^-3` as `1e-3`.
+    let text = text.replace("10^", "1e").replace("10**", "1e").replace("**", "");
+    let mut characters = text.chars().peekable();
+    while let Some(character) = characters.next() {
         match character {
+            '⁻' | '⁰'..='⁹' | '²' | '³' | '¹' if ends_in_ten(&plain) => {
+                plain.truncate(plain.len() - 1);
+                plain.push('e');
+                plain.push(plain_of(character));
+            }
+            '.' if plain.ends_with(|c: char| c.is_ascii_digit())
+                && characters.peek().is_some_and(char::is_ascii_digit) =>
+            {
+                plain.push('.');
+            }
             'µ' | 'μ' => plain.push('u'),
             'Å' | '\u{212B}' => plain.push_str("angstrom"),
-            '⁻' | '−' | '–' => plain.push('-'),
-            '⁰' | '¹' | '²' | '³' | '⁴' | '⁵' | '⁶' | '⁷' | '⁸' | '⁹' => {
-                let digit = "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|digit| digit == character).unwrap_or_default();
-                plain.push_str(&digit.to_string());
-            }
+            '⁻' | '−' | '–' | '⁰'..='⁹' | '¹' | '²' | '³' => plain.push(plain_of(character)),
             '^' | '{' | '}' | '$' => {}
             '*' | '·' | '⋅' | '×' | '•' | '.' | '_' | '[' | ']' | '"' => plain.push(' '),
             '/' => plain.push_str(" / "),
@@ -117,6 +138,18 @@ pub(super) fn tokens(text: &str) -> Vec<Token> {
     }
     let plain = plain.replace("(cm-1)-1", " / cm-1 ").replace(['(', ')'], " ");
     plain.split_whitespace().flat_map(pieces).collect()
+}
+
+/// Whether a text ends in the number 10.
+fn ends_in_ten(text: &str) -> bool {
+    let is_digit = |c: char| c.is_ascii_digit() || c == '.';
+    text.strip_suffix("10").is_some_and(|before| !before.ends_with(is_digit) && !before.ends_with(char::is_alphabetic))
+}
+
+/// A minus or a raised digit as it is typed.
+fn plain_of(character: char) -> char {
+    let digit = "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|digit| digit == character);
+    digit.and_then(|digit| "0123456789".chars().nth(digit)).unwrap_or('-')
 }
 
 /// The pieces of a word: a hyphen before a letter parts factors, before a digit it is the sign of a power.

@@ -48,8 +48,8 @@ VIEWERS = [
     Viewer("GIMP", "gimp-console-2.10",
            lambda frame, out: ["gimp-console-2.10", "-i", "-d", "-f", "-b", gimp_script(frame, out), "-b", "(gimp-quit 0)"],
            ["--version"], r"version ([\d.]+)"),
-    # Its version stands in the name of what is behind the link.
-    Viewer("ImageJ", "readlink", lambda frame, out: ["xvfb-run", "-a", "java", "-cp", IMAGEJ, "ij.ImageJ", "-batch",
+    # Its version stands in the name of what is behind the link; a complaint waits in a window of its own.
+    Viewer("ImageJ", "readlink", lambda frame, out: ["timeout", 20, "xvfb-run", "-a", "java", "-cp", IMAGEJ, "ij.ImageJ", "-batch",
                                                      imagej_macro(out), f"{frame}|{out}"],
            ["-f", IMAGEJ], r"ij-([\d.]+[a-z]?)\.jar", ("tiff",)),
 ]

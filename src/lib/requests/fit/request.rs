@@ -26,9 +26,9 @@ pub struct Fit {
     /// Sensor: a known name, or a file
     #[arg(long, value_name = "NAME|FILE", default_value = data::DEFAULT_SENSOR)]
     pub sensor: String,
-    /// Method: least squares on the training samples (sky-rad-ls), with one sample kept exact (sky-rad-sppls), or on the
-    /// responses alone with one sample kept exact (max-ign-sppls; with positive spectra, max-ign-positive-sppls)
-    #[arg(id = "method", long, value_name = "METHOD", default_value = Regression::default().name(), value_parser = values::choice::<Regression>())]
+    /// Least squares on the training samples (sky-rad-ls), with one sample kept exact (sky-rad-sppls), or on the responses
+    /// alone with one sample kept exact (max-ign-sppls; with positive spectra, max-ign-positive-sppls)
+    #[arg(long, alias = "method", value_name = "NAME", default_value = Regression::default().name(), value_parser = values::regression())]
     pub regression: Regression,
     /// Training samples: a list such as 0,17,240, or one number, that many chosen to span the library; by default all
     #[arg(long, value_name = "LIST|COUNT", value_parser = training)]
@@ -62,7 +62,7 @@ pub struct Fit {
     #[command(flatten)]
     pub exposure: SampleExposureChoice,
     /// Demosaicking method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
-    #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>(), requires = "noisy")]
+    #[arg(long, default_value = Method::default().name(), value_parser = values::demosaicking(), requires = "noisy")]
     pub demosaic: Method,
     /// Pixels of each sample
     #[arg(long, default_value = "20x16", value_name = "WxH", value_parser = values::patch, requires = "evaluate")]
@@ -116,7 +116,7 @@ fn training(text: &str) -> std::result::Result<TrainingChoice, String> {
 ///
 /// What is expected, in words.
 fn weights(text: &str) -> std::result::Result<Weights, String> {
-    match text {
+    match text.to_ascii_lowercase().as_str() {
         "equal" => Ok(Weights::Equal),
         "relative" => Ok(Weights::Relative),
         list => {

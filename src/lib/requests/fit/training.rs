@@ -75,7 +75,7 @@ fn kept_sample(fit: &Fit, seen: &SeenLibrary, candidates: &[usize]) -> Result<Op
         (true, None) => Ok(Some(average_sample(&seen.signals, candidates)?)),
         (false, None) => Ok(None),
         (false, Some(_)) => Err(Error::Usage(format!(
-            "{} keeps no sample exact; leave out --white-sample, or choose another --method",
+            "{} keeps no sample exact; leave out --white-sample, or choose another --regression",
             fit.regression.name()
         ))),
     }

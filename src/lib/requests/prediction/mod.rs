@@ -5,6 +5,7 @@ mod sweep;
 pub use sweep::Sweep;
 
 use super::conversion::doubt_of_white;
+use super::described::either;
 use super::notes::Note;
 use super::options::{ExposureChoice, NoiseChoice, SignalLevel, SpectrumChoice, Subject, WhiteChoice, defaults};
 use super::scene::{Scene, Uniform};
@@ -59,10 +60,13 @@ pub struct NoisePrediction {
     #[command(flatten)]
     pub noise: NoiseChoice,
     /// Demosaicking method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
-    #[arg(long, default_value = Method::default().name(), value_parser = values::choice::<Method>())]
+    #[arg(long, default_value = Method::default().name(), value_parser = values::demosaicking())]
     pub method: Method,
-    /// Pattern of the filter array; by default the sensor's own
-    #[arg(long, value_parser = values::pattern)]
+    /// Pattern of the filter array, rggb, bggr, grbg or gbrg; by default the sensor's own
+    #[arg(long, value_name = "PATTERN", value_parser = values::pattern)]
+    pub cfa: Option<CfaPattern>,
+    /// The same by its other name.
+    #[arg(long, hide = true, value_name = "PATTERN", value_parser = values::pattern)]
     pub pattern: Option<CfaPattern>,
     /// Matrix file, as fit-matrix makes it, for XYZ and L*a*b*
     #[arg(long, value_name = "FILE")]
@@ -286,7 +290,7 @@ impl NoisePrediction {
             f_number: exposure.f_number,
             temperature_k: self.noise.temperature_k.unwrap_or(sensor.readout()?.temperature_k),
             method: self.method.name(),
-            pattern: self.pattern.map_or_else(|| sensor.bayer(), Ok)?,
+            pattern: either(self.cfa, self.pattern)?.map_or_else(|| sensor.bayer(), Ok)?,
             equations: self.equations,
             patch: self.patch,
             quadrature_error: None,
@@ -300,7 +304,7 @@ impl NoisePrediction {
                 sensor: sensor.clone(),
                 exposure,
                 noise: self.noise.settings(),
-                pattern: self.pattern,
+                pattern: either(self.cfa, self.pattern)?,
                 dark_frames: self.dark_frames,
                 method: self.method,
             },

@@ -36,10 +36,11 @@ impl Sweep {
                 LEVELS_E.end()
             ));
         }
+        let count = &count.to_ascii_lowercase();
         let (count, is_logarithmic) = match (count.strip_suffix("log"), count.strip_suffix("lin")) {
             (Some(count), _) => (count, true),
             (_, Some(count)) => (count, false),
-            _ => (count, false),
+            _ => (count.as_str(), false),
         };
         let count = count.parse().ok().filter(|count| (1..=100_000).contains(count)).ok_or_else(wrong)?;
         if is_logarithmic && !(start_e > 0.0 && end_e > 0.0) {
@@ -69,6 +70,7 @@ impl Sweep {
 ///
 /// What is expected, in words.
 pub(super) fn uncertainty(text: &str) -> Result<Uncertainty, String> {
+    let text = &text.to_ascii_lowercase();
     let positive = |text: &str| text.trim().parse().ok().filter(|x: &f64| *x > 0.0 && x.is_finite());
     let relative = text.strip_suffix('%').and_then(positive).map(|percent| Uncertainty::Relative(percent / 100.0));
     let jnd = text.strip_suffix("jnd").and_then(positive).map(Uncertainty::Jnd);

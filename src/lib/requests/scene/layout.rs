@@ -8,6 +8,7 @@ use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{self, FrameHeader};
+use crate::requests::described::either;
 use crate::stages::render::Rendering;
 
 /// How much of the frame a pixel of the source takes, and how much there is of both.
@@ -23,6 +24,7 @@ impl Scene {
     pub(super) fn rendering(&self, prepared: &Prepared) -> Result<Rendering> {
         let Prepared { sensor, exposure, light, brightest_e, found } = prepared;
         let Extent { size, patch, source_width } = self.extent(light, sensor)?;
+        let cfa = either(self.cfa, self.pattern)?;
         let (source, uniform) = match light {
             Light::Uniform { electrons, source } => (source, Some(*electrons)),
             Light::Image { source, .. } => (source, None),
@@ -39,7 +41,7 @@ impl Scene {
         if is_negligible {
             leave_out("vignetting", "it changes no sample by half a unit in the last place");
         }
-        if self.cfa.is_some() {
+        if cfa.is_some() {
             leave_out("two of the three planes at each photosite", "the mosaic drops them");
         }
         if vignetting.is_none() && patch[0] * patch[1] > 1 {
@@ -47,7 +49,7 @@ impl Scene {
             leave_out(what, "without vignetting they expect the same");
         }
         let is_uniform = uniform.is_some() && vignetting.is_none();
-        metadata.cfa = self.cfa.map(Into::into);
+        metadata.cfa = cfa.map(Into::into);
         metadata.sensor = Some(sensor.clone());
         metadata.exposure = Some(*exposure);
         metadata.scene = Some(metadata::Scene {
@@ -60,10 +62,10 @@ impl Scene {
             brightest_e: *brightest_e,
             upsampling: found.upsampling.clone(),
         });
-        let channels: &[&str] = if self.cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
+        let channels: &[&str] = if cfa.is_some() { &["Y"] } else { &["R", "G", "B"] };
         let geometry = Geometry::new(size[0], size[1], channels);
         let header = FrameHeader { name: "the frame".into(), geometry, metadata };
-        Ok(Rendering { header, patch, vignetting, cfa: self.cfa })
+        Ok(Rendering { header, patch, vignetting, cfa })
     }
 
     fn extent(&self, light: &Light, sensor: &Sensor) -> Result<Extent> {

@@ -44,6 +44,9 @@ pub struct Scene {
     /// Render only the plane that the mosaic of this pattern keeps: rggb, bggr, grbg or gbrg
     #[arg(long, value_name = "PATTERN", value_parser = values::pattern)]
     pub cfa: Option<CfaPattern>,
+    /// The same by its other name.
+    #[arg(long, hide = true, value_name = "PATTERN", value_parser = values::pattern)]
+    pub pattern: Option<CfaPattern>,
     /// Part of a multi-part EXR, counted from 0
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub part: usize,

@@ -1,0 +1,203 @@
+//! What is known by name or comes with the programs: where it was found, and a line about it.
+
+use super::csv::SpectralTable;
+use super::data::{BUILT_IN, DATA_VARIABLE, directories};
+use super::files::read_file;
+use super::input::{FrameReader, InputOptions};
+use super::yaml;
+use crate::analysis::characterization::CameraMatrix;
+use crate::camera::sensor::Sensor;
+use crate::color::illuminant::Illuminant;
+use crate::names::Named;
+use crate::stream::RowSource;
+use std::path::{Path, PathBuf};
+
+/// A kind of what is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Sensor files.
+    Sensors,
+    /// Matrix files.
+    Matrices,
+    /// Observers.
+    Observers,
+    /// Spectra, libraries and spectral images.
+    Spectra,
+    /// Lights.
+    Illuminants,
+    /// Charts of colors.
+    Charts,
+}
+
+impl Named for Kind {
+    const ALL: &'static [Self] =
+        &[Self::Sensors, Self::Matrices, Self::Observers, Self::Spectra, Self::Illuminants, Self::Charts];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Sensors => "sensors",
+            Self::Matrices => "matrices",
+            Self::Observers => "observers",
+            Self::Spectra => "spectra",
+            Self::Illuminants => "illuminants",
+            Self::Charts => "charts",
+        }
+    }
+
+    fn other_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Sensors => &["sensor"],
+            Self::Matrices => &["matrix"],
+            Self::Observers => &["observer"],
+            Self::Spectra => &["spectrum", "skies"],
+            Self::Illuminants => &["illuminant", "lights"],
+            Self::Charts => &["chart"],
+        }
+    }
+}
+
+impl Kind {
+    fn title(self) -> &'static str {
+        match self {
+            Self::Sensors => "Sensors (--sensor NAME)",
+            Self::Matrices => "Matrices (--matrix FILE)",
+            Self::Observers => "Observers (all programs use the CIE 1931 2-degree one, which is built in)",
+            Self::Spectra => "Spectra and libraries (inputs of render-radiance, predict-noise and fit-matrix)",
+            Self::Illuminants => "Illuminants (--illuminant, --adapt-to, --scene-white, --reference-light NAME)",
+            Self::Charts => "Charts (--reference NAME)",
+        }
+    }
+
+    /// Directories of data directories where such files lie.
+    fn places(self) -> &'static [&'static str] {
+        match self {
+            Self::Sensors => &["sensors"],
+            Self::Matrices => &["matrices", "sensors", ""],
+            Self::Observers => &["observers"],
+            Self::Spectra => &["skies", "spectra"],
+            Self::Illuminants => &["illuminants"],
+            Self::Charts => &["charts"],
+        }
+    }
+}
+
+/// Something that is known.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Known {
+    /// Its name, as options take it.
+    pub name: String,
+    /// Where it was found.
+    pub place: String,
+    /// A line about it.
+    pub about: String,
+}
+
+/// What is known of a kind; where two have one name, that which options take.
+pub fn known(kind: Kind) -> Vec<Known> {
+    let mut found: Vec<Known> = if kind == Kind::Illuminants { lights() } else { Vec::new() };
+    for directory in directories() {
+        for place in kind.places() {
+            found.extend(files(&directory.join(place)).iter().filter_map(|path| of_file(kind, path)));
+        }
+    }
+    found.extend(BUILT_IN.iter().filter_map(|(name, bytes)| {
+        let path = Path::new(name);
+        let is_there = path.parent().is_some_and(|parent| kind.places().iter().any(|place| Path::new(place) == parent));
+        is_there.then(|| of_bytes(kind, path, bytes, "built in")).flatten()
+    }));
+    let mut kept: Vec<Known> = Vec::new();
+    for one in found {
+        if !kept.iter().any(|known| known.name == one.name) {
+            kept.push(one);
+        }
+    }
+    kept
+}
+
+/// The files of a directory by name.
+fn files(directory: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(directory).into_iter().flatten();
+    let mut paths: Vec<PathBuf> =
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file()).collect();
+    paths.sort();
+    paths
+}
+
+fn ends_in(path: &Path, ends: &[&str]) -> bool {
+    path.extension().is_some_and(|end| ends.iter().any(|known| end.eq_ignore_ascii_case(known)))
+}
+
+/// A file of a kind; none where it is of another, or cannot be read.
+fn of_file(kind: Kind, path: &Path) -> Option<Known> {
+    if kind == Kind::Spectra && ends_in(path, &["exr"]) {
+        let options = InputOptions { path: Some(path.to_owned()), all_channels: true, ..InputOptions::default() };
+        let reader = FrameReader::open(&options).ok()?;
+        let geometry = &reader.header().geometry;
+        let [width, height, count] = [geometry.width, geometry.height, geometry.channels.len()];
+        let about = format!("{} spectra ({width}x{height} pixels) of {count} wavelengths", width * height);
+        return Some(Known { name: path.display().to_string(), place: "file".into(), about });
+    }
+    if !ends_in(path, &["csv", "yaml", "yml"]) {
+        return None;
+    }
+    let directory = path.parent().map_or(String::new(), |directory| directory.display().to_string());
+    of_bytes(kind, path, &read_file(path).ok()?, &directory)
+}
+
+/// The content of a file of a kind.
+fn of_bytes(kind: Kind, path: &Path, bytes: &[u8], place: &str) -> Option<Known> {
+    let shown = path.display().to_string();
+    let stem = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+    let named = |name: String, about: String| Some(Known { name, place: place.into(), about });
+    let as_file = |about: String| Some(Known { name: shown.clone(), place: "file".into(), about });
+    let is_table = ends_in(path, &["csv"]);
+    match kind {
+        Kind::Sensors if !is_table => {
+            let sensor: Sensor = yaml::parse_sensor(&shown, bytes).ok()?;
+            named(stem, sensor.description.unwrap_or(sensor.name))
+        }
+        Kind::Matrices if !is_table => {
+            let matrix: CameraMatrix = yaml::parse_matrix(&shown, bytes).ok()?;
+            let about = [Some("to XYZ".into()), matrix.sensor.map(|sensor| format!("of {sensor}")), matrix.method];
+            as_file(about.into_iter().flatten().collect::<Vec<_>>().join(", "))
+        }
+        Kind::Observers if is_table => named(stem, first_comment(bytes)),
+        Kind::Charts if is_table => named(stem, first_comment(bytes)),
+        Kind::Spectra if is_table => {
+            SpectralTable::parse(&shown, bytes).ok()?;
+            as_file(first_comment(bytes))
+        }
+        _ => None,
+    }
+}
+
+/// The first comment of a table.
+fn first_comment(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let comment = text.lines().find_map(|line| line.strip_prefix('#'));
+    comment.map_or_else(|| "(it says nothing of itself)".into(), |line| line.trim().to_owned())
+}
+
+/// The lights that are known by name.
+fn lights() -> Vec<Known> {
+    let about = |name: &str| match name {
+        "a" => "incandescent light of 2856 K, CIE standard illuminant A".to_owned(),
+        "d65" => "CIE standard illuminant D65, daylight of 6504 K".to_owned(),
+        "e" => "equal energy".to_owned(),
+        other => format!("CIE daylight {}", other.to_uppercase()),
+    };
+    let built_in = |name: &str, about: String| Known { name: name.into(), place: "built in".into(), about };
+    let named = Illuminant::NAMED.iter().map(|(name, _)| built_in(name, about(name)));
+    named.chain([built_in("3200K", "a temperature: below 4000 K a black body, above CIE daylight".into())]).collect()
+}
+
+/// What is known of a kind, in words.
+pub fn page(kind: Kind) -> String {
+    let known = known(kind);
+    let width = |cell: fn(&Known) -> &String| known.iter().map(|one| cell(one).len()).max().unwrap_or_default();
+    let [name, place] = [width(|one| &one.name), width(|one| &one.place)];
+    let line = |one: &Known| format!("  {:name$}  {:place$}  {}\n", one.name, one.place, one.about);
+    let lines: String = known.iter().map(line).collect();
+    let none = || format!("  none; {DATA_VARIABLE} names directories to look in\n");
+    format!("{}:\n{}", kind.title(), if known.is_empty() { none() } else { lines })
+}
