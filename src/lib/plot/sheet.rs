@@ -5,13 +5,14 @@ use super::figure::{Anchor, Axis};
 use super::font;
 use super::png::painted;
 use super::ruler::{Ruler, Tick};
-use super::style::{FRAME, MIDDLE, TEXT, TEXT_RGB, TICK};
+use super::style::{FRAME, MIDDLE, TEXT_RGB, TICK};
 use crate::error::{Error, Result};
 
 /// The side in pixels from which on words grow with the picture, so that they can be read where it is shown smaller.
 const PLAIN_SIDE: f64 = 640.0;
-/// Lengths at that size: white about a picture, the distance of lines, and the bar.
+/// Lengths at that size: white about a picture, type, the distance of lines, and the bar.
 const MARGIN: f64 = 12.0;
+const TEXT: f64 = 13.0;
 const LINE: f64 = 17.0;
 /// What stands above a bar: a line, and room to its topmost number.
 const TITLE: f64 = 25.0;

@@ -8,7 +8,6 @@ mod averaging;
 mod bench;
 mod demosaicking;
 mod equations;
-mod labels;
 mod page;
 mod pareto;
 mod precision;

@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::{Work, timed};
-use crate::labels::Shape;
 use crate::page::{Section, count, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::error::{Error, Result};
@@ -103,8 +102,7 @@ pub fn study(study: &Study) -> Result<Section> {
         Choice::new("whole chain by formula", formula[1] * 1e3, 0.0),
     ];
     let groups = [Group::new("simulated", simulated), Group::new("by formula (no sampling error)", formulas)];
-    let left =
-        pareto::panel(Shape::Stacked, "", ["CPU time, ms", "relative error of σ (rms over frames)"], &groups, foot);
+    let left = pareto::panel("", ["CPU time, ms", "relative error of σ (rms over frames)"], &groups, foot);
     let mut right = Panel::new(Axis::log10("photosites"), Axis::log10("relative error of σ (rms over frames)"));
     let line = |x: f64| [x, (2.0 * x).sqrt().recip()];
     right.add("1/√(2n)", Color::Gray, Marks::Line(found.iter().map(|size| line(size.photosites as f64)).collect()));
