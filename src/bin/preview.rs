@@ -46,7 +46,10 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         session.report_reader(&reader);
         match arguments.frames.columns() {
             None => write_png(&mut reader, &settings, &arguments.output)?,
-            Some(_) => tiles.push(thumbnail(&mut reader, &settings)?),
+            Some(_) => {
+                reader.keep_mask();
+                tiles.push(thumbnail(&mut reader, &settings)?);
+            }
         }
         session.tell(&requests::of_marks(&reader));
     }

@@ -50,6 +50,8 @@ pub struct Panel {
     /// Whether a unit (on logarithmic axes: a factor) is equally long on both axes. The panel becomes narrower or lower;
     /// where less than a tenth of it would be left, it stays as it is.
     pub equal_scale: bool,
+    /// Whether axes are drawn, with all between them; without, the title stands alone.
+    pub has_axes: bool,
 }
 
 /// How values are spread along an axis.
@@ -220,6 +222,7 @@ impl Panel {
             notes: Vec::new(),
             names: Vec::new(),
             equal_scale: false,
+            has_axes: true,
         }
     }
 
@@ -261,6 +264,11 @@ impl Marks {
 
     pub(super) fn ranges(&self) -> &[[f64; 3]] {
         if let Self::ErrorBars(ranges) = self { ranges } else { &[] }
+    }
+
+    /// Whether there is nothing to show.
+    pub fn is_empty(&self) -> bool {
+        self.points().is_empty() && self.ranges().is_empty()
     }
 
     /// All that the x axis should reach.

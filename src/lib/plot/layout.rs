@@ -14,7 +14,7 @@ pub(super) fn draw(plot: &Plot) -> Drawing {
     let (columns, cell_width, cell_height) = match (plot.arrangement, count) {
         (_, 1) => (1, 900.0, 600.0 - title_height - MARGIN),
         (Arrangement::Stacked, _) => (1, 900.0, 400.0),
-        (Arrangement::SideBySide, _) => (count, 640.0, 500.0),
+        (Arrangement::SideBySide, _) => (count, 560.0, 500.0),
         (Arrangement::Pairs, _) => (2, 520.0, 390.0),
     };
     // The first panel of an odd number takes two places.
@@ -45,13 +45,17 @@ pub(super) fn draw(plot: &Plot) -> Drawing {
             room.put_legend_above(panel, width_of(index));
         }
     }
-    let tallest = rooms.iter().map(|room| room.top).fold(0.0, f64::max);
+    let row_of = |index: usize| (index + usize::from(is_wide(0) && index > 0)) / columns;
+    let tallest = |row: usize| {
+        let of_row = rooms.iter().enumerate().filter(|(index, _)| row_of(*index) == row);
+        of_row.map(|(_, room)| room.top).fold(0.0, f64::max)
+    };
     for (index, (panel, room)) in plot.panels.iter().zip(&rooms).enumerate() {
         // Edges of panels that share a row or a column are aligned.
         let (left, top) = match plot.arrangement {
-            Arrangement::Pairs => (widest, tallest),
+            Arrangement::Pairs => (widest, tallest(row_of(index))),
             _ if columns == 1 => (widest, room.top),
-            _ => (room.left, tallest),
+            _ => (room.left, tallest(0)),
         };
         Pane::new(panel, room, cell_of(index), left, top).draw(&mut drawing);
     }

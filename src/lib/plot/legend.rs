@@ -51,9 +51,8 @@ impl Covered {
 /// What a legend says, and how large it is.
 pub(super) struct Legend<'a> {
     named: Vec<&'a Series>,
-    /// Of one series.
-    width: f64,
-    columns: usize,
+    /// Of each column.
+    widths: Vec<f64>,
     rows: usize,
 }
 
@@ -61,22 +60,20 @@ impl<'a> Legend<'a> {
     /// The legend of a panel in one column; `None` where no series has a name.
     pub fn of(panel: &'a Panel) -> Option<Self> {
         let named: Vec<&Series> = panel.series.iter().filter(|series| !series.name.is_empty()).collect();
-        let longest = named.iter().map(|series| font::width(&series.name, TEXT)).fold(0.0, f64::max);
-        let (width, rows) = (SWATCH + 8.0 + longest + 18.0, named.len());
-        (rows > 0).then_some(Self { named, width, columns: 1, rows })
+        let rows = named.len();
+        (rows > 0).then(|| Self { widths: widths(&named, rows), named, rows })
     }
 
     /// The same in as many columns as have room, all about equally long.
     pub fn spread(self, width: f64) -> Self {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few columns")]
-        let most = ((width / self.width).floor() as usize).clamp(1, self.named.len());
-        let rows = self.named.len().div_ceil(most);
-        Self { columns: self.named.len().div_ceil(rows), rows, ..self }
+        let fits = |rows: &usize| widths(&self.named, *rows).iter().sum::<f64>() <= width;
+        let rows = (1..self.rows).find(fits).unwrap_or(self.rows);
+        Self { widths: widths(&self.named, rows), rows, ..self }
     }
 
     /// Width and height.
     pub fn size(&self) -> [f64; 2] {
-        [self.columns as f64 * self.width, LINE * self.rows as f64 + 8.0]
+        [self.widths.iter().sum(), LINE * self.rows as f64 + 8.0]
     }
 
     /// Where it covers nothing within the frame, at best in a corner; `None` where there is no such place.
@@ -109,12 +106,18 @@ impl<'a> Legend<'a> {
         for (index, series) in self.named.iter().enumerate() {
             let (column, row) = (index / self.rows, index % self.rows);
             let middle = top + 4.0 + (row as f64 + 0.5) * LINE;
-            let left = left + 8.0 + column as f64 * self.width;
+            let left = left + 8.0 + self.widths[..column].iter().sum::<f64>();
             draw_swatch(drawing, series, [left, middle], look);
             let baseline = [left + SWATCH + 8.0, middle + MIDDLE * TEXT];
             write(drawing, &series.name, baseline, TEXT, Anchor::Start);
         }
     }
+}
+
+/// The width of each column of so many rows.
+fn widths(named: &[&Series], rows: usize) -> Vec<f64> {
+    let of = |series: &&Series| SWATCH + 8.0 + font::width(&series.name, TEXT) + 18.0;
+    named.chunks(rows).map(|column| column.iter().map(of).fold(0.0, f64::max)).collect()
 }
 
 /// Writes beside a horizontal line at `y` what it is, at the end where it covers least.

@@ -39,24 +39,46 @@ pub(super) struct Obstacles<'a> {
     pub lines: &'a Covered,
 }
 
-/// Finds a place for each name at a point of the canvas, the first first. A name is left out where there is none.
+/// Finds a place for each name at a point of the canvas, the first first; where one finds none, it is the first of a new trial.
+/// A name is left out where there is none in any of them.
 pub(super) fn place(names: &[(Point, &Name)], around: &Obstacles) -> Vec<Placed> {
+    const TRIALS: usize = 12;
+    let mut order = names.to_vec();
+    let mut best: Vec<Placed> = Vec::new();
+    for _ in 0..TRIALS {
+        let (placed, missing) = trial(&order, around);
+        if placed.len() > best.len() {
+            best = placed;
+        }
+        let Some(missing) = missing else { break };
+        let first = order.remove(missing);
+        order.insert(0, first);
+    }
+    best
+}
+
+/// Places names in their order, and says which is the first that found none.
+fn trial(names: &[(Point, &Name)], around: &Obstacles) -> (Vec<Placed>, Option<usize>) {
     let mut placed: Vec<Placed> = Vec::new();
+    let mut missing = None;
     let mut named: Vec<(Point, &str)> = Vec::new();
-    for (at, name) in names {
+    for (index, (at, name)) in names.iter().enumerate() {
         if named.iter().any(|(other, text)| *text == name.text && distance(*other, *at) < NEAR) {
             continue;
         }
         let shares = |(other, their): &(Point, &Name)| their.text == name.text && distance(*other, *at) < NEAR;
         let is_shared = names.iter().filter(|other| shares(other)).any(|(_, their)| their.color != name.color);
-        let Some((rect, leader)) = best(*at, font::width(&name.text, TEXT), around, &placed) else { continue };
+        let Some((rect, leader)) = best(*at, font::width(&name.text, TEXT), around, &placed) else {
+            missing = missing.or(Some(index));
+            continue;
+        };
         named.push((*at, &name.text));
         // Somewhat darker than the mark: letters are thin.
         let dark = name.color.rgb().map(|part| part / 4 * 3);
         let rgb = if is_shared || name.color == Color::Yellow { TEXT_RGB } else { dark };
         placed.push(Placed { rect, text: name.text.clone(), rgb, leader });
     }
-    placed
+    (placed, missing)
 }
 
 /// The place that costs least, and the line to it.

@@ -102,6 +102,10 @@ impl<'a> Pane<'a> {
 
     /// Draws all, from the bottom up.
     pub fn draw(&self, drawing: &mut Drawing) {
+        if !self.panel.has_axes {
+            let center = [self.area.left + 0.5 * self.area.width, self.area.top + 0.5 * self.area.height];
+            return write(drawing, &self.panel.title, center, LABEL, Anchor::Middle);
+        }
         self.panel.regions.iter().for_each(|region| self.draw_region(drawing, region));
         self.draw_ticks(drawing);
         self.draw_names(drawing);

@@ -204,7 +204,11 @@ impl Bar {
     fn of(meaning: &ScaleBar, height: f64, size: Type) -> Self {
         let height = height.max(size.of(LEAST_BAR)).round();
         let ruler = Ruler::new(&Axis::linear("").range(meaning.range.0, meaning.range.1), std::iter::empty());
-        let ticks = ruler.ticks((height / size.of(2.6 * TEXT)).clamp(3.0, 12.0));
+        let most = (height / size.of(2.6 * TEXT)).clamp(3.0, 12.0);
+        // One number says nothing of the others.
+        let enough = |ticks: &Vec<Tick>| ticks.len() > 1;
+        let closer = (0..10).map(|more| ruler.ticks(most + f64::from(more)));
+        let ticks = closer.clone().find(enough).or_else(|| closer.last()).unwrap_or_default();
         let widest = ticks.iter().filter_map(|tick| tick.label.as_deref()).map(|label| size.width(label));
         let widest = widest.chain(meaning.missing.iter().map(|(_, name)| size.width(name))).fold(0.0, f64::max);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few pixels")]
@@ -300,6 +304,19 @@ mod tests {
             .map(|c| c[0])
             .collect();
         assert!(bar.is_sorted_by(|a, b| a > b));
+    }
+
+    #[test]
+    fn a_bar_has_two_numbers_or_more() {
+        for high in [0.3, 1.7, 3.4, 4.9, 9.9, 19.0, 77.0] {
+            for low in [0.0, 0.31, 0.6, 0.87, 0.95].map(|part| part * high) {
+                let tile = tile([20, 20], [9; 3], true, &[]);
+                let meaning = ScaleBar { range: (low, high), ..tile.bar.clone().unwrap() };
+                let bar = Bar::of(&meaning, 20.0, Type { scale: 1.0 });
+                let labels = bar.ticks.iter().filter(|tick| tick.label.is_some()).count();
+                assert!((2..9).contains(&labels), "{low} {high}: {:?}", bar.ticks);
+            }
+        }
     }
 
     #[test]

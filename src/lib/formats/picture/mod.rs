@@ -6,7 +6,7 @@ mod shade;
 
 use super::atomic::Target;
 use super::foreign::png_complaint;
-use crate::analysis::statistics::Region;
+use crate::analysis::statistics::{MarkedRows, Region, Saturated};
 use crate::color::ramp::ramp;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
@@ -79,7 +79,8 @@ pub fn write_sheet(tiles: Vec<Tile>, columns: usize, path: &Path) -> Result<()> 
 }
 
 /// Reads a frame for a sheet: a small picture with the name of the frame, what it holds, and mean and standard deviation of its
-/// samples, plane by plane or class by class.
+/// samples, plane by plane or class by class. Pixels that were made of saturated samples, or are marked otherwise, are shown but
+/// not counted, as in [`measure`](crate::analysis::statistics::measure).
 ///
 /// A frame that makes no picture as it is shows its luminance, its lightness or its first plane in false color.
 ///
@@ -87,7 +88,10 @@ pub fn write_sheet(tiles: Vec<Tile>, columns: usize, path: &Path) -> Result<()> 
 ///
 /// As of [`write_png`].
 pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Result<Tile> {
-    let frame = source.header().clone();
+    // Where a plane is named it may be the layer itself.
+    let named = source.header().clone();
+    let mut source = MarkedRows::of(source, Saturated::LeftOut);
+    let frame = if settings.plane.is_some() { named } else { source.unmarked() };
     let mut settings = settings.clone();
     if settings.zoom <= 1 {
         settings.fit = settings.fit.or(Some(THUMBNAIL));
@@ -101,10 +105,15 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
     };
     let reduction = reduction(&frame, &settings, &choice)?;
     let region = settings.region.unwrap_or(Region::whole(&frame));
-    let mut tally = Tally::new(&frame, region, &choice);
-    let reduced = Reduced::read(source, &reduction, &choice, Some(&mut tally))?;
+    let mut tally = Tally::new(&frame, &source, region, &choice);
+    let reduced = Reduced::read(&mut source, &reduction, &choice, Some(&mut tally))?;
     let mut caption = vec![frame.name.clone(), planes::stage(&frame, &choice, [region.width, region.height])];
     caption.extend(tally.groups.iter().map(|(name, moments)| seen(name, moments)));
+    let reasons = tally.left_out.into_iter().zip(["saturated or marked", "not finite"]).filter(|(count, _)| *count > 0);
+    let reasons: Vec<String> = reasons.map(|(count, reason)| format!("{count} {reason}")).collect();
+    if !reasons.is_empty() {
+        caption.push(format!("left out: {}", reasons.join(", ")));
+    }
     Ok(Shown::paint(&frame, &settings, &choice, &reduced)?.tile(caption))
 }
 
@@ -113,16 +122,12 @@ const THUMBNAIL: usize = 320;
 
 /// What is said of the samples of a plane.
 fn seen(name: &str, moments: &Moments) -> String {
-    let left_out = match moments.not_finite {
-        0 => String::new(),
-        count => format!(", {count} not finite"),
-    };
     match moments.std(0) {
         Some(std) => {
-            format!("{name}: mean {}, std {}{left_out}", planes::rounded(moments.mean[0]), planes::rounded(std))
+            format!("{name}: mean {}, std {}", planes::rounded(moments.mean[0]), planes::rounded(std))
         }
-        None if moments.count == 1 => format!("{name}: {}{left_out}", planes::rounded(moments.mean[0])),
-        None => format!("{name}: no number{left_out}"),
+        None if moments.count == 1 => format!("{name}: {}", planes::rounded(moments.mean[0])),
+        None => format!("{name}: no number"),
     }
 }
 

@@ -118,7 +118,7 @@ fn colors(studio: &Studio, case: &Case) -> Plot {
 fn noise(case: &Case) -> Plot {
     let panel = |(index, (name, color)): (usize, (&str, Color))| {
         let x = Axis::log10(&format!("predicted σ of {name}, cd m⁻²"));
-        let mut panel = Panel::new(x, Axis::log10(&format!("observed σ of {name}")));
+        let mut panel = Panel::new(x, Axis::log10(&format!("observed σ of {name}, cd m⁻²")));
         let point = |sky: &SampleEvaluation| {
             let noise = sky.noise?;
             Some([noise.predicted?.xyz_std[index], noise.xyz_std[index]])
