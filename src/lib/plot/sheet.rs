@@ -51,7 +51,9 @@ pub struct Tile {
     pub picture: Pixels,
     /// The bar to the right of it.
     pub bar: Option<ScaleBar>,
-    /// Lines below it; the first loses its middle where it is wider than all else.
+    /// What it is called, the first line below it, which loses its middle where it is wider than all else; may be empty.
+    pub name: String,
+    /// More lines below it.
     pub caption: Vec<String>,
 }
 
@@ -157,20 +159,27 @@ impl Type {
     }
 }
 
+impl Tile {
+    /// All that stands below it.
+    fn lines(&self) -> impl Iterator<Item = &str> {
+        let name = Some(self.name.as_str()).filter(|name| !name.is_empty());
+        name.into_iter().chain(self.caption.iter().map(String::as_str))
+    }
+}
+
 impl<'a> Block<'a> {
     fn of(tile: &'a Tile, size: Type) -> Self {
         let [columns, rows] = tile.picture.size.map(|side| side as f64);
         let bar = tile.bar.as_ref().map(|bar| Bar::of(bar, rows, size));
         let beside = bar.as_ref().map_or(0.0, |bar| bar.width);
         let title = tile.bar.as_ref().map_or(0.0, |bar| size.width(&bar.label));
-        let (name, words) = tile.caption.split_at(tile.caption.len().min(1));
-        let name = name.iter().map(|line| size.width(line).min(size.of(LEAST_NAME))).fold(0.0, f64::max);
-        let caption = words.iter().map(|line| size.width(line)).fold(name, f64::max);
+        let name = size.width(&tile.name).min(size.of(LEAST_NAME));
+        let caption = tile.caption.iter().map(|line| size.width(line)).fold(name, f64::max);
         let width = (columns + beside).max(title).max(caption);
         let above = if bar.is_some() { size.of(TITLE) } else { 0.0 };
         let below = tile.bar.as_ref().and_then(|bar| bar.missing.as_ref()).map_or(0.0, |_| size.of(LINE));
         let of_bar = bar.as_ref().map_or(0.0, |bar| bar.pixels.size[1] as f64 + below + size.of(0.5 * LINE));
-        let height = above + rows.max(of_bar) + size.of(LINE) * tile.caption.len() as f64;
+        let height = above + rows.max(of_bar) + size.of(LINE) * tile.lines().count() as f64;
         Self { tile, size, width: width.ceil(), height: height.ceil(), bar }
     }
 
@@ -191,8 +200,8 @@ impl<'a> Block<'a> {
             bar.draw(drawing, pasted, meaning, [beside, top], size);
         }
         paste_framed(drawing, pasted, picture, [left, top], size);
-        let first = bottom - size.of(LINE) * self.tile.caption.len() as f64;
-        for (index, line) in self.tile.caption.iter().enumerate() {
+        let first = bottom - size.of(LINE) * self.tile.lines().count() as f64;
+        for (index, line) in self.tile.lines().enumerate() {
             let baseline = first + size.of(LINE * (index as f64 + 0.85));
             size.write(drawing, &size.shortened(line, width), [left, baseline], Anchor::Start);
         }
@@ -271,7 +280,9 @@ mod tests {
         let picture = Pixels { size, rgb: rgb.repeat(size[0] * size[1]) };
         let colors = (0..=255).map(|code| [code, 0, 0]).collect();
         let meaning = ScaleBar { label: "Y / cd m⁻²".into(), range: (0.0, 10.0), colors, missing: None };
-        Tile { picture, bar: bar.then_some(meaning), caption: caption.iter().map(|line| (*line).to_owned()).collect() }
+        let name = caption.first().map(|name| (*name).to_owned()).unwrap_or_default();
+        let caption = caption.iter().skip(1).map(|line| (*line).to_owned()).collect();
+        Tile { picture, bar: bar.then_some(meaning), name, caption }
     }
 
     fn count(sheet: &Pixels, is: impl Fn([u8; 3]) -> bool) -> usize {

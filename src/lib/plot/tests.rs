@@ -1,5 +1,6 @@
 //! Reads the pictures back: what an SVG and a PNG show is what the plot says.
 
+mod laws;
 mod reading;
 
 use super::*;

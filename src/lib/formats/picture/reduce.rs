@@ -56,6 +56,13 @@ impl Reduction {
     }
 }
 
+impl Reduction {
+    /// Columns and rows of samples that make one pixel.
+    pub fn samples_per_pixel(&self) -> [usize; 2] {
+        self.step
+    }
+}
+
 impl Reduced {
     /// Reads the rows of a region, and counts what they hold where a tally is wanted.
     ///
