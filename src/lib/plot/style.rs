@@ -33,7 +33,8 @@ pub(super) const REFERENCE: Stroke =
 /// Dashes of a color: lines can be told apart in a gray print too.
 pub(super) fn dashes(color: Color) -> &'static [f64] {
     match color {
-        Color::Blue | Color::Gray => &[8.0, 4.0],
+        Color::Blue => &[8.0, 4.0],
+        Color::Gray => &[7.0, 7.0],
         Color::Vermillion => &[14.0, 4.0],
         Color::Green => &[4.0, 3.0],
         Color::Purple => &[10.0, 3.0, 2.0, 3.0],

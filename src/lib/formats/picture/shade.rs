@@ -125,15 +125,14 @@ impl Shade {
             unit if ["1", "unspecified"].contains(&unit.as_str()) => String::new(),
             unit => format!(" {unit}"),
         };
-        let number = |value: f64| rounded(if value == 0.0 { 0.0 } else { value });
         match self {
             Self::Planes(ranges) if ranges.iter().all(|range| *range == ranges[0]) => {
                 let (low, high) = ranges[0];
-                Some(format!("black {}, white {}{unit}", number(low), number(high)))
+                Some(format!("black {}, white {}{unit}", rounded(low), rounded(high)))
             }
             Self::Planes(ranges) => {
                 let range = |(name, (low, high)): (&String, &(f64, f64))| {
-                    format!("{name} {} to {}", number(*low), number(*high))
+                    format!("{name} {} to {}", rounded(*low), rounded(*high))
                 };
                 let ranges: Vec<String> = names.iter().zip(ranges).map(range).collect();
                 Some(format!("black to white: {}{unit}", ranges.join(", ")))
@@ -141,7 +140,7 @@ impl Shade {
             Self::Xyz(_) | Self::Encoded => {
                 let white = frame.metadata.color.as_ref()?.white?;
                 let [_, luminance, _] = white.into();
-                Some(format!("white {} cd m⁻²", number(luminance)))
+                Some(format!("white {} cd m⁻²", rounded(luminance)))
             }
         }
     }

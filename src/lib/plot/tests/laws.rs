@@ -109,10 +109,17 @@ fn every_series_is_seen_though_others_lie_over_it() {
 
 #[test]
 fn colors_differ_in_the_form_of_points_and_in_dashes() {
-    let mut forms = Vec::new();
+    let mut looks = Vec::new();
     for color in (0..7).map(Color::of_index).chain([Color::Gray]) {
-        assert!(!forms.contains(&super::style::dashes(color)), "{color:?}");
-        forms.push(super::style::dashes(color));
+        let mut panel = Panel::new(Axis::linear("x").range(0.0, 1.0), Axis::linear("y").range(0.0, 1.0));
+        panel.add("", color, Marks::Points(vec![[0.5, 0.5]]));
+        let mark = elements(&Plot::new("", panel)).into_iter().find(|e| e.get("stroke") == "#ffffff");
+        let mark = mark.unwrap_or_else(|| panic!("{color:?} has no mark"));
+        let look = (mark.get("d").to_owned(), super::style::dashes(color));
+        for (form, dashes) in &looks {
+            assert!(*form != look.0 && *dashes != look.1, "{color:?}");
+        }
+        looks.push(look);
     }
 }
 

@@ -143,6 +143,7 @@ impl Panels {
     /// Dashed lines of an equation, with the names of channels at their ends.
     fn add_paper(&mut self, camera: &Camera, places: &[f64], equation: Equation, look: (&str, &[Color; 3])) {
         let (name, colors) = look;
+        let mut ends: Vec<[f64; 2]> = Vec::new();
         for (channel, &color) in colors.iter().enumerate() {
             let mean = |e: f64| mean_xyz(camera, e, Equations::Paper)[channel];
             let value = |e: f64| paper_xyz(camera, equation, e)[channel];
@@ -151,10 +152,16 @@ impl Panels {
             let quotient: Vec<[f64; 2]> = below().map(|&e| [e, ratio(e)]).collect();
             self.noise.add("", color, Marks::Dashed(below().map(|&e| [e, value(e)]).collect()));
             self.snr.add("", color, Marks::Dashed(below().map(|&e| [e, db(mean(e), value(e))]).collect()));
-            if let Some(last) = quotient.last() {
-                self.ratio.name(*last, NAMES[channel], color);
-            }
+            ends.extend(quotient.last());
             self.ratio.add("", color, Marks::Dashed(quotient));
+        }
+        // Lines that all but lie over each other share a name.
+        let apart = ends.iter().map(|[_, y]| (y - ends[0][1]).abs()).fold(0.0, f64::max);
+        if apart < 1e-3 && !ends.is_empty() {
+            self.ratio.name(ends[0], "X, Y, Z", Color::Black);
+        } else {
+            let named = ends.iter().zip(NAMES).zip(colors);
+            named.for_each(|((end, name), color)| self.ratio.name(*end, name, *color));
         }
         let color = if colors[0] == colors[1] { colors[0] } else { Color::Black };
         for panel in [&mut self.noise, &mut self.snr, &mut self.ratio] {
