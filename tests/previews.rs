@@ -179,7 +179,7 @@ fn captions_count_what_measure_counts() {
         reader.keep_mask();
         let tile = thumbnail(&mut reader, &PictureSettings::default()).unwrap();
         let measured: serde_json::Value =
-            serde_json::from_slice(&shop.attempt(&format!("measure {name} --format json"), &[]).stdout).unwrap();
+            serde_json::from_slice(&shop.attempt(&format!("measure {name} --output-format json"), &[]).stdout).unwrap();
         let region = &measured["regions"][0];
         let saturated = region["saturated"].as_u64().unwrap();
         assert!((100..2300).contains(&saturated), "{name}: {saturated}");
