@@ -216,8 +216,8 @@ impl Bar {
         let most = (height / size.of(2.6 * TEXT)).clamp(3.0, 12.0);
         // One number says nothing of the others.
         let enough = |ticks: &Vec<Tick>| ticks.len() > 1;
-        let closer = (0..10).map(|more| ruler.ticks(most + f64::from(more)));
-        let ticks = closer.clone().find(enough).or_else(|| closer.last()).unwrap_or_default();
+        let mut closer = (0..10).map(|more| ruler.ticks(most + f64::from(more)));
+        let ticks = closer.find(enough).unwrap_or_else(|| ruler.ticks(most));
         let widest = ticks.iter().filter_map(|tick| tick.label.as_deref()).map(|label| size.width(label));
         let widest = widest.chain(meaning.missing.iter().map(|(_, name)| size.width(name))).fold(0.0, f64::max);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few pixels")]

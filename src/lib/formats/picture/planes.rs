@@ -257,9 +257,7 @@ mod tests {
             assert_eq!(label(quantity, &three, name), wanted);
         }
         assert_eq!(label(QuantityKind::ColorDifference, &MAP_CHANNELS, "delta_e_76"), "ΔE*ab");
-        for (number, wanted) in
-            [(0.0, "0"), (2730.123, "2730.1"), (-0.001_234_56, "−0.0012346"), (1e9, "1.0000e9")]
-        {
+        for (number, wanted) in [(0.0, "0"), (2730.123, "2730.1"), (-0.001_234_56, "−0.0012346"), (1e9, "1.0000e9")] {
             assert_eq!(rounded(number), wanted);
         }
         let frame = frame(QuantityKind::Xyy, &["R", "G", "B"]);

@@ -139,7 +139,7 @@ impl Shade {
             }
             Self::Xyz(_) | Self::Encoded => {
                 let white = frame.metadata.color.as_ref()?.white?;
-                let [_, luminance, _] = white.into();
+                let [_, luminance, _] = white;
                 Some(format!("white {} cd m⁻²", rounded(luminance)))
             }
         }

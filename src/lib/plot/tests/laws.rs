@@ -100,10 +100,10 @@ fn every_series_is_seen_though_others_lie_over_it() {
         panel.add("", *color, Marks::Points(places.clone()));
     }
     let plot = Plot::new("", panel);
-    for index in 0..colors.len() {
+    for (index, color) in colors.iter().enumerate() {
         let mut other = plot.clone();
         other.panels[0].series.remove(index);
-        assert!(difference(&plot, &other).is_some(), "{:?} is hidden", colors[index]);
+        assert!(difference(&plot, &other).is_some(), "{color:?} is hidden");
     }
 }
 
