@@ -155,3 +155,27 @@ fn a_figure_has_its_panels_and_what_it_cannot_be_is_told() {
     }
     assert!(!shop.path("x.svg").exists());
 }
+
+/// Frames that have no histogram: uniform expected electrons, and one that is saturated throughout.
+#[test]
+fn a_figure_says_why_it_shows_nothing() {
+    let shop = Workshop::new();
+    // Programs warn of the saturated one.
+    for line in [
+        "render-radiance --electrons 20000,20000,20000 --size 20x16 -o expected.exr",
+        "render-radiance --electrons 90000,90000,90000 --size 20x16 -o bright.exr",
+        "add-noise bright.exr --seed 1 -o noisy.exr",
+        "digitize noisy.exr -o codes.exr",
+        "mosaic codes.exr -o plane.exr",
+        "demosaic plane.exr -o rgb.exr",
+    ] {
+        assert!(shop.attempt(line, &[]).status.success(), "{line}");
+    }
+    for (name, said, panels) in [("expected.exr", "are the same", 2), ("rgb.exr", "No pixel is left", 0)] {
+        assert!(shop.attempt(&format!("measure {name} --plot plot.svg"), &[]).status.success(), "{name}");
+        let svg = String::from_utf8(shop.bytes("plot.svg")).unwrap();
+        assert!(svg.contains(said) && !svg.contains("correlation</text>"), "{name}");
+        // Each panel clips what it shows once.
+        assert_eq!(svg.matches("<clipPath").count(), panels, "{name}");
+    }
+}

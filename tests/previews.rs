@@ -3,6 +3,8 @@
 mod support;
 
 use cyanometer::color::ramp::ramp;
+use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::formats::picture::{PictureSettings, thumbnail};
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// A picture that `preview` made.
@@ -143,4 +145,76 @@ fn all_stages_make_a_sheet() {
     shop.run("color-difference xyz.exr xyz.exr --map map.exr", &[]);
     shop.run("preview expected.exr noisy.exr codes.exr plane.exr rgb.exr xyz.exr lab.exr map.exr -o sheet.png", &[]);
     shop.run("preview xyz.exr lab.exr --region 1,1,4,3 --zoom 8 -o part.png", &[]);
+}
+
+/// The lines below a picture, of which the numbers are those of `measure`, though a part of the pixels is saturated.
+#[test]
+fn captions_count_what_measure_counts() {
+    let shop = Workshop::new();
+    // Programs warn of saturated pixels.
+    for line in [
+        "render-radiance --electrons 39500,20000,20000 --size 60x40 -o expected.exr",
+        "add-noise expected.exr --seed 3 -o noisy.exr",
+        "digitize noisy.exr -o codes.exr",
+        "mosaic codes.exr -o plane.exr",
+        "demosaic plane.exr -o rgb.exr",
+    ] {
+        assert!(shop.attempt(line, &[]).status.success(), "{line}");
+    }
+    let digits = |value: f64| {
+        format!(
+            "{value:.*}",
+            if value >= 1000.0 {
+                1
+            } else if value >= 100.0 {
+                2
+            } else {
+                3
+            }
+        )
+    };
+    for (name, kept) in [("rgb.exr", false), ("plane.exr", true)] {
+        let path = Some(shop.path(name));
+        let mut reader = FrameReader::open(&InputOptions { path, ..InputOptions::default() }).unwrap();
+        reader.keep_mask();
+        let tile = thumbnail(&mut reader, &PictureSettings::default()).unwrap();
+        let measured: serde_json::Value =
+            serde_json::from_slice(&shop.attempt(&format!("measure {name} --output-format json"), &[]).stdout).unwrap();
+        let region = &measured["regions"][0];
+        let saturated = region["saturated"].as_u64().unwrap();
+        assert!((100..2300).contains(&saturated), "{name}: {saturated}");
+        let groups = if kept { &region["classes"] } else { &region["channels"] };
+        for group in groups.as_array().unwrap() {
+            let [mean, std] = ["mean", "std"].map(|key| digits(group[key].as_f64().unwrap()));
+            let wanted = format!("{}: mean {mean}, std {std}", group["name"].as_str().unwrap());
+            assert!(tile.caption.contains(&wanted), "{name}: no {wanted} in {:?}", tile.caption);
+        }
+        let left_out = format!("left out: {saturated} saturated or marked");
+        assert_eq!(tile.caption.contains(&left_out), !kept, "{name}: {:?}", tile.caption);
+        let words: Vec<&str> = if kept { vec!["a CFA plane of ADU"] } else { vec!["three demosaicked planes of ADU"] };
+        assert!(tile.caption[0].starts_with(words[0]), "{:?}", tile.caption);
+        assert!(tile.caption.last().unwrap().starts_with("black "), "{:?}", tile.caption);
+    }
+}
+
+/// A caption stands below the picture, which stays as it is.
+#[test]
+fn a_caption_leaves_the_picture_as_it_is() {
+    let shop = Workshop::new();
+    let codes: Vec<u8> = (0..40 * 30_u32).map(|place| u8::try_from(place % 251).unwrap()).collect();
+    std::fs::write(shop.path("a.bin"), &codes).unwrap();
+    shop.run("preview --raw 40x30:u8 --range 0,255 a.bin -o plain.png", &[]);
+    let plain = Picture::read(&shop, "plain.png");
+    for caption in ["--caption", "--caption=a few words"] {
+        let mut command = shop.command("preview --raw 40x30:u8 --range 0,255 a.bin -o said.png");
+        assert!(command.arg(caption).status().unwrap().success());
+        let said = Picture::read(&shop, "said.png");
+        assert!(said.height() > 30 + 2 * 12 + 17, "{caption}: {}", said.height());
+        for y in 0..30 {
+            let row = &said.pixels[(y + 12) * said.width + 12..][..40];
+            assert_eq!(row, &plain.pixels[y * 40..][..40], "{caption}: row {y}");
+        }
+    }
+    let output = shop.attempt("preview --raw 40x30:u8 --caption a.bin a.bin -o x.png", &[]);
+    assert_eq!(output.status.code(), Some(BAD_USAGE));
 }

@@ -7,11 +7,13 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-OURS, PEER = "#1f5fa8", "#b5b5b5"
-COLORS = {"ours": OURS, "numpy": "#c44e52", "OpenCV": "#55a868"}
+# The colors of Okabe and Ito, which the color-blind can tell apart; each line has a mark of its own besides.
+OURS, PEER = "#0072b2", "#b5b5b5"
+COLORS = {"ours": OURS, "numpy": "#d55e00", "OpenCV": "#009e73"}
+MARKS = {"ours": "o", "numpy": "s", "OpenCV": "^"}
 NAMES = {"ours": "cyanometer", "numpy": "numpy + colour", "OpenCV": "numpy + OpenCV"}
 
-plt.rcParams.update({"svg.hashsalt": "cyanometer", "font.size": 10, "axes.spines.top": False, "axes.spines.right": False})
+plt.rcParams.update({"svg.hashsalt": "cyanometer", "font.size": 12, "axes.spines.top": False, "axes.spines.right": False})
 
 
 def save(figure, folder, name):
@@ -27,7 +29,7 @@ def speeds(topics, folder):
         return None
     heights = [len(topic.plots) for topic in shown]
     figure, axes = plt.subplots(
-        len(shown), 1, figsize=(7.5, 0.32 * sum(heights) + 1.3 * len(shown)), squeeze=False, height_ratios=heights
+        len(shown), 1, figsize=(7.5, 0.36 * sum(heights) + 1.4 * len(shown)), squeeze=False, height_ratios=heights
     )
     for axis, topic in zip(axes[:, 0], shown):
         titles = {"noise": "Noise of a CFA plane", "demosaic": "Demosaicking (bilinear unless named)"}
@@ -37,7 +39,7 @@ def speeds(topics, folder):
         colors = [OURS if name.startswith("ours") else PEER for name in names]
         bars = axis.barh(labels, values, color=colors)
         axis.bar_label(bars, fmt="%.3g", padding=3)
-        axis.set_title(f"{titles[topic.name]}, one core", loc="left", fontsize=10)
+        axis.set_title(f"{titles[topic.name]}, one core", loc="left", fontsize=12)
         axis.set_xlabel("Mpix/s")
         axis.set_xlim(0, 1.12 * max(values))
     figure.tight_layout()
@@ -59,7 +61,7 @@ def by_pixels(topic, folder, column, name, what, scale):
         if points:
             xs = [number / 1e6 for number, *_ in points]
             ys = [scale(point[column], point[0]) for point in points]
-            axis.loglog(xs, ys, "o-", color=COLORS[key], label=NAMES[key])
+            axis.loglog(xs, ys, MARKS[key] + "-", color=COLORS[key], label=NAMES[key])
     axis.set_xlabel("frame, Mpix")
     axis.set_ylabel(what)
     axis.grid(True, which="major", color="#dddddd")
@@ -76,8 +78,8 @@ def threads(topic, folder):
     figure, axis = plt.subplots(figsize=(5, 3.6))
     numbers = sorted({number for points in topic.plots.values() for number, _ in points})
     axis.plot(numbers, numbers, "--", color=PEER, label="ideal")
-    for (name, points), marker in zip(topic.plots.items(), "os^"):
-        axis.plot(*zip(*points), marker + "-", label=name)
+    for (name, points), marker, color in zip(topic.plots.items(), MARKS.values(), COLORS.values()):
+        axis.plot(*zip(*points), marker + "-", color=color, label=name)
     axis.set_xticks(numbers)
     axis.set_ylim(0, max(numbers) * 1.1)
     axis.set_xlabel("threads")

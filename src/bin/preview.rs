@@ -45,10 +45,17 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         let mut reader = arguments.picture.open(&input)?;
         session.report_reader(&reader);
         match arguments.frames.columns() {
-            None => write_png(&mut reader, &settings, &arguments.output)?,
-            Some(_) => tiles.push(thumbnail(&mut reader, &settings)?),
+            None if settings.caption.is_none() => write_png(&mut reader, &settings, &arguments.output)?,
+            _ => {
+                reader.keep_mask();
+                tiles.push(thumbnail(&mut reader, &settings)?);
+            }
         }
         session.tell(&requests::of_marks(&reader));
     }
-    arguments.frames.columns().map_or(Ok(()), |columns| write_sheet(tiles, columns, &arguments.output))
+    if tiles.is_empty() {
+        Ok(())
+    } else {
+        write_sheet(tiles, arguments.frames.columns().unwrap_or(1), &arguments.output)
+    }
 }

@@ -427,6 +427,13 @@ impl FrameHeader {
                 format!("three demosaicked planes of {quantity}")
             }
             (3, _) => format!("three planes of {quantity}"),
+            (n, _) if self.leads_with_three_planes() => {
+                let layers = &self.geometry.channels[3..];
+                let more = if layers.len() > 2 { ", …" } else { "" };
+                let names = layers[..layers.len().min(2)].join(", ") + more;
+                let count = if n == 4 { "a layer".to_owned() } else { format!("{} layers", n - 3) };
+                format!("three planes of {quantity} and {count} ({names})")
+            }
             (n, _) => format!("{n} planes ({}) of {quantity}", self.some_channels()),
         }
     }

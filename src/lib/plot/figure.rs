@@ -45,9 +45,13 @@ pub struct Panel {
     pub horizontal_lines: Vec<ReferenceLine>,
     /// Thin shapes and words, above all series.
     pub notes: Vec<Note>,
+    /// Words beside points, the most important first.
+    pub names: Vec<Name>,
     /// Whether a unit (on logarithmic axes: a factor) is equally long on both axes. The panel becomes narrower or lower;
     /// where less than a tenth of it would be left, it stays as it is.
     pub equal_scale: bool,
+    /// Whether axes are drawn, with all between them; without, the title stands alone.
+    pub has_axes: bool,
 }
 
 /// How values are spread along an axis.
@@ -150,6 +154,19 @@ pub enum Note {
     },
 }
 
+/// A word that belongs to a point. It stands where it covers no mark, no other word and, if that can be, no line; at the end of
+/// a thin line where there is no such place beside its point. Points so near to each other that their marks touch share a
+/// word that all of them have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Name {
+    /// The point, `[x, y]` in the units of the axes.
+    pub at: [f64; 2],
+    /// What it says.
+    pub text: String,
+    /// The color, that of the point.
+    pub color: Color,
+}
+
 /// Which part of a text stands at its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
@@ -203,13 +220,20 @@ impl Panel {
             vertical_lines: Vec::new(),
             horizontal_lines: Vec::new(),
             notes: Vec::new(),
+            names: Vec::new(),
             equal_scale: false,
+            has_axes: true,
         }
     }
 
     /// Adds a series; see [`Series`].
     pub fn add(&mut self, name: &str, color: Color, marks: Marks) {
         self.series.push(Series { name: name.into(), color, marks });
+    }
+
+    /// Names a point; see [`Name`].
+    pub fn name(&mut self, at: [f64; 2], text: &str, color: Color) {
+        self.names.push(Name { at, text: text.into(), color });
     }
 }
 
@@ -240,6 +264,11 @@ impl Marks {
 
     pub(super) fn ranges(&self) -> &[[f64; 3]] {
         if let Self::ErrorBars(ranges) = self { ranges } else { &[] }
+    }
+
+    /// Whether there is nothing to show.
+    pub fn is_empty(&self) -> bool {
+        self.points().is_empty() && self.ranges().is_empty()
     }
 
     /// All that the x axis should reach.

@@ -14,8 +14,8 @@ pub(super) fn draw(plot: &Plot) -> Drawing {
     let (columns, cell_width, cell_height) = match (plot.arrangement, count) {
         (_, 1) => (1, 900.0, 600.0 - title_height - MARGIN),
         (Arrangement::Stacked, _) => (1, 900.0, 400.0),
-        (Arrangement::SideBySide, _) => (count, 640.0, 500.0),
-        (Arrangement::Pairs, _) => (2, 480.0, 350.0),
+        (Arrangement::SideBySide, _) => (count, 560.0, 500.0),
+        (Arrangement::Pairs, _) => (2, 520.0, 390.0),
     };
     // The first panel of an odd number takes two places.
     let is_wide = |index: usize| plot.arrangement == Arrangement::Pairs && count > 1 && count % 2 == 1 && index == 0;
@@ -27,25 +27,37 @@ pub(super) fn draw(plot: &Plot) -> Drawing {
 
     let width_of = |index: usize| if is_wide(index) { 2.0 * cell_width } else { cell_width };
     let panels = plot.panels.iter().enumerate();
-    let rooms: Vec<Room> = panels.map(|(index, panel)| Room::new(panel, width_of(index), cell_height)).collect();
-    let widest = rooms.iter().map(|room| room.left).fold(0.0, f64::max);
-    let tallest = rooms.iter().map(|room| room.top).fold(0.0, f64::max);
-    for (index, (panel, room)) in plot.panels.iter().zip(&rooms).enumerate() {
+    let mut rooms: Vec<Room> = panels.map(|(index, panel)| Room::new(panel, width_of(index), cell_height)).collect();
+    let cell_of = |index: usize| {
         let place = if is_wide(0) && index > 0 { index + 1 } else { index };
         let (column, row) = (place % columns, place / columns);
-        let cell = Rect {
+        Rect {
             left: column as f64 * cell_width,
             top: title_height + MARGIN + row as f64 * cell_height,
             width: width_of(index),
             height: cell_height,
-        };
+        }
+    };
+    let widest = rooms.iter().map(|room| room.left).fold(0.0, f64::max);
+    // A legend that has no room within the frame stands above it.
+    for (index, (panel, room)) in plot.panels.iter().zip(&mut rooms).enumerate() {
+        if !Pane::new(panel, room, cell_of(index), widest, room.top).has_room_for_legend() {
+            room.put_legend_above(panel, width_of(index));
+        }
+    }
+    let row_of = |index: usize| (index + usize::from(is_wide(0) && index > 0)) / columns;
+    let tallest = |row: usize| {
+        let of_row = rooms.iter().enumerate().filter(|(index, _)| row_of(*index) == row);
+        of_row.map(|(_, room)| room.top).fold(0.0, f64::max)
+    };
+    for (index, (panel, room)) in plot.panels.iter().zip(&rooms).enumerate() {
         // Edges of panels that share a row or a column are aligned.
         let (left, top) = match plot.arrangement {
-            Arrangement::Pairs => (widest, tallest),
+            Arrangement::Pairs => (widest, tallest(row_of(index))),
             _ if columns == 1 => (widest, room.top),
-            _ => (room.left, tallest),
+            _ => (room.left, tallest(0)),
         };
-        Pane::new(panel, room, cell, left, top).draw(&mut drawing);
+        Pane::new(panel, room, cell_of(index), left, top).draw(&mut drawing);
     }
     drawing
 }

@@ -3,11 +3,11 @@
 use super::drawing::{Drawing, Ink, Point, Rect, Stroke};
 use super::figure::{Anchor, Panel, Series};
 use super::font;
-use super::marks::draw_swatch;
+use super::marks::{Look, draw_swatch};
 use super::style::{LINE, MIDDLE, SWATCH, TEXT, write};
 
 /// Places on the canvas that are better not covered, a few pixels apart.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub(super) struct Covered {
     places: Vec<Point>,
 }
@@ -41,45 +41,83 @@ impl Covered {
     }
 
     /// How much a rectangle with some room about it would cover.
-    fn cost(&self, rect: Rect) -> usize {
+    pub fn cost(&self, rect: Rect) -> usize {
         let room =
             Rect { left: rect.left - 4.0, top: rect.top - 4.0, width: rect.width + 8.0, height: rect.height + 8.0 };
         self.places.iter().filter(|at| room.contains(**at)).count()
     }
 }
 
-/// Draws the legend where it covers least; of equal places, in a corner.
-pub(super) fn draw_legend(drawing: &mut Drawing, panel: &Panel, area: Rect, covered: &mut Covered) {
-    let named: Vec<&Series> = panel.series.iter().filter(|series| !series.name.is_empty()).collect();
-    if named.is_empty() {
-        return;
+/// What a legend says, and how large it is.
+pub(super) struct Legend<'a> {
+    named: Vec<&'a Series>,
+    /// Of each column.
+    widths: Vec<f64>,
+    rows: usize,
+}
+
+impl<'a> Legend<'a> {
+    /// The legend of a panel in one column; `None` where no series has a name.
+    pub fn of(panel: &'a Panel) -> Option<Self> {
+        let named: Vec<&Series> = panel.series.iter().filter(|series| !series.name.is_empty()).collect();
+        let rows = named.len();
+        (rows > 0).then(|| Self { widths: widths(&named, rows), named, rows })
     }
-    let longest = named.iter().map(|series| font::width(&series.name, TEXT)).fold(0.0, f64::max);
-    let (width, height) = (8.0 + SWATCH + 8.0 + longest + 10.0, LINE * named.len() as f64 + 8.0);
-    let (free_x, free_y) = (area.width - width - 20.0, area.height - height - 20.0);
-    // Corners first, then the other places of a grid; the first of the best is taken.
-    const STEPS: [f64; 9] = [1.0, 0.0, 0.875, 0.125, 0.75, 0.25, 0.625, 0.375, 0.5];
-    let places = STEPS.iter().flat_map(|along| STEPS.iter().map(move |up| (*along, *up)));
-    let at = |(along, up): (f64, f64)| Rect {
-        left: (area.left + 10.0 + along * free_x.max(0.0)).round() + 0.5,
-        top: (area.top + 10.0 + (1.0 - up) * free_y.max(0.0)).round() + 0.5,
-        width,
-        height,
-    };
-    let Some(rect) = places.map(at).min_by_key(|rect| covered.cost(*rect)) else { return };
-    drawing.shape(
-        rect.outline(),
-        Ink { rgb: [0xff; 3], opacity: 0.88 },
-        Stroke { ink: Ink { rgb: [0; 3], opacity: 0.25 }, width: 1.0, dashes: &[] },
-    );
-    for (index, series) in named.into_iter().enumerate() {
-        let middle = rect.top + 4.0 + (index as f64 + 0.5) * LINE;
-        let left = rect.left + 8.0;
-        draw_swatch(drawing, series, [left, middle]);
-        let baseline = [left + SWATCH + 8.0, middle + MIDDLE * TEXT];
-        write(drawing, &series.name, baseline, TEXT, Anchor::Start);
+
+    /// The same in as many columns as have room, all about equally long.
+    pub fn spread(self, width: f64) -> Self {
+        let fits = |rows: &usize| widths(&self.named, *rows).iter().sum::<f64>() <= width;
+        let rows = (1..self.rows).find(fits).unwrap_or(self.rows);
+        Self { widths: widths(&self.named, rows), rows, ..self }
     }
-    covered.add(rect);
+
+    /// Width and height.
+    pub fn size(&self) -> [f64; 2] {
+        [self.widths.iter().sum(), LINE * self.rows as f64 + 8.0]
+    }
+
+    /// Where it covers nothing within the frame, at best in a corner; `None` where there is no such place.
+    pub fn place_within(&self, area: Rect, covered: &Covered) -> Option<Rect> {
+        let [width, height] = self.size();
+        let (free_x, free_y) = (area.width - width - 20.0, area.height - height - 20.0);
+        if free_x < 0.0 || free_y < 0.0 {
+            return None;
+        }
+        // Corners first, then the other places of a grid; the first that is free is taken.
+        const STEPS: [f64; 9] = [1.0, 0.0, 0.875, 0.125, 0.75, 0.25, 0.625, 0.375, 0.5];
+        let places = STEPS.iter().flat_map(|along| STEPS.iter().map(move |up| (*along, *up)));
+        let at = |(along, up): (f64, f64)| Rect {
+            left: (area.left + 10.0 + along * free_x).round() + 0.5,
+            top: (area.top + 10.0 + (1.0 - up) * free_y).round() + 0.5,
+            width,
+            height,
+        };
+        places.map(at).find(|rect| covered.cost(*rect) == 0)
+    }
+
+    /// Draws it with its upper left corner at a place.
+    pub fn draw(&self, drawing: &mut Drawing, [left, top]: Point, look: Look) {
+        let [width, height] = self.size();
+        drawing.shape(
+            Rect { left, top, width, height }.outline(),
+            Ink { rgb: [0xff; 3], opacity: 0.88 },
+            Stroke { ink: Ink { rgb: [0; 3], opacity: 0.25 }, width: 1.0, dashes: &[] },
+        );
+        for (index, series) in self.named.iter().enumerate() {
+            let (column, row) = (index / self.rows, index % self.rows);
+            let middle = top + 4.0 + (row as f64 + 0.5) * LINE;
+            let left = left + 8.0 + self.widths[..column].iter().sum::<f64>();
+            draw_swatch(drawing, series, [left, middle], look);
+            let baseline = [left + SWATCH + 8.0, middle + MIDDLE * TEXT];
+            write(drawing, &series.name, baseline, TEXT, Anchor::Start);
+        }
+    }
+}
+
+/// The width of each column of so many rows.
+fn widths(named: &[&Series], rows: usize) -> Vec<f64> {
+    let of = |series: &&Series| SWATCH + 8.0 + font::width(&series.name, TEXT) + 18.0;
+    named.chunks(rows).map(|column| column.iter().map(of).fold(0.0, f64::max)).collect()
 }
 
 /// Writes beside a horizontal line at `y` what it is, at the end where it covers least.

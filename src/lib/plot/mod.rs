@@ -19,7 +19,8 @@
 //! ```
 //!
 //! Several [`Panel`]s stand below or beside each other with their edges aligned. What only one figure needs (arrows, circles,
-//! words beside points, a small diagram in a corner) is made of [`Note`]s: lines, circles and words at values of the axes.
+//! a small diagram in a corner) is made of [`Note`]s: lines, circles and words at values of the axes. Words that belong to
+//! points are [`Name`]s, which find their places themselves. A legend that would cover something stands above the frame.
 //!
 //! [`sheet()`] lays pictures of pixels out in a grid, with scale bars and captions.
 //!
@@ -49,6 +50,7 @@ mod font;
 mod layout;
 mod legend;
 mod marks;
+mod names;
 mod pane;
 mod png;
 mod room;
@@ -58,7 +60,9 @@ mod style;
 mod svg;
 
 use crate::error::Result;
-pub use figure::{Anchor, Arrangement, Axis, Color, Marks, Note, Panel, Plot, ReferenceLine, Region, Scale, Series};
+pub use figure::{
+    Anchor, Arrangement, Axis, Color, Marks, Name, Note, Panel, Plot, ReferenceLine, Region, Scale, Series,
+};
 pub use ruler::power_of_ten;
 pub use sheet::{Pixels, ScaleBar, Tile, sheet};
 

@@ -3,11 +3,12 @@
 use super::drawing::{Drawing, Outline, Point, Rect};
 use super::figure::{Anchor, Marks, Note, Panel, Region, Series};
 use super::font;
-use super::legend::{Covered, draw_legend, draw_line_label};
-use super::marks::{draw_error_bar, draw_mark, point_radius};
+use super::legend::{Covered, Legend, draw_line_label};
+use super::marks::{Look, draw_error_bar, draw_mark, point_radius};
+use super::names::{Obstacles, Placed, place};
 use super::room::{Room, arrange, x_ticks, y_ticks};
 use super::style::{
-    DASHES, FRAME, GRID, LABEL, LINE, MARGIN, MIDDLE, MINOR_GRID, REFERENCE, RIGHT, TEXT, TICK, ink, line, write,
+    FRAME, GRID, LABEL, LINE, MARGIN, MIDDLE, MINOR_GRID, REFERENCE, RIGHT, TEXT, TICK, dashes, ink, line, write,
     write_upward,
 };
 
@@ -101,6 +102,10 @@ impl<'a> Pane<'a> {
 
     /// Draws all, from the bottom up.
     pub fn draw(&self, drawing: &mut Drawing) {
+        if !self.panel.has_axes {
+            let center = [self.area.left + 0.5 * self.area.width, self.area.top + 0.5 * self.area.height];
+            return write(drawing, &self.panel.title, center, LABEL, Anchor::Middle);
+        }
         self.panel.regions.iter().for_each(|region| self.draw_region(drawing, region));
         self.draw_ticks(drawing);
         self.draw_names(drawing);
@@ -108,7 +113,8 @@ impl<'a> Pane<'a> {
             self.panel.notes.iter().for_each(|note| self.draw_note(drawing, note));
             self.panel.series.iter().for_each(|series| self.draw_lines(drawing, series));
         });
-        self.panel.series.iter().for_each(|series| self.draw_points(drawing, series));
+        let look = self.look();
+        self.panel.series.iter().for_each(|series| self.draw_points(drawing, series, look));
         let Rect { left, top, .. } = self.area;
         for x in self.vertical_lines() {
             drawing.stroke(Outline::Line(vec![[x, top], [x, self.area.bottom()]]), REFERENCE);
@@ -120,10 +126,67 @@ impl<'a> Pane<'a> {
         self.draw_top_labels(drawing);
         self.panel.notes.iter().for_each(|note| self.write_note(drawing, note));
         let mut covered = self.covered();
-        draw_legend(drawing, self.panel, self.area, &mut covered);
+        self.names(&mut covered).iter().for_each(|name| name.draw(drawing));
+        self.draw_legend(drawing, look, &mut covered);
         for (y, label) in self.horizontal_lines() {
             draw_line_label(drawing, label, y, self.area, &mut covered);
         }
+    }
+
+    /// Whether the legend covers nothing within the frame, or there is none.
+    pub fn has_room_for_legend(&self) -> bool {
+        let mut covered = self.covered();
+        self.names(&mut covered);
+        Legend::of(self.panel).is_none_or(|legend| legend.place_within(self.area, &covered).is_some())
+    }
+
+    fn draw_legend(&self, drawing: &mut Drawing, look: Look, covered: &mut Covered) {
+        if let Some(legend) = &self.room.legend {
+            let (width, right) = (legend.size()[0], self.cell.right() - RIGHT);
+            let left = self.area.left.min(right - width).max(self.cell.left).floor() + 0.5;
+            let top = self.area.top - self.room.top + self.room.head - legend.size()[1] - 8.0;
+            legend.draw(drawing, [left, top], look);
+        } else if let Some(legend) = Legend::of(self.panel)
+            && let Some(rect) = legend.place_within(self.area, covered)
+        {
+            legend.draw(drawing, [rect.left, rect.top], look);
+            covered.add(rect);
+        }
+    }
+
+    /// Middles of marks within the frame, with the series of each.
+    fn marks(&self) -> Vec<(usize, Point)> {
+        let all = self.panel.series.iter().enumerate().flat_map(|(index, series)| match &series.marks {
+            Marks::Points(points) | Marks::LineAndPoints(points) => {
+                self.points(points).into_iter().map(|at| (index, at)).collect()
+            }
+            _ => Vec::new(),
+        });
+        all.filter(|(_, at)| self.area.contains(*at)).collect()
+    }
+
+    /// Open where a point of one series would hide one of another.
+    fn look(&self) -> Look {
+        let marks = self.marks();
+        let (few, apart) = (100 * self.panel.series.len(), point_radius(0));
+        let hides = |(index, [x, y]): &(usize, Point)| {
+            let near = |[a, b]: &Point| f64::hypot(a - x, b - y) < apart;
+            marks.iter().any(|(other, at)| other > index && near(at))
+        };
+        if marks.len() <= few && marks.iter().any(hides) { Look::Open } else { Look::Solid }
+    }
+
+    /// Places for names, which are then covered.
+    fn names(&self, covered: &mut Covered) -> Vec<Placed> {
+        let named = self.panel.names.iter().filter_map(|name| Some((self.point(name.at)?, name)));
+        let named: Vec<_> = named.filter(|(at, _)| self.area.contains(*at)).collect();
+        let marks: Vec<Point> = self.marks().into_iter().map(|(_, at)| at).collect();
+        let placed = place(&named, &Obstacles { area: self.area, marks: &marks, lines: covered });
+        for name in &placed {
+            covered.add(name.rect);
+            name.leader.iter().for_each(|[from, to]| covered.walk(*from, *to));
+        }
+        placed
     }
 
     fn draw_region(&self, drawing: &mut Drawing, region: &Region) {
@@ -178,7 +241,7 @@ impl<'a> Pane<'a> {
                 drawing.stroke(Outline::Line(self.points(points)), line(series.color, 2.0, &[]));
             }
             Marks::Dashed(points) => {
-                drawing.stroke(Outline::Line(self.points(points)), line(series.color, 2.0, DASHES));
+                drawing.stroke(Outline::Line(self.points(points)), line(series.color, 2.0, dashes(series.color)));
             }
             Marks::ErrorBars(ranges) => {
                 self.ranges(ranges).into_iter().for_each(|range| draw_error_bar(drawing, series.color, range));
@@ -187,11 +250,11 @@ impl<'a> Pane<'a> {
         }
     }
 
-    fn draw_points(&self, drawing: &mut Drawing, series: &Series) {
+    fn draw_points(&self, drawing: &mut Drawing, series: &Series, look: Look) {
         let (Marks::Points(points) | Marks::LineAndPoints(points)) = &series.marks else { return };
         let radius = point_radius(points.len());
         for at in self.points(points).into_iter().filter(|at| self.area.contains(*at)) {
-            draw_mark(drawing, series.color, at, radius);
+            draw_mark(drawing, series.color, at, radius, look);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::figure::Panel;
 use super::font;
+use super::legend::Legend;
 use super::ruler::{Ruler, Tick};
 use super::style::{FOOT, LABEL, LINE, MARGIN, RIGHT, TEXT, TICK};
 
@@ -16,6 +17,10 @@ pub(super) struct Room<'a> {
     pub top: f64,
     /// Below the frame, for ticks' labels and the axis's.
     pub bottom: f64,
+    /// The legend, where it stands between the title and the labels above the frame.
+    pub legend: Option<Legend<'a>>,
+    /// How far the title and the legend reach down.
+    pub head: f64,
 }
 
 /// A label above the frame.
@@ -40,8 +45,20 @@ impl<'a> Room<'a> {
         let top_labels = top_labels(panel, &x);
         let rows = arrange(&top_labels, 0.0, cell_width - left - RIGHT).iter().map(|(row, _)| row + 1).max();
         let title = if panel.title.is_empty() { 0.0 } else { LABEL + 10.0 };
-        let top = 8.0 + title + rows.map_or(0.0, |rows| rows as f64 * LINE + 2.0);
-        Self { x, y, top_labels, left, top, bottom }
+        let head = 8.0 + title;
+        let top = head + rows.map_or(0.0, |rows| rows as f64 * LINE + 2.0);
+        Self { x, y, top_labels, left, top, bottom, legend: None, head }
+    }
+
+    /// Makes room for the legend above the frame.
+    pub fn put_legend_above(&mut self, panel: &'a Panel, cell_width: f64) {
+        const GAP: f64 = 8.0;
+        let legend = Legend::of(panel).map(|legend| legend.spread(cell_width - self.left - RIGHT));
+        if let Some(legend) = &legend {
+            let height = legend.size()[1] + GAP;
+            (self.top, self.head) = (self.top + height, self.head + height);
+        }
+        self.legend = legend;
     }
 }
 

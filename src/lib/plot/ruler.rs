@@ -103,16 +103,19 @@ impl Ruler {
         }
         #[expect(clippy::cast_possible_truncation, reason = "at most 200 decades")]
         let stride = (span / count.max(1.0)).ceil().max(1.0) as i32;
+        // All numbers of an axis are written alike.
+        let is_plain = (self.low - 1e-9).ceil() >= PLAIN.0 && (self.high + 1e-9).floor() <= PLAIN.1;
+        let style = if is_plain { plain_decade } else { decade_label };
         let mut ticks = Vec::new();
         for decade in first..=last {
             if stride > 1 {
-                let label = (decade.rem_euclid(stride) == 0).then(|| decade_label(1, decade));
+                let label = (decade.rem_euclid(stride) == 0).then(|| style(1, decade));
                 ticks.extend(self.tick(10_f64.powi(decade), label));
                 continue;
             }
             for digit in 1..=9 {
                 let labeled = digit == 1 || (span < 2.0 && (digit == 2 || digit == 5));
-                let label = labeled.then(|| decade_label(digit, decade));
+                let label = labeled.then(|| style(digit, decade));
                 ticks.extend(self.tick(f64::from(digit) * 10_f64.powi(decade), label));
             }
         }
@@ -171,14 +174,17 @@ fn plain_labels(values: &[f64]) -> Vec<String> {
     values.iter().map(label).collect()
 }
 
-/// A digit times a power of ten: 0.02, 1000, 10⁴, 5·10⁴.
+/// Logarithmic axes between these powers of ten have plain numbers, all others powers.
+const PLAIN: (f64, f64) = (-3.0, 5.0);
+
+/// A digit times a power of ten as a plain number: 0.02, 1000.
+fn plain_decade(digit: i32, decade: i32) -> String {
+    format!("{:.*}", usize::try_from(-decade).unwrap_or(0), f64::from(digit) * 10_f64.powi(decade))
+}
+
+/// A digit times a power of ten: 10⁴, 5·10⁴.
 fn decade_label(digit: i32, decade: i32) -> String {
-    match decade {
-        0..=3 => format!("{}", f64::from(digit) * 10_f64.powi(decade)),
-        -3..0 => format!("{:.*}", usize::try_from(-decade).unwrap_or(0), f64::from(digit) * 10_f64.powi(decade)),
-        _ if digit == 1 => power_of_ten(decade),
-        _ => format!("{digit}·{}", power_of_ten(decade)),
-    }
+    if digit == 1 { power_of_ten(decade) } else { format!("{digit}·{}", power_of_ten(decade)) }
 }
 
 /// A power of ten as one writes it: 10⁻⁷.
@@ -225,11 +231,12 @@ mod tests {
     #[test]
     fn logarithmic_ticks_are_decades_with_minor_ones() {
         let axis = |low, high| Axis::log10("").range(low, high);
-        assert_eq!(labels(&axis(0.01, 1e5), 10.0), ["0.01", "0.1", "1", "10", "100", "1000", "10⁴", "10⁵"]);
-        assert_eq!(labels(&axis(1e-8, 1e8), 4.0), ["10⁻⁸", "10⁻⁴", "1", "10⁴", "10⁸"]);
+        assert_eq!(labels(&axis(0.01, 1e5), 10.0), ["0.01", "0.1", "1", "10", "100", "1000", "10000", "100000"]);
+        assert_eq!(labels(&axis(1e-8, 1e8), 4.0), ["10⁻⁸", "10⁻⁴", "10⁰", "10⁴", "10⁸"]);
         assert_eq!(labels(&axis(3.0, 30.0), 8.0), ["5", "10", "20"]);
-        assert_eq!(labels(&axis(1e4, 6e4), 8.0), ["10⁴", "2·10⁴", "5·10⁴"]);
+        assert_eq!(labels(&axis(1e4, 6e4), 8.0), ["10000", "20000", "50000"]);
         assert_eq!(labels(&axis(100.0, 300.0), 5.0), ["100", "150", "200", "250", "300"]);
+        assert_eq!(labels(&axis(3e5, 4e6), 8.0), ["5·10⁵", "10⁶", "2·10⁶"]);
         let ticks = Ruler::new(&axis(1.0, 1000.0), std::iter::empty()).ticks(8.0);
         // 1…9 in each of three decades, and the end.
         assert_eq!(ticks.len(), 28);

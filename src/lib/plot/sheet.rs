@@ -5,13 +5,14 @@ use super::figure::{Anchor, Axis};
 use super::font;
 use super::png::painted;
 use super::ruler::{Ruler, Tick};
-use super::style::{FRAME, MIDDLE, TEXT, TEXT_RGB, TICK};
+use super::style::{FRAME, MIDDLE, TEXT_RGB, TICK};
 use crate::error::{Error, Result};
 
 /// The side in pixels from which on words grow with the picture, so that they can be read where it is shown smaller.
 const PLAIN_SIDE: f64 = 640.0;
-/// Lengths at that size: white about a picture, the distance of lines, and the bar.
+/// Lengths at that size: white about a picture, type, the distance of lines, and the bar.
 const MARGIN: f64 = 12.0;
+const TEXT: f64 = 13.0;
 const LINE: f64 = 17.0;
 /// What stands above a bar: a line, and room to its topmost number.
 const TITLE: f64 = 25.0;
@@ -50,7 +51,9 @@ pub struct Tile {
     pub picture: Pixels,
     /// The bar to the right of it.
     pub bar: Option<ScaleBar>,
-    /// Lines below it; the first loses its middle where it is wider than all else.
+    /// What it is called, the first line below it, which loses its middle where it is wider than all else; may be empty.
+    pub name: String,
+    /// More lines below it.
     pub caption: Vec<String>,
 }
 
@@ -156,20 +159,27 @@ impl Type {
     }
 }
 
+impl Tile {
+    /// All that stands below it.
+    fn lines(&self) -> impl Iterator<Item = &str> {
+        let name = Some(self.name.as_str()).filter(|name| !name.is_empty());
+        name.into_iter().chain(self.caption.iter().map(String::as_str))
+    }
+}
+
 impl<'a> Block<'a> {
     fn of(tile: &'a Tile, size: Type) -> Self {
         let [columns, rows] = tile.picture.size.map(|side| side as f64);
         let bar = tile.bar.as_ref().map(|bar| Bar::of(bar, rows, size));
         let beside = bar.as_ref().map_or(0.0, |bar| bar.width);
         let title = tile.bar.as_ref().map_or(0.0, |bar| size.width(&bar.label));
-        let (name, words) = tile.caption.split_at(tile.caption.len().min(1));
-        let name = name.iter().map(|line| size.width(line).min(size.of(LEAST_NAME))).fold(0.0, f64::max);
-        let caption = words.iter().map(|line| size.width(line)).fold(name, f64::max);
+        let name = size.width(&tile.name).min(size.of(LEAST_NAME));
+        let caption = tile.caption.iter().map(|line| size.width(line)).fold(name, f64::max);
         let width = (columns + beside).max(title).max(caption);
         let above = if bar.is_some() { size.of(TITLE) } else { 0.0 };
         let below = tile.bar.as_ref().and_then(|bar| bar.missing.as_ref()).map_or(0.0, |_| size.of(LINE));
         let of_bar = bar.as_ref().map_or(0.0, |bar| bar.pixels.size[1] as f64 + below + size.of(0.5 * LINE));
-        let height = above + rows.max(of_bar) + size.of(LINE) * tile.caption.len() as f64;
+        let height = above + rows.max(of_bar) + size.of(LINE) * tile.lines().count() as f64;
         Self { tile, size, width: width.ceil(), height: height.ceil(), bar }
     }
 
@@ -190,8 +200,8 @@ impl<'a> Block<'a> {
             bar.draw(drawing, pasted, meaning, [beside, top], size);
         }
         paste_framed(drawing, pasted, picture, [left, top], size);
-        let first = bottom - size.of(LINE) * self.tile.caption.len() as f64;
-        for (index, line) in self.tile.caption.iter().enumerate() {
+        let first = bottom - size.of(LINE) * self.tile.lines().count() as f64;
+        for (index, line) in self.tile.lines().enumerate() {
             let baseline = first + size.of(LINE * (index as f64 + 0.85));
             size.write(drawing, &size.shortened(line, width), [left, baseline], Anchor::Start);
         }
@@ -203,7 +213,11 @@ impl Bar {
     fn of(meaning: &ScaleBar, height: f64, size: Type) -> Self {
         let height = height.max(size.of(LEAST_BAR)).round();
         let ruler = Ruler::new(&Axis::linear("").range(meaning.range.0, meaning.range.1), std::iter::empty());
-        let ticks = ruler.ticks((height / size.of(2.6 * TEXT)).clamp(3.0, 12.0));
+        let most = (height / size.of(2.6 * TEXT)).clamp(3.0, 12.0);
+        // One number says nothing of the others.
+        let enough = |ticks: &Vec<Tick>| ticks.len() > 1;
+        let mut closer = (0..10).map(|more| ruler.ticks(most + f64::from(more)));
+        let ticks = closer.find(enough).unwrap_or_else(|| ruler.ticks(most));
         let widest = ticks.iter().filter_map(|tick| tick.label.as_deref()).map(|label| size.width(label));
         let widest = widest.chain(meaning.missing.iter().map(|(_, name)| size.width(name))).fold(0.0, f64::max);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few pixels")]
@@ -266,7 +280,9 @@ mod tests {
         let picture = Pixels { size, rgb: rgb.repeat(size[0] * size[1]) };
         let colors = (0..=255).map(|code| [code, 0, 0]).collect();
         let meaning = ScaleBar { label: "Y / cd m⁻²".into(), range: (0.0, 10.0), colors, missing: None };
-        Tile { picture, bar: bar.then_some(meaning), caption: caption.iter().map(|line| (*line).to_owned()).collect() }
+        let name = caption.first().map(|name| (*name).to_owned()).unwrap_or_default();
+        let caption = caption.iter().skip(1).map(|line| (*line).to_owned()).collect();
+        Tile { picture, bar: bar.then_some(meaning), name, caption }
     }
 
     fn count(sheet: &Pixels, is: impl Fn([u8; 3]) -> bool) -> usize {
@@ -299,6 +315,19 @@ mod tests {
             .map(|c| c[0])
             .collect();
         assert!(bar.is_sorted_by(|a, b| a > b));
+    }
+
+    #[test]
+    fn a_bar_has_two_numbers_or_more() {
+        for high in [0.3, 1.7, 3.4, 4.9, 9.9, 19.0, 77.0] {
+            for low in [0.0, 0.31, 0.6, 0.87, 0.95].map(|part| part * high) {
+                let tile = tile([20, 20], [9; 3], true, &[]);
+                let meaning = ScaleBar { range: (low, high), ..tile.bar.clone().unwrap() };
+                let bar = Bar::of(&meaning, 20.0, Type { scale: 1.0 });
+                let labels = bar.ticks.iter().filter(|tick| tick.label.is_some()).count();
+                assert!((2..9).contains(&labels), "{low} {high}: {:?}", bar.ticks);
+            }
+        }
     }
 
     #[test]

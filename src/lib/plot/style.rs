@@ -3,12 +3,13 @@
 use super::drawing::{Drawing, Ink, Point, Stroke, Text};
 use super::figure::{Anchor, Color};
 
-/// Type: the plot's title, panels' titles and axes' labels, numbers and names.
-pub(super) const TITLE: f64 = 18.0;
-pub(super) const LABEL: f64 = 15.0;
-pub(super) const TEXT: f64 = 13.0;
+/// Type: the plot's title, panels' titles and axes' labels, numbers and names: large enough to be read where a plot of 900
+/// pixels is shown with 500.
+pub(super) const TITLE: f64 = 19.0;
+pub(super) const LABEL: f64 = 17.0;
+pub(super) const TEXT: f64 = 16.0;
 /// The distance of lines of text.
-pub(super) const LINE: f64 = 19.0;
+pub(super) const LINE: f64 = 21.0;
 /// From the baseline of digits to their middle, as a part of the size.
 pub(super) const MIDDLE: f64 = 0.365;
 
@@ -28,7 +29,20 @@ pub(super) const GRID: Stroke = Stroke { ink: Ink { rgb: [0; 3], opacity: 0.14 }
 pub(super) const MINOR_GRID: Stroke = Stroke { ink: Ink { rgb: [0; 3], opacity: 0.05 }, width: 1.0, dashes: &[] };
 pub(super) const REFERENCE: Stroke =
     Stroke { ink: Ink { rgb: [0x33; 3], opacity: 1.0 }, width: 1.2, dashes: &[2.0, 3.0] };
-pub(super) const DASHES: &[f64] = &[7.0, 4.0];
+
+/// Dashes of a color: lines can be told apart in a gray print too.
+pub(super) fn dashes(color: Color) -> &'static [f64] {
+    match color {
+        Color::Blue => &[8.0, 4.0],
+        Color::Gray => &[7.0, 7.0],
+        Color::Vermillion => &[14.0, 4.0],
+        Color::Green => &[4.0, 3.0],
+        Color::Purple => &[10.0, 3.0, 2.0, 3.0],
+        Color::Orange => &[14.0, 3.0, 2.0, 3.0, 2.0, 3.0],
+        Color::SkyBlue => &[2.0, 2.0],
+        Color::Black | Color::Yellow => &[6.0, 4.0],
+    }
+}
 
 pub(super) fn ink(color: Color, opacity: f64) -> Ink {
     Ink { rgb: color.rgb(), opacity }

@@ -12,8 +12,8 @@ use std::f64::consts::TAU;
 /// Bins of a histogram are about so many of its standard deviations wide, and reach so many to both sides.
 const BIN: f64 = 0.2;
 const REACH: f64 = 5.0;
-/// How much higher an axis is than what it shows, for the legend.
-const HEADROOM: f64 = 1.45;
+/// How much higher an axis is than what it shows.
+const HEADROOM: f64 = 1.08;
 /// The share of a normal law of two variables within its ellipse.
 const WITHIN: f64 = 0.95;
 
@@ -21,10 +21,16 @@ const WITHIN: f64 = 0.95;
 /// predicted band of ±σ of a mean, the autocorrelation along x and y beside the predicted, and of XYZ the chromaticities with the
 /// ellipses of the measured and of the predicted covariance.
 pub fn portrait(portrait: &Portrait, region: &RegionReport) -> Plot {
-    let mut panels = vec![histogram(portrait)];
+    let unsaid = without_spread(portrait);
+    let mut panels = vec![unsaid.map_or_else(|| histogram(portrait), in_words)];
     panels.extend(chromaticity(portrait, region));
     panels.extend((0..2).map(|axis| profile(portrait, axis)));
-    panels.extend((0..2).map(|axis| correlation(portrait, axis)));
+    if unsaid.is_none() {
+        panels.extend((0..2).map(|axis| correlation(portrait, axis)));
+    }
+    // Panels without a number say nothing.
+    let says = |panel: &Panel| !panel.has_axes || panel.series.iter().any(|series| !series.marks.is_empty());
+    panels.retain(says);
     let size = format!("{} × {}", portrait.region.width, portrait.region.height);
     let title = format!("{}: {}, {size}", portrait.name(), portrait.holds);
     Plot { title, panels, arrangement: Arrangement::Pairs }
@@ -57,6 +63,25 @@ fn words_of_reference(portrait: &Portrait) -> &'static str {
     } else {
         "sample − mean"
     }
+}
+
+/// Why there is no histogram; none where there is one.
+fn without_spread(portrait: &Portrait) -> Option<&'static str> {
+    if portrait.groups.iter().all(|group| group.mean().is_none()) {
+        return Some("No pixel is left to show: all are saturated, marked or no finite numbers.");
+    }
+    let is_constant = |group: &Likeness| group.std().is_none_or(|std| std <= 0.0);
+    let all = portrait.groups.iter().all(is_constant);
+    all.then_some("All samples of a class or channel are the same: there is neither a histogram nor a correlation.")
+}
+
+/// A panel that only says something.
+fn in_words(text: &str) -> Panel {
+    let axis = || Axis::linear("").range(0.0, 1.0);
+    let mut panel = Panel::new(axis(), axis());
+    panel.title = text.into();
+    panel.has_axes = false;
+    panel
 }
 
 fn histogram(portrait: &Portrait) -> Panel {
@@ -141,9 +166,13 @@ fn profile(portrait: &Portrait, axis: usize) -> Panel {
         let band = group.predicted.as_ref().and_then(|foreseen| foreseen.profile_std);
         bands.extend(band.map(|stds| (color(portrait, index), stds[axis], [first, last])));
     }
-    for (index, (color, std, [first, last])) in bands.into_iter().enumerate() {
-        for (bound, name) in [(std, "predicted ±σ of a mean"), (-std, "")] {
-            panel.add(if index == 0 { name } else { "" }, color, Marks::Dashed(vec![[first, bound], [last, bound]]));
+    if !bands.is_empty() {
+        // For the legend: each class or channel has its own, in its color.
+        panel.add("predicted ±σ of a mean", Color::Black, Marks::Dashed(Vec::new()));
+    }
+    for (color, std, [first, last]) in bands {
+        for bound in [std, -std] {
+            panel.add("", color, Marks::Dashed(vec![[first, bound], [last, bound]]));
         }
     }
     panel
@@ -180,8 +209,11 @@ fn correlation(portrait: &Portrait, axis: usize) -> Panel {
     });
     let [low, high] =
         ends.fold([0.0, 0.0], |[low, high], [_, below, above]| [f64::min(low, below), f64::max(high, above)]);
-    for (index, (color, line)) in lines.into_iter().enumerate() {
-        panel.add(if index == 0 { "predicted" } else { "" }, color, Marks::Dashed(line));
+    if !lines.is_empty() {
+        panel.add("predicted", Color::Black, Marks::Dashed(Vec::new()));
+    }
+    for (color, line) in lines {
+        panel.add("", color, Marks::Dashed(line));
     }
     panel.y = panel.y.range(low - 0.05 * (high - low), low + HEADROOM * (high - low));
     panel.horizontal_lines.push(ReferenceLine { at: 0.0, label: String::new() });

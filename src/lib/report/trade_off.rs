@@ -8,11 +8,12 @@ pub fn trade_off(curve: &[TradeOff]) -> Plot {
     let x = Axis::log10("error of the matrix, rms ΔE*ab");
     let y = Axis::log10("noise of a pixel, rms ΔE*ab");
     let mut panel = Panel::new(x, y);
-    let points = |chosen: &dyn Fn(&TradeOff) -> bool| {
-        curve.iter().filter(|p| chosen(p)).map(|p| [p.model_delta_e, p.noise_delta_e]).collect::<Vec<_>>()
-    };
-    panel.add("noise weights from 0 to 100", Color::Blue, Marks::LineAndPoints(points(&|_| true)));
-    panel.add("weight 1: single pixels", Color::Vermillion, Marks::Points(points(&|p| p.noise_weight == 1.0)));
-    panel.add("weight 0: the best colors", Color::Green, Marks::Points(points(&|p| p.noise_weight == 0.0)));
+    let place = |point: &TradeOff| [point.model_delta_e, point.noise_delta_e];
+    panel.add("noise weights from 0 to 100", Color::Blue, Marks::LineAndPoints(curve.iter().map(place).collect()));
+    for (weight, name) in [(1.0, "weight 1: single pixels"), (0.0, "weight 0: the best colors")] {
+        for point in curve.iter().filter(|point| point.noise_weight == weight) {
+            panel.name(place(point), name, Color::Black);
+        }
+    }
     Plot::new("Errors of color against noise", panel)
 }

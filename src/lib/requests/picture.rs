@@ -79,6 +79,10 @@ pub struct PictureOptions {
     /// in false color 0%,100%
     #[arg(long, value_name = "full|LOW,HIGH|LOW%,HIGH%|Nsigma", value_parser = range, allow_hyphen_values = true)]
     range: Option<Range>,
+    /// Say below the picture what is seen: in these words, or by the frame's name, what it holds, mean and standard deviation;
+    /// and what is black and what is white
+    #[arg(long, value_name = "TEXT", num_args = 0..=1, require_equals = true, default_missing_value = "", conflicts_with = "more")]
+    caption: Option<String>,
 }
 
 fn range(text: &str) -> std::result::Result<Range, String> {
@@ -118,8 +122,8 @@ impl PictureOptions {
 
     /// What is to be shown.
     pub fn settings(&self) -> PictureSettings {
-        let Self { region, plane, false_color, zoom, fit, range } = self.clone();
-        PictureSettings { region, zoom, fit, plane, false_color, range }
+        let Self { region, plane, false_color, zoom, fit, range, caption } = self.clone();
+        PictureSettings { region, zoom, fit, plane, false_color, range, caption }
     }
 }
 

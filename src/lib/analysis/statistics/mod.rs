@@ -19,4 +19,4 @@ mod watch;
 pub use measure::{measure, measure_with_portrait};
 pub use region::Region;
 pub use report::{ChannelReport, RegionReport, Report};
-pub use watch::Saturated;
+pub use watch::{MarkedRows, Saturated};

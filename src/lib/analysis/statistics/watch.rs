@@ -43,12 +43,8 @@ impl Marks {
 
 /// The rows of a frame without its layer of marks, marked pixels as NaN where they are left out.
 pub(super) struct Watch<'a> {
-    source: Watched<'a>,
+    source: MarkedRows<'a>,
     header: FrameHeader,
-    /// Place of the layer among the channels of the source; none where no pixel can be marked.
-    layer: Option<usize>,
-    /// The bits whose pixels are left out.
-    left_out: u32,
     regions: Vec<Region>,
     counts: Vec<Marks>,
     rows_read: usize,
@@ -61,34 +57,73 @@ enum Watched<'a> {
     Marked(Box<Marked<'a>>),
 }
 
-impl<'a> Watched<'a> {
-    /// The rows of `source`, and the place of their layer of marks.
-    fn of(source: &'a mut dyn RowSource) -> (Self, Option<usize>) {
+/// The rows of a frame with the layer of their marks, and which marks leave a pixel out of statistics.
+pub struct MarkedRows<'a> {
+    source: Watched<'a>,
+    /// Place of the layer among the channels; none where no pixel can be marked.
+    pub layer: Option<usize>,
+    /// The bits whose pixels are left out.
+    pub left_out: u32,
+}
+
+impl<'a> MarkedRows<'a> {
+    /// The rows of `source`. Samples of photosites always count, as the records that they are.
+    pub fn of(source: &'a mut dyn RowSource, saturated: Saturated) -> Self {
         let header = source.header();
         // What other programs call so is measured as any channel; ours comes last.
         let is_ours = |layer: &usize| *layer > 0 && !header.metadata.history.is_empty();
         let layer = header.geometry.channels.iter().position(|channel| channel == MASK_LAYER).filter(is_ours);
         let levels = FullLevels::of(header).filter(|levels| saturation::is_possible(header, levels));
-        match (layer, levels) {
+        let (source, layer) = match (layer, levels) {
             (None, Some(levels)) => {
                 let layer = header.geometry.channels.len();
-                (Self::Marked(Box::new(Marked::new(source, Some(levels)))), Some(layer))
+                (Watched::Marked(Box::new(Marked::new(source, Some(levels)))), Some(layer))
             }
-            _ => (Self::AsTheyCome(source), layer),
+            _ => (Watched::AsTheyCome(source), layer),
+        };
+        let mut rows = Self { source, layer, left_out: !SATURATED };
+        if saturated == Saturated::LeftOut && (rows.comes_with_layer() || !samples_tell(&rows.unmarked())) {
+            rows.left_out = u32::MAX;
         }
+        rows
+    }
+
+    /// The head of the frame without the layer and what follows it.
+    pub fn unmarked(&self) -> FrameHeader {
+        let mut header = self.header().clone();
+        self.layer.iter().for_each(|layer| header.geometry.channels.truncate(*layer));
+        header
+    }
+
+    fn comes_with_layer(&self) -> bool {
+        self.layer.is_some() && matches!(self.source, Watched::AsTheyCome(_))
     }
 
     fn rows(&self) -> &dyn RowSource {
-        match self {
-            Self::AsTheyCome(source) => *source,
-            Self::Marked(source) => source.as_ref(),
+        match &self.source {
+            Watched::AsTheyCome(source) => *source,
+            Watched::Marked(source) => source.as_ref(),
         }
+    }
+}
+
+impl RowSource for MarkedRows<'_> {
+    fn header(&self) -> &FrameHeader {
+        self.rows().header()
+    }
+
+    fn natural_rows(&self) -> usize {
+        self.rows().natural_rows()
+    }
+
+    fn may_wait(&self) -> bool {
+        self.rows().may_wait()
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
-        match self {
-            Self::AsTheyCome(source) => source.read(rows, samples),
-            Self::Marked(source) => source.read(rows, samples),
+        match &mut self.source {
+            Watched::AsTheyCome(source) => source.read(rows, samples),
+            Watched::Marked(source) => source.read(rows, samples),
         }
     }
 }
@@ -97,25 +132,15 @@ impl<'a> Watch<'a> {
     /// Watches `source`. Samples of photosites always count, as the records that they are, and so do the formulas that
     /// predict them.
     pub fn new(source: &'a mut dyn RowSource, saturated: Saturated, regions: &[Region]) -> Self {
-        let (source, layer) = Watched::of(source);
-        let mut header = source.rows().header().clone();
-        let comes_with_layer = layer.is_some() && matches!(source, Watched::AsTheyCome(_));
-        if let Some(layer) = layer {
-            header.geometry.channels.truncate(layer);
-            if saturated == Saturated::Kept && comes_with_layer && header.leads_with_three_planes() {
-                // What uncertainty says of marked pixels is infinite, and would leave them out.
-                header.geometry.channels.truncate(3);
-            }
+        let source = MarkedRows::of(source, saturated);
+        let mut header = source.unmarked();
+        if saturated == Saturated::Kept && source.comes_with_layer() && header.leads_with_three_planes() {
+            // What uncertainty says of marked pixels is infinite, and would leave them out.
+            header.geometry.channels.truncate(3);
         }
-        let left_out = match saturated {
-            Saturated::LeftOut if comes_with_layer || !samples_tell(&header) => u32::MAX,
-            _ => !SATURATED,
-        };
         Self {
             source,
             header,
-            layer,
-            left_out,
             regions: regions.to_vec(),
             counts: vec![Marks::default(); regions.len()],
             rows_read: 0,
@@ -125,12 +150,12 @@ impl<'a> Watch<'a> {
 
     /// Marked pixels of each region, and whether saturated ones were left out.
     pub fn seen(self) -> (Vec<Marks>, bool) {
-        (self.counts, self.left_out & SATURATED != 0)
+        (self.counts, self.source.left_out & SATURATED != 0)
     }
 
     /// Takes in one row of samples and its marks: counts, and leaves out.
     fn take(&mut self, marks: &[f32], samples: &mut [f32]) {
-        let y = self.rows_read;
+        let (y, left_out) = (self.rows_read, self.source.left_out);
         self.rows_read += 1;
         if marks.iter().all(|mark| *mark == 0.0) {
             return;
@@ -138,12 +163,12 @@ impl<'a> Watch<'a> {
         for (region, count) in self.regions.iter().zip(&mut self.counts) {
             if (region.y..region.y + region.height).contains(&y) {
                 let marks = &marks[region.x..region.x + region.width];
-                marks.iter().for_each(|mark| count.add(bits(*mark), self.left_out));
+                marks.iter().for_each(|mark| count.add(bits(*mark), left_out));
             }
         }
         for line in samples.chunks_exact_mut(marks.len()) {
             for (sample, mark) in line.iter_mut().zip(marks) {
-                *sample = if bits(*mark) & self.left_out == 0 { *sample } else { f32::NAN };
+                *sample = if bits(*mark) & left_out == 0 { *sample } else { f32::NAN };
             }
         }
     }
@@ -155,15 +180,15 @@ impl RowSource for Watch<'_> {
     }
 
     fn natural_rows(&self) -> usize {
-        self.source.rows().natural_rows()
+        self.source.natural_rows()
     }
 
     fn may_wait(&self) -> bool {
-        self.source.rows().may_wait()
+        self.source.may_wait()
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
-        let Some(layer) = self.layer else { return self.source.read(rows, samples) };
+        let Some(layer) = self.source.layer else { return self.source.read(rows, samples) };
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
         self.source.read(rows, &mut buffer)?;

@@ -6,7 +6,7 @@ mod shade;
 
 use super::atomic::Target;
 use super::foreign::png_complaint;
-use crate::analysis::statistics::Region;
+use crate::analysis::statistics::{MarkedRows, Region, Saturated};
 use crate::color::ramp::ramp;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
@@ -43,6 +43,8 @@ pub struct PictureSettings {
     pub false_color: bool,
     /// What is black and what is white; the full range of the stage where there is none, in false color all that is shown.
     pub range: Option<Range>,
+    /// Whether what is seen is said below the picture: in these words, or, where they are empty, by what the frame holds.
+    pub caption: Option<String>,
 }
 
 /// Reads a frame and writes it as a PNG.
@@ -58,7 +60,7 @@ pub fn write_png(source: &mut dyn RowSource, settings: &PictureSettings, path: &
     let shown = Shown::of(source, settings)?;
     match shown.bar {
         None => encode(&shown.bytes, shown.size, shown.samples_per_pixel, path),
-        Some(_) => write_sheet(vec![shown.tile(Vec::new())], 1, path),
+        Some(_) => write_sheet(vec![shown.tile(String::new(), Vec::new())], 1, path),
     }
 }
 
@@ -78,8 +80,9 @@ pub fn write_sheet(tiles: Vec<Tile>, columns: usize, path: &Path) -> Result<()> 
     encode(&rgb, size, 3, path)
 }
 
-/// Reads a frame for a sheet: a small picture with the name of the frame, what it holds, and mean and standard deviation of its
-/// samples, plane by plane or class by class.
+/// Reads a frame for a sheet, or for a caption of its own: a picture, small on a sheet, with the name of the frame, what it holds, and mean and standard deviation of its
+/// samples, plane by plane or class by class. Pixels that were made of saturated samples, or are marked otherwise, are shown but
+/// not counted, as in [`measure`](crate::analysis::statistics::measure).
 ///
 /// A frame that makes no picture as it is shows its luminance, its lightness or its first plane in false color.
 ///
@@ -87,12 +90,16 @@ pub fn write_sheet(tiles: Vec<Tile>, columns: usize, path: &Path) -> Result<()> 
 ///
 /// As of [`write_png`].
 pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Result<Tile> {
-    let frame = source.header().clone();
+    // Where a plane is named it may be the layer itself.
+    let named = source.header().clone();
+    let mut source = MarkedRows::of(source, Saturated::LeftOut);
+    let frame = if settings.plane.is_some() { named } else { source.unmarked() };
     let mut settings = settings.clone();
-    if settings.zoom <= 1 {
+    let is_alone = settings.caption.is_some();
+    if settings.zoom <= 1 && !is_alone {
         settings.fit = settings.fit.or(Some(THUMBNAIL));
     }
-    let is_told = settings.plane.is_some() || settings.false_color;
+    let is_told = settings.plane.is_some() || settings.false_color || is_alone;
     let choice = if is_told || shade::is_picture(&frame, settings.range) {
         Choice::of(&frame, settings.plane.as_deref(), settings.false_color)?
     } else {
@@ -101,11 +108,34 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
     };
     let reduction = reduction(&frame, &settings, &choice)?;
     let region = settings.region.unwrap_or(Region::whole(&frame));
-    let mut tally = Tally::new(&frame, region, &choice);
-    let reduced = Reduced::read(source, &reduction, &choice, Some(&mut tally))?;
-    let mut caption = vec![frame.name.clone(), planes::stage(&frame, &choice, [region.width, region.height])];
+    let mut tally = Tally::new(&frame, &source, region, &choice);
+    let reduced = Reduced::read(&mut source, &reduction, &choice, Some(&mut tally))?;
+    let shown = Shown::paint(&frame, &settings, &choice, &reduced)?;
+    let scale = scale(&settings, &reduction, &shown);
+    if let Some(words) = settings.caption.filter(|words| !words.is_empty()) {
+        return Ok(shown.tile(String::new(), words.lines().map(str::to_owned).chain(scale).collect()));
+    }
+    let mut caption = vec![planes::stage(&frame, &choice, [region.width, region.height])];
     caption.extend(tally.groups.iter().map(|(name, moments)| seen(name, moments)));
-    Ok(Shown::paint(&frame, &settings, &choice, &reduced)?.tile(caption))
+    let reasons = tally.left_out.into_iter().zip(["saturated or marked", "not finite"]).filter(|(count, _)| *count > 0);
+    let reasons: Vec<String> = reasons.map(|(count, reason)| format!("{count} {reason}")).collect();
+    if !reasons.is_empty() {
+        caption.push(format!("left out: {}", reasons.join(", ")));
+    }
+    caption.extend(scale);
+    Ok(shown.tile(frame.name, caption))
+}
+
+/// What black, white and a pixel of the picture are.
+fn scale(settings: &PictureSettings, reduction: &Reduction, shown: &Shown) -> Option<String> {
+    let [columns, rows] = reduction.samples_per_pixel();
+    let pixel = match (settings.zoom, [columns, rows]) {
+        (2.., _) => Some(format!("each sample {0} × {0} pixels", settings.zoom)),
+        (_, [1, 1]) => None,
+        _ => Some(format!("each pixel the mean of {columns} × {rows} samples")),
+    };
+    let parts: Vec<String> = shown.scale.iter().cloned().chain(pixel).collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
 }
 
 /// The side of a small picture.
@@ -113,16 +143,12 @@ const THUMBNAIL: usize = 320;
 
 /// What is said of the samples of a plane.
 fn seen(name: &str, moments: &Moments) -> String {
-    let left_out = match moments.not_finite {
-        0 => String::new(),
-        count => format!(", {count} not finite"),
-    };
     match moments.std(0) {
         Some(std) => {
-            format!("{name}: mean {}, std {}{left_out}", planes::rounded(moments.mean[0]), planes::rounded(std))
+            format!("{name}: mean {}, std {}", planes::rounded(moments.mean[0]), planes::rounded(std))
         }
-        None if moments.count == 1 => format!("{name}: {}{left_out}", planes::rounded(moments.mean[0])),
-        None => format!("{name}: no number{left_out}"),
+        None if moments.count == 1 => format!("{name}: {}", planes::rounded(moments.mean[0])),
+        None => format!("{name}: no number"),
     }
 }
 
@@ -133,6 +159,8 @@ struct Shown {
     samples_per_pixel: usize,
     bytes: Vec<u8>,
     bar: Option<ScaleBar>,
+    /// What is black and what is white, where there is no bar.
+    scale: Option<String>,
 }
 
 impl Shown {
@@ -155,7 +183,7 @@ impl Shown {
             let missing = reduced.samples.iter().any(|sample| !sample.is_finite());
             let missing = missing.then(|| (MISSING, "not finite".to_owned()));
             let bar = ScaleBar { label: choice.label(frame), range: (low, high), colors, missing };
-            return Ok(Self { size, samples_per_pixel: 3, bytes, bar: Some(bar) });
+            return Ok(Self { size, samples_per_pixel: 3, bytes, bar: Some(bar), scale: None });
         }
         let shade = Shade::new(frame, settings.range.unwrap_or(Range::Full), reduced)?;
         let planes = reduced.planes;
@@ -164,15 +192,16 @@ impl Shown {
             samples_per_pixel: planes,
             bytes: zoomed(&shade.bytes(reduced), reduced.size, planes, zoom),
             bar: None,
+            scale: shade.words(frame, &choice.names(frame)),
         })
     }
 
-    fn tile(self, caption: Vec<String>) -> Tile {
+    fn tile(self, name: String, caption: Vec<String>) -> Tile {
         let rgb = match self.samples_per_pixel {
             1 => self.bytes.iter().flat_map(|gray| [*gray; 3]).collect(),
             _ => self.bytes,
         };
-        Tile { picture: Pixels { size: self.size, rgb }, bar: self.bar, caption }
+        Tile { picture: Pixels { size: self.size, rgb }, bar: self.bar, name, caption }
     }
 }
 

@@ -193,8 +193,11 @@ pub(super) fn stage(frame: &FrameHeader, choice: &Choice, [width, height]: [usiz
 /// A number in five digits.
 pub(super) fn rounded(value: f64) -> String {
     const DIGITS: i32 = 5;
+    if value == 0.0 {
+        return "0".into();
+    }
     #[expect(clippy::cast_possible_truncation, reason = "logarithms of doubles are within ±324")]
-    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    let magnitude = value.abs().log10().floor() as i32;
     if (-4..7).contains(&magnitude) {
         format!("{value:.*}", usize::try_from(DIGITS - 1 - magnitude).unwrap_or(0)).replace('-', "−")
     } else {
@@ -254,9 +257,7 @@ mod tests {
             assert_eq!(label(quantity, &three, name), wanted);
         }
         assert_eq!(label(QuantityKind::ColorDifference, &MAP_CHANNELS, "delta_e_76"), "ΔE*ab");
-        for (number, wanted) in
-            [(0.0, "0.0000"), (2730.123, "2730.1"), (-0.001_234_56, "−0.0012346"), (1e9, "1.0000e9")]
-        {
+        for (number, wanted) in [(0.0, "0"), (2730.123, "2730.1"), (-0.001_234_56, "−0.0012346"), (1e9, "1.0000e9")] {
             assert_eq!(rounded(number), wanted);
         }
         let frame = frame(QuantityKind::Xyy, &["R", "G", "B"]);

@@ -1,11 +1,12 @@
 //! The pixels of a picture: samples as they are, or means of squares of them.
 
 use super::planes::Choice;
-use crate::analysis::statistics::Region;
+use crate::analysis::statistics::{MarkedRows, Region};
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
+use crate::stages::saturation::bits;
 use crate::stream::{RowSource, fold};
 use crate::units::Any;
 use rayon::prelude::*;
@@ -55,6 +56,13 @@ impl Reduction {
     }
 }
 
+impl Reduction {
+    /// Columns and rows of samples that make one pixel.
+    pub fn samples_per_pixel(&self) -> [usize; 2] {
+        self.step
+    }
+}
+
 impl Reduced {
     /// Reads the rows of a region, and counts what they hold where a tally is wanted.
     ///
@@ -79,7 +87,8 @@ impl Reduced {
             for y in band.rows().filter(|y| *y >= region.y) {
                 if let Some(tally) = &mut tally {
                     let line = |channel: usize| &window.row(y.cast_signed(), channel)[region.x..][..region.width];
-                    choice.channels.iter().enumerate().for_each(|(plane, channel)| tally.add(plane, y, line(*channel)));
+                    let planes: Vec<&[f32]> = choice.channels.iter().map(|channel| line(*channel)).collect();
+                    tally.add_row(y, &planes, tally.layer.map(line));
                 }
                 let row = (y - region.y) / step[1];
                 if row >= rows {
@@ -147,6 +156,13 @@ impl Reduced {
 pub(super) struct Tally {
     /// What each is called, and what was seen of it.
     pub groups: Vec<(String, Moments)>,
+    /// Pixels that marks leave out, and of the others those of which a sample is not finite.
+    pub left_out: [u64; 2],
+    /// Place of the layer of marks among the channels.
+    layer: Option<usize>,
+    /// The marks that leave a pixel out.
+    marks: u32,
+    is_out: Vec<bool>,
     /// Photosites of each class; empty of other frames.
     classes: Vec<Seen>,
     line: Vec<f32>,
@@ -154,7 +170,7 @@ pub(super) struct Tally {
 
 impl Tally {
     /// Nothing seen yet of what is shown.
-    pub fn new(frame: &FrameHeader, region: Region, choice: &Choice) -> Self {
+    pub fn new(frame: &FrameHeader, rows: &MarkedRows, region: Region, choice: &Choice) -> Self {
         let filters = choice.filters(frame);
         let of_class = |filter: &char| Choice { channels: vec![0], filter: Some(*filter) };
         let classes = filters.iter().map(|filter| Seen::of(frame, region, &of_class(filter))).collect();
@@ -162,18 +178,46 @@ impl Tally {
             [] => choice.names(frame),
             filters => filters.iter().map(char::to_string).collect(),
         };
-        Self { groups: names.into_iter().map(|name| (name, Moments::new(1))).collect(), classes, line: Vec::new() }
+        Self {
+            groups: names.into_iter().map(|name| (name, Moments::new(1))).collect(),
+            left_out: [0; 2],
+            // The layer itself is shown with all that it says.
+            layer: rows.layer.filter(|layer| !choice.channels.contains(layer)),
+            marks: rows.left_out,
+            is_out: Vec::new(),
+            classes,
+            line: Vec::new(),
+        }
     }
 
-    fn add(&mut self, plane: usize, y: usize, line: &[f32]) {
+    /// Takes in a row of all planes. A pixel counts as `measure` counts it: without marks that leave it out, and with finite
+    /// samples in all planes.
+    fn add_row(&mut self, y: usize, planes: &[&[f32]], marks: Option<&[f32]>) {
+        let width = planes.first().map_or(0, |line| line.len());
+        let is_marked = |x: usize| marks.is_some_and(|marks| bits(marks[x]) & self.marks != 0);
+        let is_finite = |x: usize| planes.iter().all(|line| line[x].is_finite());
+        self.is_out.clear();
+        for x in 0..width {
+            let reasons = [is_marked(x), !is_finite(x)];
+            let reason = reasons.iter().position(|is_so| *is_so);
+            reason.iter().for_each(|reason| self.left_out[*reason] += 1);
+            self.is_out.push(reason.is_some());
+        }
         if self.classes.is_empty() {
-            self.groups[plane].1.add(&[line]);
+            for ((_, moments), line) in self.groups.iter_mut().zip(planes) {
+                self.line.clear();
+                self.line
+                    .extend(line.iter().zip(&self.is_out).filter(|(_, is_out)| !**is_out).map(|(sample, _)| *sample));
+                moments.add(&[&self.line]);
+            }
+            return;
         }
         for ((_, moments), seen) in self.groups.iter_mut().zip(&self.classes) {
             let Some(sites) = seen.row(y) else { continue };
             self.line.clear();
-            let seen = line.iter().zip(sites.iter().cycle()).filter(|(_, is_seen)| **is_seen);
-            self.line.extend(seen.map(|(sample, _)| *sample));
+            let counted = planes[0].iter().zip(&self.is_out).zip(sites.iter().cycle());
+            let counted = counted.filter(|((_, is_out), is_seen)| **is_seen && !**is_out);
+            self.line.extend(counted.map(|((sample, _), _)| *sample));
             moments.add(&[&self.line]);
         }
     }

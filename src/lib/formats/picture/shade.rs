@@ -1,10 +1,11 @@
 //! From samples to gray and color.
 
+use super::planes::rounded;
 use super::reduce::Reduced;
 use crate::color::{linear_srgb_from_xyz, srgb_decode, srgb_encode};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
-use crate::units::QuantityKind;
+use crate::units::{QuantityKind, typeset};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -115,6 +116,32 @@ impl Shade {
                 "{}: a range from {low} to {high} shows nothing; give another with --range",
                 frame.name
             ))),
+        }
+    }
+
+    /// What is black and what is white, in the unit of the samples.
+    pub fn words(&self, frame: &FrameHeader, names: &[String]) -> Option<String> {
+        let unit = match typeset(&frame.metadata.unit) {
+            unit if ["1", "unspecified"].contains(&unit.as_str()) => String::new(),
+            unit => format!(" {unit}"),
+        };
+        match self {
+            Self::Planes(ranges) if ranges.iter().all(|range| *range == ranges[0]) => {
+                let (low, high) = ranges[0];
+                Some(format!("black {}, white {}{unit}", rounded(low), rounded(high)))
+            }
+            Self::Planes(ranges) => {
+                let range = |(name, (low, high)): (&String, &(f64, f64))| {
+                    format!("{name} {} to {}", rounded(*low), rounded(*high))
+                };
+                let ranges: Vec<String> = names.iter().zip(ranges).map(range).collect();
+                Some(format!("black to white: {}{unit}", ranges.join(", ")))
+            }
+            Self::Xyz(_) | Self::Encoded => {
+                let white = frame.metadata.color.as_ref()?.white?;
+                let [_, luminance, _] = white;
+                Some(format!("white {} cd m⁻²", rounded(luminance)))
+            }
         }
     }
 

@@ -181,20 +181,20 @@ impl ReadAxis {
 /// The axes of each panel.
 pub fn axes(plot: &Plot) -> Vec<[ReadAxis; 2]> {
     let elements = elements(plot);
-    let ticks = elements.iter().filter(|element| element.name == "text" && element.number("font-size") == 13.0);
+    let ticks = elements.iter().filter(|element| element.name == "text" && element.number("font-size") == 16.0);
     let ticks: Vec<(&Element, f64)> = ticks.filter_map(|text| Some((text, value(&text.text)?))).collect();
     let axes = |(panel, [left, top, right, bottom]): (usize, [f64; 4])| {
-        let below = |text: &Element| (bottom..bottom + 24.0).contains(&text.number("y"));
+        let below = |text: &Element| (bottom..bottom + 28.0).contains(&text.number("y"));
         let under = |text: &Element| (left - 1.0..right + 1.0).contains(&text.number("x")) && below(text);
         let beside = |text: &Element| (left - 24.0..left).contains(&text.number("x"));
-        let level = |text: &Element| (top..bottom + 9.0).contains(&text.number("y")) && beside(text);
+        let level = |text: &Element| (top..bottom + 10.0).contains(&text.number("y")) && beside(text);
         let x: Vec<(f64, f64)> =
             ticks.iter().filter(|(text, _)| under(text)).map(|(text, value)| (text.number("x"), *value)).collect();
         // Digits are 0.73 of the size high; they are centered to the tick.
         let y: Vec<(f64, f64)> = ticks
             .iter()
             .filter(|(text, _)| level(text))
-            .map(|(text, value)| (text.number("y") - 0.365 * 13.0, *value))
+            .map(|(text, value)| (text.number("y") - 0.365 * 16.0, *value))
             .collect();
         [ReadAxis::new(plot.panels[panel].x.scale, &x), ReadAxis::new(plot.panels[panel].y.scale, &y)]
     };

@@ -227,7 +227,7 @@ impl NoisePrediction {
         let conditions = Conditions { quadrature_error, ..self.conditions(&sensor, exposure, color.as_ref())? };
         let mut predictor = self.predictor(&sensor, exposure, color)?;
         let budgets = match self.sweep {
-            Some(sweep) => Budgets::Sweep(sweep_levels(&mut predictor, sweep, electrons)?),
+            Some(sweep) => Budgets::Sweep(predictions(&mut predictor, sweep.levels(), electrons)?),
             None => Budgets::Scene(predictor.predict(electrons)?),
         };
         Ok(PredictedNoise { conditions, budgets, notes, scene: Some((predictor, electrons)), sweep: self.sweep })
@@ -345,7 +345,8 @@ impl NoisePrediction {
 }
 
 impl PredictedNoise {
-    /// The photon transfer curve of the brightest class, over the levels of the sweep, or up to full well.
+    /// The photon transfer curve of the brightest class, over the levels of the sweep, or up to full well; near full well,
+    /// where it bends, with more levels between.
     ///
     /// # Errors
     ///
@@ -357,16 +358,33 @@ impl PredictedNoise {
         let (full_well_e, sensor) = (predictor.sensor().readout()?.full_well_e, predictor.sensor().name.clone());
         let all = Sweep { start_e: 1.0, end_e: full_well_e, count: 200, is_logarithmic: true };
         let electrons = if *electrons == [0.0; 3] { [1.0; 3] } else { *electrons };
-        let levels = sweep_levels(predictor, self.sweep.unwrap_or(all), electrons)?;
+        let mut levels: Vec<f64> = self.sweep.unwrap_or(all).levels().collect();
+        let [low, high] = [f64::min, f64::max].map(|pick| levels.iter().copied().fold(full_well_e, pick));
+        levels.extend(near_full_well(full_well_e).filter(|level| (low..=high).contains(level)));
+        levels.sort_by(f64::total_cmp);
+        levels.dedup();
+        let levels = predictions(predictor, levels.into_iter(), electrons)?;
         let brightest = (0..3).max_by(|&a, &b| electrons[a].total_cmp(&electrons[b])).unwrap_or_default();
         Ok(TransferCurve { sensor, class: Class::ALL[brightest], full_well_e, levels })
     }
 }
 
+/// Levels so near to each other that the bend of a curve at full well is seen.
+fn near_full_well(full_well_e: f64) -> impl Iterator<Item = f64> {
+    const WITHIN: f64 = 0.2;
+    const STEPS: u32 = 160;
+    let part = |step: u32| 1.0 - WITHIN + 2.0 * WITHIN * f64::from(step) / f64::from(STEPS);
+    (0..=STEPS).map(move |step| part(step) * full_well_e)
+}
+
 /// Predicts the scene at one level of its brightest class after another.
-fn sweep_levels(predictor: &mut Predictor, sweep: Sweep, electrons: [f64; 3]) -> Result<Vec<ChainPrediction>> {
+fn predictions(
+    predictor: &mut Predictor,
+    levels: impl Iterator<Item = f64>,
+    electrons: [f64; 3],
+) -> Result<Vec<ChainPrediction>> {
     let brightest = electrons.iter().copied().fold(0.0, f64::max);
-    sweep.levels().map(|level| predictor.predict(electrons.map(|e| e / brightest * level))).collect()
+    levels.map(|level| predictor.predict(electrons.map(|e| e / brightest * level))).collect()
 }
 
 #[cfg(test)]
@@ -398,7 +416,19 @@ mod tests {
         assert_eq!((electrons[0], electrons[2]), ([2.5, 10.0, 5.0], [250.0, 1000.0, 500.0]));
         let levels = levels.clone();
         let curve = found.transfer_curve().unwrap();
-        assert_eq!((curve.class, curve.levels), (Class::Green, levels));
+        assert_eq!(curve.class, Class::Green);
+        assert!(levels.iter().all(|level| curve.levels.contains(level)));
+    }
+
+    #[test]
+    fn a_curve_has_no_chords_where_full_well_bends_it() {
+        let curve = NoisePrediction { sweep: None, ..given([1.0, 4.0, 2.0]) }.run().unwrap().transfer_curve().unwrap();
+        let points: Vec<[f64; 2]> =
+            curve.levels.iter().map(|level| [level.electrons[1], level.stages[0].std[1]]).collect();
+        assert!(points.is_sorted_by(|a, b| a[0] < b[0]));
+        // No step of more than a tenth of the largest noise: the drop at full well is several of its standard deviations wide.
+        let highest = points.iter().map(|[_, std]| *std).fold(0.0, f64::max);
+        assert!(points.windows(2).all(|pair| (pair[1][1] - pair[0][1]).abs() < 0.12 * highest));
     }
 
     #[test]

@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::timed;
-use crate::labels::Shape;
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::chain::{ChainStage, StagePrediction};
@@ -108,7 +107,7 @@ pub fn study(study: &Study) -> Result<Section> {
         means.iter().map(|m| Choice::new(format!("n = {}", m.count), m.time * 1e6, m.simulated)).collect()
     };
     let groups = [Group::new("n frames", choices(&by_frames)), Group::new("n pixels", choices(&by_pixels))];
-    let top = pareto::panel(Shape::Stacked, "", ["CPU time per mean, µs", "σ of the mean of red, ADU"], &groups, 1e-9);
+    let top = pareto::panel("", ["CPU time per mean, µs", "σ of the mean of red, ADU"], &groups, 1e-9);
     let mut bottom = Panel::new(Axis::log10("values averaged, n"), Axis::log10("σ of the mean of red, ADU"));
     let series = |means: &[Mean], of: &dyn Fn(&Mean) -> f64| means.iter().map(|m| [m.count as f64, of(m)]).collect();
     bottom.add("n frames: simulated", Color::Blue, Marks::Points(series(&by_frames, &|m| m.simulated)));

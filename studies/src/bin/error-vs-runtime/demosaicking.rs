@@ -2,14 +2,13 @@
 
 use crate::Study;
 use crate::bench::Work;
-use crate::labels::Shape;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::cfa::CfaPattern;
 use cyanometer::error::Result;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::frame::to_sample;
-use cyanometer::plot::{Anchor, Arrangement, Axis, Color, Marks, Note, Panel, Plot};
+use cyanometer::plot::{Arrangement, Axis, Color, Marks, Panel, Plot};
 use cyanometer::propagation::{Equations, gains};
 use cyanometer::random::philox::philox4x32_10;
 use cyanometer::stages::black::Black;
@@ -83,23 +82,16 @@ pub fn study(study: &Study) -> Result<Section> {
     };
     let x = "CPU time per pixel, ns";
     let structure = pareto::panel(
-        Shape::Beside,
         &format!("bias: {}", scenes[judged].name),
         [x, "rms error / rms signal"],
         &points(&|i| errors[i][judged]),
         1e-9,
     );
-    let color = pareto::panel(
-        Shape::Beside,
-        "color noise: clear sky",
-        [x, "expected ΔE*ab of noise"],
-        &points(&|i| noise[i]),
-        1e-9,
-    );
+    let color = pareto::panel("color noise: clear sky", [x, "expected ΔE*ab of noise"], &points(&|i| noise[i]), 1e-9);
     let mut plot = Plot::new("Demosaicking methods", structure);
     plot.panels.push(color);
     plot.panels.push(trade(&errors, judged, &noise));
-    plot.arrangement = Arrangement::SideBySide;
+    plot.arrangement = Arrangement::Pairs;
 
     let mut heads = vec!["method".to_owned()];
     heads.extend(scenes.iter().map(|scene| format!("bias: {}", scene.name)));
@@ -157,14 +149,8 @@ fn trade(errors: &[Vec<f64>], judged: usize, noise: &[f64]) -> Panel {
     let front: Vec<[f64; 2]> = pareto::front(points.iter()).into_iter().map(place).collect();
     panel.add("beaten by none in both", Color::Gray, Marks::Line(front));
     panel.add("", Color::Blue, Marks::Points(points.iter().map(place).collect()));
-    let ends = noise.iter().fold([f64::INFINITY, 0.0], |[low, high], &value| [value.min(low), value.max(high)]);
     for choice in &points {
-        let [x, y] = place(choice);
-        // Beside the point, toward the middle.
-        let aside = 0.015 * (ends[1] - ends[0]);
-        let is_left = x < 0.5 * (ends[0] + ends[1]);
-        let (x, anchor) = if is_left { (x + aside, Anchor::Start) } else { (x - aside, Anchor::End) };
-        panel.notes.push(Note::Text { at: [x, y], anchor, text: choice.label.clone() });
+        panel.name(place(choice), &choice.label, Color::Blue);
     }
     panel
 }

@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::{Work, timed};
-use crate::labels::Shape;
 use crate::page::{Section, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::chain::{ChainPrediction, ChainStage, Predictor};
@@ -111,7 +110,7 @@ pub fn study(study: &Study) -> Result<Section> {
             Group::new(name, of_name.map(point).collect())
         })
         .collect();
-    let panel = pareto::panel(Shape::Alone, "", ["CPU time, µs", "largest relative error of σ"], &groups, 1e-5);
+    let panel = pareto::panel("", ["CPU time, µs", "largest relative error of σ"], &groups, 1e-5);
     let plot = Plot::new("σ of demosaicked channels: paper, exact, simulated", panel);
     let mut heads = vec!["method", "way"];
     let level_heads: Vec<String> = LEVELS.iter().map(|(name, _)| format!("{name}: error")).collect();

@@ -8,7 +8,6 @@ mod averaging;
 mod bench;
 mod demosaicking;
 mod equations;
-mod labels;
 mod page;
 mod pareto;
 mod precision;
@@ -162,8 +161,8 @@ fn head(study: &Study) -> String {
         "Each point is a setting that a user can choose: its error against a reference that is better by orders of magnitude (where it is not, the section says so), and \
          its time. Times are CPU time of one thread (the programs use all cores where that helps), the median of {} runs where nothing else is \
          said; the alternatives of a study run by turns, so that \
-         whatever else the machine does hits all alike. The gray staircase is the Pareto front: the least error that is reached \
-         within a time. Signals are those of the KAF-5101CE, 33 ms at f/8.\n",
+         whatever else the machine does hits all alike. The gray staircase, where there is one, is the Pareto front: the least error that is reached \
+         within a time; names have the color of their points, and are black where points of several share one. Signals are those of the KAF-5101CE, 33 ms at f/8.\n",
         study.bench.rounds()
     );
     text

@@ -1,6 +1,5 @@
 //! Choices on a plane of run time and error, and the front of those that no other beats.
 
-use crate::labels::{self, Canvas, Shape};
 use cyanometer::plot::{Axis, Color, Marks, Panel, Series};
 
 /// A setting that a user may choose.
@@ -51,7 +50,7 @@ pub fn front<'a>(choices: impl Iterator<Item = &'a Choice>) -> Vec<&'a Choice> {
 }
 
 /// A panel of choices with their front. Errors below `foot` are shown there: a logarithmic axis has no zero.
-pub fn panel(shape: Shape, title: &str, [time, error]: [&str; 2], groups: &[Group], foot: f64) -> Panel {
+pub fn panel(title: &str, [time, error]: [&str; 2], groups: &[Group], foot: f64) -> Panel {
     let shown = |choice: &Choice| [choice.time, choice.error.max(foot)];
     let all = || groups.iter().flat_map(|group| &group.choices).filter(|choice| choice.error.is_finite());
     let range = |place: usize| {
@@ -81,13 +80,16 @@ pub fn panel(shape: Shape, title: &str, [time, error]: [&str; 2], groups: &[Grou
     for (index, group) in groups.iter().enumerate() {
         panel.add(&group.name, Color::of_index(index), Marks::Points(group.choices.iter().map(shown).collect()));
     }
-    let points: Vec<[f64; 2]> = all().map(shown).collect();
     // Names on the front find their places first.
-    let is_best = |choice: &&Choice| front(all()).iter().any(|best| std::ptr::eq(*best, *choice));
-    let (mut first, others): (Vec<&Choice>, Vec<&Choice>) = all().filter(|c| !c.label.is_empty()).partition(is_best);
+    let is_best = |choice: &Choice| front(all()).iter().any(|best| std::ptr::eq(*best, choice));
+    let colors = (0..).map(Color::of_index);
+    let named = groups.iter().zip(colors).flat_map(|(group, color)| group.choices.iter().map(move |c| (c, color)));
+    let named = named.filter(|(choice, _)| choice.error.is_finite() && !choice.label.is_empty());
+    let (mut first, others): (Vec<_>, Vec<_>) = named.partition(|(choice, _)| is_best(choice));
     first.extend(others);
-    let named: Vec<([f64; 2], &str)> = first.into_iter().map(|c| (shown(c), c.label.as_str())).collect();
-    labels::write(&mut panel, Canvas { ends: [x, y], shape }, &named, &points, &steps);
+    for (choice, color) in first {
+        panel.name(shown(choice), &choice.label, color);
+    }
     panel.series.insert(0, Series { name: "Pareto front".into(), color: Color::Gray, marks: Marks::Line(steps) });
     panel
 }

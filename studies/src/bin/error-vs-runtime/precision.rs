@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::Work;
-use crate::labels::Shape;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::color::difference::delta_e_76;
@@ -158,13 +157,7 @@ pub fn study(study: &Study) -> Result<Section> {
     let groups: Vec<Group> = (0..3)
         .map(|i| Group::new("", vec![Choice::new(names[i], times[i] * 1e9 / pixels, errors[i].largest)]))
         .collect();
-    let panel = pareto::panel(
-        Shape::Alone,
-        "",
-        ["CPU time per pixel, ns", "largest ΔE*ab against double precision"],
-        &groups,
-        1e-7,
-    );
+    let panel = pareto::panel("", ["CPU time per pixel, ns", "largest ΔE*ab against double precision"], &groups, 1e-7);
     let plot = Plot::new("Precision from electrons to XYZ, BI", panel);
     let mut table = Table::new(&[
         "arithmetic",

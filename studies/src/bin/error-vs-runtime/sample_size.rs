@@ -2,13 +2,12 @@
 
 use crate::Study;
 use crate::bench::{Work, timed};
-use crate::labels::Shape;
 use crate::page::{Section, count, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::error::{Error, Result};
 use cyanometer::frame::to_sample;
 use cyanometer::numerics::moments::Moments;
-use cyanometer::plot::{Axis, Color, Marks, Panel, Plot};
+use cyanometer::plot::{Axis, Color, Marks, Panel, Plot, power_of_ten};
 use cyanometer::propagation::{Equations, Photosite};
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::noise::NoiseModel;
@@ -30,6 +29,12 @@ struct Size {
     /// What theory expects, kurtosis included.
     expected: f64,
     time: f64,
+}
+
+/// A power of ten as such, any other number as it is.
+fn power(value: usize) -> String {
+    let magnitude = value.max(1).ilog10();
+    if value == 10_usize.pow(magnitude) { power_of_ten(magnitude.cast_signed()) } else { value.to_string() }
 }
 
 pub fn study(study: &Study) -> Result<Section> {
@@ -95,7 +100,7 @@ pub fn study(study: &Study) -> Result<Section> {
     }
 
     let simulated =
-        found.iter().map(|s| Choice::new(format!("{} photosites", count(s.photosites)), s.time * 1e3, s.error));
+        found.iter().map(|s| Choice::new(format!("{} photosites", power(s.photosites)), s.time * 1e3, s.error));
     let simulated: Vec<Choice> = simulated.collect();
     let foot = found.last().map_or(1e-4, |size| 0.3 * size.expected);
     let formulas = vec![
@@ -103,8 +108,7 @@ pub fn study(study: &Study) -> Result<Section> {
         Choice::new("whole chain by formula", formula[1] * 1e3, 0.0),
     ];
     let groups = [Group::new("simulated", simulated), Group::new("by formula (no sampling error)", formulas)];
-    let left =
-        pareto::panel(Shape::Stacked, "", ["CPU time, ms", "relative error of σ (rms over frames)"], &groups, foot);
+    let left = pareto::panel("", ["CPU time, ms", "relative error of σ (rms over frames)"], &groups, foot);
     let mut right = Panel::new(Axis::log10("photosites"), Axis::log10("relative error of σ (rms over frames)"));
     let line = |x: f64| [x, (2.0 * x).sqrt().recip()];
     right.add("1/√(2n)", Color::Gray, Marks::Line(found.iter().map(|size| line(size.photosites as f64)).collect()));

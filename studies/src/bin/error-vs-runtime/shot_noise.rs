@@ -2,15 +2,13 @@
 
 use crate::Study;
 use crate::bench::Work;
-use crate::labels::Shape;
 use crate::page::{Section, digits, percent, time};
-use crate::pareto::{self, Choice, Group};
 use cyanometer::error::Result;
 use cyanometer::frame::to_sample;
 use cyanometer::metadata::{FrameHeader, PoissonKind, Scene};
 use cyanometer::numerics::normal::cumulative;
 use cyanometer::numerics::significance::of_chi_square;
-use cyanometer::plot::Plot;
+use cyanometer::plot::{Axis, Color, Marks, Panel, Plot};
 use cyanometer::random::{Source, poisson::tails};
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::MemoryFrame;
@@ -98,6 +96,29 @@ struct Case {
     significance: f64,
 }
 
+/// Error and time of each kind of number against the rate.
+fn figure(cases: &[Case]) -> Plot {
+    let rate = || Axis::log10("rate, e⁻");
+    let mut error = Panel::new(rate(), Axis::log10("distance of the law to Poisson"));
+    let mut time = Panel::new(rate(), Axis::linear("CPU time per photosite, ns"));
+    for (kind, name) in KINDS.into_iter().enumerate() {
+        let line = |of: &dyn Fn(&Case) -> f64| -> Vec<[f64; 2]> {
+            cases.iter().filter(|case| case.kind == kind).map(|case| [case.rate, of(case)]).collect()
+        };
+        let color = Color::of_index(kind);
+        // Of exact numbers, which share their foot, the second are drawn as points alone.
+        let errors = line(&|case| case.distance.max(FOOT));
+        error.add(name, color, if kind == 1 { Marks::Points(errors) } else { Marks::LineAndPoints(errors) });
+        time.add(name, color, Marks::LineAndPoints(line(&|case| case.time * 1e9)));
+    }
+    error.name([RATES[0], FOOT], "exact: less than 10⁻¹¹", Color::Blue);
+    let highest = cases.iter().map(|case| 1.1e9 * case.time).fold(1.0, f64::max);
+    time.y = time.y.range(0.0, highest);
+    let mut plot = Plot::new("Shot noise: exact, Gaussian, none", error);
+    plot.panels.push(time);
+    plot
+}
+
 pub fn study(study: &Study) -> Result<Section> {
     let size = if study.quick { [512, 256] } else { [1024, 1024] };
     let mut cases = Vec::new();
@@ -105,18 +126,7 @@ pub fn study(study: &Study) -> Result<Section> {
         let seed = study.seed(2) + cases.len() as u64;
         cases.extend(at_rate(study, rate, size, seed)?);
     }
-    let mut laws = Vec::new();
-    for (kind, name) in KINDS.into_iter().enumerate() {
-        let of_kind = |error: &dyn Fn(&Case) -> f64| {
-            let points = cases.iter().filter(|case| case.kind == kind);
-            points.map(|c| Choice::new(digits(c.rate, 1), c.time * 1e9, error(c))).collect::<Vec<_>>()
-        };
-        laws.push(Group::new(name, of_kind(&|case| case.distance)));
-    }
-    let x = "CPU time per photosite, ns";
-    let law =
-        pareto::panel(Shape::Alone, "labels: rate in e⁻", [x, "total variation distance to Poisson"], &laws, FOOT);
-    let plot = Plot::new("Shot noise: exact, Gaussian, none", law);
+    let plot = figure(&cases);
 
     let mut table = Table::new(&[
         "rate, e⁻",
@@ -161,7 +171,7 @@ pub fn study(study: &Study) -> Result<Section> {
             percent((photosites as f64).sqrt().recip()),
             percent((2.0 * photosites as f64).sqrt().recip()),
         ),
-        figures: vec![("shot-noise".into(), "Distance to the law of Poisson against time".into(), plot)],
+        figures: vec![("shot-noise".into(), "Distance to the law of Poisson, and time, against the rate".into(), plot)],
         tables: vec![(String::new(), table)],
         advice: advice(&cases),
     })

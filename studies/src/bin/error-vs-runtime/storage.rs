@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::Work;
-use crate::labels::Shape;
 use crate::page::{Section, digits, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::color::difference::delta_e_76;
@@ -66,37 +65,23 @@ pub fn study(study: &Study) -> Result<Section> {
     let mut plot = Plot::new(
         "Storage: size against time",
         pareto::panel(
-            Shape::Stacked,
             "codes of 12 bits, CFA plane",
             [x, "bits per sample"],
             &groups(&of_codes_ways, &|w| w.bits),
             1e-9,
         ),
     );
-    plot.panels.push(pareto::panel(
-        Shape::Stacked,
-        "XYZ",
-        [x, "bits per sample"],
-        &groups(&of_xyz_ways, &|w| w.bits),
-        1e-9,
-    ));
+    plot.panels.push(pareto::panel("XYZ", [x, "bits per sample"], &groups(&of_xyz_ways, &|w| w.bits), 1e-9));
     let mut errors = Plot::new(
         "Storage: error against time (lossless at the foot)",
         pareto::panel(
-            Shape::Stacked,
             "codes of 12 bits, CFA plane",
             [x, "largest error, ADU"],
             &groups(&of_codes_ways, &|w| w.error),
             1e-2,
         ),
     );
-    errors.panels.push(pareto::panel(
-        Shape::Stacked,
-        "XYZ",
-        [x, "largest ΔE*ab"],
-        &groups(&of_xyz_ways, &|w| w.error),
-        1e-4,
-    ));
+    errors.panels.push(pareto::panel("XYZ", [x, "largest ΔE*ab"], &groups(&of_xyz_ways, &|w| w.error), 1e-4));
 
     let table = |ways: &[Way], unit: &str| {
         let mut table = Table::new(&[

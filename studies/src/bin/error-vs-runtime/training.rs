@@ -2,9 +2,7 @@
 
 use crate::Study;
 use crate::bench::{Work, quantile, timed};
-use crate::labels::Shape;
 use crate::page::{Section, digits, time};
-use crate::pareto::{self, Choice, Group};
 use cyanometer::analysis::characterization::Signals;
 use cyanometer::analysis::characterization::evaluation::{
     EvaluationSettings, Filling, SampleExposure, evaluate, noise_free,
@@ -14,7 +12,7 @@ use cyanometer::analysis::characterization::training::spanning_subset;
 use cyanometer::color::Space;
 use cyanometer::color::difference::DELTA_E_PER_JND;
 use cyanometer::error::{Error, Result};
-use cyanometer::plot::Plot;
+use cyanometer::plot::{Axis, Color, Marks, Panel, Plot};
 use cyanometer::random::philox::philox4x32_10;
 use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::noise::NoiseSettings;
@@ -38,6 +36,25 @@ struct Training {
     refused: f64,
     choose: f64,
     fit: f64,
+}
+
+/// Error and time against the number of spectra.
+fn figure(found: &[Training], total: usize) -> Plot {
+    let spectra = || Axis::log10("training spectra");
+    let mut error = Panel::new(spectra(), Axis::log10(&format!("mean ΔE*ab of all {total} skies")));
+    let mut time = Panel::new(spectra(), Axis::log10("CPU time, ms"));
+    let line = |of: &dyn Fn(&Training) -> f64| {
+        let points = found.iter().filter(|t| t.fit.is_finite()).map(|t| [t.count as f64, of(t)]);
+        Marks::LineAndPoints(points.filter(|[_, value]| value.is_finite()).collect())
+    };
+    error.add("chosen by k-medoids", Color::Blue, line(&|t| t.chosen));
+    error.add("drawn by lot: median", Color::Vermillion, line(&|t| t.drawn[0]));
+    error.add("drawn by lot: 90 % are better", Color::Green, line(&|t| t.drawn[1]));
+    time.add("choice and fit", Color::Blue, line(&|t| 1e3 * (t.choose + t.fit)));
+    time.add("fit alone", Color::Vermillion, line(&|t| 1e3 * t.fit));
+    let mut plot = Plot::new("Training spectra of a matrix", error);
+    plot.panels.push(time);
+    plot
 }
 
 pub fn study(study: &Study) -> Result<Section> {
@@ -89,18 +106,7 @@ pub fn study(study: &Study) -> Result<Section> {
         found[index].fit = time;
     }
 
-    let points = |error: &dyn Fn(&Training) -> f64, time: &dyn Fn(&Training) -> f64| {
-        let point = |t: &Training| Choice::new(t.count.to_string(), time(t) * 1e3, error(t));
-        found.iter().filter(|t| t.fit.is_finite() && error(t).is_finite()).map(point).collect::<Vec<_>>()
-    };
-    let groups = [
-        Group::new("chosen by k-medoids: choice and fit", points(&|t| t.chosen, &|t| t.choose + t.fit)),
-        Group::new("drawn by lot, median: fit", points(&|t| t.drawn[0], &|t| t.fit)),
-        Group::new("drawn by lot, 90 % are better: fit", points(&|t| t.drawn[1], &|t| t.fit)),
-    ];
-    let y = format!("mean ΔE*ab of all {total} skies");
-    let plot =
-        Plot::new("Training spectra of a matrix", pareto::panel(Shape::Alone, "", ["CPU time, ms", &y], &groups, 1e-9));
+    let plot = figure(&found, total);
     let mut table = Table::new(&[
         "spectra",
         "chosen: mean ΔE\\*ab",
@@ -150,7 +156,11 @@ pub fn study(study: &Study) -> Result<Section> {
              skies are judged by the same matrices.",
             measured.library.radiance.nrows()
         ),
-        figures: vec![("training".into(), "Color error against time, by number of training spectra".into(), plot)],
+        figures: vec![(
+            "training".into(),
+            "Color error, and time, against the number of training spectra".into(),
+            plot,
+        )],
         tables: vec![(String::new(), table)],
         advice: format!(
             "Where all spectra are at hand, fit on all: {} and mean ΔE {}, without the {} to {} that choosing takes. Where each \

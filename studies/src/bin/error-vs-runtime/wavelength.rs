@@ -2,7 +2,6 @@
 
 use crate::Study;
 use crate::bench::{Work, quantile};
-use crate::labels::Shape;
 use crate::page::{Section, digits, percent, time};
 use crate::pareto::{self, Choice, Group};
 use cyanometer::error::Result;
@@ -115,7 +114,6 @@ pub fn study(study: &Study) -> Result<Section> {
             })
             .collect();
         panels.push(pareto::panel(
-            Shape::Stacked,
             scene.name,
             ["CPU time per spectrum, µs", "relative error of electrons"],
             &groups,

@@ -18,6 +18,9 @@ pub struct SkyColor {
 /// What x and y span unless skies lie outside.
 const SPAN: [f64; 2] = [0.20, 0.42];
 
+/// Errors of a few thousandths are drawn so many times as long: at their own length points would hide them.
+const LONGER: f64 = 5.0;
+
 /// The diameter of the circle of the largest difference, in pixels.
 const LARGEST_CIRCLE: f64 = 32.0;
 
@@ -25,7 +28,7 @@ const LARGEST_CIRCLE: f64 = 32.0;
 /// and clear skies, and in the entire diagram (small, in a corner); and beside it with circles in proportion to the
 /// differences.
 ///
-/// An arrow points at the sky `kept`, whose color the camera's matrix keeps exactly.
+/// The sky `kept`, whose color the camera's matrix keeps exactly, has a mark and a name.
 pub fn chromaticity(skies: &[SkyColor], kept: Option<usize>, observer: &Observer, title: &str) -> Plot {
     let span = span(skies);
     let panels = vec![errors(skies, kept, observer, span), differences(skies, span)];
@@ -35,18 +38,21 @@ pub fn chromaticity(skies: &[SkyColor], kept: Option<usize>, observer: &Observer
 fn errors(skies: &[SkyColor], kept: Option<usize>, observer: &Observer, span: [f64; 2]) -> Panel {
     let mut panel = panel(span, "colors and errors");
     let black_bodies = black_bodies(observer);
-    let error = |sky: &SkyColor| Note::Line { points: vec![sky.xy, sky.fitted_xy], color: Color::Gray };
+    let error = |sky: &SkyColor| {
+        let end = [0, 1].map(|axis| sky.xy[axis] + LONGER * (sky.fitted_xy[axis] - sky.xy[axis]));
+        Note::Line { points: vec![sky.xy, end], color: Color::Vermillion }
+    };
     panel.notes = skies.iter().map(error).collect();
     panel.notes.extend(diagram(skies, &black_bodies, observer, span));
     panel.add("black bodies", Color::Black, Marks::Line(black_bodies));
     panel.add("daylight (CIE)", Color::Orange, Marks::Line(curve(locus::DAYLIGHT_X, locus::daylight)));
-    panel.add("measured clear skies", Color::Vermillion, Marks::Dashed(curve(locus::CLEAR_SKY_X, locus::clear_sky)));
+    panel.add("measured clear skies", Color::Green, Marks::Dashed(curve(locus::CLEAR_SKY_X, locus::clear_sky)));
     // For the legend: the errors are notes.
-    panel.add("error of the camera", Color::Gray, Marks::Line(Vec::new()));
+    panel.add(&format!("error of the camera × {LONGER}"), Color::Vermillion, Marks::Line(Vec::new()));
     panel.add("skies", Color::Blue, Marks::Points(places(skies)));
     if let Some(sky) = kept.and_then(|index| skies.get(index)) {
         panel.add("", Color::Black, Marks::Points(vec![sky.xy]));
-        panel.notes.extend(arrow(sky.xy, "kept exactly"));
+        panel.name(sky.xy, "kept exactly", Color::Black);
     }
     panel
 }
@@ -120,18 +126,6 @@ fn curve([first, last]: [f64; 2], y: fn(f64) -> f64) -> Vec<[f64; 2]> {
     (0..=60).map(|step| first + (last - first) * f64::from(step) / 60.0).map(|x| [x, y(x)]).collect()
 }
 
-/// An arrow from below and the right, where no sky is, and what it points at.
-fn arrow(to: [f64; 2], label: &str) -> [Note; 3] {
-    let at = |before: f64, aside: f64| [to[0] + 0.6 * before + 0.8 * aside, to[1] - 0.8 * before + 0.6 * aside];
-    let line = |points| Note::Line { points, color: Color::Black };
-    let (tip, tail) = (at(0.004, 0.0), at(0.02, 0.0));
-    [
-        line(vec![tail, tip]),
-        line(vec![at(0.009, 0.002), tip, at(0.009, -0.002)]),
-        Note::Text { at: [tail[0], tail[1] - 0.006], anchor: Anchor::Middle, text: label.into() },
-    ]
-}
-
 /// Round differences up to the largest, with what the legend says: about all, half and a fifth of it.
 fn sample_differences(largest: f64) -> Vec<(f64, String)> {
     let power = largest.log10().floor();
@@ -179,17 +173,14 @@ mod tests {
         assert_eq!(skies.len(), 912);
         let plot = chromaticity(&skies, Some(7), &load_observer().unwrap(), "Skies and a camera");
         let [errors, _] = &plot.panels[..] else { panic!("two panels") };
-        for (sky, note) in skies.iter().zip(notes(errors, Color::Gray)) {
-            assert_eq!(*note, Note::Line { points: vec![sky.xy, sky.fitted_xy], color: Color::Gray });
+        for (sky, note) in skies.iter().zip(notes(errors, Color::Vermillion)) {
+            let Note::Line { points, .. } = note else { panic!("{note:?}") };
+            assert_eq!(points[0], sky.xy);
+            let longer = [0, 1].map(|axis| (points[1][axis] - sky.xy[axis]) / LONGER + sky.xy[axis]);
+            assert!((0..2).all(|axis| (longer[axis] - sky.fitted_xy[axis]).abs() < 1e-12), "{note:?}");
         }
-        // Of the arrow, the last notes in black, the shaft ends beside the sky.
-        let black: Vec<&Note> = notes(errors, Color::Black).collect();
-        let [.., Note::Line { points, .. }, _] = &black[..] else { panic!("no shaft") };
-        let [far, near] = [0, 1].map(|end: usize| {
-            let [x, y] = points[end];
-            f64::hypot(x - skies[7].xy[0], y - skies[7].xy[1])
-        });
-        assert!(near < 0.005 && far > 0.015, "{near} {far}");
+        // The sky that is kept has a name.
+        assert!(matches!(&errors.names[..], [name] if name.at == skies[7].xy), "{:?}", errors.names);
     }
 
     #[test]

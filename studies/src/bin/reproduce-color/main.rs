@@ -14,7 +14,7 @@ use cyanometer::analysis::characterization::regression::{Regression, Weights};
 use cyanometer::color::difference::DifferenceReport;
 use cyanometer::error::Result;
 use cyanometer::formats::output::write_text;
-use cyanometer::plot::{Axis, Color, Marks, Panel, Plot};
+use cyanometer::plot::{Arrangement, Axis, Color, Marks, Panel, Plot};
 use cyanometer::report::trade_off;
 use cyanometer::stages::demosaic::Method;
 use cyanometer_studies::camera::METHODS;
@@ -114,23 +114,27 @@ fn colors(studio: &Studio, case: &Case) -> Plot {
     chromaticity(&skies, Some(studio.kept), &studio.camera.observer, "Fig. 3: 912 skies and the errors of SkyRadSPPLS")
 }
 
-/// Fig. 8: observed against predicted noise of X, Y, Z.
+/// Fig. 8: observed against predicted noise of X, Y, Z, each by itself: together they would hide each other.
 fn noise(case: &Case) -> Plot {
-    let mut panel = Panel::new(Axis::log10("predicted σ, cd m⁻²"), Axis::log10("observed σ, cd m⁻²"));
-    let mut ends = [f64::INFINITY, 0.0];
-    for (index, (name, color)) in
-        [("X", Color::Vermillion), ("Y", Color::Green), ("Z", Color::Blue)].into_iter().enumerate()
-    {
+    let panel = |(index, (name, color)): (usize, (&str, Color))| {
+        let x = Axis::log10(&format!("predicted σ of {name}, cd m⁻²"));
+        let mut panel = Panel::new(x, Axis::log10(&format!("observed σ of {name}, cd m⁻²")));
         let point = |sky: &SampleEvaluation| {
             let noise = sky.noise?;
             Some([noise.predicted?.xyz_std[index], noise.xyz_std[index]])
         };
         let points: Vec<[f64; 2]> = case.skies.iter().filter_map(point).collect();
-        for [predicted, _] in &points {
-            ends = [ends[0].min(*predicted), ends[1].max(*predicted)];
-        }
-        panel.add(name, color, Marks::Points(points));
+        let end = |pick: fn(f64, f64) -> f64| points.iter().map(|[predicted, _]| *predicted).reduce(pick);
+        let ends = end(f64::min).into_iter().chain(end(f64::max));
+        let equal = Marks::Line(ends.map(|end| [end, end]).collect());
+        panel.add(&format!("{name} of a sky"), color, Marks::Points(points));
+        panel.add("observed = predicted", Color::Black, equal);
+        panel
+    };
+    let channels = [("X", Color::Vermillion), ("Y", Color::Green), ("Z", Color::Blue)];
+    Plot {
+        title: "Fig. 8: noise of XYZ of 912 skies, ECI, SkyRadSPPLS".into(),
+        panels: channels.into_iter().enumerate().map(panel).collect(),
+        arrangement: Arrangement::Stacked,
     }
-    panel.add("observed = predicted", Color::Black, Marks::Line(ends.map(|end| [end, end]).to_vec()));
-    Plot::new("Fig. 8: noise of XYZ of 912 skies, ECI, SkyRadSPPLS", panel)
 }

@@ -349,7 +349,7 @@ pub fn markdown(results: &Results) -> Result<String> {
     tables(&mut out, [5, 6], Formula::DeltaE94, &results.methods, &PAPER_METHODS[1])?;
 
     out.push_str(
-        "## Fig. 3\n\n![Fig. 3](fig3.svg)\n\nLeft: the 912 skies, with the errors of SkyRadSPPLS in their true length, and the sky \
+        "## Fig. 3\n\n![Fig. 3](fig3.svg)\n\nLeft: the 912 skies, with the errors of SkyRadSPPLS five times as long as they are, and the sky \
          that is kept exact. Right: circles whose diameters go with ΔE94. The paper's locus of Granada skies could not be had as \
          an equation; drawn instead are the CIE daylight locus and a fit to the measured skies of \
          [Kider2014](../references.md) (y = −4.9088 x² + 3.8004 x − 0.3836, rms 0.0033).\n\n",
@@ -363,7 +363,7 @@ pub fn markdown(results: &Results) -> Result<String> {
 
 fn noise_section(results: &Results, out: &mut String) -> Result<()> {
     out.push_str(
-        "## Fig. 8, and the noise of every sky predicted\n\n![Fig. 8](fig8.svg)\n\nObserved is the spread of one patch; \
+        "## Fig. 8, and the noise of every sky predicted\n\n![Fig. 8](fig8.svg)\n\nObserved is the spread of one patch, X, Y and Z each by itself; \
          predicted are the exact moments, not the paper's mean coefficients. The scatter about the line is the sampling error of \
          so few pixels. In L\\*a\\*b\\*, the mean distance of pixels from the color without noise, JND, over the 912 skies:\n\n",
     );

@@ -49,18 +49,17 @@ fn places() -> Vec<f64> {
     even.chain((0..=30).map(|step| 37_000.0 + 100.0 * f64::from(step))).collect()
 }
 
+/// The panels of Figs. 4, 5 and 7: standard deviations, signal over noise, and standard deviations over the exact ones.
+struct Panels {
+    noise: Panel,
+    snr: Panel,
+    ratio: Panel,
+}
+
 /// Noise and signal-to-noise ratio of X, Y and Z after a method, simulated, by the paper and exact. `gray` is drawn in
-/// gray; `ratios` is what the lowest panel spans.
-pub fn xyz(
-    camera: &Camera,
-    levels: &[Level],
-    title: &str,
-    equation: Equation,
-    gray: Option<Equation>,
-    ratios: (f64, f64),
-) -> Plot {
+/// gray.
+pub fn xyz(camera: &Camera, levels: &[Level], title: &str, equation: Equation, gray: Option<(Equation, &str)>) -> Plot {
     let method = equation.method();
-    let index = index_of(method);
     // Green well above its noise, or there is no first order.
     let holds = |e: &f64| {
         let sites = Sites::of(camera, [*e; 3], Equations::Exact);
@@ -69,69 +68,106 @@ pub fn xyz(
     let places: Vec<f64> = places().into_iter().filter(holds).collect();
     let levels: Vec<&Level> = levels.iter().filter(|level| holds(&level.electrons)).collect();
     let lowest = places.first().map_or(20.0, |e| 0.9 * e);
-    let signal = || Axis::log10("signal in each class, e⁻").range(lowest, 50_000.0);
-    let mut noise = Panel::new(signal(), Axis::log10("standard deviation, cd m⁻²"));
-    let mut snr = Panel::new(signal(), Axis::linear("SNR, dB").range(0.0, 56.0));
-    let mut ratio = Panel::new(signal(), Axis::linear("standard deviation over exact").range(ratios.0, ratios.1));
-    let line = |value: &dyn Fn(f64) -> f64| -> Vec<[f64; 2]> { places.iter().map(|&e| [e, value(e)]).collect() };
-    let db = |mean: f64, std: f64| 20.0 * (mean / std).log10();
-    // Above this the converter clips and no equation of the paper holds.
-    let below = |e: f64| e <= crate::agreement::UNCLIPPED_E;
-    for channel in 0..3 {
-        let (name, color) = (NAMES[channel], COLORS[channel]);
-        let mean = |e: f64, equations| mean_xyz(camera, e, equations)[channel];
-        let exact = |e: f64| exact_xyz(camera, method, [e; 3])[channel];
-        let paper = |e: f64| paper_xyz(camera, equation, e)[channel];
-        noise.add(&format!("{name}, exact"), color, Marks::Line(line(&exact)));
-        noise.add(&format!("{name}, paper"), color, Marks::Dashed(line(&paper)));
-        noise.add(
-            &format!("{name}, simulated 40×30"),
-            color,
-            Marks::Points(levels.iter().map(|level| [level.electrons, level.small.xyz[index][channel]]).collect()),
-        );
-        snr.add("", color, Marks::Line(line(&|e| db(mean(e, Equations::Exact), exact(e)))));
-        snr.add("", color, Marks::Dashed(line(&|e| db(mean(e, Equations::Paper), paper(e)))));
-        snr.add(
-            name,
-            color,
-            Marks::Points(levels.iter().map(|level| [level.electrons, level.small.snr_db[index][channel]]).collect()),
-        );
-        let quotient: Vec<[f64; 2]> = places.iter().filter(|&&e| below(e)).map(|&e| [e, paper(e) / exact(e)]).collect();
-        ratio.add(&format!("{name}, paper"), color, Marks::Dashed(quotient));
-        let mut points = Vec::new();
-        let mut bars = Vec::new();
-        for level in levels.iter().filter(|level| below(level.electrons)) {
-            let sites = Sites::of(camera, [level.electrons; 3], Equations::Exact);
-            let matrix = &camera.xyz_from_adu;
-            let predicted = roots(&(matrix * of_frame(method, &sites, LARGE) * matrix.transpose()))[channel];
-            let share = effective_share(&weights(method, &sites).through(matrix), sites.variance)[channel];
-            let error = 1.0 / (2.0 * share * (LARGE[0] * LARGE[1]) as f64).sqrt();
-            let at = level.large.xyz[index][channel] / predicted;
-            points.push([level.electrons, at]);
-            bars.push([level.electrons, at - error, at + error]);
-        }
-        ratio.add(&format!("{name}, simulated 600×400"), color, Marks::Points(points));
-        ratio.add("", color, Marks::ErrorBars(bars));
+    let panel = |y| Panel::new(Axis::log10("signal in each class, e⁻").range(lowest, 50_000.0), y);
+    let mut panels = Panels {
+        noise: panel(Axis::log10("standard deviation, cd m⁻²")),
+        snr: panel(Axis::linear("SNR, dB")),
+        ratio: panel(Axis::linear("std over exact")),
+    };
+    panels.add_simulated(camera, &levels, method);
+    panels.add_exact(camera, &places, method);
+    panels.add_paper(camera, &places, equation, ("paper", &COLORS));
+    if let Some((gray, name)) = gray {
+        panels.add_paper(camera, &places, gray, (name, &[Color::Gray; 3]));
     }
-    for channel in 0..3 {
-        if let Some(gray) = gray {
-            let mean = |e: f64| mean_xyz(camera, e, Equations::Paper)[channel];
-            let value = |e: f64| paper_xyz(camera, gray, e)[channel];
-            noise.add(if channel == 0 { "X, Y, Z by Eq. 48" } else { "" }, Color::Gray, Marks::Dashed(line(&value)));
-            snr.add("", Color::Gray, Marks::Dashed(line(&|e| db(mean(e), value(e)))));
-            let quotient = places
-                .iter()
-                .filter(|&&e| below(e))
-                .map(|&e| [e, value(e) / exact_xyz(camera, method, [e; 3])[channel]])
-                .collect();
-            ratio.add(if channel == 0 { "X, Y, Z by Eq. 48" } else { "" }, Color::Gray, Marks::Dashed(quotient));
-        }
-    }
+    let Panels { noise, snr, mut ratio } = panels;
     ratio.horizontal_lines.push(ReferenceLine { at: 1.0, label: String::new() });
     let mut plot = Plot::new(title, noise);
-    plot.panels.push(snr);
-    plot.panels.push(ratio);
+    plot.panels.extend([snr, ratio]);
     plot
+}
+
+fn db(mean: f64, std: f64) -> f64 {
+    20.0 * (mean / std).log10()
+}
+
+/// Above this the converter clips and no equation of the paper holds.
+fn is_unclipped(electrons: f64) -> bool {
+    electrons <= crate::agreement::UNCLIPPED_E
+}
+
+impl Panels {
+    /// Points, and error bars of the ratio.
+    fn add_simulated(&mut self, camera: &Camera, levels: &[&Level], method: Method) {
+        let index = index_of(method);
+        let matrix = &camera.xyz_from_adu;
+        for (channel, (name, color)) in NAMES.into_iter().zip(COLORS).enumerate() {
+            let points = |of: &dyn Fn(&Level) -> f64| {
+                Marks::Points(levels.iter().map(|level| [level.electrons, of(level)]).collect())
+            };
+            self.noise.add(
+                &format!("{name}, simulated 40×30"),
+                color,
+                points(&|level| level.small.xyz[index][channel]),
+            );
+            self.snr.add(&format!("{name}, simulated"), color, points(&|level| level.small.snr_db[index][channel]));
+            // The three stand beside each other, that none hides another.
+            let aside = 1.02_f64.powf(channel as f64 - 1.0);
+            let (mut points, mut bars) = (Vec::new(), Vec::new());
+            for level in levels.iter().filter(|level| is_unclipped(level.electrons)) {
+                let sites = Sites::of(camera, [level.electrons; 3], Equations::Exact);
+                let predicted = roots(&(matrix * of_frame(method, &sites, LARGE) * matrix.transpose()))[channel];
+                let share = effective_share(&weights(method, &sites).through(matrix), sites.variance)[channel];
+                let error = 1.0 / (2.0 * share * (LARGE[0] * LARGE[1]) as f64).sqrt();
+                let at = level.large.xyz[index][channel] / predicted;
+                points.push([aside * level.electrons, at]);
+                bars.push([aside * level.electrons, at - error, at + error]);
+            }
+            self.ratio.add(&format!("{name}, simulated 600×400"), color, Marks::Points(points));
+            self.ratio.add("", color, Marks::ErrorBars(bars));
+        }
+    }
+
+    fn add_exact(&mut self, camera: &Camera, places: &[f64], method: Method) {
+        for (channel, color) in COLORS.into_iter().enumerate() {
+            let exact = |e: f64| exact_xyz(camera, method, [e; 3])[channel];
+            let mean = |e: f64| mean_xyz(camera, e, Equations::Exact)[channel];
+            self.noise.add("", color, Marks::Line(places.iter().map(|&e| [e, exact(e)]).collect()));
+            self.snr.add("", color, Marks::Line(places.iter().map(|&e| [e, db(mean(e), exact(e))]).collect()));
+        }
+        for panel in [&mut self.noise, &mut self.snr] {
+            panel.add("exact", Color::Black, Marks::Line(Vec::new()));
+        }
+    }
+
+    /// Dashed lines of an equation, with the names of channels at their ends.
+    fn add_paper(&mut self, camera: &Camera, places: &[f64], equation: Equation, look: (&str, &[Color; 3])) {
+        let (name, colors) = look;
+        let mut ends: Vec<[f64; 2]> = Vec::new();
+        for (channel, &color) in colors.iter().enumerate() {
+            let mean = |e: f64| mean_xyz(camera, e, Equations::Paper)[channel];
+            let value = |e: f64| paper_xyz(camera, equation, e)[channel];
+            let ratio = |e: f64| value(e) / exact_xyz(camera, equation.method(), [e; 3])[channel];
+            let below = || places.iter().filter(|&&e| is_unclipped(e));
+            let quotient: Vec<[f64; 2]> = below().map(|&e| [e, ratio(e)]).collect();
+            self.noise.add("", color, Marks::Dashed(below().map(|&e| [e, value(e)]).collect()));
+            self.snr.add("", color, Marks::Dashed(below().map(|&e| [e, db(mean(e), value(e))]).collect()));
+            ends.extend(quotient.last());
+            self.ratio.add("", color, Marks::Dashed(quotient));
+        }
+        // Lines that all but lie over each other share a name.
+        let apart = ends.iter().map(|[_, y]| (y - ends[0][1]).abs()).fold(0.0, f64::max);
+        if apart < 1e-3 && !ends.is_empty() {
+            self.ratio.name(ends[0], "X, Y, Z", Color::Black);
+        } else {
+            let named = ends.iter().zip(NAMES).zip(colors);
+            named.for_each(|((end, name), color)| self.ratio.name(*end, name, *color));
+        }
+        let color = if colors[0] == colors[1] { colors[0] } else { Color::Black };
+        for panel in [&mut self.noise, &mut self.snr, &mut self.ratio] {
+            panel.add(name, color, Marks::Dashed(Vec::new()));
+        }
+    }
 }
 
 /// One level of Fig. 6.

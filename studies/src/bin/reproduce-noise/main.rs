@@ -80,11 +80,11 @@ fn run(directory: &Path) -> Result<()> {
     let factor_rows = agreement::rows(&camera, &plotted);
 
     let figure = |name: &str, plot: &Plot| write_figure(directory, name, plot);
-    let xyz = |title: &str, equation, gray, ratios| figures::xyz(&camera, &plotted, title, equation, gray, ratios);
-    figure("fig4", &xyz("Fig. 4: noise of XYZ after BI", Equation::Bi14, None, (0.96, 1.04)))?;
-    figure("fig5", &xyz("Fig. 5: noise of XYZ after SHTI", Equation::Shti15, Some(Equation::Shti48), (0.6, 1.8)))?;
+    let xyz = |title: &str, equation, gray| figures::xyz(&camera, &plotted, title, equation, gray);
+    figure("fig4", &xyz("Fig. 4: noise of XYZ after BI", Equation::Bi14, None))?;
+    figure("fig5", &xyz("Fig. 5: noise of XYZ after SHTI", Equation::Shti15, Some((Equation::Shti48, "Eq. 48"))))?;
     figure("fig6", &figures::hue(&camera, &hues))?;
-    figure("fig7", &xyz("Fig. 7: noise of XYZ after ECI", Equation::EciEqual, None, (0.94, 1.08)))?;
+    figure("fig7", &xyz("Fig. 7: noise of XYZ after ECI", Equation::EciEqual, None))?;
     let results = Results { camera, levels, rows, factor_rows, sky_rows, hues, correlations, limits, edges };
     write_text(Some(&directory.join("noise.md")), &report::markdown(&results)?)
 }
