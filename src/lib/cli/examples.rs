@@ -176,8 +176,28 @@ pub fn of(program: &str) -> &'static [Example] {
 
 /// The examples of a program as its help shows them.
 pub(super) fn text(program: &str) -> String {
-    let shown = of(program).iter().map(|Example { reason, command }| format!("  # {reason}\n  {command}\n"));
+    let shown = of(program)
+        .iter()
+        .map(|Example { reason, command }| format!("  # {reason}\n  {}\n", lines(command).join(" \\\n      ")));
     format!("Examples:\n{}", shown.collect::<Vec<_>>().join("\n"))
+}
+
+/// A command in lines that no terminal breaks.
+fn lines(command: &str) -> Vec<String> {
+    /// Columns of a line, before its indent and a backslash.
+    const COLUMNS: usize = 72;
+    let mut lines = vec![String::new()];
+    for word in command.split(' ') {
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => line.push_str(word),
+            Some(line) if line.len() + word.len() < COLUMNS => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// The same in roff, as a section of a manual page.
