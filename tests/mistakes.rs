@@ -75,13 +75,13 @@ const MISTAKES: [(&str, i32, &str); 103] = [
     (
         "add-noise expected.exr --without ssm",
         BAD_USAGE,
-        "`ssm` is no value for --without <SOURCES>; it is one of dcsn, dcnu, ssn, prnu, ron; did you mean `ssn`?; see \
+        "`ssm` is no value for --without <SOURCES>; it is one of dcsn, dcnu, ssn, prnu, ron; did you mean `ssn`? See \
          `add-noise --help`",
     ),
     (
         "add-noise expected.exr --sed 7",
         BAD_USAGE,
-        "unknown option or extra argument `--sed`; did you mean `--seed`?; see `add-noise --help`",
+        "unknown option or extra argument `--sed`; did you mean `--seed`? See `add-noise --help`",
     ),
     (
         "add-noise expected.exr -o expected.exr",
@@ -314,7 +314,7 @@ const MISTAKES: [(&str, i32, &str); 103] = [
     (
         "measure noisy.exr --output-format xml",
         BAD_USAGE,
-        "`xml` is no value for --output-format <OUTPUT_FORMAT>; it is one of text, json, yaml, csv; did you mean `yaml`?; see \
+        "`xml` is no value for --output-format <OUTPUT_FORMAT>; it is one of text, json, yaml, csv; did you mean `yaml`? See \
          `measure --help`",
     ),
     ("color-difference xyz.exr", BAD_USAGE, "<B> is missing; see `color-difference --help`"),

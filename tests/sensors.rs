@@ -232,7 +232,7 @@ const COMPLAINTS: [(&str, &str); 20] = [
     (
         "measure rates.exr --check",
         "rates.exr: nothing can be checked: a prediction needs a uniform scene and metadata that say what was done to it, up \
-         to XYZ, xyY or L*a*b*; here the metadata have no `sensor.readout`",
+         to XYZ, xyY or L*a*b*; here the metadata has no `sensor.readout`",
     ),
     (
         "fit-matrix SAMPLES/skies/sky912.exr --sensor ./response.yaml",

@@ -12,6 +12,7 @@ use cyanometer::stream::{Counts, RowSink};
 use cyanometer::units::QuantityKind;
 use nalgebra::{Matrix3, Vector3};
 use std::fs;
+use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// What a command says that ends with `status`.
@@ -394,4 +395,36 @@ fn codes_that_f16_rounds_are_told() {
     let told =
         "f16 holds codes to 2048 as they are, and rounds those above, by steps of 2 at the white level, 4095 ADU; f32";
     assert!(heard.contains(told), "{heard}");
+}
+
+fn sidecar(shop: &Workshop) -> String {
+    fs::read_to_string(shop.path("out.exr.yaml")).unwrap()
+}
+
+/// Patches beyond full well are told as a uniform scene is; so is an image that is cut.
+#[test]
+fn images_that_are_overexposed_or_cut_are_told() {
+    let shop = Workshop::new();
+    let skies = format!("{TREE}/sample_data/skies/sky912.exr");
+    let heard = said(&shop, &format!("render-radiance {skies} --patch 2x2 --exposure 1 -o out.exr"), 0);
+    assert!(heard.contains("samples expect full well or more, and will be saturated"), "{heard}");
+    assert!(sidecar(&shop).contains("saturated: "));
+    assert_eq!(said(&shop, &format!("render-radiance {skies} --patch 2x2 -o out.exr"), 0), "");
+    let heard = said(&shop, &format!("render-radiance {skies} --size 8x6 -o out.exr"), 0);
+    assert!(heard.contains("--size 8x6 shows a corner of its 38x24 pixels in patches of 1x1"), "{heard}");
+}
+
+/// A column is named as people see it, without its unit.
+#[test]
+fn columns_are_found_without_their_units() {
+    let shop = Workshop::new();
+    let table = "nm,north [mW m-2 sr-1 nm-1],south [mW m-2 sr-1 nm-1]\n360,10,20\n830,10,20\n";
+    fs::write(shop.path("two.csv"), table).unwrap();
+    let digest = |column: &str| {
+        let mut command = shop.command("render-radiance two.csv --size 2x2 -o out.exr --column");
+        assert!(command.arg(column).output().unwrap().status.success(), "{column}");
+        sidecar(&shop).lines().find(|line| line.contains("digest")).unwrap().to_owned()
+    };
+    assert_eq!(digest("south"), digest("south [mW m-2 sr-1 nm-1]"));
+    assert_ne!(digest("north"), digest("south"));
 }

@@ -5,7 +5,6 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::output::FrameWriter;
 use cyanometer::requests::{Scene, options};
-use cyanometer::stream::Counts;
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -38,9 +37,10 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     session.sign(scene.header_mut());
     let mut writer = FrameWriter::create(&arguments.output.options(), scene.header())?;
     let bar = session.progress(scene.header().geometry.height);
-    notes.extend(scene.draw(&mut writer, &mut |rows| bar.set_position(rows as u64))?);
+    let (counts, found) = scene.draw(&mut writer, &mut |rows| bar.set_position(rows as u64))?;
+    notes.extend(found);
     bar.finish_and_clear();
-    writer.finish(Counts::default())?;
+    writer.finish(counts)?;
     session.tell(&notes);
     Ok(())
 }

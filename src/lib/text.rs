@@ -36,8 +36,9 @@ pub fn counted(count: u64, what: &str) -> String {
             ("values", "value"),
             ("colors", "color"),
             ("bytes", "byte"),
+            ("wavelengths", "wavelength"),
         ],
-        &[("are", "is"), ("were", "was"), ("have", "has"), ("had", "had")],
+        &[("are", "is"), ("were", "was"), ("have", "has"), ("had", "had"), ("do", "does")],
     ];
     if count != 1 {
         return format!("{count} {what}");

@@ -51,7 +51,8 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command) ->
             text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned()
         }
     };
-    format!("{problem}; see `{program} --help`")
+    let joined = if problem.ends_with('?') { " See" } else { "; see" };
+    format!("{problem}{joined} `{program} --help`")
 }
 
 /// Whether an argument, as clap shows it, is needed whatever options are given: of options those that are declared so.

@@ -150,7 +150,14 @@ impl SpectralTable {
     /// [`Error::Usage`] naming the columns that there are.
     pub fn column_index(&self, column: Option<&str>) -> Result<usize> {
         let Some(column) = column else { return Ok(0) };
-        self.columns.iter().position(|name| name == column).ok_or_else(|| {
+        let is_it = |name: &&str| *name == column;
+        let exact = self.columns.iter().position(|name| is_it(&name.as_str()));
+        // The name of `sky (mW m-2 sr-1 nm-1)` is `sky`, where no other column's is.
+        let bare = || {
+            let mut places = (0..self.columns.len()).filter(|place| is_it(&without_unit(&self.columns[*place])));
+            places.next().filter(|_| places.next().is_none())
+        };
+        exact.or_else(bare).ok_or_else(|| {
             let some: Vec<&str> = self.columns.iter().take(8).map(String::as_str).collect();
             Error::Usage(format!("{}: there is no column `{column}`; it has {}", self.name, some.join(", ")))
         })
@@ -437,6 +444,12 @@ fn unpacked<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>> {
         ));
     }
     Ok(unpacked.into())
+}
+
+/// A heading without the unit in brackets behind it.
+fn without_unit(heading: &str) -> &str {
+    let opening = heading.ends_with(')').then_some('(').or_else(|| heading.ends_with(']').then_some('['));
+    opening.and_then(|bracket| heading.rfind(bracket)).map_or(heading, |at| heading[..at].trim_end())
 }
 
 #[cfg(test)]

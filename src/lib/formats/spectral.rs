@@ -46,7 +46,7 @@ impl SpectralChannels {
         if found.is_empty() {
             let hint = match frame.geometry.channels.len() {
                 1 => "; of a gray picture store the plane three times, as R, G and B, for `render-radiance`",
-                _ => " (a picture in R, G, B goes into `render-radiance`)",
+                _ => " (of a picture `render-radiance` takes R, G and B)",
             };
             return Err(frame.refuse(format!(
                 "it holds no spectral radiance: no channel is named like S0.550,000000nm; give a spectrum as CSV or a \

@@ -35,7 +35,7 @@ pub enum FramePrediction {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Unpredictable {
     /// The metadata lack a key.
-    #[error("the metadata have no `{0}`")]
+    #[error("the metadata has no `{0}`")]
     Missing(&'static str),
     /// Photosites of a class expect different signals.
     #[error("the scene is not uniform")]

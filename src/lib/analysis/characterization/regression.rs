@@ -240,7 +240,9 @@ fn refuse(undetermined: Undetermined, count: usize, trained: bool, keeps: bool) 
     let Undetermined { rank, unknowns, condition } = undetermined;
     let what = if trained { "training samples" } else { "wavelengths" };
     let kept = if keeps { " and the one kept exact" } else { "" };
-    Error::Data(if condition.is_finite() && rank == unknowns {
+    Error::Data(if count == 1 && trained && !keeps {
+        "1 training sample does not determine the matrix, which takes 3 that are independent; give more".into()
+    } else if condition.is_finite() && rank == unknowns {
         format!(
             "{count} {what}{kept} do not determine the matrix: with each signal scaled to unit length, their condition \
              number {condition:.1e} is above {LARGEST_CONDITION:.0e}; give more varied ones"

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{self, FrameHeader};
 use crate::requests::described::either;
+use crate::requests::notes::Note;
 use crate::stages::render::Rendering;
 
 /// How much of the frame a pixel of the source takes, and how much there is of both.
@@ -66,6 +67,18 @@ impl Scene {
         let geometry = Geometry::new(size[0], size[1], channels);
         let header = FrameHeader { name: "the frame".into(), geometry, metadata };
         Ok(Rendering { header, patch, vignetting, cfa })
+    }
+
+    /// A warning of pixels of an image that the frame has no room for.
+    pub(super) fn cut(&self, light: &Light) -> Option<Note> {
+        let Light::Image { width, height, source, .. } = light else { return None };
+        let ([columns, rows], [across, down]) = (self.size?, self.patch.unwrap_or([1, 1]));
+        (columns < width * across || rows < height * down).then(|| {
+            Note::Warning(format!(
+                "{source}: --size {columns}x{rows} shows a corner of its {width}x{height} pixels in patches of {across}x{down}; \
+                 without --size the frame shows all"
+            ))
+        })
     }
 
     fn extent(&self, light: &Light, sensor: &Sensor) -> Result<Extent> {

@@ -16,7 +16,9 @@ use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::stages::render::Rendering;
-use crate::stream::{MemoryFrame, RowSink};
+use crate::stages::saturation::{Counted, FullLevels};
+use crate::stream::{Counts, MemoryFrame, RowSink};
+use crate::text::counted;
 use light::Light;
 use open::Prepared;
 use picture::Losses;
@@ -55,7 +57,8 @@ impl Scene {
     pub fn open(&self) -> Result<OpenScene> {
         let prepared = self.prepare()?;
         let rendering = self.rendering(&prepared)?;
-        let Prepared { light, found, .. } = prepared;
+        let Prepared { light, mut found, .. } = prepared;
+        found.notes.extend(self.cut(&light));
         Ok(OpenScene { rendering, light, losses: found.losses, notes: found.notes })
     }
 
@@ -68,7 +71,7 @@ impl Scene {
         let mut open = self.open()?;
         let mut notes = std::mem::take(&mut open.notes);
         let mut frame = MemoryFrame::new(open.header().clone(), Vec::new());
-        notes.extend(open.draw(&mut frame, &mut |_| ())?);
+        notes.extend(open.draw(&mut frame, &mut |_| ())?.1);
         Ok((frame, notes))
     }
 
@@ -103,15 +106,30 @@ impl OpenScene {
         &mut self.rendering.header
     }
 
-    /// Draws the whole frame into a sink, and gives what came up meanwhile; `progress` hears the number of rows that are done.
+    /// Draws the whole frame into a sink; gives how many samples full well will clip and what came up meanwhile. `progress` hears
+    /// the number of rows that are done.
     ///
     /// # Errors
     ///
     /// Those of reader and sink.
-    pub fn draw(self, sink: &mut dyn RowSink, progress: &mut dyn FnMut(usize)) -> Result<Option<Note>> {
+    pub fn draw(self, sink: &mut dyn RowSink, progress: &mut dyn FnMut(usize)) -> Result<(Counts, Vec<Note>)> {
         let Self { rendering, light, losses, .. } = self;
-        light.draw(&rendering, sink, progress)?;
-        Ok(losses.note())
+        // Of a uniform scene it was said before.
+        let is_known = matches!(light, Light::Uniform { .. });
+        let mut counts = Counts::default();
+        match FullLevels::of(&rendering.header) {
+            Some(levels) => {
+                let mut counted = Counted::new(sink, &rendering.header, levels);
+                light.draw(&rendering, &mut counted, progress)?;
+                counts.saturated_samples = counted.count;
+            }
+            None => light.draw(&rendering, sink, progress)?,
+        }
+        let full = counts.saturated_samples;
+        let text = "samples expect full well or more, and will be saturated; a shorter exposure, or --expose-to 0.8 in place of \
+                    --exposure, keeps them below";
+        let saturated = (full > 0 && !is_known).then(|| Note::Warning(counted(full, text)));
+        Ok((counts, losses.note().into_iter().chain(saturated).collect()))
     }
 }
 

@@ -79,13 +79,15 @@ impl<'a> Sums<'a> {
             )));
         }
         if uncovered > 1e-6 {
-            notes.push(Note::Warning(format!(
+            let text = format!(
                 "{name}: it covers {} to {} nm; {:.2} % of the sensor's response lies beyond, where its radiance is \
                  taken as zero",
                 sampled_nm[0],
                 sampled_nm[sampled_nm.len() - 1],
                 100.0 * uncovered
-            )));
+            );
+            // What rounds to none is no reason to warn.
+            notes.push(if uncovered < 5e-5 { Note::Remark(text) } else { Note::Warning(text) });
         }
         Ok(Seen { camera: if is_followed { exact.clone() } else { of_sum }, exact })
     }
