@@ -372,7 +372,7 @@ fn shop() -> Workshop {
     for (name, text) in [
         ("bare.csv", format!("wavelength_nm,radiance\n{rows}")),
         ("named.csv", format!("wavelength_nm,radiance (W m-2 sr-1 nm-1)\n{rows}")),
-        ("scaled.csv", format!("wavelength_nm,radiance (1e-3 W m-2 sr-1 nm-1)\n{rows}")),
+        ("scaled.csv", format!("wavelength_nm,radiance (100 W m-2 sr-1 nm-1)\n{rows}")),
         ("two.csv", "# Unit: W/m2/sr/nm\nnm,a,b\n360,0.1,0.1\n830,0.2,0.1\n".to_owned()),
         ("micrometers.csv", "wavelength,L W/m2/sr/nm\n0.36,0.1\n0.83,0.2\n".to_owned()),
         ("renamed.csv", "wavelength_um,L W/m2/sr/nm\n0.36,0.1\n0.83,0.2\n".to_owned()),

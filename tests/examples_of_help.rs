@@ -65,7 +65,8 @@ fn every_example_runs_without_a_warning() {
 fn foreign(shop: &Workshop) {
     use image::codecs::png::PngEncoder;
     use image::{ExtendedColorType, ImageEncoder};
-    let codes: Vec<u8> = (0..640 * 480_u32).flat_map(|i| (((i * 7919) % 900 + 64) as u16).to_ne_bytes()).collect();
+    let codes: Vec<u8> =
+        (0..640 * 480_u32).flat_map(|i| u16::try_from((i * 7919) % 900 + 64).unwrap().to_ne_bytes()).collect();
     let file = std::fs::File::create(shop.path("foreign.png")).unwrap();
     PngEncoder::new(file).write_image(&codes, 640, 480, ExtendedColorType::L16).unwrap();
 }

@@ -250,8 +250,10 @@ fn read_beside(place: &Place, sensor: &str, file: &str) -> Result<(String, Vec<u
             if std::fs::metadata(&path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
                 return Err(Error::format(&shown, "it is no file but a pipe or a device; a table must be a file"));
             }
-            let bytes = read_file(&path)
-                .map_err(|error| Error::format(sensor, format!("it names a file that is not read: {error}")))?;
+            let bytes = read_file(&path).map_err(|error| match error {
+                Error::Disk { .. } => Error::format(sensor, format!("it names a file that is not read: {error}")),
+                other => other,
+            })?;
             Ok((shown, bytes))
         }
         Place::BuiltIn => match built_in(&format!("sensors/{file}")) {
