@@ -98,7 +98,7 @@ fn an_observing_camera_gives_back_the_colors() {
     assert_eq!((upsampling.encoding.as_str(), upsampling.method.as_str()), ("linear", "jakob-hanika-2019"));
 
     // Under another light gray has its color, at the luminance of its reflectance.
-    shop.run("render-radiance in.exr --sensor observer.yaml --luminance 250 --illuminant a -o a.exr", &[]);
+    shop.run("render-radiance in.exr --sensor observer.yaml --luminance 250 --illuminant a --quiet -o a.exr", &[]);
     let (under_a, _) = shop.read("a.exr");
     let gray = xyz_of_chromaticity([0.447_58, 0.407_45], 50.0).map(electrons_of);
     for i in 0..3 {
@@ -149,7 +149,7 @@ fn the_scene_does_not_hang_on_how_it_is_worked_out() {
     let codes: Vec<u8> = (0_u32..70 * 40 * 3).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     fs::write(shop.path("in.png"), png(70, png::BitDepth::Eight, png::ColorType::Rgb, &codes)).unwrap();
     let render = |options: &str| {
-        shop.run(&format!("render-radiance in.png -o out.exr --luminance {options}"), &[]);
+        shop.run(&format!("render-radiance in.png -o out.exr --quiet --luminance {options}"), &[]);
         shop.read("out.exr").0
     };
     let whole = render("100 --threads 1");

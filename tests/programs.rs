@@ -86,7 +86,7 @@ fn named_output_is_the_standard_output_byte_for_byte() {
     .into();
     for storage in [
         "--format exr --compression zip",
-        "--format exr --compression piz --sample-type f16",
+        "--format exr --compression piz --sample-type f16 --quiet",
         "--format tiff",
         "--format tiff --compression lzw",
         "--format tiff --compression deflate --sample-type f32",

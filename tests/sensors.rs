@@ -418,6 +418,7 @@ fn frames_made_before_go_on_down_the_chain() {
     let sidecar =
         OLD_METADATA.lines().take_while(|line| !line.starts_with("correction")).collect::<Vec<_>>().join("\n");
     let sidecar = sidecar.replace("quantity: adu", "quantity: expected_electrons").replace("cfa: rggb\nblack", "black");
+    let sidecar = sidecar.replace("unit: ADU", "unit: e-");
     bench.write("rates.exr.yaml", &sidecar);
     bench.run("add-noise rates.exr --seed 3 -o again.exr");
     let digest = |name: &str| {

@@ -38,7 +38,7 @@ pub fn counted(count: u64, what: &str) -> String {
             ("bytes", "byte"),
             ("wavelengths", "wavelength"),
         ],
-        &[("are", "is"), ("were", "was"), ("have", "has"), ("had", "had"), ("do", "does")],
+        &[("are", "is"), ("were", "was"), ("have", "has"), ("had", "had"), ("do", "does"), ("expect", "expects")],
     ];
     if count != 1 {
         return format!("{count} {what}");

@@ -106,7 +106,8 @@ mod tests {
         ] {
             let words = std::iter::once("measure").chain(line.split(' '));
             let error = command().try_get_matches_from(words).unwrap_err();
-            assert_eq!(one_line("measure", &error, &command()), format!("{wanted}; see `measure --help`"), "{line}");
+            let joined = if wanted.ends_with('?') { " See" } else { "; see" };
+            assert_eq!(one_line("measure", &error, &command()), format!("{wanted}{joined} `measure --help`"), "{line}");
         }
     }
 }

@@ -622,8 +622,12 @@ mod tests {
             );
             assert!(refused("nm,photon_radiance\n400,1\n", given).contains("a unit of photons"));
         }
-        assert!(refused("nm,L (1e-3 W m-2 sr-1 nm-1)\n400,1\n", None).contains("a number before it"));
-        assert_eq!(unit("nm,L (1e-3 W m-2 sr-1 nm-1)\n400,1\n", given).unwrap().0, watts);
+        assert!(refused("nm,L (100 W m-2 sr-1 nm-1)\n400,1\n", None).contains("a number before it"));
+        assert_eq!(unit("nm,L (100 W m-2 sr-1 nm-1)\n400,1\n", given).unwrap().0, watts);
+        assert_eq!(
+            unit("nm,L (1e-3 W m-2 sr-1 nm-1)\n400,1\n", None).unwrap().0,
+            RadianceUnit::parse("mW m-2 sr-1 nm-1").unwrap()
+        );
         let both = "# from W m-2 sr-1 nm-1 to W cm-2 sr-1 nm-1\nnm,L\n400,1\n";
         assert!(refused(both, None).contains("name the units of radiance W m-2 sr-1 nm-1 and W cm-2 sr-1 nm-1"));
         assert_eq!(unit(both, given).unwrap().0, watts);

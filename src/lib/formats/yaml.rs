@@ -174,7 +174,9 @@ pub fn check_misspelt(name: &str, metadata: &Metadata) -> Result<()> {
 /// The first unknown key of metadata that looks like a known one.
 pub fn misspelt(metadata: &Metadata) -> Option<String> {
     let known = field_names::<Metadata>();
-    metadata.unknown.keys().filter_map(Value::as_str).find_map(|key| {
+    // A known key stands here for those within it that are not.
+    let unknown = metadata.unknown.keys().filter_map(Value::as_str).filter(|key| !known.contains(key));
+    unknown.into_iter().find_map(|key| {
         let typed = key.to_lowercase();
         let nearest = nearest(&typed, known.iter().copied(), |known| (known.len() / 4).min(2))?;
         Some(format!("unknown key `{key}`; did you mean `{nearest}`?"))
