@@ -157,6 +157,17 @@ class Uncertainty(ProgramCase):
                 # XYZ and covariances are stored with seven digits; temperatures change fastest with them.
                 off = np.abs(samples - by_way[name]).max() / np.abs(samples).max()
                 self.assertLess(off, 2e-4 if name == "sigma.CCT" else 2e-5, f"{space} {name}")
+        # Bluer than any black body: no temperature, and no deviation of one; luminance has both.
+        self.run_pipe(*[[words if words != sample_data("skies/rural25_horizon.csv") else sample_data("skies/clear_zenith.csv")
+                         for words in command] for command in chain])
+        self.run_program(["to-xyz", "rgb.exr", "--matrix", "m.yaml", "--sigma", "-o", "xyz.exr"])
+        deviation = self.frame(["to-xyz", "rgb.exr", "--matrix", "m.yaml", "--sigma"])["sigma.G"]
+        for source in (["rgb.exr", "--matrix", "m.yaml", "--sigma"], ["xyz.exr"]):
+            found = self.frame(["to-xyz", *source, "--space", "cct"])
+            without = np.isnan(found["CCT"])
+            self.assertGreater(without.mean(), 0.5)
+            self.assertTrue((np.isnan(found["sigma.CCT"]) == without).all() and (np.isnan(found["sigma.Duv"]) == without).all())
+            np.testing.assert_allclose(found["sigma.Y"], deviation, rtol=1e-5)
         refused = self.attempt(["to-xyz", "xyz.exr", "--space", "srgb", "--sigma"])
         self.assertEqual(refused.returncode, 2)
 

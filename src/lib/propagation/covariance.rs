@@ -23,5 +23,10 @@ pub fn symmetric(covariance: &Covariance) -> Matrix3<f64> {
 
 /// Standard deviations of the three channels.
 pub fn stds(covariance: &Covariance) -> [f64; 3] {
-    [covariance[0], covariance[3], covariance[5]].map(|variance| variance.max(0.0).sqrt())
+    [covariance[0], covariance[3], covariance[5]].map(std_of)
+}
+
+/// The standard deviation of a variance that rounding may have made negative; of none, none.
+pub fn std_of(variance: f64) -> f64 {
+    if variance < 0.0 { 0.0 } else { variance.sqrt() }
 }

@@ -153,12 +153,19 @@ impl FromXyz {
         let [xx, xy, xz, yy, yz, zz] = covariance;
         let whole = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         let jacobian = self.coordinates.jacobian(xyz);
-        let is_cct = self.coordinates.space() == Space::Cct;
-        let absent = Matrix3::repeat(if is_cct { f64::NAN } else { 0.0 });
-        let made = jacobian.map_or(absent, |jacobian| {
-            let whole_jacobian = jacobian * self.adaptation;
-            whole_jacobian * whole * whole_jacobian.transpose()
-        });
+        let through = |jacobian: Matrix3<f64>| jacobian * whole * jacobian.transpose();
+        let made = jacobian.map_or_else(
+            || {
+                let space = self.coordinates.space();
+                let mut absent = Matrix3::repeat(if space == Space::Cct { f64::NAN } else { 0.0 });
+                // Luminance has an uncertainty where what stands beside it has none.
+                if matches!(space, Space::Cct | Space::Xyy) {
+                    absent[(2, 2)] = through(self.adaptation)[(1, 1)];
+                }
+                absent
+            },
+            |jacobian| through(jacobian * self.adaptation),
+        );
         let shown = if self.coordinates.space() == Space::Xyz { PAIRS.len() } else { 0 };
         let covariances = PAIRS.map(|pair| made[pair]);
         let stds = [0, 1, 2].map(|k| made[(k, k)].max(0.0).sqrt());

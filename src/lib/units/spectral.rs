@@ -102,6 +102,8 @@ pub enum OtherUnit {
     Scaled,
     /// A radiance beside which a factor stands.
     BesideFactor,
+    /// Two units of radiance.
+    Several,
     /// None that is known.
     Unknown,
 }
@@ -118,6 +120,7 @@ impl OtherUnit {
             Self::BesideFactor => {
                 "a radiance beside a factor that may be in the values already or not; say what they are in as they stand"
             }
+            Self::Several => "two units of radiance; say in which they are",
             Self::Unknown => "no unit of spectral radiance that is known",
         }
     }
@@ -137,6 +140,12 @@ pub fn units_in(text: &str) -> Vec<Stated> {
 /// What the heading of a column says about the unit of its numbers; a name such as `irradiance` counts where there is no
 /// unit, and what stands in brackets where it looks like one.
 pub fn unit_of_heading(heading: &str) -> Option<Stated> {
+    let whole = |kind| Some(Stated::Other { text: heading.trim().to_owned(), kind });
+    let radiances = units_among(&tokens(heading)).into_iter().filter(|found| matches!(found.says, Stated::Radiance(_)));
+    let radiances: Vec<Stated> = radiances.map(|found| found.says).collect();
+    if radiances.windows(2).any(|pair| pair[0] != pair[1]) {
+        return whole(OtherUnit::Several);
+    }
     // What stands before brackets that hold a unit is none of it.
     if let Some(text) = in_last_brackets(heading) {
         let outside = heading.replace(text, "");
@@ -144,7 +153,12 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
         if let [found] = units_among(&tokens).as_slice()
             && matches!(found.says, Stated::Radiance(_))
         {
-            return Some(beside_factor(heading, &outside).unwrap_or_else(|| found.says.clone()));
+            let scaled = if found.is_beside_factor(text, &tokens) {
+                whole(OtherUnit::BesideFactor)
+            } else {
+                beside_factor(heading, &outside)
+            };
+            return Some(scaled.unwrap_or_else(|| found.says.clone()));
         }
     }
     let tokens = tokens(heading);
@@ -178,7 +192,9 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
         }
         (says, _) => says,
     });
-    found.or_else(in_words).or_else(in_brackets)
+    // `radiance_w_m2_sr_um`: powers that nobody tells from places.
+    let in_name = || whole(OtherUnit::Unknown).filter(|_| names_unit_in_words(heading));
+    found.or_else(in_words).or_else(in_brackets).or_else(in_name)
 }
 
 /// Tokens as a text.
@@ -186,13 +202,64 @@ fn shown(tokens: &[Token]) -> String {
     tokens.iter().map(Token::shown).collect::<Vec<_>>().join(" ")
 }
 
+/// Whether a piece beside a unit, in the same brackets, may be a factor: a number, a word with one, or a letter or prefix alone.
+fn scales(token: &Token) -> bool {
+    match token {
+        Token::Number(_) => true,
+        Token::Factor { word, exponent } => {
+            let lower = word.to_lowercase();
+            let has_number = exponent.is_some() || lower.contains(|c: char| c.is_numeric());
+            has_number || lower.chars().count() == 1 || FACTORS_IN_WORDS.contains(&lower.as_str())
+        }
+        Token::Per | Token::Square | Token::End => false,
+    }
+}
+
+/// Whether a piece before a power of ten changes nothing.
+fn is_times_one(token: &Token) -> bool {
+    match token {
+        Token::Number(number) => number == "1",
+        Token::Factor { word, exponent: None } => word.eq_ignore_ascii_case("x"),
+        _ => false,
+    }
+}
+
+/// Whether the words of a name are those of a unit of radiance.
+fn names_unit_in_words(heading: &str) -> bool {
+    const POWERS: [&str; 6] = ["w", "mw", "uw", "µw", "kw", "nw"];
+    let lower = heading.to_lowercase();
+    let words: Vec<&str> = lower.split(|c: char| !c.is_alphanumeric()).collect();
+    words.contains(&"sr") && words.iter().any(|word| POWERS.contains(word))
+}
+
+/// Words that multiply.
+const FACTORS_IN_WORDS: [&str; 18] = [
+    "log",
+    "log10",
+    "ln",
+    "times",
+    "scaled",
+    "multiplied",
+    "divided",
+    "db",
+    "kilo",
+    "milli",
+    "micro",
+    "nano",
+    "mega",
+    "giga",
+    "thousand",
+    "million",
+    "percent",
+    "x",
+];
+
 /// What is said where a factor stands beside the unit of a heading; nothing where none does. `outside` is the heading without
 /// the unit.
 fn beside_factor(heading: &str, outside: &str) -> Option<Stated> {
-    const IN_WORDS: [&str; 7] = ["log", "log10", "ln", "times", "scaled", "multiplied", "divided"];
-    let lower = outside.to_lowercase().replace(['×', '*', '·'], " * ");
-    let mut words =
-        lower.split(|c: char| !(c.is_alphanumeric() || "^*.+-".contains(c))).filter(|word| !word.is_empty());
+    let lower = outside.to_lowercase().replace(['×', '*', '·', '/'], " * ");
+    let words: Vec<&str> =
+        lower.split(|c: char| !(c.is_alphanumeric() || "^*.+-".contains(c))).filter(|word| !word.is_empty()).collect();
     let is_power = |text: &str| {
         let digits = text.strip_prefix("10").unwrap_or_default();
         digits.starts_with('^') || digits.starts_with('-') || digits.starts_with('⁻')
@@ -200,13 +267,17 @@ fn beside_factor(heading: &str, outside: &str) -> Option<Stated> {
     let is_exponential = |text: &str| {
         text.starts_with(|c: char| c.is_ascii_digit()) && text.contains('e') && text.parse::<f64>().is_ok()
     };
-    let is_large = |text: &str| is_power(text) || text.parse::<f64>().is_ok_and(|factor| factor >= 10.0);
-    let mut after_sign = false;
-    let is_factor = words.any(|word| {
+    let is_large = |text: &str| {
+        is_power(text) || text.parse::<f64>().is_ok_and(|factor| factor >= 10.0 || factor > 0.0 && factor < 1.0)
+    };
+    let is_sign = |place: usize| words.get(place).is_some_and(|word| ["x", "*"].contains(word));
+    let is_factor = words.iter().enumerate().any(|(place, word)| {
         let number = word.trim_start_matches(['x', '*']);
-        let is_signed = number.len() < word.len() || after_sign;
-        after_sign = number.is_empty();
-        IN_WORDS.contains(&word) || is_power(number) || is_exponential(number) || is_signed && is_large(number)
+        let is_signed = number.len() < word.len() || place > 0 && is_sign(place - 1) || is_sign(place + 1);
+        FACTORS_IN_WORDS.contains(word) && *word != "x"
+            || is_power(number)
+            || is_exponential(number)
+            || is_signed && is_large(number)
     });
     is_factor.then(|| Stated::Other { text: heading.trim().to_owned(), kind: OtherUnit::BesideFactor })
 }
@@ -285,6 +356,23 @@ struct Found {
 }
 
 impl Found {
+    /// Whether what stands beside it in a text of these pieces may be a factor.
+    fn is_beside_factor(&self, text: &str, tokens: &[Token]) -> bool {
+        let (mut before, after) = (&tokens[..self.begin], &tokens[self.end..]);
+        let has_power = matches!(tokens[self.begin], Token::Number(_));
+        // `1 x 10^-3 W` is a power of ten.
+        while let Some((_, rest)) = before.split_last().filter(|(last, _)| has_power && is_times_one(last)) {
+            before = rest;
+        }
+        let beside = as_written(text, &tokens[self.begin..self.end]).and_then(|unit| text.split_once(unit));
+        let has_digits = |text: &str| text.contains(|c: char| c.is_numeric());
+        let is_told = beside.is_some_and(|(left, right)| {
+            let left = if has_power { left.trim_end_matches(|c: char| "x×*·1 ".contains(c)) } else { left };
+            has_digits(left) || has_digits(right)
+        });
+        is_told || text.contains('%') || before.iter().chain(after).any(scales)
+    }
+
     /// What it says, another unit than of radiance as it is written in a text of these pieces.
     fn written_in(&self, text: &str, tokens: &[Token]) -> Stated {
         match &self.says {
@@ -538,6 +626,20 @@ mod tests {
             format!("log10 radiance ({UNIT})"),
             format!("radiance, scaled by 100 ({UNIT})"),
             format!("radiance x1000, {UNIT}"),
+            format!("radiance (x10^-3 {UNIT})"),
+            format!("radiance ({UNIT} x 1000)"),
+            format!("radiance ({UNIT} / 1000)"),
+            format!("radiance ({UNIT} 10^-3)"),
+            format!("radiance ({UNIT} (x 10^3))"),
+            format!("radiance ({UNIT}; scaled by 1000)"),
+            format!("radiance ({UNIT} per 10 nm)"),
+            format!("radiance (m {UNIT})"),
+            format!("radiance (% {UNIT})"),
+            format!("1000*radiance ({UNIT})"),
+            format!("radiance/10 ({UNIT})"),
+            format!("0.001 * radiance ({UNIT})"),
+            format!("dB radiance ({UNIT})"),
+            format!("kilo radiance ({UNIT})"),
         ] {
             let wanted = Stated::Other { text: heading.clone(), kind: OtherUnit::BesideFactor };
             assert_eq!(unit_of_heading(&heading), Some(wanted));
@@ -566,7 +668,7 @@ mod tests {
 
     #[test]
     fn other_units_are_told_from_radiances() {
-        use OtherUnit::{AllWavelengths, Irradiance, PerFrequency, Photons, Scaled, Unknown};
+        use OtherUnit::{AllWavelengths, Irradiance, PerFrequency, Photons, Scaled, Several, Unknown};
         for (text, kind) in [
             ("irradiance (W m-2 nm-1)", Irradiance),
             ("E [W/m2/nm]", Irradiance),
@@ -599,6 +701,12 @@ mod tests {
             ("sky [a.u.]", Unknown),
             ("L (flick)", Unknown),
             ("radiance (W/m2/xy/nm)", Unknown),
+            ("MW m-2 sr-1 nm-1", Unknown),
+            ("radiance_w_m2_sr_um", Unknown),
+            ("Lw_W_m2_sr_um", Unknown),
+            ("radiance_uW_cm2_sr_nm", Unknown),
+            ("radiance (mW m-2 sr-1 nm-1) (W m-2 sr-1 nm-1)", Several),
+            ("radiance (mW m-2 sr-1 nm-1, was W m-2 sr-1 nm-1)", Several),
         ] {
             assert!(
                 matches!(unit_of_heading(text), Some(Stated::Other { kind: found, .. }) if found == kind),
@@ -613,7 +721,6 @@ mod tests {
             "W",
             "A",
             "sky (measured)",
-            "MW m-2 sr-1 nm-1",
             "Y 1391.68 cd m-2",
             "a work of W",
             "sky (az=90/el=45)",
