@@ -3,4 +3,5 @@
 pub mod characterization;
 pub mod chart;
 pub mod comparison;
+pub mod photon_transfer;
 pub mod statistics;

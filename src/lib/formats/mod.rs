@@ -13,6 +13,7 @@ pub mod files;
 pub mod fits;
 pub mod foreign;
 pub mod format;
+pub mod frame_list;
 pub mod headerless;
 mod icc;
 pub mod input;

@@ -1,8 +1,10 @@
 //! Reports: statistics and matrices as text, JSON, YAML and CSV, and as plots.
 
+pub mod camera;
 pub mod characterization;
 pub mod chart;
 
+mod camera_page;
 mod difference;
 mod matrix_text;
 mod photon_transfer;
@@ -11,6 +13,8 @@ mod prediction;
 mod raw_outputs;
 mod trade_off;
 
+pub use camera::CameraOutputs;
+pub use camera_page::camera_page;
 pub use difference::difference;
 pub use photon_transfer::photon_transfer;
 pub use portrait::portrait;

@@ -26,6 +26,7 @@ pub mod fit;
 pub mod independence;
 pub mod measurement;
 pub mod options;
+pub mod photon_transfer;
 pub mod picture;
 pub mod prediction;
 pub mod values;

@@ -1,0 +1,440 @@
+//! The photon transfer curve of a class: gain, dark noise, responsivity and dark current, with what they are uncertain by.
+//!
+//! Of flats above the dark level, σ² − σ_d² = K (μ − μ_d) \[EMVA1288, Eq. 13], and μ − μ_d = R μ_p \[EMVA1288, Eq. 9]; of darks,
+//! μ_d = μ_0 + K I t and σ_d² = σ_0² + K² I t \[EMVA1288, Eqs. 4, 5].
+//!
+//! Every point has the weight of what both of its coordinates scatter by, worked out at the level of the fit, so that a point
+//! that lies low by chance counts no more than one that lies high. Intervals follow from how each number changes with each mean and
+//! variance that was measured, which are independent. Where points miss their line by more than they scatter, as those of a camera
+//! that is not quite linear do, all of them have one more error, alike, which is as large as they miss it: then the line tends to
+//! that of equal weights, which the standard fits.
+
+use super::fit::{Line, Point, variance_besides};
+use super::level::Level;
+use crate::numerics::variance_components::Interval;
+
+/// Variance of the error of rounding, in codes² [EMVA1288, Sec. 2.5].
+pub const ROUNDING: f64 = 1.0 / 12.0;
+/// Below this temporal variance in codes² rounding is not the even error of [`ROUNDING`] \[EMVA1288, Sec. 6.4].
+pub const LEAST_VARIANCE: f64 = 0.24;
+/// The fits end at this share of saturation [EMVA1288, Sec. 6.5].
+const HIGHEST: f64 = 0.7;
+/// So many samples at an end, beyond those that darks have there, and what is measured of the others is no longer that of all.
+const FEW_AT_ENDS: f64 = 1e-5;
+/// Exposure times that differ by less are one.
+const SAME_TIME: f64 = 1e-6;
+
+/// A measured number and what it scatters by, a variance.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Datum {
+    value: f64,
+    variance: f64,
+}
+
+/// What a level tells: its independent numbers.
+#[derive(Debug, Clone, PartialEq)]
+struct Point4 {
+    exposure_s: Option<f64>,
+    mean: Datum,
+    variance: Datum,
+    photons: Option<Datum>,
+    freedom: f64,
+}
+
+impl Point4 {
+    fn of(level: &Level) -> Self {
+        Self {
+            exposure_s: level.condition.exposure_s,
+            mean: Datum { value: level.mean, variance: level.mean_variance },
+            variance: Datum { value: level.variance, variance: level.variance_variance },
+            photons: level.condition.photons.map(|value| Datum { value, variance: 0.0 }),
+            freedom: level.freedom(),
+        }
+    }
+}
+
+/// Where the dark signal beneath a flat is known from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Beneath {
+    /// A dark level.
+    Dark(usize),
+    /// The lines through all.
+    Lines,
+    /// Nowhere.
+    Unknown,
+}
+
+/// The levels of a class, and how they are fitted.
+#[derive(Debug, Clone)]
+pub struct Curve {
+    flats: Vec<Point4>,
+    darks: Vec<Point4>,
+    beneath: Vec<Beneath>,
+    /// Flats that the fits of gain and responsivity take.
+    fitted: Vec<usize>,
+    /// The flat whose variance is the largest, where brighter ones have less.
+    pub saturated: Option<usize>,
+    /// Whether the variance of no light is left to the fit, as darks are silent beneath the rounding, clipped, or absent.
+    pub is_offset_free: bool,
+    /// Whether the darks are clipped at 0.
+    pub are_darks_clipped: bool,
+    rounding: f64,
+    weights: Weights,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Weights {
+    gain: Vec<f64>,
+    response: Vec<f64>,
+    dark_mean: Vec<f64>,
+    dark_variance: Vec<f64>,
+}
+
+/// What the levels of a class lead to, in the unit of the samples.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Values {
+    /// K, samples per electron.
+    pub gain: f64,
+    /// Temporal variance of no light, rounding included.
+    pub dark_variance: Option<f64>,
+    /// Mean of no light and no time.
+    pub dark_mean: Option<f64>,
+    /// R, samples per photon.
+    pub responsivity: Option<f64>,
+    /// Dark signal per second.
+    pub dark_slope: Option<f64>,
+    /// Dark variance per second.
+    pub dark_variance_slope: Option<f64>,
+}
+
+impl Curve {
+    /// Of flats in the order of their light, and darks of one temperature. `rounding` is the variance of the rounding error of
+    /// the samples. None where no gain follows.
+    pub fn of(flats: &[Level], darks: &[Level], rounding: f64, photon_error: f64) -> Option<Self> {
+        let are_darks_clipped = rounding > 0.0 && darks.iter().any(|dark| dark.at_ends[1] > FEW_AT_ENDS.max(1e-3));
+        let is_silent = rounding > 0.0 && darks.iter().all(|dark| dark.variance < LEAST_VARIANCE);
+        let hot = darks.iter().map(|dark| dark.at_ends[0]).fold(0.0, f64::max);
+        let mut curve = Self {
+            beneath: Vec::new(),
+            flats: flats.iter().map(Point4::of).collect(),
+            darks: darks.iter().map(Point4::of).collect(),
+            fitted: Vec::new(),
+            saturated: peak(flats),
+            is_offset_free: is_silent || are_darks_clipped,
+            are_darks_clipped,
+            rounding,
+            weights: Weights::default(),
+        };
+        curve.beneath = curve.flats.iter().map(|flat| curve.beneath(flat)).collect();
+        let no_light = |index: usize| curve.no_light(index).map_or(0.0, |[mean, _]| mean);
+        let reach = curve.saturated.map_or(f64::INFINITY, |peak| HIGHEST * (flats[peak].mean - no_light(peak)));
+        curve.fitted = (0..flats.len())
+            .filter(|&index| {
+                let [at_top, at_bottom] = flats[index].at_ends;
+                let is_whole = at_top <= hot + FEW_AT_ENDS && (rounding <= 0.0 || at_bottom <= FEW_AT_ENDS);
+                let is_told = rounding <= 0.0 || flats[index].variance >= LEAST_VARIANCE;
+                is_whole && is_told && flats[index].mean - no_light(index) <= reach
+            })
+            .collect();
+        if !curve.is_offset_free && curve.fitted.iter().any(|&index| curve.beneath[index] == Beneath::Unknown) {
+            curve.is_offset_free = true;
+        }
+        let needed = if curve.is_offset_free { 2 } else { 1 };
+        if curve.fitted.len() < needed {
+            return None;
+        }
+        for flat in &mut curve.flats {
+            if let Some(photons) = &mut flat.photons {
+                photons.variance = (photon_error * photons.value).powi(2);
+            }
+        }
+        curve.weigh();
+        Some(curve)
+    }
+
+    /// The flats that gain and responsivity are fitted to, by their places.
+    pub fn fitted(&self) -> &[usize] {
+        &self.fitted
+    }
+
+    fn beneath(&self, flat: &Point4) -> Beneath {
+        let is_same = |dark: &Point4| match (dark.exposure_s, flat.exposure_s) {
+            (Some(dark), Some(flat)) => (dark - flat).abs() <= SAME_TIME * flat.abs(),
+            (None, None) => true,
+            _ => false,
+        };
+        match self.darks.iter().position(is_same) {
+            Some(dark) => Beneath::Dark(dark),
+            None if flat.exposure_s.is_some() && self.times() >= 2 => Beneath::Lines,
+            // A camera whose dark signal is not known in time: the level of the only darks.
+            None if self.darks.len() == 1 => Beneath::Dark(0),
+            None => Beneath::Unknown,
+        }
+    }
+
+    /// How many exposure times the darks have.
+    pub fn times(&self) -> usize {
+        let mut times: Vec<f64> = self.darks.iter().filter_map(|dark| dark.exposure_s).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup_by(|a, b| (*a - *b).abs() <= SAME_TIME * b.abs());
+        times.len()
+    }
+
+    /// Lines of mean and variance of the darks over time, where there are several times.
+    fn dark_lines(&self) -> Option<[Line; 2]> {
+        let weights = &self.weights;
+        let points = |of: fn(&Point4) -> f64, weights: &[f64]| -> Vec<Point> {
+            let point = |(index, dark): (usize, &Point4)| {
+                Some(Point { x: dark.exposure_s?, y: of(dark), weight: weights.get(index).copied().unwrap_or(1.0) })
+            };
+            self.darks.iter().enumerate().filter_map(point).collect()
+        };
+        let mean = points(|dark| dark.mean.value, &weights.dark_mean);
+        let variance = points(|dark| dark.variance.value, &weights.dark_variance);
+        (self.times() >= 2).then(|| Some([Line::through(mean)?, Line::through(variance)?])).flatten()
+    }
+
+    /// Mean and variance of no light beneath a flat.
+    fn no_light(&self, flat: usize) -> Option<[f64; 2]> {
+        match self.beneath.get(flat)? {
+            Beneath::Dark(dark) => Some([self.darks[*dark].mean.value, self.darks[*dark].variance.value]),
+            Beneath::Lines => {
+                let time = self.flats[flat].exposure_s?;
+                self.dark_lines().map(|lines| lines.map(|line| line.at(time)))
+            }
+            Beneath::Unknown => None,
+        }
+    }
+
+    /// Mean above no light.
+    pub fn signal(&self, flat: usize) -> f64 {
+        self.flats[flat].mean.value - self.no_light(flat).map_or(0.0, |[mean, _]| mean)
+    }
+
+    /// Temporal variance above that of no light; of a curve whose offset is free, all of it.
+    pub fn noise(&self, flat: usize) -> f64 {
+        let dark = if self.is_offset_free { 0.0 } else { self.no_light(flat).map_or(0.0, |[_, variance]| variance) };
+        self.flats[flat].variance.value - dark
+    }
+
+    fn gain_points(&self) -> impl Iterator<Item = Point> + Clone {
+        self.fitted.iter().enumerate().map(|(place, &flat)| Point {
+            x: self.signal(flat),
+            y: self.noise(flat),
+            weight: self.weights.gain.get(place).copied().unwrap_or(1.0),
+        })
+    }
+
+    fn gain_line(&self) -> Option<Line> {
+        if self.is_offset_free { Line::through(self.gain_points().collect::<Vec<_>>()) } else { Line::through_zero(self.gain_points()) }
+    }
+
+    fn response_points(&self) -> impl Iterator<Item = Point> + Clone {
+        self.fitted.iter().enumerate().filter_map(|(place, &flat)| {
+            let photons = self.flats[flat].photons?;
+            let weight = self.weights.response.get(place).copied().unwrap_or(1.0 / photons.value.max(1.0));
+            (self.beneath[flat] != Beneath::Unknown).then_some(Point { x: photons.value, y: self.signal(flat), weight })
+        })
+    }
+
+    /// Weights, from the first fit on at its levels; what points miss their lines by is added to what they scatter by.
+    fn weigh(&mut self) {
+        self.weigh_darks();
+        let pooled = |points: &[Point4]| {
+            let all: f64 = points.iter().map(|point| point.freedom).sum();
+            let share = |point: &Point4| point.freedom / all * point.freedom * point.variance.variance / point.variance.value.powi(2);
+            let pooled: f64 = points.iter().filter(|point| point.variance.value > 0.0).map(share).sum();
+            if pooled > 0.0 { pooled } else { 2.0 }
+        };
+        let fitted: Vec<Point4> = self.fitted.iter().map(|&flat| self.flats[flat].clone()).collect();
+        // Relative variance of a variance, times its freedom: 2 of normal noise.
+        let relative = pooled(&fitted);
+        let parameters = if self.is_offset_free { 2 } else { 1 };
+        let freedom = self.fitted.len().saturating_sub(parameters) as f64;
+        let mut besides = 0.0;
+        for _ in 0..3 {
+            let Some(line) = self.gain_line() else { return };
+            let own: Vec<f64> = self
+                .fitted
+                .iter()
+                .map(|&flat| {
+                    let dark = self.no_light(flat).map_or(0.0, |[_, variance]| variance);
+                    let level = line.at(self.signal(flat)) + if self.is_offset_free { 0.0 } else { dark };
+                    let point = &self.flats[flat];
+                    let beneath = self.scatter_beneath(flat);
+                    let of_dark = if self.is_offset_free { 0.0 } else { beneath[1] };
+                    relative / point.freedom * level.max(self.rounding).powi(2)
+                        + of_dark
+                        + line.slope.powi(2) * (point.mean.variance + beneath[0])
+                })
+                .collect();
+            let weighted = |besides: f64| {
+                let gain = own.iter().map(|own| 1.0 / (own + besides).max(f64::MIN_POSITIVE)).collect();
+                Self { weights: Weights { gain, ..self.weights.clone() }, ..self.clone() }
+            };
+            let misfit = |besides: f64| {
+                let weighted = weighted(besides);
+                weighted.gain_line().map_or(0.0, |line| line.chi_square(weighted.gain_points()))
+            };
+            let largest = self.fitted.iter().map(|&flat| self.noise(flat).powi(2)).fold(0.0, f64::max);
+            besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
+            self.weights = weighted(besides).weights;
+        }
+        for &flat in &self.fitted {
+            self.flats[flat].variance.variance += besides;
+        }
+        self.weigh_response();
+    }
+
+    /// What scatters beneath a flat: of the mean and of the variance of no light.
+    fn scatter_beneath(&self, flat: usize) -> [f64; 2] {
+        match self.beneath[flat] {
+            Beneath::Dark(dark) => [self.darks[dark].mean.variance, self.darks[dark].variance.variance],
+            Beneath::Lines => {
+                let count = self.darks.len() as f64;
+                let mean = |of: fn(&Point4) -> f64| self.darks.iter().map(of).sum::<f64>() / (count * count);
+                [mean(|dark| dark.mean.variance), mean(|dark| dark.variance.variance)]
+            }
+            Beneath::Unknown => [0.0; 2],
+        }
+    }
+
+    fn weigh_darks(&mut self) {
+        let weigh = |of: fn(&Point4) -> Datum, besides: f64| -> Vec<f64> {
+            self.darks.iter().map(|dark| 1.0 / (of(dark).variance + besides).max(f64::MIN_POSITIVE)).collect()
+        };
+        let (means, variances) = (weigh(|dark| dark.mean, 0.0), weigh(|dark| dark.variance, 0.0));
+        (self.weights.dark_mean, self.weights.dark_variance) = (means, variances);
+        let freedom = self.darks.len() as f64 - 2.0;
+        if self.times() < 2 || freedom <= 0.0 {
+            return;
+        }
+        for (which, of) in [|dark: &Point4| dark.mean, |dark: &Point4| dark.variance].into_iter().enumerate() {
+            let points = |besides: f64| -> Vec<Point> {
+                let point = |dark: &Point4| {
+                    let weight = 1.0 / (of(dark).variance + besides).max(f64::MIN_POSITIVE);
+                    Some(Point { x: dark.exposure_s?, y: of(dark).value, weight })
+                };
+                self.darks.iter().filter_map(point).collect()
+            };
+            let misfit = |besides: f64| {
+                let points = points(besides);
+                Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
+            };
+            let largest = self.darks.iter().map(|dark| of(dark).value.powi(2)).fold(0.0, f64::max);
+            let besides = variance_besides(freedom, misfit, largest);
+            if besides <= 0.0 {
+                continue;
+            }
+            for dark in &mut self.darks {
+                let datum = if which == 0 { &mut dark.mean } else { &mut dark.variance };
+                datum.variance += besides;
+            }
+            // A black level that moves does so under light too.
+            if which == 0 {
+                self.flats.iter_mut().for_each(|flat| flat.mean.variance += besides);
+            }
+            let weights: Vec<f64> = self.darks.iter().map(|dark| 1.0 / of(dark).variance).collect();
+            if which == 0 { self.weights.dark_mean = weights } else { self.weights.dark_variance = weights }
+        }
+    }
+
+    fn weigh_response(&mut self) {
+        let freedom = self.response_points().count() as f64 - 1.0;
+        if freedom < 0.0 {
+            return;
+        }
+        let weights = |besides: f64| -> Vec<f64> {
+            let own = |&flat: &usize| self.flats[flat].mean.variance + self.scatter_beneath(flat)[0];
+            self.fitted.iter().map(|flat| 1.0 / (own(flat) + besides).max(f64::MIN_POSITIVE)).collect()
+        };
+        let misfit = |besides: f64| {
+            let weighted = Self { weights: Weights { response: weights(besides), ..self.weights.clone() }, ..self.clone() };
+            let points: Vec<Point> = weighted.response_points().collect();
+            Line::through_zero(points.clone()).map_or(0.0, |line| line.chi_square(points))
+        };
+        let largest = self.fitted.iter().map(|&flat| self.signal(flat).powi(2)).fold(0.0, f64::max);
+        let besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
+        self.weights.response = weights(besides);
+        // What they miss it by is an error of the light: it tells nothing of the gain.
+        let Some(line) = Line::through_zero(self.response_points()) else { return };
+        for flat in &mut self.flats {
+            if let Some(photons) = &mut flat.photons {
+                photons.variance += besides / line.slope.powi(2);
+            }
+        }
+    }
+
+    /// What the levels lead to.
+    pub fn values(&self) -> Option<Values> {
+        let line = self.gain_line()?;
+        let lines = self.dark_lines().filter(|_| self.times() >= 3);
+        let shortest = || {
+            let time = |dark: &&Point4| dark.exposure_s.unwrap_or(f64::INFINITY);
+            self.darks.iter().min_by(|a, b| time(a).total_cmp(&time(b)))
+        };
+        let mean = lines.map(|[mean, _]| mean.offset).or_else(|| shortest().map(|dark| dark.mean.value));
+        let measured = lines.map(|[_, variance]| variance.offset).or_else(|| shortest().map(|dark| dark.variance.value));
+        let has_darks = !self.darks.is_empty() && !self.are_darks_clipped;
+        let dark_variance = if self.is_offset_free { Some(line.offset) } else { measured };
+        Some(Values {
+            gain: line.slope,
+            dark_variance: dark_variance.filter(|_| has_darks),
+            dark_mean: mean.filter(|_| has_darks),
+            responsivity: Line::through_zero(self.response_points()).map(|line| line.slope),
+            dark_slope: lines.map(|[mean, _]| mean.slope).filter(|_| has_darks),
+            dark_variance_slope: lines.map(|[_, variance]| variance.slope).filter(|_| has_darks && !self.is_offset_free),
+        })
+    }
+
+    /// The interval of a number that follows from the values, at such confidence; none where it does not follow.
+    pub fn interval(&self, of: impl Fn(&Values) -> Option<f64>, confidence: f64) -> Option<Interval> {
+        let value = of(&self.values()?)?;
+        let mut variance = 0.0;
+        let mut moved = self.clone();
+        let mut add = |curve: &mut Self, datum: &dyn Fn(&mut Self) -> Option<&mut Datum>| {
+            let Some(Datum { value: at, variance: own }) = datum(curve).copied() else { return };
+            if own <= 0.0 {
+                return;
+            }
+            let mut ends = [value; 2];
+            for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
+                if let Some(datum) = datum(curve) {
+                    datum.value = at + sign * own.sqrt();
+                }
+                *end = curve.values().as_ref().and_then(&of).unwrap_or(value);
+            }
+            if let Some(datum) = datum(curve) {
+                datum.value = at;
+            }
+            variance += ((ends[1] - ends[0]) / 2.0).powi(2);
+        };
+        for &flat in &self.fitted {
+            add(&mut moved, &|curve| Some(&mut curve.flats[flat].mean));
+            add(&mut moved, &|curve| Some(&mut curve.flats[flat].variance));
+            add(&mut moved, &|curve| curve.flats[flat].photons.as_mut());
+        }
+        for dark in 0..self.darks.len() {
+            add(&mut moved, &|curve| Some(&mut curve.darks[dark].mean));
+            add(&mut moved, &|curve| Some(&mut curve.darks[dark].variance));
+        }
+        Some(Interval::normal(value, variance, confidence))
+    }
+
+    /// What the mean above no light scatters by, a variance.
+    pub fn signal_variance(&self, flat: usize) -> f64 {
+        self.flats[flat].mean.variance + self.scatter_beneath(flat)[0]
+    }
+}
+
+/// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].
+fn peak(flats: &[Level]) -> Option<usize> {
+    let (peak, largest) = flats.iter().enumerate().max_by(|(_, a), (_, b)| a.variance.total_cmp(&b.variance))?;
+    /// Standard deviations that are beyond chance.
+    const BEYOND: f64 = 5.0;
+    let falls = |after: &Level| {
+        let scatter = (after.variance_variance + largest.variance_variance).sqrt();
+        after.variance < largest.variance - BEYOND * scatter && after.variance < 0.9 * largest.variance
+    };
+    flats[peak + 1..].iter().any(falls).then_some(peak)
+}

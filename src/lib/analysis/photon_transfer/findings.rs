@@ -1,0 +1,328 @@
+//! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
+
+use super::curve::{Curve, LEAST_VARIANCE, ROUNDING, Values};
+use super::level::Level;
+use super::linearity::{Linearity, Response, linearity};
+use super::pattern::{Part, fixed, of_light, temporal};
+use crate::numerics::variance_components::Interval;
+
+/// What is asked of the measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Probability that an interval holds its number.
+    pub confidence: f64,
+    /// Relative standard uncertainty of all numbers of photons together.
+    pub photon_error: f64,
+    /// Whether samples are codes, which are rounded.
+    pub are_codes: bool,
+}
+
+/// A number that was measured, or why it was not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// Its name in reports.
+    pub key: &'static str,
+    /// What it is, for people.
+    pub what: &'static str,
+    /// Its unit; empty for a number without one.
+    pub unit: &'static str,
+    /// The number; or which frames would tell it.
+    pub found: Result<Interval, String>,
+}
+
+/// A level as the curve shows it.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct CurvePoint {
+    /// Exposure time in s.
+    pub exposure_s: Option<f64>,
+    /// Photons per photosite.
+    pub photons: Option<f64>,
+    /// Mean above no light.
+    pub signal_adu: f64,
+    /// Temporal variance above that of no light.
+    pub variance_adu2: f64,
+    /// What that scatters by: a standard deviation.
+    pub variance_error_adu2: f64,
+    /// Whether gain and responsivity are fitted to it.
+    pub is_fitted: bool,
+}
+
+/// What was measured of a class.
+#[derive(Debug, Clone)]
+pub struct ClassFindings {
+    /// The class.
+    pub name: String,
+    /// Numbers, in the order of reports.
+    pub findings: Vec<Finding>,
+    /// The photon transfer curve.
+    pub curve: Vec<CurvePoint>,
+    /// Deviations from the straight line.
+    pub linearity: Option<Linearity>,
+    /// What the fits give, in samples.
+    pub values: Option<Values>,
+    /// What a careful user should know.
+    pub notes: Vec<String>,
+}
+
+impl ClassFindings {
+    /// A number by its name.
+    pub fn get(&self, key: &str) -> Option<Interval> {
+        self.findings.iter().find(|finding| finding.key == key)?.found.clone().ok()
+    }
+}
+
+type Found = Result<Interval, String>;
+
+fn lacking(what: &str) -> String {
+    what.to_owned()
+}
+
+/// What the levels of a class tell; flats in the order of their light, darks of the flats' temperature.
+pub fn of_class(name: &str, flats: &[Level], darks: &[Level], settings: &Settings) -> ClassFindings {
+    let Settings { confidence, photon_error, are_codes } = *settings;
+    let rounding = if are_codes { ROUNDING } else { 0.0 };
+    let Some(curve) = Curve::of(flats, darks, rounding, photon_error) else {
+        let why = "no gain follows: it takes two flats of one light below saturation, with darks of their exposure time, or flats at \
+                   several levels";
+        return ClassFindings {
+            name: name.into(),
+            findings: vec![finding("gain_adu_per_e", Err(why.into()))],
+            curve: Vec::new(),
+            linearity: None,
+            values: None,
+            notes: Vec::new(),
+        };
+    };
+    let mut found = Vec::new();
+    let mut add = |key: &'static str, result: Found| found.push(finding(key, result));
+    let number = |of: &dyn Fn(&Values) -> Option<f64>, why: String| curve.interval(of, confidence).ok_or(why);
+    let no_darks = || {
+        if curve.are_darks_clipped {
+            lacking("darks are clipped at code 0: raise the black level of the camera")
+        } else {
+            lacking("it takes two darks or more")
+        }
+    };
+    let no_photons = || lacking("the photons per photosite of the flats are not known");
+    let few_times = || lacking("it takes darks at three exposure times or more");
+    let gain = number(&|v| Some(v.gain), String::new());
+    add("gain_adu_per_e", gain.clone());
+    let responsivity = number(&|v| v.responsivity, no_photons());
+    add("responsivity_adu_per_photon", responsivity.clone());
+    add("quantum_efficiency", number(&|v| Some(v.responsivity? / v.gain), no_photons()));
+    add("black_level_adu", number(&|v| v.dark_mean, no_darks()));
+    add("dark_noise_adu", number(&|v| v.dark_variance, no_darks()).map(Interval::root));
+    let read_variance = |v: &Values| Some((v.dark_variance? - rounding) / (v.gain * v.gain));
+    add("dark_noise_e", number(&read_variance, no_darks()).map(Interval::root));
+    let parts = [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)];
+    let repeated: Vec<&Level> = darks.iter().filter(|dark| dark.frames >= 2).collect();
+    let over_gain = |part: Found| -> Found { Ok(over(part?.root(), gain.clone()?)) };
+    for (key, part) in parts {
+        let off = if part == Part::Pixel { rounding } else { 0.0 };
+        let of_part = || temporal(&repeated, part, confidence).map(|variance| variance - off);
+        let is_told = !repeated.is_empty() && !curve.is_offset_free;
+        add(key, if is_told { over_gain(Ok(of_part())) } else { Err(silent(&curve, no_darks())) });
+    }
+    // The signal that equals its noise: ½ + √(¼ + σ²) [EMVA1288, Eq. 25].
+    let threshold = |v: &Values| Some(0.5 + (0.25 + v.dark_variance?.max(0.0) / (v.gain * v.gain)).sqrt());
+    let threshold_e = number(&threshold, no_darks());
+    add("threshold_e", threshold_e.clone());
+    let threshold_photons = |v: &Values| Some(threshold(v)? * v.gain / v.responsivity?);
+    add("threshold_photons", number(&threshold_photons, if darks.is_empty() { no_darks() } else { no_photons() }));
+    let saturation = saturation(&curve, flats, gain.clone());
+    let [saturation_e, saturation_photons, full_well] = saturation;
+    add("saturation_e", saturation_e.clone());
+    add("saturation_photons", saturation_photons);
+    add("full_well_e", full_well);
+    add("snr_max", saturation_e.clone().map(Interval::root));
+    let range = |saturation: Interval, threshold: Interval| Interval {
+        value: saturation.value / threshold.value,
+        low: saturation.low / threshold.high,
+        high: saturation.high / threshold.low,
+    };
+    add("dynamic_range", saturation_e.and_then(|saturation| Ok(range(saturation, threshold_e?))));
+    let straight = straightness(&curve, flats, confidence);
+    for (key, end) in [("linearity_error_min", 0), ("linearity_error_max", 1)] {
+        add(key, straight.as_ref().map(|line| line.extremes[end]).map_err(Clone::clone));
+    }
+    let stacks = stacks(&curve, flats, darks);
+    add_patterns(&mut add, &curve, stacks, &over_gain, confidence);
+    let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
+    add("dark_current_e_per_s", number(&per_second, if darks.is_empty() { no_darks() } else { few_times() }));
+    let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
+    let why = || if curve.is_offset_free { silent(&curve, no_darks()) } else { few_times() };
+    add("dark_current_from_variance_e_per_s", number(&from_variance, why()));
+    let points = (0..flats.len()).map(|flat| CurvePoint {
+        exposure_s: flats[flat].condition.exposure_s,
+        photons: flats[flat].condition.photons,
+        signal_adu: curve.signal(flat),
+        variance_adu2: curve.noise(flat),
+        variance_error_adu2: flats[flat].variance_variance.sqrt(),
+        is_fitted: curve.fitted().contains(&flat),
+    });
+    let (curve_points, values) = (points.collect(), curve.values());
+    let notes = notes(&curve, flats);
+    ClassFindings { name: name.into(), findings: found, curve: curve_points, linearity: straight.ok(), values, notes }
+}
+
+/// Why temporal noise of darks is not parted.
+fn silent(curve: &Curve, otherwise: String) -> String {
+    if curve.is_offset_free && !curve.are_darks_clipped {
+        format!("darks have a temporal variance below {LEAST_VARIANCE} codes², which rounding hides")
+    } else {
+        otherwise
+    }
+}
+
+fn finding(key: &'static str, found: Found) -> Finding {
+    let named = KEYS.iter().find(|(known, ..)| *known == key);
+    let (_, what, unit) = named.copied().unwrap_or((key, key, ""));
+    Finding { key, what, unit, found }
+}
+
+/// Every number: its key, what it is, its unit.
+pub const KEYS: [(&str, &str, &str); 28] = [
+    ("gain_adu_per_e", "system gain K", "ADU/e-"),
+    ("responsivity_adu_per_photon", "responsivity R", "ADU/photon"),
+    ("quantum_efficiency", "quantum efficiency", ""),
+    ("black_level_adu", "black level", "ADU"),
+    ("dark_noise_adu", "temporal dark noise", "ADU"),
+    ("dark_noise_e", "temporal dark noise", "e-"),
+    ("row_noise_e", "temporal noise of rows", "e-"),
+    ("column_noise_e", "temporal noise of columns", "e-"),
+    ("pixel_noise_e", "temporal noise of photosites", "e-"),
+    ("threshold_e", "absolute sensitivity threshold", "e-"),
+    ("threshold_photons", "absolute sensitivity threshold", "photons"),
+    ("saturation_e", "saturation capacity", "e-"),
+    ("saturation_photons", "saturation capacity", "photons"),
+    ("full_well_e", "full well", "e-"),
+    ("snr_max", "largest signal-to-noise ratio", ""),
+    ("dynamic_range", "dynamic range", ""),
+    ("linearity_error_min", "linearity error, least", ""),
+    ("linearity_error_max", "linearity error, largest", ""),
+    ("prnu", "photo response non-uniformity", ""),
+    ("prnu_row", "of rows", ""),
+    ("prnu_column", "of columns", ""),
+    ("prnu_pixel", "of photosites", ""),
+    ("dsnu_e", "dark signal non-uniformity", "e-"),
+    ("dsnu_row_e", "of rows", "e-"),
+    ("dsnu_column_e", "of columns", "e-"),
+    ("dsnu_pixel_e", "of photosites", "e-"),
+    ("dark_current_e_per_s", "dark current, from means", "e-/s"),
+    ("dark_current_from_variance_e_per_s", "dark current, from variances", "e-/s"),
+];
+
+/// An interval over another of which it is independent.
+fn over(of: Interval, by: Interval) -> Interval {
+    let value = of.value / by.value;
+    let [low, high] = [(of.low - of.value, by.high - by.value), (of.high - of.value, by.low - by.value)]
+        .map(|(own, other)| (own / by.value).hypot(value * other / by.value));
+    Interval { value, low: (value - low).max(0.0), high: value + high }
+}
+
+/// Saturation in electrons and in photons, and full well.
+fn saturation(curve: &Curve, flats: &[Level], gain: Found) -> [Found; 3] {
+    let gain = match gain {
+        Ok(gain) => gain,
+        Err(why) => return [Err(why.clone()), Err(why.clone()), Err(why)],
+    };
+    let Some(peak) = curve.saturated else {
+        let why = || lacking("the variance still rises at the brightest flat: brighter ones, until it falls, would tell");
+        return [Err(why()), Err(why()), Err(why())];
+    };
+    // The largest variance lies between the neighbors of the level that has it.
+    let [below, above] = [peak.saturating_sub(1), (peak + 1).min(flats.len() - 1)];
+    let bracket = |of: &dyn Fn(usize) -> f64| Interval { value: of(peak), low: of(below), high: of(above).max(of(peak)) };
+    let electrons = over(bracket(&|flat| curve.signal(flat)), gain);
+    let photons = |flat: usize| flats[flat].condition.photons;
+    let has_photons = [below, peak, above].into_iter().all(|flat| photons(flat).is_some());
+    let in_photons = has_photons.then(|| bracket(&|flat| photons(flat).unwrap_or_default()));
+    let brightest = flats.len() - 1;
+    let last = &flats[brightest];
+    let is_flat = last.variance < 0.02 * flats[peak].variance;
+    let full_well = if !is_flat {
+        Err(lacking("no flat is so bright that every photosite is full"))
+    } else if last.at_ends[0] > 0.5 {
+        let reached = curve.signal(brightest) / gain.value;
+        Err(format!("the converter ends first: it is no less than {reached:.0} e-"))
+    } else {
+        Ok(over(Interval::normal(curve.signal(brightest), curve.signal_variance(brightest), 0.95), gain))
+    };
+    [Ok(electrons), in_photons.ok_or_else(|| lacking("the photons per photosite of the flats are not known")), full_well]
+}
+
+/// The deviations from a straight line, against photons, or against time where light was constant.
+fn straightness(curve: &Curve, flats: &[Level], confidence: f64) -> Result<Linearity, String> {
+    let light = |level: &Level| level.condition.photons.or(level.condition.exposure_s);
+    let peak = curve.saturated.ok_or("the saturation is not known, from 5 to 95 % of which the line is fitted")?;
+    let levels: Vec<Response> = flats
+        .iter()
+        .enumerate()
+        .filter_map(|(index, flat)| {
+            Some(Response { light: light(flat)?, signal: curve.signal(index), variance: curve.signal_variance(index) })
+        })
+        .collect();
+    let few = "it takes three flats or more between 5 and 95 % of saturation, of known photons or exposure times";
+    linearity(&levels, curve.signal(peak), confidence).ok_or_else(|| few.into())
+}
+
+/// The flat and the dark that patterns are measured on: of the most frames; of such, the flat nearest to half of saturation, and
+/// the dark nearest to its exposure time.
+fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<(usize, &'a Level)>; 2] {
+    let half = curve.saturated.map_or_else(
+        || curve.fitted().last().map_or(0.0, |&flat| curve.signal(flat)) / 2.0,
+        |peak| curve.signal(peak) / 2.0,
+    );
+    let most = |levels: &[Level]| levels.iter().map(|level| level.frames).max();
+    let fitted = curve.fitted().iter().copied();
+    let frames = curve.fitted().iter().map(|&flat| flats[flat].frames).max();
+    let off = |flat: &usize| (curve.signal(*flat) - half).abs();
+    let flat = fitted.filter(|&flat| Some(flats[flat].frames) == frames).min_by(|a, b| off(a).total_cmp(&off(b)));
+    let time = |level: &Level| level.condition.exposure_s.unwrap_or(0.0);
+    let wanted = flat.map_or(0.0, |flat| time(&flats[flat]));
+    let apart = |dark: &(usize, &Level)| (time(dark.1) - wanted).abs();
+    let dark = darks.iter().enumerate().filter(|(_, dark)| Some(dark.frames) == most(darks));
+    [flat.map(|flat| (flat, &flats[flat])), dark.min_by(|a, b| apart(a).total_cmp(&apart(b)))]
+}
+
+fn add_patterns(
+    add: &mut impl FnMut(&'static str, Found),
+    curve: &Curve,
+    [flat, dark]: [Option<(usize, &Level)>; 2],
+    over_gain: &dyn Fn(Found) -> Found,
+    confidence: f64,
+) {
+    let no_darks = || lacking("it takes two darks or more");
+    for (key, part) in
+        [("prnu", Part::Total), ("prnu_row", Part::Row), ("prnu_column", Part::Column), ("prnu_pixel", Part::Pixel)]
+    {
+        let result = match (flat, dark) {
+            (Some((index, flat)), Some((_, dark))) => {
+                let signal = curve.signal(index);
+                Ok(of_light(flat, dark, part, confidence).root().map(|spread| spread / signal))
+            }
+            (None, _) => Err(lacking("it takes two flats or more below saturation")),
+            _ => Err(no_darks()),
+        };
+        add(key, result);
+    }
+    for (key, part) in
+        [("dsnu_e", Part::Total), ("dsnu_row_e", Part::Row), ("dsnu_column_e", Part::Column), ("dsnu_pixel_e", Part::Pixel)]
+    {
+        add(key, dark.map_or_else(|| Err(no_darks()), |(_, dark)| over_gain(Ok(fixed(dark, part, confidence)))));
+    }
+}
+
+fn notes(curve: &Curve, flats: &[Level]) -> Vec<String> {
+    let mut notes = Vec::new();
+    if curve.is_offset_free {
+        notes.push(
+            "the variance of no light is that which the line through the flats has at no signal, as darks do not tell it".into(),
+        );
+    }
+    let lit = flats.iter().filter(|flat| flat.condition.photons.is_none()).count();
+    if lit > 0 && flats.iter().any(|flat| flat.condition.photons.is_some()) {
+        notes.push(format!("{lit} flats have no number of photons, and do not count for the responsivity"));
+    }
+    notes
+}

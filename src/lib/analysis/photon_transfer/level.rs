@@ -1,0 +1,65 @@
+//! What a class of photosites does at one level of light, or in the dark.
+
+use super::survey::SiteSurvey;
+
+/// A level of light, or darkness, as frames of it were taken.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Condition {
+    /// Whether light fell.
+    pub is_lit: bool,
+    /// Exposure time in s, where it is known.
+    pub exposure_s: Option<f64>,
+    /// Photons per photosite during the exposure, where they are known.
+    pub photons: Option<f64>,
+    /// Temperature of the sensor in K, where it is known.
+    pub temperature_k: Option<f64>,
+}
+
+/// What a class does under one condition.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Level {
+    /// The condition.
+    pub condition: Condition,
+    /// Frames.
+    pub frames: usize,
+    /// Mean of the samples.
+    pub mean: f64,
+    /// What it scatters by: a variance.
+    pub mean_variance: f64,
+    /// Temporal variance of a sample.
+    pub variance: f64,
+    /// What it scatters by: a variance.
+    pub variance_variance: f64,
+    /// Shares of the samples at or above the top code, and at or below 0.
+    pub at_ends: [f64; 2],
+    /// The grids of the class.
+    pub sites: Vec<SiteSurvey>,
+}
+
+impl Level {
+    /// Of grids of one class, each counted by its photosites.
+    pub fn of(condition: Condition, sites: Vec<SiteSurvey>) -> Self {
+        let count: f64 = sites.iter().map(|site| site.count() as f64).sum();
+        let share = |site: &SiteSurvey| site.count() as f64 / count;
+        let mean = |of: &dyn Fn(&SiteSurvey) -> f64| sites.iter().map(|site| share(site) * of(site)).sum();
+        let scatter = |of: &dyn Fn(&SiteSurvey) -> f64| sites.iter().map(|site| share(site).powi(2) * of(site)).sum();
+        let frames = sites.first().map_or(0, |site| site.frames);
+        let at_end = |end: usize| mean(&|site| site.at_ends[end] as f64 / (site.count() * site.frames) as f64);
+        Self {
+            condition,
+            frames,
+            mean: mean(&|site| site.mean),
+            mean_variance: scatter(&|site| site.mean_variance),
+            variance: mean(&|site| site.variance),
+            variance_variance: scatter(&|site| site.variance_variance),
+            at_ends: [at_end(0), at_end(1)],
+            sites,
+        }
+    }
+
+    /// Independent values that its variance is an average of.
+    pub fn freedom(&self) -> f64 {
+        let count: usize = self.sites.iter().map(SiteSurvey::count).sum();
+        (self.frames as f64 - 1.0) * count as f64
+    }
+}

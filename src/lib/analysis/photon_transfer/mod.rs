@@ -1,0 +1,21 @@
+//! Photon transfer: what a camera is, from pairs or stacks of flats and darks, after EMVA 1288 release 4.0, linear model.
+//!
+//! [`survey()`] reads the frames of one condition; [`of_class`] makes of the levels of a class its gain, noise, saturation, patterns
+//! and dark current, each with an interval, or says which frames would tell it.
+
+mod curve;
+mod findings;
+mod fit;
+mod level;
+mod linearity;
+mod pattern;
+mod sites;
+mod survey;
+
+pub use curve::Values;
+pub use findings::{ClassFindings, CurvePoint, Finding, KEYS, Settings, of_class};
+pub use fit::Line;
+pub use level::{Condition, Level};
+pub use linearity::Linearity;
+pub use sites::Site;
+pub use survey::{SiteSurvey, Survey, survey};

@@ -1,0 +1,81 @@
+//! Fixed patterns and temporal noise, each parted into what rows, columns and single photosites add.
+//!
+//! The mean of L frames holds the pattern and 1/L of the temporal noise; each part of that comes off its part of the pattern
+//! \[EMVA1288, Sec. 8.2]. What light adds is that of the flats less that of the darks, over the mean between them.
+
+use super::level::Level;
+use crate::numerics::variance_components::{Interval, MeanSquare, MeanSquares, combination};
+
+/// A part of a variance between photosites.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    Total,
+    /// What rows add.
+    Row,
+    /// What columns add.
+    Column,
+    /// What is left to single photosites.
+    Pixel,
+}
+
+impl Part {
+    /// How much of each mean square is this part of the variance, in a table of so many columns and rows.
+    fn shares(self, [columns, rows]: [usize; 2]) -> [f64; 3] {
+        let [of_row, of_column] = [1.0 / columns as f64, 1.0 / rows as f64];
+        match self {
+            Self::Total => [of_row, of_column, 1.0 - of_row - of_column],
+            Self::Row => [of_row, 0.0, -of_row],
+            Self::Column => [0.0, of_column, -of_column],
+            Self::Pixel => [0.0, 0.0, 1.0],
+        }
+    }
+}
+
+/// The terms of a part of a variance that several grids share, each counted by its photosites.
+fn terms(level: &Level, part: Part, of: impl Fn(usize) -> (MeanSquares, [usize; 2]), factor: f64) -> Vec<(f64, MeanSquare)> {
+    let count: f64 = level.sites.iter().map(|site| site.count() as f64).sum();
+    let mut terms = Vec::new();
+    for (index, site) in level.sites.iter().enumerate() {
+        let (squares, size) = of(index);
+        let [rows, columns, rest] = part.shares(size).map(|share| share * factor * site.count() as f64 / count);
+        terms.extend([(rows, squares.rows), (columns, squares.columns), (rest, squares.rest)]);
+    }
+    terms.retain(|(share, _)| *share != 0.0);
+    terms
+}
+
+/// Terms of the fixed pattern of a level.
+fn fixed_terms(level: &Level, part: Part, factor: f64) -> Vec<(f64, MeanSquare)> {
+    let mut found = terms(level, part, |index| (level.sites[index].spatial, size(level, index)), factor);
+    let off = -factor / level.frames as f64;
+    found.extend(terms(level, part, |index| (level.sites[index].temporal, size(level, index)), off));
+    found
+}
+
+fn size(level: &Level, index: usize) -> [usize; 2] {
+    level.sites[index].size
+}
+
+/// Variance that a part of the fixed pattern has at a level.
+pub fn fixed(level: &Level, part: Part, confidence: f64) -> Interval {
+    combination(&fixed_terms(level, part, 1.0), confidence)
+}
+
+/// Variance that a part of the pattern has under light beyond that in the dark.
+pub fn of_light(flat: &Level, dark: &Level, part: Part, confidence: f64) -> Interval {
+    let mut found = fixed_terms(flat, part, 1.0);
+    found.extend(fixed_terms(dark, part, -1.0));
+    combination(&found, confidence)
+}
+
+/// Variance that a part of the temporal noise has, over several levels that have it alike.
+pub fn temporal(levels: &[&Level], part: Part, confidence: f64) -> Interval {
+    let weight = |level: &Level| level.frames as f64 - 1.0;
+    let all: f64 = levels.iter().map(|level| weight(level)).sum();
+    let of_level = |level: &&Level| {
+        let (level, share) = (*level, weight(level) / all);
+        terms(level, part, move |index| (level.sites[index].temporal, level.sites[index].size), share)
+    };
+    combination(&levels.iter().flat_map(of_level).collect::<Vec<_>>(), confidence)
+}

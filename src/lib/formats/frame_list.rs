@@ -1,0 +1,270 @@
+//! Lists of flats and darks: a table, a YAML list, or the descriptor of an EMVA 1288 measurement.
+
+use super::files::read_file;
+use super::{csv, delimited, yaml};
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What a frame of a measurement shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FrameKind {
+    /// Even light.
+    Flat,
+    /// No light.
+    Dark,
+}
+
+/// A frame as a list has it; what it does not say, the frame's own metadata may.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListedFrame {
+    /// The file, as seen from the list.
+    pub file: PathBuf,
+    /// What it shows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<FrameKind>,
+    /// Exposure time in s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_s: Option<f64>,
+    /// Photons per photosite during the exposure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub photons: Option<f64>,
+    /// Temperature of the sensor in K.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_k: Option<f64>,
+    /// Any word that tells levels of light of one exposure time apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level: Option<String>,
+}
+
+/// A list of frames, and what it says of all.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct FrameList {
+    /// The frames.
+    pub frames: Vec<ListedFrame>,
+    /// The largest code.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub white_level_adu: Option<f64>,
+}
+
+/// Columns of a table.
+const COLUMNS: [&str; 7] = ["file", "kind", "exposure_s", "photons", "temperature_k", "temperature_c", "level"];
+/// 0 °C in K.
+const ZERO_CELSIUS_K: f64 = 273.15;
+
+/// Reads a list; files are found beside it.
+///
+/// # Errors
+///
+/// Those of the disk; [`Error::Format`] for what is no such list, naming the line or the column.
+pub fn read(path: &Path) -> Result<FrameList> {
+    let name = path.display().to_string();
+    let bytes = read_file(path)?;
+    let text = delimited::decoded(&name, &bytes)?;
+    let mut list = if is_descriptor(&text) {
+        descriptor(&name, &text)?
+    } else if is_yaml(path, &text) {
+        let is_plain = text.lines().any(|line| line.starts_with('-'));
+        let whole = if is_plain { format!("frames:\n{text}") } else { text.into_owned() };
+        yaml::parse_strict(&name, whole.as_bytes())?
+    } else {
+        FrameList { frames: table(&name, &bytes)?, white_level_adu: None }
+    };
+    if list.frames.is_empty() {
+        return Err(Error::format(&name, "it lists no frames"));
+    }
+    for frame in &list.frames {
+        check(&name, frame)?;
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for frame in &mut list.frames {
+        frame.file = folder.join(&frame.file);
+    }
+    Ok(list)
+}
+
+fn is_yaml(path: &Path, text: &str) -> bool {
+    let is_named = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("yaml") || end.eq_ignore_ascii_case("yml"));
+    is_named || text.lines().any(|line| line.starts_with("frames:") || line.starts_with("- "))
+}
+
+fn check(name: &str, frame: &ListedFrame) -> Result<()> {
+    let file = frame.file.display();
+    let positive = [("exposure_s", frame.exposure_s), ("temperature_k", frame.temperature_k)];
+    for (key, value) in positive {
+        if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
+            return Err(Error::format(name, format!("`{key}` of {file} is {value}; it must be above 0")));
+        }
+    }
+    match frame.photons {
+        Some(photons) if !(0.0..f64::INFINITY).contains(&photons) => {
+            Err(Error::format(name, format!("`photons` of {file} is {photons}; it must not be negative")))
+        }
+        Some(photons) if photons > 0.0 && frame.kind == Some(FrameKind::Dark) => {
+            Err(Error::format(name, format!("{file} is a dark with {photons} photons; it is a flat, or has none")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
+    let columns = csv::columns(name, bytes)?;
+    if let Some(unknown) = columns.iter().find(|column| !COLUMNS.contains(&column.trim())) {
+        let problem = format!("unknown column `{unknown}`; a list of frames has {}", COLUMNS.join(", "));
+        return Err(Error::format(name, problem));
+    }
+    let column = |wanted: &str| -> Result<Option<Vec<String>>> {
+        let found = columns.iter().find(|column| column.trim() == wanted);
+        found.map(|column| csv::text_column(name, bytes, column)).transpose()
+    };
+    let files = column("file")?.ok_or_else(|| Error::format(name, "it has no column `file`"))?;
+    let [kind, level] = [column("kind")?, column("level")?];
+    let numbers = |wanted: &str| -> Result<Vec<Option<f64>>> {
+        let Some(cells) = column(wanted)? else { return Ok(vec![None; files.len()]) };
+        let read = |(row, cell): (usize, &String)| match cell.trim() {
+            "" => Ok(None),
+            cell => delimited::number(cell).or_else(|| delimited::decimal(cell)).map(Some).ok_or_else(|| {
+                Error::format(name, format!("`{cell}` in row {} of `{wanted}` is not a number", row + 1))
+            }),
+        };
+        cells.iter().enumerate().map(read).collect()
+    };
+    let [exposure_s, photons, kelvin, celsius] =
+        [numbers("exposure_s")?, numbers("photons")?, numbers("temperature_k")?, numbers("temperature_c")?];
+    let kind_of = |row: usize| -> Result<Option<FrameKind>> {
+        match kind.as_ref().map_or("", |cells| cells[row].trim()) {
+            "" => Ok(None),
+            cell if cell.eq_ignore_ascii_case("flat") => Ok(Some(FrameKind::Flat)),
+            cell if cell.eq_ignore_ascii_case("dark") => Ok(Some(FrameKind::Dark)),
+            cell => Err(Error::format(name, format!("`{cell}` in row {} of `kind` is neither flat nor dark", row + 1))),
+        }
+    };
+    let frame = |(row, file): (usize, &String)| {
+        let level = level.as_ref().map(|cells| cells[row].trim().to_owned()).filter(|level| !level.is_empty());
+        Ok(ListedFrame {
+            file: file.trim().into(),
+            kind: kind_of(row)?,
+            exposure_s: exposure_s[row],
+            photons: photons[row],
+            temperature_k: kelvin[row].or(celsius[row].map(|celsius| celsius + ZERO_CELSIUS_K)),
+            level,
+        })
+    };
+    files.iter().enumerate().map(frame).collect()
+}
+
+/// Lines of a descriptor that say something, with their numbers.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let numbered = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
+    numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+fn is_descriptor(text: &str) -> bool {
+    let is_line = |(_, line): (usize, &str)| {
+        let mut words = line.split_whitespace();
+        matches!(words.next(), Some("v" | "n" | "b" | "d" | "i")) && words.next().is_some()
+    };
+    lines(text).next().is_some() && lines(text).take(4).all(is_line)
+}
+
+/// Reads a descriptor of the reference implementation's form: `n` bits, width, height; `b` exposure in ns and photons, `d` exposure
+/// in ns, each before its images, `i` the path of one.
+fn descriptor(name: &str, text: &str) -> Result<FrameList> {
+    /// Seconds of the descriptor's unit.
+    const S_PER_NS: f64 = 1e-9;
+    let mut list = FrameList::default();
+    let mut condition: Option<(FrameKind, f64, Option<f64>, String)> = None;
+    for (number, line) in lines(text) {
+        let wrong = |what: &str| Error::format(name, format!("line {number}, `{line}`: {what}"));
+        let (sign, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let words: Vec<&str> = rest.split_whitespace().collect();
+        let value = |index: usize| {
+            let cell = words.get(index).copied().unwrap_or_default();
+            delimited::number(cell).or_else(|| delimited::decimal(cell)).ok_or_else(|| wrong("a number is missing"))
+        };
+        match sign {
+            "v" => {}
+            "n" => {
+                let bits = value(0)?;
+                if !(1.0..=16.0).contains(&bits) {
+                    return Err(wrong("the bits of a sample are 1 to 16"));
+                }
+                list.white_level_adu = Some(bits.exp2() - 1.0);
+            }
+            "b" => condition = Some((FrameKind::Flat, value(0)? * S_PER_NS, Some(value(1)?), number.to_string())),
+            "d" => condition = Some((FrameKind::Dark, value(0)? * S_PER_NS, None, number.to_string())),
+            "i" => {
+                let (kind, exposure_s, photons, level) =
+                    condition.clone().ok_or_else(|| wrong("an image stands before any line `b` or `d`"))?;
+                // Paths are those of Windows.
+                let file = rest.trim().replace('\\', "/").into();
+                let frame = ListedFrame {
+                    file,
+                    kind: Some(kind),
+                    exposure_s: Some(exposure_s),
+                    photons,
+                    temperature_k: None,
+                    level: Some(level),
+                };
+                list.frames.push(frame);
+            }
+            _ => return Err(wrong("it begins with none of v, n, b, d and i")),
+        }
+    }
+    Ok(list)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(name: &str, text: &str) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        (folder, path)
+    }
+
+    #[test]
+    fn the_three_forms_are_read() {
+        let (folder, path) = written("list.csv", "file,kind,exposure_s,photons,temperature_c\na.tiff,flat,0.01,120,20\nb.tiff,Dark,0.01,,20\n");
+        let list = read(&path).unwrap();
+        let frame = |file: &str, kind, photons| ListedFrame {
+            file: folder.path().join(file),
+            kind: Some(kind),
+            exposure_s: Some(0.01),
+            photons,
+            temperature_k: Some(293.15),
+            level: None,
+        };
+        assert_eq!(list.frames, [frame("a.tiff", FrameKind::Flat, Some(120.0)), frame("b.tiff", FrameKind::Dark, None)]);
+        let (_folder, path) = written("list.yaml", "- file: a.tiff\n  kind: flat\n- file: b.tiff\n  kind: dark\n");
+        assert_eq!(read(&path).unwrap().frames.len(), 2);
+        let (folder, path) =
+            written("data.txt", "# measured\nv 3.0\nn 12 640 480\nb 40000.0 120,5\ni images\\b_0.png\nd 40000.0\ni images\\d_0.png\n");
+        let list = read(&path).unwrap();
+        assert_eq!(list.white_level_adu, Some(4095.0));
+        assert_eq!(list.frames[0].file, folder.path().join("images/b_0.png"));
+        assert_eq!((list.frames[0].exposure_s, list.frames[0].photons), (Some(40_000.0 * 1e-9), Some(120.5)));
+        assert_eq!(list.frames[1].kind, Some(FrameKind::Dark));
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (file, text, wanted) in [
+            ("list.csv", "name,kind\na,flat\n", "unknown column `name`"),
+            ("list.csv", "file,kind\na,light\n", "`light` in row 1 of `kind` is neither flat nor dark"),
+            ("list.csv", "file,exposure_s\na,-1\n", "`exposure_s` of a is -1; it must be above 0"),
+            ("list.csv", "file,kind,photons\na,dark,5\n", "a is a dark with 5 photons"),
+            ("list.csv", "file,exposure_s\na,fast\n", "`fast` in row 1 of `exposure_s` is not a number"),
+            ("data.txt", "n 12 640 480\ni a.png\n", "line 2, `i a.png`: an image stands before any line"),
+            ("data.txt", "n 40 640 480\nb 1 2\n", "the bits of a sample are 1 to 16"),
+        ] {
+            let (_folder, path) = written(file, text);
+            let said = read(&path).unwrap_err().to_string();
+            assert!(said.contains(wanted), "{said}");
+        }
+    }
+}

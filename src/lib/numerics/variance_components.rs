@@ -1,0 +1,127 @@
+//! Variances that rows, columns and single places of a table add, apart from each other, with intervals that hold.
+//!
+//! x_rc = μ + ρ_r + γ_c + ε_rc. In a table of R rows and C columns the mean squares of the analysis of variance expect
+//!
+//! - rows: C Σ (x̄_r − x̄)²/(R − 1), σ_ε² + C σ_ρ²
+//! - columns: R Σ (x̄_c − x̄)²/(C − 1), σ_ε² + R σ_γ²
+//! - what is left: σ_ε²
+//!
+//! and each, where the three are normal, is distributed as its expectation times χ²/ν, independently of the others
+//! \[Searle1992]. A linear combination of mean squares has the interval of \[TingEtAl1990], the modified large-sample one,
+//! without its small cross terms.
+
+use super::quantiles;
+
+/// A mean square: an estimate of a variance whose distribution is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct MeanSquare {
+    /// Its value.
+    pub value: f64,
+    /// Degrees of freedom ν: its variance is 2 value²/ν.
+    pub freedom: f64,
+}
+
+/// The mean squares of a table, or of several tables alike that were drawn apart.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct MeanSquares {
+    /// Of the means of rows.
+    pub rows: MeanSquare,
+    /// Of the means of columns.
+    pub columns: MeanSquare,
+    /// Of what is left.
+    pub rest: MeanSquare,
+}
+
+/// Sums of squares of one or several tables of one size.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SquareSums {
+    /// Σ (x − x̄)² over all places.
+    pub all: f64,
+    /// C Σ (x̄_r − x̄)².
+    pub rows: f64,
+    /// R Σ (x̄_c − x̄)².
+    pub columns: f64,
+}
+
+impl MeanSquares {
+    /// Of tables of so many rows and columns, from sums over all of them; `tables` are as many as have means of their own.
+    pub fn of(sums: SquareSums, [columns, rows]: [usize; 2], tables: f64) -> Self {
+        let [c, r] = [columns as f64, rows as f64];
+        let square = |sum: f64, freedom: f64| MeanSquare { value: sum.max(0.0) / (tables * freedom), freedom: tables * freedom };
+        Self {
+            rows: square(sums.rows, r - 1.0),
+            columns: square(sums.columns, c - 1.0),
+            rest: square(sums.all - sums.rows - sums.columns, (r - 1.0) * (c - 1.0)),
+        }
+    }
+}
+
+/// A number, and what it lies between with the stated confidence.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Interval {
+    /// The estimate.
+    pub value: f64,
+    /// The lower end.
+    pub low: f64,
+    /// The upper end.
+    pub high: f64,
+}
+
+impl Interval {
+    /// A normal estimate of such variance, at such confidence.
+    pub fn normal(value: f64, variance: f64, confidence: f64) -> Self {
+        let reach = quantiles::of_normal(f64::midpoint(1.0, confidence)) * variance.max(0.0).sqrt();
+        Self { value, low: value - reach, high: value + reach }
+    }
+
+    /// The interval of a rising function of the number.
+    #[must_use]
+    pub fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        Self { value: f(self.value), low: f(self.low), high: f(self.high) }
+    }
+
+    /// The interval of the root of a variance, none of it below 0.
+    #[must_use]
+    pub fn root(self) -> Self {
+        self.map(|variance| variance.max(0.0).sqrt())
+    }
+}
+
+/// The interval of Σ c·MS over independent mean squares, two-sided.
+pub fn combination(terms: &[(f64, MeanSquare)], confidence: f64) -> Interval {
+    let tail = (1.0 - confidence) / 2.0;
+    let value = terms.iter().map(|(c, square)| c * square.value).sum();
+    let (mut below, mut above) = (0.0, 0.0);
+    for (c, MeanSquare { value, freedom }) in terms.iter().filter(|(_, square)| square.freedom > 0.0) {
+        let down = 1.0 - freedom / quantiles::of_chi_square(1.0 - tail, *freedom);
+        let up = freedom / quantiles::of_chi_square(tail, *freedom) - 1.0;
+        let [down, up] = if *c > 0.0 { [down, up] } else { [up, down] };
+        below += (c * value * down).powi(2);
+        above += (c * value * up).powi(2);
+    }
+    let value: f64 = value;
+    Interval { value, low: value - below.sqrt(), high: value + above.sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A table worked out by hand: rows 1 and 3 apart, columns by 2, nothing left.
+    #[test]
+    fn sums_of_squares_part_rows_from_columns() {
+        // 1 3 5 / 5 7 9: x̄ = 5, rows 3 and 7, columns 3, 5 and 7.
+        let sums = SquareSums { all: 40.0, rows: 3.0 * 8.0, columns: 2.0 * 8.0 };
+        let squares = MeanSquares::of(sums, [3, 2], 1.0);
+        assert_eq!(squares.rows, MeanSquare { value: 24.0, freedom: 1.0 });
+        assert_eq!(squares.columns, MeanSquare { value: 8.0, freedom: 2.0 });
+        assert_eq!(squares.rest, MeanSquare { value: 0.0, freedom: 2.0 });
+    }
+
+    /// The interval of a single mean square is that of χ²: of 10 degrees of freedom, 10/20.4831 to 10/3.24697 times it.
+    #[test]
+    fn one_mean_square_has_the_interval_of_chi_square() {
+        let found = combination(&[(1.0, MeanSquare { value: 1.0, freedom: 10.0 })], 0.95);
+        assert!((found.low - 10.0 / 20.4831).abs() < 1e-5 && (found.high - 10.0 / 3.24697).abs() < 1e-4, "{found:?}");
+    }
+}

@@ -1,0 +1,341 @@
+//! A camera measured from flats and darks.
+
+use super::described::Described;
+use super::notes::Note;
+use super::values;
+use crate::analysis::photon_transfer::{
+    ClassFindings, Condition, Level, Settings, Site, Survey, of_class, survey,
+};
+use crate::error::{Error, Result};
+use crate::formats::frame_list::{self, FrameKind, FrameList, ListedFrame};
+use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::many::OneOfMany;
+use crate::frame::Geometry;
+use crate::metadata::FrameHeader;
+use crate::stream::RowSource;
+use crate::text::counted;
+use crate::units::QuantityKind;
+use clap::Args;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// Flats and darks, and what is asked of them.
+#[derive(Debug, Clone, Args)]
+pub struct PhotonTransfer {
+    /// List of flats and darks: a table with the columns file, kind (flat or dark), exposure_s, photons, temperature_k, level; the same
+    /// as YAML; an EMVA 1288 descriptor; or a directory of frames that say all that themselves
+    #[arg(value_name = "LIST")]
+    pub list: PathBuf,
+    /// Of frames that do not say: array, largest code.
+    #[command(flatten)]
+    pub described: Described,
+    /// Probability that an interval holds its number
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = values::fraction)]
+    pub confidence: f64,
+    /// Relative standard uncertainty of the numbers of photons, all alike, as that of the radiometer
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0, value_parser = values::number)]
+    pub photon_error: f64,
+}
+
+/// What was measured.
+#[derive(Debug, Clone)]
+pub struct MeasuredCamera {
+    /// What the list was called.
+    pub list: String,
+    /// The frame that the others are like.
+    pub head: FrameHeader,
+    /// Each class of photosites, or each plane.
+    pub classes: Vec<ClassFindings>,
+    /// Frames that counted, flats and darks.
+    pub frames: [usize; 2],
+    /// The probability that an interval holds its number.
+    pub confidence: f64,
+    /// Temperature of the sensor in K, where it is known.
+    pub temperature_k: Option<f64>,
+    /// What came up.
+    pub notes: Vec<Note>,
+}
+
+/// Frames of one condition.
+struct Group {
+    condition: Condition,
+    level: String,
+    files: Vec<PathBuf>,
+}
+
+impl PhotonTransfer {
+    /// Reads all frames and measures the camera.
+    ///
+    /// # Errors
+    ///
+    /// Those of the list and of the frames; [`Error::Data`] for frames that are no measurement.
+    pub fn run(&self) -> Result<MeasuredCamera> {
+        if !(self.photon_error >= 0.0) {
+            return Err(Error::Usage("an uncertainty is not negative".into()).give(&["photon_error"]));
+        }
+        let list_name = self.list.display().to_string();
+        let is_folder = self.list.is_dir();
+        let FrameList { frames, white_level_adu } =
+            if is_folder { FrameList { frames: in_folder(&self.list)?, white_level_adu: None } } else { frame_list::read(&self.list)? };
+        let described = Described { white_level_adu: self.described.white_level_adu.or(white_level_adu), ..self.described };
+        let heads = frames.par_iter().map(|frame| head_of(frame, &described)).collect::<Result<Vec<_>>>()?;
+        let Some(first) = heads.first() else {
+            return Err(Error::format(&list_name, "it holds no frames"));
+        };
+        for head in &heads {
+            check_alike(first, head)?;
+        }
+        let mut notes = Vec::new();
+        let mut groups: Vec<Group> = Vec::new();
+        for (frame, head) in frames.iter().zip(&heads) {
+            let (condition, level) = condition(frame, head)?;
+            let known = groups.iter_mut().find(|group| group.condition == condition && group.level == level);
+            match known {
+                Some(group) => group.files.push(frame.file.clone()),
+                None => groups.push(Group { condition, level, files: vec![frame.file.clone()] }),
+            }
+        }
+        let single: Vec<&Group> = groups.iter().filter(|group| group.files.len() < 2).collect();
+        if let Some(one) = single.first() {
+            let others = if single.len() > 1 { format!(" and {} more", single.len() - 1) } else { String::new() };
+            notes.push(Note::Warning(format!(
+                "{}{others}: no other frame has its light and exposure; temporal noise takes two, so it is left out",
+                one.files[0].display()
+            )));
+        }
+        groups.retain(|group| group.files.len() >= 2);
+        if groups.iter().all(|group| !group.condition.is_lit) {
+            return Err(Error::Data(format!("{list_name}: it has no two flats of one light and exposure")));
+        }
+        let top = first.metadata.white_level_adu.map(|white| white.largest());
+        let are_codes = first.metadata.quantity != QuantityKind::Electrons;
+        if top.is_none() && are_codes {
+            notes.push(Note::Warning(format!(
+                "{list_name}: the largest code is not known, so that clipped levels are told by their variance alone; give --white"
+            )));
+        }
+        let surveys = groups.par_iter().map(|group| self.survey(group, &described, top)).collect::<Result<Vec<_>>>()?;
+        let settings =
+            Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes };
+        let temperature_k = main_temperature(&groups);
+        let classes = classes(first, &groups, &surveys, temperature_k, &settings);
+        for class in &classes {
+            notes.extend(class.notes.iter().map(|note| Note::Remark(format!("{}: {note}", class.name))));
+        }
+        let count = |is_lit: bool| {
+            groups.iter().filter(|group| group.condition.is_lit == is_lit).map(|group| group.files.len()).sum()
+        };
+        Ok(MeasuredCamera {
+            list: list_name,
+            head: first.clone(),
+            classes,
+            frames: [count(true), count(false)],
+            confidence: self.confidence,
+            temperature_k,
+            notes,
+        })
+    }
+
+    fn survey(&self, group: &Group, described: &Described, top: Option<f64>) -> Result<Survey> {
+        /// Files that other groups may have open meanwhile.
+        const OTHERS: usize = 64;
+        let mut frames = OneOfMany::open_all(group.files.iter().map(|file| options(file)).collect(), OTHERS)?;
+        for frame in &mut frames {
+            described.apply(frame.header_mut())?;
+        }
+        let found = survey(&mut frames, top, false)?;
+        for site in &found.sites {
+            check_same_light(group, &site.frame_means, top)?;
+        }
+        Ok(found)
+    }
+}
+
+/// Frames of one light whose means differ by more than this share were taken under several.
+const SAME_LIGHT: f64 = 0.1;
+
+fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Result<()> {
+    if !group.condition.is_lit {
+        return Ok(());
+    }
+    let [least, most] = [means.iter().copied().fold(f64::INFINITY, f64::min), means.iter().copied().fold(0.0, f64::max)];
+    // Of codes near the black level a tenth is little light.
+    let scale = top.map_or(most, |top| most.max(top / 10.0));
+    if most - least > SAME_LIGHT * scale {
+        let at = |wanted: f64| means.iter().position(|mean| *mean == wanted).map_or(Path::new("?"), |index| &group.files[index]);
+        return Err(Error::Data(format!(
+            "{} and {} are listed as of one light and exposure, and their means are {least:.4} and {most:.4}; tell levels of light \
+             apart by the column `photons` or `level`",
+            at(least).display(),
+            at(most).display()
+        )));
+    }
+    Ok(())
+}
+
+fn options(file: &Path) -> InputOptions {
+    InputOptions { path: Some(file.to_owned()), ..InputOptions::default() }
+}
+
+/// The head of a frame, as it is described.
+fn head_of(frame: &ListedFrame, described: &Described) -> Result<FrameHeader> {
+    let mut head = FrameReader::open(&options(&frame.file))?.header().clone();
+    described.apply(&mut head)?;
+    let metadata = &head.metadata;
+    let holds = head.holds();
+    if metadata.demosaic.is_some() || !matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Electrons | QuantityKind::Unspecified) {
+        return Err(head.refuse(format!("it holds {holds}; photon transfer takes frames before they are demosaicked")));
+    }
+    if metadata.correction.is_some() {
+        return Err(head.refuse("it is corrected already; photon transfer takes frames as the camera gives them"));
+    }
+    Ok(head)
+}
+
+/// Makes sure that two frames are of one camera as far as they say.
+fn check_alike(first: &FrameHeader, other: &FrameHeader) -> Result<()> {
+    let Geometry { width, height, channels, .. } = &first.geometry;
+    let differs = |what: &str| Err(other.refuse(format!("its {what} is not that of {}", first.name)));
+    if (&other.geometry.width, &other.geometry.height) != (width, height) {
+        let [w, h] = [other.geometry.width, other.geometry.height];
+        return Err(other.refuse(format!("it is {w}x{h}, and {} is {width}x{height}", first.name)));
+    }
+    if other.geometry.channels.len() != channels.len() || other.metadata.cfa != first.metadata.cfa {
+        return differs("filter array");
+    }
+    if other.geometry.origin != first.geometry.origin {
+        return differs("place on the sensor");
+    }
+    if other.metadata.quantity != first.metadata.quantity {
+        return Err(other.refuse(format!("it holds {}, and {} {}", other.holds(), first.name, first.holds())));
+    }
+    if other.metadata.white_level_adu != first.metadata.white_level_adu {
+        return differs("white level");
+    }
+    Ok(())
+}
+
+/// The condition of a frame, by the list and by what it says itself, and what tells its light apart.
+fn condition(frame: &ListedFrame, head: &FrameHeader) -> Result<(Condition, String)> {
+    let metadata = &head.metadata;
+    let own = metadata.exposure.map(|exposure| exposure.exposure_s);
+    if let (Some(listed), Some(own)) = (frame.exposure_s, own)
+        && (listed / own - 1.0).abs() > 1e-3
+    {
+        return Err(head.refuse(format!("it was exposed for {own} s, and the list says {listed} s")));
+    }
+    let electrons = metadata.scene.as_ref().and_then(|scene| scene.expected_electrons);
+    let by_scene = electrons.map(|electrons| if electrons == [0.0; 3] { FrameKind::Dark } else { FrameKind::Flat });
+    if let (Some(listed), Some(own)) = (frame.kind, by_scene)
+        && listed != own
+    {
+        return Err(head.refuse("the list and its metadata differ on whether light fell on it"));
+    }
+    let kind = frame.kind.or(by_scene).or_else(|| by_name(&frame.file));
+    let kind = kind.ok_or_else(|| {
+        head.refuse("nothing says whether it is a flat or a dark; name it in a list, or put it into a folder `flats` or `darks`")
+    })?;
+    let level = frame.level.clone().or_else(|| electrons.map(|electrons| format!("{electrons:?}")));
+    let noise = metadata.noise.as_ref().map(|noise| noise.temperature_k);
+    let condition = Condition {
+        is_lit: kind == FrameKind::Flat,
+        exposure_s: frame.exposure_s.or(own),
+        photons: frame.photons.filter(|_| kind == FrameKind::Flat),
+        temperature_k: frame.temperature_k.or(noise),
+    };
+    Ok((condition, level.unwrap_or_default()))
+}
+
+/// What a frame shows by the name of its file or folder.
+fn by_name(file: &Path) -> Option<FrameKind> {
+    let names = [file.file_stem(), file.parent().and_then(Path::file_name)];
+    names.into_iter().flatten().find_map(|name| {
+        let name = name.to_string_lossy().to_lowercase();
+        let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
+        match (has(&["flat", "bright"]), has(&["dark", "bias"])) {
+            (true, false) => Some(FrameKind::Flat),
+            (false, true) => Some(FrameKind::Dark),
+            _ => None,
+        }
+    })
+}
+
+/// The frames in a folder and in those within it, in the order of their names; sidecars and texts are none.
+fn in_folder(folder: &Path) -> Result<Vec<ListedFrame>> {
+    const OTHERS: [&str; 8] = ["yaml", "yml", "csv", "txt", "json", "md", "svg", "xml"];
+    let failed = |error| Error::disk(&folder.display().to_string(), "read", error);
+    let mut entries = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        entries.push(entry.map_err(failed)?.path());
+    }
+    entries.sort();
+    let mut found = Vec::new();
+    for path in entries {
+        let is_hidden = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
+        let end = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        if is_hidden || OTHERS.contains(&end.as_str()) {
+            continue;
+        }
+        if path.is_dir() {
+            found.extend(in_folder(&path)?);
+        } else {
+            found.push(ListedFrame { file: path, kind: None, exposure_s: None, photons: None, temperature_k: None, level: None });
+        }
+    }
+    Ok(found)
+}
+
+/// The temperature at which most flats were taken.
+fn main_temperature(groups: &[Group]) -> Option<f64> {
+    let lit = || groups.iter().filter(|group| group.condition.is_lit);
+    let count = |wanted: f64| lit().filter(|group| group.condition.temperature_k == Some(wanted)).count();
+    lit().filter_map(|group| group.condition.temperature_k).max_by_key(|temperature| count(*temperature))
+}
+
+/// What is measured of each class.
+fn classes(
+    head: &FrameHeader,
+    groups: &[Group],
+    surveys: &[Survey],
+    temperature_k: Option<f64>,
+    settings: &Settings,
+) -> Vec<ClassFindings> {
+    let sites = Site::of(head);
+    let mut names: Vec<&str> = Vec::new();
+    for site in &sites {
+        if !names.contains(&site.class.as_str()) {
+            names.push(&site.class);
+        }
+    }
+    let level = |name: &str, index: usize| {
+        let own = sites.iter().zip(&surveys[index].sites).filter(|(site, _)| site.class == name);
+        Level::of(groups[index].condition, own.map(|(_, survey)| survey.clone()).collect())
+    };
+    let light = |level: &Level| {
+        let Condition { photons, exposure_s, .. } = level.condition;
+        [photons.or(exposure_s).unwrap_or(0.0), level.mean]
+    };
+    let by_photons = groups.iter().filter(|group| group.condition.is_lit).all(|group| group.condition.photons.is_some());
+    let of = |name: &&str| {
+        let of_kind = |is_lit: bool| -> Vec<Level> {
+            let wanted = |index: &usize| {
+                let condition = &groups[*index].condition;
+                condition.is_lit == is_lit && (condition.temperature_k == temperature_k || condition.temperature_k.is_none())
+            };
+            (0..groups.len()).filter(wanted).map(|index| level(name, index)).collect()
+        };
+        let [mut flats, darks] = [of_kind(true), of_kind(false)];
+        flats.sort_by(|a, b| {
+            let ([light_a, mean_a], [light_b, mean_b]) = (light(a), light(b));
+            let by_light = if by_photons { light_a.total_cmp(&light_b) } else { std::cmp::Ordering::Equal };
+            by_light.then(mean_a.total_cmp(&mean_b))
+        });
+        of_class(name, &flats, &darks, settings)
+    };
+    names.par_iter().map(of).collect()
+}
+
+/// What a report calls the number of frames.
+pub fn frames_in_words([flats, darks]: [usize; 2]) -> String {
+    format!("{} and {}", counted(flats as u64, "flats"), counted(darks as u64, "darks"))
+}
