@@ -10,13 +10,24 @@ use std::process::{Command, Output};
 use support::TREE;
 use support::workshop::{BAD_USAGE, Workshop, path_of, programs};
 
-/// What the examples name and no example makes: dark frames, another program's plane, a second raw file, frames to compare.
+/// What the examples name and no example makes: dark frames, flats, another program's plane, a second raw file,
+/// frames to compare.
 const SET_UP: &str = "
 time=$(sed -n 's/.*exposure_s: *//p' plane.tiff.yaml | head -n 1)
 for i in 1 2; do
   render-radiance --dark --exposure $time --size 640x480 | add-noise --frame $i | digitize | mosaic -o d$i.exr
 done
 cp plane.dng plane2.dng
+
+mkdir frames
+echo file,kind,photons > list.csv
+for e in 0 1000 4000 8000 16000 24000 32000; do
+  for i in 1 2; do
+    render-radiance --electrons $e,$e,$e --size 64x48 | add-noise --frame $e$i | digitize | mosaic -o frames/$e-$i.exr
+    if [ $e = 0 ]; then kind=dark; else kind=flat; fi
+    echo frames/$e-$i.exr,$kind,$((2 * e)) >> list.csv
+  done
+done
 
 demosaic plane.tiff | to-xyz --matrix matrix.yaml -o reference.exr
 demosaic plane.tiff -o demosaicked.exr

@@ -14,7 +14,7 @@ const fn example(reason: &'static str, command: &'static str) -> Example {
 }
 
 /// The examples of each program, in an order in which they can be run.
-pub const EXAMPLES: [(&str, &[Example]); 14] = [
+pub const EXAMPLES: [(&str, &[Example]); 15] = [
     (
         "fit-matrix",
         &[
@@ -134,6 +134,16 @@ pub const EXAMPLES: [(&str, &[Example]); 14] = [
             example(
                 "The photon transfer curve, as table and figure",
                 "predict-noise --sweep 10:40000:50log --plot transfer.svg -o sweep.csv",
+            ),
+        ],
+    ),
+    (
+        "photon-transfer",
+        &[
+            example("A camera from a folder of flats and darks that tell what they are", "photon-transfer frames"),
+            example(
+                "From a list of them, with its curves, for another program",
+                "photon-transfer list.csv --plot camera.svg --output-format json -o camera.json",
             ),
         ],
     ),

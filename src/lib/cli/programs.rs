@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};
 
 /// All programs but the front door, about in the order in which a frame meets them.
-pub const PROGRAMS: [&str; 13] = [
+pub const PROGRAMS: [&str; 14] = [
     "render-radiance",
     "add-noise",
     "digitize",
@@ -22,6 +22,7 @@ pub const PROGRAMS: [&str; 13] = [
     "to-xyz",
     "measure",
     "predict-noise",
+    "photon-transfer",
     "color-difference",
     "preview",
 ];

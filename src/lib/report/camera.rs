@@ -1,7 +1,7 @@
 //! Reports of measured cameras: as text, JSON, YAML and Markdown.
 
 use super::{in_digits, table, unwritable};
-use crate::analysis::photon_transfer::{ClassFindings, Finding};
+use crate::analysis::photon_transfer::{ClassFindings, Finding, OUTSTANDING, PatternView};
 use crate::error::Result;
 use crate::formats::plots::{PlotFormat, write_plot};
 use crate::formats::{output, register, yaml_writer};
@@ -47,7 +47,7 @@ pub struct CameraOutputs {
     /// Form of the report
     #[arg(long, default_value = CameraFormat::Text.name(), value_parser = values::choice::<CameraFormat>())]
     pub output_format: CameraFormat,
-    /// Draw photon transfer, response, linearity and signal-to-noise ratio, as SVG or PNG
+    /// Draw photon transfer, response, linearity, signal to noise, and the patterns, as SVG or PNG
     #[arg(long, value_name = "FILE.svg|png")]
     pub plot: Option<PathBuf>,
     /// File for the report; by default standard output
@@ -96,7 +96,7 @@ pub fn camera_report(camera: &MeasuredCamera, format: CameraFormat) -> Result<St
 }
 
 fn document(camera: &MeasuredCamera) -> Value {
-    let channels: Vec<Value> = camera.classes.iter().map(channel).collect();
+    let channels: Vec<Value> = camera.classes.iter().zip(&camera.patterns).map(|(class, views)| channel(class, views)).collect();
     json!({
         "list": camera.list,
         "frames": {"flats": camera.frames[0], "darks": camera.frames[1]},
@@ -106,7 +106,7 @@ fn document(camera: &MeasuredCamera) -> Value {
     })
 }
 
-fn channel(class: &ClassFindings) -> Value {
+fn channel(class: &ClassFindings, [light, dark]: &[Option<PatternView>; 2]) -> Value {
     let mut all = Map::new();
     all.insert("name".into(), class.name.clone().into());
     let mut undetermined = Map::new();
@@ -124,8 +124,15 @@ fn channel(class: &ClassFindings) -> Value {
     all.insert("curve".into(), json!(class.curve));
     let deviations = class.linearity.as_ref().map(|linearity| &linearity.deviations);
     all.insert("linearity".into(), json!(deviations));
+    all.insert("defects".into(), json!({"light": light.as_ref().map(defects), "dark": dark.as_ref().map(defects)}));
     all.insert("notes".into(), json!(class.notes));
     all.into()
+}
+
+/// Photosites that stand out from those around them.
+fn defects(view: &PatternView) -> Value {
+    let [count, expected] = view.outstanding;
+    json!({"beyond_std": OUTSTANDING, "std": view.spread, "count": count, "expected": expected, "worst": view.outliers})
 }
 
 /// An interval with the digits that its width leaves, in per cent where that is how it is read.
@@ -159,7 +166,7 @@ fn heading(camera: &MeasuredCamera) -> String {
 
 fn text(camera: &MeasuredCamera) -> String {
     let mut out = heading(camera) + "\n";
-    for class in &camera.classes {
+    for (class, views) in camera.classes.iter().zip(&camera.patterns) {
         let _ = writeln!(out, "\n{}", class.name);
         let (told, untold): (Vec<&Finding>, Vec<&Finding>) = class.findings.iter().partition(|finding| finding.found.is_ok());
         let mut rows: Vec<[String; 4]> = vec![["".into(), "value".into(), "from".into(), "to".into()]];
@@ -187,14 +194,26 @@ fn text(camera: &MeasuredCamera) -> String {
         for (why, keys) in reasons {
             let _ = writeln!(out, "not determined: {}: {why}", keys.join(", "));
         }
+        for (view, place) in views.iter().zip(["under light", "in the dark"]) {
+            out.push_str(&view.as_ref().map_or(String::new(), |view| outstanding(view, place) + "\n"));
+        }
     }
     out
+}
+
+/// How many photosites stand out, in words.
+fn outstanding(view: &PatternView, place: &str) -> String {
+    let [count, expected] = view.outstanding;
+    format!(
+        "{count} photosites stand out {place} by more than {OUTSTANDING} standard deviations of most; {} of a normal law would",
+        in_digits(expected, 2)
+    )
 }
 
 fn markdown(camera: &MeasuredCamera) -> String {
     let escaped = |text: &str| text.replace('|', "\\|");
     let mut out = format!("# Camera measured by photon transfer\n\n{}.\n", escaped(&heading(camera)));
-    for class in &camera.classes {
+    for (class, views) in camera.classes.iter().zip(&camera.patterns) {
         let _ = write!(out, "\n## {}\n\n| quantity | value | from | to |\n|---|---:|---:|---:|\n", escaped(&class.name));
         for finding in &class.findings {
             if let Ok(interval) = &finding.found {
@@ -206,6 +225,9 @@ fn markdown(camera: &MeasuredCamera) -> String {
         let lines: Vec<String> = untold.map(|(key, why)| format!("- `{key}`: {why}\n")).collect();
         if !lines.is_empty() {
             let _ = write!(out, "\nNot determined:\n\n{}", lines.concat());
+        }
+        for (view, place) in views.iter().zip(["under light", "in the dark"]) {
+            out.push_str(&view.as_ref().map_or(String::new(), |view| format!("\n{}.\n", outstanding(view, place))));
         }
     }
     out

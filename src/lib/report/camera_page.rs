@@ -1,16 +1,20 @@
 //! The curves of a measured camera.
 
 use crate::analysis::photon_transfer::ClassFindings;
-use crate::plot::{Axis, Color, Marks, Panel, Plot};
+use crate::plot::{Arrangement, Axis, Color, Marks, Panel, Plot};
 use crate::requests::photon_transfer::MeasuredCamera;
 
-/// Draws, one beside the other, variance against signal with the line of the gain, signal against light, deviations from the straight
-/// line, and signal-to-noise ratio.
+/// Draws, two beside each other: variance against signal with the line of the gain, signal against light, deviations from the straight
+/// line, signal-to-noise ratio; then spectrograms, profiles and histograms of the patterns under light and in the dark.
 pub fn camera_page(camera: &MeasuredCamera) -> Plot {
     let mut transfer = Panel::new(Axis::linear("signal above dark / ADU"), Axis::linear("temporal variance above dark / ADU\u{B2}"));
     let mut response = Panel::new(Axis::linear(light_label(camera)), Axis::linear("signal above dark / ADU"));
     let mut straight = Panel::new(Axis::linear(light_label(camera)), Axis::linear("deviation from the line / %"));
     let mut ratio = Panel::new(Axis::log10("signal / e\u{207B}"), Axis::log10("signal-to-noise ratio"));
+    transfer.title = "Photon transfer".into();
+    response.title = "Response".into();
+    straight.title = "Linearity".into();
+    ratio.title = "Signal to noise".into();
     for (index, class) in camera.classes.iter().enumerate() {
         let color = color(&class.name, index);
         add_transfer(&mut transfer, class, color);
@@ -22,9 +26,48 @@ pub fn camera_page(camera: &MeasuredCamera) -> Plot {
         }
         add_ratio(&mut ratio, class, color);
     }
-    let mut plot = Plot::new(&format!("Photon transfer of {}", camera.list), transfer);
-    plot.panels.extend([response, straight, ratio].into_iter().filter(|panel| !panel.series.is_empty()));
+    let mut panels = vec![transfer, response, straight, ratio];
+    for (which, name, unit) in [(0, "PRNU", "%"), (1, "DSNU", "e\u{207B}")] {
+        panels.extend(patterns(camera, which, name, unit));
+    }
+    panels.retain(|panel| !panel.series.is_empty());
+    let title = format!("Photon transfer of {}", camera.list);
+    let mut panels = panels.into_iter();
+    let first = panels.next().unwrap_or_else(|| Panel::new(Axis::linear(""), Axis::linear("")));
+    let mut plot = Plot::new(&title, first);
+    plot.panels.extend(panels);
+    plot.arrangement = Arrangement::Pairs;
     plot
+}
+
+/// Spectrogram, profiles and histogram of a pattern.
+fn patterns(camera: &MeasuredCamera, which: usize, name: &str, unit: &str) -> [Panel; 3] {
+    let label = |of: &str| format!("{of} / {unit}");
+    let mut spectrum = Panel::new(
+        Axis::linear("frequency / cycles per photosite of the class"),
+        Axis::log10(&format!("power / {unit}\u{B2}")),
+    );
+    let mut profile = Panel::new(Axis::linear("column or row"), Axis::linear(&label("mean behind the filter")));
+    let mut histogram = Panel::new(Axis::linear(&label("deviation behind the filter")), Axis::log10("photosites"));
+    spectrum.title = format!("{name}, spectrogram");
+    profile.title = format!("{name}, profiles");
+    histogram.title = format!("{name}, histogram");
+    for (index, (class, views)) in camera.classes.iter().zip(&camera.patterns).enumerate() {
+        let (Some(view), Some(values)) = (&views[which], class.values) else { continue };
+        let color = color(&class.name, index);
+        let scale = if which == 0 { 100.0 } else { 1.0 / values.gain };
+        let scaled = |points: &[[f64; 2]], factor: f64| points.iter().map(|[x, y]| [*x, y * factor]).collect::<Vec<_>>();
+        let [along_rows, along_columns] = &view.spectra;
+        spectrum.add(&format!("{}, rows", class.name), color, Marks::Line(scaled(&along_rows[1..], scale * scale)));
+        spectrum.add(&format!("{}, columns", class.name), color, Marks::Dashed(scaled(&along_columns[1..], scale * scale)));
+        profile.add(&format!("{}, columns", class.name), color, Marks::Line(scaled(&view.profiles[0], scale)));
+        profile.add(&format!("{}, rows", class.name), color, Marks::Dashed(scaled(&view.profiles[1], scale)));
+        let along = |points: &[[f64; 2]]| points.iter().map(|[x, y]| [x * scale, *y]).collect::<Vec<_>>();
+        histogram.add(&class.name, color, Marks::Points(along(&view.histogram)));
+        let law = along(&view.normal).into_iter().filter(|[_, count]| *count > 0.1);
+        histogram.add(&format!("{}, normal law", class.name), color, Marks::Line(law.collect()));
+    }
+    [spectrum, profile, histogram]
 }
 
 fn light_label(camera: &MeasuredCamera) -> &'static str {
@@ -60,7 +103,9 @@ fn add_transfer(panel: &mut Panel, class: &ClassFindings, color: Color) {
 fn add_ratio(panel: &mut Panel, class: &ClassFindings, color: Color) {
     let Some(values) = class.values else { return };
     let dark = values.dark_variance.unwrap_or(0.0);
-    let measured = class.curve.iter().filter(|point| point.signal_adu > 0.0 && point.variance_adu2 + dark > 0.0);
+    let most = class.get("saturation_e").map_or(f64::INFINITY, |saturation| saturation.high * values.gain);
+    let is_whole = |signal: f64| signal > 0.0 && signal <= most;
+    let measured = class.curve.iter().filter(|point| is_whole(point.signal_adu) && point.variance_adu2 + dark > 0.0);
     let points = measured.map(|point| [point.signal_adu / values.gain, point.signal_adu / (point.variance_adu2 + dark).sqrt()]);
     panel.add(&class.name, color, Marks::Points(points.collect()));
 }

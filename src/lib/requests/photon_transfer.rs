@@ -4,8 +4,9 @@ use super::described::Described;
 use super::notes::Note;
 use super::values;
 use crate::analysis::photon_transfer::{
-    ClassFindings, Condition, Level, Settings, Site, Survey, of_class, survey,
+    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, of_class, pattern_view, survey,
 };
+use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::formats::frame_list::{self, FrameKind, FrameList, ListedFrame};
 use crate::formats::input::{FrameReader, InputOptions};
@@ -26,9 +27,12 @@ pub struct PhotonTransfer {
     /// as YAML; an EMVA 1288 descriptor; or a directory of frames that say all that themselves
     #[arg(value_name = "LIST")]
     pub list: PathBuf,
-    /// Of frames that do not say: array, largest code.
-    #[command(flatten)]
-    pub described: Described,
+    /// Filter array of frames that do not say: rggb, bggr, grbg, gbrg, monochrome, or its period as 4x4:RRGGRRGGGGBBGGBB
+    #[arg(long, value_name = "PATTERN", value_parser = str::parse::<FilterArray>)]
+    pub cfa: Option<FilterArray>,
+    /// The largest code, where frames do not say
+    #[arg(long = "white", value_name = "N", value_parser = values::number)]
+    pub white_level_adu: Option<f64>,
     /// Probability that an interval holds its number
     #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = values::fraction)]
     pub confidence: f64,
@@ -46,6 +50,8 @@ pub struct MeasuredCamera {
     pub head: FrameHeader,
     /// Each class of photosites, or each plane.
     pub classes: Vec<ClassFindings>,
+    /// What the patterns of each look like, under light and in the dark.
+    pub patterns: Vec<[Option<PatternView>; 2]>,
     /// Frames that counted, flats and darks.
     pub frames: [usize; 2],
     /// The probability that an interval holds its number.
@@ -77,7 +83,8 @@ impl PhotonTransfer {
         let is_folder = self.list.is_dir();
         let FrameList { frames, white_level_adu } =
             if is_folder { FrameList { frames: in_folder(&self.list)?, white_level_adu: None } } else { frame_list::read(&self.list)? };
-        let described = Described { white_level_adu: self.described.white_level_adu.or(white_level_adu), ..self.described };
+        let white_level_adu = self.white_level_adu.or(white_level_adu);
+        let described = Described { cfa: self.cfa, white_level_adu, ..Described::default() };
         let heads = frames.par_iter().map(|frame| head_of(frame, &described)).collect::<Result<Vec<_>>>()?;
         let Some(first) = heads.first() else {
             return Err(Error::format(&list_name, "it holds no frames"));
@@ -114,11 +121,20 @@ impl PhotonTransfer {
                 "{list_name}: the largest code is not known, so that clipped levels are told by their variance alone; give --white"
             )));
         }
-        let surveys = groups.par_iter().map(|group| self.survey(group, &described, top)).collect::<Result<Vec<_>>>()?;
+        let stacks = stacks(&groups);
+        let surveys = groups.par_iter().enumerate();
+        let surveys = surveys.map(|(place, group)| survey_of(group, &described, top, stacks.contains(&place)));
+        let mut surveys = surveys.collect::<Result<Vec<_>>>()?;
         let settings =
             Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes };
         let temperature_k = main_temperature(&groups);
         let classes = classes(first, &groups, &surveys, temperature_k, &settings);
+        for place in classes.iter().flat_map(|class| class.stacks).flatten().map(|(place, _)| place) {
+            if surveys[place].picture.is_none() {
+                surveys[place] = survey_of(&groups[place], &described, top, true)?;
+            }
+        }
+        let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys)).collect();
         for class in &classes {
             notes.extend(class.notes.iter().map(|note| Note::Remark(format!("{}: {note}", class.name))));
         }
@@ -129,26 +145,55 @@ impl PhotonTransfer {
             list: list_name,
             head: first.clone(),
             classes,
+            patterns,
             frames: [count(true), count(false)],
             confidence: self.confidence,
             temperature_k,
             notes,
         })
     }
+}
 
-    fn survey(&self, group: &Group, described: &Described, top: Option<f64>) -> Result<Survey> {
-        /// Files that other groups may have open meanwhile.
-        const OTHERS: usize = 64;
-        let mut frames = OneOfMany::open_all(group.files.iter().map(|file| options(file)).collect(), OTHERS)?;
-        for frame in &mut frames {
-            described.apply(frame.header_mut())?;
-        }
-        let found = survey(&mut frames, top, false)?;
-        for site in &found.sites {
-            check_same_light(group, &site.frame_means, top)?;
-        }
-        Ok(found)
+/// Reads the frames of a condition.
+fn survey_of(group: &Group, described: &Described, top: Option<f64>, keeps: bool) -> Result<Survey> {
+    /// Files that other groups may have open meanwhile.
+    const OTHERS: usize = 64;
+    let mut frames = OneOfMany::open_all(group.files.iter().map(|file| options(file)).collect(), OTHERS)?;
+    for frame in &mut frames {
+        described.apply(frame.header_mut())?;
     }
+    let found = survey(&mut frames, top, keeps)?;
+    for site in &found.sites {
+        check_same_light(group, &site.frame_means, top)?;
+    }
+    Ok(found)
+}
+
+/// The conditions of the most frames, one with light and one without, where they are alone in that.
+fn stacks(groups: &[Group]) -> Vec<usize> {
+    let of_kind = |is_lit: bool| {
+        let own = || groups.iter().enumerate().filter(move |(_, group)| group.condition.is_lit == is_lit);
+        let most = own().map(|(_, group)| group.files.len()).max()?;
+        let mut with_most = own().filter(move |(_, group)| group.files.len() == most).map(|(place, _)| place);
+        with_most.next().filter(|_| with_most.next().is_none())
+    };
+    [true, false].into_iter().filter_map(of_kind).collect()
+}
+
+/// What the patterns of a class look like: that of light, a share of the signal, and that of the dark, in samples.
+fn patterns(head: &FrameHeader, class: &ClassFindings, surveys: &[Survey]) -> [Option<PatternView>; 2] {
+    let sites = Site::of(head);
+    let own: Vec<&Site> = sites.iter().filter(|site| site.class == class.name).collect();
+    let size = [head.geometry.width, head.geometry.channels.len()];
+    let picture = |stack: usize| {
+        let (place, signal) = class.stacks[stack]?;
+        surveys[place].picture.as_deref().map(|picture| (picture, signal))
+    };
+    let dark = picture(1).and_then(|(dark, _)| pattern_view(&own, size, &|index| f64::from(dark[index])));
+    let light = picture(0).zip(picture(1)).and_then(|((flat, signal), (dark, _))| {
+        pattern_view(&own, size, &|index| (f64::from(flat[index]) - f64::from(dark[index])) / signal)
+    });
+    [light, dark]
 }
 
 /// Frames of one light whose means differ by more than this share were taken under several.
@@ -309,7 +354,7 @@ fn classes(
     }
     let level = |name: &str, index: usize| {
         let own = sites.iter().zip(&surveys[index].sites).filter(|(site, _)| site.class == name);
-        Level::of(groups[index].condition, own.map(|(_, survey)| survey.clone()).collect())
+        Level::of(index, groups[index].condition, own.map(|(_, survey)| survey.clone()).collect())
     };
     let light = |level: &Level| {
         let Condition { photons, exposure_s, .. } = level.condition;

@@ -240,15 +240,8 @@ impl Curve {
     /// Weights, from the first fit on at its levels; what points miss their lines by is added to what they scatter by.
     fn weigh(&mut self) {
         self.weigh_darks();
-        let pooled = |points: &[Point4]| {
-            let all: f64 = points.iter().map(|point| point.freedom).sum();
-            let share = |point: &Point4| point.freedom / all * point.freedom * point.variance.variance / point.variance.value.powi(2);
-            let pooled: f64 = points.iter().filter(|point| point.variance.value > 0.0).map(share).sum();
-            if pooled > 0.0 { pooled } else { 2.0 }
-        };
         let fitted: Vec<Point4> = self.fitted.iter().map(|&flat| self.flats[flat].clone()).collect();
-        // Relative variance of a variance, times its freedom: 2 of normal noise.
-        let relative = pooled(&fitted);
+        let relative = relative_scatter(&fitted);
         let parameters = if self.is_offset_free { 2 } else { 1 };
         let freedom = self.fitted.len().saturating_sub(parameters) as f64;
         let mut besides = 0.0;
@@ -308,6 +301,16 @@ impl Curve {
         let freedom = self.darks.len() as f64 - 2.0;
         if self.times() < 2 || freedom <= 0.0 {
             return;
+        }
+        // A variance that is low by chance does not count more.
+        let relative = relative_scatter(&self.darks);
+        for _ in 0..2 {
+            let Some([_, line]) = self.dark_lines() else { return };
+            for (dark, weight) in self.darks.iter_mut().zip(&mut self.weights.dark_variance) {
+                let level = line.at(dark.exposure_s.unwrap_or(0.0)).max(self.rounding).max(0.5 * dark.variance.value);
+                dark.variance.variance = relative / dark.freedom * level * level;
+                *weight = 1.0 / dark.variance.variance.max(f64::MIN_POSITIVE);
+            }
         }
         for (which, of) in [|dark: &Point4| dark.mean, |dark: &Point4| dark.variance].into_iter().enumerate() {
             let points = |besides: f64| -> Vec<Point> {
@@ -425,6 +428,15 @@ impl Curve {
     pub fn signal_variance(&self, flat: usize) -> f64 {
         self.flats[flat].mean.variance + self.scatter_beneath(flat)[0]
     }
+}
+
+/// Relative variance of a variance, times its freedom, over several levels: 2 of normal noise.
+fn relative_scatter(points: &[Point4]) -> f64 {
+    let all: f64 = points.iter().map(|point| point.freedom).sum();
+    let share =
+        |point: &Point4| point.freedom / all * point.freedom * point.variance.variance / point.variance.value.powi(2);
+    let pooled: f64 = points.iter().filter(|point| point.variance.value > 0.0).map(share).sum();
+    if pooled > 0.0 { pooled } else { 2.0 }
 }
 
 /// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].

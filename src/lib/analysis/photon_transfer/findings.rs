@@ -60,6 +60,9 @@ pub struct ClassFindings {
     pub linearity: Option<Linearity>,
     /// What the fits give, in samples.
     pub values: Option<Values>,
+    /// The conditions, by their places, and the signals above no light, on which the patterns under light and in the dark were
+    /// measured.
+    pub stacks: [Option<(usize, f64)>; 2],
     /// What a careful user should know.
     pub notes: Vec<String>,
 }
@@ -90,6 +93,7 @@ pub fn of_class(name: &str, flats: &[Level], darks: &[Level], settings: &Setting
             curve: Vec::new(),
             linearity: None,
             values: None,
+            stacks: [None; 2],
             notes: Vec::new(),
         };
     };
@@ -146,6 +150,8 @@ pub fn of_class(name: &str, flats: &[Level], darks: &[Level], settings: &Setting
         add(key, straight.as_ref().map(|line| line.extremes[end]).map_err(Clone::clone));
     }
     let stacks = stacks(&curve, flats, darks);
+    let [lit, dark] = stacks;
+    let places = [lit.map(|(flat, level)| (level.place, curve.signal(flat))), dark.map(|(_, level)| (level.place, 0.0))];
     add_patterns(&mut add, &curve, stacks, &over_gain, confidence);
     let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
     add("dark_current_e_per_s", number(&per_second, if darks.is_empty() { no_darks() } else { few_times() }));
@@ -162,7 +168,7 @@ pub fn of_class(name: &str, flats: &[Level], darks: &[Level], settings: &Setting
     });
     let (curve_points, values) = (points.collect(), curve.values());
     let notes = notes(&curve, flats);
-    ClassFindings { name: name.into(), findings: found, curve: curve_points, linearity: straight.ok(), values, notes }
+    ClassFindings { name: name.into(), findings: found, curve: curve_points, linearity: straight.ok(), values, stacks: places, notes }
 }
 
 /// Why temporal noise of darks is not parted.

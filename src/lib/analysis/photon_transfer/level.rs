@@ -20,6 +20,8 @@ pub struct Condition {
 pub struct Level {
     /// The condition.
     pub condition: Condition,
+    /// Which of all the conditions it is.
+    pub place: usize,
     /// Frames.
     pub frames: usize,
     /// Mean of the samples.
@@ -37,8 +39,8 @@ pub struct Level {
 }
 
 impl Level {
-    /// Of grids of one class, each counted by its photosites.
-    pub fn of(condition: Condition, sites: Vec<SiteSurvey>) -> Self {
+    /// Of grids of one class under the condition at such a place among all, each counted by its photosites.
+    pub fn of(place: usize, condition: Condition, sites: Vec<SiteSurvey>) -> Self {
         let count: f64 = sites.iter().map(|site| site.count() as f64).sum();
         let share = |site: &SiteSurvey| site.count() as f64 / count;
         let mean = |of: &dyn Fn(&SiteSurvey) -> f64| sites.iter().map(|site| share(site) * of(site)).sum();
@@ -47,6 +49,7 @@ impl Level {
         let at_end = |end: usize| mean(&|site| site.at_ends[end] as f64 / (site.count() * site.frames) as f64);
         Self {
             condition,
+            place,
             frames,
             mean: mean(&|site| site.mean),
             mean_variance: scatter(&|site| site.mean_variance),

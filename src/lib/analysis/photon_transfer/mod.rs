@@ -11,6 +11,7 @@ mod linearity;
 mod pattern;
 mod sites;
 mod survey;
+mod view;
 
 pub use curve::Values;
 pub use findings::{ClassFindings, CurvePoint, Finding, KEYS, Settings, of_class};
@@ -19,3 +20,4 @@ pub use level::{Condition, Level};
 pub use linearity::Linearity;
 pub use sites::Site;
 pub use survey::{SiteSurvey, Survey, survey};
+pub use view::{OUTSTANDING, Outlier, PatternView, pattern_view};

@@ -1,0 +1,201 @@
+//! What a fixed pattern looks like: spectrograms, profiles, histogram, and the photosites that stand out.
+//!
+//! A spectrogram is the mean power of the Fourier transforms of all rows, or columns, of the pattern less its mean: white noise of
+//! variance s² has power s² at every frequency \[EMVA1288, Sec. 8.3]. Profiles, histogram and defects are those of the pattern behind
+//! the standard's high-pass filter, which takes from each photosite the mean of the 5x5 around it, and with it what light and lens
+//! make uneven \[EMVA1288, Sec. 8.6]. Photosites count as the grid of their class does.
+
+use super::sites::Site;
+use rustfft::{FftPlanner, num_complex::Complex};
+
+/// Photosites on a side of the filter's box.
+const BOX: usize = 5;
+/// Bins of the histogram.
+const BINS: usize = 256;
+/// A photosite stands out beyond so many standard deviations of most.
+pub const OUTSTANDING: f64 = 5.0;
+/// So many of those that stand out most are named.
+const NAMED: usize = 100;
+/// The median of absolute deviations of a normal law, in standard deviations.
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+
+/// A photosite that stands out.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Outlier {
+    /// Column of the frame.
+    pub x: usize,
+    /// Row.
+    pub y: usize,
+    /// How far it lies off those around it.
+    pub deviation: f64,
+}
+
+/// A fixed pattern of a class.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PatternView {
+    /// Frequency in cycles per photosite and power, along rows and along columns.
+    pub spectra: [Vec<[f64; 2]>; 2],
+    /// Place and mean, column by column and row by row, behind the filter.
+    pub profiles: [Vec<[f64; 2]>; 2],
+    /// Value and photosites of each bin, behind the filter.
+    pub histogram: Vec<[f64; 2]>,
+    /// The same of a normal law of the spread of most.
+    pub normal: Vec<[f64; 2]>,
+    /// Spread of most photosites behind the filter: that of a normal law with their median absolute deviation.
+    pub spread: f64,
+    /// How many stand out, and how many of a normal law would.
+    pub outstanding: [f64; 2],
+    /// Those that stand out most, the most first.
+    pub outliers: Vec<Outlier>,
+}
+
+/// A grid of values.
+struct Grid {
+    columns: usize,
+    rows: usize,
+    values: Vec<f64>,
+}
+
+impl Grid {
+    fn of(site: &Site, width: usize, planes: usize, at: &dyn Fn(usize) -> f64) -> Self {
+        let [columns, rows] = site.size;
+        let index = |x: usize, y: usize| {
+            ((site.first[1] + y * site.step[1]) * planes + site.plane) * width + site.first[0] + x * site.step[0]
+        };
+        let values = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))).map(|(x, y)| at(index(x, y))).collect();
+        Self { columns, rows, values }
+    }
+
+    fn mean(&self) -> f64 {
+        self.values.iter().sum::<f64>() / self.values.len() as f64
+    }
+
+    fn turned(&self) -> Self {
+        let values = (0..self.columns).flat_map(|x| (0..self.rows).map(move |y| self.values[y * self.columns + x]));
+        Self { columns: self.rows, rows: self.columns, values: values.collect() }
+    }
+
+    /// Mean power of the rows.
+    fn spectrum(&self) -> Vec<[f64; 2]> {
+        let mean = self.mean();
+        let transform = FftPlanner::new().plan_fft_forward(self.columns);
+        let mut power = vec![0.0; self.columns / 2 + 1];
+        let mut line = vec![Complex::default(); self.columns];
+        let mut scratch = vec![Complex::default(); transform.get_inplace_scratch_len()];
+        for row in self.values.chunks_exact(self.columns) {
+            for (line, value) in line.iter_mut().zip(row) {
+                *line = Complex::new(value - mean, 0.0);
+            }
+            transform.process_with_scratch(&mut line, &mut scratch);
+            power.iter_mut().zip(&line).for_each(|(power, value)| *power += value.norm_sqr());
+        }
+        let scale = 1.0 / (self.columns * self.rows) as f64;
+        power.iter().enumerate().map(|(index, power)| [index as f64 / self.columns as f64, power * scale]).collect()
+    }
+
+    /// Each value less the mean of the box around it, where there is one.
+    fn high_passed(&self) -> Self {
+        let margin = BOX / 2;
+        let (columns, rows) = (self.columns - 2 * margin, self.rows - 2 * margin);
+        // Sums over the box's rows, then over its columns.
+        let mut sums = vec![0.0; self.columns];
+        let mut values = Vec::with_capacity(columns * rows);
+        for y in 0..rows {
+            sums.fill(0.0);
+            for line in self.values[y * self.columns..(y + BOX) * self.columns].chunks_exact(self.columns) {
+                sums.iter_mut().zip(line).for_each(|(sum, value)| *sum += value);
+            }
+            let own = &self.values[(y + margin) * self.columns + margin..];
+            let boxes = sums.windows(BOX).map(|sums| sums.iter().sum::<f64>() / (BOX * BOX) as f64);
+            values.extend(own.iter().zip(boxes).map(|(own, around)| own - around));
+        }
+        Self { columns, rows, values }
+    }
+
+    fn profile(&self) -> Vec<f64> {
+        let mut sums = vec![0.0; self.columns];
+        for row in self.values.chunks_exact(self.columns) {
+            sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+        }
+        sums.iter().map(|sum| sum / self.rows as f64).collect()
+    }
+}
+
+/// The pattern of a class whose grids are `sites` in a picture of so many columns and planes, of which `at` gives the value at an
+/// index; none of a grid that the filter leaves nothing of.
+pub fn pattern_view(sites: &[&Site], [width, planes]: [usize; 2], at: &dyn Fn(usize) -> f64) -> Option<PatternView> {
+    if sites.iter().any(|site| site.size.iter().any(|extent| *extent < 2 * BOX)) {
+        return None;
+    }
+    let grids: Vec<Grid> = sites.iter().map(|site| Grid::of(site, width, planes, at)).collect();
+    let spectra = [false, true].map(|is_turned| {
+        let of = |grid: &Grid| if is_turned { grid.turned().spectrum() } else { grid.spectrum() };
+        mean_of(grids.iter().map(of).collect())
+    });
+    let filtered: Vec<Grid> = grids.iter().map(Grid::high_passed).collect();
+    let profiles = [0, 1].map(|axis| {
+        let mut all: Vec<[f64; 2]> = Vec::new();
+        for (site, grid) in sites.iter().zip(&filtered) {
+            let profile = if axis == 0 { grid.profile() } else { grid.turned().profile() };
+            let place = |index: usize| (site.first[axis] + (index + BOX / 2) * site.step[axis]) as f64;
+            all.extend(profile.iter().enumerate().map(|(index, mean)| [place(index), *mean]));
+        }
+        all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        all
+    });
+    let mut values: Vec<f64> = filtered.iter().flat_map(|grid| grid.values.iter().copied()).collect();
+    let count = values.len();
+    let middle = median(&mut values);
+    let mut absolute: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
+    let spread = median(&mut absolute) / NORMAL_MEDIAN;
+    let mut outliers = Vec::new();
+    for (site, grid) in sites.iter().zip(&filtered) {
+        for (index, value) in grid.values.iter().enumerate() {
+            if (value - middle).abs() > OUTSTANDING * spread && spread > 0.0 {
+                let place = |axis: usize, of: usize| site.first[axis] + (of + BOX / 2) * site.step[axis];
+                let [x, y] = [place(0, index % grid.columns), place(1, index / grid.columns)];
+                outliers.push(Outlier { x, y, deviation: *value });
+            }
+        }
+    }
+    let expected = crate::numerics::significance::of_normal(OUTSTANDING) * count as f64;
+    let outstanding = [outliers.len() as f64, expected];
+    outliers.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
+    outliers.truncate(NAMED);
+    let (histogram, normal) = histogram(&values, middle, spread);
+    Some(PatternView { spectra, profiles, histogram, normal, spread, outstanding, outliers })
+}
+
+fn mean_of(spectra: Vec<Vec<[f64; 2]>>) -> Vec<[f64; 2]> {
+    let count = spectra.len() as f64;
+    let shortest = spectra.iter().map(Vec::len).min().unwrap_or(0);
+    let power = |index: usize| spectra.iter().map(|spectrum| spectrum[index][1]).sum::<f64>() / count;
+    (0..shortest).map(|index| [spectra[0][index][0], power(index)]).collect()
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Photosites in each bin, and what a normal law has there.
+fn histogram(values: &[f64], mean: f64, spread: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
+    let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
+    let width = (high - low) / BINS as f64;
+    if !(width > 0.0) {
+        return (Vec::new(), Vec::new());
+    }
+    let mut counts = [0.0; BINS];
+    for value in values {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bin")]
+        let bin = ((value - low) / width) as usize;
+        counts[bin.min(BINS - 1)] += 1.0;
+    }
+    let center = |bin: usize| low + (bin as f64 + 0.5) * width;
+    let law = |bin: usize| {
+        let density = crate::numerics::normal::density((center(bin) - mean) / spread) / spread;
+        [center(bin), density * width * values.len() as f64]
+    };
+    let measured = counts.iter().enumerate().map(|(bin, count)| [center(bin), *count]).collect();
+    (measured, (0..BINS).map(law).collect())
+}

@@ -1,0 +1,240 @@
+//! Cameras whose numbers are known, simulated and measured: each number comes back within its interval as often as is stated.
+//!
+//! CYANOMETER_CAMERAS=500 measures so many, and tells how often each interval held.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::analysis::photon_transfer::{ClassFindings, Condition, Level, Settings, Site, of_class, survey};
+use cyanometer::camera::optics::Exposure;
+use cyanometer::camera::readout::ReadOut;
+use cyanometer::chain::{CameraSetup, uniform_frame};
+use cyanometer::metadata::Scene;
+use cyanometer::numerics::normal::NearlyNormal;
+use cyanometer::random::Source;
+use cyanometer::random::philox::philox4x32_10;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stream::MemoryFrame;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+const CONFIDENCE: f64 = 0.95;
+const QUANTUM_EFFICIENCY: f64 = 0.5;
+/// Exposure time of the flats, and of the dark stack.
+const FLAT_S: f64 = 0.02;
+
+/// Uniform numbers of a camera.
+struct Chance {
+    camera: u32,
+    drawn: u32,
+}
+
+impl Chance {
+    fn uniform(&mut self) -> f64 {
+        self.drawn += 1;
+        let [word, ..] = philox4x32_10([self.camera, self.drawn, 0, 0], [0x5EED, 7]);
+        (f64::from(word) + 0.5) / 4_294_967_296.0
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.uniform()
+    }
+
+    fn log_between(&mut self, low: f64, high: f64) -> f64 {
+        self.between(low.ln(), high.ln()).exp()
+    }
+}
+
+/// A camera drawn from the ranges of real ones.
+fn camera(index: u32) -> ReadOut {
+    let mut chance = Chance { camera: index, drawn: 0 };
+    let full_well_e = chance.log_between(3000.0, 80_000.0);
+    let bits = [10, 12, 14, 16][(chance.uniform() * 4.0) as usize];
+    let top = f64::from((1_u32 << bits) - 1);
+    let bias_adu = (top * chance.between(0.01, 0.05)).round();
+    let adu_per_e = (top - bias_adu) / full_well_e * chance.between(0.7, 1.4);
+    // Noise that the converter sees: at least 0.6 codes.
+    let least = 0.6 / adu_per_e;
+    ReadOut {
+        full_well_e,
+        bits,
+        bias_adu,
+        adu_per_e,
+        read_noise_e: chance.log_between(1.0, 30.0).max(least).min(full_well_e / 50.0),
+        prnu: chance.log_between(0.002, 0.02),
+        dcnu: chance.between(0.05, 0.2),
+        dark_current_na_per_cm2: None,
+        dark_current_e_per_s: Some(chance.log_between(5.0, 2000.0)),
+        temperature_k: 300.0,
+        ..support::readout()
+    }
+}
+
+const SIZE: [usize; 2] = [96, 64];
+
+/// Frames of one condition of a camera.
+fn level(readout: &ReadOut, index: u32, condition: Condition, expected_e: f64, frames: u32, first: u32) -> Level {
+    let mut sensor = support::sensor();
+    sensor.readout = Some(readout.clone());
+    let exposure = Exposure { exposure_s: condition.exposure_s.unwrap(), f_number: 8.0, lens_transmittance: 1.0 };
+    let setup = CameraSetup::new(sensor, exposure);
+    let head = setup.plane(SIZE, Scene::uniform("flat", [expected_e; 3])).unwrap();
+    let light = uniform_frame(head, [expected_e; 3]).unwrap();
+    let mut taken: Vec<MemoryFrame> = (first..first + frames)
+        .map(|frame| {
+            let settings = NoiseSettings { seed: index.into(), sensor_seed: index.into(), frame, ..NoiseSettings::default() };
+            let noisy = light.through(&AddNoise::new(&light.header, &settings).unwrap()).unwrap().0;
+            let digitized = noisy.through(&Digitize::new(&noisy.header, &AdcSettings::default()).unwrap()).unwrap().0;
+            MemoryFrame::new(digitized.header, digitized.samples)
+        })
+        .collect();
+    let top = f64::from((1_u32 << readout.bits) - 1);
+    let sites = Site::of(&taken[0].header);
+    let found = survey(&mut taken, Some(top), false).unwrap();
+    let green = sites.iter().zip(found.sites).filter(|(site, _)| site.class == "G");
+    Level::of(0, condition, green.map(|(_, survey)| survey).collect())
+}
+
+/// What a camera is found to be.
+fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
+    let lit = |photons: f64| Condition { is_lit: true, exposure_s: Some(FLAT_S), photons: Some(photons), temperature_k: None };
+    let dark = |exposure_s: f64| Condition { is_lit: false, exposure_s: Some(exposure_s), photons: None, temperature_k: None };
+    let end = readout.full_well_e.min((f64::from((1_u32 << readout.bits) - 1) - readout.bias_adu) / readout.adu_per_e);
+    let shares = [0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.3];
+    let mut number = 0;
+    let mut next = |frames: u32| {
+        number += frames;
+        number - frames
+    };
+    let flats: Vec<Level> = shares
+        .iter()
+        .map(|share| {
+            let frames = if *share == 0.5 { 8 } else { 2 };
+            level(readout, index, lit(share * end / QUANTUM_EFFICIENCY), share * end, frames, next(frames))
+        })
+        .collect();
+    let darks: Vec<Level> = [(FLAT_S, 8), (0.1, 2), (0.25, 2), (0.5, 2), (1.0, 2)]
+        .iter()
+        .map(|(time, frames)| level(readout, index, dark(*time), 0.0, *frames, next(*frames)))
+        .collect();
+    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true };
+    of_class("G", &flats, &darks, &settings)
+}
+
+/// The signal of the largest temporal variance, in electrons.
+fn saturation(readout: &ReadOut) -> f64 {
+    let top = (f64::from((1_u32 << readout.bits) - 1) + 0.5 - readout.bias_adu) / readout.adu_per_e;
+    let dark = readout.dark_current_e_per_s(readout.temperature_k) * FLAT_S;
+    let variance = |signal: f64| -> f64 {
+        // Over the photosites: a normal law in 21 steps.
+        let steps = (-10..=10).map(|step| f64::from(step) / 2.5);
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for step in steps {
+            let rate = signal * (1.0 + readout.prnu * step) + dark;
+            let held = NearlyNormal::normal(rate, rate).clipped_above(readout.full_well_e);
+            let read = NearlyNormal::normal(held.mean, held.variance + readout.read_noise_e.powi(2)).clipped_above(top);
+            let weight = (-0.5 * step * step).exp();
+            sum += weight * read.variance;
+            weights += weight;
+        }
+        sum / weights
+    };
+    let levels = (500..=1400).map(|share| f64::from(share) / 1000.0 * top.min(readout.full_well_e));
+    levels.max_by(|a, b| variance(*a).total_cmp(&variance(*b))).unwrap()
+}
+
+/// The mean sensitivity of a camera's green photosites.
+fn mean_sensitivity(readout: &ReadOut, index: u32) -> f64 {
+    const LEVEL_E: f64 = 1000.0;
+    let mut sensor = support::sensor();
+    sensor.readout = Some(ReadOut { full_well_e: 1e6, ..readout.clone() });
+    let exposure = Exposure { exposure_s: FLAT_S, f_number: 8.0, lens_transmittance: 1.0 };
+    let head = CameraSetup::new(sensor, exposure).plane(SIZE, Scene::uniform("flat", [LEVEL_E; 3])).unwrap();
+    let light = uniform_frame(head, [LEVEL_E; 3]).unwrap();
+    let without = Source::ALL.into_iter().filter(|source| *source != Source::Prnu).collect();
+    let settings = NoiseSettings { sensor_seed: index.into(), without, ..NoiseSettings::default() };
+    let mut pattern = vec![light.through(&AddNoise::new(&light.header, &settings).unwrap()).unwrap().0; 2];
+    let dark = pattern[0].header.metadata.dark_signal_e.unwrap();
+    let pattern: Vec<MemoryFrame> = pattern.drain(..).map(|frame| MemoryFrame::new(frame.header, frame.samples)).collect();
+    let sites = Site::of(&pattern[0].header);
+    let found = survey(&mut pattern.clone(), None, false).unwrap();
+    let green: Vec<f64> =
+        sites.iter().zip(found.sites).filter(|(site, _)| site.class == "G").map(|(_, survey)| survey.mean).collect();
+    (green.iter().sum::<f64>() / green.len() as f64 - dark) / LEVEL_E
+}
+
+/// What a camera is.
+fn truths(readout: &ReadOut, index: u32) -> Vec<(&'static str, f64)> {
+    // The responsivity is that of the photosites there are.
+    let efficiency = QUANTUM_EFFICIENCY * mean_sensitivity(readout, index);
+    let current = readout.dark_current_e_per_s(readout.temperature_k);
+    let dark_e = current * FLAT_S;
+    let dark_variance = readout.read_noise_e.powi(2) + 1.0 / 12.0 / readout.adu_per_e.powi(2);
+    let pattern = readout.dcnu * dark_e;
+    vec![
+        ("gain_adu_per_e", readout.adu_per_e),
+        ("responsivity_adu_per_photon", readout.adu_per_e * efficiency),
+        ("quantum_efficiency", efficiency),
+        ("black_level_adu", readout.bias_adu),
+        ("dark_noise_e", readout.read_noise_e),
+        ("threshold_e", 0.5 + (0.25 + dark_variance).sqrt()),
+        ("row_noise_e", 0.0),
+        ("column_noise_e", 0.0),
+        ("saturation_e", saturation(readout)),
+        ("linearity_error_min", 0.0),
+        ("linearity_error_max", 0.0),
+        ("prnu", readout.prnu),
+        ("prnu_row", 0.0),
+        ("prnu_column", 0.0),
+        ("prnu_pixel", readout.prnu),
+        ("dsnu_e", pattern),
+        ("dsnu_pixel_e", pattern),
+        ("dsnu_row_e", 0.0),
+        ("dsnu_column_e", 0.0),
+        ("dark_current_e_per_s", current),
+        // Fixed patterns multiply counts, so that the temporal variance goes by the square of what a photosite has.
+        ("dark_current_from_variance_e_per_s", current * (1.0 + readout.dcnu.powi(2))),
+    ]
+}
+
+/// Of n cameras so many intervals may miss by chance: 4 standard deviations beyond 5 %.
+#[test]
+fn numbers_lie_within_their_intervals() {
+    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(40, |count| count.parse().unwrap());
+    let found: Vec<_> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let readout = camera(index);
+            let found = measured(&readout, index);
+            let judged = truths(&readout, index).into_iter().map(|(key, truth)| {
+                let interval = found.get(key);
+                let held = interval.map(|interval| (interval.low - 1e-12..=interval.high + 1e-12).contains(&truth));
+                let width = interval.map_or(f64::NAN, |interval| (interval.high - interval.low) / 2.0);
+                let off = interval.map_or(f64::NAN, |interval| interval.value - truth);
+                (key, held, width / truth, off / width)
+            });
+            judged.collect::<Vec<_>>()
+        })
+        .collect();
+    let mut tally: BTreeMap<&str, (u32, u32, Vec<f64>, f64)> = BTreeMap::new();
+    for (key, held, width, off) in found.into_iter().flatten() {
+        let entry = tally.entry(key).or_default();
+        if let Some(held) = held {
+            entry.0 += 1;
+            entry.1 += u32::from(!held);
+            entry.2.push(width);
+            entry.3 += off;
+        }
+    }
+    for (key, (known, missed, mut widths, off)) in tally {
+        widths.sort_by(f64::total_cmp);
+        let width = widths.get(widths.len() / 2).copied().unwrap_or(f64::NAN);
+        let n = f64::from(known);
+        println!("{key}: {missed} of {known} missed, median half-width {width:.2e}, mean error over half-width {:.3}", off / n);
+        let allowed = n * (1.0 - CONFIDENCE) + 4.0 * (n * CONFIDENCE * (1.0 - CONFIDENCE)).sqrt();
+        assert!(known * 10 >= count * 6, "{key} is known of {known} of {count} cameras alone");
+        assert!(f64::from(missed) <= allowed, "{key}: {missed} of {known} intervals missed");
+    }
+}
