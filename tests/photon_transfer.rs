@@ -115,12 +115,12 @@ fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
             level(readout, index, lit(share * end / QUANTUM_EFFICIENCY), share * end, frames, next(frames))
         })
         .collect();
-    let darks: Vec<Level> = [(FLAT_S, 8), (0.1, 2), (0.25, 2), (0.5, 2), (1.0, 2)]
+    let darks: Vec<Level> = [(FLAT_S, 8), (0.1, 2), (0.25, 2), (0.5, 4), (1.0, 4)]
         .iter()
         .map(|(time, frames)| level(readout, index, dark(*time), 0.0, *frames, next(*frames)))
         .collect();
     let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true };
-    of_class("G", &flats, &darks, &settings)
+    of_class("G", &flats, &darks, &darks, &settings)
 }
 
 /// The signal of the largest temporal variance, in electrons.
@@ -194,6 +194,8 @@ fn truths(readout: &ReadOut, index: u32) -> Vec<(&'static str, f64)> {
         ("dsnu_row_e", 0.0),
         ("dsnu_column_e", 0.0),
         ("dark_current_e_per_s", current),
+        ("dcnu", readout.dcnu),
+        ("dsnu_offset_e", 0.0),
         // Fixed patterns multiply counts, so that the temporal variance goes by the square of what a photosite has.
         ("dark_current_from_variance_e_per_s", current * (1.0 + readout.dcnu.powi(2))),
     ]

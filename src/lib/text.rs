@@ -37,8 +37,10 @@ pub fn counted(count: u64, what: &str) -> String {
             ("colors", "color"),
             ("bytes", "byte"),
             ("wavelengths", "wavelength"),
+            ("flats", "flat"),
+            ("darks", "dark"),
         ],
-        &[("are", "is"), ("were", "was"), ("have", "has"), ("had", "had"), ("do", "does"), ("expect", "expects")],
+        &[("are", "is"), ("were", "was"), ("have", "has"), ("had", "had"), ("do", "does"), ("expect", "expects"), ("stand", "stands")],
     ];
     if count != 1 {
         return format!("{count} {what}");

@@ -12,7 +12,7 @@ pub fn of_normal(p: f64) -> f64 {
 const MANY: f64 = 200.0;
 
 /// The sum of squares of `freedom` degrees of freedom, whole or not, that a share `p` lies below, 0 < p < 1: for few by
-/// bisection of the incomplete gamma function, for many by the cube of a normal deviate \[WilsonHilferty1931].
+/// bisection of the incomplete gamma function, for many by the cube of a normal deviate \[WH1931].
 pub fn of_chi_square(p: f64, freedom: f64) -> f64 {
     let ninth = 2.0 / (9.0 * freedom);
     let near = freedom * (1.0 - ninth + of_normal(p) * ninth.sqrt()).max(0.0).powi(3);

@@ -9,7 +9,7 @@ use crate::names::Named;
 use crate::numerics::variance_components::Interval;
 use crate::requests::photon_transfer::{MeasuredCamera, frames_in_words};
 use crate::requests::values;
-use crate::text::visible;
+use crate::text::{counted, visible};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -204,8 +204,11 @@ fn text(camera: &MeasuredCamera) -> String {
 /// How many photosites stand out, in words.
 fn outstanding(view: &PatternView, place: &str) -> String {
     let [count, expected] = view.outstanding;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of photosites")]
+    let count = count as u64;
     format!(
-        "{count} photosites stand out {place} by more than {OUTSTANDING} standard deviations of most; {} of a normal law would",
+        "{} stand out {place} by more than {OUTSTANDING} standard deviations of most; of a normal law {} would",
+        counted(count, "photosites"),
         in_digits(expected, 2)
     )
 }

@@ -55,13 +55,15 @@ fn patterns(camera: &MeasuredCamera, which: usize, name: &str, unit: &str) -> [P
     for (index, (class, views)) in camera.classes.iter().zip(&camera.patterns).enumerate() {
         let (Some(view), Some(values)) = (&views[which], class.values) else { continue };
         let color = color(&class.name, index);
+        // The two directions of a single class are told apart by color too.
+        let other = if camera.classes.len() == 1 { Color::Vermillion } else { color };
         let scale = if which == 0 { 100.0 } else { 1.0 / values.gain };
         let scaled = |points: &[[f64; 2]], factor: f64| points.iter().map(|[x, y]| [*x, y * factor]).collect::<Vec<_>>();
         let [along_rows, along_columns] = &view.spectra;
         spectrum.add(&format!("{}, rows", class.name), color, Marks::Line(scaled(&along_rows[1..], scale * scale)));
-        spectrum.add(&format!("{}, columns", class.name), color, Marks::Dashed(scaled(&along_columns[1..], scale * scale)));
+        spectrum.add(&format!("{}, columns", class.name), other, Marks::Dashed(scaled(&along_columns[1..], scale * scale)));
         profile.add(&format!("{}, columns", class.name), color, Marks::Line(scaled(&view.profiles[0], scale)));
-        profile.add(&format!("{}, rows", class.name), color, Marks::Dashed(scaled(&view.profiles[1], scale)));
+        profile.add(&format!("{}, rows", class.name), other, Marks::Dashed(scaled(&view.profiles[1], scale)));
         let along = |points: &[[f64; 2]]| points.iter().map(|[x, y]| [x * scale, *y]).collect::<Vec<_>>();
         histogram.add(&class.name, color, Marks::Points(along(&view.histogram)));
         let law = along(&view.normal).into_iter().filter(|[_, count]| *count > 0.1);

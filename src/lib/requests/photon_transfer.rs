@@ -375,7 +375,9 @@ fn classes(
             let by_light = if by_photons { light_a.total_cmp(&light_b) } else { std::cmp::Ordering::Equal };
             by_light.then(mean_a.total_cmp(&mean_b))
         });
-        of_class(name, &flats, &darks, settings)
+        let all: Vec<Level> =
+            (0..groups.len()).filter(|&index| !groups[index].condition.is_lit).map(|index| level(name, index)).collect();
+        of_class(name, &flats, &darks, &all, settings)
     };
     names.par_iter().map(of).collect()
 }

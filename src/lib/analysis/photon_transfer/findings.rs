@@ -1,6 +1,7 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
 use super::curve::{Curve, LEAST_VARIANCE, ROUNDING, Values};
+use super::dark::{doubling_temperature, parted_pattern};
 use super::level::Level;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal};
@@ -80,8 +81,8 @@ fn lacking(what: &str) -> String {
     what.to_owned()
 }
 
-/// What the levels of a class tell; flats in the order of their light, darks of the flats' temperature.
-pub fn of_class(name: &str, flats: &[Level], darks: &[Level], settings: &Settings) -> ClassFindings {
+/// What the levels of a class tell; flats in the order of their light, darks of the flats' temperature, and all darks.
+pub fn of_class(name: &str, flats: &[Level], darks: &[Level], all_darks: &[Level], settings: &Settings) -> ClassFindings {
     let Settings { confidence, photon_error, are_codes } = *settings;
     let rounding = if are_codes { ROUNDING } else { 0.0 };
     let Some(curve) = Curve::of(flats, darks, rounding, photon_error) else {
@@ -158,6 +159,16 @@ pub fn of_class(name: &str, flats: &[Level], darks: &[Level], settings: &Setting
     let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
     let why = || if curve.is_offset_free { silent(&curve, no_darks()) } else { few_times() };
     add("dark_current_from_variance_e_per_s", number(&from_variance, why()));
+    add("dark_current_doubling_k", doubling_temperature(all_darks, confidence));
+    let parted = parted_pattern(darks, confidence);
+    let offset = parted.clone().map(|[offset, _]| offset);
+    add("dsnu_offset_e", over_gain(offset));
+    let slope = curve.interval(|values| values.dark_slope, confidence).filter(|slope| slope.low > 0.0);
+    let uneven = parted.and_then(|[_, square]| {
+        let slope = slope.ok_or("the dark current is not told from none, nor is how it differs among photosites")?;
+        Ok(over(square.root(), slope))
+    });
+    add("dcnu", uneven);
     let points = (0..flats.len()).map(|flat| CurvePoint {
         exposure_s: flats[flat].condition.exposure_s,
         photons: flats[flat].condition.photons,
@@ -187,7 +198,7 @@ fn finding(key: &'static str, found: Found) -> Finding {
 }
 
 /// Every number: its key, what it is, its unit.
-pub const KEYS: [(&str, &str, &str); 28] = [
+pub const KEYS: [(&str, &str, &str); 31] = [
     ("gain_adu_per_e", "system gain K", "ADU/e-"),
     ("responsivity_adu_per_photon", "responsivity R", "ADU/photon"),
     ("quantum_efficiency", "quantum efficiency", ""),
@@ -216,6 +227,9 @@ pub const KEYS: [(&str, &str, &str); 28] = [
     ("dsnu_pixel_e", "of photosites", "e-"),
     ("dark_current_e_per_s", "dark current, from means", "e-/s"),
     ("dark_current_from_variance_e_per_s", "dark current, from variances", "e-/s"),
+    ("dark_current_doubling_k", "dark current doubles in", "K"),
+    ("dsnu_offset_e", "dark pattern that no time adds", "e-"),
+    ("dcnu", "dark current non-uniformity", ""),
 ];
 
 /// An interval over another of which it is independent.

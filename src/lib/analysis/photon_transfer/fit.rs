@@ -56,7 +56,8 @@ impl Line {
     }
 }
 
-/// The variance that all points of a fit have besides their own, so that Σ (y − line)² over both is as many as `freedom`; `misfit`
+/// The variance that all points of a fit have besides their own, so that Σ (y − line)² over both is as many as `freedom`
+/// \[PauleMandel1982]; `misfit`
 /// gives the sum for a variance, which falls as that grows. None where their own suffice.
 pub fn variance_besides(freedom: f64, misfit: impl Fn(f64) -> f64, largest: f64) -> f64 {
     if misfit(0.0) <= freedom || misfit(largest) >= freedom {

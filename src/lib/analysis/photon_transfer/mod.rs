@@ -4,6 +4,7 @@
 //! and dark current, each with an interval, or says which frames would tell it.
 
 mod curve;
+mod dark;
 mod findings;
 mod fit;
 mod level;
@@ -14,6 +15,7 @@ mod survey;
 mod view;
 
 pub use curve::Values;
+pub use dark::doubling_temperature;
 pub use findings::{ClassFindings, CurvePoint, Finding, KEYS, Settings, of_class};
 pub use fit::Line;
 pub use level::{Condition, Level};

@@ -13,7 +13,8 @@
 
 use super::sites::Site;
 use crate::error::{Error, Result};
-use crate::frame::Geometry;
+use crate::frame::{Geometry, to_sample};
+use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::numerics::variance_components::{MeanSquare, MeanSquares, SquareSums};
 use crate::stream::RowSource;
 use rayon::prelude::*;
@@ -80,6 +81,7 @@ pub fn survey<S: RowSource>(frames: &mut [S], top: Option<f64>, keeps: bool) -> 
     let mut picture = keeps.then(|| Vec::with_capacity(geometry.row_samples() * geometry.height));
     let step = frames.iter().map(|frame| geometry.band_rows(frame.natural_rows(), 1)).max().unwrap_or(1).max(1);
     let mut bands: Vec<Vec<f32>> = vec![Vec::new(); frames.len()];
+    let mut sums: Vec<f64> = Vec::new();
     let mut done = 0;
     while done < geometry.height {
         let rows = step.min(geometry.height - done);
@@ -94,8 +96,12 @@ pub fn survey<S: RowSource>(frames: &mut [S], top: Option<f64>, keeps: bool) -> 
             }
         }
         if let Some(picture) = &mut picture {
-            let mean = |index: usize| bands.iter().map(|band| f64::from(band[index])).sum::<f64>() / bands.len() as f64;
-            picture.extend((0..rows * geometry.row_samples()).map(|index| crate::frame::to_sample(mean(index))));
+            sums.clear();
+            sums.resize(rows * geometry.row_samples(), 0.0);
+            for band in &bands {
+                sums.iter_mut().zip(band).for_each(|(sum, sample)| *sum += f64::from(*sample));
+            }
+            picture.extend(sums.iter().map(|sum| to_sample(sum / bands.len() as f64)));
         }
         done += rows;
     }
@@ -138,6 +144,9 @@ struct Tally {
     samples: Vec<f64>,
     means: Vec<f64>,
     squared: Vec<f64>,
+    /// ȳ − c of the row.
+    above: Vec<f64>,
+    instructions: Instructions,
 }
 
 impl Tally {
@@ -162,18 +171,27 @@ impl Tally {
             samples: vec![0.0; columns * frames],
             means: vec![0.0; columns],
             squared: vec![0.0; columns],
+            above: vec![0.0; columns],
+            instructions: Instructions::widest(),
         }
     }
 
     /// Adds a row: that of each frame.
     fn add<'a>(&mut self, site: &Site, rows: impl Iterator<Item = &'a [f32]>) {
+        for (samples, row) in self.samples.chunks_exact_mut(self.size[0]).zip(rows) {
+            site.gather(row, samples);
+        }
+        vectors::run_on(self.instructions, AddRow(self));
+    }
+
+    #[inline(always)]
+    fn add_gathered(&mut self) {
         let columns = self.size[0];
         let count = columns as f64;
         self.means.fill(0.0);
-        for (samples, row) in self.samples.chunks_exact_mut(columns).zip(rows) {
-            site.gather(row, samples);
+        for samples in self.samples.chunks_exact(columns) {
             let (mut at_top, mut at_bottom) = (0, 0);
-            for (mean, sample) in self.means.iter_mut().zip(&*samples) {
+            for (mean, sample) in self.means.iter_mut().zip(samples) {
                 *mean += sample;
                 at_top += u64::from(*sample >= self.top);
                 at_bottom += u64::from(*sample <= 0.0);
@@ -184,46 +202,36 @@ impl Tally {
         let share = 1.0 / self.frames as f64;
         self.means.iter_mut().for_each(|mean| *mean *= share);
         if self.row_means.is_empty() {
-            self.center = self.means.iter().sum::<f64>() / count;
+            self.center = sum(&self.means) / count;
         }
-        let (mut row_sum, mut row_square) = (0.0, 0.0);
-        for (of_column, mean) in self.column_means.iter_mut().zip(&self.means) {
-            let above = mean - self.center;
-            *of_column += above;
-            row_sum += above;
-            row_square += above * above;
+        for ((above, mean), of_column) in self.above.iter_mut().zip(&self.means).zip(&mut self.column_means) {
+            *above = mean - self.center;
+            *of_column += *above;
         }
-        self.row_means.push(row_sum);
-        self.squares += row_square;
+        self.row_means.push(sum(&self.above));
+        self.squares += dot(&self.above, &self.above);
         self.squared.fill(0.0);
         let mut all = 0.0;
         let columns_of = self.column_sums.chunks_exact_mut(columns);
         for ((index, samples), of_columns) in self.samples.chunks_exact_mut(columns).enumerate().zip(columns_of) {
-            let (mut sum, mut product) = (0.0, 0.0);
             for ((sample, mean), of_column) in samples.iter_mut().zip(&self.means).zip(of_columns) {
                 *sample -= mean;
                 *of_column += *sample;
-                sum += *sample;
-                product += *sample * (mean - self.center);
             }
-            self.frame_sums[index] += sum;
-            self.products[index] += product;
-            self.row_sums.push(sum);
-            let about = sum / count;
-            let mut squares = 0.0;
+            let of_row = sum(samples);
+            self.frame_sums[index] += of_row;
+            self.products[index] += dot(samples, &self.above);
+            self.row_sums.push(of_row);
+            all += dot(samples, samples);
+            let about = of_row / count;
             for ((squared, of_column), sample) in self.squared.iter_mut().zip(&mut self.column_squares).zip(&*samples) {
-                let square = sample * sample;
-                *of_column += square;
-                squares += square;
+                *of_column += sample * sample;
                 *squared += (sample - about).powi(2);
             }
-            all += squares;
         }
         self.row_squares.push(all);
-        for q in &self.squared {
-            self.within[0] += q;
-            self.within[1] += q * q;
-        }
+        self.within[0] += sum(&self.squared);
+        self.within[1] += dot(&self.squared, &self.squared);
     }
 
     fn finish(self) -> SiteSurvey {
@@ -319,6 +327,46 @@ impl Tally {
         let freedom = (self.frames as f64 - 1.0) * n;
         (apart + together(&of_rows) + together(&of_columns)) / (freedom * freedom)
     }
+}
+
+/// Adds the row that was gathered.
+struct AddRow<'a>(&'a mut Tally);
+
+impl Kernel for AddRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.0.add_gathered();
+    }
+}
+
+/// Sums run in so many lanes, whatever the instructions.
+const LANES: usize = 8;
+
+#[inline(always)]
+fn sum(values: &[f64]) -> f64 {
+    let (whole, rest) = values.as_chunks::<LANES>();
+    let mut lanes = [0.0; LANES];
+    for values in whole {
+        for (lane, value) in lanes.iter_mut().zip(values) {
+            *lane += value;
+        }
+    }
+    lanes.iter().sum::<f64>() + rest.iter().sum::<f64>()
+}
+
+/// Σ a b.
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((whole_a, rest_a), (whole_b, rest_b)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let mut lanes = [0.0; LANES];
+    for (a, b) in whole_a.iter().zip(whole_b) {
+        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
+            *lane += a * b;
+        }
+    }
+    lanes.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// What a scatter has beyond another that it should equal, to a relative error; nothing where that may be chance.

@@ -1,0 +1,87 @@
+//! What darks tell beyond one temperature and one exposure time: how dark current rises with temperature, and how it differs from
+//! photosite to photosite.
+
+use super::fit::{Line, Point, variance_besides};
+use super::level::Level;
+use super::pattern::{Part, fixed};
+use crate::numerics::quantiles;
+use crate::numerics::variance_components::Interval;
+use std::f64::consts::LN_2;
+
+/// A line through points with what its slope and offset scatter by, variances; points miss it by no more than they scatter, or else
+/// all have one more error alike.
+fn fitted(points: &[(f64, f64, f64)]) -> Option<(Line, [f64; 2])> {
+    let weighted = |besides: f64| -> Vec<Point> {
+        points.iter().map(|(x, y, variance)| Point { x: *x, y: *y, weight: 1.0 / (variance + besides).max(f64::MIN_POSITIVE) }).collect()
+    };
+    let misfit = |besides: f64| Line::through(weighted(besides)).map_or(0.0, |line| line.chi_square(weighted(besides)));
+    let freedom = points.len() as f64 - 2.0;
+    let largest = points.iter().map(|(_, y, _)| y * y).fold(0.0, f64::max);
+    let besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
+    let points = weighted(besides);
+    let line = Line::through(points.clone())?;
+    let all: f64 = points.iter().map(|point| point.weight).sum();
+    let mean = points.iter().map(|point| point.weight * point.x).sum::<f64>() / all;
+    let spread: f64 = points.iter().map(|point| point.weight * (point.x - mean).powi(2)).sum();
+    Some((line, [1.0 / all + mean * mean / spread, 1.0 / spread]))
+}
+
+/// The temperature step that doubles the dark current, K, from darks at several temperatures, each at several times:
+/// log₂ I is a line over temperature \[EMVA1288, Eq. 33].
+///
+/// # Errors
+///
+/// Which frames would tell it.
+pub fn doubling_temperature(darks: &[Level], confidence: f64) -> Result<Interval, String> {
+    let mut temperatures: Vec<f64> = darks.iter().filter_map(|dark| dark.condition.temperature_k).collect();
+    temperatures.sort_by(f64::total_cmp);
+    temperatures.dedup();
+    let rate = |temperature: &f64| {
+        let own = darks.iter().filter(|dark| dark.condition.temperature_k == Some(*temperature));
+        let points: Vec<(f64, f64, f64)> =
+            own.filter_map(|dark| Some((dark.condition.exposure_s?, dark.mean, dark.mean_variance))).collect();
+        let (line, [_, variance]) = fitted(&points)?;
+        // The logarithm of a rate that is not told from none tells nothing.
+        let is_told = line.slope > 3.0 * variance.sqrt();
+        is_told.then(|| (*temperature, line.slope.log2(), variance / (line.slope * LN_2).powi(2)))
+    };
+    let rates: Vec<(f64, f64, f64)> = temperatures.iter().filter_map(rate).collect();
+    let few = "it takes darks at two temperatures or more, each at two exposure times or more that tell its dark current";
+    let (line, [_, variance]) = if rates.len() < 2 { None } else { fitted(&rates) }.ok_or(few)?;
+    let slope = Interval::normal(line.slope, variance, confidence);
+    if slope.low <= 0.0 {
+        return Err("the dark current does not rise with temperature beyond chance".into());
+    }
+    Ok(Interval { value: 1.0 / slope.value, low: 1.0 / slope.high, high: 1.0 / slope.low })
+}
+
+/// The fixed pattern of darks parted into what no time adds and what goes by it: variances of single photosites at no exposure, in
+/// samples², and per second².
+///
+/// # Errors
+///
+/// Which frames would tell it.
+pub fn parted_pattern(darks: &[Level], confidence: f64) -> Result<[Interval; 2], String> {
+    let reach = quantiles::of_normal(f64::midpoint(1.0, confidence));
+    let freedom: f64 = darks.first().map_or(1.0, |dark| dark.sites.iter().map(|site| site.spatial.rest.freedom).sum());
+    let points: Vec<(f64, f64, f64)> = darks
+        .iter()
+        .filter_map(|dark| {
+            let found = fixed(dark, Part::Pixel, confidence);
+            let scatter = ((found.high - found.low) / (2.0 * reach)).powi(2);
+            // The pattern is the same in all of them: that it is one of many is an error that they share.
+            let own = (scatter - 2.0 * found.value.powi(2) / freedom).max(1e-3 * scatter);
+            Some((dark.condition.exposure_s?.powi(2), found.value, own))
+        })
+        .collect();
+    let mut times: Vec<f64> = points.iter().map(|(time, ..)| *time).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    let few = "it takes darks at three exposure times or more";
+    let (line, [of_offset, of_slope]) = if times.len() < 3 { None } else { fitted(&points) }.ok_or(few)?;
+    let shared = |value: f64| 2.0 * value * value / freedom;
+    Ok([
+        Interval::normal(line.offset, of_offset + shared(line.offset), confidence),
+        Interval::normal(line.slope, of_slope + shared(line.slope), confidence),
+    ])
+}
