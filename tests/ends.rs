@@ -32,6 +32,15 @@ const QUIET: NoiseModel = NoiseModel {
     dark_shot: true,
     signal_shot: true,
     poisson: PoissonKind::Exact,
+    lines: LineNoise {
+        row_noise_e: 0.0,
+        column_noise_e: 0.0,
+        dsnu_e: 0.0,
+        dsnu_row_e: 0.0,
+        dsnu_column_e: 0.0,
+        prnu_row: 0.0,
+        prnu_column: 0.0,
+    },
 };
 
 const PAPER: AdcRecord = AdcRecord::new(12, 1753.0, 0.058824);

@@ -15,6 +15,8 @@ const LEAST_TEMPERATURE_K: f64 = 70.0;
 const MOST_DCNU: f64 = 2.0;
 /// The same of the response.
 const MOST_PRNU: f64 = 0.5;
+/// The same of whole rows and columns: gains of amplifiers differ by less.
+const MOST_LINE_PRNU: f64 = 0.1;
 /// The smallest full well in e⁻ that does not look like thousands of them.
 const LEAST_WELL_E: f64 = 100.0;
 /// So many times the range of the converter is beyond what amplifiers are set to.
@@ -48,6 +50,27 @@ pub struct ReadOut {
     pub prnu: f64,
     /// Read noise: rms, e⁻.
     pub read_noise_e: f64,
+    /// Noise that the photosites of a row have in common in one exposure: rms, e⁻.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub row_noise_e: f64,
+    /// The same of a column.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub column_noise_e: f64,
+    /// Fixed offsets of photosites, read out with their charge whatever the exposure: rms, e⁻.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub dsnu_e: f64,
+    /// Fixed offsets of rows: rms, e⁻.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub dsnu_row_e: f64,
+    /// Fixed offsets of columns: rms, e⁻.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub dsnu_column_e: f64,
+    /// Non-uniformity of the response from row to row: rms, fraction of 1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub prnu_row: f64,
+    /// Non-uniformity of the response from column to column: rms, fraction of 1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub prnu_column: f64,
     /// Bits of the converter.
     pub bits: u32,
     /// What the converter adds, ADU.
@@ -57,6 +80,11 @@ pub struct ReadOut {
     /// What makes its codes proportional to charge; none where they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub linearization: Option<Linearization>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 impl ReadOut {
@@ -85,6 +113,13 @@ impl ReadOut {
             ("dcnu", self.dcnu),
             ("prnu", self.prnu),
             ("read_noise_e", self.read_noise_e),
+            ("row_noise_e", self.row_noise_e),
+            ("column_noise_e", self.column_noise_e),
+            ("dsnu_e", self.dsnu_e),
+            ("dsnu_row_e", self.dsnu_row_e),
+            ("dsnu_column_e", self.dsnu_column_e),
+            ("prnu_row", self.prnu_row),
+            ("prnu_column", self.prnu_column),
         ];
         for (key, value) in not_negative {
             if !(0.0..f64::INFINITY).contains(&value) {
@@ -122,7 +157,13 @@ impl ReadOut {
             let kelvin = kelvin(self.temperature_k);
             return suspect("temperature_k", self.temperature_k, "K", format!("degrees Celsius, which is {kelvin} K"));
         }
-        for (key, value, most) in [("dcnu", self.dcnu, MOST_DCNU), ("prnu", self.prnu, MOST_PRNU)] {
+        let patterns = [
+            ("dcnu", self.dcnu, MOST_DCNU),
+            ("prnu", self.prnu, MOST_PRNU),
+            ("prnu_row", self.prnu_row, MOST_LINE_PRNU),
+            ("prnu_column", self.prnu_column, MOST_LINE_PRNU),
+        ];
+        for (key, value, most) in patterns {
             if value > most {
                 return suspect(key, value, "fractions of 1", format!("per cent, which is {}", value / 100.0));
             }
@@ -136,10 +177,18 @@ impl ReadOut {
                 format!("thousands of them, which is {electrons}"),
             );
         }
-        if self.read_noise_e >= self.full_well_e {
+        let noises = [
+            ("read_noise_e", self.read_noise_e),
+            ("row_noise_e", self.row_noise_e),
+            ("column_noise_e", self.column_noise_e),
+            ("dsnu_e", self.dsnu_e),
+            ("dsnu_row_e", self.dsnu_row_e),
+            ("dsnu_column_e", self.dsnu_column_e),
+        ];
+        if let Some((key, noise)) = noises.into_iter().find(|(_, noise)| *noise >= self.full_well_e) {
             return Err(format!(
-                "`read_noise_e` is {}, no less than `full_well_e`, {}; both are in electrons",
-                self.read_noise_e, self.full_well_e
+                "`{key}` is {noise}, no less than `full_well_e`, {}; both are in electrons",
+                self.full_well_e
             ));
         }
         let top_code = 2_f64.powi(i32::try_from(self.bits).unwrap_or_default()) - 1.0;
@@ -225,6 +274,13 @@ pub(crate) mod tests {
             dcnu: 0.2,
             prnu: 0.008,
             read_noise_e: 15.7,
+            row_noise_e: 0.0,
+            column_noise_e: 0.0,
+            dsnu_e: 0.0,
+            dsnu_row_e: 0.0,
+            dsnu_column_e: 0.0,
+            prnu_row: 0.0,
+            prnu_column: 0.0,
             bits: 12,
             bias_adu: 1753.0,
             adu_per_e: 0.058824,

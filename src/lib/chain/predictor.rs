@@ -16,7 +16,7 @@ use crate::propagation::frame::{Sites, quantity_of_sites};
 use crate::propagation::gains;
 use crate::propagation::saturation;
 use crate::propagation::smooth_hue::FirstOrder;
-use crate::propagation::{Equations, FramePrediction, PixelMoments};
+use crate::propagation::{Equations, FramePrediction, PixelMoments, SiteCovariance};
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::PHASES;
 use crate::stages::to_xyz::ColorSettings;
@@ -403,15 +403,15 @@ impl PredictorSettings {
     fn mean_and_covariance(&self, prediction: &FramePrediction, is_curved: bool) -> ([f64; 3], Matrix3<f64>) {
         match prediction {
             FramePrediction::Planes(classes) => {
-                let variances = classes.map(|class| class.moments.variance);
-                (classes.map(|class| class.moments.mean), Matrix3::from_diagonal(&variances.into()))
+                let sites = SiteCovariance::of(classes);
+                let own = Matrix3::from_diagonal(&sites.own.into());
+                (classes.map(|class| class.moments.mean), own + sites.row + sites.column)
             }
             FramePrediction::Pixels(mixture) if self.equations == Equations::Paper => {
                 (mixture.mean, mixture.covariance)
             }
             FramePrediction::Pixels(mixture) => {
-                let variances = mixture.sites.map(|site| site.moments.variance);
-                let first_order = || gains::mean_pixel(&mixture.weights).covariance(variances);
+                let first_order = || gains::mean_pixel(&mixture.weights).of(&mixture.site_covariance());
                 (mixture.mean, if is_curved { mixture.covariance } else { first_order() })
             }
         }
@@ -431,17 +431,36 @@ impl PredictorSettings {
         };
         let variance = |cause: Cause| {
             let of_classes = [0, 1, 2].map(|class| causes[class][cause as usize]);
-            match &gains {
-                None => of_classes,
-                Some(gains) => gains.covariance(of_classes).diagonal().into(),
+            let Some(gains) = &gains else { return of_classes };
+            match cause.shared_by() {
+                None => gains.covariance(of_classes).diagonal().into(),
+                Some(axis) => {
+                    let shared = Matrix3::from_fn(|k, l| (of_classes[k] * of_classes[l]).max(0.0).sqrt());
+                    let none = Matrix3::zeros();
+                    let lines = if axis == 0 { [&shared, &none] } else { [&none, &shared] };
+                    gains.of_lines(lines).diagonal().into()
+                }
             }
         };
         let mut found: Vec<CauseVariance> =
             Cause::ALL.into_iter().map(|cause| CauseVariance { cause, variance: variance(cause) }).collect();
         if let (Some(gains), FramePrediction::Pixels(mixture)) = (&gains, prediction) {
-            let first_order = gains.covariance(mixture.sites.map(|site| site.moments.variance));
+            let sites = mixture.site_covariance();
+            let first_order = gains.of(&sites);
+            if !sites.is_independent() {
+                // What is curved in what rows and columns share.
+                let told = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i]).sum::<f64>());
+                let left = [0, 1, 2].map(|i| first_order[(i, i)] - told[i]);
+                let is_left = (0..3).any(|i| left[i].abs() > 1e-9 * first_order[(i, i)]);
+                let clipped = &mut found[Cause::ClippedPattern as usize].variance;
+                clipped.iter_mut().zip(left).filter(|_| is_left).for_each(|(clipped, left)| *clipped += left);
+            }
             found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| covariance[(i, i)] - first_order[(i, i)]);
         }
+        // Causes that the sensor does not know are not told of.
+        let readout = self.camera.sensor.readout();
+        let is_known = |cause: Cause| readout.as_ref().is_ok_and(|readout| cause.optional(readout) != Some(0.0));
+        found.retain(|entry| is_known(entry.cause));
         found
     }
 
@@ -450,12 +469,12 @@ impl PredictorSettings {
         if self.equations == Equations::Paper {
             return Vec::new();
         }
-        let variances = mixture.sites.map(|site| site.moments.variance);
+        let sites = mixture.site_covariance();
         let entry = |(phase, [column, row]): (usize, [isize; 2])| PhaseCovariance {
             column,
             row,
             class: mixture.weights.class(phase, [0, 0]).letter(),
-            covariance: rows(&gains::pixel(&mixture.weights, phase).covariance(variances)),
+            covariance: rows(&gains::pixel(&mixture.weights, phase).of(&sites)),
         };
         PHASES.into_iter().enumerate().map(entry).collect()
     }
@@ -467,7 +486,13 @@ impl PredictorSettings {
                 let phase = self.patch_at.map(|[x, y]| crate::stages::demosaic::stencil::phase(x, y));
                 mixture.patch_mean_covariance(phase, size)
             }
-            _ => covariance / (size[0] as f64 * size[1] as f64),
+            FramePrediction::Planes(classes) => {
+                let sites = SiteCovariance::of(classes);
+                let [columns, rows] = size.map(|extent| extent as f64);
+                let own = Matrix3::from_diagonal(&sites.own.into());
+                own / (columns * rows) + sites.row / rows + sites.column / columns
+            }
+            FramePrediction::Pixels(_) => covariance / (size[0] as f64 * size[1] as f64),
         }
     }
 

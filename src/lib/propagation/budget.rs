@@ -6,7 +6,9 @@ use super::masters::Dark;
 use super::moments::Equations;
 use super::pattern::Shared;
 use super::photosite::Photosite;
+use crate::camera::readout::ReadOut;
 use crate::metadata::AdcRecord;
+use crate::stages::noise::{LineNoise, NoiseModel};
 use serde::Serialize;
 
 /// A cause of variance.
@@ -17,6 +19,10 @@ pub enum Cause {
     SignalShot,
     /// Photo-response non-uniformity, a fixed pattern.
     Prnu,
+    /// Non-uniformity of the response from row to row, a fixed pattern.
+    PrnuRow,
+    /// Non-uniformity of the response from column to column, a fixed pattern.
+    PrnuColumn,
     /// Shot noise of the dark signal.
     DarkShot,
     /// Dark-current non-uniformity, a fixed pattern.
@@ -25,6 +31,16 @@ pub enum Cause {
     ShotTimesPattern,
     /// Read noise.
     Read,
+    /// Noise that the photosites of a row have in common.
+    RowNoise,
+    /// Noise that the photosites of a column have in common.
+    ColumnNoise,
+    /// Offsets of photosites, a fixed pattern.
+    Dsnu,
+    /// Offsets of rows, a fixed pattern.
+    DsnuRow,
+    /// Offsets of columns, a fixed pattern.
+    DsnuColumn,
     /// Full well, which takes from the variance.
     FullWell,
     /// Rounding to whole codes.
@@ -39,13 +55,20 @@ pub enum Cause {
 
 impl Cause {
     /// All causes, in the order in which they act.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 18] = [
         Self::SignalShot,
         Self::Prnu,
+        Self::PrnuRow,
+        Self::PrnuColumn,
         Self::DarkShot,
         Self::Dcnu,
         Self::ShotTimesPattern,
         Self::Read,
+        Self::RowNoise,
+        Self::ColumnNoise,
+        Self::Dsnu,
+        Self::DsnuRow,
+        Self::DsnuColumn,
         Self::FullWell,
         Self::Quantization,
         Self::Rails,
@@ -58,10 +81,17 @@ impl Cause {
         match self {
             Self::SignalShot => "signal_shot",
             Self::Prnu => "prnu",
+            Self::PrnuRow => "prnu_row",
+            Self::PrnuColumn => "prnu_column",
             Self::DarkShot => "dark_shot",
             Self::Dcnu => "dcnu",
             Self::ShotTimesPattern => "shot_times_pattern",
             Self::Read => "read",
+            Self::RowNoise => "row_noise",
+            Self::ColumnNoise => "column_noise",
+            Self::Dsnu => "dsnu",
+            Self::DsnuRow => "dsnu_row",
+            Self::DsnuColumn => "dsnu_column",
             Self::FullWell => "full_well",
             Self::Quantization => "quantization",
             Self::Rails => "rails",
@@ -72,12 +102,49 @@ impl Cause {
 
     /// Whether it is the same in every exposure of one sensor.
     pub fn is_fixed_pattern(self) -> bool {
-        matches!(self, Self::Prnu | Self::Dcnu | Self::ClippedPattern)
+        PATTERNS.contains(&self) || OFFSETS.contains(&self) || self == Self::ClippedPattern
+    }
+
+    /// Whether photosites of a row (0), or of a column (1), share it; none where each has its own.
+    pub fn shared_by(self) -> Option<usize> {
+        match self {
+            Self::RowNoise | Self::DsnuRow | Self::PrnuRow => Some(0),
+            Self::ColumnNoise | Self::DsnuColumn | Self::PrnuColumn => Some(1),
+            _ => None,
+        }
+    }
+
+    /// What a sensor says of a cause that few sensors have; none of others.
+    pub fn optional(self, readout: &ReadOut) -> Option<f64> {
+        match self {
+            Self::RowNoise => Some(readout.row_noise_e),
+            Self::ColumnNoise => Some(readout.column_noise_e),
+            Self::Dsnu => Some(readout.dsnu_e),
+            Self::DsnuRow => Some(readout.dsnu_row_e),
+            Self::DsnuColumn => Some(readout.dsnu_column_e),
+            Self::PrnuRow => Some(readout.prnu_row),
+            Self::PrnuColumn => Some(readout.prnu_column),
+            _ => None,
+        }
     }
 }
 
+/// Fixed patterns of the charge.
+const PATTERNS: [Cause; 4] = [Cause::Prnu, Cause::PrnuRow, Cause::PrnuColumn, Cause::Dcnu];
+
+/// What is added to the charge as it is read.
+const ADDED: [Cause; 6] =
+    [Cause::Read, Cause::RowNoise, Cause::ColumnNoise, Cause::Dsnu, Cause::DsnuRow, Cause::DsnuColumn];
+
+/// Fixed patterns of it.
+const OFFSETS: [Cause; 3] = [Cause::Dsnu, Cause::DsnuRow, Cause::DsnuColumn];
+
 /// Variances by cause, in the order of [`Cause::ALL`]; they add up to the whole variance.
 pub type Budget = [f64; Cause::ALL.len()];
+
+fn sum_of(budget: &Budget, causes: &[Cause]) -> f64 {
+    causes.iter().map(|cause| budget[*cause as usize]).sum()
+}
 
 /// The share of a variance that is left of it below which its causes are told in proportion: their differences would be lost in
 /// rounding.
@@ -86,10 +153,10 @@ const NEXT_TO_NOTHING: f64 = 1e-6;
 /// The causes of what full well leaves of a charge that is next to always full: patterns and shot noise share it as they would
 /// without full well.
 fn share_what_is_left(mut budget: Budget, fixed: f64, whole: f64) -> Budget {
-    let read = budget[Cause::Read as usize];
+    let read = sum_of(&budget, &ADDED);
     let shot = [Cause::SignalShot, Cause::DarkShot, Cause::ShotTimesPattern];
-    for (causes, left) in [(&[Cause::Prnu, Cause::Dcnu][..], fixed), (&shot[..], whole - fixed - read)] {
-        let sum: f64 = causes.iter().map(|cause| budget[*cause as usize]).sum();
+    for (causes, left) in [(&PATTERNS[..], fixed), (&shot[..], whole - fixed - read)] {
+        let sum = sum_of(&budget, causes);
         for cause in causes.iter().filter(|_| sum > 0.0) {
             budget[*cause as usize] *= (left / sum).max(0.0);
         }
@@ -119,15 +186,28 @@ impl Photosite {
         let darks: Vec<([f64; 2], Budget)> = self.darks.iter().flatten().map(of_dark).collect();
         let mut budget = Cause::ALL.map(|cause| match cause {
             Cause::Dcnu | Cause::ClippedPattern => 0.0,
+            Cause::Dsnu | Cause::DsnuRow | Cause::DsnuColumn => light[cause as usize] * self.offset_left(cause).powi(2),
             _ => {
                 let kept = |kept: &[f64; 2]| kept[usize::from(cause == Cause::Quantization)];
                 light[cause as usize] + darks.iter().map(|(of, dark)| kept(of) * dark[cause as usize]).sum::<f64>()
             }
         });
         let left = self.less_dark(adc, expected_e, true).moments.variance - budget.iter().sum::<f64>();
-        let is_left = left.abs() > 1e-9 * (light[Cause::Dcnu as usize] + light[Cause::Prnu as usize]);
+        let is_left = left.abs() > 1e-9 * (sum_of(&light, &PATTERNS) + sum_of(&light, &OFFSETS));
         budget[Cause::ClippedPattern as usize] = if is_left { left } else { 0.0 };
         budget
+    }
+
+    /// The share of fixed offsets that the averages which came off leave.
+    fn offset_left(&self, cause: Cause) -> f64 {
+        let part = |model: &NoiseModel| match cause {
+            Cause::Dsnu => model.lines.dsnu_e,
+            Cause::DsnuRow => model.lines.dsnu_row_e,
+            _ => model.lines.dsnu_column_e,
+        };
+        let own = part(&self.model);
+        let off: f64 = self.darks.iter().flatten().map(|dark| dark.weight * part(&dark.model)).sum();
+        if own > 0.0 { 1.0 - off / own } else { 0.0 }
     }
 
     /// The variance of the charge and of its read noise, in e².
@@ -137,7 +217,7 @@ impl Photosite {
         if self.equations == Equations::Exact && law.reaches_full_well() {
             let unclipped: f64 = budget.iter().sum();
             let reading = law.of_electrons();
-            let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
+            let patterns = sum_of(&budget, &PATTERNS);
             let whole = law.predict(&reading).moments.variance;
             let fixed = Shared::of_one(&law, &reading).min(whole);
             if fixed < NEXT_TO_NOTHING * patterns || whole < NEXT_TO_NOTHING * unclipped {
@@ -159,16 +239,27 @@ impl Photosite {
             let shot = if shot { rate } else { 0.0 };
             [mean * mean * shot, pattern * rate * rate, if exact { pattern * shot } else { 0.0 }]
         };
-        let light = product(expected_e, model.signal_shot, model.prnu);
+        let light = product(expected_e, model.signal_shot, model.response());
         let dark = product(model.dark_e, model.dark_shot, model.dcnu);
         let mut budget = [0.0; Cause::ALL.len()];
         let mut set = |cause: Cause, variance: f64| budget[cause as usize] = variance;
         set(Cause::SignalShot, light[0]);
-        set(Cause::Prnu, light[1]);
+        let LineNoise { prnu_row, prnu_column, .. } = model.lines;
+        let square = model.response().powi(2);
+        for (cause, part) in [(Cause::PrnuRow, prnu_row), (Cause::PrnuColumn, prnu_column)] {
+            set(cause, if part > 0.0 { light[1] * part * part / square } else { 0.0 });
+        }
+        let own = if model.lines.has_gains() { model.prnu * model.prnu / square } else { 1.0 };
+        set(Cause::Prnu, light[1] * own);
         set(Cause::DarkShot, dark[0]);
         set(Cause::Dcnu, dark[1]);
         set(Cause::ShotTimesPattern, light[2] + dark[2]);
         set(Cause::Read, model.read_noise_e.powi(2));
+        set(Cause::RowNoise, model.lines.row_noise_e.powi(2));
+        set(Cause::ColumnNoise, model.lines.column_noise_e.powi(2));
+        set(Cause::Dsnu, model.lines.dsnu_e.powi(2));
+        set(Cause::DsnuRow, model.lines.dsnu_row_e.powi(2));
+        set(Cause::DsnuColumn, model.lines.dsnu_column_e.powi(2));
         budget
     }
 
@@ -183,7 +274,7 @@ impl Photosite {
             let endless = law.endless_variance(adc).unwrap_or(whole);
             budget[Cause::Quantization as usize] = endless - charge;
             if !law.is_plain(adc) {
-                let patterns = budget[Cause::Prnu as usize] + budget[Cause::Dcnu as usize];
+                let patterns = sum_of(&budget, &PATTERNS) + sum_of(&budget, &OFFSETS);
                 let clipped = self.shared(adc, (expected_e, None), (self, None), false).light.min(whole) - patterns;
                 let further = clipped - budget[Cause::ClippedPattern as usize];
                 let is_told = further.abs() > 1e-9 * patterns;

@@ -54,6 +54,6 @@ pub(super) fn product(rate: f64, shot: bool, kind: PoissonKind, sigma: f64) -> N
 
 /// Cumulants of a photosite's charge, light and dark together, before full well and read-out.
 pub(super) fn charge(model: &NoiseModel, expected_e: f64) -> NearlyNormal {
-    let light = product(expected_e, model.signal_shot, model.poisson, model.prnu);
+    let light = product(expected_e, model.signal_shot, model.poisson, model.response());
     light.plus(product(model.dark_e, model.dark_shot, model.poisson, model.dcnu))
 }

@@ -1,13 +1,14 @@
 //! Moments of photosites that were divided by a flat field.
 
 use super::charge::charge;
-use super::masters::{Dark, Drawn};
+use super::masters::{Dark, Drawn, Flat};
 use super::moments::Prediction;
 use super::photosite::Photosite;
 use crate::metadata::AdcRecord;
 use crate::numerics::averages::Combine;
 use crate::numerics::gauss::panel;
 use crate::numerics::normal::{cumulative, density};
+use crate::stages::noise::{LineNoise, NoiseModel};
 
 /// Sensitivities max(0, 1 + σ z) and their weights.
 fn sensitivities(sigma: f64) -> Vec<(f64, f64)> {
@@ -62,7 +63,7 @@ impl Photosite {
         }
         let bias = |darks: &[Option<Dark>]| darks.iter().flatten().find(|dark| dark.is_bias).copied();
         let in_both = bias(&self.darks).zip(bias(&flat.darks)).filter(|(a, b)| a.frames == b.frames);
-        let [lights, darks] = [self.model.prnu, self.model.dcnu].map(sensitivities);
+        let [lights, darks] = [self.model.response(), self.model.dcnu].map(sensitivities);
         let mut sums = [0.0; 7];
         for (&(x, of_x), &(u, of_u)) in lights.iter().flat_map(|x| darks.iter().map(move |u| (x, u))) {
             let site = [x, u];
@@ -85,6 +86,8 @@ impl Photosite {
             let square = ((above.mean.powi(2) + above.variance) * of_square - 4.0 * above.mean * both) / (f * f);
             // Third cumulant of the quotient, of its own noise and of the curvature of 1/F.
             let noise = above.variance / (f * f);
+            let offset = self.offsets_left(&adc, &flat, above.mean / f) / f;
+            let square = square + offset;
             let third = (above.third - above.mean.powi(3) * skew) / f.powi(3)
                 + 6.0 * first * rho * (noise + first * first * rho);
             let of_flat = f * f + below.variance;
@@ -104,6 +107,23 @@ impl Photosite {
         Some(Prediction { common: off / flat.photosites[class].max(1.0), ..prediction })
     }
 
+    /// The variance, in ADU², of the fixed offsets that darks leave of the codes and of the flat field, which counts by the
+    /// ratio of the two.
+    fn offsets_left(&self, adc: &AdcRecord, flat: &Flat, ratio: f64) -> f64 {
+        let left = |own: &NoiseModel, darks: &[Option<Dark>], part: fn(&LineNoise) -> f64| {
+            let off: f64 = darks.iter().flatten().map(|dark| dark.weight * part(&dark.model.lines)).sum();
+            part(&own.lines) - off
+        };
+        let parts: [fn(&LineNoise) -> f64; 3] =
+            [|lines| lines.dsnu_e, |lines| lines.dsnu_row_e, |lines| lines.dsnu_column_e];
+        let sum: f64 = parts
+            .map(|part| left(&self.model, &self.darks, part) - ratio * left(&flat.frames.model, &flat.darks, part))
+            .iter()
+            .map(|left| left * left)
+            .sum();
+        adc.adu_per_e * adc.adu_per_e * sum
+    }
+
     /// The variance after division by the flat field; where [`Self::divided`] gives none, to first order: that of the codes
     /// less the pattern of the response, and what the noise of the flat field adds.
     pub(super) fn variance_divided(&self, class: usize, expected_e: f64) -> f64 {
@@ -114,14 +134,14 @@ impl Photosite {
         let (Some(adc), Some(flat)) = (self.adc, self.flat) else { return own };
         let below = flat.frames.drawn(&adc, flat.expected_e[class], [1.0; 2]).less(&flat.darks, &adc, [1.0; 2]);
         let level = expected_e * adc.adu_per_e;
-        (own - (self.model.prnu * level).powi(2)).max(0.0) + below.variance * (level / below.mean).powi(2)
+        (own - (self.model.response() * level).powi(2)).max(0.0) + below.variance * (level / below.mean).powi(2)
     }
 
     /// Whether rounding is a uniform error of an average of such codes: averages, or photosites, scatter.
     fn is_smooth(&self, average: &Dark, adc: &AdcRecord, expected_e: f64) -> bool {
         let temporal = average.std_codes(adc, expected_e) * average.kept()[0].sqrt();
         let Self { model, .. } = self;
-        let patterns = adc.adu_per_e * (model.prnu * expected_e).hypot(model.dcnu * model.dark_e);
+        let patterns = adc.adu_per_e * (model.response() * expected_e).hypot(model.dcnu * model.dark_e).hypot(model.offsets());
         match average.combine {
             Combine::Mean => true,
             Combine::Median => temporal.hypot(patterns) >= LEAST_CODES,
@@ -136,7 +156,7 @@ impl Photosite {
         let of_charge = charge(&self.model, expected_e);
         let rounding = adc.rounding_at(expected_e + self.model.dark_e);
         let temporal = Drawn::codes(&self.model, adc, expected_e, [1.0; 2]).variance - rounding;
-        let read_e = self.model.read_noise_e;
+        let read_e = self.model.added();
         let reach_e = REACH * (of_charge.variance + read_e * read_e).sqrt();
         let level = |charge_e: f64| adc.level_at(charge_e);
         !adc.is_bent()

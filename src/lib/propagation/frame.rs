@@ -4,6 +4,7 @@
 //! pixels ([`PixelMoments`]).
 
 use super::curved;
+use super::lines::LineCovariance;
 use super::divided::NARROW;
 use super::masters::{Dark, Flat};
 use super::moments::{Equations, Prediction};
@@ -139,7 +140,7 @@ impl Sites {
         let expected_e = scene.expected_electrons.ok_or(Unpredictable::Missing("scene.expected_electrons"))?;
         let model = noise_model(frame)?;
         let photosite = Photosite::of_electrons(model, equations);
-        let (photosite, moments) = match quantity_of_sites(frame) {
+        let (photosite, mut moments) = match quantity_of_sites(frame) {
             QuantityKind::ExpectedElectrons => {
                 (photosite, expected_e.map(|mean| Prediction::of_cumulants(mean, 0.0, 0.0, 0.0)))
             }
@@ -153,6 +154,14 @@ impl Sites {
             }
             _ => return Err(Unpredictable::Beyond("only electrons, ADU and what is made of them are predicted")),
         };
+        photosite.check_lines()?;
+        if quantity_of_sites(frame) != QuantityKind::ExpectedElectrons {
+            let lines = photosite.lines(expected_e)?;
+            if frame.metadata.is_transferred() && lines != [LineCovariance::default(); 3] {
+                return Err(Unpredictable::Beyond("charge transfer before rows and columns that share noise"));
+            }
+            moments.iter_mut().zip(lines).for_each(|(moments, lines)| moments.lines = lines);
+        }
         Ok(Self { photosite, expected_e, moments })
     }
 
@@ -352,7 +361,7 @@ fn transferred(
         .map_err(|_| Unpredictable::Beyond("its charge transfer efficiency is impossible"))?;
     let of_variance = transfer.mean_square_share();
     let slope = photosite.slope();
-    let after = photosite.model.read_noise_e.powi(2) * slope * slope + rounding;
+    let after = photosite.model.added().powi(2) * slope * slope + rounding;
     Ok(classes.map(|class| {
         let mean = class.moments.mean * uniform_share(cte);
         let variance = (class.moments.variance - after).max(0.0) * of_variance + after.min(class.moments.variance);

@@ -2,7 +2,12 @@
 //!
 //! With weights w on sites s of independent noise, cov(Σ w s, Σ w′ s) = Σ w w′ σ², where σ² is that of the site's
 //! class. So every covariance here is a sum over the classes of a gain times a variance.
+//!
+//! What photosites share by rows adds Σ_r Σ_kl A_rk A′_rl R_kl, A_rk the sum of the weights on the sites of class k in row r and R
+//! their covariance ([`SiteCovariance`]); so do columns.
 
+use super::covariance::PAIRS;
+use super::lines::SiteCovariance;
 use crate::cfa::Class;
 use crate::stages::demosaic::stencil::{PHASES, REACH, phase};
 use crate::stages::demosaic::weights::Weights;
@@ -10,27 +15,73 @@ use nalgebra::Matrix3;
 
 /// What each class adds to a covariance of the three channels, per variance of its photosites.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gains(pub [Matrix3<f64>; 3]);
+pub struct Gains {
+    /// Of what is a photosite's own.
+    pub own: [Matrix3<f64>; 3],
+    /// Of what the photosites of rows and of columns share, by pairs of classes.
+    pub lines: [LineGains; 2],
+}
+
+/// What each pair of classes, in the order of [`PAIRS`], adds to a covariance of the three channels, per covariance of their
+/// photosites within rows, or within columns.
+pub type LineGains = [Matrix3<f64>; PAIRS.len()];
+
+/// What the sites of a row, or column, give to the three channels, by classes.
+type LineWeights = [[f64; 3]; 3];
 
 impl Gains {
     /// No gain.
     pub fn zero() -> Self {
-        Self([Matrix3::zeros(); 3])
+        Self { own: [Matrix3::zeros(); 3], lines: [[Matrix3::zeros(); PAIRS.len()]; 2] }
+    }
+
+    /// The covariance for photosites of such covariances.
+    pub fn of(&self, sites: &SiteCovariance) -> Matrix3<f64> {
+        let own = self.covariance(sites.own);
+        if sites.is_independent() { own } else { own + self.of_lines(sites.lines()) }
+    }
+
+    /// What the covariances of photosites within rows and columns give.
+    pub fn of_lines(&self, lines: [&Matrix3<f64>; 2]) -> Matrix3<f64> {
+        let of_axis = |(gains, covariance): (&LineGains, &Matrix3<f64>)| -> Matrix3<f64> {
+            PAIRS.iter().zip(gains).map(|(&[k, l], gain)| covariance[(k, l)] * gain).sum()
+        };
+        self.lines.iter().zip(lines).map(of_axis).sum()
     }
 
     /// The covariance at given variances of the photosites of R, G and B.
     pub fn covariance(&self, variances: [f64; 3]) -> Matrix3<f64> {
-        self.0[0] * variances[0] + self.0[1] * variances[1] + self.0[2] * variances[2]
+        self.own[0] * variances[0] + self.own[1] * variances[1] + self.own[2] * variances[2]
     }
 
     /// The gains of the channels that `matrix` makes of these: Σ′ = M Σ Mᵀ.
     #[must_use]
     pub fn through(&self, matrix: &Matrix3<f64>) -> Self {
-        Self(self.0.map(|gain| matrix * gain * matrix.transpose()))
+        let carried = |gain: Matrix3<f64>| matrix * gain * matrix.transpose();
+        Self { own: self.own.map(carried), lines: self.lines.map(|gains| gains.map(carried)) }
     }
 
     fn add(&mut self, class: Class, first: [f64; 3], second: [f64; 3], times: f64) {
-        self.0[class as usize] += Matrix3::from_fn(|i, j| times * first[i] * second[j]);
+        self.own[class as usize] += Matrix3::from_fn(|i, j| times * first[i] * second[j]);
+    }
+
+    /// Adds a row (0), or a column (1), so many times.
+    fn add_line(&mut self, axis: usize, first: &LineWeights, second: &LineWeights, times: f64) {
+        for (gain, [k, l]) in self.lines[axis].iter_mut().zip(PAIRS) {
+            *gain += Matrix3::from_fn(|i, j| {
+                let both = first[k][i] * second[l][j];
+                times * if k == l { both } else { both + first[l][i] * second[k][j] }
+            });
+        }
+    }
+
+    fn mean(all: &[Self; PHASES.len()]) -> Self {
+        let share = 1.0 / PHASES.len() as f64;
+        let mean = |of: &dyn Fn(&Self) -> Matrix3<f64>| all.iter().map(of).sum::<Matrix3<f64>>() * share;
+        Self {
+            own: [0, 1, 2].map(|class| mean(&|gains| gains.own[class])),
+            lines: [0, 1].map(|axis| std::array::from_fn(|pair| mean(&|gains| gains.lines[axis][pair]))),
+        }
     }
 }
 
@@ -41,8 +92,7 @@ pub fn pixel(weights: &Weights, phase: usize) -> Gains {
 
 /// Gains of the covariance of a pixel over all phases, that of the pixels of a large frame.
 pub fn mean_pixel(weights: &Weights) -> Gains {
-    let phases = [0, 1, 2, 3].map(|phase| pixel(weights, phase));
-    Gains([0, 1, 2].map(|class| phases.iter().map(|gains| gains.0[class]).sum::<Matrix3<f64>>() / 4.0))
+    Gains::mean(&[0, 1, 2, 3].map(|phase| pixel(weights, phase)))
 }
 
 /// Gains of the covariance of the channels of a pixel of one phase (rows) with those of the pixel `lag` (column, row)
@@ -55,6 +105,15 @@ pub fn autocovariance(weights: &Weights, phase: usize, lag: [isize; 2]) -> Gains
             let first = [0, 1, 2].map(|channel| weights.stencil(phase, channel).at([x, y]));
             let second = [0, 1, 2].map(|channel| weights.stencil(other, channel).at([x - lag[0], y - lag[1]]));
             gains.add(weights.class(phase, [x, y]), first, second, 1.0);
+        }
+    }
+    // However far apart along a row two pixels are, they share it.
+    for axis in [0, 1] {
+        let lag = lag[1 - axis];
+        for line in (-REACH).max(lag - REACH)..=REACH.min(lag + REACH) {
+            let first = line_weights(weights, phase, axis, line);
+            let second = line_weights(weights, other, axis, line - lag);
+            gains.add_line(axis, &first, &second, 1.0);
         }
     }
     gains
@@ -71,8 +130,9 @@ pub fn patch_mean(weights: &Weights, phase: usize, size: [usize; 2]) -> Gains {
     let count = size[0] as f64 * size[1] as f64;
     let [columns, rows] = size.map(distinct_sites);
     let [width, height] = size.map(usize::cast_signed);
-    for &(y, times_y) in &rows {
-        for &(x, times_x) in &columns {
+    let mut lines = [vec![LineWeights::default(); rows.len()], vec![LineWeights::default(); columns.len()]];
+    for (row, &(y, times_y)) in rows.iter().enumerate() {
+        for (column, &(x, times_x)) in columns.iter().enumerate() {
             let mut weight = [0.0; 3];
             for dy in (y - height + 1).max(-REACH)..=y.min(REACH) {
                 for dx in (x - width + 1).max(-REACH)..=x.min(REACH) {
@@ -83,16 +143,38 @@ pub fn patch_mean(weights: &Weights, phase: usize, size: [usize; 2]) -> Gains {
                 }
             }
             let mean = weight.map(|weight| weight / count);
-            gains.add(weights.class(phase, [x, y]), mean, mean, times_x * times_y);
+            let class = weights.class(phase, [x, y]);
+            gains.add(class, mean, mean, times_x * times_y);
+            for (channel, mean) in mean.into_iter().enumerate() {
+                lines[0][row][class as usize][channel] += times_x * mean;
+                lines[1][column][class as usize][channel] += times_y * mean;
+            }
+        }
+    }
+    for (axis, (lines, places)) in lines.iter().zip([&rows, &columns]).enumerate() {
+        for (line, (_, times)) in lines.iter().zip(places) {
+            gains.add_line(axis, line, line, *times);
         }
     }
     gains
 }
 
+/// What the sites of a row (axis 0), or column (1), `line` away from a pixel give to its channels.
+fn line_weights(weights: &Weights, phase: usize, axis: usize, line: isize) -> LineWeights {
+    let mut found = LineWeights::default();
+    for along in -REACH..=REACH {
+        let offset = if axis == 0 { [along, line] } else { [line, along] };
+        let class = weights.class(phase, offset) as usize;
+        for (channel, sum) in found[class].iter_mut().enumerate() {
+            *sum += weights.stencil(phase, channel).at(offset);
+        }
+    }
+    found
+}
+
 /// Gains of the covariance of the means of patches whose corner may have any phase, the average over the four.
 pub fn mean_patch_mean(weights: &Weights, size: [usize; 2]) -> Gains {
-    let phases = [0, 1, 2, 3].map(|phase| patch_mean(weights, phase, size));
-    Gains([0, 1, 2].map(|class| phases.iter().map(|gains| gains.0[class]).sum::<Matrix3<f64>>() / 4.0))
+    Gains::mean(&[0, 1, 2, 3].map(|phase| patch_mean(weights, phase, size)))
 }
 
 /// Along one axis of a patch of `length` pixels that starts at 0: the sites that differ in what they give to its mean,
@@ -163,7 +245,7 @@ mod tests {
             let gains = mean_patch_mean(&weights, [side as usize; 2]);
             for (class, share) in [(Class::Red, 4.0), (Class::Green, 2.0), (Class::Blue, 4.0)] {
                 let index = class as usize;
-                let total: f64 = gains.0.iter().map(|gain| gain[(index, index)]).sum();
+                let total: f64 = gains.own.iter().map(|gain| gain[(index, index)]).sum();
                 // The rim is REACH/side = 0.15 % of the sites on each side.
                 assert!((total * n / share - 1.0).abs() < 0.01, "{method:?} {class:?}: {}", total * n);
             }
@@ -190,7 +272,8 @@ mod tests {
                     let back = autocovariance(&weights, other, [-lag[0], -lag[1]]).covariance([2.0, 3.0, 5.0]);
                     assert!(close(&there, &back.transpose(), 1e-14));
                 }
-                assert_eq!(autocovariance(&weights, phase, [7, 0]), Gains::zero());
+                assert_eq!(autocovariance(&weights, phase, [7, 7]), Gains::zero());
+                assert_eq!(autocovariance(&weights, phase, [7, 0]).own, Gains::zero().own);
             }
         }
     }

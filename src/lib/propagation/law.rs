@@ -11,7 +11,7 @@ use super::memory::Memory;
 use super::moments::Prediction;
 pub(super) use super::node::Law;
 use super::node::{MANY_WELLS, Node};
-use super::reading::{ENDLESS, Moments, Reading};
+use super::reading::{ENDLESS, Moments, Reading, codes_of};
 use super::rectified::{corrections, signed_nodes};
 use crate::frame::to_sample;
 use crate::metadata::AdcRecord;
@@ -33,7 +33,7 @@ impl Law {
             let rate = if shot.is_none() { f64::from(to_sample(rate)) } else { rate };
             Charge { rate: rate.max(0.0), shot, pattern: if rate > 0.0 { pattern } else { 0.0 } }
         };
-        let mut light = charge(expected_e, model.signal_shot, model.prnu);
+        let mut light = charge(expected_e, model.signal_shot, model.response());
         let mut dark = charge(model.dark_e, model.dark_shot, model.dcnu);
         // The sum of two counts without patterns is a count.
         if light.pattern <= 0.0 && dark.pattern <= 0.0 && light.shot == dark.shot {
@@ -41,7 +41,7 @@ impl Law {
             dark.rate = 0.0;
         }
         let full_well_e = f64::from(to_sample(model.full_well_e));
-        Self { light, dark, full_well_e, read_noise_e: model.read_noise_e }
+        Self { light, dark, full_well_e, read_noise_e: model.added() }
     }
 
     /// Whether full well is within reach of any photosite.
@@ -63,12 +63,32 @@ impl Law {
             && adc.electrons_at(top) > high
     }
 
+    /// Whether full well, or sensitivities of zero, cut the charge off.
+    pub fn is_cut(&self) -> bool {
+        self.reaches_full_well() || self.light.is_rectified(self.full_well_e) || self.dark.is_rectified(self.full_well_e)
+    }
+
+    /// Whether no end of the codes is within reach.
+    pub fn is_within(&self, adc: &AdcRecord) -> bool {
+        let [low, high] = self.reach();
+        adc.electrons_at(0.0) < low && adc.electrons_at(f64::from(adc.top_code())) > high
+    }
+
+    /// The same where all photosites have this share of the light, whose spread over them stays; shot noise is that of the
+    /// light.
+    pub fn gained(&self, share: f64) -> Self {
+        let share = share.max(f64::MIN_POSITIVE);
+        let light = Charge { rate: self.light.rate * share, pattern: self.light.pattern / share, ..self.light };
+        Self { light, ..*self }
+    }
+
     /// Whether the charge is so far above full well that its laws are cut off at floors.
     pub fn has_floors(&self) -> bool {
         self.light.rate + self.dark.rate > MANY_WELLS * self.full_well_e
     }
 
-    fn least_pattern_std(&self) -> f64 {
+    /// The smallest spread that patterns give to counts that matter, e⁻.
+    pub fn least_pattern_std(&self) -> f64 {
         self.light.least_pattern_std().hypot(self.dark.least_pattern_std())
     }
 
@@ -175,6 +195,15 @@ impl Law {
     /// What is predicted of a reading.
     pub fn predict(&self, reading: &Reading) -> Prediction {
         Prediction::about(reading.center, &self.expect(reading))
+    }
+
+    /// Mean slope of the codes by what is added to the charge, ADU per e⁻: that of the mean over a tenth of a code to either
+    /// side.
+    pub fn mean_slope(&self, adc: &AdcRecord) -> f64 {
+        let step = 0.1 / adc.sample_per_e(self.about_e()).abs().max(f64::MIN_POSITIVE);
+        let reading = self.of_codes(adc, codes_of(adc));
+        let [above, below] = [step, -step].map(|offset_e| self.expect(&Reading { offset_e, ..reading })[0]);
+        (above - below) / (2.0 * step)
     }
 
     /// The variance that codes without ends would have; none where the ends are out of reach.

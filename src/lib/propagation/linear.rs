@@ -23,13 +23,13 @@ pub struct LinearNoise {
 impl LinearNoise {
     /// The line of a photosite that a converter reads.
     pub fn of(model: &NoiseModel, adc: &AdcRecord) -> Self {
-        let (mean, pattern, ..) = sensitivity(model.prnu);
+        let (mean, pattern, ..) = sensitivity(model.response());
         let shot = if model.signal_shot { mean * mean + pattern } else { 0.0 };
         let dark = product(model.dark_e, model.dark_shot, model.poisson, model.dcnu).variance;
         let gain = adc.adu_per_e;
         Self {
             slope_adu: gain * shot / mean,
-            offset_adu2: gain * gain * (dark + model.read_noise_e.powi(2)) + 1.0 / 12.0,
+            offset_adu2: gain * gain * (dark + model.added().powi(2)) + 1.0 / 12.0,
         }
     }
 }
@@ -39,6 +39,7 @@ mod tests {
     use super::*;
     use crate::metadata::PoissonKind;
     use crate::propagation::{Equations, Photosite};
+    use crate::stages::noise::LineNoise;
 
     /// The exact moments of codes, at three signals that no end of the range is near. Patterns that are cut off at zero have
     /// theirs by quadrature, good to 10⁻⁷ here; the others are formulas.
@@ -55,6 +56,7 @@ mod tests {
                 dark_shot: true,
                 signal_shot: shot,
                 poisson: PoissonKind::Exact,
+                lines: LineNoise::default(),
             };
             let line = LinearNoise::of(&model, &adc);
             let photosite = Photosite::of_electrons(model, Equations::Exact).digitized(adc);

@@ -186,7 +186,7 @@ impl Drawn {
         let mean_e = x * expected_e + u * model.dark_e;
         Self {
             mean: k * mean_e,
-            variance: k * k * (charge + model.read_noise_e.powi(2)) + adc.rounding_at(mean_e),
+            variance: k * k * (charge + model.read_noise().powi(2)) + adc.rounding_at(mean_e),
             third: if model.poisson == PoissonKind::Exact { k.powi(3) * skew } else { 0.0 },
         }
     }
@@ -229,7 +229,7 @@ impl Flat {
         let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0;
         let off_e: f64 = darks.iter().flatten().map(|dark| dark.weight * dark_e(&dark.model)).sum();
         let left_e = dark_e(&model) - off_e - level_adu / adc.adu_per_e;
-        let light_e = |mean: f64| (mean / adc.adu_per_e - left_e) / sensitivity(model.prnu).0;
+        let light_e = |mean: f64| (mean / adc.adu_per_e - left_e) / sensitivity(model.response()).0;
         Some(Self {
             expected_e: three(&record.means_adu)?.map(light_e),
             photosites: three(&photosites)?,

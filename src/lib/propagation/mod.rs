@@ -15,6 +15,8 @@ mod ends;
 pub mod frame;
 pub mod gains;
 mod law;
+mod lines;
+mod line_sampling;
 pub mod linear;
 pub mod masters;
 mod memory;
@@ -33,6 +35,7 @@ pub mod saturation;
 pub mod smooth_hue;
 
 pub use frame::{FramePrediction, Unpredictable, of_frame};
+pub use lines::{LineCovariance, SiteCovariance};
 pub use moments::{Equations, Prediction};
 pub use photosite::Photosite;
 pub use pixel_moments::PixelMoments;

@@ -1,5 +1,6 @@
 //! What is predicted of a sample, and by which equations.
 
+use super::lines::LineCovariance;
 use crate::names::{Named, serde_by_name};
 use crate::numerics::normal::MeanVariance;
 
@@ -37,6 +38,8 @@ pub struct Prediction {
     pub excess_kurtosis: f64,
     /// Variance of what all samples of the class in a frame are off together, which no number of them averages away.
     pub common: f64,
+    /// What it shares with others of its row and of its column.
+    pub lines: LineCovariance,
 }
 
 impl Prediction {
@@ -44,7 +47,7 @@ impl Prediction {
     pub fn of_cumulants(mean: f64, variance: f64, third: f64, fourth: f64) -> Self {
         let of_spread = |cumulant: f64| if variance > 0.0 { cumulant } else { 0.0 };
         let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) } else { 0.0 };
-        Self { moments: MeanVariance { mean, variance }, third: of_spread(third), excess_kurtosis, common: 0.0 }
+        Self { moments: MeanVariance { mean, variance }, third: of_spread(third), excess_kurtosis, common: 0.0, lines: LineCovariance::default() }
     }
 
     /// The prediction of a variable with these moments 1 to 4 about a center.

@@ -401,7 +401,7 @@ impl<'a> Temporal<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::noise::NoiseModel;
+    use crate::stages::noise::{LineNoise, NoiseModel};
 
     /// Of dark current that fills three of four wells, and none in one: what is left of the variance beside the pattern is the
     /// mean variance of a photosite over exposures, which a fine sum over sensitivities gives by itself.
@@ -421,6 +421,7 @@ mod tests {
                 dark_shot: true,
                 signal_shot: true,
                 poisson: PoissonKind::Exact,
+                lines: LineNoise::default(),
             };
             let law = Law::of(&model, light_e);
             let reading = law.of_electrons();

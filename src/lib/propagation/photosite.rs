@@ -2,6 +2,7 @@
 
 use super::charge::{charge, sensitivity};
 use super::law::Law;
+use super::lines::offsets_of_both;
 use super::masters::{Dark, Flat, MOST_DARKS};
 use super::moments::{Equations, Prediction};
 use super::pattern::{Seen, Shared};
@@ -28,7 +29,7 @@ const VISIBLE_IN_BOTH: f64 = 0.65;
 /// ```
 /// use cyanometer::metadata::PoissonKind;
 /// use cyanometer::propagation::{Equations, Photosite};
-/// use cyanometer::stages::noise::NoiseModel;
+/// use cyanometer::stages::noise::{LineNoise, NoiseModel};
 ///
 /// let model = NoiseModel {
 ///     dark_e: 0.0,
@@ -39,6 +40,7 @@ const VISIBLE_IN_BOTH: f64 = 0.65;
 ///     dark_shot: true,
 ///     signal_shot: true,
 ///     poisson: PoissonKind::Exact,
+///     lines: LineNoise::default(),
 /// };
 /// let variance = |equations| Photosite::of_electrons(model, equations).moments(10_000.0).moments.variance;
 /// // Shot noise 10⁴, non-uniformity (10⁴ · 0.01)², read noise 10².
@@ -113,7 +115,7 @@ impl Photosite {
 
     pub(super) fn electrons(&self, expected_e: f64) -> Prediction {
         let model = &self.model;
-        let read = model.read_noise_e.powi(2);
+        let read = model.added().powi(2);
         match self.equations {
             Equations::Paper => {
                 // Eq. 11 of [HP2005]; each source counts only where it is drawn.
@@ -214,11 +216,11 @@ impl Photosite {
 
     /// Whether roundings of its codes and of those of dark frames have something in common: neither scatters over codes from
     /// exposure to exposure, nor does light from photosite to photosite.
-    fn rounds_as(&self, adc: &AdcRecord, expected_e: f64, dark: &Dark, of_dark: &Self) -> bool {
+    pub(super) fn rounds_as(&self, adc: &AdcRecord, expected_e: f64, dark: &Dark, of_dark: &Self) -> bool {
         let own = Dark::mean_of(self.model, 1).std_codes(adc, expected_e);
-        let light = adc.adu_per_e * self.pattern(self.model.prnu).sqrt() * expected_e;
+        let light = adc.adu_per_e * self.pattern(self.model.response()).sqrt() * expected_e;
         self.equations == Equations::Exact
-            && of_dark.model.dark_e * of_dark.model.dcnu > 0.0
+            && (of_dark.model.dark_e * of_dark.model.dcnu > 0.0 || of_dark.model.offsets() > 0.0)
             && own.hypot(dark.std_codes(adc, 0.0)) < VISIBLE_IN_BOTH
             && light < MANY_CODES / 2.0
     }
@@ -238,11 +240,27 @@ impl Photosite {
         if self.equations == Equations::Paper || is_plain {
             let square = adc.adu_per_e * adc.adu_per_e;
             let [own, of_dark] = [self, dark].map(|site| site.dark_pattern() * square);
-            let light = self.pattern(self.model.prnu) * expected_e * expected_e * square;
-            return Shared { light: light + own, dark: of_dark, both: (own * of_dark).sqrt(), median: None };
+            let light = self.pattern(self.model.response()) * expected_e * expected_e * square;
+            let shared = Shared { light: light + own, dark: of_dark, both: (own * of_dark).sqrt(), median: None };
+            return self.with_offsets(shared, dark, [adc.adu_per_e; 2]);
         }
         let seen = |law: Law, median_of| Seen { law, reading: law.of_codes(adc, codes_of(adc)), median_of, is_fine };
-        Shared::of(seen(law, median_of), seen(of_dark, dark_median_of))
+        let shared = Shared::of(seen(law, median_of), seen(of_dark, dark_median_of));
+        if self.model.offsets() == 0.0 && dark.model.offsets() == 0.0 {
+            return shared;
+        }
+        self.with_offsets(shared, dark, [law.mean_slope(adc), of_dark.mean_slope(adc)])
+    }
+
+    /// The same with the fixed offsets of photosites, which codes follow with such slopes.
+    fn with_offsets(&self, shared: Shared, dark: &Self, [slope, of_dark]: [f64; 2]) -> Shared {
+        let (a, b) = (&self.model, &dark.model);
+        Shared {
+            light: shared.light + slope * slope * a.offsets().powi(2),
+            dark: shared.dark + of_dark * of_dark * b.offsets().powi(2),
+            both: shared.both + slope * of_dark * offsets_of_both(a, b),
+            ..shared
+        }
     }
 
     /// Variance of the fixed pattern of the dark current, λ² c₂, in e².
@@ -266,6 +284,7 @@ mod tests {
     use crate::numerics::normal::{self, NearlyNormal};
     use crate::propagation::budget::Cause;
     use crate::propagation::charge::product;
+    use crate::stages::noise::LineNoise;
 
     /// Probabilities of the counts of a Poisson variable.
     fn counts(rate: f64) -> Vec<(f64, f64)> {
@@ -296,6 +315,7 @@ mod tests {
             dark_shot: true,
             signal_shot: true,
             poisson: PoissonKind::Exact,
+            lines: LineNoise::default(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::curved;
 use super::gains;
+use super::lines::SiteCovariance;
 use super::moments::{Equations, Prediction};
 use super::paper;
 use super::smooth_hue::{self, FirstOrder, hues};
@@ -64,7 +65,7 @@ impl PixelMoments {
                         bias = second.bias;
                         second.covariance
                     }
-                    None => gains::mean_pixel(&weights).covariance(variances),
+                    None => gains::mean_pixel(&weights).of(&SiteCovariance::of(&sites)),
                 }
             }
             Equations::Paper => paper::demosaicked(method, variances, mean, Some(size))?,
@@ -134,9 +135,20 @@ impl PixelMoments {
 
     /// Covariance of a pixel of each phase of the filter array; what the second order adds counts for all alike.
     pub fn phase_covariances(&self) -> [Matrix3<f64>; PHASES.len()] {
-        let variances = self.sites.map(|site| site.moments.variance);
-        let further = self.covariance - gains::mean_pixel(&self.weights).covariance(variances);
-        std::array::from_fn(|phase| gains::pixel(&self.weights, phase).covariance(variances) + further)
+        let sites = self.site_covariance();
+        let further = self.beyond_weights();
+        std::array::from_fn(|phase| gains::pixel(&self.weights, phase).of(&sites) + further)
+    }
+
+    /// The covariance of the photosites.
+    pub fn site_covariance(&self) -> SiteCovariance {
+        SiteCovariance::of(&self.sites)
+    }
+
+    /// What is predicted of the covariance beyond the weights: the second order of smooth hue transition, or the paper's
+    /// equations.
+    pub fn beyond_weights(&self) -> Matrix3<f64> {
+        self.covariance - gains::mean_pixel(&self.weights).of(&self.site_covariance())
     }
 
     /// Distance of a pixel from what lies `offset` before the mean, the phases of the filter array in these shares.
@@ -159,7 +171,7 @@ impl PixelMoments {
             Some(phase) => gains::patch_mean(&self.weights, phase, size),
             None => gains::mean_patch_mean(&self.weights, size),
         };
-        gains.covariance(self.sites.map(|site| site.moments.variance))
+        gains.of(&self.site_covariance())
     }
 }
 

@@ -7,6 +7,7 @@
 use super::charge;
 use super::covariance::{Covariance, PAIRS};
 use super::frame::corrected;
+use super::lines::LineTerms;
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::smooth_hue;
@@ -32,6 +33,8 @@ pub struct PixelNoise {
     gains: Vec<PixelGains>,
     /// The same of what whole rows, columns and sites are off together, and its variances; none where the black level has none.
     of_black: Option<(Vec<PixelGains>, [f64; 3])>,
+    /// What photosites share by rows and by columns; none where they share nothing.
+    of_lines: Option<PixelLines>,
     depends_on_hue: bool,
     variances: [LevelVariance; 3],
     /// What no light reads in the frame, in the unit of its samples.
@@ -72,7 +75,52 @@ impl Places {
 /// Gains of three variances, those of the classes or of the black level, for the six covariances, as polynomials in the pixel's
 /// hues: with weights f + ρ h, cov(k, m) = Σ \[f f + ρ_k h f + ρ_m f h + ρ_k ρ_m h h] σ².
 #[derive(Debug, Clone, PartialEq)]
-struct PixelGains([[[f64; 3]; 4]; 6]);
+struct PixelGains<const N: usize = 3>([[[f64; N]; 4]; 6]);
+
+/// What photosites share by rows and by columns, at any pixel.
+#[derive(Debug, Clone, PartialEq)]
+struct PixelLines {
+    /// Gains of the covariances of pairs of classes, in rows and in columns.
+    gains: Vec<PixelGains<{ 2 * PAIRS.len() }>>,
+    terms: [LineTerms; 2],
+    photosite: Photosite,
+}
+
+impl PixelLines {
+    /// The covariances of pairs of classes at levels above black.
+    fn at(&self, level: [f64; 3]) -> [f64; 2 * PAIRS.len()] {
+        let full_well_e = self.photosite.model.full_well_e;
+        // `max` drops what is no number.
+        let expected_e = level.map(|level| self.photosite.expected_at(level.max(0.0)).max(0.0).min(full_well_e));
+        let x = self.photosite.line_signals(expected_e);
+        let dark_e = self.photosite.model.dark_e;
+        let slope = expected_e.map(|e| self.photosite.adc.map_or(1.0, |adc| adc.sample_per_e(e + dark_e)));
+        std::array::from_fn(|index| {
+            let [k, l] = PAIRS[index % PAIRS.len()];
+            slope[k] * slope[l] * self.terms[index / PAIRS.len()].at(x[k], x[l])
+        })
+    }
+}
+
+impl PixelGains<{ 2 * PAIRS.len() }> {
+    /// Those of what pairs of classes share in rows, then in columns.
+    fn of_lines(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
+        let phase = phase_at(at, geometry);
+        let class = |offset| table.class(phase, offset) as usize;
+        Self::by(table, at, geometry, |a, b| {
+            let mut sums = [0.0; 2 * PAIRS.len()];
+            for (here, weight) in a.sites() {
+                for (there, other) in b.sites() {
+                    let [k, l] = [class(here), class(there)];
+                    let pair = PAIRS.iter().position(|pair| *pair == [k.min(l), k.max(l)]).unwrap_or_default();
+                    sums[pair] += if here[1] == there[1] { weight * other } else { 0.0 };
+                    sums[PAIRS.len() + pair] += if here[0] == there[0] { weight * other } else { 0.0 };
+                }
+            }
+            sums
+        })
+    }
+}
 
 impl PixelGains {
     /// Those of the classes.
@@ -105,11 +153,14 @@ impl PixelGains {
         })
     }
 
+}
+
+impl<const N: usize> PixelGains<N> {
     fn by(
         table: &WeightTable,
         at: [usize; 2],
         geometry: &Geometry,
-        dot: impl Fn(&Stencil, &Stencil) -> [f64; 3],
+        dot: impl Fn(&Stencil, &Stencil) -> [f64; N],
     ) -> Self {
         let phase = phase_at(at, geometry);
         let folded = |stencil: &Stencil| stencil.folded(at, [geometry.width, geometry.height]);
@@ -124,8 +175,11 @@ impl PixelGains {
         }))
     }
 
-    fn covariance(&self, variances: [f64; 3], hues: Option<[f64; 3]>) -> Covariance {
-        let sum = |gains: &[f64; 3]| gains[0] * variances[0] + gains[1] * variances[1] + gains[2] * variances[2];
+    fn covariance(&self, variances: [f64; N], hues: Option<[f64; 3]>) -> Covariance {
+        let sum = |gains: &[f64; N]| {
+            let (first, rest) = (gains[0] * variances[0], gains.iter().zip(variances).skip(1));
+            rest.fold(first, |sum, (gain, variance)| sum + gain * variance)
+        };
         let mut covariance = [0.0; 6];
         for ((value, [k, m]), gains) in covariance.iter_mut().zip(PAIRS).zip(&self.0) {
             *value = sum(&gains[0]);
@@ -168,7 +222,7 @@ impl LevelVariance {
 
     fn new(photosite: &Photosite, class: usize, largest: f64) -> Self {
         // Patterns that are cut off at zero take long to predict, and their variances are smooth.
-        let is_rectified = photosite.model.prnu.max(photosite.model.dcnu) > 0.2;
+        let is_rectified = photosite.model.response().max(photosite.model.dcnu) > 0.2;
         let steps = if is_rectified { STEPS / 8 } else { STEPS };
         let step = largest / steps as f64;
         let variance = |index: usize| {
@@ -182,7 +236,7 @@ impl LevelVariance {
             }
             let electrons = photosite.model.dark_e + expected_e;
             let slope = adc.sample_per_e(electrons);
-            let charge = charge::charge(&photosite.model, expected_e).variance + photosite.model.read_noise_e.powi(2);
+            let charge = charge::charge(&photosite.model, expected_e).variance + photosite.model.added().powi(2);
             // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
             if charge.sqrt() * slope < 0.5 * adc.sample_slope(adc.level_at(electrons)) {
                 charge * slope * slope + adc.rounding_at(electrons)
@@ -227,16 +281,22 @@ impl PixelNoise {
         let table = WeightTable::of(method, record.cfa);
         let columns = Places::new(frame.geometry.width, method.reach());
         let rows = Places::new(frame.geometry.height, method.reach());
+        let places = || rows.examples.iter().flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]));
         let gains = |gains: fn(&WeightTable, [usize; 2], &Geometry) -> PixelGains| -> Vec<PixelGains> {
-            let places = rows.examples.iter().flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]));
-            places.map(|at| gains(table, at, &frame.geometry)).collect()
+            places().map(|at| gains(table, at, &frame.geometry)).collect()
         };
+        photosite.check_lines().map_err(|why| frame.refuse(why.to_string()))?;
+        let of_lines = photosite.has_lines().then(|| PixelLines {
+            gains: places().map(|at| PixelGains::of_lines(table, at, &frame.geometry)).collect(),
+            terms: photosite.line_terms(),
+            photosite,
+        });
         let of_black = metadata
             .black_noise
             .map(|noise| (gains(PixelGains::of_black), [noise.row_adu2, noise.column_adu2, noise.site_adu2]));
         let gains = gains(PixelGains::new);
         let variances = LevelVariance::of_classes(&photosite, largest);
-        Ok(Self { columns, rows, gains, of_black, depends_on_hue: table.depends_on_hue(), variances, black })
+        Ok(Self { columns, rows, gains, of_black, of_lines, depends_on_hue: table.depends_on_hue(), variances, black })
     }
 
     /// The covariance of the pixel in column `x` and row `y` of the frame, whose samples are `rgb`; and whether
@@ -246,15 +306,26 @@ impl PixelNoise {
     /// green would make at its noise, and says only that it is large.
     pub fn covariance(&self, [x, y]: [usize; 2], rgb: [f64; 3]) -> (Covariance, bool) {
         let kind = self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x);
-        let all = |variances: [f64; 3], hues: Option<[f64; 3]>| {
+        let level = rgb.map(|sample| sample - self.black);
+        let all = |mut variances: [f64; 3], hues: Option<[f64; 3]>| {
+            let shared = self.of_lines.as_ref().map(|lines| (&lines.gains[kind], lines.at(level)));
+            if let Some((_, shared)) = &shared {
+                for (k, variance) in variances.iter_mut().enumerate() {
+                    let own = PAIRS.iter().position(|pair| *pair == [k, k]).unwrap_or_default();
+                    *variance = (*variance - shared[own] - shared[PAIRS.len() + own]).max(0.0);
+                }
+            }
             let mut covariance = self.gains[kind].covariance(variances, hues);
+            if let Some((gains, shared)) = shared {
+                let more = gains.covariance(shared, hues);
+                covariance.iter_mut().zip(more).for_each(|(covariance, more)| *covariance += more);
+            }
             if let Some((gains, of_black)) = &self.of_black {
                 let more = gains[kind].covariance(*of_black, hues);
                 covariance.iter_mut().zip(more).for_each(|(covariance, more)| *covariance += more);
             }
             covariance
         };
-        let level = rgb.map(|sample| sample - self.black);
         let variances = [0, 1, 2].map(|class| self.variances[class].at(level[class]));
         if !self.depends_on_hue {
             return (all(variances, None), true);
@@ -310,7 +381,7 @@ pub fn dim_green_below(frame: &FrameHeader) -> Option<f64> {
     let mut level = 0.0;
     // Rises to where a level is so many times its noise; the noise rises as its root.
     for _ in 0..40 {
-        let charge = charge::charge(&photosite.model, level / slope).variance + photosite.model.read_noise_e.powi(2);
+        let charge = charge::charge(&photosite.model, level / slope).variance + photosite.model.added().powi(2);
         let rounding = if photosite.adc.is_some() { 1.0 / 12.0 } else { 0.0 };
         level = smooth_hue::VOID_BELOW * (charge * slope * slope + rounding).sqrt() / 2.0;
     }

@@ -17,6 +17,8 @@ pub(super) struct Reading {
     pub noise_e: f64,
     /// What moments are about.
     pub center: f64,
+    /// What is added to every charge, e⁻.
+    pub offset_e: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,17 +42,18 @@ pub(super) const ENDLESS: Rounding = Rounding { lowest: f64::NEG_INFINITY, highe
 impl Reading {
     /// Electrons about a charge.
     pub fn electrons(noise_e: f64, center: f64) -> Self {
-        Self { asked: Asked::Electrons, noise_e, center }
+        Self { asked: Asked::Electrons, noise_e, center, offset_e: 0.0 }
     }
 
     /// Codes between ends, about the code of a charge.
     pub fn codes(adc: AdcRecord, ends: Rounding, noise_e: f64, about_e: f64) -> Self {
-        Self { asked: Asked::Codes(adc, ends), noise_e, center: adc.sample(ends.code(adc.level_at(about_e))) }
+        let center = adc.sample(ends.code(adc.level_at(about_e)));
+        Self { asked: Asked::Codes(adc, ends), noise_e, center, offset_e: 0.0 }
     }
 
     /// Whether a charge and read noise exceed a level.
     pub fn beyond(noise_e: f64, level_e: f64) -> Self {
-        Self { asked: Asked::Beyond(level_e), noise_e, center: 0.0 }
+        Self { asked: Asked::Beyond(level_e), noise_e, center: 0.0, offset_e: 0.0 }
     }
 
     /// Whether nothing that is told apart has an end.
@@ -60,12 +63,13 @@ impl Reading {
 
     /// Whether what is asked is to be beyond a level that no charge up to `most` reaches.
     pub fn is_never_beyond(&self, most: f64) -> bool {
-        matches!(self.asked, Asked::Beyond(level) if most + REACH * self.noise_e < level)
+        matches!(self.asked, Asked::Beyond(level) if most + self.offset_e + REACH * self.noise_e < level)
     }
 
     /// The moments at a charge whose own variance is `variance`.
     pub fn at(&self, electrons: f64, variance: f64) -> Moments {
         let variance = variance + self.noise_e * self.noise_e;
+        let electrons = electrons + self.offset_e;
         match self.asked {
             Asked::Electrons => about(electrons - self.center, variance, 0.0),
             Asked::Codes(adc, ends) if adc.linearization.is_some() => {
@@ -91,6 +95,7 @@ impl Reading {
     pub fn smooth_at(&self, electrons: f64) -> Moments {
         match self.asked {
             Asked::Codes(adc, _) => {
+                let electrons = electrons + self.offset_e;
                 let (slope, step) = (adc.sample_per_e(electrons), adc.sample_slope(adc.level_at(electrons)));
                 let variance = (slope * self.noise_e).powi(2) + step * step / 12.0;
                 about(adc.sample_at(electrons) - self.center, variance, -step.powi(4) / 120.0)
@@ -102,6 +107,7 @@ impl Reading {
     /// Whether all charges between two are read as one code, with their read noise.
     pub fn is_one(&self, least: f64, most: f64) -> bool {
         let reach = REACH * self.noise_e;
+        let [least, most] = [least, most].map(|electrons| electrons + self.offset_e);
         match self.asked {
             Asked::Codes(adc, ends) => ends.code(adc.level_at(least - reach)) == ends.code(adc.level_at(most + reach)),
             _ => false,
@@ -132,15 +138,21 @@ impl Reading {
         }
     }
 
+    /// The charge that is read as a level of the converter.
+    fn charge_at(&self, adc: &AdcRecord, level: f64) -> f64 {
+        adc.electrons_at(level) - self.offset_e
+    }
+
     /// The charges from the lowest to the highest end of what is told apart, read noise included.
     pub fn ends_e(&self) -> [f64; 2] {
         let reach = REACH * self.noise_e;
         match self.asked {
             Asked::Electrons => [f64::NEG_INFINITY, f64::INFINITY],
             Asked::Codes(adc, ends) => {
-                [adc.electrons_at(ends.lowest - 0.5) - reach, adc.electrons_at(ends.highest + 0.5) + reach]
+                let [low, high] = [ends.lowest - 0.5, ends.highest + 0.5].map(|code| self.charge_at(&adc, code));
+                [low - reach, high + reach]
             }
-            Asked::Beyond(level) => [level - reach, level + reach],
+            Asked::Beyond(level) => [level - reach - self.offset_e, level + reach - self.offset_e],
         }
     }
 
@@ -148,15 +160,15 @@ impl Reading {
     pub fn rails_e(&self) -> [f64; 2] {
         match self.asked {
             Asked::Electrons => [f64::NEG_INFINITY, f64::INFINITY],
-            Asked::Codes(adc, ends) => [ends.lowest, ends.highest].map(|code| adc.electrons_at(code)),
-            Asked::Beyond(level) => [level; 2],
+            Asked::Codes(adc, ends) => [ends.lowest, ends.highest].map(|code| self.charge_at(&adc, code)),
+            Asked::Beyond(level) => [level - self.offset_e; 2],
         }
     }
 
     /// The first edge between two codes above a charge.
     pub fn edge_above(&self, electrons: f64) -> f64 {
         match self.asked {
-            Asked::Codes(adc, _) => adc.electrons_at((adc.level_at(electrons) + 0.5).floor() + 0.5),
+            Asked::Codes(adc, _) => self.charge_at(&adc, (adc.level_at(electrons + self.offset_e) + 0.5).floor() + 0.5),
             _ => f64::INFINITY,
         }
     }

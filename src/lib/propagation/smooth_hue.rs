@@ -5,6 +5,7 @@
 //! joint cumulants of a, u and v, which are sums over the weights of green.
 
 use super::gains;
+use super::lines::SiteCovariance;
 use super::moments::Prediction;
 use crate::cfa::{CfaPattern, Class};
 use crate::stages::demosaic::Method;
@@ -18,6 +19,8 @@ pub fn hues(mean: [f64; 3]) -> [f64; 2] {
     let green = mean[Class::Green as usize];
     [Class::Red, Class::Blue].map(|class| if green > 0.0 { mean[class as usize] / green } else { 1.0 })
 }
+
+mod sharing;
 
 /// How far green is from where smooth hue transition would divide by zero.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -74,7 +77,11 @@ pub fn second_order(
         return None;
     }
     let weights = WeightTable::of(method, pattern).about(hues(mean));
+    let covariance = SiteCovariance::of(sites);
     let moments = [0, 1, 2, 3].map(|phase| {
+        if !covariance.is_independent() {
+            return sharing::of_phase(pattern, phase, mean, sites);
+        }
         let linear = gains::pixel(&weights, phase).covariance(variances);
         of_phase(pattern, phase, mean, sites, linear)
     });
@@ -211,6 +218,7 @@ impl<C: Fn([isize; 2]) -> Class> GreenNoise<'_, C> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::propagation::LineCovariance;
 
     fn sites(variances: [f64; 3]) -> [Prediction; 3] {
         variances.map(|variance| Prediction::of_cumulants(0.0, variance, 0.0, 0.0))
@@ -259,6 +267,23 @@ mod tests {
         let weights = WeightTable::new(Method::SmoothHue, CfaPattern::Rggb).about(super::hues(mean));
         let first = gains::mean_pixel(&weights).covariance(variances);
         assert!(simulated[(0, 0)] / first[(0, 0)] > 1.008 && simulated[(2, 2)] / first[(2, 2)] > 1.008, "{first}");
+    }
+
+    /// The moments of photosites that share rows are those of the other formulas where they share next to nothing; the fourth
+    /// order is the same in both, but for the order of sums.
+    #[test]
+    fn both_expansions_are_one() {
+        let mean = [30.0, 60.0, 200.0];
+        let plain = [4.0, 6.0, 30.0].map(|variance| Prediction::of_cumulants(0.0, variance, 0.3, 0.8));
+        let shared = plain.map(|site| Prediction {
+            lines: LineCovariance { row: [1e-14; 3], column: [0.0; 3] },
+            ..site
+        });
+        for pattern in [CfaPattern::Rggb, CfaPattern::Gbrg] {
+            let [a, b] = [plain, shared].map(|s| second_order(Method::SmoothHue, pattern, mean, &s).unwrap());
+            assert!((a.covariance - b.covariance).abs().max() < 1e-9 * a.covariance.max(), "{} {}", a.covariance, b.covariance);
+            assert!((0..3).all(|i| (a.bias[i] - b.bias[i]).abs() < 1e-9), "{a:?} {b:?}");
+        }
     }
 
     /// One quotient against what is known of it: with a = 0 and u normal of variance s, E 1/(1 + u) = 1 + s + 3s² + …

@@ -12,7 +12,7 @@ use philox::{LONGEST_RUN, Words, halves, philox4x32_10};
 use poisson::Table;
 use std::ops::Range;
 
-/// A source of noise, as the paper lists them (Sec. 3.3).
+/// A source of noise: those that the paper lists (Sec. 3.3), and those of sensors that are read by row and column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Source {
     /// Dark-current shot noise, temporal.
@@ -25,15 +25,42 @@ pub enum Source {
     Prnu,
     /// Read-out noise, temporal.
     Ron,
+    /// Noise common to a row, temporal.
+    RowNoise,
+    /// Noise common to a column, temporal.
+    ColumnNoise,
+    /// Offsets of photosites, a fixed pattern.
+    Dsnu,
+    /// Offsets of rows, a fixed pattern.
+    DsnuRow,
+    /// Offsets of columns, a fixed pattern.
+    DsnuColumn,
+    /// Photo-response non-uniformity of rows, a fixed pattern.
+    PrnuRow,
+    /// Photo-response non-uniformity of columns, a fixed pattern.
+    PrnuColumn,
 }
 
 impl Source {
-    /// All sources in the order of Eq. 9.
-    pub const ALL: [Self; 5] = [Self::Dcsn, Self::Dcnu, Self::Ssn, Self::Prnu, Self::Ron];
+    /// All sources, first those of Eq. 9 in its order.
+    pub const ALL: [Self; 12] = [
+        Self::Dcsn,
+        Self::Dcnu,
+        Self::Ssn,
+        Self::Prnu,
+        Self::Ron,
+        Self::RowNoise,
+        Self::ColumnNoise,
+        Self::Dsnu,
+        Self::DsnuRow,
+        Self::DsnuColumn,
+        Self::PrnuRow,
+        Self::PrnuColumn,
+    ];
 
     /// Whether the source repeats from frame to frame of one sensor.
     pub fn is_fixed_pattern(self) -> bool {
-        matches!(self, Self::Dcnu | Self::Prnu)
+        !matches!(self, Self::Dcsn | Self::Ssn | Self::Ron | Self::RowNoise | Self::ColumnNoise)
     }
 }
 
@@ -47,6 +74,13 @@ impl Named for Source {
             Self::Ssn => "ssn",
             Self::Prnu => "prnu",
             Self::Ron => "ron",
+            Self::RowNoise => "row_noise",
+            Self::ColumnNoise => "column_noise",
+            Self::Dsnu => "dsnu",
+            Self::DsnuRow => "dsnu_row",
+            Self::DsnuColumn => "dsnu_column",
+            Self::PrnuRow => "prnu_row",
+            Self::PrnuColumn => "prnu_column",
         }
     }
 }
@@ -63,6 +97,8 @@ serde_by_name!(Source);
 /// | seed | column | frame | class · 2¹⁶ + 1 | SSN and DCSN low |
 /// | sensor seed | column less bit 7 | 0 | 2²⁴ + class · 2¹⁶ | DCNU and PRNU high where bit 7 is 0, then where it is 1 |
 /// | sensor seed | column less bit 7 | 0 | 2²⁴ + class · 2¹⁶ + 1 | their low words |
+/// | sensor seed | column less bits 6 and 7 | 1 | 2²⁴ + class · 2¹⁶ | DSNU high where these bits are 0, 1, 2, 3 |
+/// | sensor seed | column less bits 6 and 7 | 1 | 2²⁴ + class · 2¹⁶ + 1 | their low words |
 ///
 /// The second word of the counter is the row; column and row are those on the sensor. Each draw has a 64-bit word of its
 /// own; low words that have a block of their own are made only where the high ones do not settle a number.
@@ -119,6 +155,9 @@ const COLUMNS: i32 = LONGEST_RUN as i32;
 /// Columns between two photosites that share a block of their patterns.
 const HALF: usize = LONGEST_RUN / 2;
 
+/// Columns between two neighbors among the four photosites that share a block of their offsets.
+const QUARTER: usize = LONGEST_RUN / 4;
+
 /// The bit of a column in which two such photosites differ.
 #[expect(clippy::cast_possible_truncation, reason = "128")]
 const HALF_BIT: u32 = HALF as u32;
@@ -131,11 +170,14 @@ pub struct RunWords {
     shared: Words,
     /// High words of DCNU and PRNU.
     pattern: [[u32; LONGEST_RUN]; 2],
+    /// High words of DSNU.
+    offset: [u32; LONGEST_RUN],
 }
 
 impl Default for RunWords {
     fn default() -> Self {
-        Self { temporal: [[0; LONGEST_RUN]; 4], shared: [[0; LONGEST_RUN]; 4], pattern: [[0; LONGEST_RUN]; 2] }
+        let empty = [0; LONGEST_RUN];
+        Self { temporal: [empty; 4], shared: [empty; 4], pattern: [empty; 2], offset: empty }
     }
 }
 
@@ -183,6 +225,35 @@ impl Run {
         }
     }
 
+    /// Makes the high words of the fixed offsets of photosites.
+    #[inline(always)]
+    pub fn make_offsets(&self, words: &mut RunWords) {
+        let first = self.place[0].rem_euclid(COLUMNS) as usize;
+        let end = (first + self.length).min(LONGEST_RUN);
+        let is_in_one = first / QUARTER == (end - 1) / QUARTER;
+        let made = if is_in_one { first % QUARTER..(end - 1) % QUARTER + 1 } else { 0..QUARTER };
+        let [even, odd] = self.fourth().map(|class| class | PATTERN);
+        let fourth = if (first - made.start).is_multiple_of(2) { [even, odd] } else { [odd, even] };
+        #[expect(clippy::cast_possible_truncation, reason = "below 256")]
+        let x = (self.place[0].cast_unsigned() & !(LONGEST_RUN as u32 - 1)) + made.start as u32;
+        let y = self.place[1].cast_unsigned();
+        philox::fill(&mut words.shared, made.len(), halves(self.sensor_seed), [x, y, 1], fourth);
+        for quarter in first / QUARTER..=(end - 1) / QUARTER {
+            let columns = first.max(quarter * QUARTER)..end.min((quarter + 1) * QUARTER);
+            let before = quarter * QUARTER + made.start;
+            words.offset[columns.start - first..columns.end - first]
+                .copy_from_slice(&words.shared[quarter][columns.start - before..columns.end - before]);
+        }
+    }
+
+    /// The low word of DSNU.
+    fn offset_low(&self, index: usize) -> u32 {
+        let [x, y] = self.counter(index);
+        let quarters = (LONGEST_RUN - QUARTER) as u32;
+        let counter = [x & !quarters, y, 1, self.fourth()[index % 2] | PATTERN | 1];
+        philox4x32_10(counter, halves(self.sensor_seed))[((x & quarters) / QUARTER as u32) as usize]
+    }
+
     /// The low words of SSN and DCSN.
     fn low(&self, index: usize) -> [u32; 4] {
         let [x, y] = self.counter(index);
@@ -197,7 +268,8 @@ impl Run {
         if x & HALF_BIT == 0 { [a, b] } else { [c, d] }
     }
 
-    /// Fills `numbers` with standard normal numbers of RON, DCNU or PRNU, or of the word that SSN and DCSN have.
+    /// Fills `numbers` with standard normal numbers of RON, DCNU, PRNU or DSNU, or of the word that SSN and DCSN have. Sources
+    /// of rows and columns have none here, but [`of_row`] and [`of_column`].
     #[inline(always)]
     pub fn normals(&self, words: &RunWords, source: Source, numbers: &mut [f32]) {
         let (temporal, pattern) = (&words.temporal, &words.pattern);
@@ -208,6 +280,8 @@ impl Run {
             Source::Ron => gaussian::fill(numbers, &temporal[2][..length], |index| temporal[3][index]),
             Source::Dcnu => gaussian::fill(numbers, &pattern[0][..length], |index| self.pattern_low(index)[0]),
             Source::Prnu => gaussian::fill(numbers, &pattern[1][..length], |index| self.pattern_low(index)[1]),
+            Source::Dsnu => gaussian::fill(numbers, &words.offset[..length], |index| self.offset_low(index)),
+            _ => numbers.fill(0.0),
         }
     }
 
@@ -225,6 +299,45 @@ impl Run {
         let low = |index: usize| self.low(index)[word];
         poisson::fill_by_tables(counts, tables, &words.temporal[word][..self.length], low);
     }
+}
+
+/// The draws of a whole row or column, as standard normal numbers.
+///
+/// | key | first and second word of the counter | third | fourth | words |
+/// |---|---|---|---|---|
+/// | seed | 0, row | frame | 2²⁵ | row noise |
+/// | sensor seed | 0, row | 0 | 2²⁵ + 2²⁴ | DSNU and PRNU of the row |
+/// | seed | column, 0 | frame | 2²⁵ + 1 | column noise |
+/// | sensor seed | column, 0 | 0 | 2²⁵ + 2²⁴ + 1 | DSNU and PRNU of the column |
+///
+/// Each number has two words, the high one first. All classes of a row share its draws.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineDraws {
+    /// Of noise that is drawn anew in each frame.
+    pub temporal: f64,
+    /// Of fixed offsets.
+    pub offset: f64,
+    /// Of the fixed response.
+    pub response: f64,
+}
+
+const LINE: u32 = 1 << 25;
+
+/// The draws of a row of the sensor.
+pub fn of_row([seed, sensor_seed]: [u64; 2], frame: u32, row: i32) -> LineDraws {
+    of_line([seed, sensor_seed], frame, [0, row.cast_unsigned()], LINE)
+}
+
+/// The draws of a column of the sensor.
+pub fn of_column([seed, sensor_seed]: [u64; 2], frame: u32, column: i32) -> LineDraws {
+    of_line([seed, sensor_seed], frame, [column.cast_unsigned(), 0], LINE | 1)
+}
+
+fn of_line([seed, sensor_seed]: [u64; 2], frame: u32, [x, y]: [u32; 2], fourth: u32) -> LineDraws {
+    let normal = |high: u32, low: u32| gaussian::quantile(u64::from(high) << 32 | u64::from(low));
+    let [a, b, ..] = philox4x32_10([x, y, frame, fourth], halves(seed));
+    let [c, d, e, f] = philox4x32_10([x, y, 0, fourth | PATTERN], halves(sensor_seed));
+    LineDraws { temporal: normal(a, b), offset: normal(c, d), response: normal(e, f) }
 }
 
 #[cfg(test)]
@@ -248,6 +361,7 @@ mod tests {
                 let mut words = RunWords::default();
                 run.make_temporal(&mut words);
                 run.make_pattern(&mut words);
+                run.make_offsets(&mut words);
                 for index in 0..span.len() {
                     let x = place[0].wrapping_add(i32::try_from(index).unwrap()).cast_unsigned();
                     let y = (-7_i32).cast_unsigned();
@@ -262,6 +376,10 @@ mod tests {
                         "{column} {index}"
                     );
                     assert_eq!(run.pattern_low(index), [block(1)[slot], block(1)[slot + 1]]);
+                    let block = |last: u32| philox4x32_10([x & !192, y, 1, (1 << 24) | class | last], [0, 1 << 8]);
+                    let slot = (x & 192) as usize / 64;
+                    assert_eq!(words.offset[index], block(0)[slot], "{column} {index}");
+                    assert_eq!(run.offset_low(index), block(1)[slot]);
                 }
             }
             assert_eq!(covered, width);

@@ -24,9 +24,18 @@ pub fn photon_transfer(curve: &TransferCurve) -> Plot {
             chosen.map(|entry| entry.variance[class]).sum::<f64>().sqrt()
         }
     };
-    let floor = part(&[Cause::Read, Cause::DarkShot, Cause::Dcnu]);
+    let floor = part(&[
+        Cause::Read,
+        Cause::RowNoise,
+        Cause::ColumnNoise,
+        Cause::Dsnu,
+        Cause::DsnuRow,
+        Cause::DsnuColumn,
+        Cause::DarkShot,
+        Cause::Dcnu,
+    ]);
     let shot = part(&[Cause::SignalShot]);
-    let pattern = part(&[Cause::Prnu]);
+    let pattern = part(&[Cause::Prnu, Cause::PrnuRow, Cause::PrnuColumn]);
     let mut panel = Panel::new(Axis::log10("signal / e\u{207B}"), Axis::log10("noise, rms / e\u{207B}"));
     let all =
         |levels: &[ChainPrediction]| levels.iter().map(|level| [signal(level), level.stages[0].std[class]]).collect();

@@ -2,6 +2,7 @@
 
 use super::check::{self, Measured, Test};
 use super::expectation::{Expectation, Predicted};
+use super::grids::Array;
 use super::levels::Levels;
 use super::region::Region;
 use super::report::{ChannelReport, RegionReport};
@@ -33,6 +34,7 @@ impl<'a> Assessment<'a> {
     pub fn new(
         tally: &'a Tally,
         frame: &FrameHeader,
+        region: Region,
         prediction: Option<&FramePrediction>,
         sampling: impl FnOnce(&PixelMoments) -> Sampling,
     ) -> Self {
@@ -42,13 +44,18 @@ impl<'a> Assessment<'a> {
         let planes = tally.channels.channels();
         let is_three = count > 0 && (planes == 3 || (planes > 3 && is_demosaicked));
         let counts = tally.classes.as_ref().map(|classes| classes.each_ref().map(|class| class.count));
+        let bayer = frame.metadata.cfa.and_then(|array| array.bayer());
+        let array = bayer.map(|pattern| Array::of(pattern, &frame.geometry, region));
         let mut of_classes: [Predicted; 3] = Default::default();
         let of_channels = match (prediction, counts) {
             (Some(FramePrediction::Planes(predictions)), Some(counts)) => {
-                of_classes = [0, 1, 2].map(|k| Predicted::of_class(&predictions[k], counts[k]));
-                Predicted::of_cfa_plane(predictions, counts)
+                of_classes = [0, 1, 2]
+                    .map(|k| Predicted::of_class(&predictions[k], Class::ALL[k], counts[k], array.as_ref()));
+                Predicted::of_cfa_plane(predictions, counts, array.as_ref())
             }
-            (Some(FramePrediction::Planes(predictions)), None) if is_three => Predicted::of_planes(predictions, count),
+            (Some(FramePrediction::Planes(predictions)), None) if is_three => {
+                Predicted::of_planes(predictions, count, region)
+            }
             (Some(FramePrediction::Pixels(mixture)), None) if is_three => {
                 Predicted::of_pixels(mixture, sampling(mixture))
             }
@@ -74,7 +81,8 @@ impl<'a> Assessment<'a> {
             (0..group.names.len()).map(|index| group.channel(index, black, has_rails)).collect()
         };
         let mut channels = reports(&self.channels, black.whole);
-        if let ([plane], false) = (&mut channels[..], self.classes.is_empty()) {
+        // Errors of what is known to share rows or columns are those of the prediction.
+        if let ([plane], false, false) = (&mut channels[..], self.classes.is_empty(), self.shares_lines()) {
             (plane.mean_error, plane.std_error) = self.plane_errors();
         }
         let mut classes: Vec<ChannelReport> =
@@ -112,6 +120,12 @@ impl<'a> Assessment<'a> {
     /// Tests of everything that is predicted.
     pub fn tests(&self) -> Vec<Test> {
         std::iter::once(&self.channels).chain(&self.classes).flat_map(Group::tests).collect()
+    }
+
+    /// Whether a prediction says that photosites share rows or columns.
+    fn shares_lines(&self) -> bool {
+        let tested = self.classes.iter().filter_map(|class| class.predicted.tested.as_ref());
+        tested.into_iter().any(|expected| expected.sampling.variance_thirds.is_some())
     }
 
     /// Standard errors of mean and standard deviation of a CFA plane, whose classes have shares w that are not drawn.

@@ -138,6 +138,12 @@ impl Expected {
         let of_class = |k: usize, count: f64| self.site_thirds[k] / self.site_variances[k].powf(1.5) / count.sqrt();
         let count = self.sampling.count;
         if self.is_plane {
+            if self.sampling.variance_thirds.is_some() {
+                // What is shared is normal, and makes the mean no skewer.
+                return self.site_thirds[channel]
+                    / (count * count)
+                    / self.sampling.mean_covariance[(channel, channel)].powf(1.5);
+            }
             return of_class(channel, count);
         }
         let skews = (0..3).map(|k| of_class(k, count / 4.0)).filter(|skewness| skewness.is_finite());
@@ -149,8 +155,13 @@ impl Expected {
     fn variance_skewness(&self, channel: usize, scatter: f64) -> f64 {
         let (second, third) = (self.site_variances[channel], self.site_thirds[channel]);
         let fourth = self.site_kurtosis[channel] * second * second;
-        let cumulant = 12.0 * fourth * second + 4.0 * third * third + 8.0 * second.powi(3);
-        cumulant / self.sampling.count.powi(2) / scatter.powf(1.5)
+        let of_sites = 12.0 * fourth * second + 4.0 * third * third;
+        let square = self.sampling.count.powi(2);
+        let cumulant = match self.sampling.variance_thirds {
+            Some(thirds) => of_sites.max(0.0) / square + thirds[channel],
+            None => (of_sites + 8.0 * second.powi(3)) / square,
+        };
+        cumulant / scatter.powf(1.5)
     }
 
     /// What rounding may take a sample of a channel off by: pixels that are made of several samples are rounded as the largest of
@@ -261,7 +272,7 @@ fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
         degrees_of_freedom: Some(freedom),
         p: if freedom < FEW || (law.is_plane && law.site_kurtosis[i] < FLAT) {
             (scatter / (found - expected).powi(2)).min(1.0)
-        } else if law.is_plane && law.site_kurtosis[i] > 0.0 {
+        } else if law.sampling.variance_thirds.is_some() || (law.is_plane && law.site_kurtosis[i] > 0.0) {
             significance::of_skewed((found - expected) / scatter.sqrt(), law.variance_skewness(i, scatter))
         } else {
             significance::of_chi_square(freedom * found / expected, freedom)

@@ -1,9 +1,12 @@
 //! What is predicted of the samples of a region.
 
 use super::check::{Expected, pair, rounding};
+use super::grids::{self, Array, Grid, PlaneScatter};
+use super::region::Region;
+use crate::cfa::Class;
 use crate::numerics::normal::MeanVariance;
 use crate::propagation::sampling::Sampling;
-use crate::propagation::{PixelMoments, Prediction};
+use crate::propagation::{LineCovariance, PixelMoments, Prediction, SiteCovariance};
 use nalgebra::Matrix3;
 
 /// What is predicted of channels that are observed together; nothing by default.
@@ -35,9 +38,14 @@ pub(super) struct Expectation {
 }
 
 impl Predicted {
-    /// Of `count` pixels of three planes that are drawn apart.
-    pub fn of_planes(classes: &[Prediction; 3], count: u64) -> Self {
-        let sampling = Sampling::independent(classes, count as f64);
+    /// Of `count` pixels of three planes that are drawn apart, but for what rows and columns share in a region.
+    pub fn of_planes(classes: &[Prediction; 3], count: u64, region: Region) -> Self {
+        let sites = SiteCovariance::of(classes);
+        let sampling = if sites.is_independent() {
+            Sampling::independent(classes, count as f64)
+        } else {
+            grids::sampling(classes, &[Grid::of_planes(region)])
+        };
         let expected = Expected {
             mean: classes.map(|class| class.moments.mean),
             site_variances: classes.map(|class| class.moments.variance),
@@ -46,7 +54,12 @@ impl Predicted {
             sampling,
             is_plane: true,
         };
-        Self::of_three(&expected.sampling.covariance.clone(), expected)
+        let population = if sites.is_independent() {
+            expected.sampling.covariance
+        } else {
+            sites.row + sites.column + Matrix3::from_diagonal(&sites.own.into())
+        };
+        Self::of_three(&population, expected)
     }
 
     /// Of mixed pixels that scatter as `sampling` says.
@@ -79,28 +92,48 @@ impl Predicted {
         }
     }
 
-    /// Of `count` independent samples of one class of a CFA plane.
-    pub fn of_class(prediction: &Prediction, count: u64) -> Self {
+    /// Of `count` samples of one class of a CFA plane, independent but for what rows and columns share in the array.
+    pub fn of_class(prediction: &Prediction, class: Class, count: u64, array: Option<&Array>) -> Self {
+        let channels = grids::alike(prediction, class);
+        let grids = array.filter(|_| !SiteCovariance::of(&channels).is_independent()).map(|array| array.grids(class));
+        let sampling = match &grids {
+            Some(grids) => grids::sampling(&channels, grids),
+            None => Sampling::independent(&[*prediction; 3], count as f64),
+        };
+        let one = match &grids {
+            Some(_) if count > 0 => Self::of_one_that_is(Expectation::of_sampling(prediction, &sampling), prediction, count),
+            _ => Self::of_one(prediction, count),
+        };
         let expected = Expected {
             mean: [prediction.moments.mean; 3],
             site_variances: [prediction.moments.variance; 3],
             site_thirds: [prediction.third; 3],
             site_kurtosis: [prediction.excess_kurtosis; 3],
-            sampling: Sampling::independent(&[*prediction; 3], count as f64),
+            sampling,
             is_plane: true,
         };
-        Self { tested: (count > 0).then_some(expected), ..Self::of_one(prediction, count) }
+        Self { tested: (count > 0).then_some(expected), ..one }
     }
 
     /// Of a CFA plane that has so many samples of each class; nothing of none.
-    pub fn of_cfa_plane(classes: &[Prediction; 3], counts: [u64; 3]) -> Self {
+    pub fn of_cfa_plane(classes: &[Prediction; 3], counts: [u64; 3], array: Option<&Array>) -> Self {
         let total = counts.iter().sum();
-        mixed(classes, counts).map_or_else(Self::default, |prediction| Self::of_one(&prediction, total))
+        let Some(prediction) = mixed(classes, counts) else { return Self::default() };
+        match array.filter(|_| !SiteCovariance::of(classes).is_independent()) {
+            Some(array) => {
+                let expectation = Expectation::of_plane(&prediction, &array.of_plane(classes));
+                Self::of_one_that_is(expectation, &prediction, total)
+            }
+            None => Self::of_one(&prediction, total),
+        }
     }
 
     fn of_one(prediction: &Prediction, count: u64) -> Self {
-        let expectation = Expectation::of(prediction, count);
-        let std = expectation.std;
+        Self::of_one_that_is(Expectation::of(prediction, count), prediction, count)
+    }
+
+    fn of_one_that_is(expectation: Expectation, prediction: &Prediction, count: u64) -> Self {
+        let std = prediction.moments.std();
         Self {
             channels: vec![expectation],
             covariance: Some(vec![vec![std * std]]),
@@ -114,6 +147,30 @@ impl Expectation {
     /// Whether samples scatter, and by more than the rounding of single precision.
     pub fn is_resolved(&self) -> bool {
         self.std > rounding(self.mean)
+    }
+
+    /// Of samples that scatter as `sampling` says.
+    fn of_sampling(prediction: &Prediction, sampling: &Sampling) -> Self {
+        let variance = sampling.covariance[(0, 0)];
+        Self {
+            mean: prediction.moments.mean,
+            std: prediction.moments.std(),
+            mean_error: sampling.mean_covariance[(0, 0)].sqrt(),
+            sample_std: variance.max(0.0).sqrt(),
+            std_error: sampling.spread[0][0].sqrt() / (2.0 * variance),
+        }
+    }
+
+    /// Of all photosites of a plane.
+    fn of_plane(prediction: &Prediction, scatter: &PlaneScatter) -> Self {
+        let MeanVariance { mean, variance } = scatter.sample;
+        Self {
+            mean: prediction.moments.mean,
+            std: prediction.moments.std(),
+            mean_error: scatter.mean_variance.sqrt(),
+            sample_std: mean.max(0.0).sqrt(),
+            std_error: variance.sqrt() / (2.0 * mean),
+        }
     }
 
     /// Of `count` independent samples.
@@ -150,5 +207,5 @@ fn mixed(classes: &[Prediction; 3], counts: [u64; 3]) -> Option<Prediction> {
         .sum();
     let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) - 3.0 } else { 0.0 };
     let common = shares.iter().zip(classes).map(|(w, p)| w * w * p.common).sum();
-    Some(Prediction { moments: MeanVariance { mean, variance }, third: 0.0, excess_kurtosis, common })
+    Some(Prediction { moments: MeanVariance { mean, variance }, third: 0.0, excess_kurtosis, common, lines: LineCovariance::default() })
 }

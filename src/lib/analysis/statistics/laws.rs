@@ -3,7 +3,7 @@
 use super::region::Region;
 use crate::metadata::FrameHeader;
 use crate::propagation::sampling::{Place, Sampling};
-use crate::propagation::{PixelMoments, gains};
+use crate::propagation::PixelMoments;
 use nalgebra::Matrix3;
 
 /// Sampling laws by place: regions of one size and phase share one.
@@ -18,18 +18,11 @@ impl Samplings {
             return known.clone();
         }
         let mut made = Sampling::of(&mixture.weights, &mixture.sites, &place);
-        made.covariance += beyond_weights(mixture);
+        made.covariance += mixture.beyond_weights();
         made.mean_covariance += common(mixture);
         self.0.push((place, made.clone()));
         made
     }
-}
-
-/// What is predicted of the covariance beyond the weights: the second order of smooth hue transition, or the paper's
-/// equations.
-pub(super) fn beyond_weights(mixture: &PixelMoments) -> Matrix3<f64> {
-    let variances = mixture.sites.map(|site| site.moments.variance);
-    mixture.covariance - gains::mean_pixel(&mixture.weights).covariance(variances)
 }
 
 /// What all pixels are off together: each channel as the class that it is named for.

@@ -106,7 +106,7 @@ fn measure_all(
         let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, *region);
         // What is left where pixels are left out by their values follows no formula; those of defects are any.
         let prediction = prediction.as_ref().ok().filter(|_| is_fair(marks));
-        let assessment = Assessment::new(tally, &frame, prediction, sampling);
+        let assessment = Assessment::new(tally, &frame, *region, prediction, sampling);
         let tests = if level.is_some() { assessment.tests() } else { Vec::new() };
         RegionReport { tests, ..assessment.report(&frame, *region, &levels).with_marks(*marks, left_out) }
     };

@@ -6,6 +6,7 @@
 mod assessment;
 pub mod check;
 mod expectation;
+mod grids;
 mod laws;
 mod levels;
 mod measure;

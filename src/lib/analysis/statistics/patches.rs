@@ -4,7 +4,7 @@
 //! them, and spread and covariance are predicted at these. The means are used up by that, and are not tested.
 
 use super::assessment::Assessment;
-use super::laws::{Samplings, beyond_weights};
+use super::laws::Samplings;
 use super::levels::Levels;
 use super::region::Region;
 use super::report::{RegionReport, Report, coverage};
@@ -165,7 +165,7 @@ pub fn measure(
             tallies
                 .map(|(tally, region)| {
                     let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, region);
-                    Assessment::new(tally, &frame, Some(&known), sampling).report(&frame, region, &levels)
+                    Assessment::new(tally, &frame, region, Some(&known), sampling).report(&frame, region, &levels)
                 })
                 .collect()
         }
@@ -177,7 +177,7 @@ pub fn measure(
                 .map(|(tally, region)| {
                     let prediction = at_means(tally, &frame, equations);
                     let sampling = |mixture: &PixelMoments| laws.sampling(mixture, region.place(&frame));
-                    let assessment = Assessment::new(tally, &frame, prediction.as_ref(), sampling);
+                    let assessment = Assessment::new(tally, &frame, *region, prediction.as_ref(), sampling);
                     let mut report = assessment.report(&frame, *region, &levels);
                     for channel in report.channels.iter_mut().chain(&mut report.classes) {
                         (channel.predicted_mean, channel.z_mean) = (None, None);
@@ -217,12 +217,14 @@ impl Laws {
     }
 
     fn sampling(&self, mixture: &PixelMoments, place: Place) -> Sampling {
-        let known = self.0.iter().find(|(of, _)| *of == place);
+        // The law of what rows and columns share is none of nine.
+        let is_independent = mixture.site_covariance().is_independent();
+        let known = self.0.iter().find(|(of, _)| is_independent && *of == place);
         let mut sampling = match known {
             Some((_, basis)) => basis.sampling(&mixture.sites).through(&mixture.from_camera),
             None => Sampling::of(&mixture.weights, &mixture.sites, &place),
         };
-        sampling.covariance += beyond_weights(mixture);
+        sampling.covariance += mixture.beyond_weights();
         sampling
     }
 }

@@ -268,13 +268,19 @@ impl Foreseen {
             FramePrediction::Planes(classes) => {
                 let class = &classes[index];
                 let variance = class.moments.variance;
-                let mean_std =
-                    |[columns, rows]: [usize; 2]| (variance / (share * (columns * rows) as f64) + class.common).sqrt();
+                let [row, column] = [class.lines.row[index], class.lines.column[index]];
+                // Of classes of which not every line has photosites, one in two has.
+                let lines = |count: usize| if share < 0.5 { (count as f64 / 2.0).max(1.0) } else { count as f64 };
+                let mean_std = |[columns, rows]: [usize; 2]| {
+                    let own = (variance - row - column) / (share * (columns * rows) as f64);
+                    (own + row / lines(rows) + column / lines(columns) + class.common).max(0.0).sqrt()
+                };
+                let correlation = |shared: f64| vec![if shared > 0.0 { shared / variance } else { 0.0 }; LAGS];
                 Self {
                     mean: class.moments.mean,
                     stds: vec![variance.max(0.0).sqrt()],
                     profile_std: Some(patches.map(mean_std)),
-                    correlations: Some([vec![0.0; LAGS], vec![0.0; LAGS]]),
+                    correlations: Some([correlation(row), correlation(column)]),
                 }
             }
             FramePrediction::Pixels(mixture) => Self::of_pixels(mixture, index, patches),
@@ -284,8 +290,8 @@ impl Foreseen {
 
     fn of_pixels(mixture: &PixelMoments, index: usize, patches: [[usize; 2]; 2]) -> Self {
         let PixelMoments { weights, sites, .. } = mixture;
-        let variances = sites.map(|site| site.moments.variance);
-        let of = |gains: gains::Gains| gains.covariance(variances)[(index, index)];
+        let site_covariance = mixture.site_covariance();
+        let of = |gains: gains::Gains| gains.of(&site_covariance)[(index, index)];
         let whole = of(gains::mean_pixel(weights));
         let beyond = (mixture.covariance[(index, index)] - whole).max(0.0);
         let common = sites.map(|site| site.common);

@@ -85,6 +85,13 @@ pub fn greens_of_hue(pattern: CfaPattern, phase: usize, wanted: Class) -> (Stenc
     (green([0, 0]), neighbors.into_iter().map(green).collect())
 }
 
+/// The neighbors that smooth hue transition restores `wanted` from at the pixels of a phase; the pixel itself where it is
+/// measured.
+pub fn sites_of_hue(pattern: CfaPattern, phase: usize, wanted: Class) -> Vec<[isize; 2]> {
+    let surroundings = Surroundings { pattern, phase: PHASES[phase] };
+    if surroundings.class([0, 0]) == wanted { vec![[0, 0]] } else { surroundings.neighbors([0, 0], wanted) }
+}
+
 /// The stencils of R, G and B in each phase.
 type Stencils = [[Stencil; 3]; 4];
 

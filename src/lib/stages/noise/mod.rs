@@ -4,10 +4,12 @@
 //!
 //! DCNU and PRNU are fixed patterns: they hang on the sensor's seed alone. DCSN, SSN and RON are temporal: they hang on
 //! seed and frame. Where charge transfer is simulated, it takes light and dark charge to the output before RON is added.
+//! Sensors that are read by row and column have noise of these besides ([`LineNoise`]): gains beside PRNU, and offsets, fixed
+//! and temporal, beside RON.
 
 mod model;
 
-pub use model::{NoiseModel, NoiseSettings, rectified_mean, rectified_mean_square};
+pub use model::{LineNoise, NoiseModel, NoiseSettings, rectified_mean, rectified_mean_square};
 
 use crate::camera::readout::ReadOut;
 use crate::cfa::{CfaPattern, Class};
@@ -17,7 +19,7 @@ use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::random::philox::{LONGEST_RUN, VECTOR};
 use crate::random::poisson::Table;
-use crate::random::{Run, RunWords, Source, spans};
+use crate::random::{LineDraws, Run, RunWords, Source, of_column, of_row, spans};
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
 use crate::units::{Electrons, ExpectedElectrons, QuantityKind};
@@ -63,7 +65,40 @@ pub struct AddNoise {
     record: NoiseRecord,
     transfer: Option<Transfer>,
     tables: Tables,
+    columns: Columns,
     instructions: Instructions,
+}
+
+/// What the frame's columns have by themselves; empty where they have nothing.
+#[derive(Debug, Clone, Default)]
+struct Columns {
+    /// Electrons that are added.
+    offsets: Vec<f32>,
+    /// Relative gains less 1.
+    gains: Vec<f32>,
+}
+
+impl Columns {
+    fn of(frame: &FrameHeader, model: &NoiseModel, record: &NoiseRecord) -> Self {
+        let LineNoise { column_noise_e, dsnu_column_e, prnu_column, .. } = model.lines;
+        let has_offsets = column_noise_e > 0.0 || dsnu_column_e > 0.0;
+        if !has_offsets && prnu_column <= 0.0 {
+            return Self::default();
+        }
+        let seeds = [record.seed, record.sensor_seed];
+        let draws = (0..frame.geometry.width).map(|x| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
+            let column = frame.geometry.origin[0].wrapping_add(x as i32);
+            of_column(seeds, record.frame, column)
+        });
+        let offset = |draw: &LineDraws| to_sample(column_noise_e * draw.temporal + dsnu_column_e * draw.offset);
+        let gain = |draw: &LineDraws| to_sample(prnu_column * draw.response);
+        let (offsets, gains): (Vec<f32>, Vec<f32>) = draws.map(|draw| (offset(&draw), gain(&draw))).unzip();
+        Self {
+            offsets: if has_offsets { offsets } else { Vec::new() },
+            gains: if prnu_column > 0.0 { gains } else { Vec::new() },
+        }
+    }
 }
 
 /// Counts at rates that are known beforehand: those of the dark signal, and of light where the scene is uniform.
@@ -163,8 +198,9 @@ impl AddNoise {
         metadata.noise = Some(record.clone());
         let instructions = Instructions::widest();
         let tables = Tables::of(input, &model, instructions);
+        let columns = Columns::of(input, &model, &record);
         let header = FrameHeader { metadata, ..input.clone() };
-        Ok(Self { header, pattern, model, record, transfer, tables, instructions })
+        Ok(Self { header, pattern, model, record, transfer, tables, columns, instructions })
     }
 
     /// Draws on a narrower set of instructions than the widest there is; the noise is the same.
@@ -215,6 +251,13 @@ fn has_noise(readout: &ReadOut, source: Source) -> bool {
         Source::Dcnu => readout.dcnu > 0.0,
         Source::Prnu => readout.prnu > 0.0,
         Source::Ron => readout.read_noise_e > 0.0,
+        Source::RowNoise => readout.row_noise_e > 0.0,
+        Source::ColumnNoise => readout.column_noise_e > 0.0,
+        Source::Dsnu => readout.dsnu_e > 0.0,
+        Source::DsnuRow => readout.dsnu_row_e > 0.0,
+        Source::DsnuColumn => readout.dsnu_column_e > 0.0,
+        Source::PrnuRow => readout.prnu_row > 0.0,
+        Source::PrnuColumn => readout.prnu_column > 0.0,
         Source::Dcsn | Source::Ssn => true,
     }
 }
@@ -255,7 +298,7 @@ impl Stage for AddNoise {
         };
         let mut counts = Counts::default();
         let [mut charge, mut noise] = [(); 2].map(|()| vec![0.0; input.width()]);
-        let has_read_noise = self.model.read_noise_e > 0.0;
+        let has_read_noise = self.model.read_noise_e > 0.0 || !self.model.lines.is_none();
         for channel in 0..input.channels() {
             let mut passage = transfer.passage();
             // The rows above are drawn again, and counted in the band that they belong to.
@@ -291,6 +334,10 @@ struct Line<'a> {
     model: &'a NoiseModel,
     record: &'a NoiseRecord,
     tables: &'a Tables,
+    columns: &'a Columns,
+    /// Electrons that are added to the row, and its relative gain less 1.
+    offset: f32,
+    gain: f32,
     /// Row of the sensor, and column of the frame's first.
     row: i32,
     first_column: i32,
@@ -308,8 +355,15 @@ impl AddNoise {
         let [first_column, y0] = geometry.origin;
         #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
         let row = y0.wrapping_add(y as i32);
-        let Self { model, record, tables, .. } = self;
-        Line { model, record, tables, row, first_column, classes }
+        let Self { model, record, tables, columns, .. } = self;
+        let LineNoise { row_noise_e, dsnu_row_e, prnu_row, .. } = model.lines;
+        let (mut offset, mut gain) = (0.0, 0.0);
+        if row_noise_e > 0.0 || dsnu_row_e > 0.0 || prnu_row > 0.0 {
+            let draws = of_row([record.seed, record.sensor_seed], record.frame, row);
+            offset = to_sample(row_noise_e * draws.temporal + dsnu_row_e * draws.offset);
+            gain = to_sample(prnu_row * draws.response);
+        }
+        Line { model, record, tables, columns, offset, gain, row, first_column, classes }
     }
 }
 
@@ -335,12 +389,13 @@ impl Kernel for Expose<'_> {
                 let noisy = output.row(y, channel);
                 for span in spans(line.first_column, expected.len()) {
                     let run = line.run(&span);
-                    let (expected, noisy) = (&expected[span.clone()], &mut noisy[span]);
+                    let (expected, noisy) = (&expected[span.clone()], &mut noisy[span.clone()]);
                     run.make_temporal(&mut scratch.words);
-                    line.charges(&run, &mut scratch, expected, noisy, &mut counts);
+                    line.charges(&run, &mut scratch, &span, expected, noisy, &mut counts);
                     if noise.model.read_noise_e > 0.0 {
                         add(noisy, line.read_noise(&run, &mut scratch));
                     }
+                    line.add_offsets(&run, &mut scratch, span, noisy);
                     counts.not_finite += not_finite(noisy);
                 }
             }
@@ -368,11 +423,16 @@ impl Kernel for Charges<'_> {
         for span in spans(line.first_column, expected.len()) {
             let run = line.run(&span);
             run.make_temporal(&mut scratch.words);
-            line.charges(&run, &mut scratch, &expected[span.clone()], &mut charge[span.clone()], &mut counts);
+            line.charges(&run, &mut scratch, &span, &expected[span.clone()], &mut charge[span.clone()], &mut counts);
             if let Some(read_noise) = &mut read_noise {
-                let made = line.read_noise(&run, &mut scratch);
-                let of_span = &mut read_noise[span];
-                of_span.copy_from_slice(&made[..of_span.len()]);
+                let of_span = &mut read_noise[span.clone()];
+                if line.model.read_noise_e > 0.0 {
+                    let made = line.read_noise(&run, &mut scratch);
+                    of_span.copy_from_slice(&made[..of_span.len()]);
+                } else {
+                    of_span.fill(0.0);
+                }
+                line.add_offsets(&run, &mut scratch, span, of_span);
             }
         }
         counts
@@ -413,7 +473,15 @@ impl Line<'_> {
 
     /// Draws the charge of each photosite, light and dark, clipped at full well. The run's temporal words are made.
     #[inline(always)]
-    fn charges(&self, run: &Run, scratch: &mut Scratch, expected: &[f32], charge: &mut [f32], counts: &mut Counts) {
+    fn charges(
+        &self,
+        run: &Run,
+        scratch: &mut Scratch,
+        span: &Range<usize>,
+        expected: &[f32],
+        charge: &mut [f32],
+        counts: &mut Counts,
+    ) {
         let model = self.model;
         let Scratch { words, rates, light, dark, normals } = scratch;
         let [rates, light, dark, normals] = [rates, light, dark, normals].map(|numbers| &mut numbers[..run.length]);
@@ -438,6 +506,10 @@ impl Line<'_> {
         }
         if model.prnu > 0.0 {
             run.normals(words, Source::Prnu, normals);
+        }
+        if model.lines.has_gains() {
+            self.scale_by_lines(light, span, normals);
+        } else if model.prnu > 0.0 {
             scale(light, to_sample(model.prnu), normals);
         }
         if model.dark_e > 0.0 {
@@ -489,6 +561,45 @@ impl Line<'_> {
         let differs = |pair: &[f32; 2]| (pair[0] != known[0]) | (pair[1] != known[1]);
         let any = rates.as_chunks::<2>().0.iter().fold(false, |any, pair| any | differs(pair));
         (!any).then_some([even, odd])
+    }
+
+    /// Multiplies each number by max(0, 1 + σ n + g), g the gains of row and column less 1; where σ is 0, whatever n is.
+    #[inline(always)]
+    fn scale_by_lines(&self, numbers: &mut [f32], span: &Range<usize>, normals: &mut [f32]) {
+        let sigma = to_sample(self.model.prnu);
+        for normal in &mut *normals {
+            *normal = if sigma > 0.0 { sigma * *normal } else { 0.0 };
+        }
+        if let Some(gains) = self.columns.gains.get(span.clone()) {
+            for (normal, &gain) in normals.iter_mut().zip(gains) {
+                *normal += self.gain + gain;
+            }
+        } else {
+            normals.iter_mut().for_each(|normal| *normal += self.gain);
+        }
+        scale(numbers, 1.0, normals);
+    }
+
+    /// Adds the fixed offsets of photosites, and what row and columns add.
+    #[inline(always)]
+    fn add_offsets(&self, run: &Run, scratch: &mut Scratch, span: Range<usize>, samples: &mut [f32]) {
+        let lines = &self.model.lines;
+        if lines.dsnu_e > 0.0 {
+            let offsets = &mut scratch.normals[..run.length];
+            run.make_offsets(&mut scratch.words);
+            run.normals(&scratch.words, Source::Dsnu, offsets);
+            let rms = to_sample(lines.dsnu_e);
+            for (sample, &offset) in samples.iter_mut().zip(&*offsets) {
+                *sample += rms * offset;
+            }
+        }
+        if let Some(offsets) = self.columns.offsets.get(span) {
+            for (sample, &offset) in samples.iter_mut().zip(offsets) {
+                *sample += self.offset + offset;
+            }
+        } else if lines.has_line_offsets() {
+            samples.iter_mut().for_each(|sample| *sample += self.offset);
+        }
     }
 
     /// Draws the read noise of each photosite. The run's temporal words are made.

@@ -11,9 +11,9 @@ pub struct NoiseModel {
     pub dark_e: f64,
     /// Relative rms of the dark current over photosites; 0 when left out.
     pub dcnu: f64,
-    /// Relative rms of the response over photosites; 0 when left out.
+    /// Relative rms of the response over photosites, rows and columns apart; 0 when left out.
     pub prnu: f64,
-    /// Read noise, rms e⁻; 0 when left out.
+    /// Read noise of a photosite by itself, rms e⁻; 0 when left out.
     pub read_noise_e: f64,
     /// Full well, e⁻.
     pub full_well_e: f64,
@@ -23,6 +23,58 @@ pub struct NoiseModel {
     pub signal_shot: bool,
     /// How Poisson numbers are drawn.
     pub poisson: PoissonKind,
+    /// What rows and columns share, and offsets of photosites.
+    pub lines: LineNoise,
+}
+
+/// Noise of sensors that are read by row and column, rms; 0 what is left out or not there.
+///
+/// A photosite in row r and column c has the sensitivity max(0, 1 + prnu n + prnu_row n_r + prnu_column n_c), and to what is
+/// read of it are added dsnu n′ + row_noise m_r + column_noise m_c + dsnu_row n′_r + dsnu_column n′_c, all n and m standard
+/// normal numbers. Those of a row serve all its photosites, of whatever class.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LineNoise {
+    /// Of a row in one exposure, e⁻.
+    pub row_noise_e: f64,
+    /// Of a column in one exposure, e⁻.
+    pub column_noise_e: f64,
+    /// Fixed offsets of photosites, e⁻.
+    pub dsnu_e: f64,
+    /// Fixed offsets of rows, e⁻.
+    pub dsnu_row_e: f64,
+    /// Fixed offsets of columns, e⁻.
+    pub dsnu_column_e: f64,
+    /// Relative response of rows.
+    pub prnu_row: f64,
+    /// Relative response of columns.
+    pub prnu_column: f64,
+}
+
+impl LineNoise {
+    /// Whether there is none.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether photosites of a row or of a column have any in common.
+    pub fn has_lines(&self) -> bool {
+        Self { dsnu_e: 0.0, ..*self } != Self::default()
+    }
+
+    /// Whether rows or columns differ in response.
+    pub fn has_gains(&self) -> bool {
+        self.prnu_row > 0.0 || self.prnu_column > 0.0
+    }
+
+    /// Whether anything is added to a row or a column.
+    pub fn has_line_offsets(&self) -> bool {
+        Self { dsnu_e: 0.0, prnu_row: 0.0, prnu_column: 0.0, ..*self } != Self::default()
+    }
+}
+
+/// √(Σ x²); of one number that is not zero that number itself.
+fn root_sum<const N: usize>(parts: [f64; N]) -> f64 {
+    parts.into_iter().fold(0.0, |sum: f64, part| if part == 0.0 { sum } else { sum.hypot(part) })
 }
 
 impl NoiseModel {
@@ -44,7 +96,36 @@ impl NoiseModel {
             dark_shot: drawn(Source::Dcsn),
             signal_shot: drawn(Source::Ssn),
             poisson: record.poisson,
+            lines: LineNoise {
+                row_noise_e: if_drawn(Source::RowNoise, readout.row_noise_e),
+                column_noise_e: if_drawn(Source::ColumnNoise, readout.column_noise_e),
+                dsnu_e: if_drawn(Source::Dsnu, readout.dsnu_e),
+                dsnu_row_e: if_drawn(Source::DsnuRow, readout.dsnu_row_e),
+                dsnu_column_e: if_drawn(Source::DsnuColumn, readout.dsnu_column_e),
+                prnu_row: if_drawn(Source::PrnuRow, readout.prnu_row),
+                prnu_column: if_drawn(Source::PrnuColumn, readout.prnu_column),
+            },
         })
+    }
+
+    /// Relative rms of the response over photosites, that of rows and columns included.
+    pub fn response(&self) -> f64 {
+        root_sum([self.prnu, self.lines.prnu_row, self.lines.prnu_column])
+    }
+
+    /// What is added anew to a photosite in each exposure, that of rows and columns included: rms e⁻.
+    pub fn read_noise(&self) -> f64 {
+        root_sum([self.read_noise_e, self.lines.row_noise_e, self.lines.column_noise_e])
+    }
+
+    /// Fixed offsets of photosites, those of rows and columns included: rms e⁻.
+    pub fn offsets(&self) -> f64 {
+        root_sum([self.lines.dsnu_e, self.lines.dsnu_row_e, self.lines.dsnu_column_e])
+    }
+
+    /// All that is added to the charge of a photosite: rms e⁻.
+    pub fn added(&self) -> f64 {
+        root_sum([self.read_noise(), self.offsets()])
     }
 }
 

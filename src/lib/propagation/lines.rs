@@ -1,0 +1,421 @@
+//! What photosites of a row, or of a column, have in common, and what becomes of it through the converter and corrections.
+//!
+//! The reading of a photosite of class k is y_k(x, u, v), with x what is its own, and of its row the normal numbers u, by which
+//! its response differs, and v, which are added to its charge. Another of class l in the same row shares u and v alone, so
+//! that
+//!
+//! cov(y_k, y_l) = cov(m_k(u, v), m_l(u, v)),  m_k(u, v) = E\[y_k | u, v]
+//!
+//! and so for columns. Where nothing is clipped and what is a photosite's own blurs the codes, m is straight:
+//!
+//! R_kl = K² \[Σ_j c_jk c_jl σ_j² + f_k f_l δ² + E_k E_l s²]
+//!
+//! K in ADU per e⁻ (1 of electrons), σ the temporal noise of rows, δ their fixed offsets, s their relative response, E the
+//! signal. j goes over the frame itself, with c = 1, and over the averages that came off it, with c² what the average keeps of
+//! the variance, times its weight squared; f is what the fixed offsets of these leave. Those of a flat field count in
+//! proportion to y_k/F_k, to first order, and it takes s off. The share of R that comes of rounding is below e^(−4π²σ²)/2π² of a squared code, σ
+//! what is a photosite's own in codes: 3·10⁻⁸ from [`BLURRED`] on.
+//!
+//! Elsewhere m follows from the law of a photosite ([`Law`]) and the covariance is a sum over u and v. Brighter rows have more
+//! shot noise; m takes it for that of their light, (1 + s u) E: off by s u/2 of its rms where full well cuts it, and of second
+//! order elsewhere.
+//!
+//! The covariance matrix of all photosites of a frame is then block plus low rank: D + Σ_rows Z R Zᵀ + Σ_columns Z S Zᵀ, Z
+//! telling the classes, D diagonal with the variance of each less R_kk + S_kk.
+
+use super::covariance::PAIRS;
+use super::frame::{Predicted, Unpredictable};
+use super::law::Law;
+use super::masters::Dark;
+use super::moments::{Equations, Prediction};
+use super::photosite::Photosite;
+use super::reading::{Reading, codes_of};
+use crate::metadata::AdcRecord;
+use crate::numerics::averages::Combine;
+use crate::numerics::normal::density;
+use crate::stages::noise::{LineNoise, NoiseModel};
+use nalgebra::Matrix3;
+
+/// Covariances of a photosite with another of class R, G or B in its row, and in its column.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LineCovariance {
+    /// In its row.
+    pub row: [f64; 3],
+    /// In its column.
+    pub column: [f64; 3],
+}
+
+/// The covariance of photosites: what each has by itself, and what those of a row and of a column share, by classes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SiteCovariance {
+    /// Variances of what is their own.
+    pub own: [f64; 3],
+    /// Covariance of two in a row, also of one class.
+    pub row: Matrix3<f64>,
+    /// The same in a column.
+    pub column: Matrix3<f64>,
+}
+
+impl SiteCovariance {
+    /// That of photosites that share nothing.
+    pub fn independent(own: [f64; 3]) -> Self {
+        Self { own, row: Matrix3::zeros(), column: Matrix3::zeros() }
+    }
+
+    /// That of photosites of these moments.
+    pub fn of(sites: &[Prediction; 3]) -> Self {
+        let own = |k: usize| {
+            let LineCovariance { row, column } = sites[k].lines;
+            let shared = row[k] + column[k];
+            let variance = sites[k].moments.variance;
+            if shared == 0.0 { variance } else { (variance - shared).max(0.0) }
+        };
+        Self {
+            own: [0, 1, 2].map(own),
+            row: Matrix3::from_fn(|k, l| sites[k].lines.row[l]),
+            column: Matrix3::from_fn(|k, l| sites[k].lines.column[l]),
+        }
+    }
+
+    /// Whether photosites share nothing.
+    pub fn is_independent(&self) -> bool {
+        self.row == Matrix3::zeros() && self.column == Matrix3::zeros()
+    }
+
+    /// What photosites share beyond themselves: in a row and in a column.
+    pub fn lines(&self) -> [&Matrix3<f64>; 2] {
+        [&self.row, &self.column]
+    }
+}
+
+/// Variance of the fixed offsets that photosites of two frames share, e².
+pub(super) fn offsets_of_both(a: &NoiseModel, b: &NoiseModel) -> f64 {
+    let parts = |model: &NoiseModel| {
+        let LineNoise { dsnu_e, dsnu_row_e, dsnu_column_e, .. } = model.lines;
+        [dsnu_e, dsnu_row_e, dsnu_column_e]
+    };
+    parts(a).iter().zip(parts(b)).map(|(a, b)| a * b).sum()
+}
+
+/// The standard deviation, in codes, of what is a photosite's own from which codes follow what it shares as straight lines do.
+const BLURRED: f64 = 0.6;
+
+/// The same from which they do so on the mean: e^(−4π²σ²)/2π² is 2·10⁻⁵ of a squared code.
+const BLURRED_ON_AVERAGE: f64 = 0.45;
+
+/// Values of what is shared that are gone through at most.
+const MOST_NODES: usize = 4000;
+
+/// Why nothing is said of what rows and columns share where more would be needed.
+pub(super) const TOO_COARSE: &str = "what rows or columns share goes over many codes, and what each photosite has of its own blurs \
+                                     none of them; give the sensor read noise";
+
+/// Why nothing is said of averages that are no means.
+const NO_MEANS: &str = "medians and clipped means of frames whose rows or columns share noise follow no formula here; use \
+                        `--combine mean`";
+
+/// Why nothing is said of offsets that show how codes are rounded.
+const OFFSETS_SHOW: &str = "photosites have fixed offsets, and the noise of the dark frames, over less than a code, makes what they \
+                            leave of these hang on where in a code each mean lies";
+
+/// Why the paper says nothing.
+const NOT_IN_THE_PAPER: &str = "the paper has no equations for noise of rows and columns, nor for fixed offsets";
+
+/// Along rows or along columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Axis {
+    Row,
+    Column,
+}
+
+impl Axis {
+    const ALL: [Self; 2] = [Self::Row, Self::Column];
+
+    /// Temporal noise in e⁻, fixed offsets in e⁻, and relative response.
+    fn parts(self, lines: &LineNoise) -> [f64; 3] {
+        match self {
+            Self::Row => [lines.row_noise_e, lines.dsnu_row_e, lines.prnu_row],
+            Self::Column => [lines.column_noise_e, lines.dsnu_column_e, lines.prnu_column],
+        }
+    }
+
+    /// The model without them.
+    fn without(self, model: &NoiseModel) -> NoiseModel {
+        let lines = match self {
+            Self::Row => LineNoise { row_noise_e: 0.0, dsnu_row_e: 0.0, prnu_row: 0.0, ..model.lines },
+            Self::Column => LineNoise { column_noise_e: 0.0, dsnu_column_e: 0.0, prnu_column: 0.0, ..model.lines },
+        };
+        NoiseModel { lines, ..*model }
+    }
+}
+
+/// What is a photosite's own of the noise.
+fn own(model: &NoiseModel) -> NoiseModel {
+    NoiseModel { lines: LineNoise { dsnu_e: model.lines.dsnu_e, ..LineNoise::default() }, ..*model }
+}
+
+impl Photosite {
+    /// All models of noise that its samples follow from.
+    fn models(&self) -> impl Iterator<Item = &NoiseModel> {
+        let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
+        std::iter::once(&self.model).chain(self.darks.iter().flatten().chain(flat).map(|dark| &dark.model))
+    }
+
+    /// Makes sure that formulas are known for what rows and columns share, and for fixed offsets.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`].
+    pub(super) fn check_lines(&self) -> Predicted<()> {
+        if self.models().all(|model| model.lines.is_none()) {
+            return Ok(());
+        }
+        if self.equations == Equations::Paper {
+            return Err(Unpredictable::Beyond(NOT_IN_THE_PAPER));
+        }
+        let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
+        let mut averages = self.darks.iter().flatten().chain(flat);
+        let is_shared = |dark: &Dark| dark.model.lines.row_noise_e > 0.0 || dark.model.lines.column_noise_e > 0.0;
+        if averages.any(|dark| is_shared(dark) && dark.frames > 2 && dark.combine != Combine::Mean) {
+            return Err(Unpredictable::Beyond(NO_MEANS));
+        }
+        let Some(adc) = self.adc else { return Ok(()) };
+        let shows = |dark: &Dark| {
+            let of_dark = self.of_dark(dark);
+            dark.model.offsets() > 0.0
+                && (of_dark.visible_median(dark, &adc).is_some() || self.rounds_as(&adc, 0.0, dark, &of_dark))
+        };
+        if self.darks.iter().flatten().any(shows) {
+            return Err(Unpredictable::Beyond(OFFSETS_SHOW));
+        }
+        Ok(())
+    }
+
+    /// Whether photosites of a row or of a column share anything.
+    pub(super) fn has_lines(&self) -> bool {
+        self.models().any(|model| model.lines.has_lines())
+    }
+
+    /// What photosites of these signals share with others of their rows and columns, in squared units of their samples.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`] where no formula tells.
+    pub(super) fn lines(&self, expected_e: [f64; 3]) -> Predicted<[LineCovariance; 3]> {
+        if !self.has_lines() {
+            return Ok([LineCovariance::default(); 3]);
+        }
+        let [row, column] = match self.regime(expected_e) {
+            Regime::Straight => Axis::ALL.map(|axis| self.straight(axis, expected_e, [self.slope(); 3])),
+            Regime::OnAverage => {
+                let slopes = expected_e.map(|expected_e| self.mean_slope(expected_e));
+                Axis::ALL.map(|axis| self.straight(axis, expected_e, slopes))
+            }
+            Regime::Curved => {
+                let of_axis = |axis: Axis| self.curved(axis, expected_e);
+                [of_axis(Axis::Row)?, of_axis(Axis::Column)?]
+            }
+            Regime::Unknown => return Err(Unpredictable::Beyond(TOO_COARSE)),
+        };
+        let of_class = |matrix: &Matrix3<f64>, k: usize| [0, 1, 2].map(|l| matrix[(k, l)]);
+        Ok([0, 1, 2].map(|k| LineCovariance { row: of_class(&row, k), column: of_class(&column, k) }))
+    }
+
+    fn mean_slope(&self, expected_e: f64) -> f64 {
+        self.adc.map_or(1.0, |adc| Law::of(&self.model, expected_e).mean_slope(&adc))
+    }
+
+    fn regime(&self, expected_e: [f64; 3]) -> Regime {
+        let is_corrected = self.darks[0].is_some() || self.flat.is_some();
+        let own = own(&self.model);
+        let laws = expected_e.map(|expected_e| Law::of(&self.model, expected_e));
+        let is_cut = laws.iter().any(|law| law.is_cut());
+        let Some(adc) = self.adc else { return if is_cut { Regime::Curved } else { Regime::Straight } };
+        let blur = expected_e.map(|expected_e| adc.adu_per_e * blur_e(&own, &adc, expected_e));
+        let least = blur.into_iter().fold(f64::INFINITY, f64::min);
+        let is_straight = !is_cut && !adc.is_bent() && laws.iter().all(|law| law.is_within(&adc));
+        if is_straight && least >= BLURRED {
+            return Regime::Straight;
+        }
+        match is_corrected {
+            false => Regime::Curved,
+            true if least >= BLURRED_ON_AVERAGE => Regime::OnAverage,
+            true => Regime::Unknown,
+        }
+    }
+
+    /// R of the straight codes, of such slopes to the charge.
+    fn straight(&self, axis: Axis, expected_e: [f64; 3], slopes: [f64; 3]) -> Matrix3<f64> {
+        let terms = self.terms(axis);
+        let x = self.line_signals(expected_e);
+        Matrix3::from_fn(|k, l| slopes[k] * slopes[l] * terms.at(x[k], x[l]))
+    }
+
+    /// What [`LineTerms`] are of: the signals, or with a flat field y/F, by which what is in the flat field counts.
+    pub(super) fn line_signals(&self, expected_e: [f64; 3]) -> [f64; 3] {
+        let Some(flat) = &self.flat else { return expected_e };
+        [0, 1, 2].map(|k| expected_e[k] / flat.expected_e[k])
+    }
+
+    fn terms(&self, axis: Axis) -> LineTerms {
+        let parts = |model: &NoiseModel| axis.parts(&model.lines);
+        let averages = |darks: &'_ [Option<Dark>]| -> Vec<Dark> { darks.iter().flatten().copied().collect() };
+        let darks = averages(&self.darks);
+        let temporal = |dark: &Dark| dark.weight * dark.weight * dark.kept()[0] * parts(&dark.model)[0].powi(2);
+        let left = |own: &NoiseModel, darks: &[Dark]| {
+            parts(own)[1] - darks.iter().map(|dark| dark.weight * parts(&dark.model)[1]).sum::<f64>()
+        };
+        let light = parts(&self.model)[0].powi(2) + darks.iter().map(temporal).sum::<f64>();
+        let offset = left(&self.model, &darks);
+        let constant = light + offset * offset;
+        let Some(flat) = &self.flat else {
+            return LineTerms { constant, linear: 0.0, square: parts(&self.model)[2].powi(2) };
+        };
+        let of_flat = averages(&flat.darks);
+        let divisor = temporal(&flat.frames) + of_flat.iter().map(temporal).sum::<f64>();
+        let of_divisor = left(&flat.frames.model, &of_flat);
+        let bias = |darks: &[Dark]| darks.iter().find(|dark| dark.is_bias).copied();
+        let in_both = match (bias(&darks), bias(&of_flat)) {
+            (Some(a), Some(b)) if a.frames == b.frames => {
+                a.weight * b.weight * a.kept()[0] * parts(&a.model)[0].powi(2)
+            }
+            _ => 0.0,
+        };
+        let square = divisor + of_divisor * of_divisor;
+        LineTerms { constant, linear: -in_both - offset * of_divisor, square }
+    }
+
+    /// The terms of rows and of columns.
+    pub(super) fn line_terms(&self) -> [LineTerms; 2] {
+        Axis::ALL.map(|axis| self.terms(axis))
+    }
+
+    /// R by sums over what is shared.
+    fn curved(&self, axis: Axis, expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
+        let [temporal, fixed, response] = axis.parts(&self.model.lines);
+        let offset_e = temporal.hypot(fixed);
+        if offset_e == 0.0 && response == 0.0 {
+            return Ok(Matrix3::zeros());
+        }
+        let rest = axis.without(&self.model);
+        let brightest = expected_e.into_iter().fold(0.0, f64::max);
+        let blurs = expected_e.map(|expected_e| self.adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e)));
+        let blur_e = blurs.into_iter().fold(f64::INFINITY, f64::min);
+        let finest_e = blur_e.max(self.adc.map_or(0.0, |adc| FINEST / adc.adu_per_e));
+        let offsets = nodes(offset_e, finest_e);
+        let shot_e = if self.model.signal_shot { brightest.sqrt() } else { 0.0 };
+        let at_full = shot_e.hypot(brightest * rest.response()).max(1.0);
+        let gains = nodes(brightest * response, finest_e.min(at_full));
+        if offsets.len() * gains.len() > MOST_NODES {
+            return Err(Unpredictable::Beyond(TOO_COARSE));
+        }
+        let mut first = [0.0; 3];
+        let mut second = [0.0; 6];
+        let laws = expected_e.map(|expected_e| Law::of(&rest, expected_e));
+        for &(u, of_u) in &gains {
+            let gained = laws.map(|law| law.gained(1.0 + response * u));
+            for &(v, of_v) in &offsets {
+                let mean = |k: usize| self.mean_at(&laws[k], &gained[k], offset_e * v);
+                let of_red = mean(0);
+                let same = |k: usize, other: usize| expected_e[k] == expected_e[other];
+                let of_green = if same(1, 0) { of_red } else { mean(1) };
+                let of_blue = if same(2, 0) {
+                    of_red
+                } else if same(2, 1) {
+                    of_green
+                } else {
+                    mean(2)
+                };
+                let means = [of_red, of_green, of_blue];
+                for (sum, mean) in first.iter_mut().zip(means) {
+                    *sum += of_u * of_v * mean;
+                }
+                for (sum, [k, l]) in second.iter_mut().zip(PAIRS) {
+                    *sum += of_u * of_v * means[k] * means[l];
+                }
+            }
+        }
+        let mut found = Matrix3::zeros();
+        for (square, [k, l]) in second.into_iter().zip(PAIRS) {
+            found[(k, l)] = square - first[k] * first[l];
+            found[(l, k)] = found[(k, l)];
+        }
+        Ok(found)
+    }
+
+    /// The mean reading of photosites of a row, about the center that `law` has.
+    fn mean_at(&self, law: &Law, gained: &Law, offset_e: f64) -> f64 {
+        match self.adc {
+            // What is added to electrons is in them.
+            None => gained.expect(&law.of_electrons())[0] + offset_e,
+            Some(adc) => gained.expect(&Reading { offset_e, ..law.of_codes(&adc, codes_of(&adc)) })[0],
+        }
+    }
+}
+
+/// What two photosites of signals x and y in one row, or column, share, in e²: a + b (x + y) + c x y.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LineTerms {
+    constant: f64,
+    linear: f64,
+    square: f64,
+}
+
+impl LineTerms {
+    pub fn at(&self, x: f64, y: f64) -> f64 {
+        self.constant + self.linear * (x + y) + self.square * x * y
+    }
+}
+
+/// How samples follow what is shared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Regime {
+    Straight,
+    OnAverage,
+    Curved,
+    Unknown,
+}
+
+/// Codes that are told apart, in codes.
+const FINEST: f64 = 0.04;
+
+/// What of a photosite's own spread blurs codes, e⁻: shot noise counts as far as whole electrons are no whole codes.
+fn blur_e(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> f64 {
+    /// ADU per electron up to which codes take several electrons.
+    const FEW: f64 = 0.2;
+    let law = Law::of(model, expected_e);
+    let turn = std::f64::consts::TAU;
+    let counts = if model.signal_shot { expected_e } else { 0.0 } + if model.dark_shot { model.dark_e } else { 0.0 };
+    let shot = if adc.adu_per_e <= FEW {
+        2.0 * counts * (1.0 - (turn * adc.adu_per_e).cos()) / (turn * adc.adu_per_e).powi(2)
+    } else {
+        0.0
+    };
+    law.read_noise_e.hypot(law.least_pattern_std()).hypot(shot.sqrt())
+}
+
+/// Standard normal numbers and their weights for a function that is smooth on the scale of `blur` of what they are times
+/// `spread`.
+fn nodes(spread: f64, blur: f64) -> Vec<(f64, f64)> {
+    /// Steps to the scale: the error of the sum is below e^(−2π²·1.3²).
+    const STEPS: f64 = 1.3;
+    const REACH: f64 = 6.5;
+    if spread <= 0.0 {
+        return vec![(0.0, 1.0)];
+    }
+    let scale = (blur / spread).min(1.0);
+    let step = scale / STEPS;
+    let steps = (REACH / step).ceil();
+    if steps > MOST_NODES as f64 {
+        return vec![(0.0, 0.0); MOST_NODES + 1];
+    }
+    let mut found = Vec::new();
+    let mut z = -steps * step;
+    while z <= steps * step + 0.5 * step {
+        found.push((z, density(z)));
+        z += step;
+    }
+    let sum: f64 = found.iter().map(|(_, weight)| weight).sum();
+    found.iter_mut().for_each(|(_, weight)| *weight /= sum);
+    found
+}
