@@ -14,8 +14,8 @@ use cyanometer::metadata::Scene;
 use cyanometer::numerics::normal::NearlyNormal;
 use cyanometer::random::Source;
 use cyanometer::random::philox::philox4x32_10;
-use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::MemoryFrame;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -47,9 +47,30 @@ impl Chance {
     }
 }
 
+/// Whether rows and columns have noise and patterns of their own.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Ccd,
+    Cmos,
+}
+
 /// A camera drawn from the ranges of real ones.
-fn camera(index: u32) -> ReadOut {
+fn camera(index: u32, kind: Kind) -> ReadOut {
     let mut chance = Chance { camera: index, drawn: 0 };
+    let ccd = ccd(&mut chance);
+    if kind == Kind::Ccd {
+        return ccd;
+    }
+    let read_noise_e = ccd.read_noise_e;
+    let mut share = |low: f64, high: f64| read_noise_e * chance.between(low, high);
+    let (row_noise_e, column_noise_e) = (share(0.1, 0.5), share(0.05, 0.3));
+    let (dsnu_e, dsnu_row_e, dsnu_column_e) = (share(0.2, 1.0), share(0.05, 0.5), share(0.1, 0.8));
+    let prnu_row = ccd.prnu * chance.between(0.05, 0.3);
+    let prnu_column = ccd.prnu * chance.between(0.05, 0.5);
+    ReadOut { row_noise_e, column_noise_e, dsnu_e, dsnu_row_e, dsnu_column_e, prnu_row, prnu_column, ..ccd }
+}
+
+fn ccd(chance: &mut Chance) -> ReadOut {
     let full_well_e = chance.log_between(3000.0, 80_000.0);
     let bits = [10, 12, 14, 16][(chance.uniform() * 4.0) as usize];
     let top = f64::from((1_u32 << bits) - 1);
@@ -84,7 +105,8 @@ fn level(readout: &ReadOut, index: u32, condition: Condition, expected_e: f64, f
     let light = uniform_frame(head, [expected_e; 3]).unwrap();
     let mut taken: Vec<MemoryFrame> = (first..first + frames)
         .map(|frame| {
-            let settings = NoiseSettings { seed: index.into(), sensor_seed: index.into(), frame, ..NoiseSettings::default() };
+            let settings =
+                NoiseSettings { seed: index.into(), sensor_seed: index.into(), frame, ..NoiseSettings::default() };
             let noisy = light.through(&AddNoise::new(&light.header, &settings).unwrap()).unwrap().0;
             let digitized = noisy.through(&Digitize::new(&noisy.header, &AdcSettings::default()).unwrap()).unwrap().0;
             MemoryFrame::new(digitized.header, digitized.samples)
@@ -99,8 +121,14 @@ fn level(readout: &ReadOut, index: u32, condition: Condition, expected_e: f64, f
 
 /// What a camera is found to be.
 fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
-    let lit = |photons: f64| Condition { is_lit: true, exposure_s: Some(FLAT_S), photons: Some(photons), temperature_k: None };
-    let dark = |exposure_s: f64| Condition { is_lit: false, exposure_s: Some(exposure_s), photons: None, temperature_k: None };
+    let lit = |photons: f64| Condition {
+        is_lit: true,
+        exposure_s: Some(FLAT_S),
+        photons: Some(photons),
+        temperature_k: None,
+    };
+    let dark =
+        |exposure_s: f64| Condition { is_lit: false, exposure_s: Some(exposure_s), photons: None, temperature_k: None };
     let end = readout.full_well_e.min((f64::from((1_u32 << readout.bits) - 1) - readout.bias_adu) / readout.adu_per_e);
     let shares = [0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.3];
     let mut number = 0;
@@ -153,11 +181,13 @@ fn mean_sensitivity(readout: &ReadOut, index: u32) -> f64 {
     let exposure = Exposure { exposure_s: FLAT_S, f_number: 8.0, lens_transmittance: 1.0 };
     let head = CameraSetup::new(sensor, exposure).plane(SIZE, Scene::uniform("flat", [LEVEL_E; 3])).unwrap();
     let light = uniform_frame(head, [LEVEL_E; 3]).unwrap();
-    let without = Source::ALL.into_iter().filter(|source| *source != Source::Prnu).collect();
+    let of_response = [Source::Prnu, Source::PrnuRow, Source::PrnuColumn];
+    let without = Source::ALL.into_iter().filter(|source| !of_response.contains(source)).collect();
     let settings = NoiseSettings { sensor_seed: index.into(), without, ..NoiseSettings::default() };
     let mut pattern = vec![light.through(&AddNoise::new(&light.header, &settings).unwrap()).unwrap().0; 2];
     let dark = pattern[0].header.metadata.dark_signal_e.unwrap();
-    let pattern: Vec<MemoryFrame> = pattern.drain(..).map(|frame| MemoryFrame::new(frame.header, frame.samples)).collect();
+    let pattern: Vec<MemoryFrame> =
+        pattern.drain(..).map(|frame| MemoryFrame::new(frame.header, frame.samples)).collect();
     let sites = Site::of(&pattern[0].header);
     let found = survey(&mut pattern.clone(), None, false).unwrap();
     let green: Vec<f64> =
@@ -171,44 +201,56 @@ fn truths(readout: &ReadOut, index: u32) -> Vec<(&'static str, f64)> {
     let efficiency = QUANTUM_EFFICIENCY * mean_sensitivity(readout, index);
     let current = readout.dark_current_e_per_s(readout.temperature_k);
     let dark_e = current * FLAT_S;
-    let dark_variance = readout.read_noise_e.powi(2) + 1.0 / 12.0 / readout.adu_per_e.powi(2);
-    let pattern = readout.dcnu * dark_e;
+    let dark_pattern = readout.dcnu * dark_e;
+    let ReadOut { row_noise_e, column_noise_e, dsnu_e, dsnu_row_e, dsnu_column_e, prnu_row, prnu_column, .. } =
+        *readout;
+    let dark_noise_e = readout.read_noise_e.hypot(row_noise_e).hypot(column_noise_e);
+    let dark_variance = dark_noise_e.powi(2) + 1.0 / 12.0 / readout.adu_per_e.powi(2);
+    let dsnu_pixel_e = dsnu_e.hypot(dark_pattern);
     vec![
         ("gain_adu_per_e", readout.adu_per_e),
         ("responsivity_adu_per_photon", readout.adu_per_e * efficiency),
         ("quantum_efficiency", efficiency),
-        ("black_level_adu", readout.bias_adu),
-        ("dark_noise_e", readout.read_noise_e),
+        ("dark_noise_e", dark_noise_e),
         ("threshold_e", 0.5 + (0.25 + dark_variance).sqrt()),
-        ("row_noise_e", 0.0),
-        ("column_noise_e", 0.0),
+        ("row_noise_e", row_noise_e),
+        ("column_noise_e", column_noise_e),
         ("saturation_e", saturation(readout)),
         ("linearity_error_min", 0.0),
         ("linearity_error_max", 0.0),
-        ("prnu", readout.prnu),
-        ("prnu_row", 0.0),
-        ("prnu_column", 0.0),
+        ("prnu", readout.prnu.hypot(prnu_row).hypot(prnu_column)),
+        ("prnu_row", prnu_row),
+        ("prnu_column", prnu_column),
         ("prnu_pixel", readout.prnu),
-        ("dsnu_e", pattern),
-        ("dsnu_pixel_e", pattern),
-        ("dsnu_row_e", 0.0),
-        ("dsnu_column_e", 0.0),
-        ("dark_current_e_per_s", current),
+        ("dsnu_e", dsnu_pixel_e.hypot(dsnu_row_e).hypot(dsnu_column_e)),
+        ("dsnu_pixel_e", dsnu_pixel_e),
+        ("dsnu_row_e", dsnu_row_e),
+        ("dsnu_column_e", dsnu_column_e),
+        ("dsnu_offset_e", dsnu_e),
         ("dcnu", readout.dcnu),
-        ("dsnu_offset_e", 0.0),
+        ("dark_current_e_per_s", current),
         // Fixed patterns multiply counts, so that the temporal variance goes by the square of what a photosite has.
         ("dark_current_from_variance_e_per_s", current * (1.0 + readout.dcnu.powi(2))),
     ]
 }
 
-/// Of n cameras so many intervals may miss by chance: 4 standard deviations beyond 5 %.
 #[test]
-fn numbers_lie_within_their_intervals() {
+fn numbers_of_ccds_lie_within_their_intervals() {
+    check_coverage(Kind::Ccd);
+}
+
+#[test]
+fn numbers_of_cmos_cameras_lie_within_their_intervals() {
+    check_coverage(Kind::Cmos);
+}
+
+/// Of n cameras so many intervals may miss by chance: 4 standard deviations beyond 5 %.
+fn check_coverage(kind: Kind) {
     let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(40, |count| count.parse().unwrap());
     let found: Vec<_> = (0..count)
         .into_par_iter()
         .map(|index| {
-            let readout = camera(index);
+            let readout = camera(index, kind);
             let found = measured(&readout, index);
             let judged = truths(&readout, index).into_iter().map(|(key, truth)| {
                 let interval = found.get(key);
@@ -234,7 +276,10 @@ fn numbers_lie_within_their_intervals() {
         widths.sort_by(f64::total_cmp);
         let width = widths.get(widths.len() / 2).copied().unwrap_or(f64::NAN);
         let n = f64::from(known);
-        println!("{key}: {missed} of {known} missed, median half-width {width:.2e}, mean error over half-width {:.3}", off / n);
+        println!(
+            "{key}: {missed} of {known} missed, median half-width {width:.2e}, mean error over half-width {:.3}",
+            off / n
+        );
         let allowed = n * (1.0 - CONFIDENCE) + 4.0 * (n * CONFIDENCE * (1.0 - CONFIDENCE)).sqrt();
         assert!(known * 10 >= count * 6, "{key} is known of {known} of {count} cameras alone");
         assert!(f64::from(missed) <= allowed, "{key}: {missed} of {known} intervals missed");

@@ -40,7 +40,15 @@ pub fn counted(count: u64, what: &str) -> String {
             ("flats", "flat"),
             ("darks", "dark"),
         ],
-        &[("are", "is"), ("were", "was"), ("have", "has"), ("had", "had"), ("do", "does"), ("expect", "expects"), ("stand", "stands")],
+        &[
+            ("are", "is"),
+            ("were", "was"),
+            ("have", "has"),
+            ("had", "had"),
+            ("do", "does"),
+            ("expect", "expects"),
+            ("stand", "stands"),
+        ],
     ];
     if count != 1 {
         return format!("{count} {what}");

@@ -36,6 +36,7 @@ const GROUPS: [(&str, &[&str]); 10] = [
             "map",
             "write-matrix",
             "write-readout",
+            "sensor-out",
         ],
     ),
     (GENERAL, &["threads", "quiet", "verbose", "progress", "describe-keys", "help", "version"]),

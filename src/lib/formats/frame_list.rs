@@ -86,7 +86,8 @@ pub fn read(path: &Path) -> Result<FrameList> {
 }
 
 fn is_yaml(path: &Path, text: &str) -> bool {
-    let is_named = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("yaml") || end.eq_ignore_ascii_case("yml"));
+    let is_named =
+        path.extension().is_some_and(|end| end.eq_ignore_ascii_case("yaml") || end.eq_ignore_ascii_case("yml"));
     is_named || text.lines().any(|line| line.starts_with("frames:") || line.starts_with("- "))
 }
 
@@ -229,7 +230,10 @@ mod tests {
 
     #[test]
     fn the_three_forms_are_read() {
-        let (folder, path) = written("list.csv", "file,kind,exposure_s,photons,temperature_c\na.tiff,flat,0.01,120,20\nb.tiff,Dark,0.01,,20\n");
+        let (folder, path) = written(
+            "list.csv",
+            "file,kind,exposure_s,photons,temperature_c\na.tiff,flat,0.01,120,20\nb.tiff,Dark,0.01,,20\n",
+        );
         let list = read(&path).unwrap();
         let frame = |file: &str, kind, photons| ListedFrame {
             file: folder.path().join(file),
@@ -239,11 +243,16 @@ mod tests {
             temperature_k: Some(293.15),
             level: None,
         };
-        assert_eq!(list.frames, [frame("a.tiff", FrameKind::Flat, Some(120.0)), frame("b.tiff", FrameKind::Dark, None)]);
+        assert_eq!(
+            list.frames,
+            [frame("a.tiff", FrameKind::Flat, Some(120.0)), frame("b.tiff", FrameKind::Dark, None)]
+        );
         let (_folder, path) = written("list.yaml", "- file: a.tiff\n  kind: flat\n- file: b.tiff\n  kind: dark\n");
         assert_eq!(read(&path).unwrap().frames.len(), 2);
-        let (folder, path) =
-            written("data.txt", "# measured\nv 3.0\nn 12 640 480\nb 40000.0 120,5\ni images\\b_0.png\nd 40000.0\ni images\\d_0.png\n");
+        let (folder, path) = written(
+            "data.txt",
+            "# measured\nv 3.0\nn 12 640 480\nb 40000.0 120,5\ni images\\b_0.png\nd 40000.0\ni images\\d_0.png\n",
+        );
         let list = read(&path).unwrap();
         assert_eq!(list.white_level_adu, Some(4095.0));
         assert_eq!(list.frames[0].file, folder.path().join("images/b_0.png"));

@@ -254,8 +254,13 @@ impl SampleReader for PngReader {
                     }
                     _ => {
                         let (stored, _) = row.data().as_chunks::<2>();
-                        let stored = stored[channel..].iter().step_by(channels);
-                        samples.extend(stored.map(|bytes| f32::from(u16::from_be_bytes(*bytes))));
+                        let sample = |bytes: &[u8; 2]| f32::from(u16::from_be_bytes(*bytes));
+                        // A loop over all of a slice runs in vectors.
+                        if channels == 1 {
+                            samples.extend(stored.iter().map(sample));
+                        } else {
+                            samples.extend(stored[channel..].iter().step_by(channels).map(sample));
+                        }
                     }
                 }
             }

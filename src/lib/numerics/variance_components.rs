@@ -47,7 +47,8 @@ impl MeanSquares {
     /// Of tables of so many rows and columns, from sums over all of them; `tables` are as many as have means of their own.
     pub fn of(sums: SquareSums, [columns, rows]: [usize; 2], tables: f64) -> Self {
         let [c, r] = [columns as f64, rows as f64];
-        let square = |sum: f64, freedom: f64| MeanSquare { value: sum.max(0.0) / (tables * freedom), freedom: tables * freedom };
+        let square =
+            |sum: f64, freedom: f64| MeanSquare { value: sum.max(0.0) / (tables * freedom), freedom: tables * freedom };
         Self {
             rows: square(sums.rows, r - 1.0),
             columns: square(sums.columns, c - 1.0),

@@ -4,8 +4,8 @@
 //! pixels ([`PixelMoments`]).
 
 use super::curved;
-use super::lines::LineCovariance;
 use super::divided::NARROW;
+use super::lines::LineCovariance;
 use super::masters::{Dark, Flat};
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;

@@ -106,9 +106,9 @@ impl Local {
     /// Of a place that stands for one of a size.
     pub fn of(weights: &Weights, sites: &SiteCovariance, small: &Place, size: [usize; 2]) -> Self {
         let shared = [0, 1].map(|axis| Shared::of(weights, sites.lines()[axis], axis, small, size[axis]));
-        let sums = shared.each_ref().map(|shared| {
-            (0..shared.profiles.len()).map(|t| [0, 1].map(|p| shared.row_sum(p, t))).collect()
-        });
+        let sums = shared
+            .each_ref()
+            .map(|shared| (0..shared.profiles.len()).map(|t| [0, 1].map(|p| shared.row_sum(p, t))).collect());
         let tables = shared.each_ref().map(|shared| {
             let pixels = 2 * shared.profiles.len();
             let both = (0..pixels).flat_map(|a| (0..pixels).map(move |b| [[a % 2, a / 2], [b % 2, b / 2]]));

@@ -50,6 +50,9 @@ pub struct CameraOutputs {
     /// Draw photon transfer, response, linearity, signal to noise, and the patterns, as SVG or PNG
     #[arg(long, value_name = "FILE.svg|png")]
     pub plot: Option<PathBuf>,
+    /// Write what was measured as a sensor file, for --sensor, which says of each number whether it was measured, derived or assumed
+    #[arg(long, value_name = "FILE")]
+    pub sensor_out: Option<PathBuf>,
     /// File for the report; by default standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
@@ -65,7 +68,7 @@ impl CameraOutputs {
         if let Some(plot) = &self.plot {
             PlotFormat::of_path(plot)?;
         }
-        register::announce(&[self.output.as_deref(), self.plot.as_deref()])
+        register::announce(&[self.output.as_deref(), self.plot.as_deref(), self.sensor_out.as_deref()])
     }
 
     /// Writes report and plot.
@@ -76,6 +79,10 @@ impl CameraOutputs {
     pub fn write(&self, camera: &MeasuredCamera) -> Result<()> {
         if let Some(plot) = &self.plot {
             write_plot(plot, &super::camera_page(camera))?;
+        }
+        if let Some(path) = &self.sensor_out {
+            let sensor = super::sensor_of(camera)?;
+            output::write_text(Some(path), &yaml_writer::write("the sensor", &sensor)?)?;
         }
         output::write_text(self.output.as_deref(), &camera_report(camera, self.output_format)?)
     }
@@ -88,7 +95,9 @@ impl CameraOutputs {
 /// [`crate::error::Error::Data`] when the form cannot hold it.
 pub fn camera_report(camera: &MeasuredCamera, format: CameraFormat) -> Result<String> {
     match format {
-        CameraFormat::Json => serde_json::to_string_pretty(&document(camera)).map(|text| text + "\n").map_err(unwritable),
+        CameraFormat::Json => {
+            serde_json::to_string_pretty(&document(camera)).map(|text| text + "\n").map_err(unwritable)
+        }
         CameraFormat::Yaml => yaml_writer::document("the report", &document(camera)),
         CameraFormat::Markdown => Ok(markdown(camera)),
         CameraFormat::Text => Ok(visible(&text(camera)).into_owned()),
@@ -96,7 +105,8 @@ pub fn camera_report(camera: &MeasuredCamera, format: CameraFormat) -> Result<St
 }
 
 fn document(camera: &MeasuredCamera) -> Value {
-    let channels: Vec<Value> = camera.classes.iter().zip(&camera.patterns).map(|(class, views)| channel(class, views)).collect();
+    let channels: Vec<Value> =
+        camera.classes.iter().zip(&camera.patterns).map(|(class, views)| channel(class, views)).collect();
     json!({
         "list": camera.list,
         "frames": {"flats": camera.frames[0], "darks": camera.frames[1]},
@@ -161,14 +171,19 @@ fn heading(camera: &MeasuredCamera) -> String {
     let [width, height] = [camera.head.geometry.width, camera.head.geometry.height];
     let percent = in_digits(camera.confidence * 100.0, 3);
     let percent = percent.trim_end_matches('0').trim_end_matches('.');
-    format!("{}: {} of {width}x{height}{at}; intervals hold with {percent} %", camera.list, frames_in_words(camera.frames))
+    format!(
+        "{}: {} of {width}x{height}{at}; intervals hold with {percent} %",
+        camera.list,
+        frames_in_words(camera.frames)
+    )
 }
 
 fn text(camera: &MeasuredCamera) -> String {
     let mut out = heading(camera) + "\n";
     for (class, views) in camera.classes.iter().zip(&camera.patterns) {
         let _ = writeln!(out, "\n{}", class.name);
-        let (told, untold): (Vec<&Finding>, Vec<&Finding>) = class.findings.iter().partition(|finding| finding.found.is_ok());
+        let (told, untold): (Vec<&Finding>, Vec<&Finding>) =
+            class.findings.iter().partition(|finding| finding.found.is_ok());
         let mut rows: Vec<[String; 4]> = vec![["".into(), "value".into(), "from".into(), "to".into()]];
         for finding in told {
             if let Ok(interval) = &finding.found {
@@ -180,7 +195,8 @@ fn text(camera: &MeasuredCamera) -> String {
         for row in &mut rows {
             row[0] = format!("{:<width$}", row[0]);
         }
-        let columns: Vec<Vec<String>> = (0..4).map(|column| rows.iter().map(|row| row[column].clone()).collect()).collect();
+        let columns: Vec<Vec<String>> =
+            (0..4).map(|column| rows.iter().map(|row| row[column].clone()).collect()).collect();
         table(&columns, &mut out);
         let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
         for finding in untold {
@@ -217,7 +233,8 @@ fn markdown(camera: &MeasuredCamera) -> String {
     let escaped = |text: &str| text.replace('|', "\\|");
     let mut out = format!("# Camera measured by photon transfer\n\n{}.\n", escaped(&heading(camera)));
     for (class, views) in camera.classes.iter().zip(&camera.patterns) {
-        let _ = write!(out, "\n## {}\n\n| quantity | value | from | to |\n|---|---:|---:|---:|\n", escaped(&class.name));
+        let _ =
+            write!(out, "\n## {}\n\n| quantity | value | from | to |\n|---|---:|---:|---:|\n", escaped(&class.name));
         for finding in &class.findings {
             if let Ok(interval) = &finding.found {
                 let [value, low, high] = shown(finding, *interval);

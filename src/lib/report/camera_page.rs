@@ -7,7 +7,8 @@ use crate::requests::photon_transfer::MeasuredCamera;
 /// Draws, two beside each other: variance against signal with the line of the gain, signal against light, deviations from the straight
 /// line, signal-to-noise ratio; then spectrograms, profiles and histograms of the patterns under light and in the dark.
 pub fn camera_page(camera: &MeasuredCamera) -> Plot {
-    let mut transfer = Panel::new(Axis::linear("signal above dark / ADU"), Axis::linear("temporal variance above dark / ADU\u{B2}"));
+    let mut transfer =
+        Panel::new(Axis::linear("signal above dark / ADU"), Axis::linear("temporal variance above dark / ADU\u{B2}"));
     let mut response = Panel::new(Axis::linear(light_label(camera)), Axis::linear("signal above dark / ADU"));
     let mut straight = Panel::new(Axis::linear(light_label(camera)), Axis::linear("deviation from the line / %"));
     let mut ratio = Panel::new(Axis::log10("signal / e\u{207B}"), Axis::log10("signal-to-noise ratio"));
@@ -58,10 +59,15 @@ fn patterns(camera: &MeasuredCamera, which: usize, name: &str, unit: &str) -> [P
         // The two directions of a single class are told apart by color too.
         let other = if camera.classes.len() == 1 { Color::Vermillion } else { color };
         let scale = if which == 0 { 100.0 } else { 1.0 / values.gain };
-        let scaled = |points: &[[f64; 2]], factor: f64| points.iter().map(|[x, y]| [*x, y * factor]).collect::<Vec<_>>();
+        let scaled =
+            |points: &[[f64; 2]], factor: f64| points.iter().map(|[x, y]| [*x, y * factor]).collect::<Vec<_>>();
         let [along_rows, along_columns] = &view.spectra;
         spectrum.add(&format!("{}, rows", class.name), color, Marks::Line(scaled(&along_rows[1..], scale * scale)));
-        spectrum.add(&format!("{}, columns", class.name), other, Marks::Dashed(scaled(&along_columns[1..], scale * scale)));
+        spectrum.add(
+            &format!("{}, columns", class.name),
+            other,
+            Marks::Dashed(scaled(&along_columns[1..], scale * scale)),
+        );
         profile.add(&format!("{}, columns", class.name), color, Marks::Line(scaled(&view.profiles[0], scale)));
         profile.add(&format!("{}, rows", class.name), other, Marks::Dashed(scaled(&view.profiles[1], scale)));
         let along = |points: &[[f64; 2]]| points.iter().map(|[x, y]| [x * scale, *y]).collect::<Vec<_>>();
@@ -98,7 +104,11 @@ fn add_transfer(panel: &mut Panel, class: &ClassFindings, color: Color) {
     }
     if let Some(values) = class.values {
         let most = class.curve.iter().filter(|point| point.is_fitted).map(|point| point.signal_adu).fold(0.0, f64::max);
-        panel.add(&format!("{}, K {:.5}", class.name, values.gain), color, Marks::Line(vec![[0.0, 0.0], [most, values.gain * most]]));
+        panel.add(
+            &format!("{}, K {:.5}", class.name, values.gain),
+            color,
+            Marks::Line(vec![[0.0, 0.0], [most, values.gain * most]]),
+        );
     }
 }
 
@@ -108,6 +118,7 @@ fn add_ratio(panel: &mut Panel, class: &ClassFindings, color: Color) {
     let most = class.get("saturation_e").map_or(f64::INFINITY, |saturation| saturation.high * values.gain);
     let is_whole = |signal: f64| signal > 0.0 && signal <= most;
     let measured = class.curve.iter().filter(|point| is_whole(point.signal_adu) && point.variance_adu2 + dark > 0.0);
-    let points = measured.map(|point| [point.signal_adu / values.gain, point.signal_adu / (point.variance_adu2 + dark).sqrt()]);
+    let points =
+        measured.map(|point| [point.signal_adu / values.gain, point.signal_adu / (point.variance_adu2 + dark).sqrt()]);
     panel.add(&class.name, color, Marks::Points(points.collect()));
 }

@@ -5,6 +5,7 @@ pub mod characterization;
 pub mod chart;
 
 mod camera_page;
+mod camera_sensor;
 mod difference;
 mod matrix_text;
 mod photon_transfer;
@@ -15,6 +16,7 @@ mod trade_off;
 
 pub use camera::CameraOutputs;
 pub use camera_page::camera_page;
+pub use camera_sensor::sensor_of;
 pub use difference::difference;
 pub use photon_transfer::photon_transfer;
 pub use portrait::portrait;

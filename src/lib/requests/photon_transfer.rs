@@ -81,8 +81,11 @@ impl PhotonTransfer {
         }
         let list_name = self.list.display().to_string();
         let is_folder = self.list.is_dir();
-        let FrameList { frames, white_level_adu } =
-            if is_folder { FrameList { frames: in_folder(&self.list)?, white_level_adu: None } } else { frame_list::read(&self.list)? };
+        let FrameList { frames, white_level_adu } = if is_folder {
+            FrameList { frames: in_folder(&self.list)?, white_level_adu: None }
+        } else {
+            frame_list::read(&self.list)?
+        };
         let white_level_adu = self.white_level_adu.or(white_level_adu);
         let described = Described { cfa: self.cfa, white_level_adu, ..Described::default() };
         let heads = frames.par_iter().map(|frame| head_of(frame, &described)).collect::<Result<Vec<_>>>()?;
@@ -125,8 +128,7 @@ impl PhotonTransfer {
         let surveys = groups.par_iter().enumerate();
         let surveys = surveys.map(|(place, group)| survey_of(group, &described, top, stacks.contains(&place)));
         let mut surveys = surveys.collect::<Result<Vec<_>>>()?;
-        let settings =
-            Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes };
+        let settings = Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes };
         let temperature_k = main_temperature(&groups);
         let classes = classes(first, &groups, &surveys, temperature_k, &settings);
         for place in classes.iter().flat_map(|class| class.stacks).flatten().map(|(place, _)| place) {
@@ -203,11 +205,14 @@ fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Result<()
     if !group.condition.is_lit {
         return Ok(());
     }
-    let [least, most] = [means.iter().copied().fold(f64::INFINITY, f64::min), means.iter().copied().fold(0.0, f64::max)];
+    let [least, most] =
+        [means.iter().copied().fold(f64::INFINITY, f64::min), means.iter().copied().fold(0.0, f64::max)];
     // Of codes near the black level a tenth is little light.
     let scale = top.map_or(most, |top| most.max(top / 10.0));
     if most - least > SAME_LIGHT * scale {
-        let at = |wanted: f64| means.iter().position(|mean| *mean == wanted).map_or(Path::new("?"), |index| &group.files[index]);
+        let at = |wanted: f64| {
+            means.iter().position(|mean| *mean == wanted).map_or(Path::new("?"), |index| &group.files[index])
+        };
         return Err(Error::Data(format!(
             "{} and {} are listed as of one light and exposure, and their means are {least:.4} and {most:.4}; tell levels of light \
              apart by the column `photons` or `level`",
@@ -228,7 +233,9 @@ fn head_of(frame: &ListedFrame, described: &Described) -> Result<FrameHeader> {
     described.apply(&mut head)?;
     let metadata = &head.metadata;
     let holds = head.holds();
-    if metadata.demosaic.is_some() || !matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Electrons | QuantityKind::Unspecified) {
+    if metadata.demosaic.is_some()
+        || !matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Electrons | QuantityKind::Unspecified)
+    {
         return Err(head.refuse(format!("it holds {holds}; photon transfer takes frames before they are demosaicked")));
     }
     if metadata.correction.is_some() {
@@ -324,7 +331,14 @@ fn in_folder(folder: &Path) -> Result<Vec<ListedFrame>> {
         if path.is_dir() {
             found.extend(in_folder(&path)?);
         } else {
-            found.push(ListedFrame { file: path, kind: None, exposure_s: None, photons: None, temperature_k: None, level: None });
+            found.push(ListedFrame {
+                file: path,
+                kind: None,
+                exposure_s: None,
+                photons: None,
+                temperature_k: None,
+                level: None,
+            });
         }
     }
     Ok(found)
@@ -360,12 +374,14 @@ fn classes(
         let Condition { photons, exposure_s, .. } = level.condition;
         [photons.or(exposure_s).unwrap_or(0.0), level.mean]
     };
-    let by_photons = groups.iter().filter(|group| group.condition.is_lit).all(|group| group.condition.photons.is_some());
+    let by_photons =
+        groups.iter().filter(|group| group.condition.is_lit).all(|group| group.condition.photons.is_some());
     let of = |name: &&str| {
         let of_kind = |is_lit: bool| -> Vec<Level> {
             let wanted = |index: &usize| {
                 let condition = &groups[*index].condition;
-                condition.is_lit == is_lit && (condition.temperature_k == temperature_k || condition.temperature_k.is_none())
+                condition.is_lit == is_lit
+                    && (condition.temperature_k == temperature_k || condition.temperature_k.is_none())
             };
             (0..groups.len()).filter(wanted).map(|index| level(name, index)).collect()
         };
@@ -375,8 +391,10 @@ fn classes(
             let by_light = if by_photons { light_a.total_cmp(&light_b) } else { std::cmp::Ordering::Equal };
             by_light.then(mean_a.total_cmp(&mean_b))
         });
-        let all: Vec<Level> =
-            (0..groups.len()).filter(|&index| !groups[index].condition.is_lit).map(|index| level(name, index)).collect();
+        let all: Vec<Level> = (0..groups.len())
+            .filter(|&index| !groups[index].condition.is_lit)
+            .map(|index| level(name, index))
+            .collect();
         of_class(name, &flats, &darks, &all, settings)
     };
     names.par_iter().map(of).collect()

@@ -226,7 +226,11 @@ impl Curve {
     }
 
     fn gain_line(&self) -> Option<Line> {
-        if self.is_offset_free { Line::through(self.gain_points().collect::<Vec<_>>()) } else { Line::through_zero(self.gain_points()) }
+        if self.is_offset_free {
+            Line::through(self.gain_points().collect::<Vec<_>>())
+        } else {
+            Line::through_zero(self.gain_points())
+        }
     }
 
     fn response_points(&self) -> impl Iterator<Item = Point> + Clone {
@@ -352,7 +356,8 @@ impl Curve {
             self.fitted.iter().map(|flat| 1.0 / (own(flat) + besides).max(f64::MIN_POSITIVE)).collect()
         };
         let misfit = |besides: f64| {
-            let weighted = Self { weights: Weights { response: weights(besides), ..self.weights.clone() }, ..self.clone() };
+            let weighted =
+                Self { weights: Weights { response: weights(besides), ..self.weights.clone() }, ..self.clone() };
             let points: Vec<Point> = weighted.response_points().collect();
             Line::through_zero(points.clone()).map_or(0.0, |line| line.chi_square(points))
         };
@@ -377,7 +382,8 @@ impl Curve {
             self.darks.iter().min_by(|a, b| time(a).total_cmp(&time(b)))
         };
         let mean = lines.map(|[mean, _]| mean.offset).or_else(|| shortest().map(|dark| dark.mean.value));
-        let measured = lines.map(|[_, variance]| variance.offset).or_else(|| shortest().map(|dark| dark.variance.value));
+        let measured =
+            lines.map(|[_, variance]| variance.offset).or_else(|| shortest().map(|dark| dark.variance.value));
         let has_darks = !self.darks.is_empty() && !self.are_darks_clipped;
         let dark_variance = if self.is_offset_free { Some(line.offset) } else { measured };
         Some(Values {
@@ -386,7 +392,9 @@ impl Curve {
             dark_mean: mean.filter(|_| has_darks),
             responsivity: Line::through_zero(self.response_points()).map(|line| line.slope),
             dark_slope: lines.map(|[mean, _]| mean.slope).filter(|_| has_darks),
-            dark_variance_slope: lines.map(|[_, variance]| variance.slope).filter(|_| has_darks && !self.is_offset_free),
+            dark_variance_slope: lines
+                .map(|[_, variance]| variance.slope)
+                .filter(|_| has_darks && !self.is_offset_free),
         })
     }
 

@@ -12,7 +12,10 @@ use std::f64::consts::LN_2;
 /// all have one more error alike.
 fn fitted(points: &[(f64, f64, f64)]) -> Option<(Line, [f64; 2])> {
     let weighted = |besides: f64| -> Vec<Point> {
-        points.iter().map(|(x, y, variance)| Point { x: *x, y: *y, weight: 1.0 / (variance + besides).max(f64::MIN_POSITIVE) }).collect()
+        points
+            .iter()
+            .map(|(x, y, variance)| Point { x: *x, y: *y, weight: 1.0 / (variance + besides).max(f64::MIN_POSITIVE) })
+            .collect()
     };
     let misfit = |besides: f64| Line::through(weighted(besides)).map_or(0.0, |line| line.chi_square(weighted(besides)));
     let freedom = points.len() as f64 - 2.0;
@@ -46,7 +49,8 @@ pub fn doubling_temperature(darks: &[Level], confidence: f64) -> Result<Interval
         is_told.then(|| (*temperature, line.slope.log2(), variance / (line.slope * LN_2).powi(2)))
     };
     let rates: Vec<(f64, f64, f64)> = temperatures.iter().filter_map(rate).collect();
-    let few = "it takes darks at two temperatures or more, each at two exposure times or more that tell its dark current";
+    let few =
+        "it takes darks at two temperatures or more, each at two exposure times or more that tell its dark current";
     let (line, [_, variance]) = if rates.len() < 2 { None } else { fitted(&rates) }.ok_or(few)?;
     let slope = Interval::normal(line.slope, variance, confidence);
     if slope.low <= 0.0 {

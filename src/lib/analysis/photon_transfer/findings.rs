@@ -82,7 +82,13 @@ fn lacking(what: &str) -> String {
 }
 
 /// What the levels of a class tell; flats in the order of their light, darks of the flats' temperature, and all darks.
-pub fn of_class(name: &str, flats: &[Level], darks: &[Level], all_darks: &[Level], settings: &Settings) -> ClassFindings {
+pub fn of_class(
+    name: &str,
+    flats: &[Level],
+    darks: &[Level],
+    all_darks: &[Level],
+    settings: &Settings,
+) -> ClassFindings {
     let Settings { confidence, photon_error, are_codes } = *settings;
     let rounding = if are_codes { ROUNDING } else { 0.0 };
     let Some(curve) = Curve::of(flats, darks, rounding, photon_error) else {
@@ -152,7 +158,8 @@ pub fn of_class(name: &str, flats: &[Level], darks: &[Level], all_darks: &[Level
     }
     let stacks = stacks(&curve, flats, darks);
     let [lit, dark] = stacks;
-    let places = [lit.map(|(flat, level)| (level.place, curve.signal(flat))), dark.map(|(_, level)| (level.place, 0.0))];
+    let places =
+        [lit.map(|(flat, level)| (level.place, curve.signal(flat))), dark.map(|(_, level)| (level.place, 0.0))];
     add_patterns(&mut add, &curve, stacks, &over_gain, confidence);
     let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
     add("dark_current_e_per_s", number(&per_second, if darks.is_empty() { no_darks() } else { few_times() }));
@@ -179,7 +186,15 @@ pub fn of_class(name: &str, flats: &[Level], darks: &[Level], all_darks: &[Level
     });
     let (curve_points, values) = (points.collect(), curve.values());
     let notes = notes(&curve, flats);
-    ClassFindings { name: name.into(), findings: found, curve: curve_points, linearity: straight.ok(), values, stacks: places, notes }
+    ClassFindings {
+        name: name.into(),
+        findings: found,
+        curve: curve_points,
+        linearity: straight.ok(),
+        values,
+        stacks: places,
+        notes,
+    }
 }
 
 /// Why temporal noise of darks is not parted.
@@ -247,12 +262,14 @@ fn saturation(curve: &Curve, flats: &[Level], gain: Found) -> [Found; 3] {
         Err(why) => return [Err(why.clone()), Err(why.clone()), Err(why)],
     };
     let Some(peak) = curve.saturated else {
-        let why = || lacking("the variance still rises at the brightest flat: brighter ones, until it falls, would tell");
+        let why =
+            || lacking("the variance still rises at the brightest flat: brighter ones, until it falls, would tell");
         return [Err(why()), Err(why()), Err(why())];
     };
     // The largest variance lies between the neighbors of the level that has it.
     let [below, above] = [peak.saturating_sub(1), (peak + 1).min(flats.len() - 1)];
-    let bracket = |of: &dyn Fn(usize) -> f64| Interval { value: of(peak), low: of(below), high: of(above).max(of(peak)) };
+    let bracket =
+        |of: &dyn Fn(usize) -> f64| Interval { value: of(peak), low: of(below), high: of(above).max(of(peak)) };
     let electrons = over(bracket(&|flat| curve.signal(flat)), gain);
     let photons = |flat: usize| flats[flat].condition.photons;
     let has_photons = [below, peak, above].into_iter().all(|flat| photons(flat).is_some());
@@ -268,7 +285,11 @@ fn saturation(curve: &Curve, flats: &[Level], gain: Found) -> [Found; 3] {
     } else {
         Ok(over(Interval::normal(curve.signal(brightest), curve.signal_variance(brightest), 0.95), gain))
     };
-    [Ok(electrons), in_photons.ok_or_else(|| lacking("the photons per photosite of the flats are not known")), full_well]
+    [
+        Ok(electrons),
+        in_photons.ok_or_else(|| lacking("the photons per photosite of the flats are not known")),
+        full_well,
+    ]
 }
 
 /// The deviations from a straight line, against photons, or against time where light was constant.
@@ -326,9 +347,12 @@ fn add_patterns(
         };
         add(key, result);
     }
-    for (key, part) in
-        [("dsnu_e", Part::Total), ("dsnu_row_e", Part::Row), ("dsnu_column_e", Part::Column), ("dsnu_pixel_e", Part::Pixel)]
-    {
+    for (key, part) in [
+        ("dsnu_e", Part::Total),
+        ("dsnu_row_e", Part::Row),
+        ("dsnu_column_e", Part::Column),
+        ("dsnu_pixel_e", Part::Pixel),
+    ] {
         add(key, dark.map_or_else(|| Err(no_darks()), |(_, dark)| over_gain(Ok(fixed(dark, part, confidence)))));
     }
 }

@@ -35,8 +35,10 @@ pub struct Linearity {
 /// The linearity of levels whose `saturation` is known; none where fewer than three lie in the range.
 pub fn linearity(levels: &[Response], saturation: f64, confidence: f64) -> Option<Linearity> {
     let range = RANGE.map(|share| share * saturation);
-    let within: Vec<&Response> =
-        levels.iter().filter(|level| level.signal >= range[0] && level.signal <= range[1] && level.light > 0.0).collect();
+    let within: Vec<&Response> = levels
+        .iter()
+        .filter(|level| level.signal >= range[0] && level.signal <= range[1] && level.light > 0.0)
+        .collect();
     if within.len() < 3 {
         return None;
     }

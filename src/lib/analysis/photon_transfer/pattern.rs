@@ -33,7 +33,12 @@ impl Part {
 }
 
 /// The terms of a part of a variance that several grids share, each counted by its photosites.
-fn terms(level: &Level, part: Part, of: impl Fn(usize) -> (MeanSquares, [usize; 2]), factor: f64) -> Vec<(f64, MeanSquare)> {
+fn terms(
+    level: &Level,
+    part: Part,
+    of: impl Fn(usize) -> (MeanSquares, [usize; 2]),
+    factor: f64,
+) -> Vec<(f64, MeanSquare)> {
     let count: f64 = level.sites.iter().map(|site| site.count() as f64).sum();
     let mut terms = Vec::new();
     for (index, site) in level.sites.iter().enumerate() {

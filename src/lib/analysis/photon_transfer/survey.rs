@@ -14,8 +14,8 @@
 use super::sites::Site;
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, to_sample};
-use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::numerics::variance_components::{MeanSquare, MeanSquares, SquareSums};
+use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::stream::RowSource;
 use rayon::prelude::*;
 
@@ -270,7 +270,9 @@ impl Tally {
             .column_sums
             .chunks_exact(self.size[0])
             .enumerate()
-            .flat_map(|(frame, sums)| sums.iter().zip(&self.column_means).map(move |(sum, of_mean)| (frame, *sum, *of_mean)))
+            .flat_map(|(frame, sums)| {
+                sums.iter().zip(&self.column_means).map(move |(sum, of_mean)| (frame, *sum, *of_mean))
+            })
             .map(|(frame, sum, of_mean)| left(sum, rows, frame, of_mean).powi(2))
             .sum();
         let all: f64 = self.row_squares.iter().sum::<f64>()

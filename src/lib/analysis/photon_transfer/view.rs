@@ -180,7 +180,9 @@ fn median(values: &mut [f64]) -> f64 {
 
 /// Photosites in each bin, and what a normal law has there.
 fn histogram(values: &[f64], mean: f64, spread: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
-    let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
+    let [low, high] = values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
     let width = (high - low) / BINS as f64;
     if !(width > 0.0) {
         return (Vec::new(), Vec::new());

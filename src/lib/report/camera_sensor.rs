@@ -1,0 +1,202 @@
+//! A measured camera as a sensor file, with what each number is from.
+
+use crate::analysis::photon_transfer::ClassFindings;
+use crate::camera::readout::ReadOut;
+use crate::camera::sensor::{SENSOR_SCHEMA, Sensor};
+use crate::cfa::FilterArray;
+use crate::error::{Error, Result};
+use crate::numerics::variance_components::Interval;
+use crate::requests::photon_transfer::{MeasuredCamera, frames_in_words};
+use crate::units::QuantityKind;
+use std::fmt::Write;
+
+/// The temperature that is assumed where none is known, K.
+const ROOM_K: f64 = 295.0;
+
+/// Where a number of the file is from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Origin {
+    Measured,
+    Derived,
+    Assumed,
+}
+
+/// Numbers of the file with their origins.
+#[derive(Default)]
+struct Told(Vec<(&'static str, Origin, String)>);
+
+impl Told {
+    fn tell(&mut self, key: &'static str, origin: Origin, why: impl Into<String>) {
+        self.0.push((key, origin, why.into()));
+    }
+}
+
+/// The read-out of a measured camera as a sensor, each number with its origin: measured, derived from what was measured, or assumed.
+///
+/// # Errors
+///
+/// [`Error::Data`] where there is no gain or black level, and for frames of electrons, which tell nothing of a converter.
+pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
+    let metadata = &camera.head.metadata;
+    let lacking = |what: &str| Error::Data(format!("{}: no sensor file follows: {what}", camera.list));
+    if metadata.quantity == QuantityKind::Electrons {
+        return Err(lacking("the frames are of electrons, before any converter"));
+    }
+    let top = metadata
+        .white_level_adu
+        .map(|white| white.largest())
+        .ok_or_else(|| lacking("the largest code is not known").give(&["white_level_adu"]))?;
+    let mut told = Told::default();
+    let pooled = |key: &str| pooled(&camera.classes, key);
+    let needed = |key: &str| pooled(key).ok_or_else(|| lacking(&reason(&camera.classes, key)));
+    let gain = needed("gain_adu_per_e")?;
+    let bias_adu = needed("black_level_adu")?;
+    told.tell("adu_per_e", Origin::Measured, shown(gain));
+    told.tell("bias_adu", Origin::Measured, shown(bias_adu));
+    let bits = bits_of(top);
+    let of_bits =
+        if f64::from(bits).exp2() - 1.0 == top { "the largest code" } else { "the least that hold the largest code" };
+    told.tell("bits", Origin::Derived, of_bits);
+    let full_well_e = match pooled("full_well_e") {
+        Some(full) => {
+            told.tell("full_well_e", Origin::Measured, shown(full));
+            full.value
+        }
+        None => {
+            let reached = |class: &ClassFindings| class.curve.iter().map(|point| point.signal_adu).fold(0.0, f64::max);
+            let reached = camera.classes.iter().map(reached).fold(0.0, f64::max) / gain.value;
+            told.tell(
+                "full_well_e",
+                Origin::Assumed,
+                format!("no less than what was reached; {}", reason(&camera.classes, "full_well_e")),
+            );
+            reached.max((top - bias_adu.value) / gain.value)
+        }
+    };
+    let mut taken = |key: &'static str, from: &'static str| match pooled(from) {
+        Some(found) if found.value > 0.0 && found.low > 0.0 => {
+            told.tell(key, Origin::Measured, shown(found));
+            found.value
+        }
+        Some(found) => {
+            told.tell(key, Origin::Assumed, format!("none is told from none: {}", shown(found)));
+            0.0
+        }
+        None => {
+            told.tell(key, Origin::Assumed, format!("none; {}", reason(&camera.classes, from)));
+            0.0
+        }
+    };
+    let row_noise_e = taken("row_noise_e", "row_noise_e");
+    let column_noise_e = taken("column_noise_e", "column_noise_e");
+    let prnu = taken("prnu", "prnu_pixel");
+    let [prnu_row, prnu_column] = [taken("prnu_row", "prnu_row"), taken("prnu_column", "prnu_column")];
+    let [dsnu_row_e, dsnu_column_e] = [taken("dsnu_row_e", "dsnu_row_e"), taken("dsnu_column_e", "dsnu_column_e")];
+    let dark_current = taken("dark_current_e_per_s", "dark_current_e_per_s");
+    let dcnu = if dark_current > 0.0 { taken("dcnu", "dcnu") } else { 0.0 };
+    let dsnu_e = if dcnu > 0.0 { taken("dsnu_e", "dsnu_offset_e") } else { taken("dsnu_e", "dsnu_pixel_e") };
+    let dark_noise = needed("dark_noise_e")?;
+    let read_noise_e = (dark_noise.value.powi(2) - row_noise_e.powi(2) - column_noise_e.powi(2)).max(0.0).sqrt();
+    told.tell(
+        "read_noise_e",
+        Origin::Derived,
+        format!("dark noise {}, less that of rows and columns", shown(dark_noise)),
+    );
+    match camera.temperature_k {
+        Some(_) => told.tell("temperature_k", Origin::Measured, "said with the frames"),
+        None => told.tell("temperature_k", Origin::Assumed, "a room's: no frame says it"),
+    }
+    let geometry = &camera.head.geometry;
+    let three = geometry.channels.len() > 1;
+    told.tell(
+        "cfa",
+        if metadata.cfa.is_some() || !three { Origin::Measured } else { Origin::Assumed },
+        "of the frames",
+    );
+    let whole = |extent: usize| u32::try_from(extent).map_err(|_| lacking("the frames are too large"));
+    let readout = ReadOut {
+        width: whole(geometry.width)?,
+        height: whole(geometry.height)?,
+        pixel_pitch_um: None,
+        cfa: metadata.cfa.unwrap_or(if three {
+            "rggb".parse().unwrap_or(FilterArray::Monochrome)
+        } else {
+            FilterArray::Monochrome
+        }),
+        full_well_e,
+        dark_current_na_per_cm2: None,
+        dark_current_e_per_s: Some(dark_current),
+        temperature_k: camera.temperature_k.unwrap_or(ROOM_K),
+        dcnu,
+        prnu,
+        read_noise_e,
+        row_noise_e,
+        column_noise_e,
+        dsnu_e,
+        dsnu_row_e,
+        dsnu_column_e,
+        prnu_row,
+        prnu_column,
+        bits,
+        bias_adu: bias_adu.value,
+        adu_per_e: gain.value,
+        linearization: None,
+    };
+    let mut source = format!(
+        "photon-transfer of {}; intervals hold with {} %",
+        frames_in_words(camera.frames),
+        camera.confidence * 100.0
+    );
+    for (key, origin, why) in &told.0 {
+        let origin = match origin {
+            Origin::Measured => "measured",
+            Origin::Derived => "derived",
+            Origin::Assumed => "assumed",
+        };
+        let _ = write!(source, "\n{key}: {origin}: {why}");
+    }
+    let sensor = Sensor {
+        schema: SENSOR_SCHEMA.into(),
+        name: "measured".into(),
+        description: None,
+        source: Some(source),
+        readout: Some(readout),
+        response: None,
+        xyz_from_camera: None,
+    };
+    sensor.check().map_err(|problem| lacking(&problem))?;
+    Ok(sensor)
+}
+
+/// The bits that hold a code.
+fn bits_of(top: f64) -> u32 {
+    (1..16).find(|bits| f64::from(*bits).exp2() > top).unwrap_or(16)
+}
+
+/// A number over all classes, each weighted by its certainty.
+fn pooled(classes: &[ClassFindings], key: &str) -> Option<Interval> {
+    let found: Vec<Interval> = classes.iter().filter_map(|class| class.get(key)).collect();
+    let weight = |interval: &Interval| 1.0 / ((interval.high - interval.low) / 2.0).powi(2).max(f64::MIN_POSITIVE);
+    let all: f64 = found.iter().map(weight).sum();
+    let mean =
+        |of: fn(&Interval) -> f64| found.iter().map(|interval| weight(interval) / all * of(interval)).sum::<f64>();
+    let value = mean(|interval| interval.value);
+    let narrower = (found.len() as f64).sqrt();
+    let [below, above] = [value - mean(|interval| interval.low), mean(|interval| interval.high) - value];
+    (found.len() == classes.len() && !found.is_empty()).then(|| Interval {
+        value,
+        low: value - below / narrower,
+        high: value + above / narrower,
+    })
+}
+
+/// Why a number is not known.
+fn reason(classes: &[ClassFindings], key: &str) -> String {
+    let of = |class: &ClassFindings| class.findings.iter().find(|finding| finding.key == key)?.found.clone().err();
+    classes.iter().find_map(of).unwrap_or_else(|| "it was not measured".into())
+}
+
+fn shown(interval: Interval) -> String {
+    let digits = |value: f64| super::in_digits(value, 4);
+    format!("{} to {}", digits(interval.low), digits(interval.high))
+}
