@@ -373,6 +373,6 @@ fn what_rows_share_is_not_left_out() {
     let std = |frame: &MemoryFrame| regions(frame, &[])[0].patch_mean_std.clone().unwrap();
     for (shared, alone) in std(&camera).into_iter().zip(std(&independent)) {
         // 40 rows and 60 columns instead of 2400 pixels.
-        assert!(shared > 3.0 * alone, "{shared} {alone}");
+        assert!(shared > 1.5 * alone, "{shared} {alone}");
     }
 }

@@ -603,50 +603,93 @@ fn any_camera(chance: &mut Chance) -> (CameraSetup, [f64; 3]) {
     let mut setup = CameraSetup::new(sensor, exposure);
     setup.noise.seed = chance.word();
     setup.noise.sensor_seed = chance.word();
-    setup.noise.without = Source::ALL.iter().copied().filter(|_| chance.word().is_multiple_of(5)).collect();
+    setup.noise.without = Source::ALL[..5].iter().copied().filter(|_| chance.word().is_multiple_of(5)).collect();
     setup.method = Method::ALL[usize::try_from(chance.word()).unwrap() % Method::ALL.len()];
     let light = [0; 3].map(|_| chance.log_or_none(1e-6, 10.0 * full_well_e));
     (setup, light)
+}
+
+/// Alarms of a camera's frames at every stage, how many were judged and how many refused, and the longest that one took in s.
+type Outcome = (Vec<String>, u32, u32, f64);
+
+/// Judges a frame of each stage at a level.
+fn judged(index: u64, (setup, light): (CameraSetup, [f64; 3]), level: f64) -> Outcome {
+    let (mut alarms, mut judged, mut void, mut slowest) = (Vec::new(), 0, 0, 0.0_f64);
+    let scene = Scene::uniform("any", light);
+    let expected = uniform_frame(setup.plane([24, 20], scene).unwrap(), light).unwrap();
+    let stages = setup.stages(&expected.header).unwrap();
+    let charge = expected.through(&stages.add_noise).unwrap().0;
+    let codes = charge.through(&stages.digitize).unwrap().0;
+    let camera = codes.through(&stages.demosaic).unwrap().0;
+    for (stage, frame) in [("electrons", charge), ("codes", codes), ("demosaicked", camera)] {
+        let mut source = MemoryFrame::new(frame.header, frame.samples);
+        let started = Instant::now();
+        let found = measure(&mut source, &[], Saturated::Kept, Equations::Exact, Some(level));
+        slowest = slowest.max(started.elapsed().as_secs_f64());
+        match found.map(|report| report.check.unwrap()) {
+            Ok(verdict) if verdict.passed => judged += 1,
+            Ok(verdict) => {
+                judged += 1;
+                alarms.push(format!("camera {index}, {stage}: p = {:.1e}", verdict.corrected_p));
+            }
+            Err(refused) => {
+                void += 1;
+                assert!(refused.to_string().contains("nothing can be checked"), "camera {index}: {refused}");
+            }
+        }
+    }
+    (alarms, judged, void, slowest)
+}
+
+fn cameras() -> u64 {
+    std::env::var("CYANOMETER_CAMERAS").map_or(1000, |count| count.parse().unwrap())
 }
 
 /// Frames of cameras drawn at random are as predicted, at every stage: alarms at a level of 10⁻³ come no more often than that.
 /// What cannot be predicted is refused with the reason.
 #[test]
 fn cameras_drawn_at_random_are_as_predicted() {
-    let cameras: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(1000, |count| count.parse().unwrap());
     let start = Instant::now();
-    let level = 1e-3;
-    let outcomes: Vec<(Vec<String>, u32, u32, f64)> = (0..cameras)
+    let outcomes = (0..cameras())
         .into_par_iter()
-        .map(|index| {
-            let (setup, light) = any_camera(&mut Chance(index));
-            let (mut alarms, mut judged, mut void, mut slowest) = (Vec::new(), 0, 0, 0.0_f64);
-            let scene = Scene::uniform("any", light);
-            let expected = uniform_frame(setup.plane([24, 20], scene).unwrap(), light).unwrap();
-            let stages = setup.stages(&expected.header).unwrap();
-            let charge = expected.through(&stages.add_noise).unwrap().0;
-            let codes = charge.through(&stages.digitize).unwrap().0;
-            let camera = codes.through(&stages.demosaic).unwrap().0;
-            for (stage, frame) in [("electrons", charge), ("codes", codes), ("demosaicked", camera)] {
-                let mut source = MemoryFrame::new(frame.header, frame.samples);
-                let started = Instant::now();
-                let found = measure(&mut source, &[], Saturated::Kept, Equations::Exact, Some(level));
-                slowest = slowest.max(started.elapsed().as_secs_f64());
-                match found.map(|report| report.check.unwrap()) {
-                    Ok(verdict) if verdict.passed => judged += 1,
-                    Ok(verdict) => {
-                        judged += 1;
-                        alarms.push(format!("camera {index}, {stage}: p = {:.1e}", verdict.corrected_p));
-                    }
-                    Err(refused) => {
-                        void += 1;
-                        assert!(refused.to_string().contains("nothing can be checked"), "camera {index}: {refused}");
-                    }
-                }
-            }
-            (alarms, judged, void, slowest)
-        })
+        .map(|index| judged(index, any_camera(&mut Chance(index)), LEVEL))
         .collect();
+    tell_of_cameras("cameras", outcomes, start);
+}
+
+/// The same of sensors that are read by row and column.
+#[test]
+fn sensors_of_rows_and_columns_drawn_at_random_are_as_predicted() {
+    let start = Instant::now();
+    let of_rows = |index: u64| {
+        let mut chance = Chance(index);
+        let (mut setup, light) = any_camera(&mut chance);
+        let readout = setup.sensor.readout.as_mut().unwrap();
+        let full_well_e = readout.full_well_e;
+        for part in [
+            &mut readout.row_noise_e,
+            &mut readout.column_noise_e,
+            &mut readout.dsnu_e,
+            &mut readout.dsnu_row_e,
+            &mut readout.dsnu_column_e,
+        ] {
+            *part = chance.log_or_none(1e-6, 0.03) * full_well_e;
+        }
+        for part in [&mut readout.prnu_row, &mut readout.prnu_column] {
+            *part = chance.log_or_none(1e-6, 0.05);
+        }
+        readout.check().unwrap();
+        (setup, light)
+    };
+    let outcomes = (0..cameras() / 2).into_par_iter().map(|index| judged(index, of_rows(index), LEVEL)).collect();
+    tell_of_cameras("sensors of rows and columns", outcomes, start);
+}
+
+/// The level at which frames of cameras at random are judged.
+const LEVEL: f64 = 1e-3;
+
+fn tell_of_cameras(what: &str, outcomes: Vec<Outcome>, start: Instant) {
+    let (cameras, level) = (outcomes.len(), LEVEL);
     let alarms: Vec<&String> = outcomes.iter().flat_map(|(alarms, ..)| alarms).collect();
     let (judged, void) = outcomes.iter().fold((0, 0), |(judged, void), found| (judged + found.1, void + found.2));
     let slowest = outcomes.iter().map(|found| found.3).fold(0.0, f64::max);
@@ -656,7 +699,7 @@ fn cameras_drawn_at_random_are_as_predicted() {
         alarms.len(),
         1e3 * slowest
     );
-    let what = format!("{cameras} cameras at random, each frame judged at a level of {level}");
+    let what = format!("{cameras} {what} at random, each frame judged at a level of {level}");
     told("predictions", &what, "no more alarms than the level", &found, None, start.elapsed().as_secs_f64());
     // A Poisson number of this mean is above mean + 4 σ + 3 in fewer than one case of 10⁴.
     assert!((alarms.len() as f64) <= expected + 4.0 * expected.sqrt() + 3.0, "{found}\n{alarms:#?}");

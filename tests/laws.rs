@@ -362,7 +362,11 @@ fn all_but(kept: &[Source]) -> Vec<Source> {
 
 #[test]
 fn frames_change_temporal_noise_and_sensors_change_patterns() {
-    let light = expected(33, 20, |x, y, class| 9000.0 * scatter(x, y, class as usize) + 20.0);
+    let mut light = expected(33, 20, |x, y, class| 9000.0 * scatter(x, y, class as usize) + 20.0);
+    let readout = light.header.metadata.sensor.as_mut().unwrap().readout.as_mut().unwrap();
+    (readout.row_noise_e, readout.column_noise_e, readout.dsnu_e) = (3.0, 2.0, 4.0);
+    (readout.dsnu_row_e, readout.dsnu_column_e) = (1.0, 5.0);
+    (readout.prnu_row, readout.prnu_column) = (0.01, 0.02);
     let take = |kept: &[Source], seed, sensor_seed, frame| {
         let without = all_but(kept);
         noisy(&light, &NoiseSettings { seed, sensor_seed, frame, without, ..Default::default() })

@@ -142,6 +142,81 @@ class Prediction(ProgramCase):
                 stages, _ = self.predict(electrons, "--method", method, "--pattern", "grbg", "--patch", f"{width}x{height}")
                 self.close(stages["demosaicked"]["patch_mean_std"], np.sqrt(np.mean(found, axis=0)), 1e-6, method)
 
+    ROWS = {"row_noise_e": 9.0, "column_noise_e": 4.0, "dsnu_e": 6.0, "dsnu_row_e": 2.0, "dsnu_column_e": 11.0,
+            "prnu_row": 0.003, "prnu_column": 0.005}
+
+    def rows_and_columns(self):
+        """A sensor that is read by row and column, otherwise the default one."""
+        numbers = {
+            "width": 400, "height": 300, "pixel_pitch_um": 6.8, "cfa": "grbg", "full_well_e": 40000,
+            "dark_current_na_per_cm2": 0.068558, "temperature_k": 333, "dcnu": DCNU, "prnu": PRNU, "read_noise_e": READ_E,
+            "bits": 16, "bias_adu": BIAS, "adu_per_e": SLOPE, **self.ROWS,
+        }
+        lines = "".join(f"  {key}: {value}\n" for key, value in numbers.items())
+        path = self.directory / "rows.yaml"
+        path.write_text(f"schema: cyanometer-sensor/2\nname: rows\nreadout:\n{lines}", encoding="utf-8")
+        return path
+
+    def test_patch_means_of_rows_and_columns(self):
+        """Every pair of sites that share a row or a column, one by one."""
+        sensor, rows = self.rows_and_columns(), self.ROWS
+        electrons, dark = np.array([7000.0, 12_000.0, 19_000.0]), dark_electrons(333, 0.033)
+        temporal_and_fixed = {
+            "row": rows["row_noise_e"] ** 2 + rows["dsnu_row_e"] ** 2,
+            "column": rows["column_noise_e"] ** 2 + rows["dsnu_column_e"] ** 2,
+        }
+        shared = {
+            axis: SLOPE**2 * (added + np.outer(electrons, electrons) * rows[f"prnu_{axis}"] ** 2)
+            for axis, added in temporal_and_fixed.items()
+        }
+        gains = PRNU**2 + rows["prnu_row"] ** 2 + rows["prnu_column"] ** 2
+        added = READ_E**2 + rows["dsnu_e"] ** 2 + sum(temporal_and_fixed.values())
+        codes = np.array([
+            SLOPE**2 * (signal + (signal**2 + signal) * gains + dark + (dark**2 + dark) * DCNU**2 + added) + 1 / 12
+            for signal in electrons
+        ])
+        own = codes - np.diag(shared["row"]) - np.diag(shared["column"])
+        for method in METHODS:
+            derivatives, _ = weights(method, "grbg", electrons)
+            for (width, height), (row, column) in [((1, 1), (0, 0)), ((2, 3), (1, 0)), ((9, 5), (0, 1)), ((14, 16), (1, 1))]:
+                total = patch_mean_weights(derivatives, (row, column), width, height)
+                ys, xs = (axis.ravel() for axis in np.mgrid[0 : total.shape[1], 0 : total.shape[2]])
+                masks = class_masks("grbg", 2, 2)
+                tile = sum(masks[name].astype(int) * index for index, name in enumerate("RGB"))
+                classes = tile[(ys + row - 3) % 2, (xs + column - 3) % 2]
+                covariance = np.diag(own[classes])
+                for axis, places in [("row", ys), ("column", xs)]:
+                    is_same = places[:, None] == places[None, :]
+                    covariance += is_same * shared[axis][classes[:, None], classes[None, :]]
+                total = total.reshape(3, -1)
+                expected = total @ covariance @ total.T
+                stages, _ = self.predict(
+                    electrons, "--sensor", sensor, "--method", method, "--patch", f"{width}x{height}",
+                    "--patch-at", f"{column},{row}",
+                )
+                stage = stages["demosaicked"]
+                self.close(stage["patch_mean_covariance"], expected, 1e-6, f"{method} {width}x{height}")
+                self.close(stages["adu"]["std"], np.sqrt(codes), 1e-6, "codes")
+                causes = np.sum([cause["variance"] for cause in stage["causes"]], axis=0)
+                self.close(causes, np.diag(stage["covariance"]), 1e-9, "causes")
+                names = {cause["cause"] for cause in stage["causes"]}
+                self.assertLessEqual({"row_noise", "column_noise", "dsnu", "dsnu_row", "prnu_column"}, names)
+
+    def test_simulated_patches_of_rows_and_columns(self):
+        """Means of 16×16 pixels, one of each of 300 frames of 300 sensors."""
+        sensor, electrons = self.rows_and_columns(), (7000.0, 12_000.0, 19_000.0)
+        means = []
+        for seed in range(300):
+            render = ["render-radiance", "--sensor", sensor, "--electrons", "7000,12000,19000", "--size", "24x24", "-q"]
+            noisy = ["add-noise", "--seed", seed, "--sensor-seed", seed, "-q"]
+            rest = (["digitize", "-q"], ["demosaic", "--method", "eci", "-q"])
+            frame = self.planes(self.run_pipe(render, ["mosaic", "-q"], noisy, *rest))
+            means.append([frame[name][4:20, 4:20].astype(np.float64).mean() for name in "RGB"])
+        stages, _ = self.predict(electrons, "--sensor", sensor, "--patch", "16x16", "--patch-at", "4,4")
+        ratio = np.std(means, axis=0, ddof=1) / stages["demosaicked"]["patch_mean_std"]
+        # 1/√(2·299) = 0.041.
+        self.assertLess(np.max(np.abs(ratio - 1)), 4.5 * 0.041, ratio)
+
     def matrix(self):
         self.run_program(["fit-matrix", sample_data("skies/sky912.exr"), "-o", "matrix.yaml", "-q"])
         fitted = self.run_program(["fit-matrix", sample_data("skies/sky912.exr"), "--output-format", "json", "-q"])

@@ -155,6 +155,7 @@ impl Sites {
             _ => return Err(Unpredictable::Beyond("only electrons, ADU and what is made of them are predicted")),
         };
         photosite.check_lines()?;
+        photosite.check_level()?;
         if quantity_of_sites(frame) != QuantityKind::ExpectedElectrons {
             let lines = photosite.lines(expected_e)?;
             if frame.metadata.is_transferred() && lines != [LineCovariance::default(); 3] {

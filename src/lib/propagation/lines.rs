@@ -118,6 +118,10 @@ const NO_MEANS: &str = "medians and clipped means of frames whose rows or column
 const OFFSETS_SHOW: &str = "photosites have fixed offsets, and the noise of the dark frames, over less than a code, makes what they \
                             leave of these hang on where in a code each mean lies";
 
+/// Why nothing is said of samples over a flat field.
+const NORMALIZED: &str = "it was divided by a flat field whose rows or columns share noise or gains, and how far these move its level \
+                          is not predicted";
+
 /// Why the paper says nothing.
 const NOT_IN_THE_PAPER: &str = "the paper has no equations for noise of rows and columns, nor for fixed offsets";
 
@@ -189,6 +193,16 @@ impl Photosite {
             return Err(Unpredictable::Beyond(OFFSETS_SHOW));
         }
         Ok(())
+    }
+
+    /// Makes sure that the level of the flat field is as sure as its photosites are many.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`].
+    pub(super) fn check_level(&self) -> Predicted<()> {
+        let is_shared = self.flat.is_some() && self.has_lines();
+        if is_shared { Err(Unpredictable::Beyond(NORMALIZED)) } else { Ok(()) }
     }
 
     /// Whether photosites of a row or of a column share anything.

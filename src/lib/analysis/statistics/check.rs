@@ -158,7 +158,8 @@ impl Expected {
         let of_sites = 12.0 * fourth * second + 4.0 * third * third;
         let square = self.sampling.count.powi(2);
         let cumulant = match self.sampling.variance_thirds {
-            Some(thirds) => of_sites.max(0.0) / square + thirds[channel],
+            Some(thirds) if self.is_plane => of_sites.max(0.0) / square + thirds[channel],
+            Some(thirds) => thirds[channel],
             None => (of_sites + 8.0 * second.powi(3)) / square,
         };
         cumulant / scatter.powf(1.5)
