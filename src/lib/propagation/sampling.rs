@@ -468,7 +468,7 @@ mod tests {
     use crate::propagation::gains;
     use crate::stages::demosaic::Method;
     use crate::stages::demosaic::weights::WeightTable;
-    use nalgebra::{DMatrix, DVector};
+    use nalgebra::DMatrix;
 
     fn sites(variances: [f64; 3], excess_kurtosis: f64) -> [Prediction; 3] {
         variances.map(|variance| Prediction {

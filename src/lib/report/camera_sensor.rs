@@ -90,11 +90,20 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     let row_noise_e = taken("row_noise_e", "row_noise_e");
     let column_noise_e = taken("column_noise_e", "column_noise_e");
     let prnu = taken("prnu", "prnu_pixel");
-    let [prnu_row, prnu_column] = [taken("prnu_row", "prnu_row"), taken("prnu_column", "prnu_column")];
     let [dsnu_row_e, dsnu_column_e] = [taken("dsnu_row_e", "dsnu_row_e"), taken("dsnu_column_e", "dsnu_column_e")];
     let dark_current = taken("dark_current_e_per_s", "dark_current_e_per_s");
     let dcnu = if dark_current > 0.0 { taken("dcnu", "dcnu") } else { 0.0 };
     let dsnu_e = if dcnu > 0.0 { taken("dsnu_e", "dsnu_offset_e") } else { taken("dsnu_e", "dsnu_pixel_e") };
+    let [prnu_column, prnu_row] = [("prnu_column", 0), ("prnu_row", 1)].map(|(key, axis)| {
+        let found = lines_of_light(camera, axis);
+        let why = "as the high-pass filter shows it, so that light which is not even does not count";
+        told.tell(
+            key,
+            if found > 0.0 { Origin::Derived } else { Origin::Assumed },
+            if found > 0.0 { why } else { "none is told from none" },
+        );
+        found
+    });
     let dark_noise = needed("dark_noise_e")?;
     let read_noise_e = (dark_noise.value.powi(2) - row_noise_e.powi(2) - column_noise_e.powi(2)).max(0.0).sqrt();
     told.tell(
@@ -166,6 +175,16 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     };
     sensor.check().map_err(|problem| lacking(&problem))?;
     Ok(sensor)
+}
+
+/// Relative spread of the response between columns, or rows, behind the high-pass filter; 0 where it is not told from none.
+fn lines_of_light(camera: &MeasuredCamera, axis: usize) -> f64 {
+    let found: Vec<[f64; 2]> =
+        camera.patterns.iter().filter_map(|[light, _]| Some(light.as_ref()?.lines[axis])).collect();
+    let count = found.len().max(1) as f64;
+    let variance = found.iter().map(|[variance, _]| variance).sum::<f64>() / count;
+    let scatter = found.iter().map(|[_, scatter]| scatter * scatter).sum::<f64>().sqrt() / count;
+    if variance > 2.0 * scatter { variance.sqrt() } else { 0.0 }
 }
 
 /// The bits that hold a code.

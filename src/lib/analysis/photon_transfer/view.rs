@@ -47,6 +47,19 @@ pub struct PatternView {
     pub outstanding: [f64; 2],
     /// Those that stand out most, the most first.
     pub outliers: Vec<Outlier>,
+    /// Variances that columns and rows add as the filter shows them, without what varies smoothly, and what they scatter by, standard
+    /// deviations.
+    pub lines: [[f64; 2]; 2],
+}
+
+/// What the filter leaves of the variance of single photosites, 1 − 1/25, and of that of whole rows or columns, 1 − 1/5, as of
+/// their means.
+const LEFT: [f64; 2] = [0.96, 0.8];
+
+/// The variance between columns or rows that means of `count` photosites behind the filter tell, and what it scatters by.
+fn of_lines(means: &[[f64; 2]], count: f64, spread: f64) -> [f64; 2] {
+    let all = means.iter().map(|[_, mean]| mean * mean).sum::<f64>() / means.len() as f64 / LEFT[1];
+    [all - spread * spread / LEFT[0] / count, all * (2.0 / means.len() as f64).sqrt()]
 }
 
 /// A grid of values.
@@ -163,7 +176,14 @@ pub fn pattern_view(sites: &[&Site], [width, planes]: [usize; 2], at: &dyn Fn(us
     outliers.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
     outliers.truncate(NAMED);
     let (histogram, normal) = histogram(&values, middle, spread);
-    Some(PatternView { spectra, profiles, histogram, normal, spread, outstanding, outliers })
+    let lines = [0, 1].map(|axis| {
+        of_lines(
+            &profiles[axis],
+            filtered[0].values.len() as f64 / [filtered[0].columns, filtered[0].rows][axis] as f64,
+            spread,
+        )
+    });
+    Some(PatternView { spectra, profiles, histogram, normal, spread, outstanding, outliers, lines })
 }
 
 fn mean_of(spectra: Vec<Vec<[f64; 2]>>) -> Vec<[f64; 2]> {

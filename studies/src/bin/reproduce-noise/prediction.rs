@@ -135,7 +135,7 @@ fn frame_pixel(weights: &Weights, [width, height]: [usize; 2]) -> Gains {
             }
             let share = rows * columns / (width * height) as f64;
             for (_, class, weight) in sites {
-                gains.0[class] += Matrix3::from_fn(|i, j| share * weight[i] * weight[j]);
+                gains.own[class] += Matrix3::from_fn(|i, j| share * weight[i] * weight[j]);
             }
         }
     }
