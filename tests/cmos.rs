@@ -155,13 +155,20 @@ fn rows_and_columns_have_their_own_draws() {
     let found: Vec<f64> = offsets.samples.iter().zip(&none.samples).map(|(a, b)| f64::from(a - b)).collect();
     let square = found.iter().map(|offset| offset * offset).sum::<f64>() / 25.0;
     assert!(of_chi_square(square, found.len() as f64) > 1e-4);
-    assert_same(&offsets, &noisy(&light, &NoiseSettings {
-        seed: 50,
-        sensor_seed: 6,
-        frame: 1,
-        without: Source::ALL.into_iter().filter(|source| *source != Source::Dsnu).collect(),
-        ..Default::default()
-    }), "offsets are fixed");
+    assert_same(
+        &offsets,
+        &noisy(
+            &light,
+            &NoiseSettings {
+                seed: 50,
+                sensor_seed: 6,
+                frame: 1,
+                without: Source::ALL.into_iter().filter(|source| *source != Source::Dsnu).collect(),
+                ..Default::default()
+            },
+        ),
+        "offsets are fixed",
+    );
 }
 
 /// The mosaic commutes with noise and converter to the bit, a crop of the noisy frame is the noise of the crop, and neither
@@ -227,7 +234,8 @@ fn judge(what: &str, corrected: &[f64], share: f64) {
 }
 
 fn coverage(scene: &MemoryFrame, what: &str, share: f64) {
-    let names = ["electrons", "ADU", "CFA plane", "less 3 darks", "BI", "SHTI", "ECI", "MHC", "darks, ECI", "XYZ", "L*a*b*"];
+    let names =
+        ["electrons", "ADU", "CFA plane", "less 3 darks", "BI", "SHTI", "ECI", "MHC", "darks, ECI", "XYZ", "L*a*b*"];
     let trials: Vec<Vec<f64>> = (0..SEEDS)
         .into_par_iter()
         .map(|seed| {
@@ -302,7 +310,8 @@ fn patch_means_scatter_as_predicted() {
         made
     };
     let seeds: u64 = 2000;
-    let all: Vec<Vec<Vec<f64>>> = (0..seeds).into_par_iter().map(|seed| frames(seed).iter().map(of).collect()).collect();
+    let all: Vec<Vec<Vec<f64>>> =
+        (0..seeds).into_par_iter().map(|seed| frames(seed).iter().map(of).collect()).collect();
     let mut smallest = 1.0_f64;
     let mut tests = 0;
     for (stage, frame) in frames(0).iter().enumerate() {

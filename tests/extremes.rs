@@ -650,10 +650,8 @@ fn cameras() -> u64 {
 #[test]
 fn cameras_drawn_at_random_are_as_predicted() {
     let start = Instant::now();
-    let outcomes = (0..cameras())
-        .into_par_iter()
-        .map(|index| judged(index, any_camera(&mut Chance(index)), LEVEL))
-        .collect();
+    let outcomes =
+        (0..cameras()).into_par_iter().map(|index| judged(index, any_camera(&mut Chance(index)), LEVEL)).collect();
     tell_of_cameras("cameras", outcomes, start);
 }
 

@@ -141,7 +141,8 @@ impl Photosite {
     fn is_smooth(&self, average: &Dark, adc: &AdcRecord, expected_e: f64) -> bool {
         let temporal = average.std_codes(adc, expected_e) * average.kept()[0].sqrt();
         let Self { model, .. } = self;
-        let patterns = adc.adu_per_e * (model.response() * expected_e).hypot(model.dcnu * model.dark_e).hypot(model.offsets());
+        let patterns =
+            adc.adu_per_e * (model.response() * expected_e).hypot(model.dcnu * model.dark_e).hypot(model.offsets());
         match average.combine {
             Combine::Mean => true,
             Combine::Median => temporal.hypot(patterns) >= LEAST_CODES,

@@ -65,7 +65,9 @@ impl Law {
 
     /// Whether full well, or sensitivities of zero, cut the charge off.
     pub fn is_cut(&self) -> bool {
-        self.reaches_full_well() || self.light.is_rectified(self.full_well_e) || self.dark.is_rectified(self.full_well_e)
+        self.reaches_full_well()
+            || self.light.is_rectified(self.full_well_e)
+            || self.dark.is_rectified(self.full_well_e)
     }
 
     /// Whether no end of the codes is within reach.

@@ -27,10 +27,7 @@ impl LinearNoise {
         let shot = if model.signal_shot { mean * mean + pattern } else { 0.0 };
         let dark = product(model.dark_e, model.dark_shot, model.poisson, model.dcnu).variance;
         let gain = adc.adu_per_e;
-        Self {
-            slope_adu: gain * shot / mean,
-            offset_adu2: gain * gain * (dark + model.added().powi(2)) + 1.0 / 12.0,
-        }
+        Self { slope_adu: gain * shot / mean, offset_adu2: gain * gain * (dark + model.added().powi(2)) + 1.0 / 12.0 }
     }
 }
 

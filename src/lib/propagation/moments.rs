@@ -47,7 +47,13 @@ impl Prediction {
     pub fn of_cumulants(mean: f64, variance: f64, third: f64, fourth: f64) -> Self {
         let of_spread = |cumulant: f64| if variance > 0.0 { cumulant } else { 0.0 };
         let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) } else { 0.0 };
-        Self { moments: MeanVariance { mean, variance }, third: of_spread(third), excess_kurtosis, common: 0.0, lines: LineCovariance::default() }
+        Self {
+            moments: MeanVariance { mean, variance },
+            third: of_spread(third),
+            excess_kurtosis,
+            common: 0.0,
+            lines: LineCovariance::default(),
+        }
     }
 
     /// The prediction of a variable with these moments 1 to 4 about a center.

@@ -152,7 +152,6 @@ impl PixelGains {
             sums
         })
     }
-
 }
 
 impl<const N: usize> PixelGains<N> {

@@ -158,8 +158,13 @@ impl SamplingBasis {
         let law = |classes: &[usize], excess_kurtosis: f64| {
             let variance = |class| if classes.contains(&class) { 1.0 } else { 0.0 };
             let moments = |class| MeanVariance { mean: 0.0, variance: variance(class) };
-            let sites =
-                [0, 1, 2].map(|class| Prediction { moments: moments(class), third: 0.0,excess_kurtosis,common: 0.0,lines: LineCovariance::default() });
+            let sites = [0, 1, 2].map(|class| Prediction {
+                moments: moments(class),
+                third: 0.0,
+                excess_kurtosis,
+                common: 0.0,
+                lines: LineCovariance::default(),
+            });
             Sampling::of(weights, &sites, place)
         };
         Self {
@@ -463,7 +468,7 @@ mod tests {
     use crate::propagation::gains;
     use crate::stages::demosaic::Method;
     use crate::stages::demosaic::weights::WeightTable;
-    use nalgebra::{DMatrix, DVector};
+    use nalgebra::DMatrix;
 
     fn sites(variances: [f64; 3], excess_kurtosis: f64) -> [Prediction; 3] {
         variances.map(|variance| Prediction {
@@ -535,9 +540,16 @@ mod tests {
     /// Everything from full matrices: W of all pixels and channels, Σ = W D Wᵀ, P, traces.
     #[test]
     fn small_regions_agree_with_full_matrices() {
-        let cases = [([9, 8], [0, 2], [7, 5]), ([9, 8], [0, 0], [9, 8]), ([26, 7], [1, 1], [25, 5]), ([6, 27], [1, 2], [4, 24])];
-        for ((method, (frame, corner, size)), is_shared) in
-            Method::ALL.into_iter().flat_map(|method| cases.map(|case| (method, case))).flat_map(|case| [(case, false), (case, true)])
+        let cases = [
+            ([9, 8], [0, 2], [7, 5]),
+            ([9, 8], [0, 0], [9, 8]),
+            ([26, 7], [1, 1], [25, 5]),
+            ([6, 27], [1, 2], [4, 24]),
+        ];
+        for ((method, (frame, corner, size)), is_shared) in Method::ALL
+            .into_iter()
+            .flat_map(|method| cases.map(|case| (method, case)))
+            .flat_map(|case| [(case, false), (case, true)])
         {
             let weights = WeightTable::new(method, CfaPattern::Rggb).about([0.6, 1.8]);
             let plain = sites([1.5, 2.0, 0.7], 0.9);

@@ -130,8 +130,7 @@ impl Company {
 const SAME_EXPOSURE: f64 = 1e-6;
 
 /// Sources that every exposure draws anew.
-const TEMPORAL: [Source; 5] =
-    [Source::Dcsn, Source::Ssn, Source::Ron, Source::RowNoise, Source::ColumnNoise];
+const TEMPORAL: [Source; 5] = [Source::Dcsn, Source::Ssn, Source::Ron, Source::RowNoise, Source::ColumnNoise];
 
 /// Whether noise that an exposure draws anew may be in a frame; not in one that was simulated without.
 fn is_noisy(frame: &FrameHeader) -> bool {

@@ -49,8 +49,8 @@ impl<'a> Assessment<'a> {
         let mut of_classes: [Predicted; 3] = Default::default();
         let of_channels = match (prediction, counts) {
             (Some(FramePrediction::Planes(predictions)), Some(counts)) => {
-                of_classes = [0, 1, 2]
-                    .map(|k| Predicted::of_class(&predictions[k], Class::ALL[k], counts[k], array.as_ref()));
+                of_classes =
+                    [0, 1, 2].map(|k| Predicted::of_class(&predictions[k], Class::ALL[k], counts[k], array.as_ref()));
                 Predicted::of_cfa_plane(predictions, counts, array.as_ref())
             }
             (Some(FramePrediction::Planes(predictions)), None) if is_three => {

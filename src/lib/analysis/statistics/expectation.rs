@@ -101,7 +101,9 @@ impl Predicted {
             None => Sampling::independent(&[*prediction; 3], count as f64),
         };
         let one = match &grids {
-            Some(_) if count > 0 => Self::of_one_that_is(Expectation::of_sampling(prediction, &sampling), prediction, count),
+            Some(_) if count > 0 => {
+                Self::of_one_that_is(Expectation::of_sampling(prediction, &sampling), prediction, count)
+            }
             _ => Self::of_one(prediction, count),
         };
         let expected = Expected {
@@ -207,5 +209,11 @@ fn mixed(classes: &[Prediction; 3], counts: [u64; 3]) -> Option<Prediction> {
         .sum();
     let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) - 3.0 } else { 0.0 };
     let common = shares.iter().zip(classes).map(|(w, p)| w * w * p.common).sum();
-    Some(Prediction { moments: MeanVariance { mean, variance }, third: 0.0, excess_kurtosis, common, lines: LineCovariance::default() })
+    Some(Prediction {
+        moments: MeanVariance { mean, variance },
+        third: 0.0,
+        excess_kurtosis,
+        common,
+        lines: LineCovariance::default(),
+    })
 }

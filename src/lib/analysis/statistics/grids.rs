@@ -86,8 +86,10 @@ impl Array {
             let [q, p] = at;
             let k = class(at);
             let others = |is_here: bool, length: f64| length - if is_here { 1.0 } else { 0.0 };
-            let row = (0..2).map(|other| others(other == p, self.columns[other]) * sites.row[(k, class([q, other]))].powi(2));
-            let column = (0..2).map(|other| others(other == q, self.rows[other]) * sites.column[(k, class([other, p]))].powi(2));
+            let row =
+                (0..2).map(|other| others(other == p, self.columns[other]) * sites.row[(k, class([q, other]))].powi(2));
+            let column =
+                (0..2).map(|other| others(other == q, self.rows[other]) * sites.column[(k, class([other, p]))].powi(2));
             classes[k].moments.variance.powi(2) + row.sum::<f64>() + column.sum::<f64>()
         };
         // tr(PCPC) = tr CC − (2/n) 1ᵀCC1 + (1ᵀC1)²/n².

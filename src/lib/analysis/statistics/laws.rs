@@ -2,8 +2,8 @@
 
 use super::region::Region;
 use crate::metadata::FrameHeader;
-use crate::propagation::sampling::{Place, Sampling};
 use crate::propagation::PixelMoments;
+use crate::propagation::sampling::{Place, Sampling};
 use nalgebra::Matrix3;
 
 /// Sampling laws by place: regions of one size and phase share one.

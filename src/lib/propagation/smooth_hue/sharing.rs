@@ -161,7 +161,8 @@ pub(super) fn of_phase(
         }
     });
     let average = |products: &mut dyn Iterator<Item = Vec<Factor<'_>>>| {
-        let (sum, count) = products.fold((0.0, 0.0), |(sum, count), product| (sum + noise.product(&product), count + 1.0));
+        let (sum, count) =
+            products.fold((0.0, 0.0), |(sum, count), product| (sum + noise.product(&product), count + 1.0));
         sum / count
     };
     let first = [0, 1, 2].map(|i| average(&mut terms[i].iter().cloned()));

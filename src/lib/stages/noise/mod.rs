@@ -87,7 +87,11 @@ impl Columns {
         }
         let seeds = [record.seed, record.sensor_seed];
         let draws = (0..frame.geometry.width).map(|x| {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_possible_wrap,
+                reason = "wraps as sensor columns do"
+            )]
             let column = frame.geometry.origin[0].wrapping_add(x as i32);
             of_column(seeds, record.frame, column)
         });
