@@ -11,7 +11,7 @@ use cyanometer::metadata::{AdcRecord, PoissonKind, Scene};
 use cyanometer::propagation::budget::Cause;
 use cyanometer::propagation::{Equations, Photosite, Prediction};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
-use cyanometer::stages::noise::{AddNoise, NoiseModel, NoiseSettings};
+use cyanometer::stages::noise::{AddNoise, LineNoise, NoiseModel, NoiseSettings};
 use cyanometer::stream::MemoryFrame;
 use support::{expected, through};
 

@@ -25,6 +25,7 @@ use nalgebra::Matrix3;
 
 /// Predicted moments of a frame.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "one is made of a frame")]
 pub enum FramePrediction {
     /// Classes that are drawn apart: R, G and B before demosaicking.
     Planes([Prediction; 3]),

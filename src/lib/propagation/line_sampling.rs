@@ -16,7 +16,7 @@ use super::lines::SiteCovariance;
 use super::sampling::{Place, add_products, steps};
 use crate::stages::demosaic::stencil::{REACH, phase};
 use crate::stages::demosaic::weights::Weights;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Lines that a pixel reaches.
 const LINES: usize = 2 * REACH.unsigned_abs() + 1;
@@ -43,9 +43,10 @@ impl Shared {
             at[across] += t;
             let [x, y] = [0, 1].map(|i| i64::from(place.origin[i]) + at[i] as i64);
             let phase = phase(x, y);
+            let stencils = [0, 1, 2].map(|channel| weights.stencil(phase, channel).folded(at, place.frame));
             let mut found = Profile::default();
-            for channel in 0..3 {
-                for (offset, weight) in weights.stencil(phase, channel).folded(at, place.frame).sites() {
+            for (channel, stencil) in stencils.iter().enumerate() {
+                for (offset, weight) in stencil.sites() {
                     let class = weights.class(phase, offset) as usize;
                     found[(offset[across] + REACH).cast_unsigned()][class][channel] += weight;
                 }
@@ -66,15 +67,10 @@ impl Shared {
         let mut found = Matrix3::zeros();
         for (line, mine) in first.iter().enumerate() {
             let Some(theirs) = line.checked_add_signed(-lag).and_then(|there| second.get(there)) else { continue };
-            for k in 0..3 {
-                for l in 0..3 {
-                    let covariance = self.covariance[(k, l)];
-                    for j in 0..3 {
-                        let weight = covariance * theirs[l][j];
-                        for i in 0..3 {
-                            found[(i, j)] += mine[k][i] * weight;
-                        }
-                    }
+            for (k, mine) in mine.iter().enumerate() {
+                for (l, theirs) in theirs.iter().enumerate() {
+                    let (mine, theirs) = (Vector3::from(*mine), Vector3::from(*theirs));
+                    found += self.covariance[(k, l)] * mine * theirs.transpose();
                 }
             }
         }

@@ -104,7 +104,7 @@ const BLURRED: f64 = 0.6;
 const BLURRED_ON_AVERAGE: f64 = 0.45;
 
 /// Values of what is shared that are gone through at most.
-const MOST_NODES: usize = 4000;
+const MOST_NODES: usize = 700;
 
 /// Why nothing is said of what rows and columns share where more would be needed.
 pub(super) const TOO_COARSE: &str = "what rows or columns share goes over many codes, and what each photosite has of its own blurs \

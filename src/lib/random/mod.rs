@@ -158,6 +158,10 @@ const HALF: usize = LONGEST_RUN / 2;
 /// Columns between two neighbors among the four photosites that share a block of their offsets.
 const QUARTER: usize = LONGEST_RUN / 4;
 
+/// The bits of a column in which these differ.
+#[expect(clippy::cast_possible_truncation, reason = "192")]
+const QUARTER_BITS: u32 = (LONGEST_RUN - QUARTER) as u32;
+
 /// The bit of a column in which two such photosites differ.
 #[expect(clippy::cast_possible_truncation, reason = "128")]
 const HALF_BIT: u32 = HALF as u32;
@@ -249,9 +253,8 @@ impl Run {
     /// The low word of DSNU.
     fn offset_low(&self, index: usize) -> u32 {
         let [x, y] = self.counter(index);
-        let quarters = (LONGEST_RUN - QUARTER) as u32;
-        let counter = [x & !quarters, y, 1, self.fourth()[index % 2] | PATTERN | 1];
-        philox4x32_10(counter, halves(self.sensor_seed))[((x & quarters) / QUARTER as u32) as usize]
+        let counter = [x & !QUARTER_BITS, y, 1, self.fourth()[index % 2] | PATTERN | 1];
+        philox4x32_10(counter, halves(self.sensor_seed))[(x & QUARTER_BITS) as usize / QUARTER]
     }
 
     /// The low words of SSN and DCSN.
