@@ -28,6 +28,7 @@ pub mod measurement;
 pub mod options;
 pub mod picture;
 pub mod prediction;
+pub mod sensor;
 pub mod values;
 
 mod notes;
