@@ -77,7 +77,7 @@ fn a_colorimetric_camera_is_characterized_without_error() {
         };
         Curve::new(wavelengths.clone(), wavelengths.iter().map(value).collect()).unwrap()
     });
-    let response = SpectralResponse { quantum_efficiency: efficiency, cover_glass: None };
+    let response = SpectralResponse::absolute(efficiency, None);
     let found = signals(&sky_library(), &loaded.sensor, &response, &observer, &WavelengthGrid::default()).unwrap();
     let six = [0, 17, 240, 505, 721, 900];
     let (relative_rms, _) = residuals(&sky_rad_ls(&found, &six).unwrap().xyz_from_camera, &found, &six);

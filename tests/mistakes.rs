@@ -54,7 +54,7 @@ const MISTAKES: [(&str, i32, &str); 103] = [
     (
         "render-radiance --dark --sensor kaf-5101",
         BAD_USAGE,
-        "there is no sensor `kaf-5101`; known are kaf-5101ce (`cyanometer list`); for a file of your own give its path, ending in .yaml",
+        "there is no sensor `kaf-5101`; `cyanometer list sensors` has those that there are, and for a file of your own give its path; did you mean `kaf-5101ce`?",
     ),
     (
         "render-radiance sky.csv --electrons 1,2,3",

@@ -197,25 +197,28 @@ const COMPLAINTS: [(&str, &str); 20] = [
     ),
     (
         "render-radiance SAMPLES/skies/clear_zenith.csv --size 4x4 --sensor ./response.yaml",
-        "sensor small: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout`; give one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "render-radiance SAMPLES/skies/clear_zenith.csv --size 4x4 --sensor ./pitchless.yaml",
-        "sensor small: its sensor has no `readout.pixel_pitch_um`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout.pixel_pitch_um`; give one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "render-radiance --dark --sensor ./response.yaml",
-        "sensor small: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout`; give one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "render-radiance --electrons 1,2,3 --size 4x4 --vignetting --sensor ./pitchless.yaml",
-        "sensor small: its sensor has no `readout.pixel_pitch_um`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout.pixel_pitch_um`; give one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "render-radiance SAMPLES/skies/clear_zenith.csv --size 4x4 --sensor ./mono.yaml",
         "sensor small: it has no color filters (monochrome); only the response of the classes R, G and B is followed",
     ),
-    ("add-noise rates.exr", "rates.exr: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE"),
+    (
+        "add-noise rates.exr",
+        "rates.exr: its sensor has no `readout`; give one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE",
+    ),
     (
         "digitize rates.exr",
         "rates.exr: its sensor has no `readout.bits`; give --sensor NAME|FILE, or all of --bits, --bias and --slope",
@@ -227,7 +230,7 @@ const COMPLAINTS: [(&str, &str); 20] = [
     ),
     (
         "demosaic codes.exr --sigma",
-        "codes.exr: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
+        "codes.exr: its sensor has no `readout`; give one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "measure rates.exr --check",
@@ -236,7 +239,7 @@ const COMPLAINTS: [(&str, &str); 20] = [
     ),
     (
         "fit-matrix SAMPLES/skies/sky912.exr --sensor ./response.yaml",
-        "sensor small: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout`; give one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "fit-matrix SAMPLES/skies/sky912.exr --sensor ./readout.yaml",
@@ -244,7 +247,7 @@ const COMPLAINTS: [(&str, &str); 20] = [
     ),
     (
         "predict-noise --electrons 1,2,3 --sensor ./response.yaml",
-        "sensor small: its sensor has no `readout`; give a sensor that has it, --sensor NAME|FILE",
+        "sensor small: its sensor has no `readout`; give one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE",
     ),
     (
         "predict-noise SAMPLES/skies/clear_zenith.csv --sensor ./readout.yaml",
@@ -393,7 +396,7 @@ fn old_metadata_get_the_parts_of_their_sensor() {
     assert_eq!((&found.readout, &found.schema), (&known.readout, &known.schema));
     assert_eq!((found.xyz_from_camera, &found.source), (known.xyz_from_camera, &known.source));
     let files = found.response.unwrap();
-    assert_eq!(files.quantum_efficiency.sha256.as_deref(), Some("7f9ab3a1"));
+    assert_eq!(files.quantum_efficiency.unwrap().sha256.as_deref(), Some("7f9ab3a1"));
     assert_eq!(files.cover_glass.unwrap().column.as_deref(), Some("T_ext_1mm"));
     assert_eq!(metadata.uniform_black_adu(), Some(1757.3066749999998));
     assert_eq!(metadata.correction.as_ref().unwrap().black_adu, 4.5.into());

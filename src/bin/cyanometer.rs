@@ -18,7 +18,8 @@ static MEMORY: cli::Memory = cli::Memory;
 /// `demo [DIRECTORY]` runs the chain on skies that this program carries and shows each command; the directory that takes the
 /// files is `cyanometer-demo` unless it is named.
 ///
-/// `list [sensors|matrices|observers|spectra|illuminants|charts]` tells which are known, where they were found, and what each is.
+/// `list [sensors|matrices|observers|spectra|illuminants|charts] [WORD]` tells which are known, or those of which a word is told:
+/// where they were found, what each is, and what sensors have and lack.
 ///
 /// `keys [sensor|matrix|metadata]` describes all keys of such files; `template sensor|matrix|metadata` prints one to begin with.
 #[derive(Parser)]

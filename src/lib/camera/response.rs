@@ -1,22 +1,66 @@
 //! The spectral response of a sensor: what its classes make of light.
 
 use crate::camera::optics::Exposure;
-use crate::camera::sensor::Sensor;
+use crate::camera::sensor::{Counts, Sensor};
 use crate::error::{Error, Result};
 use crate::numerics::planes::WeightedPlane;
 use crate::spectrum::{Curve, WavelengthGrid, fold};
 use crate::units::{LIGHT_M_PER_S, M_PER_NM, PLANCK_J_S};
 
+/// How the curves of a response stand to quantum efficiencies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// They are quantum efficiencies, in e⁻ per photon.
+    Absolute,
+    /// They are known up to a common factor.
+    Relative {
+        /// What they count.
+        counts: Counts,
+        /// The largest quantum efficiency of the classes, in e⁻ per photon, where it is known.
+        peak: Option<f64>,
+    },
+}
+
 /// What the classes of a sensor make of light, as functions of wavelength.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectralResponse {
-    /// Quantum efficiency of R, G and B in e⁻ per photon.
+    /// Quantum efficiency of R, G and B in e⁻ per photon, or what stands for it by `scale`.
     pub quantum_efficiency: [Curve; 3],
     /// Transmittance of the cover glass; none means 1.
     pub cover_glass: Option<Curve>,
+    /// What the curves are.
+    pub scale: Scale,
 }
 
 impl SpectralResponse {
+    /// A response in electrons per photon.
+    pub fn absolute(quantum_efficiency: [Curve; 3], cover_glass: Option<Curve>) -> Self {
+        Self { quantum_efficiency, cover_glass, scale: Scale::Absolute }
+    }
+
+    /// What is proportional to the quantum efficiency of a class at a wavelength in nm, by a factor that all classes have in
+    /// common: of signals per watt, s(λ)/λ.
+    fn shape(&self, class: &Curve, nm: f64) -> f64 {
+        match self.scale {
+            Scale::Relative { counts: Counts::Energy, .. } => class.at(nm) / nm,
+            _ => class.at(nm),
+        }
+    }
+
+    /// Electrons per photon of a [`Self::shape`] of 1. Between samples s(λ)/λ has no maximum, so that the largest is at one.
+    fn efficiency_of_shape(&self, sensor: &Sensor) -> Result<f64> {
+        let Scale::Relative { peak, .. } = self.scale else { return Ok(1.0) };
+        let peak = peak.ok_or_else(|| {
+            let problem = "its response is relative, without a scale: how many electrons a photon gives is not known";
+            sensor.refuse(problem).give(&["peak_quantum_efficiency"])
+        })?;
+        let shapes = self
+            .quantum_efficiency
+            .iter()
+            .flat_map(|class| class.wavelengths_nm().iter().map(|&nm| self.shape(class, nm)));
+        Ok(peak / shapes.fold(0.0, f64::max))
+    }
+
     /// Weights that turn spectral radiance at `wavelengths_nm` into electrons of the three classes.
     ///
     /// ρᵏ = Σ_j w_j L_j,  w_j = C C_opt λ_j Q_jᵏ G_j Δλ,  C = A_p Δt / (hc) · 10⁻⁹        [HP2005, Eq. 5]
@@ -25,7 +69,8 @@ impl SpectralResponse {
     ///
     /// # Errors
     ///
-    /// [`Error::MissingKey`] where the sensor's read-out tells no pitch of its photosites.
+    /// [`Error::MissingKey`] where the sensor's read-out tells no pitch of its photosites; [`Error::Format`] where the response
+    /// is relative and has no scale.
     pub fn electron_weights(
         &self,
         sensor: &Sensor,
@@ -34,11 +79,14 @@ impl SpectralResponse {
         widths_nm: &[f64],
     ) -> Result<[Vec<f64>; 3]> {
         let photons_per_joule_nm = M_PER_NM / (PLANCK_J_S * LIGHT_M_PER_S);
-        let factor = sensor.pixel_area_cm2()? * exposure.exposure_s_sr() * photons_per_joule_nm;
+        let factor = sensor.pixel_area_cm2()?
+            * exposure.exposure_s_sr()
+            * photons_per_joule_nm
+            * self.efficiency_of_shape(sensor)?;
         Ok(self.quantum_efficiency.each_ref().map(|efficiency| {
             let weight = |(&nm, &width): (&f64, &f64)| {
                 let transmittance = self.cover_glass.as_ref().map_or(1.0, |glass| glass.at(nm));
-                factor * nm * efficiency.at(nm) * transmittance * width
+                factor * nm * self.shape(efficiency, nm) * transmittance * width
             };
             wavelengths_nm.iter().zip(widths_nm).map(weight).collect()
         }))
@@ -86,8 +134,10 @@ impl SpectralResponse {
         let share = |efficiency: &Curve| {
             let (mut inside, mut all) = (0.0, 0.0);
             for (&nm, &width) in points.iter().zip(&widths) {
-                let response =
-                    nm * efficiency.at(nm) * self.cover_glass.as_ref().map_or(1.0, |glass| glass.at(nm)) * width;
+                let response = nm
+                    * self.shape(efficiency, nm)
+                    * self.cover_glass.as_ref().map_or(1.0, |glass| glass.at(nm))
+                    * width;
                 all += response;
                 inside += if (grid.start_nm..=grid.end_nm).contains(&nm) { response } else { 0.0 };
             }
@@ -185,7 +235,7 @@ mod tests {
     #[test]
     fn a_perfect_sensor_counts_photons() {
         let flat = Curve::new(vec![300.0, 900.0], vec![1.0, 1.0]).unwrap();
-        let response = SpectralResponse { quantum_efficiency: [flat.clone(), flat.clone(), flat], cover_glass: None };
+        let response = SpectralResponse::absolute([flat.clone(), flat.clone(), flat], None);
         let exposure = Exposure { exposure_s: 2.0, f_number: 0.5, lens_transmittance: 1.0 };
         let weights = response.electron_weights(&kaf5101ce(), &exposure, &[500.0], &[1.0]).unwrap();
         // Photon energy at 500 nm from hc = 1.986 445 857·10⁻²⁵ J m (CODATA 2018); π/(4·¼ + 1) = π/2 sr.
@@ -194,13 +244,51 @@ mod tests {
         assert!((weights[0][0] / expected - 1.0).abs() < 1e-9);
     }
 
+    /// Signals per watt are quantum efficiencies times wavelength: a response that is one and the other, and has the same
+    /// peak, gives the same electrons; and so does any common factor of it.
+    #[test]
+    fn a_response_per_watt_is_one_per_photon_times_wavelength() {
+        let nm: Vec<f64> = (0..=40).map(|i| 380.0 + 10.0 * f64::from(i)).collect();
+        let bell = |peak: f64, height: f64| -> Vec<f64> {
+            nm.iter().map(|nm| height * (-((nm - peak) / 50.0_f64).powi(2)).exp()).collect()
+        };
+        let efficiencies = [bell(600.0, 0.3), bell(530.0, 0.45), bell(460.0, 0.4)];
+        let curve = |values: Vec<f64>| Curve::new(nm.clone(), values).unwrap();
+        let absolute = SpectralResponse::absolute(efficiencies.clone().map(curve), None);
+        let relative = |counts: Counts, factor: f64, peak: Option<f64>| {
+            let value = |(q, nm): (&f64, &f64)| factor * q * if counts == Counts::Energy { *nm } else { 1.0 };
+            let classes = efficiencies.each_ref().map(|class| curve(class.iter().zip(&nm).map(value).collect()));
+            SpectralResponse { quantum_efficiency: classes, cover_glass: None, scale: Scale::Relative { counts, peak } }
+        };
+        let exposure = Exposure { exposure_s: 2.0, f_number: 8.0, lens_transmittance: 1.0 };
+        let weights = |response: &SpectralResponse| {
+            response.electron_weights(&kaf5101ce(), &exposure, &nm, &vec![10.0; nm.len()])
+        };
+        let wanted = weights(&absolute).unwrap();
+        for counts in [Counts::Energy, Counts::Quanta] {
+            for factor in [1.0, 3.7e-3, 1e5] {
+                let found = weights(&relative(counts, factor, Some(0.45))).unwrap();
+                let pairs = found.iter().flatten().zip(wanted.iter().flatten());
+                // A few roundings of doubles.
+                assert!(pairs.clone().all(|(a, b)| (a / b - 1.0).abs() < 1e-14), "{counts:?}, {factor}");
+            }
+            let half = weights(&relative(counts, 1.0, Some(0.225))).unwrap();
+            assert!((half[1][15] / wanted[1][15] - 0.5).abs() < 1e-14);
+        }
+        let refused = weights(&relative(Counts::Energy, 1.0, None)).unwrap_err().to_string();
+        assert!(refused.contains("its response is relative, without a scale"), "{refused}");
+        // The share beyond a grid hangs on no scale.
+        let grid = WavelengthGrid { start_nm: 420.0, ..WavelengthGrid::default() };
+        let beyond = [absolute.beyond(&grid), relative(Counts::Quanta, 2.0, None).beyond(&grid)];
+        assert!((beyond[0] - beyond[1]).abs() < 1e-14 && beyond[0] > 0.01, "{beyond:?}");
+    }
+
     /// A triangle of light, 0.1 nm wide at its foot, that no whole nanometer meets, through an efficiency that rises with
     /// wavelength: ∫ λ Q L dλ by the moments of a triangle, λ₀ (λ₀/1000) + σ²/1000 of its area, σ² = w²/24.
     #[test]
     fn a_line_between_steps_is_whole_in_the_integral_and_the_sum_admits_its_loss() {
         let rising = Curve::new(vec![300.0, 1000.0], vec![0.3, 1.0]).unwrap();
-        let response =
-            SpectralResponse { quantum_efficiency: [rising.clone(), rising.clone(), rising], cover_glass: None };
+        let response = SpectralResponse::absolute([rising.clone(), rising.clone(), rising], None);
         let exposure = Exposure { exposure_s: 2.0, f_number: 8.0, lens_transmittance: 1.0 };
         let (grid, sensor) = (WavelengthGrid::default(), kaf5101ce());
         let line_nm = [300.0, 589.25, 589.3, 589.35, 900.0];

@@ -3,14 +3,16 @@
 use crate::camera::readout::ReadOut;
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
+use crate::names::{Named, serde_by_name};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A table of a function of wavelength in a file beside the sensor file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CurveFile {
     /// Name of the file, without a directory.
     pub file: String,
-    /// The column that counts; quantum efficiencies have a column for each class, R, G and B.
+    /// The column that counts; responses have a column for each class, R, G and B, or `NAME R` and so on where this is `NAME`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub column: Option<String>,
     /// SHA-256 of the file, filled in when it is read.
@@ -18,14 +20,122 @@ pub struct CurveFile {
     pub sha256: Option<String>,
 }
 
+/// What a relative response counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Counts {
+    /// Signal per watt: what signals divided by the power of a monochromator's light are.
+    #[default]
+    Energy,
+    /// Signal per photon, as quantum efficiencies are.
+    Quanta,
+}
+
+impl Named for Counts {
+    const ALL: &'static [Self] = &[Self::Energy, Self::Quanta];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Energy => "energy",
+            Self::Quanta => "quanta",
+        }
+    }
+}
+
+serde_by_name!(Counts);
+
 /// Where the spectral response of a sensor is tabled: what a monochromator measures.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ResponseFiles {
     /// Electrons per photon of the classes.
-    pub quantum_efficiency: CurveFile,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quantum_efficiency: Option<CurveFile>,
+    /// Response of the classes on a common scale that is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_response: Option<CurveFile>,
+    /// What the relative response counts; [`Counts::Energy`] where nobody says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts: Option<Counts>,
+    /// Largest quantum efficiency that the relative response stands for, in electrons per photon: its scale.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peak_quantum_efficiency: Option<f64>,
     /// Transmittance of what covers the sensor, reflections included.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cover_glass: Option<CurveFile>,
+}
+
+impl ResponseFiles {
+    /// Checks that it is of one kind, with what belongs to that.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong, in words.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        let relative =
+            [("counts", self.counts.is_some()), ("peak_quantum_efficiency", self.peak_quantum_efficiency.is_some())];
+        match (&self.quantum_efficiency, &self.relative_response) {
+            (None, None) => return Err("`response` has none of `quantum_efficiency` and `relative_response`".into()),
+            (Some(_), Some(_)) => {
+                return Err("`response` has both `quantum_efficiency` and `relative_response`; leave out one".into());
+            }
+            (Some(_), None) => {
+                if let Some((key, _)) = relative.iter().find(|(_, given)| *given) {
+                    return Err(format!(
+                        "`response` has `{key}`, which is of a `relative_response`; `quantum_efficiency` is in electrons per photon"
+                    ));
+                }
+            }
+            (None, Some(_)) => {}
+        }
+        match self.peak_quantum_efficiency {
+            Some(peak) if !(peak > 0.0 && peak <= 1.0) => {
+                let per_cent = if peak > 1.0 && peak <= 100.0 {
+                    format!("; as per cent it is {}", peak / 100.0)
+                } else {
+                    String::new()
+                };
+                Err(format!("`peak_quantum_efficiency` is {peak}; it must be above 0 and at most 1{per_cent}"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// How a number came to be known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    /// By whoever wrote the file.
+    Measured,
+    /// By others, who published it.
+    Published,
+    /// It follows from other numbers.
+    Derived,
+    /// It is not known, and taken to be so.
+    Assumed,
+}
+
+impl Named for Origin {
+    const ALL: &'static [Self] = &[Self::Measured, Self::Published, Self::Derived, Self::Assumed];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Published => "published",
+            Self::Derived => "derived",
+            Self::Assumed => "assumed",
+        }
+    }
+}
+
+serde_by_name!(Origin);
+
+/// Where a number comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// How it came to be known.
+    pub kind: Origin,
+    /// By whom, where, from what.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
 }
 
 /// A sensor in numbers: its read-out and its spectral response, either of which may be unknown.
@@ -41,6 +151,9 @@ pub struct Sensor {
     /// Where the numbers come from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
+    /// Where single numbers come from, by the path of their keys, such as `readout.read_noise_e`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub provenance: BTreeMap<String, Provenance>,
     /// Geometry, wells, noise, converter; unknown to a database of spectral responses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub readout: Option<ReadOut>,
@@ -66,6 +179,9 @@ impl Sensor {
         if self.schema != SENSOR_SCHEMA {
             return Err(format!("schema is `{}`, not `{SENSOR_SCHEMA}` or `{FLAT_SENSOR_SCHEMA}`", self.schema));
         }
+        if let Some(files) = &self.response {
+            files.check()?;
+        }
         match &self.readout {
             Some(readout) => readout.check(),
             None if self.response.is_none() && self.xyz_from_camera.is_none() => {
@@ -78,7 +194,45 @@ impl Sensor {
     /// What is possible, but may not be meant: a warning each.
     pub fn doubts(&self) -> Vec<String> {
         let doubts = self.readout.as_ref().map(ReadOut::doubts).unwrap_or_default();
-        doubts.into_iter().map(|doubt| format!("{}: {doubt}", self.called())).collect()
+        let assumed = self.assumed().collect::<Vec<_>>().join(", ");
+        let assumed = (!assumed.is_empty()).then(|| format!("not known but assumed: {assumed}"));
+        doubts.into_iter().chain(assumed).map(|doubt| format!("{}: {doubt}", self.called())).collect()
+    }
+
+    /// The keys whose values are assumed.
+    pub fn assumed(&self) -> impl Iterator<Item = &str> {
+        let is_assumed = |(_, origin): &(&String, &Provenance)| origin.kind == Origin::Assumed;
+        self.provenance.iter().filter(is_assumed).map(|(key, _)| key.as_str())
+    }
+
+    /// Takes the read-out of another sensor, and what is told of it, in place of its own; gives what is lost by that, a warning
+    /// each. The name says both.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingKey`] where the other has none.
+    pub fn replace_readout(&mut self, other: &Self) -> Result<Vec<String>> {
+        let readout = other.readout()?.clone();
+        let mut lost = Vec::new();
+        if self.readout.is_some() {
+            lost.push(format!("{}: its own read-out does not count, that of {} does", self.called(), other.called()));
+        }
+        if self.xyz_from_camera.take().is_some() {
+            lost.push(format!("{}: its `xyz_from_camera` is of its own read-out and is left out", self.called()));
+        }
+        let parts = |of: fn(&Self) -> &Option<String>| match (of(self), of(other)) {
+            (Some(own), Some(others)) => Some(format!("{own}; read-out: {others}")),
+            (own, None) => own.clone(),
+            (None, Some(others)) => Some(format!("read-out: {others}")),
+        };
+        (self.description, self.source) = (parts(|sensor| &sensor.description), parts(|sensor| &sensor.source));
+        let is_of_readout = |key: &str| key.split('.').next() == Some("readout");
+        self.provenance.retain(|key, _| !is_of_readout(key));
+        let of_readout = other.provenance.iter().filter(|(key, _)| is_of_readout(key));
+        self.provenance.extend(of_readout.map(|(key, origin)| (key.clone(), origin.clone())));
+        self.name = format!("{}+{}", self.name, other.name);
+        self.readout = Some(readout);
+        Ok(lost)
     }
 
     /// The read-out.
@@ -175,6 +329,7 @@ impl From<FlatSensor> for Sensor {
             name: flat.name,
             description: flat.description,
             source: flat.source,
+            provenance: BTreeMap::new(),
             readout: Some(ReadOut {
                 width: flat.width,
                 height: flat.height,
@@ -200,8 +355,9 @@ impl From<FlatSensor> for Sensor {
                 linearization: None,
             }),
             response: Some(ResponseFiles {
-                quantum_efficiency: flat.quantum_efficiency,
+                quantum_efficiency: Some(flat.quantum_efficiency),
                 cover_glass: flat.cover_glass,
+                ..ResponseFiles::default()
             }),
             xyz_from_camera: flat.xyz_from_camera,
         }
@@ -220,10 +376,11 @@ pub(crate) mod tests {
             name: "kaf-5101ce".into(),
             description: None,
             source: None,
+            provenance: BTreeMap::new(),
             readout: Some(readout()),
             response: Some(ResponseFiles {
-                quantum_efficiency: CurveFile { file: "qe.csv".into(), column: None, sha256: None },
-                cover_glass: None,
+                quantum_efficiency: Some(CurveFile { file: "qe.csv".into(), column: None, sha256: None }),
+                ..ResponseFiles::default()
             }),
             xyz_from_camera: None,
         }
@@ -240,6 +397,63 @@ pub(crate) mod tests {
         assert!(Sensor { schema: "sensor".into(), ..kaf5101ce() }.check().is_err());
         let impossible = Sensor { readout: Some(ReadOut { bits: 0, ..readout() }), ..kaf5101ce() };
         assert!(impossible.check().unwrap_err().contains("bits"));
+    }
+
+    #[test]
+    fn a_readout_is_replaced_with_what_is_told_of_it() {
+        let origin = |kind| Provenance { kind, note: None };
+        let told = |keys: &[(&str, Origin)]| -> BTreeMap<String, Provenance> {
+            keys.iter().map(|(key, kind)| ((*key).to_owned(), origin(*kind))).collect()
+        };
+        let mut own = Sensor {
+            source: Some("here".into()),
+            provenance: told(&[
+                ("readout.prnu", Origin::Measured),
+                ("response", Origin::Assumed),
+                ("readoutx", Origin::Derived),
+            ]),
+            xyz_from_camera: Some([[1.0; 3]; 3]),
+            ..kaf5101ce()
+        };
+        let other = Sensor {
+            name: "other".into(),
+            source: Some("there".into()),
+            provenance: told(&[("readout.bits", Origin::Assumed), ("name", Origin::Measured)]),
+            readout: Some(ReadOut { bits: 14, ..readout() }),
+            ..kaf5101ce()
+        };
+        let lost = own.replace_readout(&other).unwrap();
+        assert!(lost[0].contains("its own read-out does not count, that of sensor other does"), "{lost:?}");
+        assert!(lost[1].contains("`xyz_from_camera`") && lost.len() == 2, "{lost:?}");
+        assert_eq!((own.name.as_str(), own.readout().unwrap().bits), ("kaf-5101ce+other", 14));
+        assert_eq!((own.source.as_deref(), own.xyz_from_camera), (Some("here; read-out: there"), None));
+        let kept: Vec<&str> = own.provenance.keys().map(String::as_str).collect();
+        assert_eq!(kept, ["readout.bits", "readoutx", "response"]);
+        assert_eq!(own.doubts(), ["sensor kaf-5101ce+other: not known but assumed: readout.bits, response"]);
+        let bare = Sensor { readout: None, ..other };
+        assert!(own.replace_readout(&bare).unwrap_err().to_string().contains("no `readout`"));
+        // Nothing is lost where there was nothing.
+        let mut bare = bare;
+        assert_eq!(bare.replace_readout(&own).unwrap(), [String::new(); 0]);
+    }
+
+    #[test]
+    fn a_response_is_absolute_or_relative() {
+        let curve = || Some(CurveFile { file: "qe.csv".into(), column: None, sha256: None });
+        let relative = ResponseFiles { relative_response: curve(), ..ResponseFiles::default() };
+        let absolute = ResponseFiles { quantum_efficiency: curve(), ..ResponseFiles::default() };
+        let said = |files: ResponseFiles| files.check().unwrap_err();
+        assert!(said(ResponseFiles::default()).contains("none of"));
+        assert!(said(ResponseFiles { quantum_efficiency: curve(), ..relative.clone() }).contains("both"));
+        let counted = ResponseFiles { counts: Some(Counts::Quanta), ..absolute.clone() };
+        assert!(said(counted).contains("`counts`, which is of a `relative_response`"));
+        let per_cent = ResponseFiles { peak_quantum_efficiency: Some(45.0), ..relative.clone() };
+        assert!(said(per_cent).contains("as per cent it is 0.45"));
+        for peak in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+            let wrong = ResponseFiles { peak_quantum_efficiency: Some(peak), ..relative.clone() };
+            assert!(said(wrong).contains("above 0 and at most 1"));
+        }
+        assert_eq!((absolute.check(), relative.check()), (Ok(()), Ok(())));
     }
 
     #[test]

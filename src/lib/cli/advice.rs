@@ -4,8 +4,9 @@ use crate::error::Error;
 use clap::Command;
 
 /// What supplies a key that metadata lack, the better choice first; it counts where the program has all its options.
-const SUPPLIES: [(&str, &str); 12] = [
+const SUPPLIES: [(&str, &str); 13] = [
     ("sensor", "--sensor NAME|FILE, or all of --bits, --bias and --slope"),
+    ("sensor.readout", "one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE"),
     ("sensor.readout", "a sensor that has it, --sensor NAME|FILE"),
     ("sensor.response", "a sensor that has it, --sensor NAME|FILE"),
     ("sensor", "--sensor NAME|FILE"),

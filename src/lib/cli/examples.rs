@@ -173,6 +173,7 @@ pub const EXAMPLES: [(&str, &[Example]); 15] = [
         &[
             example("The programs, a line each", "cyanometer"),
             example("Sensors, spectra, lights and charts that are known by name", "cyanometer list"),
+            example("Sensors of which a word is told, with what they have and lack", "cyanometer list sensors nikon"),
             example("All keys of a sensor file, and a file to begin with", "cyanometer keys sensor"),
             example("A sensor of one's own", "cyanometer template sensor > my-camera.yaml"),
         ],

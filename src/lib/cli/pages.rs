@@ -8,15 +8,20 @@ use crate::names::Named;
 use std::ffi::OsString;
 use std::io::Write;
 
-/// Lists what is known by name: of the kinds that `words` name, or of all.
+/// Lists what is known by name: of the kinds that `words` begin with, or of all; where other words follow, that of which these
+/// are told.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for other words; [`Error::Disk`] where the list cannot be written.
+/// [`Error::Usage`] where the first word is another; [`Error::Disk`] where the list cannot be written.
 pub fn list(words: &[OsString]) -> Result<()> {
-    let kinds = named::<Kind>("list", words)?;
+    let is_kind = |word: &OsString| word.to_str().and_then(Kind::named).is_some();
+    let count = words.iter().position(|word| !is_kind(word)).unwrap_or(words.len()).max(words.len().min(1));
+    let (kinds, words) = words.split_at(count);
+    let kinds = named::<Kind>("list", kinds)?;
     let kinds = if kinds.is_empty() { Kind::ALL.to_vec() } else { kinds };
-    write(&kinds.into_iter().map(inventory::page).collect::<Vec<_>>().join("\n"))
+    let words: Vec<String> = words.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+    write(&kinds.into_iter().map(|kind| inventory::page(kind, &words)).collect::<Vec<_>>().join("\n"))
 }
 
 /// Describes the keys of files: of the kinds that `words` name, or of all.

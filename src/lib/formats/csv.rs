@@ -130,10 +130,7 @@ impl SpectralTable {
         let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
         wavelength_nm.iter_mut().for_each(|wavelength: &mut f64| *wavelength = unit.nm(*wavelength));
         let (wavelength_nm, values) = sorted(wavelength_nm, values);
-        check_unlike(&wavelength_nm)
-            .and_then(|()| check_wavelengths(&wavelength_nm))
-            .and_then(|()| check_likely(&wavelength_nm))
-            .map_err(|problem| Error::format(name, problem))?;
+        check_nm(&wavelength_nm).map_err(|problem| Error::format(name, problem))?;
         let by_wavenumber = unit == WavelengthUnit::PerCentimeter;
         Ok(Self { name: name.into(), wavelength_nm, columns, values, headings, remarks: comments.units, by_wavenumber })
     }
@@ -295,6 +292,17 @@ fn check_unlike(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
         Some(pair) => Err(format!("the wavelength {} nm stands there twice; leave out one", pair[0])),
         None => Ok(()),
     }
+}
+
+/// Checks that ascending wavelengths are unlike, and look like nm.
+///
+/// # Errors
+///
+/// What is wrong, in words.
+pub(super) fn check_nm(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
+    check_unlike(wavelength_nm)
+        .and_then(|()| check_wavelengths(wavelength_nm))
+        .and_then(|()| check_likely(wavelength_nm))
 }
 
 /// Above this all wavelengths look like angstroms or wavenumbers, in nm: no silicon responds.

@@ -1,17 +1,22 @@
 //! Data files: sensors, the observer, curves; where they are found, and what is built in.
 
+use super::cameras::{self, Camera};
 use super::csv::SpectralTable;
 use super::digest::sha256;
 use super::files::read_file;
+use super::response_table::ResponseTable;
 use super::yaml;
 use crate::analysis::characterization::CameraMatrix;
-use crate::camera::response::SpectralResponse;
-use crate::camera::sensor::{CurveFile, ResponseFiles, Sensor};
+use crate::camera::response::{Scale, SpectralResponse};
+use crate::camera::sensor::{Counts, CurveFile, ResponseFiles, SENSOR_SCHEMA, Sensor};
 use crate::cfa::FilterArray;
 use crate::color::illuminant::Illuminant;
 use crate::color::upsampling::whole_nm;
 use crate::error::{Error, Result};
+use crate::names::{Named, nearest};
 use crate::spectrum::{Curve, Observer};
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// The environment variable that names directories with data files, like `sample_data`.
@@ -20,9 +25,14 @@ pub const DATA_VARIABLE: &str = "CYANOMETER_DATA";
 pub const DEFAULT_SENSOR: &str = "kaf-5101ce";
 
 /// Files that every program carries, by their place in `sample_data`.
-pub(super) const BUILT_IN: [(&str, &[u8]); 8] = [
+pub(super) const BUILT_IN: [(&str, &[u8]); 13] = [
     ("sensors/kaf-5101ce.yaml", include_bytes!("../../../sample_data/sensors/kaf-5101ce.yaml")),
     ("sensors/kaf5101ce_est_qe_1nm.csv", include_bytes!("../../../sample_data/sensors/kaf5101ce_est_qe_1nm.csv")),
+    ("sensors/rawtoaces.csv", include_bytes!("../../../sample_data/sensors/rawtoaces.csv")),
+    ("sensors/rawtoaces_cameras.csv", include_bytes!("../../../sample_data/sensors/rawtoaces_cameras.csv")),
+    ("sensors/imx219.yaml", include_bytes!("../../../sample_data/sensors/imx219.yaml")),
+    ("sensors/imx477.yaml", include_bytes!("../../../sample_data/sensors/imx477.yaml")),
+    ("sensors/ov5647.yaml", include_bytes!("../../../sample_data/sensors/ov5647.yaml")),
     ("sensors/bg39_1mm.csv", include_bytes!("../../../sample_data/sensors/bg39_1mm.csv")),
     ("observers/cie1931_2deg_1nm.csv", include_bytes!("../../../sample_data/observers/cie1931_2deg_1nm.csv")),
     ("illuminants/cie_daylight_1nm.csv", include_bytes!("../../../sample_data/illuminants/cie_daylight_1nm.csv")),
@@ -34,13 +44,53 @@ pub(super) const BUILT_IN: [(&str, &[u8]); 8] = [
 /// A sensor with its curves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadedSensor {
-    /// The description, digests of the curves filled in.
+    /// The description, digests of the curves filled in, and what its response counts.
     pub sensor: Sensor,
     /// The curves of R, G and B; none where the response is unknown, or that of other classes.
     pub response: Option<SpectralResponse>,
+    /// What was assumed, and what in its response may mislead: a warning each.
+    doubts: Vec<String>,
+}
+
+/// What a user says of a sensor in place of what its file says.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SensorChanges {
+    /// The sensor whose read-out counts in place of its own: a name or a file.
+    pub readout: Option<String>,
+    /// What its relative response counts.
+    pub counts: Option<Counts>,
+    /// The largest quantum efficiency that its relative response stands for.
+    pub peak_quantum_efficiency: Option<f64>,
+}
+
+impl SensorChanges {
+    /// Puts what is said into the description of a sensor.
+    fn apply(&self, sensor: &mut Sensor) -> Result<()> {
+        let given =
+            [("counts", self.counts.is_some()), ("peak_quantum_efficiency", self.peak_quantum_efficiency.is_some())];
+        let Some((setting, _)) = given.into_iter().find(|(_, given)| *given) else { return Ok(()) };
+        let refused = |sensor: &Sensor, problem: &str| {
+            let settings: &[&str] = if setting == "counts" { &["counts"] } else { &["peak_quantum_efficiency"] };
+            Err(sensor.refuse(problem).leave_out(settings))
+        };
+        match &mut sensor.response {
+            Some(files) if files.relative_response.is_some() => {
+                files.counts = self.counts.or(files.counts);
+                files.peak_quantum_efficiency = self.peak_quantum_efficiency.or(files.peak_quantum_efficiency);
+                Ok(())
+            }
+            Some(_) => refused(sensor, "its response is not relative but in electrons per photon"),
+            None => refused(sensor, "it has no response"),
+        }
+    }
 }
 
 impl LoadedSensor {
+    /// What was assumed, and what is possible but may not be meant: a warning each.
+    pub fn doubts(&self) -> Vec<String> {
+        self.doubts.iter().cloned().chain(self.sensor.doubts()).collect()
+    }
+
     /// The curves of R, G and B.
     ///
     /// # Errors
@@ -58,7 +108,8 @@ impl LoadedSensor {
 }
 
 /// Where a data file was found: in a directory, or built in.
-enum Place {
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Place {
     Directory(PathBuf),
     BuiltIn,
 }
@@ -70,70 +121,216 @@ enum Place {
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for an unknown name, listing those there are; [`Error::Disk`] and [`Error::Format`] for bad files.
+/// [`Error::Usage`] for an unknown name, with the nearest of those there are; [`Error::Disk`] and [`Error::Format`] for bad files.
 pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
-    let path = Path::new(name);
-    let is_path = path.components().count() > 1 || path.extension().is_some_and(|end| end == "yaml" || end == "yml");
-    let (place, shown, bytes) = if is_path {
-        let bytes = read_file(path)?;
-        (Place::Directory(path.parent().map(Path::to_owned).unwrap_or_default()), name.to_owned(), bytes)
-    } else {
-        let file = format!("sensors/{}.yaml", name.to_ascii_lowercase());
-        match find(&file)? {
-            Some((Place::Directory(directory), bytes)) => {
-                (Place::Directory(directory.join("sensors")), directory.join(file).display().to_string(), bytes)
-            }
-            Some((Place::BuiltIn, bytes)) => (Place::BuiltIn, format!("sensor {name}"), bytes),
-            None => {
-                return Err(Error::Usage(format!(
-                    "there is no sensor `{name}`; known are {} (`cyanometer list`); for a file of your own give its path, ending in .yaml",
-                    known_sensors().join(", ")
-                )));
-            }
-        }
-    };
-    let mut sensor = yaml::parse_sensor(&shown, &bytes)?;
-    sensor.check().map_err(|problem| Error::format(&shown, problem))?;
-    let array = sensor.readout.as_ref().map(|readout| readout.cfa);
-    let response = sensor.response.as_mut().map(|files| load_curves(files, array, &place, &shown)).transpose()?;
-    Ok(LoadedSensor { sensor, response: response.flatten() })
+    load_changed_sensor(name, &SensorChanges::default())
 }
 
-/// Reads and checks the curves of a response, and notes the digests of their files; gives those of R, G and B, unless
-/// its classes are others.
-fn load_curves(
-    files: &mut ResponseFiles,
-    array: Option<FilterArray>,
-    place: &Place,
-    sensor: &str,
-) -> Result<Option<SpectralResponse>> {
-    let table = |curve: &mut CurveFile| -> Result<SpectralTable> {
-        let (name, bytes) = read_beside(place, sensor, &curve.file)?;
-        curve.sha256 = Some(sha256(&bytes));
-        SpectralTable::parse(&name, &bytes)
+/// The same with what a user says in place of what the file says.
+///
+/// # Errors
+///
+/// Those of [`load_sensor`], and [`Error::Format`] for changes that the sensor does not take.
+pub fn load_changed_sensor(name: &str, changes: &SensorChanges) -> Result<LoadedSensor> {
+    let Described { mut sensor, place, shown, mut doubts } = described(name)?;
+    let mut replaced = Vec::new();
+    if let Some(readout) = &changes.readout {
+        replaced = sensor.replace_readout(&load_description(readout)?)?;
+    }
+    changes.apply(&mut sensor)?;
+    sensor.check().map_err(|problem| Error::format(&shown, problem))?;
+    let array = sensor.readout.as_ref().map(|readout| readout.cfa);
+    let mut curves = Curves { place: &place, sensor: &shown, array, doubts: Vec::new(), about: None };
+    let response = sensor.response.as_mut().map(|files| curves.load(files)).transpose()?;
+    doubts.extend(curves.doubts);
+    sensor.description = sensor.description.or(curves.about);
+    let doubts = doubts.into_iter().map(|doubt| format!("sensor {}: {doubt}", sensor.name));
+    let doubts = doubts.chain(replaced).collect();
+    Ok(LoadedSensor { sensor, response: response.flatten(), doubts })
+}
+
+/// A sensor as [`load_sensor`] finds it, without the curves that it names.
+///
+/// # Errors
+///
+/// Those of [`load_sensor`].
+pub fn load_description(name: &str) -> Result<Sensor> {
+    let Described { sensor, shown, .. } = described(name)?;
+    sensor.check().map_err(|problem| Error::format(&shown, problem))?;
+    Ok(sensor)
+}
+
+/// A sensor as its file describes it.
+struct Described {
+    sensor: Sensor,
+    place: Place,
+    /// The file in messages.
+    shown: String,
+    doubts: Vec<String>,
+}
+
+fn described(name: &str) -> Result<Described> {
+    let path = Path::new(name);
+    let of_file = |place: Place, shown: String, bytes: &[u8]| {
+        let sensor = yaml::parse_sensor(&shown, bytes)?;
+        Ok(Described { sensor, place, shown, doubts: Vec::new() })
     };
-    let efficiencies = table(&mut files.quantum_efficiency)?;
-    let class = |column: Option<&str>| within_unit(sensor, "quantum_efficiency", efficiencies.curve(column)?);
-    let quantum_efficiency = if array.is_none_or(FilterArray::has_three_classes) {
-        Some([class(Some("R"))?, class(Some("G"))?, class(Some("B"))?])
-    } else {
-        let filters = array.map_or_else(Vec::new, FilterArray::filters);
+    if path.components().count() > 1 || ends_in(path, &["yaml", "yml"]) || ends_in(path, &TABLES) {
+        let place = Place::Directory(path.parent().map(Path::to_owned).unwrap_or_default());
+        let bytes = read_file(path)?;
+        let is_table = ends_in(path, &TABLES) || path.extension().is_none() && !has_schema(&bytes);
+        if is_table {
+            return Ok(Described { sensor: of_table(path), place, shown: name.to_owned(), doubts: Vec::new() });
+        }
+        return of_file(place, name.to_owned(), &bytes);
+    }
+    let typed = cameras::normalized(name);
+    let file = format!("sensors/{typed}.yaml");
+    match find(&file)? {
+        Some((Place::Directory(directory), bytes)) => {
+            let shown = directory.join(file).display().to_string();
+            of_file(Place::Directory(directory.join("sensors")), shown, &bytes)
+        }
+        Some((Place::BuiltIn, bytes)) => of_file(Place::BuiltIn, format!("sensor {name}"), &bytes),
+        None => of_camera(&typed)?.ok_or_else(|| unknown_sensor(name, &typed)),
+    }
+}
+
+/// What files of responses end in.
+const TABLES: [&str; 5] = ["csv", "tsv", "txt", "json", "gz"];
+
+fn ends_in(path: &Path, ends: &[&str]) -> bool {
+    path.extension().is_some_and(|end| ends.iter().any(|known| end.eq_ignore_ascii_case(known)))
+}
+
+/// Whether a file looks like one of ours.
+fn has_schema(bytes: &[u8]) -> bool {
+    String::from_utf8_lossy(bytes).lines().any(|line| line.starts_with("schema:"))
+}
+
+/// The sensor of a file of responses: a response alone.
+fn of_table(path: &Path) -> Sensor {
+    let text = |part: Option<&OsStr>| part.map(|part| part.to_string_lossy().into_owned()).unwrap_or_default();
+    let file = CurveFile { file: text(path.file_name()), column: None, sha256: None };
+    Sensor {
+        schema: SENSOR_SCHEMA.into(),
+        name: text(path.file_stem()),
+        description: None,
+        source: None,
+        provenance: BTreeMap::new(),
+        readout: None,
+        response: Some(ResponseFiles { relative_response: Some(file), ..ResponseFiles::default() }),
+        xyz_from_camera: None,
+    }
+}
+
+/// The camera of a name.
+fn of_camera(typed: &str) -> Result<Option<Described>> {
+    let (place, cameras) = known_cameras()?;
+    let Some(camera) = cameras.into_iter().find(|camera| camera.names().any(|name| name == typed)) else {
+        return Ok(None);
+    };
+    let another = || format!("{typed} is another model, of which it is said that its sensor is the same");
+    let doubts = camera.is_another(typed).then(another).into_iter().collect();
+    Ok(Some(Described { shown: format!("sensor {}", camera.name), sensor: camera.sensor(), place, doubts }))
+}
+
+/// The cameras of the table of responses, and where it is.
+pub(super) fn known_cameras() -> Result<(Place, Vec<Camera>)> {
+    let file = format!("sensors/{}", cameras::INDEX);
+    let (place, bytes) = find(&file)?.unwrap_or((Place::BuiltIn, Vec::new()));
+    let place = match place {
+        Place::Directory(directory) => Place::Directory(directory.join("sensors")),
+        Place::BuiltIn => Place::BuiltIn,
+    };
+    Ok((place, Camera::all(&file, &bytes)?))
+}
+
+fn unknown_sensor(name: &str, typed: &str) -> Error {
+    let known = known_sensors();
+    let near = nearest(typed, known.iter().map(String::as_str), |known| known.len() / 3);
+    let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    Error::Usage(format!(
+        "there is no sensor `{name}`; `cyanometer list sensors` has those that there are, and for a file of your own give its \
+         path{near}"
+    ))
+}
+
+/// The curves of a response as they are read and checked.
+struct Curves<'a> {
+    place: &'a Place,
+    /// The sensor file in messages.
+    sensor: &'a str,
+    array: Option<FilterArray>,
+    /// What came up.
+    doubts: Vec<String>,
+    /// What a file of another program says of the camera.
+    about: Option<String>,
+}
+
+impl Curves<'_> {
+    /// Reads those that files hold, and notes the digests of these; gives those of R, G and B, unless the classes are others.
+    fn load(&mut self, files: &mut ResponseFiles) -> Result<Option<SpectralResponse>> {
+        let found = match (&mut files.quantum_efficiency, &mut files.relative_response) {
+            (Some(curve), _) => self.absolute(curve)?.map(|classes| (classes, Scale::Absolute)),
+            (None, Some(curve)) => {
+                let classes = self.relative(curve)?;
+                let counts = files.counts.unwrap_or_else(|| {
+                    self.doubts.push(format!(
+                        "nobody says whether its response counts energy or quanta; it is taken as {} (--counts)",
+                        Counts::default().name()
+                    ));
+                    Counts::default()
+                });
+                files.counts = Some(counts);
+                classes.map(|classes| (classes, Scale::Relative { counts, peak: files.peak_quantum_efficiency }))
+            }
+            (None, None) => None,
+        };
+        let cover_glass = match &mut files.cover_glass {
+            Some(glass) => {
+                let (name, bytes) = self.bytes(glass)?;
+                let transmittance = SpectralTable::parse(&name, &bytes)?.curve(glass.column.as_deref())?;
+                Some(within_unit(self.sensor, "cover_glass", transmittance)?)
+            }
+            None => None,
+        };
+        Ok(found.map(|(quantum_efficiency, scale)| SpectralResponse { quantum_efficiency, cover_glass, scale }))
+    }
+
+    /// The file of a curve, with its name.
+    fn bytes(&self, curve: &mut CurveFile) -> Result<(String, Vec<u8>)> {
+        let (name, bytes) = read_beside(self.place, self.sensor, &curve.file)?;
+        curve.sha256 = Some(sha256(&bytes));
+        Ok((name, bytes))
+    }
+
+    /// Quantum efficiencies.
+    fn absolute(&self, curve: &mut CurveFile) -> Result<Option<[Curve; 3]>> {
+        let (name, bytes) = self.bytes(curve)?;
+        let efficiencies = SpectralTable::parse(&name, &bytes)?;
+        let class = |column: Option<&str>| within_unit(self.sensor, "quantum_efficiency", efficiencies.curve(column)?);
+        if self.array.is_none_or(FilterArray::has_three_classes) {
+            return Ok(Some([class(Some("R"))?, class(Some("G"))?, class(Some("B"))?]));
+        }
+        let filters = self.array.map_or_else(Vec::new, FilterArray::filters);
         if filters.is_empty() {
-            class(files.quantum_efficiency.column.as_deref())?;
+            class(curve.column.as_deref())?;
         }
         for filter in filters {
             class(Some(&filter.to_string()))?;
         }
-        None
-    };
-    let cover_glass = match &mut files.cover_glass {
-        Some(glass) => {
-            let transmittance = table(glass)?.curve(glass.column.as_deref())?;
-            Some(within_unit(sensor, "cover_glass", transmittance)?)
-        }
-        None => None,
-    };
-    Ok(quantum_efficiency.map(|quantum_efficiency| SpectralResponse { quantum_efficiency, cover_glass }))
+        Ok(None)
+    }
+
+    /// Relative responses, which are of R, G and B alone.
+    fn relative(&mut self, curve: &mut CurveFile) -> Result<Option<[Curve; 3]>> {
+        let (name, bytes) = self.bytes(curve)?;
+        let table = ResponseTable::parse(&name, &bytes, curve.column.as_deref())?;
+        self.doubts.extend(table.doubts);
+        self.about = table.about;
+        Ok(Some(table.classes).filter(|_| self.array.is_none_or(FilterArray::has_three_classes)))
+    }
 }
 
 /// Reads a matrix file.
@@ -299,6 +496,12 @@ fn known_sensors() -> Vec<String> {
         .filter(|path| path.extension().is_some_and(|end| end == "yaml"))
         .filter_map(|path| path.file_stem().map(|stem| stem.to_string_lossy().into_owned()))
         .collect();
+    names.extend(
+        known_cameras()
+            .into_iter()
+            .flat_map(|(_, cameras)| cameras)
+            .flat_map(|camera| camera.names().map(str::to_owned).collect::<Vec<_>>()),
+    );
     names.sort();
     names.dedup();
     names
@@ -316,7 +519,73 @@ mod tests {
         for (curve, peak) in loaded.response().unwrap().quantum_efficiency.iter().zip([0.31, 0.34, 0.31]) {
             assert!((curve.extremes().1 - peak).abs() < 0.005);
         }
-        assert!(loaded.sensor.response.unwrap().quantum_efficiency.sha256.is_some());
+        assert!(loaded.sensor.response.unwrap().quantum_efficiency.unwrap().sha256.is_some());
+    }
+
+    #[test]
+    fn cameras_are_known_by_all_their_names() {
+        let camera = load_sensor("nikon-d850").unwrap();
+        assert_eq!((&camera, camera.sensor.name.as_str()), (&load_sensor("Nikon D850").unwrap(), "nikon-d850"));
+        let files = camera.sensor.response.clone().unwrap();
+        assert_eq!((files.counts, files.peak_quantum_efficiency), (Some(Counts::Energy), None));
+        assert!(files.relative_response.unwrap().sha256.is_some() && camera.sensor.readout.is_none());
+        let [doubt] = &camera.doubts()[..] else { panic!("{:?}", camera.doubts()) };
+        assert!(doubt.starts_with("sensor nikon-d850: nobody says whether its response counts energy or quanta"));
+        assert_eq!(load_sensor("Canon Kiss X5").unwrap().sensor.name, "canon-eos-600d");
+        let alike = load_sensor("nikon-d800").unwrap();
+        assert_eq!(alike.sensor.name, "nikon-d800e");
+        assert!(alike.doubts()[0].contains("nikon-d800 is another model"), "{:?}", alike.doubts());
+        let near = load_sensor("nikon-d580").unwrap_err().to_string();
+        assert!(
+            near.contains("there is no sensor `nikon-d580`;") && near.ends_with("; did you mean `nikon-d850`?"),
+            "{near}"
+        );
+    }
+
+    #[test]
+    fn what_is_said_of_a_relative_response_counts() {
+        let changes = SensorChanges {
+            counts: Some(Counts::Quanta),
+            peak_quantum_efficiency: Some(0.4),
+            ..SensorChanges::default()
+        };
+        let changed = load_changed_sensor("nikon-d850", &changes).unwrap();
+        assert_eq!(changed.response.unwrap().scale, Scale::Relative { counts: Counts::Quanta, peak: Some(0.4) });
+        assert_eq!(changed.doubts, [String::new(); 0]);
+        let refused = |changes| load_changed_sensor(DEFAULT_SENSOR, &changes).unwrap_err().to_string();
+        let said = refused(SensorChanges { counts: Some(Counts::Energy), ..SensorChanges::default() });
+        assert!(
+            said.ends_with("its response is not relative but in electrons per photon; leave out `counts`"),
+            "{said}"
+        );
+        let said = refused(SensorChanges { peak_quantum_efficiency: Some(0.4), ..SensorChanges::default() });
+        assert!(said.ends_with("leave out `peak_quantum_efficiency`"), "{said}");
+        let said = load_changed_sensor(
+            "nikon-d850",
+            &SensorChanges { peak_quantum_efficiency: Some(40.0), ..SensorChanges::default() },
+        );
+        assert!(said.unwrap_err().to_string().contains("as per cent it is 0.4"));
+    }
+
+    /// All of rawtoaces-data are there, whole, and say nothing that is not so.
+    #[test]
+    fn every_camera_of_the_table_is_read() {
+        let (_, cameras) = known_cameras().unwrap();
+        assert_eq!(cameras.len(), 52);
+        let mut normalized = Vec::new();
+        for camera in &cameras {
+            assert_eq!(cameras::normalized(&camera.name), camera.name);
+            let loaded = load_sensor(&camera.name).unwrap();
+            let classes = &loaded.response().unwrap().quantum_efficiency;
+            assert!(classes.iter().all(|class| class.wavelengths_nm().len() == 81));
+            assert_eq!(classes.iter().map(|class| class.extremes().1).fold(0.0, f64::max), 1e5, "{}", camera.name);
+            if loaded.doubts().iter().any(|doubt| doubt.contains("normalized by itself")) {
+                normalized.push(camera.name.as_str());
+            }
+            assert!(loaded.doubts().iter().all(|doubt| !doubt.contains("order of their names")), "{}", camera.name);
+        }
+        // Their files have a largest response of 1 in every class.
+        assert_eq!(normalized, ["arri-d21", "nikon-d5100"]);
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! What is known by name or comes with the programs: where it was found, and a line about it.
 
+use super::cameras::Camera;
 use super::csv::SpectralTable;
-use super::data::{BUILT_IN, DATA_VARIABLE, directories};
+use super::data::{BUILT_IN, DATA_VARIABLE, Place, directories, known_cameras};
 use super::files::read_file;
 use super::input::{FrameReader, InputOptions};
 use super::yaml;
@@ -88,6 +89,8 @@ pub struct Known {
     pub name: String,
     /// Where it was found.
     pub place: String,
+    /// What it has and lacks, where that is told: its response and its read-out.
+    pub has: Vec<String>,
     /// A line about it.
     pub about: String,
 }
@@ -105,6 +108,9 @@ pub fn known(kind: Kind) -> Vec<Known> {
         let is_there = path.parent().is_some_and(|parent| kind.places().iter().any(|place| Path::new(place) == parent));
         is_there.then(|| of_bytes(kind, path, bytes, "built in")).flatten()
     }));
+    if kind == Kind::Sensors {
+        found.extend(cameras());
+    }
     let mut kept: Vec<Known> = Vec::new();
     for one in found {
         if !kept.iter().any(|known| known.name == one.name) {
@@ -112,6 +118,36 @@ pub fn known(kind: Kind) -> Vec<Known> {
         }
     }
     kept
+}
+
+/// The cameras of the table of responses.
+fn cameras() -> Vec<Known> {
+    let Ok((place, cameras)) = known_cameras() else { return Vec::new() };
+    let place = match place {
+        Place::Directory(directory) => directory.display().to_string(),
+        Place::BuiltIn => "built in".into(),
+    };
+    let one = |camera: Camera| {
+        let (has, about) = (parts(&camera.sensor()), camera.about());
+        Known { name: camera.name, place: place.clone(), has, about }
+    };
+    cameras.into_iter().map(one).collect()
+}
+
+/// What a sensor has and lacks.
+fn parts(sensor: &Sensor) -> Vec<String> {
+    let response = match &sensor.response {
+        None => "none",
+        Some(files) if files.quantum_efficiency.is_some() => "absolute",
+        Some(files) if files.peak_quantum_efficiency.is_some() => "scaled",
+        Some(_) => "relative",
+    };
+    let readout = match (&sensor.readout, sensor.assumed().filter(|key| key.starts_with("readout.")).count()) {
+        (None, _) => "none".to_owned(),
+        (Some(_), 0) => "yes".into(),
+        (Some(_), count) => format!("yes, {count} assumed"),
+    };
+    vec![response.into(), readout]
 }
 
 /// The files of a directory by name.
@@ -135,7 +171,7 @@ fn of_file(kind: Kind, path: &Path) -> Option<Known> {
         let geometry = &reader.header().geometry;
         let [width, height, count] = [geometry.width, geometry.height, geometry.channels.len()];
         let about = format!("{} spectra ({width}x{height} pixels) of {count} wavelengths", width * height);
-        return Some(Known { name: path.display().to_string(), place: "file".into(), about });
+        return Some(Known { name: path.display().to_string(), place: "file".into(), has: Vec::new(), about });
     }
     if !ends_in(path, &["csv", "yaml", "yml"]) {
         return None;
@@ -148,13 +184,14 @@ fn of_file(kind: Kind, path: &Path) -> Option<Known> {
 fn of_bytes(kind: Kind, path: &Path, bytes: &[u8], place: &str) -> Option<Known> {
     let shown = path.display().to_string();
     let stem = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
-    let named = |name: String, about: String| Some(Known { name, place: place.into(), about });
-    let as_file = |about: String| Some(Known { name: shown.clone(), place: "file".into(), about });
+    let named = |name: String, about: String| Some(Known { name, place: place.into(), has: Vec::new(), about });
+    let as_file = |about: String| Some(Known { name: shown.clone(), place: "file".into(), has: Vec::new(), about });
     let is_table = ends_in(path, &["csv"]);
     match kind {
         Kind::Sensors if !is_table => {
             let sensor: Sensor = yaml::parse_sensor(&shown, bytes).ok()?;
-            named(stem, sensor.description.unwrap_or(sensor.name))
+            let has = parts(&sensor);
+            named(stem, sensor.description.unwrap_or(sensor.name)).map(|known| Known { has, ..known })
         }
         Kind::Matrices if !is_table => {
             let matrix: CameraMatrix = yaml::parse_matrix(&shown, bytes).ok()?;
@@ -186,18 +223,38 @@ fn lights() -> Vec<Known> {
         "e" => "equal energy".to_owned(),
         other => format!("CIE daylight {}", other.to_uppercase()),
     };
-    let built_in = |name: &str, about: String| Known { name: name.into(), place: "built in".into(), about };
+    let built_in =
+        |name: &str, about: String| Known { name: name.into(), place: "built in".into(), has: Vec::new(), about };
     let named = Illuminant::NAMED.iter().map(|(name, _)| built_in(name, about(name)));
     named.chain([built_in("3200K", "a temperature: below 4000 K a black body, above CIE daylight".into())]).collect()
 }
 
-/// What is known of a kind, in words.
-pub fn page(kind: Kind) -> String {
-    let known = known(kind);
-    let width = |cell: fn(&Known) -> &String| known.iter().map(|one| cell(one).len()).max().unwrap_or_default();
-    let [name, place] = [width(|one| &one.name), width(|one| &one.place)];
-    let line = |one: &Known| format!("  {:name$}  {:place$}  {}\n", one.name, one.place, one.about);
-    let lines: String = known.iter().map(line).collect();
-    let none = || format!("  none; {DATA_VARIABLE} names directories to look in\n");
-    format!("{}:\n{}", kind.title(), if known.is_empty() { none() } else { lines })
+/// What is known of a kind, in words: that of which all of `words` are told, in any case.
+pub fn page(kind: Kind, words: &[String]) -> String {
+    let words: Vec<String> = words.iter().map(|word| word.to_lowercase()).collect();
+    let cells = |one: &Known| [&[one.name.clone(), one.place.clone()], &one.has[..]].concat();
+    let is_meant = |one: &Known| {
+        let line = format!("{} {}", cells(one).join(" "), one.about).to_lowercase();
+        words.iter().all(|word| line.contains(word))
+    };
+    let known: Vec<Known> = known(kind).into_iter().filter(is_meant).collect();
+    let mut rows: Vec<(Vec<String>, String)> = known.iter().map(|one| (cells(one), one.about.clone())).collect();
+    if kind == Kind::Sensors && !rows.is_empty() {
+        let heads = ["NAME", "PLACE", "RESPONSE", "READ-OUT"].map(str::to_owned).to_vec();
+        rows.insert(0, (heads, "ABOUT".into()));
+    }
+    let widest = |column: usize| rows.iter().filter_map(|(cells, _)| cells.get(column)).map(String::len).max();
+    let line = |(cells, about): &(Vec<String>, String)| {
+        let padded = cells.iter().enumerate().map(|(column, cell)| {
+            let width = widest(column).unwrap_or_default();
+            format!("  {cell:width$}")
+        });
+        format!("{}  {about}\n", padded.collect::<String>())
+    };
+    let lines: String = rows.iter().map(line).collect();
+    let none = || match words.is_empty() {
+        true => format!("  none; {DATA_VARIABLE} names directories to look in\n"),
+        false => format!("  none of which `{}` is told\n", words.join(" ")),
+    };
+    format!("{}:\n{}", kind.title(), if rows.is_empty() { none() } else { lines })
 }

@@ -1,6 +1,7 @@
 //! Files: bytes to frames and back.
 
 pub mod atomic;
+pub mod cameras;
 pub mod chart;
 pub mod csv;
 pub mod data;
@@ -30,6 +31,8 @@ pub mod plots;
 pub mod png;
 pub mod radiance_unit;
 pub mod register;
+mod response_import;
+pub mod response_table;
 pub mod spectral;
 pub mod standard;
 mod storing;

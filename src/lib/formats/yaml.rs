@@ -5,7 +5,7 @@ use super::keys::KeyPage;
 use super::{yaml_guard, yaml_writer};
 use crate::analysis::characterization::{CameraMatrix, MATRIX_SCHEMA};
 use crate::camera::readout::ReadOut;
-use crate::camera::sensor::{FLAT_SENSOR_SCHEMA, FlatSensor, ResponseFiles, SENSOR_SCHEMA, Sensor};
+use crate::camera::sensor::{FLAT_SENSOR_SCHEMA, FlatSensor, Provenance, ResponseFiles, SENSOR_SCHEMA, Sensor};
 use crate::error::{Error, Result};
 use crate::metadata::{METADATA_SCHEMA, Metadata};
 use crate::names::{Named, nearest};
@@ -65,12 +65,35 @@ pub fn parse_sensor(name: &str, bytes: &[u8]) -> Result<Sensor> {
             let problem = format!("schema is `{other}`, not `{SENSOR_SCHEMA}` or `{FLAT_SENSOR_SCHEMA}`");
             return Err(Error::format(name, problem));
         }
+        check_provenance(name, &raw)?;
         return parse_parts(name, bytes, &sensor_parts());
     }
     if let Some((part, _)) = sensor_parts().iter().find(|(part, _)| raw.contains_key(*part)) {
         return Err(Error::format(name, format!("`{part}` belongs to the schema `{SENSOR_SCHEMA}`; name that one")));
     }
     parse_strict::<FlatSensor>(name, bytes).map(Sensor::from)
+}
+
+/// Refuses a provenance of what no sensor file has, and keys of it that nobody knows.
+fn check_provenance(name: &str, raw: &Mapping) -> Result<()> {
+    let Some(told) = raw.get("provenance").and_then(Value::as_mapping) else { return Ok(()) };
+    let of_sensors = || KeyPage::Sensor.keys().map(|[path, ..]| path).filter(|path| !path.starts_with("provenance"));
+    let known = field_names::<Provenance>();
+    for (key, origin) in told {
+        let key = key.as_str().unwrap_or("?");
+        if !of_sensors().any(|path| path == key) {
+            let near = nearest(key, of_sensors(), |path| path.len() / 2);
+            let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            let problem = format!("`provenance` tells of `{key}`, which no sensor file has{near}");
+            return Err(Error::format(name, problem));
+        }
+        let mut told = origin.as_mapping().into_iter().flat_map(Mapping::keys).filter_map(Value::as_str);
+        if let Some(other) = told.find(|other| !known.contains(other)) {
+            let problem = format!("unknown key `provenance.{key}.{other}`; there are `{}`", known.join("` and `"));
+            return Err(Error::format(name, problem));
+        }
+    }
+    Ok(())
 }
 
 /// Reads a matrix file; unknown keys are errors as for [`parse_strict`].
@@ -400,6 +423,30 @@ mod tests {
         let again = write_metadata(&metadata).unwrap();
         assert!(again.contains("observer:") && again.contains("iso: 100"), "{again}");
         assert_eq!(parse_metadata("x", &again).unwrap(), Metadata { unit: String::new(), ..metadata });
+    }
+
+    #[test]
+    fn a_provenance_is_of_keys_that_there_are_and_goes_on() {
+        let text = |told: &str| {
+            format!(
+                "schema: cyanometer-sensor/2\nname: s\nxyz_from_camera: [[1,0,0],[0,1,0],[0,0,1]]\nprovenance:\n  {told}\n"
+            )
+        };
+        let complaint = |told: &str| parse_sensor("s.yaml", text(told).as_bytes()).unwrap_err().to_string();
+        let told = "readout.prnu: {kind: measured, note: by me}";
+        let sensor = parse_sensor("s.yaml", text(told).as_bytes()).unwrap();
+        assert_eq!(sensor.provenance["readout.prnu"].note.as_deref(), Some("by me"));
+        let metadata = Metadata { sensor: Some(sensor), ..Metadata::new(QuantityKind::Adu) };
+        let again = parse_metadata("m", &write_metadata(&metadata).unwrap()).unwrap();
+        assert_eq!(again.sensor, metadata.sensor);
+        let misspelled = complaint("readout.pnru: {kind: measured}");
+        assert!(misspelled.ends_with("which no sensor file has; did you mean `readout.prnu`?"), "{misspelled}");
+        let other = complaint("readout.prnu: {kind: measured, nota: x}");
+        assert!(other.ends_with("unknown key `provenance.readout.prnu.nota`; there are `kind` and `note`"), "{other}");
+        let guessed = complaint("readout.prnu: {kind: guessed}");
+        assert!(guessed.contains("`measured`") && guessed.contains("`assumed`"), "{guessed}");
+        assert!(complaint("readout.prnu: {note: x}").contains("kind"));
+        assert!(complaint("readout.prnu: measured").contains("readout.prnu"));
     }
 
     #[test]

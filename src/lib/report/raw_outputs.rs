@@ -154,6 +154,7 @@ fn read_out(reader: &FrameReader) -> Result<String> {
         name: format!("noise profile of {}", raw.name),
         description: Some(DESCRIPTION.into()),
         source: Some("NoiseProfile of the DNG: variance S x + O of x = (ADU - black) / (white - black)".into()),
+        provenance: std::collections::BTreeMap::new(),
         readout: Some(readout),
         response: None,
         xyz_from_camera: None,

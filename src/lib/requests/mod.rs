@@ -29,6 +29,7 @@ pub mod options;
 pub mod photon_transfer;
 pub mod picture;
 pub mod prediction;
+pub mod sensor;
 pub mod values;
 
 mod notes;

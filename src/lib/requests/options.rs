@@ -1,6 +1,7 @@
 //! Groups of options that several programs share.
 
 use super::notes::Note;
+use super::sensor::SensorRequest;
 use super::values;
 use crate::analysis::characterization::evaluation::{Filling, SampleExposure};
 use crate::analysis::statistics::Region;
@@ -10,7 +11,7 @@ use crate::camera::sensor::Sensor;
 use crate::color::White;
 use crate::color::rgb::{Encoding, Primaries};
 use crate::error::{Error, Result};
-use crate::formats::data;
+use crate::formats::data::{self, SensorChanges};
 use crate::formats::headerless::Layout;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
@@ -86,18 +87,40 @@ pub struct SensorChoice {
     /// Sensor, for a frame whose metadata names none, or another than it names
     #[arg(long, value_name = "NAME|FILE")]
     pub sensor: Option<String>,
+    /// Sensor whose read-out counts in place of that of the frame's sensor, or of --sensor
+    #[arg(long, value_name = "NAME|FILE")]
+    pub readout: Option<String>,
 }
 
 impl SensorChoice {
-    /// Puts the sensor, if one was chosen, into the metadata of a frame; gives what in its description may not be meant.
+    /// Puts the sensor, if one was chosen, or its read-out into the metadata of a frame; gives what in its description may not
+    /// be meant.
     ///
     /// # Errors
     ///
     /// Those of [`data::load_sensor`].
     pub fn apply(&self, reader: &mut FrameReader) -> Result<Vec<Note>> {
-        let Some(sensor) = &self.sensor else { return Ok(Vec::new()) };
-        let loaded = data::load_sensor(sensor)?.sensor;
-        let doubts = loaded.doubts().into_iter().chain(contradictions(reader.header_mut(), &loaded));
+        let own = reader.header_mut().metadata.sensor.clone();
+        let (loaded, doubts) = match (&self.sensor, &self.readout, own) {
+            (None, None, _) => return Ok(Vec::new()),
+            (Some(sensor), readout, _) => {
+                let changes = SensorChanges { readout: readout.clone(), ..SensorChanges::default() };
+                let loaded = data::load_changed_sensor(sensor, &changes)?;
+                (loaded.sensor.clone(), loaded.doubts())
+            }
+            (None, Some(readout), Some(mut own)) => {
+                let lost = own.replace_readout(&data::load_description(readout)?)?;
+                let doubts = lost.into_iter().chain(own.doubts()).collect();
+                (own, doubts)
+            }
+            (None, Some(readout), None) => {
+                let other = data::load_description(readout)?;
+                other.readout()?;
+                let doubts = other.doubts();
+                (other, doubts)
+            }
+        };
+        let doubts = doubts.into_iter().chain(contradictions(reader.header_mut(), &loaded));
         let notes = doubts.map(Note::Warning).collect();
         reader.header_mut().metadata.sensor = Some(loaded);
         Ok(notes)
@@ -183,9 +206,9 @@ pub struct Subject {
     /// Spectrum or library as CSV, spectral image as EXR, or picture in R, G, B; `-` or none for standard input
     #[arg(conflicts_with_all = ["electrons", "dark"])]
     pub input: Option<PathBuf>,
-    /// Sensor: a known name, or a file
-    #[arg(long, value_name = "NAME|FILE", default_value = data::DEFAULT_SENSOR)]
-    pub sensor: String,
+    /// The sensor.
+    #[command(flatten)]
+    pub sensor: SensorRequest,
 }
 
 /// A lens.

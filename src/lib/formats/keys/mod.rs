@@ -94,7 +94,7 @@ mod tests {
     use crate::camera::linearity::Linearization;
     use crate::camera::optics::Exposure;
     use crate::camera::readout::ReadOut;
-    use crate::camera::sensor::{CurveFile, ResponseFiles, Sensor};
+    use crate::camera::sensor::{CurveFile, Provenance, ResponseFiles, Sensor};
     use crate::color::difference::DifferenceReport;
     use crate::formats::yaml::{Keys, field_names, parse_matrix, parse_metadata, parse_sensor};
     use crate::metadata::*;
@@ -107,10 +107,13 @@ mod tests {
         match page {
             KeyPage::Sensor => vec![
                 ("", field_names::<Sensor>()),
+                ("provenance.", &["KEY"]),
+                ("provenance.KEY.", field_names::<Provenance>()),
                 ("readout.", field_names::<ReadOut>()),
                 ("readout.linearization.", field_names::<Linearization>()),
                 ("response.", field_names::<ResponseFiles>()),
                 ("response.quantum_efficiency.", field_names::<CurveFile>()),
+                ("response.relative_response.", field_names::<CurveFile>()),
                 ("response.cover_glass.", field_names::<CurveFile>()),
             ],
             KeyPage::Matrix => vec![

@@ -117,7 +117,7 @@ impl Fit {
     pub fn run(&self) -> Result<Characterization> {
         let exposure = self.exposure.chosen()?;
         self.check_white()?;
-        let loaded = data::load_sensor(&self.sensor)?;
+        let (loaded, doubts) = self.sensor.load()?;
         let viewer = Viewer { loaded: &loaded, observer: data::load_observer()?, grid: WavelengthGrid::default() };
         let seen = viewer.see_training(self)?;
         let plan = Plan::new(self, &seen)?;
@@ -126,7 +126,7 @@ impl Fit {
         let (fitted, trade_off) = fitting.fit()?;
         let mut notes = seen.notes.clone();
         let long = self.exposure.exposure_s.and_then(|exposure_s| self.exposure.lens.exposed(exposure_s).ok()?.doubt());
-        notes.extend(loaded.sensor.doubts().into_iter().chain(long).map(Note::Warning));
+        notes.extend(doubts.into_iter().chain(long.map(Note::Warning)));
         notes.push(Note::Remark(format!(
             "fitted {} observations, condition number {:.1}",
             fitted.count, fitted.condition

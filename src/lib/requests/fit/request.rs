@@ -3,10 +3,10 @@
 use crate::analysis::characterization::regression::{Regression, Weights};
 use crate::color::White;
 use crate::error::{Error, Result};
-use crate::formats::data;
 use crate::names::Named;
 use crate::random::Source;
 use crate::requests::options::{SampleExposureChoice, WhiteChoice, defaults};
+use crate::requests::sensor::SensorRequest;
 use crate::requests::values;
 use crate::stages::demosaic::Method;
 use crate::stages::noise::NoiseSettings;
@@ -23,9 +23,9 @@ use std::path::PathBuf;
 pub struct Fit {
     /// Library of spectra, EXR or CSV
     pub library: PathBuf,
-    /// Sensor: a known name, or a file
-    #[arg(long, value_name = "NAME|FILE", default_value = data::DEFAULT_SENSOR)]
-    pub sensor: String,
+    /// The sensor.
+    #[command(flatten)]
+    pub sensor: SensorRequest,
     /// Least squares on the training samples (sky-rad-ls), with one sample kept exact (sky-rad-sppls), or on the responses
     /// alone with one sample kept exact (max-ign-sppls; with positive spectra, max-ign-positive-sppls)
     #[arg(long, alias = "method", value_name = "NAME", default_value = Regression::default().name(), value_parser = values::regression())]

@@ -250,7 +250,7 @@ impl NoisePrediction {
         let Some(input) = &self.subject.input else {
             return Err(Error::Usage("--all-samples is for a library of spectra; name one".into()));
         };
-        let loaded = data::load_sensor(&self.subject.sensor)?;
+        let (loaded, doubts) = self.subject.sensor.load()?;
         let (library, warnings) = spectral::read_library(input, self.spectrum.radiance_unit)?;
         let observer = data::load_observer()?;
         let signals = signals(&library, &loaded.sensor, loaded.response()?, &observer, &WavelengthGrid::default())?;
@@ -261,7 +261,7 @@ impl NoisePrediction {
             None => SampleExposure::Fixed(base),
         };
         let mut notes: Vec<Note> =
-            warnings.into_iter().chain(loaded.sensor.doubts()).chain(long).map(Note::Warning).collect();
+            warnings.into_iter().map(Note::Warning).chain(doubts).chain(long.map(Note::Warning)).collect();
         let color = self.color(&loaded.sensor, &mut notes)?;
         let one = |sample: usize| -> Result<SamplePrediction> {
             let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;

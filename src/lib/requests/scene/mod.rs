@@ -140,6 +140,7 @@ mod tests {
     use crate::formats::data::DEFAULT_SENSOR;
     use crate::numerics::quadrature::Rule;
     use crate::requests::options::{SignalLevel, Subject};
+    use crate::requests::sensor::SensorRequest;
 
     const TREE: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -150,13 +151,13 @@ mod tests {
 
     fn spectrum(file: &str) -> Scene {
         let input = Some(format!("{TREE}/sample_data/{file}").into());
-        Scene { subject: Subject { input, sensor: DEFAULT_SENSOR.into() }, ..Scene::default() }
+        Scene { subject: Subject { input, sensor: SensorRequest::default() }, ..Scene::default() }
     }
 
     #[test]
     fn the_defaults_are_those_of_the_paper() {
         let scene = Scene::default();
-        assert_eq!((scene.subject.sensor.as_str(), &scene.subject.input), (DEFAULT_SENSOR, &None));
+        assert_eq!((scene.subject.sensor.sensor.as_str(), &scene.subject.input), (DEFAULT_SENSOR, &None));
         let exposure = scene.exposure.chosen().unwrap();
         assert_eq!(exposure, Exposure { exposure_s: 0.033, f_number: 8.0, lens_transmittance: 1.0 });
         assert_eq!((scene.wavelengths, scene.quadrature), (None, Rule::Rectangle));

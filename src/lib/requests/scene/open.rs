@@ -11,7 +11,7 @@ use crate::camera::sensor::Sensor;
 use crate::cfa::Class;
 use crate::error::{Error, Result};
 use crate::formats::csv::SpectralTable;
-use crate::formats::data::{self, LoadedSensor};
+use crate::formats::data::LoadedSensor;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::frame::Geometry;
@@ -35,14 +35,14 @@ pub(super) struct Prepared {
 impl Scene {
     /// Loads the sensor, opens the light and settles the exposure.
     pub(super) fn prepare(&self) -> Result<Prepared> {
-        let loaded = data::load_sensor(&self.subject.sensor)?;
+        let (loaded, doubts) = self.subject.sensor.load()?;
         let mut exposure = self.exposure.chosen()?;
         if self.level.expose_to.is_some() {
             // The signal is proportional to time: work it out for 1 s, then choose.
             exposure.exposure_s = 1.0;
         }
         let mut found = Found::none();
-        found.notes.extend(loaded.sensor.doubts().into_iter().chain(self.doubt(exposure)).map(Note::Warning));
+        found.notes.extend(doubts.into_iter().chain(self.doubt(exposure).map(Note::Warning)));
         let mut light = match self.level.given() {
             Some(electrons) => {
                 let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
