@@ -2,32 +2,24 @@
 
 use crate::analysis::photon_transfer::ClassFindings;
 use crate::camera::readout::ReadOut;
-use crate::camera::sensor::{SENSOR_SCHEMA, Sensor};
+use crate::camera::sensor::{Origin, Provenance, SENSOR_SCHEMA, Sensor};
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::numerics::variance_components::Interval;
 use crate::requests::photon_transfer::{MeasuredCamera, frames_in_words};
 use crate::units::QuantityKind;
-use std::fmt::Write;
+use std::collections::BTreeMap;
 
 /// The temperature that is assumed where none is known, K.
 const ROOM_K: f64 = 295.0;
 
-/// Where a number of the file is from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Origin {
-    Measured,
-    Derived,
-    Assumed,
-}
-
 /// Numbers of the file with their origins.
 #[derive(Default)]
-struct Told(Vec<(&'static str, Origin, String)>);
+struct Told(BTreeMap<String, Provenance>);
 
 impl Told {
-    fn tell(&mut self, key: &'static str, origin: Origin, why: impl Into<String>) {
-        self.0.push((key, origin, why.into()));
+    fn tell(&mut self, key: &'static str, kind: Origin, why: impl Into<String>) {
+        self.0.insert(format!("readout.{key}"), Provenance { kind, note: Some(why.into()) });
     }
 }
 
@@ -90,13 +82,13 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     let row_noise_e = taken("row_noise_e", "row_noise_e");
     let column_noise_e = taken("column_noise_e", "column_noise_e");
     let prnu = taken("prnu", "prnu_pixel");
-    let [dsnu_row_e, dsnu_column_e] = [taken("dsnu_row_e", "dsnu_row_e"), taken("dsnu_column_e", "dsnu_column_e")];
     let dark_current = taken("dark_current_e_per_s", "dark_current_e_per_s");
     let dcnu = if dark_current > 0.0 { taken("dcnu", "dcnu") } else { 0.0 };
     let dsnu_e = if dcnu > 0.0 { taken("dsnu_e", "dsnu_offset_e") } else { taken("dsnu_e", "dsnu_pixel_e") };
-    let [prnu_column, prnu_row] = [("prnu_column", 0), ("prnu_row", 1)].map(|(key, axis)| {
-        let found = lines_of_light(camera, axis);
-        let why = "as the high-pass filter shows it, so that light which is not even does not count";
+    let lines = [("prnu_column", 0, 0), ("prnu_row", 0, 1), ("dsnu_column_e", 1, 0), ("dsnu_row_e", 1, 1)];
+    let [prnu_column, prnu_row, dsnu_column_e, dsnu_row_e] = lines.map(|(key, stack, axis)| {
+        let found = lines_of(camera, stack, axis) / if stack == 1 { gain.value } else { 1.0 };
+        let why = "as the high-pass filter shows it, so that what varies smoothly does not count";
         told.tell(
             key,
             if found > 0.0 { Origin::Derived } else { Origin::Assumed },
@@ -151,24 +143,14 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         adu_per_e: gain.value,
         linearization: None,
     };
-    let mut source = format!(
-        "photon-transfer of {}; intervals hold with {} %",
-        frames_in_words(camera.frames),
-        camera.confidence * 100.0
-    );
-    for (key, origin, why) in &told.0 {
-        let origin = match origin {
-            Origin::Measured => "measured",
-            Origin::Derived => "derived",
-            Origin::Assumed => "assumed",
-        };
-        let _ = write!(source, "\n{key}: {origin}: {why}");
-    }
+    let percent = camera.confidence * 100.0;
+    let source = format!("photon-transfer of {}; intervals hold with {percent} %", frames_in_words(camera.frames));
     let sensor = Sensor {
         schema: SENSOR_SCHEMA.into(),
         name: "measured".into(),
         description: None,
         source: Some(source),
+        provenance: told.0,
         readout: Some(readout),
         response: None,
         xyz_from_camera: None,
@@ -177,10 +159,11 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     Ok(sensor)
 }
 
-/// Relative spread of the response between columns, or rows, behind the high-pass filter; 0 where it is not told from none.
-fn lines_of_light(camera: &MeasuredCamera, axis: usize) -> f64 {
+/// Spread between columns, or rows, of the pattern under light or in the dark behind the high-pass filter; 0 where it is not told
+/// from none.
+fn lines_of(camera: &MeasuredCamera, stack: usize, axis: usize) -> f64 {
     let found: Vec<[f64; 2]> =
-        camera.patterns.iter().filter_map(|[light, _]| Some(light.as_ref()?.lines[axis])).collect();
+        camera.patterns.iter().filter_map(|views| Some(views[stack].as_ref()?.lines[axis])).collect();
     let count = found.len().max(1) as f64;
     let variance = found.iter().map(|[variance, _]| variance).sum::<f64>() / count;
     let scatter = found.iter().map(|[_, scatter]| scatter * scatter).sum::<f64>().sqrt() / count;
