@@ -104,6 +104,21 @@ impl SpectralTable {
             Some(record) if is_units(&record) => (Some(record), None),
             record => (None, record.or_else(|| (!has_header).then(|| first.clone()))),
         };
+        let is_wavelength = |cell: &str| {
+            let word = cell.trim().to_lowercase();
+            word.starts_with("wavelength") || word.starts_with("lambda") || word == "wl" || word == "nm"
+        };
+        if has_header
+            && !by_rows
+            && !is_wavelength(&first[0])
+            && let Some(place) = first.iter().position(is_wavelength)
+        {
+            return refuse(&format!(
+                "its wavelengths, `{}`, stand in column {}; they must be the first column",
+                first[place].trim(),
+                place + 1
+            ));
+        }
         let Cells { numbers, labels } = Cells::read(name, &mut reader, at_hand.as_ref(), by_rows)?;
         let (rows, width) = numbers.dim();
         if width < 2 || rows == 0 {
@@ -183,7 +198,45 @@ impl SpectralTable {
             let problem = "it is by wavenumber and does not say whether its radiance is per nm or per cm-1";
             return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
         }
-        radiance_unit::settle(FileSays { name: &self.name, heading, remarks: &self.remarks, place }, given)
+        self.check_filled(index)?;
+        let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
+        let (unit, assumed) = radiance_unit::settle(says, given)?;
+        if assumed.is_some() {
+            self.check_brightness(index, unit)?;
+        }
+        Ok((unit, assumed))
+    }
+
+    /// Refuses values that stand for none.
+    fn check_filled(&self, index: usize) -> Result<()> {
+        /// What other programs put where they have no value.
+        const MARKS: [f64; 6] = [-99.0, -999.0, -9999.0, -99_999.0, -1e30, -1e34];
+        let values = self.values.row(index);
+        let Some(mark) = values.iter().copied().find(|value| MARKS.contains(value)) else { return Ok(()) };
+        let count = values.iter().filter(|value| **value == mark).count();
+        let which = if self.columns.len() > 1 { format!("`{}`: ", self.columns[index]) } else { String::new() };
+        let problem = format!(
+            "{which}{count} of {} values are {mark}, which marks values that are missing; leave their rows out",
+            values.len()
+        );
+        Err(Error::format(&self.name, problem))
+    }
+
+    /// Refuses radiances that are brighter than the sun's disk in a unit that nobody named.
+    fn check_brightness(&self, index: usize, unit: RadianceUnit) -> Result<()> {
+        /// Spectral radiance of the sun's disk at its brightest, about 26 kW m⁻² sr⁻¹ nm⁻¹, in W cm⁻² sr⁻¹ nm⁻¹, rounded up
+        /// (the extraterrestrial irradiance of \[ASTM E490] over 6.8·10⁻⁵ sr, smoothed).
+        const SUN: f64 = 3.5;
+        let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
+        let brightest = samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max);
+        if brightest > SUN {
+            let problem = format!(
+                "it does not say the unit of its radiance; in {unit} it would be {:.1e} times as bright as the sun's disk",
+                brightest / SUN
+            );
+            return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
+        }
+        Ok(())
     }
 
     /// The first column as the relative power of a light, per interval of wavelength.
@@ -201,12 +254,15 @@ impl SpectralTable {
         self.curve(None)
     }
 
-    /// A warning of values below zero in a curve of radiances, if there are any.
+    /// A warning of values below zero in a curve of radiances, if there are any, or of nothing but zeros.
     pub fn negative(&self, index: usize) -> Option<String> {
         let values = self.values.row(index);
         let count = values.iter().filter(|value| **value < 0.0).count();
         let least = values.iter().copied().fold(0.0, f64::min);
         let which = if self.columns.len() > 1 { format!("`{}`: ", self.columns[index]) } else { String::new() };
+        if values.iter().all(|value| *value == 0.0) {
+            return Some(format!("{}: {which}all radiances are 0: is it the right column?", self.name));
+        }
         (count > 0).then(|| {
             let all = values.len();
             format!("{}: {which}{count} of {all} radiances are below 0, down to {least}, which no light is", self.name)

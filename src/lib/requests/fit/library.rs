@@ -2,7 +2,7 @@
 
 use super::request::Fit;
 use crate::analysis::characterization::{Signals, signals};
-use crate::error::{Error, Result};
+use crate::error::{Advice, Error, Result};
 use crate::formats::data::LoadedSensor;
 use crate::formats::{csv, files, spectral};
 use crate::requests::notes::Note;
@@ -42,7 +42,14 @@ impl Viewer<'_> {
 
     /// Reads a library without labels.
     pub(super) fn see(&self, path: &Path, fit: &Fit) -> Result<SeenLibrary> {
-        let (library, warnings) = spectral::read_library(path, fit.radiance_unit)?;
+        // Of two libraries the unit that is given is that of the one which does not say its own.
+        let has_own_unit =
+            |error: &Error| matches!(error, Error::Advised { advice: Advice::LeaveOut(["radiance_unit"]), .. });
+        let is_one_of_two = fit.evaluate.as_ref().is_some_and(|other| *other != fit.library);
+        let (library, warnings) = match spectral::read_library(path, fit.radiance_unit) {
+            Err(error) if is_one_of_two && has_own_unit(&error) => spectral::read_library(path, None)?,
+            read => read?,
+        };
         let (sensor, response) = (&self.loaded.sensor, self.loaded.response()?);
         let signals = signals(&library, sensor, response, &self.observer, &self.grid)?;
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());

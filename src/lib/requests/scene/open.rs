@@ -172,10 +172,16 @@ impl Scene {
             (None, Some(sample)) if sample < count => Ok(sample),
             (None, Some(sample)) => Err(no_sample(table.name(), sample, count)),
             (None, None) if count == 1 => Ok(0),
-            (None, None) => Err(Error::Usage(format!(
-                "{}: it holds {count} spectra; choose one with --column NAME or --sample N",
-                table.name()
-            ))),
+            (None, None) => {
+                const SHOWN: usize = 8;
+                let names: Vec<&str> = table.columns.iter().take(SHOWN).map(String::as_str).collect();
+                let more = if count > SHOWN { " ..." } else { "" };
+                Err(Error::Usage(format!(
+                    "{}: it holds {count} spectra, {}{more}; choose one with --column NAME or --sample N",
+                    table.name(),
+                    names.join(", ")
+                )))
+            }
         }
     }
 }
