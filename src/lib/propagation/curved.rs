@@ -18,7 +18,7 @@ pub(super) const VOID: &str =
     "the noise of X, Y or Z is more than a tenth of it, too much to be propagated to a color that is curved in it";
 
 /// Gauss and Hermite's nodes and weights for a standard normal variable: exact for polynomials of degree 13.
-const NODES: [(f64, f64); 7] = [
+pub(super) const NODES: [(f64, f64); 7] = [
     (0.0, 16.0 / 35.0),
     (1.154_405_394_739_968_2, 0.240_123_178_605_012_6),
     (-1.154_405_394_739_968_2, 0.240_123_178_605_012_6),

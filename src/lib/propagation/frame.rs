@@ -5,11 +5,12 @@
 
 use super::curved;
 use super::divided::NARROW;
-use super::lines::LineCovariance;
 use super::masters::{Dark, Flat};
+use super::moments::LineCovariance;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
+pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::levels::BlackLevel;
 use crate::color;
 use crate::color::luv::{luv_about, luv_from_xyz};
@@ -32,23 +33,6 @@ pub enum FramePrediction {
     /// Pixels that are weighted sums of photosites.
     Pixels(Box<PixelMoments>),
 }
-
-/// Why nothing is predicted of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Unpredictable {
-    /// The metadata lack a key.
-    #[error("the metadata has no `{0}`")]
-    Missing(&'static str),
-    /// Photosites of a class expect different signals.
-    #[error("the scene is not uniform")]
-    NotUniform,
-    /// There is no formula for what was done.
-    #[error("{0}")]
-    Beyond(&'static str),
-}
-
-/// A prediction, or why there is none.
-pub type Predicted<T> = Result<T, Unpredictable>;
 
 /// Predicts a frame from its metadata alone.
 ///

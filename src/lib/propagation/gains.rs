@@ -7,7 +7,7 @@
 //! their covariance ([`SiteCovariance`]); so do columns.
 
 use super::covariance::PAIRS;
-use super::lines::SiteCovariance;
+use super::moments::SiteCovariance;
 use crate::cfa::Class;
 use crate::stages::demosaic::stencil::{PHASES, REACH, phase};
 use crate::stages::demosaic::weights::Weights;

@@ -12,8 +12,8 @@
 //! and B ⊗ R is local. Sums over y grow with every two rows by the same amount, as those of B do.
 
 use super::covariance::PAIRS;
-use super::lines::SiteCovariance;
-use super::sampling::{Place, add_products, steps};
+use super::moments::SiteCovariance;
+use super::place::{Place, add_products, steps};
 use crate::stages::demosaic::stencil::{REACH, phase};
 use crate::stages::demosaic::weights::Weights;
 use nalgebra::{Matrix3, Vector3};

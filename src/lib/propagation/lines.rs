@@ -24,78 +24,19 @@
 //! telling the classes, D diagonal with the variance of each less R_kk + S_kk.
 
 use super::covariance::PAIRS;
-use super::frame::{Predicted, Unpredictable};
+use super::curved::NODES;
+
 use super::law::Law;
 use super::masters::Dark;
-use super::moments::{Equations, Prediction};
+use super::moments::{Equations, LineCovariance};
 use super::photosite::Photosite;
 use super::reading::{Reading, codes_of};
+use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::AdcRecord;
 use crate::numerics::averages::Combine;
 use crate::numerics::normal::density;
 use crate::stages::noise::{LineNoise, NoiseModel};
 use nalgebra::Matrix3;
-
-/// Covariances of a photosite with another of class R, G or B in its row, and in its column.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LineCovariance {
-    /// In its row.
-    pub row: [f64; 3],
-    /// In its column.
-    pub column: [f64; 3],
-}
-
-/// The covariance of photosites: what each has by itself, and what those of a row and of a column share, by classes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SiteCovariance {
-    /// Variances of what is their own.
-    pub own: [f64; 3],
-    /// Covariance of two in a row, also of one class.
-    pub row: Matrix3<f64>,
-    /// The same in a column.
-    pub column: Matrix3<f64>,
-}
-
-impl SiteCovariance {
-    /// That of photosites that share nothing.
-    pub fn independent(own: [f64; 3]) -> Self {
-        Self { own, row: Matrix3::zeros(), column: Matrix3::zeros() }
-    }
-
-    /// That of photosites of these moments.
-    pub fn of(sites: &[Prediction; 3]) -> Self {
-        let own = |k: usize| {
-            let LineCovariance { row, column } = sites[k].lines;
-            let shared = row[k] + column[k];
-            let variance = sites[k].moments.variance;
-            if shared == 0.0 { variance } else { (variance - shared).max(0.0) }
-        };
-        Self {
-            own: [0, 1, 2].map(own),
-            row: Matrix3::from_fn(|k, l| sites[k].lines.row[l]),
-            column: Matrix3::from_fn(|k, l| sites[k].lines.column[l]),
-        }
-    }
-
-    /// Whether photosites share nothing.
-    pub fn is_independent(&self) -> bool {
-        self.row == Matrix3::zeros() && self.column == Matrix3::zeros()
-    }
-
-    /// What photosites share beyond themselves: in a row and in a column.
-    pub fn lines(&self) -> [&Matrix3<f64>; 2] {
-        [&self.row, &self.column]
-    }
-}
-
-/// Variance of the fixed offsets that photosites of two frames share, e².
-pub(super) fn offsets_of_both(a: &NoiseModel, b: &NoiseModel) -> f64 {
-    let parts = |model: &NoiseModel| {
-        let LineNoise { dsnu_e, dsnu_row_e, dsnu_column_e, .. } = model.lines;
-        [dsnu_e, dsnu_row_e, dsnu_column_e]
-    };
-    parts(a).iter().zip(parts(b)).map(|(a, b)| a * b).sum()
-}
 
 /// The standard deviation, in codes, of what is a photosite's own from which codes follow what it shares as straight lines do.
 const BLURRED: f64 = 0.6;
@@ -417,7 +358,20 @@ fn nodes(spread: f64, blur: f64) -> Vec<(f64, f64)> {
     if spread <= 0.0 {
         return vec![(0.0, 1.0)];
     }
-    let scale = (blur / spread).min(1.0);
+    // Gauss's nodes where what is shared is the lesser part: what they leave out of a variance goes with the square, the fourth
+    // and higher powers of the ratio.
+    let ratio = spread / blur;
+    if ratio <= 0.05 {
+        return vec![(-1.0, 0.5), (1.0, 0.5)];
+    }
+    if ratio <= 0.3 {
+        let third = 3.0_f64.sqrt();
+        return vec![(0.0, 2.0 / 3.0), (-third, 1.0 / 6.0), (third, 1.0 / 6.0)];
+    }
+    if ratio <= 1.0 {
+        return NODES.to_vec();
+    }
+    let scale = 1.0 / ratio;
     let step = scale / STEPS;
     let steps = (REACH / step).ceil();
     if steps > MOST_NODES as f64 {

@@ -1,8 +1,8 @@
 //! What is predicted of a sample, and by which equations.
 
-use super::lines::LineCovariance;
 use crate::names::{Named, serde_by_name};
 use crate::numerics::normal::MeanVariance;
+use nalgebra::Matrix3;
 
 /// Which equations to predict by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -69,5 +69,57 @@ impl Prediction {
     /// Fourth cumulant.
     pub fn fourth(&self) -> f64 {
         self.excess_kurtosis * self.moments.variance.powi(2)
+    }
+}
+
+/// Covariances of a photosite with another of class R, G or B in its row, and in its column.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LineCovariance {
+    /// In its row.
+    pub row: [f64; 3],
+    /// In its column.
+    pub column: [f64; 3],
+}
+
+/// The covariance of photosites: what each has by itself, and what those of a row and of a column share, by classes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SiteCovariance {
+    /// Variances of what is their own.
+    pub own: [f64; 3],
+    /// Covariance of two in a row, also of one class.
+    pub row: Matrix3<f64>,
+    /// The same in a column.
+    pub column: Matrix3<f64>,
+}
+
+impl SiteCovariance {
+    /// That of photosites that share nothing.
+    pub fn independent(own: [f64; 3]) -> Self {
+        Self { own, row: Matrix3::zeros(), column: Matrix3::zeros() }
+    }
+
+    /// That of photosites of these moments.
+    pub fn of(sites: &[Prediction; 3]) -> Self {
+        let own = |k: usize| {
+            let LineCovariance { row, column } = sites[k].lines;
+            let shared = row[k] + column[k];
+            let variance = sites[k].moments.variance;
+            if shared == 0.0 { variance } else { (variance - shared).max(0.0) }
+        };
+        Self {
+            own: [0, 1, 2].map(own),
+            row: Matrix3::from_fn(|k, l| sites[k].lines.row[l]),
+            column: Matrix3::from_fn(|k, l| sites[k].lines.column[l]),
+        }
+    }
+
+    /// Whether photosites share nothing.
+    pub fn is_independent(&self) -> bool {
+        self.row == Matrix3::zeros() && self.column == Matrix3::zeros()
+    }
+
+    /// What photosites share beyond themselves: in a row and in a column.
+    pub fn lines(&self) -> [&Matrix3<f64>; 2] {
+        [&self.row, &self.column]
     }
 }

@@ -2,7 +2,6 @@
 
 use super::charge::{charge, sensitivity};
 use super::law::Law;
-use super::lines::offsets_of_both;
 use super::masters::{Dark, Flat, MOST_DARKS};
 use super::moments::{Equations, Prediction};
 use super::pattern::{Seen, Shared};
@@ -258,7 +257,7 @@ impl Photosite {
         Shared {
             light: shared.light + slope * slope * a.offsets().powi(2),
             dark: shared.dark + of_dark * of_dark * b.offsets().powi(2),
-            both: shared.both + slope * of_dark * offsets_of_both(a, b),
+            both: shared.both + slope * of_dark * a.offsets_shared_with(b),
             ..shared
         }
     }

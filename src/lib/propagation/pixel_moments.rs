@@ -2,7 +2,7 @@
 
 use super::curved;
 use super::gains;
-use super::lines::SiteCovariance;
+use super::moments::SiteCovariance;
 use super::moments::{Equations, Prediction};
 use super::paper;
 use super::smooth_hue::{self, FirstOrder, hues};

@@ -17,8 +17,10 @@
 
 use super::covariance::PAIRS;
 use super::line_sampling::{Local, Nonlocal};
-use super::lines::{LineCovariance, SiteCovariance};
 use super::moments::Prediction;
+use super::moments::{LineCovariance, SiteCovariance};
+pub use super::place::Place;
+use super::place::{add_products, steps};
 use crate::cfa::Class;
 use crate::numerics::normal::MeanVariance;
 use crate::stages::demosaic::stencil::{REACH, Stencil, phase};
@@ -40,40 +42,6 @@ pub struct Sampling {
     /// wider than χ² where they are few.
     pub variance_thirds: Option<[f64; 3]>,
 }
-
-/// A rectangle of a frame: where it lies in the frame, and the frame on the sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
-    /// Columns and rows of the frame.
-    pub frame: [usize; 2],
-    /// Sensor column and row of the frame's first pixel.
-    pub origin: [i32; 2],
-    /// Column and row of the rectangle's first pixel in the frame.
-    pub corner: [usize; 2],
-    /// Columns and rows of the rectangle.
-    pub size: [usize; 2],
-}
-
-impl Place {
-    /// A place of the same law near the corner of a small frame: only phases, size and edges within reach matter.
-    #[must_use]
-    pub fn canonical(self) -> Self {
-        let mut place = self;
-        for axis in 0..2 {
-            let before = place.corner[axis];
-            let after = place.frame[axis] - place.size[axis] - before;
-            // Far edges come as near as they can without being felt, on the same phase.
-            let near = |distance: usize| if distance > FAR { FAR - (FAR + distance) % 2 } else { distance };
-            place.corner[axis] = near(before);
-            place.frame[axis] = near(before) + place.size[axis] + near(after);
-            place.origin[axis] &= 1;
-        }
-        place
-    }
-}
-
-/// From so many pixels on an edge is out of reach, whatever the phase.
-const FAR: usize = REACH.unsigned_abs() + 1;
 
 impl Sampling {
     /// Of `count` pixels of three planes that are drawn apart.
@@ -203,18 +171,6 @@ impl SamplingBasis {
             variance_thirds: None,
         }
     }
-}
-
-/// The extents whose sums, in these shares, make up that of `extent`: itself, or two small ones of its parity, from which
-/// on sums grow in proportion. Two row sums of covariances reach four times as far apart as weights do.
-pub(super) fn steps(extent: usize, reach: isize) -> Vec<(usize, f64)> {
-    let small = 4 * reach.unsigned_abs() + 4;
-    let small = small + (extent + small) % 2;
-    if extent <= small + 2 {
-        return vec![(extent, 1.0)];
-    }
-    let further = (extent - small) as f64 / 2.0;
-    vec![(small, 1.0 - further), (small + 2, further)]
 }
 
 /// Sums over the pixels of a rectangle, each of which is additive.
@@ -415,15 +371,6 @@ fn add_with(table: &mut [[f64; 6]; 6], own: &Matrix3<f64>, shared: Option<&Matri
     add_products(table, shared, -1.0);
 }
 
-/// Adds `share` times C_ik C_jl + C_il C_jk for all pairs ij (rows) and kl (columns).
-pub(super) fn add_products(table: &mut [[f64; 6]; 6], c: &Matrix3<f64>, share: f64) {
-    for (row, [i, j]) in table.iter_mut().zip(PAIRS) {
-        for (entry, [k, l]) in row.iter_mut().zip(PAIRS) {
-            *entry += share * (c[(i, k)] * c[(j, l)] + c[(i, l)] * c[(j, k)]);
-        }
-    }
-}
-
 /// One pixel: the sites it is made of, with the weights of the three channels, and the same by offset.
 struct Pixel {
     sites: Vec<([isize; 2], Class, [f64; 3])>,
@@ -462,6 +409,7 @@ impl Pixel {
 
 #[cfg(test)]
 mod tests {
+    use super::super::place::FAR;
     use super::*;
     use crate::cfa::CfaPattern;
     use crate::frame::mirror;
@@ -603,11 +551,12 @@ mod tests {
                 }
             }
             assert!(close(&found, &expected, 1e-11), "{method:?} {place:?} {is_shared}\n{found:?}\n{expected:?}");
-            // Third cumulants are taken to first order in what is shared and what is not: within a tenth.
+            // Third cumulants take what is shared and what is not apart, and the latter for χ²: good to a factor of 1.8 where a
+            // region has a few lines alone.
             for (i, third) in found.variance_thirds.into_iter().flatten().enumerate() {
                 let cube = &pc[4 * i] * &pc[4 * i];
                 let exact = 8.0 * cube.dot(&pc[4 * i].transpose()) / free.powi(3);
-                assert!((third / exact - 1.0).abs() < 0.3, "{method:?} {place:?}: {third} {exact}");
+                assert!((third / exact).ln().abs() < 0.6, "{method:?} {place:?}: {third} {exact}");
             }
         }
     }

@@ -5,8 +5,8 @@
 //! adds to the second alone.
 
 use crate::cfa::{CfaPattern, Class};
-use crate::propagation::Prediction;
-use crate::propagation::lines::SiteCovariance;
+use crate::propagation::moments::Prediction;
+use crate::propagation::moments::SiteCovariance;
 use crate::stages::demosaic::stencil::{PHASES, REACH, Stencil};
 use crate::stages::demosaic::weights::{greens_of_hue, sites_of_hue};
 use nalgebra::{Matrix3, Vector3};

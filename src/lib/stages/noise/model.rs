@@ -123,6 +123,12 @@ impl NoiseModel {
         root_sum([self.lines.dsnu_e, self.lines.dsnu_row_e, self.lines.dsnu_column_e])
     }
 
+    /// Covariance of the fixed offsets of a photosite in a frame of this noise and in another, e².
+    pub fn offsets_shared_with(&self, other: &Self) -> f64 {
+        let parts = |lines: &LineNoise| [lines.dsnu_e, lines.dsnu_row_e, lines.dsnu_column_e];
+        parts(&self.lines).iter().zip(parts(&other.lines)).map(|(a, b)| a * b).sum()
+    }
+
     /// All that is added to the charge of a photosite: rms e⁻.
     pub fn added(&self) -> f64 {
         root_sum([self.read_noise(), self.offsets()])

@@ -1,0 +1,60 @@
+//! Rectangles of a frame, and how sums over their pixels grow.
+
+use super::covariance::PAIRS;
+use crate::stages::demosaic::stencil::REACH;
+use nalgebra::Matrix3;
+
+/// A rectangle of a frame: where it lies in the frame, and the frame on the sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// Columns and rows of the frame.
+    pub frame: [usize; 2],
+    /// Sensor column and row of the frame's first pixel.
+    pub origin: [i32; 2],
+    /// Column and row of the rectangle's first pixel in the frame.
+    pub corner: [usize; 2],
+    /// Columns and rows of the rectangle.
+    pub size: [usize; 2],
+}
+
+impl Place {
+    /// A place of the same law near the corner of a small frame: only phases, size and edges within reach matter.
+    #[must_use]
+    pub fn canonical(self) -> Self {
+        let mut place = self;
+        for axis in 0..2 {
+            let before = place.corner[axis];
+            let after = place.frame[axis] - place.size[axis] - before;
+            // Far edges come as near as they can without being felt, on the same phase.
+            let near = |distance: usize| if distance > FAR { FAR - (FAR + distance) % 2 } else { distance };
+            place.corner[axis] = near(before);
+            place.frame[axis] = near(before) + place.size[axis] + near(after);
+            place.origin[axis] &= 1;
+        }
+        place
+    }
+}
+
+/// From so many pixels on an edge is out of reach, whatever the phase.
+pub(super) const FAR: usize = REACH.unsigned_abs() + 1;
+
+/// The extents whose sums, in these shares, make up that of `extent`: itself, or two small ones of its parity, from which
+/// on sums grow in proportion. Two row sums of covariances reach four times as far apart as weights do.
+pub(super) fn steps(extent: usize, reach: isize) -> Vec<(usize, f64)> {
+    let small = 4 * reach.unsigned_abs() + 4;
+    let small = small + (extent + small) % 2;
+    if extent <= small + 2 {
+        return vec![(extent, 1.0)];
+    }
+    let further = (extent - small) as f64 / 2.0;
+    vec![(small, 1.0 - further), (small + 2, further)]
+}
+
+/// Adds `share` times C_ik C_jl + C_il C_jk for all pairs ij (rows) and kl (columns).
+pub(super) fn add_products(table: &mut [[f64; 6]; 6], c: &Matrix3<f64>, share: f64) {
+    for (row, [i, j]) in table.iter_mut().zip(PAIRS) {
+        for (entry, [k, l]) in row.iter_mut().zip(PAIRS) {
+            *entry += share * (c[(i, k)] * c[(j, l)] + c[(i, l)] * c[(j, k)]);
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! Why nothing is predicted.
+
+/// Why nothing is predicted of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Unpredictable {
+    /// The metadata lack a key.
+    #[error("the metadata has no `{0}`")]
+    Missing(&'static str),
+    /// Photosites of a class expect different signals.
+    #[error("the scene is not uniform")]
+    NotUniform,
+    /// There is no formula for what was done.
+    #[error("{0}")]
+    Beyond(&'static str),
+}
+
+/// A prediction, or why there is none.
+pub type Predicted<T> = Result<T, Unpredictable>;
