@@ -551,7 +551,7 @@ mod tests {
         };
         let changed = load_changed_sensor("nikon-d850", &changes).unwrap();
         assert_eq!(changed.response.unwrap().scale, Scale::Relative { counts: Counts::Quanta, peak: Some(0.4) });
-        assert_eq!(changed.doubts, [String::new(); 0]);
+        assert!(changed.doubts.is_empty(), "{:?}", changed.doubts);
         let refused = |changes| load_changed_sensor(DEFAULT_SENSOR, &changes).unwrap_err().to_string();
         let said = refused(SensorChanges { counts: Some(Counts::Energy), ..SensorChanges::default() });
         assert!(

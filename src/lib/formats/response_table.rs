@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn columns_are_taken_by_name() {
         let read = parse(&table("R,G,B", BELLS, [380, 780]), None).unwrap();
-        assert_eq!(read.doubts, [String::new(); 0]);
+        assert!(read.doubts.is_empty(), "{:?}", read.doubts);
         assert_eq!([600.0, 540.0, 460.0].map(|nm| read.classes[1].at(nm)), [0.052931, 1.0, 0.005383]);
         let bgr = table("B,g,R", [BELLS[2], BELLS[1], BELLS[0]], [380, 780]);
         assert_eq!(parse(&bgr, None).unwrap(), read);
@@ -221,21 +221,8 @@ mod tests {
         for other in [
             text.replace("nm,R,G,B", "wavelength (nm);Red;Green (relative);BLUE").replace(',', ";"),
             text.replace(',', "\t"),
-            text.replace('.', ",")
-                .replace("0,", "0,")
-                .replacen("nm,R,G,B", "nm;R;G;B", 1)
-                .lines()
-                .map(|line| {
-                    // Semicolons between cells, commas in decimals.
-                    let mut parts = line.splitn(2, ',');
-                    match (parts.next(), parts.next()) {
-                        (Some(nm), Some(rest)) => {
-                            format!("{nm};{}\n", rest.replace(",0,", ";0,").replace(",1,", ";1,"))
-                        }
-                        _ => format!("{line}\n"),
-                    }
-                })
-                .collect(),
+            // Commas in decimals.
+            text.replace(',', ";").replace('.', ","),
             {
                 let mut lines: Vec<&str> = text.lines().collect();
                 lines[1..].reverse();
