@@ -9,7 +9,7 @@ pub fn of_normal(p: f64) -> f64 {
 }
 
 /// Degrees of freedom from which on the approximation is good to 10⁻⁴ of the quantile for 0.001 < p < 0.999.
-const MANY: f64 = 200.0;
+const MANY: f64 = 2000.0;
 
 /// The sum of squares of `freedom` degrees of freedom, whole or not, that a share `p` lies below, 0 < p < 1: for few by
 /// bisection of the incomplete gamma function, for many by the cube of a normal deviate \[WH1931].
