@@ -70,9 +70,15 @@ fn camera(index: u32, kind: Kind) -> ReadOut {
     ReadOut { row_noise_e, column_noise_e, dsnu_e, dsnu_row_e, dsnu_column_e, prnu_row, prnu_column, ..ccd }
 }
 
+/// 0, 1, 2 or 3.
+fn quarter(chance: &mut Chance) -> u32 {
+    let at = chance.uniform();
+    [0.25, 0.5, 0.75].into_iter().map(|bound| u32::from(at >= bound)).sum()
+}
+
 fn ccd(chance: &mut Chance) -> ReadOut {
     let full_well_e = chance.log_between(3000.0, 80_000.0);
-    let bits = [10, 12, 14, 16][(chance.uniform() * 4.0) as usize];
+    let bits = 10 + 2 * quarter(chance);
     let top = f64::from((1_u32 << bits) - 1);
     let bias_adu = (top * chance.between(0.01, 0.05)).round();
     let adu_per_e = (top - bias_adu) / full_well_e * chance.between(0.7, 1.4);
@@ -276,7 +282,7 @@ fn check_coverage(kind: Kind) {
         widths.sort_by(f64::total_cmp);
         let width = widths.get(widths.len() / 2).copied().unwrap_or(f64::NAN);
         let n = f64::from(known);
-        println!(
+        eprintln!(
             "{key}: {missed} of {known} missed, median half-width {width:.2e}, mean error over half-width {:.3}",
             off / n
         );

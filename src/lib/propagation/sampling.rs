@@ -10,7 +10,7 @@
 //! where κ₄ is the fourth cumulant of a photosite and Q_ij(s) the diagonal of the form. Fixed patterns vary from site to
 //! site as temporal noise does, so within one frame they count alike.
 //!
-//! Photosites that share rows and columns add covariances of pixels far apart ([`line_sampling`](super::line_sampling)).
+//! Photosites that share rows and columns add covariances of pixels far apart (`line_sampling`).
 //!
 //! All these are sums over pixels of what lies around them. Once a region is wider than what its rim sees, they grow by
 //! the same amount with every two columns, so large regions follow exactly from small ones.

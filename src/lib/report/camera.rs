@@ -233,8 +233,7 @@ fn markdown(camera: &MeasuredCamera) -> String {
     let escaped = |text: &str| text.replace('|', "\\|");
     let mut out = format!("# Camera measured by photon transfer\n\n{}.\n", escaped(&heading(camera)));
     for (class, views) in camera.classes.iter().zip(&camera.patterns) {
-        let _ =
-            write!(out, "\n## {}\n\n| quantity | value | from | to |\n|:-|-:|-:|-:|\n", escaped(&class.name));
+        let _ = write!(out, "\n## {}\n\n| quantity | value | from | to |\n|:-|-:|-:|-:|\n", escaped(&class.name));
         for finding in &class.findings {
             if let Ok(interval) = &finding.found {
                 let [value, low, high] = shown(finding, *interval);

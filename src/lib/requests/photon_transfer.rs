@@ -76,7 +76,7 @@ impl PhotonTransfer {
     ///
     /// Those of the list and of the frames; [`Error::Data`] for frames that are no measurement.
     pub fn run(&self) -> Result<MeasuredCamera> {
-        if !(self.photon_error >= 0.0) {
+        if self.photon_error < 0.0 {
             return Err(Error::Usage("an uncertainty is not negative".into()).give(&["photon_error"]));
         }
         let list_name = self.list.display().to_string();

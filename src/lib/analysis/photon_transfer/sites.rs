@@ -55,7 +55,7 @@ impl Site {
 
     /// Whether it has photosites in row `y`.
     pub fn is_in_row(&self, y: usize) -> bool {
-        y >= self.first[1] && (y - self.first[1]) % self.step[1] == 0
+        y >= self.first[1] && (y - self.first[1]).is_multiple_of(self.step[1])
     }
 
     /// How many photosites there are.

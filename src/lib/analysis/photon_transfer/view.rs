@@ -204,7 +204,7 @@ fn histogram(values: &[f64], mean: f64, spread: f64) -> (Vec<[f64; 2]>, Vec<[f64
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
     let width = (high - low) / BINS as f64;
-    if !(width > 0.0) {
+    if width.is_nan() || width <= 0.0 {
         return (Vec::new(), Vec::new());
     }
     let mut counts = [0.0; BINS];
