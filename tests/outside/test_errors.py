@@ -3,6 +3,7 @@
 import os
 import pathlib
 import resource
+import signal
 import stat
 import subprocess
 import unittest
@@ -539,6 +540,8 @@ class Output(Errors):
             program = subprocess.Popen(
                 [str(BINARIES / "add-noise"), "-o", "out.exr"],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=self.directory,
+                # Shells start what runs in the background with SIGINT ignored, which is inherited.
+                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
             )
             try:
                 program.stdin.write(self.electrons[:-100])
