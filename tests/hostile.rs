@@ -10,6 +10,7 @@ use cyanometer::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, E
 use cyanometer::formats::fits::FitsReader;
 use cyanometer::formats::format::SampleReader;
 use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::formats::read_ahead::Pipe;
 use cyanometer::frame::Geometry;
 use cyanometer::stream::RowSource;
 use flate2::Compression;
@@ -408,7 +409,7 @@ fn read_file(bytes: &[u8]) -> Result<Vec<f32>> {
 }
 
 fn read_pipe(bytes: &[u8]) -> Result<Vec<f32>> {
-    let mut reader = ExrReader::stream(Box::new(Cursor::new(bytes.to_vec())), "in")?;
+    let mut reader = ExrReader::stream(Pipe::of(Cursor::new(bytes.to_vec())), "in")?;
     let (height, mut samples) = (reader.geometry().height, Vec::new());
     for _ in 0..height {
         reader.read(1, &mut samples)?;
@@ -467,7 +468,7 @@ fn damaged_files_and_pipes_are_taken_or_refused_alike() {
 #[test]
 fn damaged_frames_of_others_are_taken_or_refused_alike() {
     let stream = |bytes: &[u8]| -> Result<Vec<f32>> {
-        let mut reader = FitsReader::stream(Box::new(Cursor::new(bytes.to_vec())), "in")?;
+        let mut reader = FitsReader::stream(Pipe::of(Cursor::new(bytes.to_vec())), "in")?;
         let (height, mut samples) = (reader.geometry().height, Vec::new());
         for _ in 0..height {
             reader.read(1, &mut samples)?;

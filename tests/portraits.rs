@@ -3,7 +3,7 @@
 mod support;
 
 use cyanometer::analysis::statistics::portrait::{LAGS, Portrait};
-use cyanometer::analysis::statistics::{Region, Report, Saturated, measure_with_portrait};
+use cyanometer::analysis::statistics::{Laws, Region, Report, Saturated, measure_with_portrait};
 use cyanometer::frame::Geometry;
 use cyanometer::propagation::Equations;
 use cyanometer::stream::MemoryFrame;
@@ -12,7 +12,7 @@ use support::workshop::{BAD_USAGE, Workshop};
 use support::{frame, header};
 
 fn drawn(frame: &MemoryFrame, regions: &[Region]) -> (Report, Portrait) {
-    measure_with_portrait(&mut frame.clone(), regions, Saturated::LeftOut, Equations::Exact, None)
+    measure_with_portrait(&mut Laws::default(), &mut frame.clone(), regions, Saturated::LeftOut, Equations::Exact, None)
         .expect("a frame is measured")
 }
 

@@ -2,6 +2,7 @@
 #![no_main]
 
 use cyanometer::formats::exr::ExrReader;
+use cyanometer::formats::read_ahead::Pipe;
 use cyanometer_fuzz::{file, read, settle};
 use libfuzzer_sys::fuzz_target;
 use std::io::Cursor;
@@ -16,7 +17,7 @@ fuzz_target!(|bytes: &[u8]| {
     if bytes[5] & (0x02 | 0x08 | 0x10) != 0 {
         return;
     }
-    let by_pipe = ExrReader::stream(Box::new(Cursor::new(bytes.to_vec())), "in").and_then(read);
+    let by_pipe = ExrReader::stream(Pipe::of(Cursor::new(bytes.to_vec())), "in").and_then(read);
     match (by_file, by_pipe) {
         (Ok(file), Ok(pipe)) => {
             let bits = |samples: &[f32]| samples.iter().map(|sample| sample.to_bits()).collect::<Vec<_>>();

@@ -3,11 +3,9 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::metadata::PoissonKind;
-use cyanometer::names::Named;
 use cyanometer::propagation::{self, Equations};
-use cyanometer::requests::{described::DescribedInput, options, values};
-use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::requests::{described::DescribedInput, options};
+use cyanometer::stages::noise::AddNoise;
 use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
@@ -24,24 +22,8 @@ static MEMORY: cli::Memory = cli::Memory;
 struct Arguments {
     #[command(flatten)]
     input: DescribedInput,
-    /// Seed of the temporal noise
-    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>, conflicts_with = "clean")]
-    seed: u64,
-    /// Seed of the fixed patterns: another number, another sensor
-    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>, conflicts_with = "clean")]
-    sensor_seed: u64,
-    /// Number of the exposure: another number, other temporal noise
-    #[arg(long, default_value_t = 0, value_parser = values::whole::<u32>, conflicts_with = "clean")]
-    frame: u32,
     #[command(flatten)]
     noise: options::DrawnNoise,
-    /// How Poisson numbers are drawn: exact, or gaussian to see what that approximation costs
-    #[arg(long, default_value = PoissonKind::default().name(), value_parser = values::choice::<PoissonKind>(), conflicts_with = "clean")]
-    poisson: PoissonKind,
-    /// Charge transfer efficiency: the share of a packet that each move to the output takes along, above 0 and at most 1;
-    /// by default transfer is left out
-    #[arg(long, value_name = "X", value_parser = values::fraction)]
-    cte: Option<f64>,
     #[command(flatten)]
     sensor: options::SensorChoice,
     #[command(flatten)]
@@ -56,23 +38,20 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let mut reader = arguments.input.open()?;
+    let Arguments { input, noise, output, .. } = arguments;
+    session.each_exposure::<Arguments>(&input.frame, output, noise.frames.clone(), |turn| expose(arguments, turn))
+}
+
+fn expose(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
+    let cli::Turn { session, input, output, exposure } = *turn;
+    let mut reader = arguments.input.with(input.clone()).open()?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     session.tell(arguments.noise.choice.doubt().as_slice());
-    let settings = NoiseSettings {
-        seed: arguments.seed,
-        sensor_seed: arguments.sensor_seed,
-        frame: arguments.frame,
-        poisson: arguments.poisson,
-        cte: arguments.cte,
-        ..arguments.noise.settings()
-    };
-    let mut stage = AddNoise::new(reader.header(), &settings)?;
+    let mut stage = AddNoise::new(reader.header(), &arguments.noise.settings(exposure))?;
     propagation::note(stage.header_mut(), Equations::Exact);
-    session.sign(stage.header_mut());
+    session.sign_exposure(stage.header_mut(), exposure);
     if let Some(warning) = stage.warning() {
         session.warn(&warning);
     }
-    session.drive(reader, &stage, &arguments.output)?;
-    Ok(())
+    session.drive(reader, &stage, output)
 }

@@ -39,15 +39,21 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     arguments.correction.check(&arguments.input)?;
-    let mut reader = arguments.described.open(&arguments.input.options())?;
+    session.each_frame::<Arguments>(&arguments.input, &arguments.output, |turn| correct(arguments, turn))
+}
+
+fn correct(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
+    let cli::Turn { session, input, output, .. } = *turn;
+    let mut reader = arguments.described.open(&input.options())?;
     session.tell(&arguments.correction.prepare(&mut reader)?);
-    let mut correction = arguments.correction.open(reader.header_mut(), &arguments.input, &arguments.described)?;
+    let mut correction = arguments.correction.open(reader.header_mut(), input, &arguments.described)?;
     let header = correction.stage.header_mut();
     session.sign(header);
     propagation::note(header, Equations::Exact);
     session.tell(requests::of_levels(correction.header()).as_slice());
     session.tell(&correction.notes);
-    session.correct(reader, &mut correction, &arguments.output)?;
-    session.tell(&correction.findings());
+    if session.correct(reader, &mut correction, output)? {
+        session.tell(&correction.findings());
+    }
     Ok(())
 }

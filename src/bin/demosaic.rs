@@ -50,7 +50,12 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let mut reader = arguments.described.open(&arguments.input.options())?;
+    session.each_frame::<Arguments>(&arguments.input, &arguments.output, |turn| demosaic(arguments, turn))
+}
+
+fn demosaic(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
+    let cli::Turn { session, input, output, .. } = *turn;
+    let mut reader = arguments.described.open(&input.options())?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, None)?;
     session.tell(described::doubt_of_black(reader.header(), arguments.black)?.as_slice());
@@ -58,10 +63,9 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     session.tell(requests::of_levels(stage.header()).as_slice());
     session.tell(requests::of_bent_codes(reader.header()).as_slice());
     if arguments.sigma {
-        session.drive(reader, &WithSigma::of_demosaicking(stage)?, &arguments.output)?;
+        session.drive(reader, &WithSigma::of_demosaicking(stage)?, output)
     } else {
         dim_green_below(stage.header()).into_iter().for_each(|level| stage.count_greens_below(level));
-        session.drive(reader, &stage, &arguments.output)?;
+        session.drive(reader, &stage, output)
     }
-    Ok(())
 }

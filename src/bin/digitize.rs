@@ -44,7 +44,12 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let mut reader = arguments.input.open()?;
+    session.each_frame::<Arguments>(&arguments.input.frame, &arguments.output, |turn| digitize(arguments, turn))
+}
+
+fn digitize(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
+    let cli::Turn { session, input, output, .. } = *turn;
+    let mut reader = arguments.input.with(input.clone()).open()?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let settings = AdcSettings { bits: arguments.bits, bias_adu: arguments.bias, adu_per_e: arguments.slope };
     let mut stage = Digitize::new(reader.header(), &settings)?;
@@ -52,6 +57,5 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());
     session.tell(requests::of_slope(stage.header()).as_slice());
-    session.drive(reader, &stage, &arguments.output)?;
-    Ok(())
+    session.drive(reader, &stage, output)
 }

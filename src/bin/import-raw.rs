@@ -48,14 +48,17 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let jobs = arguments.beside.jobs(&arguments.files, &arguments.output)?;
-    session.each::<Arguments, _>(&jobs, |job| import(job, arguments, session))
+    let session = session.among(&arguments.files.raws);
+    session.each::<Arguments, _>(&jobs, arguments.output.is_stream(), |session, job| {
+        import(job, arguments, &session.on(job.input.as_deref()))
+    })
 }
 
 fn import(job: &Job, arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let reader = arguments.files.open(job, Worker::this_program())?;
     let texts = RawOutputs::of(&reader, job)?;
     let mut stage = Import::new(reader.header())?;
-    session.sign_among(stage.header_mut(), &arguments.files.besides(job));
+    session.sign(stage.header_mut());
     session.drive(reader, &stage, &Output { output: job.frame.clone(), ..arguments.output.clone() })?;
     RawOutputs::write(&texts)
 }

@@ -3,8 +3,9 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::{output, plots, register};
-use cyanometer::report::{self, ReportFormat};
+use cyanometer::formats::{plots, register};
+use cyanometer::report::{self, Findings, ReportFormat};
+use cyanometer::requests::options::Output;
 use cyanometer::requests::{self, described::DescribedInput, measurement::Measurement, values};
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
@@ -42,16 +43,24 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let Measurement { plot, .. } = &arguments.measurement;
-    register::announce(&[arguments.output.as_deref(), plot.as_deref()])?;
-    let mut reader = arguments.input.open_all()?;
+    register::announce(&[arguments.output.as_deref(), arguments.measurement.plot.as_deref()])?;
+    let frames = &arguments.input.frame;
+    let findings = Findings::new(arguments.output_format, frames.inputs.len() > 1, arguments.output.clone());
+    let measured =
+        session.each_frame::<Arguments>(frames, &Output::default(), |turn| measure(arguments, turn, &findings));
+    measured.and(findings.end())
+}
+
+fn measure(arguments: &Arguments, turn: &cli::Turn<'_>, findings: &Findings) -> Result<()> {
+    let cli::Turn { session, input, output, .. } = *turn;
+    let mut reader = arguments.input.with(input.clone()).open_all()?;
     session.report_reader(&reader);
-    let (report, portrait) = arguments.measurement.of(&mut reader)?;
-    if let (Some(path), Some(portrait)) = (plot, &portrait) {
+    let measurement = arguments.measurement.for_frame(input.path(), output.index, reader.header());
+    let (report, portrait) = findings.measure(|laws| measurement.of(&mut reader, laws))?;
+    if let (Some(path), Some(portrait)) = (&measurement.plot, &portrait) {
+        session.place(reader.header(), &Output { output: Some(path.clone()), ..output.clone() })?;
         plots::write_plot(path, &report::portrait(portrait, &report.regions[0]))?;
     }
-    let text = report::render(&report, arguments.output_format)?;
-    output::write_text(arguments.output.as_deref(), &text)?;
     session.tell(&requests::of_statistics(&report));
-    report.check.map_or(Ok(()), |verdict| verdict.judge(&reader.header().name))
+    findings.add(reader.header(), output.index, report)
 }

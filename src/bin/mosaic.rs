@@ -2,7 +2,7 @@
 
 use clap::Parser;
 use cyanometer::cfa::FilterArray;
-use cyanometer::cli;
+use cyanometer::cli::{self, Turn};
 use cyanometer::error::Result;
 use cyanometer::requests::{described::DescribedInput, options, values};
 use cyanometer::stages::mosaic::Mosaic;
@@ -37,9 +37,14 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let (reader, array) = arguments.input.open_planes()?;
-    let mut stage = Mosaic::new(reader.header(), array.and_then(FilterArray::bayer))?;
-    session.sign(stage.header_mut());
-    session.drive(reader, &stage, &arguments.output)?;
-    Ok(())
+    session.each_frame::<Arguments>(
+        &arguments.input.frame,
+        &arguments.output,
+        |Turn { session, input, output, .. }| {
+            let (reader, array) = arguments.input.with((*input).clone()).open_planes()?;
+            let mut stage = Mosaic::new(reader.header(), array.and_then(FilterArray::bayer))?;
+            session.sign(stage.header_mut());
+            session.drive(reader, &stage, output)
+        },
+    )
 }

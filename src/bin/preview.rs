@@ -1,12 +1,13 @@
 //! `preview`: a PNG picture of any frame.
 
 use clap::Parser;
-use cyanometer::cli;
+use cyanometer::cli::{self, Turn};
 use cyanometer::error::Result;
-use cyanometer::formats::picture::{thumbnail, write_png, write_sheet};
+use cyanometer::formats::picture::{thumbnail, write_picture, write_sheet};
 use cyanometer::formats::register::announce;
-use cyanometer::requests::picture::{PictureOptions, ShownFrames};
+use cyanometer::requests::picture::{PictureOptions, ShownFrames, each_to};
 use cyanometer::requests::{self, values};
+use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -23,7 +24,7 @@ static MEMORY: cli::Memory = cli::Memory;
 struct Arguments {
     #[command(flatten)]
     frames: ShownFrames,
-    /// PNG file to write; `-` for standard output
+    /// PNG file to write; `-` for standard output. Of each of several frames DIR/, or a name with {stem}, {frame} or {index}
     #[arg(short, long, value_name = "FILE.png", value_parser = values::png_file())]
     output: PathBuf,
     #[command(flatten)]
@@ -33,29 +34,37 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| arguments.general.clone().in_pipeline(arguments.frames.first.frame.is_pipe());
+    let general = |arguments: &Arguments| arguments.general.clone().in_pipeline(arguments.frames.input.frame.is_pipe());
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    announce(&[Some(&arguments.output)])?;
-    let settings = arguments.picture.settings();
+    let Arguments { frames, output, picture, .. } = arguments;
+    let settings = picture.settings();
+    let Some(columns) = frames.columns(output, settings.caption.is_some())? else {
+        let output = each_to(output);
+        return session.each_frame::<Arguments>(
+            &frames.input.frame,
+            &output,
+            |Turn { session, input, output, .. }| {
+                let mut reader = picture.open(&frames.input.with((*input).clone()))?;
+                session.report_reader(&reader);
+                settings.caption.is_some().then(|| reader.keep_mask());
+                let place = session.place(reader.header(), output)?.path.unwrap_or_default();
+                write_picture(&mut reader, &settings, &place)?;
+                session.tell(&requests::of_marks(&reader));
+                Ok(())
+            },
+        );
+    };
+    announce(&[Some(output)])?;
     let mut tiles = Vec::new();
-    for input in arguments.frames.each()? {
-        let mut reader = arguments.picture.open(&input)?;
+    for input in frames.each()? {
+        let mut reader = picture.open(&input)?;
         session.report_reader(&reader);
-        match arguments.frames.columns() {
-            None if settings.caption.is_none() => write_png(&mut reader, &settings, &arguments.output)?,
-            _ => {
-                reader.keep_mask();
-                tiles.push(thumbnail(&mut reader, &settings)?);
-            }
-        }
+        reader.keep_mask();
+        tiles.push(thumbnail(&mut reader, &settings)?);
         session.tell(&requests::of_marks(&reader));
     }
-    if tiles.is_empty() {
-        Ok(())
-    } else {
-        write_sheet(tiles, arguments.frames.columns().unwrap_or(1), &arguments.output)
-    }
+    write_sheet(tiles, columns, output)
 }

@@ -3,7 +3,6 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::output::FrameWriter;
 use cyanometer::requests::{Scene, options};
 use std::process::ExitCode;
 
@@ -35,12 +34,12 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let mut scene = arguments.scene.open()?;
     let mut notes = std::mem::take(&mut scene.notes);
     session.sign(scene.header_mut());
-    let mut writer = FrameWriter::create(&arguments.output.options(), scene.header())?;
-    let bar = session.progress(scene.header().geometry.height);
-    let (counts, found) = scene.draw(&mut writer, &mut |rows| bar.set_position(rows as u64))?;
-    notes.extend(found);
-    bar.finish_and_clear();
-    writer.finish(counts)?;
+    let made = scene.header().clone();
+    session.write(&made, &arguments.output, |writer, progress| {
+        let (counts, found) = scene.draw(writer, progress)?;
+        notes.extend(found);
+        Ok(counts)
+    })?;
     session.tell(&notes);
     Ok(())
 }

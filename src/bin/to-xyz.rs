@@ -1,6 +1,7 @@
 //! `to-xyz`: colors from sensor RGB.
 
 use clap::Parser;
+use cyanometer::analysis::characterization::CameraMatrix;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
@@ -46,24 +47,32 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
     session.tell(conversion.doubt_of(output).as_slice());
     announce(&[output.output.as_deref()])?;
-    check_inputs(conversion.matrix.as_deref().map(Some).into_iter().chain([arguments.input.input.as_deref()]))?;
+    check_inputs(conversion.matrix.as_deref().map(Some).into_iter().chain([arguments.input.path()]))?;
     let matrix = conversion.load_matrix()?;
-    let mut reader = FrameReader::open(&arguments.input.options())?;
-    session.tell(&arguments.sensor.apply(&mut reader)?);
+    session.each_frame::<Arguments>(&arguments.input, output, |turn| convert(arguments, matrix.clone(), turn))
+}
+
+fn convert(
+    Arguments { conversion, sensor, sigma, .. }: &Arguments,
+    matrix: Option<CameraMatrix>,
+    turn: &cli::Turn<'_>,
+) -> Result<()> {
+    let cli::Turn { session, input, output, .. } = *turn;
+    let mut reader = FrameReader::open(&input.options())?;
+    session.tell(&sensor.apply(&mut reader)?);
     let holds_layers = output.options().holds_layers()?;
-    if let Some(mut stage) = conversion.stage_of_xyz(&mut reader, arguments.sigma, holds_layers)? {
+    if let Some(mut stage) = conversion.stage_of_xyz(&mut reader, *sigma, holds_layers)? {
         session.tell(conversion.doubt_of_xyz(reader.header()).as_slice());
         session.sign(stage.header_mut());
-        return session.drive(reader, &stage, output).map(drop);
+        return session.drive(reader, &stage, output);
     }
     let (mut stage, notes) = conversion.stage(matrix, reader.header_mut())?;
     session.tell(&notes);
     session.sign(stage.header_mut());
-    if arguments.sigma {
+    if *sigma {
         let stage = WithSigma::of_conversion(stage, reader.header())?;
-        session.drive(reader, &stage, output)?;
+        session.drive(reader, &stage, output)
     } else {
-        session.drive(reader, &stage, output)?;
+        session.drive(reader, &stage, output)
     }
-    Ok(())
 }

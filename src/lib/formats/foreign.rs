@@ -250,6 +250,7 @@ mod tests {
     use crate::formats::csv::SpectralTable;
     use crate::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter, patch_table};
     use crate::formats::format::SampleReader;
+    use crate::formats::read_ahead::Pipe;
     use crate::formats::yaml::parse_strict;
     use crate::frame::Geometry;
     use image::codecs::png::PngEncoder;
@@ -277,7 +278,7 @@ mod tests {
     }
 
     fn exr_refused(bytes: Vec<u8>) -> String {
-        let read = ExrReader::stream(Box::new(io::Cursor::new(bytes)), "a.exr")
+        let read = ExrReader::stream(Pipe::of(io::Cursor::new(bytes)), "a.exr")
             .and_then(|mut reader| reader.read(4, &mut Vec::new()));
         read.unwrap_err().to_string()
     }

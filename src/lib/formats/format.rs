@@ -2,6 +2,7 @@
 //!
 //! A new format is a file that ends in a [`FrameFormat`], and a line in [`super::table`].
 
+use super::read_ahead::Pipe;
 use super::tiff::{Directory, TiffFile};
 use crate::camera::noise_profile::NoiseProfile;
 use crate::color::rgb::{Encoding, Primaries};
@@ -9,7 +10,6 @@ use crate::error::Result;
 use crate::frame::Geometry;
 use crate::metadata::Metadata;
 use std::fs::File;
-use std::io::Read;
 
 /// Reads the samples of one frame, top to bottom, and says what its file tells about it.
 pub trait SampleReader: Send {
@@ -55,6 +55,25 @@ pub trait SampleReader: Send {
     /// [`crate::error::Error::Format`] where the file is damaged or cut short, [`crate::error::Error::Disk`] where
     /// reading fails.
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()>;
+
+    /// Hands out what lies behind the last row, which has been read, in formats that know where a frame ends.
+    ///
+    /// # Errors
+    ///
+    /// [`crate::error::Error::Disk`].
+    fn rest(&mut self) -> Result<Rest> {
+        Ok(Rest::Nothing)
+    }
+}
+
+/// What lies behind a frame.
+pub enum Rest {
+    /// Nothing, or what is part of it.
+    Nothing,
+    /// What comes of a stream, if anything.
+    Pipe(Pipe),
+    /// The bytes of a file from this one on.
+    File(File, u64),
 }
 
 /// What the tags of a file say of the colors of its R, G and B.
@@ -191,7 +210,7 @@ pub struct Streaming {
     /// Whether such a file may have parts besides the first, which need a seek.
     pub has_parts: bool,
     /// Opens it; the name is for messages.
-    pub open: fn(Box<dyn Read + Send>, &str) -> Opened,
+    pub open: fn(Pipe, &str) -> Opened,
 }
 
 /// First bytes that tell most formats apart.

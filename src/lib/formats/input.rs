@@ -3,8 +3,12 @@
 use super::digest::SamplesDigest;
 use super::dng::{DngReader, RawArea};
 use super::files::{STDIN_NAME, named, open_named, read_file, sidecar_path, spool};
-use super::format::{ColorTags, HEAD_BYTES, Opened, Readers, SampleReader, SampleType, Streaming, U16_FULL_SCALE};
+use super::format::{
+    ColorTags, HEAD_BYTES, Opened, Readers, Rest, SampleReader, SampleType, Streaming, U16_FULL_SCALE,
+};
 use super::makers::{MakersReader, Worker};
+use super::read_ahead::Pipe;
+use super::sequence::Sequence;
 use super::viewable::{Scaling, is_scale};
 use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
@@ -19,7 +23,7 @@ use crate::stream::RowSource;
 use crate::text::counted;
 use crate::units::QuantityKind;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// What to open.
@@ -27,6 +31,8 @@ use std::path::{Path, PathBuf};
 pub struct InputOptions {
     /// The file; none or `-` for the standard input.
     pub path: Option<PathBuf>,
+    /// The frames that the next is taken of, instead of a file that holds one.
+    pub sequence: Option<Sequence>,
     /// Part of a multi-part EXR, page of a TIFF, HDU of a FITS.
     pub part: usize,
     /// How the samples lie in a file without a header; none where the file says what it is.
@@ -105,12 +111,15 @@ pub struct FrameReader {
     /// Column and row of the stored frame that are kept first.
     corner: [usize; 2],
     has_begun: bool,
+    /// Who reads on behind the frame; none where nothing may lie there.
+    sequence: Option<Sequence>,
 }
 
 /// A digest to compare with once all samples are in.
 struct DigestCheck {
     expected: String,
-    sidecar: String,
+    /// Who tells it, where that would be wrong.
+    sidecar: Option<String>,
     digest: SamplesDigest,
 }
 
@@ -122,10 +131,31 @@ impl FrameReader {
     /// [`Error::Usage`] where a terminal would be waited on; [`Error::Disk`] and [`Error::Format`] for what cannot be
     /// opened or is no frame.
     pub fn open(options: &InputOptions) -> Result<Self> {
+        if let Some(sequence) = &options.sequence {
+            return Self::open_next(sequence, options);
+        }
         let path = named(options.path.as_deref());
         register::check_inputs(options.metadata.as_deref().map(Some).into_iter().chain([path]))?;
         let (input, name) = open_named(path)?;
         Self::open_file(input, &name, path, options)
+    }
+
+    /// Opens the next frame of several.
+    fn open_next(sequence: &Sequence, options: &InputOptions) -> Result<Self> {
+        let next = sequence.take()?;
+        // What lies beside a file tells of its first frame.
+        let path = next.path.as_deref().filter(|_| next.number == 0);
+        let name = next.name();
+        let frame = match next.place {
+            None => Self::open(&InputOptions { path: next.path.clone(), sequence: None, ..options.clone() }),
+            Some(Rest::File(mut file, at)) => {
+                file.seek(SeekFrom::Start(at)).map_err(|e| Error::disk(&name, "read", e))?;
+                Self::open_file(file, &name, path, options)
+            }
+            Some(Rest::Pipe(pipe)) => Self::of(open_piped(pipe, &name, options.part)?, &name, path, options),
+            Some(Rest::Nothing) => Err(Error::format(&name, "it is empty")),
+        };
+        Ok(Self { sequence: Some(sequence.clone()), ..frame? })
     }
 
     /// Opens a frame in a file that is open already and stands at the frame's first byte; `path` leads to its sidecar.
@@ -193,7 +223,7 @@ impl FrameReader {
         let check = metadata.samples.as_ref().zip(sidecar).map(|(samples, sidecar)| DigestCheck {
             digest: SamplesDigest::like(&samples.digest),
             expected: samples.digest.clone(),
-            sidecar,
+            sidecar: Some(sidecar),
         });
         let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
@@ -225,6 +255,7 @@ impl FrameReader {
             first_channel,
             corner,
             has_begun: false,
+            sequence: None,
         })
     }
 
@@ -305,6 +336,38 @@ impl FrameReader {
         self.mismatch.as_deref()
     }
 
+    /// Whether a file holds a frame of the same size and place as `made`, the digest of whose samples is this.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::open_file`] and of reading.
+    pub fn holds(input: File, name: &str, made: &FrameHeader, digest: &str) -> Result<bool> {
+        let options = InputOptions { all_channels: true, ..InputOptions::default() };
+        let mut reader = Self::open_file(input, name, None, &options)?;
+        if reader.header.geometry != made.geometry {
+            return Ok(false);
+        }
+        let (expected, digest) = (digest.to_owned(), SamplesDigest::like(digest));
+        reader.check = Some(DigestCheck { expected, sidecar: None, digest });
+        reader.drain()?;
+        Ok(reader.mismatch.is_none())
+    }
+
+    /// Reads the rows that nobody has asked for.
+    ///
+    /// # Errors
+    ///
+    /// As [`RowSource::read`].
+    pub fn drain(&mut self) -> Result<()> {
+        let mut passed = Vec::new();
+        while self.rows_read < self.header.geometry.height {
+            let left = self.header.geometry.height - self.rows_read;
+            passed.clear();
+            self.read(self.header.geometry.step_rows(self.natural_rows()).clamp(1, left), &mut passed)?;
+        }
+        Ok(())
+    }
+
     /// Reads rows above those that are kept.
     fn pass_over(&mut self, rows: usize, buffer: &mut Vec<f32>) -> Result<()> {
         let step = self.reader.geometry().step_rows(self.reader.natural_rows()).max(1);
@@ -318,17 +381,32 @@ impl FrameReader {
         Ok(())
     }
 
-    /// Compares the digest once the last row is in.
-    fn check_digest(&mut self) {
+    /// Once the last row is in, hands on what lies behind it, and compares the digest.
+    fn end(&mut self) -> Result<()> {
         if self.rows_read < self.header.geometry.height {
-            return;
+            return Ok(());
         }
+        let stored = self.reader.geometry().height;
+        let below = stored - (self.corner[1] + self.header.geometry.height).min(stored);
+        match self.sequence.take() {
+            Some(sequence) => {
+                self.pass_over(below, &mut Vec::new())?;
+                sequence.go_on(self.reader.rest()?);
+            }
+            None if below == 0 => self.reader.rest()?.end(&self.header.name)?,
+            None => {}
+        }
+        self.check_digest();
+        Ok(())
+    }
+
+    fn check_digest(&mut self) {
         let Some(DigestCheck { expected, sidecar, digest }) = self.check.take() else { return };
         if digest.finish() != expected {
             let name = &self.header.name;
-            let text =
-                format!("{name}: its samples are not those that {sidecar} describes; one of the two was changed");
-            register::doubt(text.clone());
+            let by = sidecar.as_deref().unwrap_or("its digest");
+            let text = format!("{name}: its samples are not those that {by} describes; one of the two was changed");
+            sidecar.is_some().then(|| register::doubt(text.clone()));
             self.mismatch = Some(text);
         }
     }
@@ -395,8 +473,7 @@ impl RowSource for FrameReader {
         }
         self.buffer = buffer;
         self.rows_read += rows;
-        self.check_digest();
-        Ok(())
+        self.end()
     }
 }
 
@@ -436,20 +513,26 @@ fn open_seekable(mut input: File, name: &str, part: usize) -> Opened {
     open_whole(readers, &head, input, name, part)
 }
 
+/// Opens a stream.
+fn open_unseekable(input: File, name: &str, part: usize) -> Opened {
+    pipe::enlarge(&input);
+    open_piped(Pipe::of(input), name, part)
+}
+
 /// Opens a stream with the reader of its format. One that cannot be read without seeking is first copied to a temporary
 /// file.
-fn open_unseekable(mut input: File, name: &str, part: usize) -> Opened {
-    let head = head_of(&mut input, name)?;
+fn open_piped(mut input: Pipe, name: &str, part: usize) -> Opened {
+    let head = input.head(HEAD_BYTES).map_err(|e| Error::disk(name, "read", e))?.to_vec();
+    not_empty(&head, name)?;
     let readers = readers_of(&head, name)?;
     let is_streamed = |stream: &Streaming| (stream.is_streamable)(&head) && !(stream.has_parts && part != 0);
     if let Some(stream) = readers.stream.filter(is_streamed) {
         if part != 0 {
             return Err(Error::Usage(format!("{name}: it has no part {part}; it has a single one")));
         }
-        pipe::enlarge(&input);
-        return (stream.open)(Box::new(io::Cursor::new(head).chain(input)), name);
+        return (stream.open)(input, name);
     }
-    let spooled = spool(&mut io::Cursor::new(&head).chain(input), name)?;
+    let spooled = spool(&mut input, name)?;
     open_whole(readers, &head, spooled, name, part)
 }
 
@@ -463,11 +546,17 @@ fn open_whole(readers: Readers, head: &[u8], input: File, name: &str, part: usiz
 fn head_of(input: &mut File, name: &str) -> Result<Vec<u8>> {
     let mut head = Vec::new();
     input.take(HEAD_BYTES as u64).read_to_end(&mut head).map_err(|e| Error::disk(name, "read", e))?;
-    if head.is_empty() {
-        let hint = if name == STDIN_NAME { "; the program before it wrote nothing" } else { "" };
-        return Err(Error::format(name, format!("it is empty{hint}")));
-    }
+    not_empty(&head, name)?;
     Ok(head)
+}
+
+/// Makes sure that something comes.
+fn not_empty(head: &[u8], name: &str) -> Result<()> {
+    if !head.is_empty() {
+        return Ok(());
+    }
+    let hint = if name == STDIN_NAME { "; the program before it wrote nothing" } else { "" };
+    Err(Error::format(name, format!("it is empty{hint}")))
 }
 
 /// The readers of what a file begins as.

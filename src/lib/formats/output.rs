@@ -322,6 +322,11 @@ impl FrameWriter {
     }
 }
 
+/// Whether an output is the standard one.
+pub fn is_stdout(path: Option<&Path>) -> bool {
+    named(path).is_none()
+}
+
 /// Writes a text (a report, a matrix) to a named file or the standard output. A pipe that its reader has closed is no error:
 /// what remains to be done is done.
 ///

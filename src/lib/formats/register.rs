@@ -7,7 +7,7 @@
 
 use super::places::{STDIN_NAME, named, place, sidecar_path};
 use crate::error::{Error, Result};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs::Metadata;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -25,7 +25,7 @@ static REGISTER: Mutex<Option<Register>> = Mutex::new(None);
 
 #[derive(Debug, Default)]
 struct Register {
-    inputs: Vec<(FileId, String)>,
+    inputs: HashMap<FileId, String>,
     outputs: Vec<(FileId, String)>,
     reads_stdin: bool,
     doubts: Vec<String>,
@@ -139,12 +139,12 @@ impl Register {
         if let Some((_, output)) = self.outputs.iter().find(|(output, _)| *output == id) {
             return Err(same_file(output, name));
         }
-        self.inputs.push((id, name.to_owned()));
+        self.inputs.entry(id).or_insert_with(|| name.to_owned());
         Ok(())
     }
 
     fn check_output(&self, id: FileId, name: &str) -> Result<()> {
-        self.inputs.iter().find(|(input, _)| *input == id).map_or(Ok(()), |(_, input)| Err(same_file(name, input)))
+        self.inputs.get(&id).map_or(Ok(()), |input| Err(same_file(name, input)))
     }
 }
 

@@ -99,6 +99,17 @@ fn readers(format: &FrameFormat, name: &str) -> Result<Readers> {
     }
 }
 
+/// Whether bytes begin a frame that can stand behind another: one that is read without a seek and has no parts that might come
+/// later.
+pub fn may_follow(head: &[u8]) -> bool {
+    FORMATS.iter().any(|format| match (format.sign, format.reading) {
+        (Sign::Bytes(is_one), Reading::Rows(Readers { stream: Some(stream), .. })) => {
+            is_one(head) && !stream.has_parts && (stream.is_streamable)(head)
+        }
+        _ => false,
+    })
+}
+
 /// The names of the formats that are read: `an EXR nor a DNG nor a PNG nor a FITS nor a TIFF`.
 pub fn names_of_read() -> String {
     let is_read = |format: &&FrameFormat| matches!(format.reading, Reading::Rows(_));

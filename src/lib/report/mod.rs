@@ -12,6 +12,7 @@ mod photon_transfer;
 mod portrait;
 mod prediction;
 mod raw_outputs;
+mod sequence;
 mod trade_off;
 
 pub use camera::CameraOutputs;
@@ -22,6 +23,7 @@ pub use photon_transfer::photon_transfer;
 pub use portrait::portrait;
 pub use prediction::{BudgetOutputs, prediction};
 pub use raw_outputs::RawOutputs;
+pub use sequence::{Findings, Reports};
 pub use trade_off::trade_off;
 
 use crate::analysis::statistics::check::{Subject, Test};

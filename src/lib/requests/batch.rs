@@ -1,7 +1,7 @@
 //! Several inputs, each with outputs of its own.
 
 use crate::error::{Error, Result};
-use crate::formats::places::{STEM, named, output_of, place, sidecar_path};
+use crate::formats::places::{STEM, named, numbered, output_of, place, sidecar_path};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -21,25 +21,28 @@ pub struct Job {
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] where two outputs would have one place, or several inputs come or go through a pipe.
+/// [`Error::Usage`] where two outputs would have one place, or one of several inputs comes through a pipe.
 pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &[Option<&Path>]) -> Result<Vec<Job>> {
     let (Some(first), several) = (inputs.first(), inputs.len() > 1) else {
         let beside = beside.iter().map(|path| path.map(Path::to_owned)).collect();
-        return Ok(vec![Job { input: None, frame: frame.map(Path::to_owned), beside }]);
+        let jobs = vec![Job { input: None, frame: frame.map(Path::to_owned), beside }];
+        check_directories(&jobs)?;
+        return Ok(jobs);
     };
     if several && inputs.iter().any(|input| named(Some(input)).is_none()) {
         return Err(Error::Usage("the standard input cannot be one of several inputs; name a file".into()));
     }
-    if several && named(frame).is_none() {
-        return Err(Error::Usage(format!(
-            "frames of several inputs go into files; give -o DIR/, or a name with {STEM}"
-        )));
-    }
     if named(Some(first)).is_none() && [&[frame], beside].concat().into_iter().flatten().any(takes_a_name) {
-        return Err(Error::Usage(format!("the standard input has no name for {STEM}; name the output")));
+        let problem =
+            format!("the standard input has no name for {STEM}; name the output, of several frames with {{frame}}");
+        return Err(Error::Usage(problem));
     }
     let job = |input: &PathBuf| {
-        let of = |pattern: Option<&Path>, extension| pattern.map(|pattern| output_of(pattern, input, extension));
+        let of = |pattern: Option<&Path>, extension| {
+            pattern.map(|pattern| {
+                if named(Some(pattern)).is_none() { pattern.to_owned() } else { output_of(pattern, input, extension) }
+            })
+        };
         Job {
             input: Some(input.clone()),
             frame: of(frame, extension),
@@ -50,12 +53,26 @@ pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &
     if several {
         check_apart(&jobs)?;
     }
+    check_directories(&jobs)?;
     Ok(jobs)
 }
 
+/// Makes sure that the directories of frames are there, before each frame complains of its own; those whose names hold numbers are
+/// not known yet.
+fn check_directories(jobs: &[Job]) -> Result<()> {
+    let mut last = None;
+    for directory in jobs.iter().filter_map(|job| named(job.frame.as_deref())?.parent()) {
+        let is_known = !directory.as_os_str().is_empty() && numbered(directory, 0, 0).is_none();
+        if is_known && last != Some(directory) && !directory.is_dir() {
+            return Err(Error::Data(format!("there is no directory `{}`; make it first", directory.display())));
+        }
+        last = Some(directory);
+    }
+    Ok(())
+}
+
 fn takes_a_name(pattern: &Path) -> bool {
-    let name = pattern.as_os_str().as_encoded_bytes();
-    name.ends_with(b"/") || name.windows(STEM.len()).any(|part| part == STEM.as_bytes())
+    output_of(pattern, Path::new("a"), "b") != pattern
 }
 
 /// Makes sure that no two outputs, the sidecars of frames among them, have one place.
@@ -64,7 +81,9 @@ fn check_apart(jobs: &[Job]) -> Result<()> {
     for Job { input, frame, beside } in jobs {
         let input = input.as_deref().unwrap_or(Path::new("-")).display();
         let sidecar = frame.as_deref().map(sidecar_path);
-        for output in [frame, &sidecar].into_iter().chain(beside).flatten() {
+        for output in
+            [frame, &sidecar].into_iter().chain(beside).flatten().filter(|output| named(Some(output)).is_some())
+        {
             if let Some(other) = taken.insert(place(Some(output)), input.to_string()) {
                 return Err(Error::Usage(format!(
                     "{}: what is made of {other} and of {input} would both go there; give -o DIR/, or names with {STEM}, and inputs \
@@ -123,12 +142,6 @@ mod tests {
                 Some("{stem}.exr"),
                 Some("{stem}.exr.yaml"),
                 "x.exr.yaml: what is made of x.nef and of x.nef",
-            ),
-            (
-                &["x.nef", "y.nef"],
-                None,
-                None,
-                "frames of several inputs go into files; give -o DIR/, or a name with {stem}",
             ),
             (&["x.nef", "-"], Some("out/"), None, "the standard input cannot be one of several inputs; name a file"),
             (&["-"], Some("out/"), None, "the standard input has no name for {stem}; name the output"),

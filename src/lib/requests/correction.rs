@@ -134,11 +134,11 @@ impl Correction {
             (Role::FlatDark, &self.flat_dark),
         ];
         let files = kinds.into_iter().flat_map(|(role, paths)| paths.iter().map(move |path| (role, path.as_path())));
-        let light = input.input.as_deref().map(|path| (Role::Light, path));
+        let light = input.path().map(|path| (Role::Light, path));
         check_files(&light.into_iter().chain(files).collect::<Vec<_>>())?;
         let lists = [&self.dark, &self.bias, &self.flat, &self.flat_dark];
         let once = lists.into_iter().flatten().chain(&self.defects).map(PathBuf::as_path);
-        check_inputs(once.map(Some).chain([input.input.as_deref()]))?;
+        check_inputs(once.map(Some).chain([input.path()]))?;
         let of_flats =
             [&self.flat, &self.flat_dark, &self.bias].into_iter().flatten().filter(|_| !self.flat.is_empty());
         let for_defects = self.dark.iter().chain(&self.bias).filter(|_| self.find_defects.is_some());

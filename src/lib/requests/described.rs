@@ -60,6 +60,11 @@ pub struct DescribedInput {
 }
 
 impl DescribedInput {
+    /// Another frame, which is described as this is.
+    pub fn with(&self, frame: Input) -> Self {
+        Self { frame, ..self.clone() }
+    }
+
     /// Opens the frame, as it is described; channels besides R, G, B or Y are left out.
     ///
     /// # Errors

@@ -1,15 +1,18 @@
 //! Statistics of a frame beside what propagation predicts.
 
+use super::options::Output;
 use super::values;
 use crate::analysis::statistics::portrait::Portrait;
-use crate::analysis::statistics::{Region, Report, Saturated, measure, measure_with_portrait, patches};
+use crate::analysis::statistics::{Laws, Region, Report, Saturated, measure_among, measure_with_portrait, patches};
 use crate::error::Result;
+use crate::formats::places::output_of;
 use crate::formats::plots::PlotFormat;
+use crate::metadata::FrameHeader;
 use crate::names::Named;
 use crate::propagation::Equations;
 use crate::stream::RowSource;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What to measure of a frame, and what to make of it.
 #[derive(Debug, Clone, Args)]
@@ -42,20 +45,30 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Measures a frame; what a figure shows comes with the report where one is wanted.
+    /// The same for a frame of several, with a plot of its own: that of a file, and of this number in its stream.
+    pub fn for_frame(&self, path: Option<&Path>, index: u64, frame: &FrameHeader) -> Self {
+        let Some(plot) = &self.plot else { return self.clone() };
+        let plot = path.map_or_else(|| plot.clone(), |path| output_of(plot, path, "svg"));
+        let plot = Output { output: Some(plot), index, ..Output::default() }.options_for(frame).path;
+        Self { plot, ..self.clone() }
+    }
+
+    /// Measures a frame, with the laws of those before it where it has them too; what a figure shows comes with the report where one
+    /// is wanted.
     ///
     /// # Errors
     ///
     /// [`Error::Usage`](crate::error::Error::Usage) for a plot of another format or of several regions; those of [`measure`].
-    pub fn of(&self, source: &mut dyn RowSource) -> Result<(Report, Option<Portrait>)> {
+    pub fn of(&self, source: &mut dyn RowSource, laws: &mut Laws) -> Result<(Report, Option<Portrait>)> {
         let level = self.check.then_some(self.level);
         let saturated = if self.keep_saturated { Saturated::Kept } else { Saturated::LeftOut };
         match (self.patches, &self.plot) {
             (Some(size), _) => Ok((patches::measure(source, size, saturated, self.equations)?, None)),
-            (None, None) => Ok((measure(source, &self.region, saturated, self.equations, level)?, None)),
+            (None, None) => Ok((measure_among(laws, source, &self.region, saturated, self.equations, level)?, None)),
             (None, Some(path)) => {
                 PlotFormat::of_path(path)?;
-                let (report, portrait) = measure_with_portrait(source, &self.region, saturated, self.equations, level)?;
+                let (report, portrait) =
+                    measure_with_portrait(laws, source, &self.region, saturated, self.equations, level)?;
                 Ok((report, Some(portrait)))
             }
         }

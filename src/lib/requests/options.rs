@@ -16,13 +16,16 @@ use crate::formats::headerless::Layout;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::formats::pipe;
-use crate::metadata::FrameHeader;
+use crate::formats::places::{named, numbered};
+use crate::formats::sequence::Sequence;
+use crate::metadata::{FrameHeader, PoissonKind};
 use crate::names::Named;
 use crate::random::Source;
 use crate::stages::noise::NoiseSettings;
 use crate::units::{QuantityKind, RadianceUnit, kelvin};
 use clap::{Args, Command};
 use std::ffi::OsString;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A request as its options have it where `words` alone are given: what is declared as default is the default everywhere.
@@ -32,11 +35,15 @@ pub(super) fn defaults<R: Args>(words: &[OsString]) -> R {
     parsed.unwrap_or_else(|error| panic!("the defaults of a request contradict each other: {error}"))
 }
 
-/// A frame to read.
+/// A frame to read, or several.
 #[derive(Debug, Clone, Args)]
 pub struct Input {
-    /// Frame to read, EXR, TIFF, DNG, PNG or FITS; `-` or none for standard input
-    pub input: Option<PathBuf>,
+    /// Frames to read, EXR, TIFF, DNG, PNG or FITS; `-` or none for standard input, which may bring several one after another
+    #[arg(value_name = "INPUT")]
+    pub inputs: Vec<PathBuf>,
+    /// Of which the next frame is taken.
+    #[arg(skip)]
+    pub sequence: Option<Sequence>,
     /// Part of a multi-part EXR or FITS, or page of a TIFF, counted from 0
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub part: usize,
@@ -58,15 +65,26 @@ pub struct Input {
 }
 
 impl Input {
-    /// Whether the frame comes through a pipe.
+    /// The first file; none for the standard input.
+    pub fn path(&self) -> Option<&Path> {
+        self.inputs.first().map(PathBuf::as_path)
+    }
+
+    /// The same with this file alone, or the frames of this sequence.
+    pub fn only(&self, path: Option<&Path>, sequence: Option<Sequence>) -> Self {
+        Self { inputs: path.into_iter().map(Path::to_owned).collect(), sequence, ..self.clone() }
+    }
+
+    /// Whether frames come through a pipe.
     pub fn is_pipe(&self) -> bool {
-        pipe::is_input(self.input.as_deref())
+        pipe::is_input(self.path())
     }
 
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
-        let Self { input, part, raw, metadata, channel, crop, .. } = self.clone();
-        InputOptions { path: input, part, raw, metadata, channel, crop, ..InputOptions::default() }
+        let path = self.path().map(Path::to_owned);
+        let Self { sequence, part, raw, metadata, channel, crop, .. } = self.clone();
+        InputOptions { path, sequence, part, raw, metadata, channel, crop, ..InputOptions::default() }
     }
 
     /// The same with all channels.
@@ -151,9 +169,17 @@ fn contradictions(frame: &FrameHeader, sensor: &Sensor) -> Vec<String> {
 /// A frame to write.
 #[derive(Debug, Clone, Default, Args)]
 pub struct Output {
-    /// File to write, with a sidecar FILE.yaml; `-` or none for standard output
+    /// File to write, with a sidecar FILE.yaml; `-` or none for standard output. Of several frames DIR/, or a name with {stem},
+    /// that of the input, {frame}, the number of the exposure, or {index}, that in the stream: {frame:05} has five digits
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// Leave alone what is complete: a file whose samples are those that its sidecar describes, made by the same programs with the
+    /// same options
+    #[arg(long)]
+    pub resume: bool,
+    /// The number of the frame in its stream.
+    #[arg(skip)]
+    pub index: u64,
     /// Format; by default that of the file's extension, or EXR; DNG for one plane of ADU alone
     #[arg(long, value_parser = values::choice::<Format>())]
     pub format: Option<Format>,
@@ -177,6 +203,12 @@ impl Output {
         pipe::is_output(self.output.as_deref())
     }
 
+    /// Whether frames go one after another to one place: the standard output, a named pipe, a device.
+    pub fn is_stream(&self) -> bool {
+        let takes_any = |path: &Path| std::fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir());
+        named(self.output.as_deref()).is_none_or(takes_any)
+    }
+
     /// Whether a file is named whose format is EXR.
     pub fn is_exr(&self) -> bool {
         let ends_so = |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr"));
@@ -186,6 +218,14 @@ impl Output {
     /// What names end in that nobody has chosen.
     pub fn extension(&self) -> &'static str {
         self.format.unwrap_or(Format::Exr).name()
+    }
+
+    /// Where and how to write a frame of several. Where it does not tell the number of its exposure, that in the stream counts.
+    pub fn options_for(&self, made: &FrameHeader) -> OutputOptions {
+        let options = self.options();
+        let exposure = made.metadata.noise.as_ref().map(|noise| u64::from(noise.frame));
+        let path = options.path.as_deref().and_then(|path| numbered(path, exposure.unwrap_or(self.index), self.index));
+        OutputOptions { path: path.or_else(|| options.path.clone()), ..options }
     }
 
     /// Where and how to write.
@@ -382,21 +422,42 @@ impl NoiseChoice {
     }
 }
 
-/// Which noise of an exposure, or none.
-#[derive(Debug, Clone, Default, PartialEq, Args)]
+/// Which noise of which exposure, or none.
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct DrawnNoise {
+    /// Seed of the temporal noise
+    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>, conflicts_with = "clean")]
+    pub seed: u64,
+    /// Seed of the fixed patterns: another number, another sensor
+    #[arg(long, default_value_t = 0, value_parser = values::whole::<u64>, conflicts_with = "clean")]
+    pub sensor_seed: u64,
+    /// Number of the exposure: another number, other temporal noise
+    #[arg(long, default_value_t = 0, value_parser = values::whole::<u32>, conflicts_with = "clean")]
+    pub frame: u32,
+    /// Exposures to draw of each scene, from A to the one before B: one frame after another, each as --frame draws it
+    #[arg(long, value_name = "A..B", value_parser = values::exposures, conflicts_with_all = ["clean", "frame"])]
+    pub frames: Option<Range<u32>>,
     /// Which.
     #[command(flatten)]
     pub choice: NoiseChoice,
     /// Leave all sources out: the clean partner of noisy exposures, their mean, dark signal included
     #[arg(long, conflicts_with = "without")]
     pub clean: bool,
+    /// How Poisson numbers are drawn: exact, or gaussian to see what that approximation costs
+    #[arg(long, default_value = PoissonKind::default().name(), value_parser = values::choice::<PoissonKind>(), conflicts_with = "clean")]
+    pub poisson: PoissonKind,
+    /// Charge transfer efficiency: the share of a packet that each move to the output takes along, above 0 and at most 1;
+    /// by default transfer is left out
+    #[arg(long, value_name = "X", value_parser = values::fraction)]
+    pub cte: Option<f64>,
 }
 
 impl DrawnNoise {
-    /// The noise of the seeds 0.
-    pub fn settings(&self) -> NoiseSettings {
-        NoiseSettings { clean: self.clean, ..self.choice.settings() }
+    /// The noise of one of the exposures, where there are several.
+    pub fn settings(&self, exposure: Option<u32>) -> NoiseSettings {
+        let Self { seed, sensor_seed, frame, clean, poisson, cte, .. } = *self;
+        let frame = exposure.unwrap_or(frame);
+        NoiseSettings { seed, sensor_seed, frame, clean, poisson, cte, ..self.choice.settings() }
     }
 }
 

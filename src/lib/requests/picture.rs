@@ -1,27 +1,28 @@
 //! Frames shown as pictures.
 
 use super::described::DescribedInput;
+use super::options::Output;
 use super::values;
 use crate::analysis::statistics::Region;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
 use crate::formats::picture::{PictureSettings, Range};
-use crate::formats::places::named;
+use crate::formats::places::{STEM, is_pattern, named};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
-use std::path::PathBuf;
+use std::path::Path;
 
 /// Frames to show, all of which are described alike.
 #[derive(Debug, Clone, Args)]
+#[command(mut_arg("inputs", |option| option.help(
+    "Frames to read, EXR, TIFF, DNG, PNG or FITS; `-` or none for standard input. Several make a sheet, in this order, each with its name, what it holds, mean and standard deviation; or, with -o DIR/ or a name with {stem}, a picture each"
+)))]
 pub struct ShownFrames {
-    /// The first.
+    /// The frames.
     #[command(flatten)]
-    pub first: DescribedInput,
-    /// More frames: a sheet of all, in this order, each with its name, what it holds, mean and standard deviation
-    #[arg(value_name = "INPUTS")]
-    more: Vec<PathBuf>,
+    pub input: DescribedInput,
     /// Columns of the sheet; by default about as many as rows
-    #[arg(long, value_name = "N", requires = "more", value_parser = RangedU64ValueParser::<usize>::new().range(1..=64))]
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=64))]
     columns: Option<usize>,
 }
 
@@ -32,25 +33,33 @@ impl ShownFrames {
     ///
     /// [`Error::Usage`] where the standard input is one of several.
     pub fn each(&self) -> Result<Vec<DescribedInput>> {
-        let first = self.first.frame.input.as_deref();
-        if !self.more.is_empty()
-            && self.more.iter().map(|path| Some(path.as_path())).chain([first]).any(|path| named(path).is_none())
-        {
+        let paths = &self.input.frame.inputs;
+        if paths.iter().any(|path| named(Some(path)).is_none()) {
             return Err(Error::Usage("the standard input cannot be one of several inputs; name a file".into()));
         }
-        let other = |path: &PathBuf| {
-            let mut input = self.first.clone();
-            input.frame.input = Some(path.clone());
-            input
-        };
-        Ok(std::iter::once(self.first.clone()).chain(self.more.iter().map(other)).collect())
+        Ok(paths.iter().map(|path| self.input.with(self.input.frame.only(Some(path), None))).collect())
     }
 
-    /// The columns of a sheet; none where a single frame is shown by itself.
-    pub fn columns(&self) -> Option<usize> {
-        let count = self.more.len() + 1;
-        let square = (1..).find(|columns| columns * columns >= count);
-        if count > 1 { self.columns.or(square) } else { None }
+    /// The columns of the sheet that goes to `output`; none where each frame has a picture of its own.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for columns of no sheet, and for a caption of one, which has its own.
+    pub fn columns(&self, output: &Path, has_caption: bool) -> Result<Option<usize>> {
+        let count = self.input.frame.inputs.len();
+        if count < 2 || is_pattern(output) {
+            return match self.columns {
+                Some(_) => {
+                    Err(Error::Usage("columns are those of a sheet of several frames".into()).leave_out(&["columns"]))
+                }
+                None => Ok(None),
+            };
+        }
+        if has_caption {
+            let problem = "the frames of a sheet have captions, which say what each is";
+            return Err(Error::Usage(problem.into()).leave_out(&["caption"]));
+        }
+        Ok(self.columns.or_else(|| (1..).find(|columns| columns * columns >= count)))
     }
 }
 
@@ -81,7 +90,7 @@ pub struct PictureOptions {
     range: Option<Range>,
     /// Say below the picture what is seen: in these words, or by the frame's name, what it holds, mean and standard deviation;
     /// and what is black and what is white
-    #[arg(long, value_name = "TEXT", num_args = 0..=1, require_equals = true, default_missing_value = "", conflicts_with = "more")]
+    #[arg(long, value_name = "TEXT", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     caption: Option<String>,
 }
 
@@ -108,6 +117,13 @@ fn range(text: &str) -> std::result::Result<Range, String> {
         (None, None) => Ok(Range::Values(number(low)?, number(high)?)),
         _ => Err(wrong()),
     }
+}
+
+/// Where the pictures of single frames go, by a name or a pattern.
+pub fn each_to(output: &Path) -> Output {
+    let in_directory = output.as_os_str().as_encoded_bytes().ends_with(b"/");
+    let pattern = if in_directory { output.join(format!("{STEM}.png")) } else { output.to_owned() };
+    Output { output: Some(pattern), ..Output::default() }
 }
 
 impl PictureOptions {

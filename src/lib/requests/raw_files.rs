@@ -9,7 +9,7 @@ use crate::formats::makers::Worker;
 use crate::formats::pipe;
 use crate::names::Named;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Raw files, and what of them is read.
 #[derive(Debug, Clone, Args)]
@@ -40,10 +40,5 @@ impl RawFiles {
         let options =
             InputOptions { path: job.input.clone(), metadata: self.metadata.clone(), ..InputOptions::default() };
         FrameReader::open_raw(&options, self.crop, worker)
-    }
-
-    /// The files besides that of a job.
-    pub fn besides(&self, job: &Job) -> Vec<&Path> {
-        self.raws.iter().map(PathBuf::as_path).filter(|raw| Some(*raw) != job.input.as_deref()).collect()
     }
 }

@@ -15,6 +15,7 @@ use crate::units::{self, RadianceUnit};
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 use clap::{Arg, Command};
 use std::ffi::OsStr;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -108,6 +109,19 @@ fn file_of_kind(end: &'static str, advice: &'static str) -> impl TypedValueParse
         Some(other) if !other.eq_ignore_ascii_case(end) => Err(advice),
         _ => Ok(path),
     })
+}
+
+/// Reads numbers of exposures, `A..B`: from A to the one before B.
+///
+/// # Errors
+///
+/// What is wrong with the text, in words.
+pub fn exposures(text: &str) -> Result<Range<u32>, String> {
+    let wrong = || "give the first number and the one behind the last, as in 0..100 for 0 to 99".to_owned();
+    let (first, end) = text.split_once("..").ok_or_else(wrong)?;
+    let number = |text: &str| whole::<u32>(text).map_err(|_| wrong());
+    let range = number(first)?..number(end)?;
+    if range.is_empty() { Err(wrong()) } else { Ok(range) }
 }
 
 /// Reads `WIDTHxHEIGHT`, both at least 1.

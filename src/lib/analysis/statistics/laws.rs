@@ -1,10 +1,46 @@
-//! How samples of mixed pixels scatter in the regions of a frame.
+//! What the head of a frame says of its samples, worked out once for all frames that have the same.
 
 use super::region::Region;
 use crate::metadata::FrameHeader;
-use crate::propagation::PixelMoments;
 use crate::propagation::sampling::{Place, Sampling};
+use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
 use nalgebra::Matrix3;
+
+/// The laws of a frame, kept for the frames after it: exposures of one scene differ in what no law hangs on.
+#[derive(Default)]
+pub struct Laws(Option<Known>);
+
+pub(super) struct Known {
+    head: FrameHeader,
+    equations: Equations,
+    pub prediction: Result<FramePrediction, Unpredictable>,
+    pub samplings: Samplings,
+}
+
+impl Laws {
+    /// Those of a frame.
+    pub(super) fn of(&mut self, frame: &FrameHeader, equations: Equations) -> &mut Known {
+        let head = without_exposure(frame);
+        let known = self.0.take().filter(|known| known.equations == equations && known.head == head);
+        self.0.insert(known.unwrap_or_else(|| Known {
+            prediction: propagation::of_frame(frame, equations),
+            samplings: Samplings::default(),
+            head,
+            equations,
+        }))
+    }
+}
+
+/// The head of a frame without what tells it from other exposures: its name, its number, what its samples were counted to be.
+fn without_exposure(frame: &FrameHeader) -> FrameHeader {
+    let mut head = FrameHeader { name: String::new(), ..frame.clone() };
+    head.metadata.history.clear();
+    head.metadata.samples = None;
+    if let Some(noise) = &mut head.metadata.noise {
+        noise.frame = 0;
+    }
+    head
+}
 
 /// Sampling laws by place: regions of one size and phase share one.
 #[derive(Default)]

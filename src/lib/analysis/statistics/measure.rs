@@ -2,7 +2,7 @@
 
 use super::assessment::Assessment;
 use super::check::Verdict;
-use super::laws::Samplings;
+use super::laws::{Known, Laws};
 use super::levels::Levels;
 use super::portrait::{Portrait, Sitting};
 use super::region::Region;
@@ -10,7 +10,7 @@ use super::report::{RegionReport, Report, coverage};
 use super::tally::{Tally, tallies};
 use super::watch::{Marks, Saturated, Watch};
 use crate::error::{Error, Result};
-use crate::propagation::{self, Equations, FramePrediction, PixelMoments};
+use crate::propagation::{Equations, FramePrediction, PixelMoments};
 use crate::stream::RowSource;
 
 /// Reads a whole frame and works out the statistics of its regions.
@@ -29,7 +29,23 @@ pub fn measure(
     equations: Equations,
     level: Option<f64>,
 ) -> Result<Report> {
-    Ok(measure_all(source, regions, saturated, equations, level, false)?.0)
+    measure_among(&mut Laws::default(), source, regions, saturated, equations, level)
+}
+
+/// The same for one of several frames, which keep the laws that they have in common.
+///
+/// # Errors
+///
+/// Those of [`measure`].
+pub fn measure_among(
+    laws: &mut Laws,
+    source: &mut dyn RowSource,
+    regions: &[Region],
+    saturated: Saturated,
+    equations: Equations,
+    level: Option<f64>,
+) -> Result<Report> {
+    Ok(measure_all(laws, source, regions, saturated, equations, level, false)?.0)
 }
 
 /// As [`measure`], and what a figure of the region shows, the whole frame where none is named.
@@ -38,6 +54,7 @@ pub fn measure(
 ///
 /// Those of [`measure`], and [`Error::Usage`] for more than one region.
 pub fn measure_with_portrait(
+    laws: &mut Laws,
     source: &mut dyn RowSource,
     regions: &[Region],
     saturated: Saturated,
@@ -49,12 +66,13 @@ pub fn measure_with_portrait(
             Error::Usage(format!("{}: a plot shows one region; name one", source.header().name)).leave_out(&["plot"])
         );
     }
-    let (report, portrait) = measure_all(source, regions, saturated, equations, level, true)?;
+    let (report, portrait) = measure_all(laws, source, regions, saturated, equations, level, true)?;
     let portrait = portrait.ok_or_else(|| Error::Data("no portrait was made".into()))?;
     Ok((report, portrait))
 }
 
 fn measure_all(
+    laws: &mut Laws,
     source: &mut dyn RowSource,
     regions: &[Region],
     saturated: Saturated,
@@ -71,9 +89,8 @@ fn measure_all(
     let frame = watch.header().clone();
     let levels = Levels::of(&frame)?;
     // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
-    let prediction = propagation::of_frame(&frame, equations);
-    let mut samplings = Samplings::default();
-    if let Ok(FramePrediction::Pixels(mixture)) = &prediction {
+    let Known { prediction, samplings, .. } = laws.of(&frame, equations);
+    if let Ok(FramePrediction::Pixels(mixture)) = prediction {
         for region in regions {
             samplings.of(mixture, &frame, *region);
         }
@@ -111,7 +128,8 @@ fn measure_all(
         RegionReport { tests, ..assessment.report(&frame, *region, &levels).with_marks(*marks, left_out) }
     };
     let regions = regions.iter().zip(&tallies).zip(&counts).map(report).collect();
-    let mut report = Report { regions, check: None, uncertainty: coverage(&frame), unpredicted: prediction.err() };
+    let mut report =
+        Report { regions, check: None, uncertainty: coverage(&frame), unpredicted: prediction.as_ref().err().copied() };
     if let Some(level) = level {
         let regions = report.regions.iter().map(|region| (&region.tests[..], region.not_finite));
         report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted)?);

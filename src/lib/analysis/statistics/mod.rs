@@ -17,7 +17,8 @@ mod report;
 mod tally;
 mod watch;
 
-pub use measure::{measure, measure_with_portrait};
+pub use laws::Laws;
+pub use measure::{measure, measure_among, measure_with_portrait};
 pub use region::Region;
 pub use report::{ChannelReport, RegionReport, Report};
 pub use watch::{MarkedRows, Saturated};

@@ -3,9 +3,10 @@
 //! A block says itself how long it is: memory is given to it only as its bytes come. In a pipe the table must tell where
 //! each block lies as in a file, so that both are read or refused alike.
 
-use super::read_ahead::ReadAhead;
 use super::straight::Offsets;
 use crate::error::{Error, Result};
+use crate::formats::format::Rest;
+use crate::formats::read_ahead::{Pipe, ReadAhead};
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock, CompressedTileBlock, TileCoordinates};
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData};
@@ -15,9 +16,11 @@ use std::io::{self, Read};
 /// Where the bytes come from.
 enum Input {
     /// Another program.
-    Pipe(ReadAhead<Box<dyn Read + Send>>),
-    /// A file of so many bytes.
+    Pipe(Pipe),
+    /// A file of so many bytes from the frame's first on.
     File(ReadAhead<File>, u64),
+    /// Handed to whoever reads on behind the frame.
+    Gone(io::Empty),
 }
 
 /// The blocks of a part.
@@ -34,7 +37,7 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Those of a file of `length` bytes; the reader stands at its `position`.
+    /// Those of a frame from whose first byte on a file has `length` bytes; the reader stands at its `position`.
     ///
     /// # Errors
     ///
@@ -51,7 +54,7 @@ impl Blocks {
     }
 
     /// Those of a pipe, of which `position` bytes have been read.
-    pub fn of_pipe(reader: ReadAhead<Box<dyn Read + Send>>, name: &str, position: u64, offsets: Offsets) -> Self {
+    pub fn of_pipe(reader: Pipe, name: &str, position: u64, offsets: Offsets) -> Self {
         Self::new(Input::Pipe(reader), name, position, offsets)
     }
 
@@ -73,7 +76,7 @@ impl Blocks {
     pub fn known(&self) -> u64 {
         match self.input {
             Input::File(_, length) => length,
-            Input::Pipe(_) => self.stored,
+            Input::Pipe(_) | Input::Gone(_) => self.stored,
         }
     }
 
@@ -81,7 +84,7 @@ impl Blocks {
     fn go_to(&mut self, index: usize) -> Result<bool> {
         let offset = self.offsets.at(index);
         match &mut self.input {
-            Input::Pipe(_) => Ok(offset == self.position),
+            Input::Pipe(_) | Input::Gone(_) => Ok(offset == self.position),
             Input::File(reader, length) => {
                 let delta =
                     i64::try_from(offset).ok().zip(i64::try_from(self.position).ok()).map(|(to, from)| to - from);
@@ -109,6 +112,7 @@ impl Blocks {
         Ok(match &mut self.input {
             Input::Pipe(reader) => reader.peek(bytes, run),
             Input::File(reader, _) => reader.peek(bytes, run),
+            Input::Gone(_) => &[],
         })
     }
 
@@ -117,6 +121,7 @@ impl Blocks {
         match &mut self.input {
             Input::Pipe(reader) => reader.skip(bytes),
             Input::File(reader, _) => reader.skip(bytes),
+            Input::Gone(_) => {}
         }
         self.passed(bytes as u64);
         self.stored += bytes as u64;
@@ -193,28 +198,25 @@ impl Blocks {
         match &mut self.input {
             Input::Pipe(reader) => reader,
             Input::File(reader, _) => reader,
+            Input::Gone(nothing) => nothing,
         }
     }
 
-    /// Checks, once all blocks of a file of one part and no other levels have been read, that nothing lies behind them.
+    /// Hands out what lies behind the blocks, once all of a frame of one part and no other levels have been read.
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] otherwise.
-    pub fn end(&mut self) -> Result<()> {
-        let more = match &mut self.input {
-            Input::File(_, length) => *length > self.end,
-            Input::Pipe(reader) => {
-                let read = io::copy(&mut reader.take(1), &mut io::sink());
-                read.map_err(|e| Error::disk(&self.name, "read", e))? > 0
+    /// [`Error::Disk`].
+    pub fn rest(&mut self) -> Result<Rest> {
+        match std::mem::replace(&mut self.input, Input::Gone(io::empty())) {
+            Input::Pipe(reader) => Ok(Rest::Pipe(reader)),
+            Input::File(mut reader, length) if length > self.end => {
+                let behind = self.end.cast_signed() - self.position.cast_signed();
+                let at = reader.seek_relative(behind).and_then(|()| reader.stream_position());
+                let at = at.map_err(|e| Error::disk(&self.name, "read", e))?;
+                Ok(Rest::File(reader.into_inner(), at))
             }
-        };
-        if more {
-            return Err(Error::format(
-                &self.name,
-                "behind its last row come bytes that are no part of it; cut them off",
-            ));
+            Input::File(..) | Input::Gone(_) => Ok(Rest::Nothing),
         }
-        Ok(())
     }
 }

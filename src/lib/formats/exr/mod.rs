@@ -8,7 +8,6 @@ mod attributes;
 mod blocks;
 mod header;
 mod read;
-mod read_ahead;
 mod straight;
 mod write;
 mod write_behind;

@@ -3,12 +3,14 @@
 use super::PARALLEL_BLOCK_BYTES;
 use super::blocks::Blocks;
 use super::header::{Contents, read_meta};
-use super::read_ahead::ReadAhead;
 use super::straight::{Offsets, Straight};
 use crate::color::rgb::Encoding;
 use crate::error::{Error, Result};
 use crate::formats::foreign::exr_complaint;
-use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, SampleReader, SampleType, Sign, Streaming};
+use crate::formats::format::{
+    ColorTags, FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign, Streaming,
+};
+use crate::formats::read_ahead::{Pipe, ReadAhead};
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::Metadata;
 use exr::block::UncompressedBlock;
@@ -20,7 +22,7 @@ use exr::meta::{BlockDescription, MetaData, magic_number};
 use half::f16;
 use rayon::prelude::*;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Seek};
 
 /// Blocks that are decoded together may take this much, however little is stored of them.
 const SMALL: u128 = 64 << 20;
@@ -56,13 +58,15 @@ pub struct ExrReader {
 }
 
 impl ExrReader {
-    /// Opens part `part` of a file.
+    /// Opens part `part` of what begins where a file stands.
     ///
     /// # Errors
     ///
     /// [`Error::Format`] for what is damaged or not supported, naming it.
-    pub fn open(file: File, name: &str, part: usize) -> Result<Self> {
-        let length = file.metadata().map_err(|e| Error::disk(name, "read", e))?.len();
+    pub fn open(mut file: File, name: &str, part: usize) -> Result<Self> {
+        let failed = |e| Error::disk(name, "read", e);
+        let first = file.stream_position().map_err(failed)?;
+        let length = file.metadata().map_err(failed)?.len().saturating_sub(first);
         let mut reader = ReadAhead::new(file);
         let meta = read_meta(&mut reader, name)?;
         let contents = Contents::of(&meta, part, name)?;
@@ -77,7 +81,7 @@ impl ExrReader {
                 offsets = table;
             }
         }
-        let position = reader.stream_position().map_err(|e| Error::disk(name, "read", e))?;
+        let position = reader.stream_position().map_err(failed)? - first;
         let blocks = Blocks::of_file(reader, name, position, length, offsets)?;
         Ok(Self::new(blocks, name, meta, part, contents))
     }
@@ -87,8 +91,7 @@ impl ExrReader {
     /// # Errors
     ///
     /// [`Error::Format`] for what is damaged, not supported, or needs a seek.
-    pub fn stream(input: Box<dyn Read + Send>, name: &str) -> Result<Self> {
-        let mut input = ReadAhead::new(input);
+    pub fn stream(mut input: Pipe, name: &str) -> Result<Self> {
         let mut counted = Counted { inner: &mut input, count: 0 };
         let meta = read_meta(&mut counted, name)?;
         let contents = Contents::of(&meta, 0, name)?;
@@ -308,11 +311,13 @@ impl SampleReader for ExrReader {
             }
             debug_assert!(samples.len() > start);
         }
-        let is_single = !self.meta.requirements.is_multilayer() && self.header().blocks == BlockDescription::ScanLines;
-        if is_single && self.ahead.is_empty() && self.rows_read == self.contents.geometry.height {
-            self.blocks.end()?;
-        }
         Ok(())
+    }
+
+    fn rest(&mut self) -> Result<Rest> {
+        let is_single = !self.meta.requirements.is_multilayer() && self.header().blocks == BlockDescription::ScanLines;
+        let is_done = self.ahead.is_empty() && self.rows_read == self.contents.geometry.height;
+        if is_single && is_done { self.blocks.rest() } else { Ok(Rest::Nothing) }
     }
 }
 

@@ -5,6 +5,7 @@ use super::keywords::{self, Told};
 use crate::error::{Error, Result};
 use crate::formats::files::spool;
 use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign, Streaming};
+use crate::formats::read_ahead::Pipe;
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::Metadata;
 use std::fs::File;
@@ -97,7 +98,7 @@ impl FitsReader {
     /// # Errors
     ///
     /// As [`Self::open`].
-    pub fn stream(mut input: Box<dyn Read + Send>, name: &str) -> Result<Self> {
+    pub fn stream(mut input: Pipe, name: &str) -> Result<Self> {
         let header = Header::read(&mut input, name)?.ok_or_else(|| Error::format(name, "it is empty"))?;
         let array = Array::of(&header, name)?;
         if !array.is_image() {

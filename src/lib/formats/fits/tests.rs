@@ -5,6 +5,7 @@ use super::keywords;
 use super::read::FitsReader;
 use crate::error::Result;
 use crate::formats::format::SampleReader;
+use crate::formats::read_ahead::Pipe;
 use crate::units::QuantityKind;
 use std::fs::File;
 use std::io::{Cursor, Seek, Write};
@@ -57,7 +58,7 @@ fn both(bytes: &[u8]) -> Result<(FitsReader, Vec<f32>)> {
         }
         Ok((reader, samples))
     };
-    let streamed = read(FitsReader::stream(Box::new(Cursor::new(bytes.to_vec())), "in.fits"));
+    let streamed = read(FitsReader::stream(Pipe::of(Cursor::new(bytes.to_vec())), "in.fits"));
     let placed = read(FitsReader::open(file(bytes), "in.fits", 0));
     match (placed, streamed) {
         (Ok(placed), Ok(streamed)) => {

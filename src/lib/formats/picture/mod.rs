@@ -64,6 +64,18 @@ pub fn write_png(source: &mut dyn RowSource, settings: &PictureSettings, path: &
     }
 }
 
+/// Writes the picture of a single frame, with its caption where one is wanted.
+///
+/// # Errors
+///
+/// As of [`write_png`] and [`write_sheet`].
+pub fn write_picture(source: &mut dyn RowSource, settings: &PictureSettings, path: &Path) -> Result<()> {
+    if settings.caption.is_none() {
+        return write_png(source, settings, path);
+    }
+    write_sheet(vec![thumbnail(source, settings)?], 1, path)
+}
+
 /// Writes pictures with their bars and captions in a grid of so many columns.
 ///
 /// # Errors

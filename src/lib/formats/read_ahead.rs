@@ -1,4 +1,4 @@
-//! The bytes of an EXR file or stream, with a look at those to come.
+//! The bytes of a file or stream, with a look at those to come.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -9,12 +9,22 @@ const CAPACITY: usize = 1 << 17;
 const LARGEST: usize = 1 << 24;
 
 /// Reads a file or stream through a buffer that whole blocks can be looked at in before they are taken.
-pub(super) struct ReadAhead<R> {
+pub struct ReadAhead<R> {
     inner: R,
     bytes: Vec<u8>,
     /// The bytes that are held and not taken yet.
     start: usize,
     end: usize,
+}
+
+/// What comes from another program.
+pub type Pipe = ReadAhead<Box<dyn Read + Send>>;
+
+impl Pipe {
+    /// What comes of any stream.
+    pub fn of(inner: impl Read + Send + 'static) -> Self {
+        Self::new(Box::new(inner))
+    }
 }
 
 impl<R: Read> ReadAhead<R> {
@@ -47,6 +57,33 @@ impl<R: Read> ReadAhead<R> {
         }
         let whole = ((self.end - self.start) / block).min(blocks) * block;
         &self.bytes[self.start..self.start + whole]
+    }
+
+    /// The next bytes, at most `most` and fewer only where the stream ends; they stay to be taken.
+    ///
+    /// # Errors
+    ///
+    /// What the stream says.
+    pub fn head(&mut self, most: usize) -> io::Result<&[u8]> {
+        let most = most.min(CAPACITY);
+        if self.end - self.start < most {
+            self.bytes.copy_within(self.start..self.end, 0);
+            (self.start, self.end) = (0, self.end - self.start);
+        }
+        while self.end - self.start < most {
+            match self.inner.read(&mut self.bytes[self.end..]) {
+                Ok(0) => break,
+                Ok(read) => self.end += read,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(&self.bytes[self.start..self.end.min(self.start + most)])
+    }
+
+    /// What is read, where it stands behind the bytes that are held.
+    pub fn into_inner(self) -> R {
+        self.inner
     }
 
     /// Takes bytes that were looked at.

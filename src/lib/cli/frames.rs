@@ -1,0 +1,186 @@
+//! The frames that a run goes through: of files and of streams, one exposure of each or several, on one thread or on many.
+
+use super::session::Session;
+use super::{advice, complain};
+use crate::error::{Error, Result};
+use crate::formats::sequence::Sequence;
+use crate::requests::batch::{self, Job};
+use crate::requests::options::{Input, Output};
+use clap::CommandFactory;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
+
+/// A frame to work on.
+pub struct Turn<'a> {
+    /// What the program says and does besides.
+    pub session: &'a Session,
+    /// Where the frame comes from.
+    pub input: &'a Input,
+    /// Where what is made of it goes.
+    pub output: &'a Output,
+    /// Which of several exposures is meant; none where there is one.
+    pub exposure: Option<u32>,
+}
+
+impl Session {
+    /// Does something for each of several inputs, of program `A`, side by side where threads are at hand and outputs allow it.
+    /// Where one alone fails the others are done all the same, and each failure is told.
+    ///
+    /// # Errors
+    ///
+    /// That of a single input; [`Error::Data`] with the number of those that failed.
+    pub fn each<A: CommandFactory, T: Sync>(
+        &self,
+        inputs: &[T],
+        in_order: bool,
+        work: impl Fn(&Self, &T) -> Result<()> + Sync,
+    ) -> Result<()> {
+        if let [input] = inputs {
+            return work(self, input);
+        }
+        self.all::<A>(inputs.len(), "inputs", in_order, |session, index| work(session, &inputs[index]))
+    }
+
+    /// Does something with each frame of all inputs, of program `A`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`batch::jobs`], of [`Sequence`] and of `work`; [`Error::Data`] with the number of inputs that failed.
+    pub fn each_frame<A: CommandFactory>(
+        &self,
+        input: &Input,
+        output: &Output,
+        work: impl Fn(&Turn<'_>) -> Result<()> + Sync,
+    ) -> Result<()> {
+        self.each_exposure::<A>(input, output, None, work)
+    }
+
+    /// The same for each of some exposures of each frame.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::each_frame`].
+    pub fn each_exposure<A: CommandFactory>(
+        &self,
+        input: &Input,
+        output: &Output,
+        exposures: Option<Range<u32>>,
+        work: impl Fn(&Turn<'_>) -> Result<()> + Sync,
+    ) -> Result<()> {
+        let jobs = batch::jobs(&input.inputs, output.output.as_deref(), output.extension(), &[])?;
+        let session = self.among(&input.inputs);
+        let drawn = exposures.clone().map_or(1, |range| range.len());
+        // Frames of a stream, and those that go into one, have an order; so have those of a single file that holds several.
+        let in_order = output.is_stream() || input.is_pipe();
+        if in_order || jobs.len() * drawn == 1 {
+            let all = || exposures.clone().map_or_else(|| vec![None], |range| range.map(Some).collect());
+            let one = |session: &Self, index: usize| {
+                let job: &Job = &jobs[index];
+                session.on(job.input.as_deref()).frames(job, input, output, &all(), &work)
+            };
+            return if jobs.len() == 1 { one(&session, 0) } else { session.all::<A>(jobs.len(), "inputs", true, one) };
+        }
+        let one = |session: &Self, index: usize| {
+            let job = &jobs[index / drawn];
+            let exposure = exposures.clone().and_then(|mut range| range.nth(index % drawn));
+            session.on(job.input.as_deref()).frames(job, input, output, &[exposure], &work)
+        };
+        session.all::<A>(jobs.len() * drawn, "frames", false, one)
+    }
+
+    /// Works on all frames of an input, each exposed several times.
+    fn frames(
+        &self,
+        job: &Job,
+        input: &Input,
+        output: &Output,
+        exposures: &[Option<u32>],
+        work: &impl Fn(&Turn<'_>) -> Result<()>,
+    ) -> Result<()> {
+        let path: Option<&Path> = job.input.as_deref();
+        let sequence = if exposures.len() > 1 { Sequence::of_repeatable(path)? } else { Sequence::of(path) };
+        let input = input.only(path, Some(sequence.clone()));
+        let mut output = Output { output: job.frame.clone(), ..output.clone() };
+        loop {
+            for (round, exposure) in exposures.iter().enumerate() {
+                if round > 0 {
+                    sequence.again();
+                }
+                work(&Turn { session: self, input: &input, output: &output, exposure: *exposure })?;
+                self.warn_of_doubts();
+                output.index += 1;
+            }
+            if !sequence.has_more()? {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Does so many things, side by side unless `in_order`; what fails is told, and the rest is done. In a stream nothing can
+    /// follow what failed.
+    fn all<A: CommandFactory>(
+        &self,
+        count: usize,
+        what: &str,
+        in_order: bool,
+        work: impl Fn(&Self, usize) -> Result<()> + Sync,
+    ) -> Result<()> {
+        let (next, failed, is_closed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
+        let bar = self.progress(count);
+        let quiet = self.without_progress();
+        let some = |stop_at_failure: bool| {
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                if index >= count || is_closed.load(Ordering::Relaxed) {
+                    return;
+                }
+                match work(&quiet, index) {
+                    Err(Error::ClosedPipe) => is_closed.store(true, Ordering::Relaxed),
+                    Err(error) => {
+                        failed.fetch_add(1, Ordering::Relaxed);
+                        bar.suspend(|| complain(self.program, &advice::advised(&error, &A::command())));
+                        if stop_at_failure {
+                            return;
+                        }
+                    }
+                    Ok(()) => {}
+                }
+                bar.inc(1);
+            }
+        };
+        let threads = if in_order { 1 } else { Self::threads().min(count) };
+        if threads > 1 {
+            thread::scope(|scope| {
+                for _ in 0..threads {
+                    let alone = || {
+                        // One frame a thread: what works on it finds no other.
+                        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+                        some(false);
+                        drop(pool);
+                    };
+                    // Where the system starts no more threads, fewer do the work.
+                    drop(thread::Builder::new().spawn_scoped(scope, alone));
+                }
+            });
+        }
+        // What is left where no thread could be started, or all.
+        some(in_order);
+        bar.finish_and_clear();
+        let (failed, tried) = (failed.into_inner(), next.into_inner().min(count));
+        if is_closed.into_inner() {
+            return Err(Error::ClosedPipe);
+        }
+        if failed > 0 {
+            let rest = match (tried < count, failed < count) {
+                (true, _) => "; the stream ends there",
+                (false, true) => "; the others are done",
+                (false, false) => "",
+            };
+            return Err(Error::Data(format!("{failed} of {count} {what} failed{rest}")));
+        }
+        self.note(&format!("{count} of {count} {what} are done"));
+        Ok(())
+    }
+}

@@ -1,0 +1,270 @@
+//! What a running program does besides its computation: words, history, threads, outputs.
+
+use super::complain;
+use super::general::{General, ProgressWhen};
+use super::history::Signature;
+use crate::error::{Error, Result};
+use crate::formats::input::FrameReader;
+use crate::formats::output::{Format, FrameWriter, OutputOptions};
+use crate::formats::places::{FRAME_OF, named};
+use crate::formats::{register, resume};
+use crate::masking::Masking;
+use crate::metadata::FrameHeader;
+use crate::requests::correction::OpenCorrection;
+use crate::requests::options::Output;
+use crate::requests::{self, Note};
+use crate::stages::darks::DarkFrames;
+use crate::stages::saturation::with_mask;
+use crate::stream::{Counts, RowSource, Stage};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::collections::HashSet;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What a running program says besides its output.
+#[derive(Debug, Clone)]
+pub struct Session {
+    pub(super) program: &'static str,
+    pub(super) general: General,
+    signature: Arc<Signature>,
+    /// The input that is worked on, where there are several.
+    input: Option<PathBuf>,
+    run: Arc<Mutex<Run>>,
+}
+
+/// What all frames of a run have in common.
+#[derive(Debug, Default)]
+struct Run {
+    /// What was said, whichever frame it was about.
+    said: HashSet<String>,
+    /// Where frames went; none is the standard output.
+    written: HashSet<Option<PathBuf>>,
+}
+
+impl Session {
+    pub(super) fn new(program: &'static str, general: General) -> Self {
+        let signature = Arc::new(Signature::of(std::env::args_os().skip(1), &[]));
+        Self { program, general, signature, input: None, run: Arc::default() }
+    }
+
+    /// The same for a run of several inputs.
+    pub fn among(&self, inputs: &[PathBuf]) -> Self {
+        let signature = Arc::new(Signature::of(std::env::args_os().skip(1), inputs));
+        Self { signature, ..self.clone() }
+    }
+
+    /// The same for one of them.
+    pub fn on(&self, input: Option<&Path>) -> Self {
+        Self { input: input.map(Path::to_owned), ..self.clone() }
+    }
+
+    /// The same without progress of its own.
+    pub(super) fn without_progress(&self) -> Self {
+        Self { general: General { progress: ProgressWhen::Never, ..self.general.clone() }, ..self.clone() }
+    }
+
+    fn run(&self) -> MutexGuard<'_, Run> {
+        // Whoever panics leaves it as it was.
+        self.run.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Says something that the user should hear, unless `--quiet`; what it said of another frame of the same stream it does not
+    /// say again.
+    pub fn warn(&self, text: &str) {
+        if !self.general.quiet && self.run().said.insert(of_any_frame(text)) {
+            complain(self.program, &format!("warning: {text}"));
+        }
+    }
+
+    /// Says something to those who asked with `--verbose`.
+    pub fn note(&self, text: &str) {
+        if self.general.verbose && self.run().said.insert(of_any_frame(text)) {
+            complain(self.program, text);
+        }
+    }
+
+    /// Says what came up in a request.
+    pub fn tell(&self, notes: &[Note]) {
+        for note in notes {
+            match note {
+                Note::Warning(text) => self.warn(text),
+                Note::Remark(text) => self.note(text),
+            }
+        }
+    }
+
+    /// Warns of what was found out too late to refuse it.
+    pub(super) fn warn_of_doubts(&self) {
+        register::doubts().iter().for_each(|doubt| self.warn(doubt));
+    }
+
+    /// How many threads work.
+    pub(super) fn threads() -> usize {
+        rayon::current_num_threads()
+    }
+
+    /// Settles how many threads work: what was asked for; or one where frames come or go through a pipe, at whose other end
+    /// another program has a processor of its own; or all; or one where the system starts no more.
+    pub(super) fn settle_threads(&self) {
+        let General { threads, pipeline, .. } = self.general;
+        let count = threads.or(pipeline.then_some(1)).unwrap_or_default();
+        let pool = |count| rayon::ThreadPoolBuilder::new().num_threads(count);
+        // One thread is this one: no other is started.
+        let global = if count == 1 { pool(count).use_current_thread() } else { pool(count) };
+        if global.build_global().is_err() {
+            // Only the first global pool counts, and that has failed: one of this thread alone stands in.
+            self.note("the system starts no more threads; one works");
+            std::mem::forget(pool(1).use_current_thread().build());
+        } else if threads.is_none() && count == 1 {
+            self.note("one thread, as frames pass through a pipe; --threads gives it more");
+        }
+    }
+
+    /// Adds this program to a frame's history and says what it leaves out. The history of a frame that is one of several
+    /// inputs names this one alone.
+    pub fn sign(&self, header: &mut FrameHeader) {
+        self.sign_exposure(header, None);
+    }
+
+    /// The same for one of several exposures, which is told from the others as if it were drawn alone.
+    pub fn sign_exposure(&self, header: &mut FrameHeader, exposure: Option<u32>) {
+        let drawn = exposure.map(|number| ["--frame".to_owned(), number.to_string()]);
+        let entry = self.signature.entry(self.program, self.input.as_deref(), drawn.into_iter().flatten());
+        header.metadata.history.push(entry);
+        for left_out in header.metadata.left_out.iter().filter(|entry| entry.program == self.program) {
+            self.note(&format!("left out: {} ({})", left_out.what, left_out.why));
+        }
+    }
+
+    /// Says what a reader noticed.
+    pub fn report_reader(&self, reader: &FrameReader) {
+        self.tell(&requests::of_reader(reader));
+    }
+
+    /// A progress bar over rows or frames, on terminals only.
+    pub fn progress(&self, count: usize) -> ProgressBar {
+        let shown = match self.general.progress {
+            ProgressWhen::Always => true,
+            ProgressWhen::Never => false,
+            ProgressWhen::Auto => !self.general.quiet && std::io::stderr().is_terminal(),
+        };
+        let bar = ProgressBar::with_draw_target(Some(count as u64), ProgressDrawTarget::hidden());
+        if shown {
+            let template = format!("{} {{bar:30}} {{percent}} % {{eta}}", self.program);
+            if let Ok(style) = ProgressStyle::with_template(&template) {
+                bar.set_style(style);
+            }
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+        bar
+    }
+
+    /// Drives a frame through a stage from an open reader to a new output.
+    ///
+    /// # Errors
+    ///
+    /// Those of reader, stage and writer.
+    pub fn drive<S: Stage>(&self, mut reader: FrameReader, stage: &S, output: &Output) -> Result<()> {
+        self.report_reader(&reader);
+        let layers = output.options().holds_layers()?;
+        let masking = Masking::of(reader.header(), reader.has_mask(), stage.header(), layers);
+        reader.keep_mask();
+        let no_darks: Option<&mut DarkFrames<FrameReader>> = None;
+        let made = masking.header(stage);
+        let counts =
+            self.write(&made, output, |writer, progress| masking.run(stage, &mut reader, no_darks, writer, progress))?;
+        self.ended(reader, counts).map(drop)
+    }
+
+    /// Corrects a frame from an open reader to a new output; tells whether it had to be.
+    ///
+    /// # Errors
+    ///
+    /// Those of readers and writer.
+    pub fn correct(&self, mut reader: FrameReader, correction: &mut OpenCorrection, output: &Output) -> Result<bool> {
+        self.report_reader(&reader);
+        let layers = output.options().holds_layers()?;
+        let OpenCorrection { stage, corrections, .. } = correction;
+        let is_masked = reader.has_mask();
+        let counts = if corrections.may_mark() {
+            let made = if layers { with_mask(stage.header().clone()) } else { stage.header().clone() };
+            reader.keep_mask();
+            self.write(&made, output, |writer, progress| {
+                corrections.run(stage, &mut reader, [is_masked, layers], writer, progress)
+            })?
+        } else {
+            let masking = Masking::of(reader.header(), is_masked, stage.header(), layers);
+            reader.keep_mask();
+            self.write(&masking.header(stage), output, |writer, progress| {
+                masking.run(stage, &mut reader, corrections.darks.as_mut(), writer, progress)
+            })?
+        };
+        self.ended(reader, counts)
+    }
+
+    /// Says what was counted of a frame; one that was complete is passed over. Tells whether it was made.
+    fn ended(&self, mut reader: FrameReader, counts: Option<Counts>) -> Result<bool> {
+        match counts {
+            Some(counts) => counts.warnings().iter().for_each(|warning| self.warn(warning)),
+            None => reader.drain()?,
+        }
+        Ok(counts.is_some())
+    }
+
+    /// Has `run` write a frame whose head is `made`, beside a progress bar; nothing is counted of one that is complete already, with
+    /// `--resume`.
+    ///
+    /// # Errors
+    ///
+    /// Those of `run` and of the writer; [`Error::Usage`] where another frame of this run went to the same place.
+    pub fn write(
+        &self,
+        made: &FrameHeader,
+        output: &Output,
+        run: impl FnOnce(&mut FrameWriter, &mut dyn FnMut(usize)) -> Result<Counts>,
+    ) -> Result<Option<Counts>> {
+        let options = self.place(made, output)?;
+        if output.resume && resume::is_complete(options.path.as_deref(), made)? {
+            self.note(&format!("{} is complete", options.path.unwrap_or_default().display()));
+            return Ok(None);
+        }
+        let mut writer = FrameWriter::create(&options, made)?;
+        let bar = self.progress(made.geometry.height);
+        let counts = run(&mut writer, &mut |rows| bar.set_position(rows as u64))?;
+        bar.finish_and_clear();
+        let did_not_fit = writer.finish(counts)?;
+        if did_not_fit > 0 {
+            self.warn(&format!("{did_not_fit} samples do not fit 16 bits; they are stored as 0 or 65535, NaN as 0"));
+        }
+        Ok(Some(counts))
+    }
+
+    /// Where and how a frame is written.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where another frame of this run went to the same place, and cannot be followed there.
+    pub fn place(&self, made: &FrameHeader, output: &Output) -> Result<OutputOptions> {
+        let options = output.options_for(made);
+        let path = named(options.path.as_deref()).filter(|_| !output.is_stream());
+        if self.run().written.insert(path.map(Path::to_owned)) {
+            return Ok(options);
+        }
+        match path {
+            Some(path) => Err(Error::Usage(format!(
+                "{}: another frame of this run went there; give names with {{frame}}, the number of the exposure, or {{index}}, \
+                 that in the stream",
+                path.display()
+            ))),
+            None if options.format.is_none_or(|format| format == Format::Exr) => Ok(options),
+            None => Err(Error::Usage("of several frames in one stream each is an EXR; leave out --format".into())),
+        }
+    }
+}
+
+/// A text without the number of the frame in its stream.
+fn of_any_frame(text: &str) -> String {
+    let Some((before, behind)) = text.split_once(FRAME_OF) else { return text.to_owned() };
+    format!("{before}{}", behind.trim_start_matches(|c: char| c.is_ascii_digit()))
+}

@@ -1,0 +1,38 @@
+//! What an earlier run has left complete.
+
+use super::input::FrameReader;
+use super::places::{named, sidecar_path};
+use super::yaml::{parse_metadata, write_metadata};
+use crate::error::Result;
+use crate::metadata::{FrameHeader, Metadata};
+use std::fs::File;
+use std::path::Path;
+
+/// Whether the frame `made` lies at a place already, whole: its sidecar says of it what this run would, and describes the samples
+/// that the file holds. What is damaged, or cannot be read, is not complete.
+///
+/// # Errors
+///
+/// Those of [`write_metadata`].
+pub fn is_complete(path: Option<&Path>, made: &FrameHeader) -> Result<bool> {
+    let Some(path) = named(path) else { return Ok(false) };
+    let sidecar = sidecar_path(path);
+    let Some(found) = std::fs::read_to_string(&sidecar)
+        .ok()
+        .and_then(|text| parse_metadata(&sidecar.display().to_string(), &text).ok())
+    else {
+        return Ok(false);
+    };
+    let digest = found.samples.as_ref().map(|samples| samples.digest.clone());
+    if write_metadata(&lasting(found))? != write_metadata(&lasting(made.metadata.clone()))? {
+        return Ok(false);
+    }
+    let holds =
+        |digest: String| FrameReader::holds(File::open(path).ok()?, &path.display().to_string(), made, &digest).ok();
+    Ok(digest.and_then(holds).unwrap_or(false))
+}
+
+/// What of the metadata is known before the samples are, and does not hang on how they are stored.
+fn lasting(metadata: Metadata) -> Metadata {
+    Metadata { samples: None, sample_scale: None, ..metadata }
+}

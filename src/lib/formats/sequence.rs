@@ -1,0 +1,228 @@
+//! Frames one after another in a stream or a file, each complete with its own metadata, as netpbm's and pfstools' are.
+
+use super::files::{STDIN_NAME, named, open_named, spool};
+use super::format::{HEAD_BYTES, Rest};
+use super::places::FRAME_OF;
+use super::table;
+use crate::error::{Error, Result};
+use std::fmt;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What may hold several frames, of which readers take one after another, each when the one before is read to its end.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::formats::input::{FrameReader, InputOptions};
+/// use cyanometer::formats::output::{FrameWriter, OutputOptions};
+/// use cyanometer::formats::sequence::Sequence;
+/// use cyanometer::stream::{Counts, RowSink, RowSource};
+/// # use cyanometer::frame::Geometry;
+/// # use cyanometer::metadata::{FrameHeader, Metadata};
+/// # use cyanometer::units::QuantityKind;
+/// # let metadata = Metadata::new(QuantityKind::Adu);
+/// # let header = FrameHeader { name: "example".into(), geometry: Geometry::new(2, 2, &["Y"]), metadata };
+///
+/// let directory = tempfile::tempdir().unwrap();
+/// let mut bytes = Vec::new();
+/// for level in [1.0, 2.0, 3.0] {
+///     let path = directory.path().join("one.exr");
+///     let options = OutputOptions { path: Some(path.clone()), ..Default::default() };
+///     let mut writer = FrameWriter::create(&options, &header)?;
+///     writer.write(&[level; 4])?;
+///     writer.finish(Counts::default())?;
+///     bytes.extend(std::fs::read(path).unwrap());
+/// }
+/// let path = directory.path().join("all.exr");
+/// std::fs::write(&path, bytes).unwrap();
+///
+/// let sequence = Sequence::of(Some(&path));
+/// let mut levels = Vec::new();
+/// while sequence.has_more()? {
+///     let options = InputOptions { sequence: Some(sequence.clone()), ..Default::default() };
+///     let mut samples = Vec::new();
+///     FrameReader::open(&options)?.read(2, &mut samples)?;
+///     levels.push(samples[0]);
+/// }
+/// assert_eq!(levels, [1.0, 2.0, 3.0]);
+/// # Ok::<(), cyanometer::error::Error>(())
+/// ```
+#[derive(Clone)]
+pub struct Sequence(Arc<Mutex<State>>);
+
+struct State {
+    path: Option<PathBuf>,
+    at: At,
+    /// Frames that were taken.
+    taken: u64,
+    /// The frame that was taken last, where it can be taken again.
+    last: Option<(File, u64)>,
+}
+
+enum At {
+    /// Nothing is open yet.
+    Start,
+    /// Before a frame, or at the end.
+    Behind(Rest),
+    /// In a frame that is not read to its end.
+    Within,
+}
+
+/// The next frame of a sequence.
+pub(super) struct Next {
+    /// Where its bytes are; none where they are those of the file or stream that is not open yet.
+    pub place: Option<Rest>,
+    /// The file; none for the standard input.
+    pub path: Option<PathBuf>,
+    /// Its number, counted from 0.
+    pub number: u64,
+}
+
+impl Sequence {
+    /// The frames of a file, or of the standard input for `-` or none; nothing is opened yet.
+    pub fn of(path: Option<&Path>) -> Self {
+        let path = named(path).map(Path::to_owned);
+        Self(Arc::new(Mutex::new(State { path, at: At::Start, taken: 0, last: None })))
+    }
+
+    /// The same, of which each frame can be taken [again](Self::again): what comes of a stream is copied to a temporary file
+    /// first.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`open_named`]; [`Error::Disk`].
+    pub fn of_repeatable(path: Option<&Path>) -> Result<Self> {
+        let sequence = Self::of(path);
+        let (mut file, name) = open_named(path)?;
+        if !file.metadata().map_err(|e| Error::disk(&name, "read", e))?.is_file() {
+            file = spool(&mut file, &name)?;
+        }
+        let first = file.stream_position().map_err(|e| Error::disk(&name, "read", e))?;
+        sequence.state().at = At::Behind(Rest::File(file, first));
+        Ok(sequence)
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Whoever panics leaves it as it was.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What messages call it.
+    fn name(path: Option<&Path>) -> String {
+        path.map_or_else(|| STDIN_NAME.to_owned(), |path| path.display().to_string())
+    }
+
+    /// Whether another frame comes. What has not been opened yet has one, as will turn out.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for bytes behind a frame that are no frame; [`Error::Disk`].
+    pub fn has_more(&self) -> Result<bool> {
+        let State { path, at, taken, .. } = &mut *self.state();
+        match at {
+            At::Start => Ok(true),
+            At::Within => Ok(false),
+            // What is wrong with the first is told by those who open it.
+            At::Behind(_) if *taken == 0 => Ok(true),
+            At::Behind(rest) => rest.begins_frame(&Self::name(path.as_deref())),
+        }
+    }
+
+    /// Goes back to the first byte of the frame that was taken last.
+    pub fn again(&self) {
+        let state = &mut *self.state();
+        if let Some((file, at)) = state.last.take() {
+            state.at = At::Behind(Rest::File(file, at));
+            state.taken -= 1;
+        }
+    }
+
+    /// The next frame, which is about to be read.
+    pub(super) fn take(&self) -> Result<Next> {
+        let state = &mut *self.state();
+        let place = match std::mem::replace(&mut state.at, At::Within) {
+            At::Start => None,
+            At::Behind(rest) => Some(rest),
+            At::Within => {
+                return Err(Error::Data(format!("{}: it has no more frames", Self::name(state.path.as_deref()))));
+            }
+        };
+        state.last = match &place {
+            Some(Rest::File(file, at)) => file.try_clone().ok().map(|file| (file, *at)),
+            _ => None,
+        };
+        let number = state.taken;
+        state.taken += 1;
+        Ok(Next { place, path: state.path.clone(), number })
+    }
+
+    /// Goes on behind a frame that was read to its end.
+    pub(super) fn go_on(&self, rest: Rest) {
+        self.state().at = At::Behind(rest);
+    }
+}
+
+impl fmt::Debug for Sequence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let State { path, taken, .. } = &*self.state();
+        f.debug_struct("Sequence").field("path", path).field("taken", taken).finish_non_exhaustive()
+    }
+}
+
+impl Next {
+    /// What messages call the frame.
+    pub fn name(&self) -> String {
+        let name = Sequence::name(self.path.as_deref());
+        if self.number == 0 { name } else { format!("{name}{FRAME_OF}{}", self.number) }
+    }
+}
+
+impl Rest {
+    /// Up to [`HEAD_BYTES`] of what comes first.
+    fn head(&mut self, name: &str) -> Result<Vec<u8>> {
+        let head = match self {
+            Self::Nothing => Ok(Vec::new()),
+            Self::Pipe(pipe) => pipe.head(HEAD_BYTES).map(<[u8]>::to_vec),
+            Self::File(file, at) => {
+                let mut head = Vec::new();
+                let found = file.seek(SeekFrom::Start(*at));
+                found.and_then(|_| file.take(HEAD_BYTES as u64).read_to_end(&mut head)).map(|_| head)
+            }
+        };
+        head.map_err(|e| Error::disk(name, "read", e))
+    }
+
+    /// Whether a frame comes, of those that can stand behind another.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for bytes that are none; [`Error::Disk`].
+    fn begins_frame(&mut self, name: &str) -> Result<bool> {
+        let head = self.head(name)?;
+        if head.is_empty() {
+            return Ok(false);
+        }
+        if table::may_follow(&head) { Ok(true) } else { Err(Error::format(name, NO_FRAME)) }
+    }
+
+    /// Makes sure that nothing comes.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] where something does; [`Error::Disk`].
+    pub(super) fn end(mut self, name: &str) -> Result<()> {
+        let head = self.head(name)?;
+        if head.is_empty() {
+            return Ok(());
+        }
+        Err(Error::format(name, if table::may_follow(&head) { ANOTHER } else { NO_FRAME }))
+    }
+}
+
+/// The complaint about bytes that are none.
+const NO_FRAME: &str = "behind its last row come bytes that are no part of it, and no frame; cut them off";
+/// The complaint about a frame that nobody asked for.
+const ANOTHER: &str = "behind it comes another frame, where one is wanted; give each a file of its own";
