@@ -51,6 +51,14 @@ pub const EXAMPLES: [(&str, &[Example]); 15] = [
         &[
             example("One exposure, which the seed tells from others", "add-noise --seed 7 expected.exr -o noisy.exr"),
             example(
+                "Ten exposures, a file each; --resume leaves alone what is complete",
+                "add-noise --frames 0..10 --resume expected.exr -o 'noisy-{frame:03}.exr'",
+            ),
+            example(
+                "A hundred exposures in one stream, and the statistics of each",
+                "add-noise --frames 0..100 expected.exr | digitize | measure --output-format csv",
+            ),
+            example(
                 "Another exposure by the same sensor, without read noise",
                 "add-noise --frame 1 --without ron expected.exr | measure",
             ),

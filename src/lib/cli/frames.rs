@@ -5,7 +5,7 @@ use super::{advice, complain};
 use crate::error::{Error, Result};
 use crate::formats::sequence::Sequence;
 use crate::requests::batch::{self, Job};
-use crate::requests::options::{Input, Output};
+use crate::requests::options::{Following, Input, Output};
 use clap::CommandFactory;
 use std::ops::Range;
 use std::path::Path;
@@ -78,7 +78,9 @@ impl Session {
             let all = || exposures.clone().map_or_else(|| vec![None], |range| range.map(Some).collect());
             let one = |session: &Self, index: usize| {
                 let job: &Job = &jobs[index];
-                session.on(job.input.as_deref()).frames(job, input, output, &all(), &work)
+                let inputs_left = (jobs.len() - index - 1) as u64;
+                let output = Output { following: Following { inputs_left, ..Following::default() }, ..output.clone() };
+                session.on(job.input.as_deref()).frames(job, input, &output, &all(), &work)
             };
             return if jobs.len() == 1 { one(&session, 0) } else { session.all::<A>(jobs.len(), "inputs", true, one) };
         }
@@ -102,12 +104,15 @@ impl Session {
         let path: Option<&Path> = job.input.as_deref();
         let sequence = if exposures.len() > 1 { Sequence::of_repeatable(path)? } else { Sequence::of(path) };
         let input = input.only(path, Some(sequence.clone()));
+        let exposed = exposures.len() as u64;
         let mut output = Output { output: job.frame.clone(), ..output.clone() };
+        output.following = Following { sequence: Some(sequence.clone()), exposures: exposed, ..output.following };
         loop {
-            for (round, exposure) in exposures.iter().enumerate() {
+            for (round, exposure) in (0..).zip(exposures) {
                 if round > 0 {
                     sequence.again();
                 }
+                output.following.exposures_left = exposed - round - 1;
                 work(&Turn { session: self, input: &input, output: &output, exposure: *exposure })?;
                 self.warn_of_doubts();
                 output.index += 1;

@@ -27,7 +27,10 @@ const GROUPS: [(&str, &[&str]); 10] = [
             "cfa",
         ],
     ),
-    ("Noise", &["seed", "sensor-seed", "frame", "without", "clean", "temperature", "poisson", "cte", "dark-frames"]),
+    (
+        "Noise",
+        &["seed", "sensor-seed", "frame", "frames", "without", "clean", "temperature", "poisson", "cte", "dark-frames"],
+    ),
     ("The evaluation of the matrix", &["evaluate", "demosaic", "noise-free"]),
     (
         "A chart or a raw file instead of a library",
@@ -39,6 +42,7 @@ const GROUPS: [(&str, &[&str]); 10] = [
         "Output",
         &[
             "output",
+            "resume",
             "format",
             "compression",
             "sample-type",

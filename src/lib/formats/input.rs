@@ -113,6 +113,8 @@ pub struct FrameReader {
     has_begun: bool,
     /// Who reads on behind the frame; none where nothing may lie there.
     sequence: Option<Sequence>,
+    /// Frames that follow in the same stream, at least.
+    to_come: u64,
 }
 
 /// A digest to compare with once all samples are in.
@@ -155,7 +157,9 @@ impl FrameReader {
             Some(Rest::Pipe(pipe)) => Self::of(open_piped(pipe, &name, options.part)?, &name, path, options),
             Some(Rest::Nothing) => Err(Error::format(&name, "it is empty")),
         };
-        Ok(Self { sequence: Some(sequence.clone()), ..frame? })
+        let frame = frame?;
+        sequence.expect(frame.to_come);
+        Ok(Self { sequence: Some(sequence.clone()), ..frame })
     }
 
     /// Opens a frame in a file that is open already and stands at the frame's first byte; `path` leads to its sidecar.
@@ -206,6 +210,7 @@ impl FrameReader {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
         let (mut metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
         let stored = reader.geometry();
+        let to_come = metadata.frames_to_come.take().unwrap_or_default();
         let scaling = take_scaling(reader.as_ref(), &mut metadata, name)?;
         let (first_channel, geometry) = match &options.channel {
             Some(channel) => take_channel(stored, channel, name)?,
@@ -256,6 +261,7 @@ impl FrameReader {
             corner,
             has_begun: false,
             sequence: None,
+            to_come,
         })
     }
 

@@ -82,10 +82,12 @@ impl FrameWriter {
         let sample_scale = options.scale(header, encoding)?;
         let mut header = header.clone();
         header.metadata.sample_scale = (sample_scale != 1.0).then_some(sample_scale);
-        let header = &header;
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
         let target = Target::open(options.path.as_deref(), needs_seek)?;
         let name = target.name().to_owned();
+        let follow = options.frames_to_come > 0 && target.named_file().is_none();
+        header.metadata.frames_to_come = follow.then_some(options.frames_to_come);
+        let header = &header;
         if matches!(encoding, Encoding::Exr(ExrSamples::F16, _)) {
             doubt_of_codes(&name, header);
         }

@@ -5,6 +5,7 @@ use super::format::{HEAD_BYTES, Rest};
 use super::places::FRAME_OF;
 use super::table;
 use crate::error::{Error, Result};
+use crate::text::counted;
 use std::fmt;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -58,6 +59,8 @@ struct State {
     at: At,
     /// Frames that were taken.
     taken: u64,
+    /// Frames that the last says must follow it.
+    to_come: u64,
     /// The frame that was taken last, where it can be taken again.
     last: Option<(File, u64)>,
 }
@@ -85,7 +88,7 @@ impl Sequence {
     /// The frames of a file, or of the standard input for `-` or none; nothing is opened yet.
     pub fn of(path: Option<&Path>) -> Self {
         let path = named(path).map(Path::to_owned);
-        Self(Arc::new(Mutex::new(State { path, at: At::Start, taken: 0, last: None })))
+        Self(Arc::new(Mutex::new(State { path, at: At::Start, taken: 0, to_come: 0, last: None })))
     }
 
     /// The same, of which each frame can be taken [again](Self::again): what comes of a stream is copied to a temporary file
@@ -119,16 +122,34 @@ impl Sequence {
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] for bytes behind a frame that are no frame; [`Error::Disk`].
+    /// [`Error::Format`] for bytes behind a frame that are no frame, and where more were to come; [`Error::Disk`].
     pub fn has_more(&self) -> Result<bool> {
-        let State { path, at, taken, .. } = &mut *self.state();
-        match at {
+        let State { path, at, taken, to_come, .. } = &mut *self.state();
+        let name = Self::name(path.as_deref());
+        let comes = match at {
             At::Start => Ok(true),
             At::Within => Ok(false),
             // What is wrong with the first is told by those who open it.
             At::Behind(_) if *taken == 0 => Ok(true),
-            At::Behind(rest) => rest.begins_frame(&Self::name(path.as_deref())),
+            At::Behind(rest) => rest.begins_frame(&name),
+        };
+        if *to_come > 0 && matches!(comes, Ok(false)) {
+            let came = counted(*taken, "frames");
+            let problem =
+                format!("it ends behind {came}, and {to_come} more were to come: the program before has failed");
+            return Err(Error::format(&name, problem));
         }
+        comes
+    }
+
+    /// Notes how many frames at least follow the one that was taken last.
+    pub(super) fn expect(&self, to_come: u64) {
+        self.state().to_come = to_come;
+    }
+
+    /// How many frames at least follow the one that was taken last, by what it says itself.
+    pub fn to_come(&self) -> u64 {
+        self.state().to_come
     }
 
     /// Goes back to the first byte of the frame that was taken last.

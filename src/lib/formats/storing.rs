@@ -111,6 +111,8 @@ pub struct OutputOptions {
     pub samples: Option<SampleKind>,
     /// Whether samples are scaled so that viewers show them.
     pub is_viewable: bool,
+    /// Frames that follow in the same stream, at least; a named file does not tell.
+    pub frames_to_come: u64,
 }
 
 /// How a frame is encoded, once all options are settled.

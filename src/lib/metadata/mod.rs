@@ -126,6 +126,9 @@ pub struct Metadata {
     /// by its square, and marks not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_scale: Option<f64>,
+    /// How many frames at least follow this one in its stream, where that was known; programs that read it take it out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames_to_come: Option<u64>,
     /// What is known only after the last row; in sidecars alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub samples: Option<SamplesRecord>,
@@ -167,6 +170,7 @@ impl Metadata {
             left_out: Vec::new(),
             history: Vec::new(),
             sample_scale: None,
+            frames_to_come: None,
             samples: None,
             unknown: Mapping::new(),
         }

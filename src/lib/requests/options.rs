@@ -180,6 +180,9 @@ pub struct Output {
     /// The number of the frame in its stream.
     #[arg(skip)]
     pub index: u64,
+    /// What follows it.
+    #[arg(skip)]
+    pub following: Following,
     /// Format; by default that of the file's extension, or EXR; DNG for one plane of ADU alone
     #[arg(long, value_parser = values::choice::<Format>())]
     pub format: Option<Format>,
@@ -225,7 +228,8 @@ impl Output {
         let options = self.options();
         let exposure = made.metadata.noise.as_ref().map(|noise| u64::from(noise.frame));
         let path = options.path.as_deref().and_then(|path| numbered(path, exposure.unwrap_or(self.index), self.index));
-        OutputOptions { path: path.or_else(|| options.path.clone()), ..options }
+        let frames_to_come = self.following.frames();
+        OutputOptions { path: path.or_else(|| options.path.clone()), frames_to_come, ..options }
     }
 
     /// Where and how to write.
@@ -236,7 +240,29 @@ impl Output {
             compression: self.compression,
             samples: self.sample_type,
             is_viewable: self.viewable,
+            frames_to_come: 0,
         }
+    }
+}
+
+/// What is made behind a frame in the same run, as far as it is known.
+#[derive(Debug, Clone, Default)]
+pub struct Following {
+    /// The frames of the same input.
+    pub sequence: Option<Sequence>,
+    /// Exposures of each scene.
+    pub exposures: u64,
+    /// Those of the same scene that are left.
+    pub exposures_left: u64,
+    /// Inputs that are left.
+    pub inputs_left: u64,
+}
+
+impl Following {
+    /// How many frames that is, at least.
+    pub fn frames(&self) -> u64 {
+        let scenes = self.sequence.as_ref().map_or(0, Sequence::to_come).saturating_add(self.inputs_left);
+        scenes.saturating_mul(self.exposures).saturating_add(self.exposures_left)
     }
 }
 

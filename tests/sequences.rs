@@ -1,0 +1,223 @@
+//! Frames one after another: in streams and files, drawn together or alone, resumed, and told apart.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use std::fs;
+use std::process::Output;
+use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Reports of frames, a line of JSON each.
+fn lines(report: &[u8]) -> Vec<serde_json::Value> {
+    let text = String::from_utf8_lossy(report);
+    text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{line}: {error}"))).collect()
+}
+
+fn with_scene() -> Workshop {
+    let shop = Workshop::new();
+    shop.run("fit-matrix SAMPLES/skies/sky912.exr -o matrix.yaml", &[]);
+    shop.run("render-radiance --electrons 4000,6000,8000 --size 24x16 -o scene.exr", &[]);
+    shop
+}
+
+const CHAIN: [&str; 4] = ["digitize", "mosaic", "demosaic --method eci", "to-xyz --matrix matrix.yaml --sigma"];
+
+/// The chain run once over all exposures gives what it gives of each alone, to the byte: in pipes and in files, of one range or of
+/// several, on any number of threads.
+#[test]
+fn exposures_are_the_same_together_and_alone() {
+    let shop = with_scene();
+    fs::create_dir(shop.path("n")).unwrap();
+    fs::create_dir(shop.path("m")).unwrap();
+    let mut together = shop.run("add-noise scene.exr --seed 5 --frames 7..12", &[]);
+    for threads in [1, 3] {
+        shop.run(
+            &format!("add-noise scene.exr --seed 5 --frames 7..10 --threads {threads} -o n/{{frame:03}}.exr"),
+            &[],
+        );
+        shop.run(
+            &format!("add-noise scene.exr --seed 5 --frames 10..12 --threads {threads} -o n/{{frame:03}}.exr"),
+            &[],
+        );
+    }
+    let one = |frame: u32| shop.run(&format!("add-noise scene.exr --seed 5 --frame {frame}"), &[]);
+    let mut alone: Vec<Vec<u8>> = (7..12).map(one).collect();
+    for (frame, bytes) in (7..12).zip(&alone) {
+        assert!(*bytes == shop.bytes(&format!("n/{frame:03}.exr")), "frame {frame}");
+    }
+    for line in CHAIN {
+        shop.run(&format!("{line} -o {{index}}.exr"), &together);
+        together = shop.run(line, &together);
+        alone = alone.iter().map(|bytes| shop.run(line, bytes)).collect();
+        for (index, bytes) in alone.iter().enumerate() {
+            assert!(*bytes == shop.bytes(&format!("{index}.exr")), "{line}, frame {index}");
+        }
+    }
+    // Files by their names: the name of the input is part of the history, and of the others nothing.
+    shop.run("digitize n/007.exr n/008.exr n/009.exr n/010.exr n/011.exr -o m/", &[]);
+    for frame in 7..12 {
+        let name = format!("n/{frame:03}.exr");
+        shop.run(&format!("digitize {name} -o one.exr"), &[]);
+        assert!(shop.bytes(&format!("m/{frame:03}.exr")) == shop.bytes("one.exr"), "frame {frame}");
+        assert_eq!(shop.sidecar("one.exr").history.last().unwrap().arguments, [name]);
+    }
+}
+
+/// The samples of a measure of each frame are those of the frame alone; with `--check`, each is tested.
+#[test]
+fn each_frame_is_measured() {
+    let shop = with_scene();
+    let stream = shop.run("add-noise scene.exr --frames 3..6", &[]);
+    let reports = lines(&shop.run("measure --check --output-format json", &stream));
+    assert_eq!(reports.iter().map(|report| report["frame"].as_u64().unwrap()).collect::<Vec<_>>(), [3, 4, 5]);
+    for (frame, report) in (3..6).zip(&reports) {
+        let alone = shop.run(&format!("add-noise scene.exr --frame {frame}"), &[]);
+        let alone: serde_json::Value =
+            serde_json::from_slice(&shop.run("measure --check --output-format json", &alone)).unwrap();
+        assert_eq!((&report["regions"], &report["check"]), (&alone["regions"], &alone["check"]));
+        assert_eq!(report["file"], "standard input");
+    }
+    let table = String::from_utf8(shop.run("measure --output-format csv", &stream)).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!((rows.len(), rows[0].len(), rows[9].len()), (10, rows[5].len(), rows[0].len()));
+    assert_eq!((rows[0].ends_with(&["file", "frame"]), rows[9].ends_with(&["standard input", "5"])), (true, true));
+    // One wrong among three: all are reported, and the run fails.
+    let mut wrong = stream.clone();
+    let end = wrong.len() - 400;
+    wrong[end..end + 4].copy_from_slice(&1e9_f32.to_le_bytes());
+    let output = shop.attempt("measure --check --output-format json", &wrong);
+    assert_eq!((output.status.code(), lines(&output.stdout).len()), (Some(BAD_DATA), 3));
+    let complaint = said(&output);
+    assert!(complaint.contains("1 of 3 frames are not as predicted, the first of them frame 5"), "{complaint}");
+}
+
+/// What is complete stays as it is; what is damaged, missing, or would be another is made, and all is as in one run.
+#[test]
+fn a_run_is_resumed() {
+    let shop = with_scene();
+    fs::create_dir(shop.path("n")).unwrap();
+    let line = "add-noise scene.exr --seed 2 --frames 0..6 --resume -o n/{frame}.exr";
+    shop.run(line, &[]);
+    let whole: Vec<[Vec<u8>; 2]> =
+        (0..6).map(|frame| ["", ".yaml"].map(|end| shop.bytes(&format!("n/{frame}.exr{end}")))).collect();
+    let times = || {
+        (0..6)
+            .map(|frame| fs::metadata(shop.path(&format!("n/{frame}.exr"))).unwrap().modified().unwrap())
+            .collect::<Vec<_>>()
+    };
+    let before = times();
+    // A sample, the end, the sidecar, the whole, a word of the description.
+    let mut changed = whole[0][0].clone();
+    let last = changed.len() - 10;
+    changed[last] ^= 1;
+    fs::write(shop.path("n/0.exr"), changed).unwrap();
+    fs::write(shop.path("n/1.exr"), &whole[1][0][..last]).unwrap();
+    fs::remove_file(shop.path("n/2.exr.yaml")).unwrap();
+    fs::remove_file(shop.path("n/3.exr")).unwrap();
+    let other = String::from_utf8(whole[4][1].clone()).unwrap().replace("seed: 2", "seed: 3");
+    fs::write(shop.path("n/4.exr.yaml"), other).unwrap();
+    shop.run(line, &[]);
+    for (frame, [image, sidecar]) in whole.iter().enumerate() {
+        assert!(shop.bytes(&format!("n/{frame}.exr")) == *image, "frame {frame}");
+        assert!(shop.bytes(&format!("n/{frame}.exr.yaml")) == *sidecar, "frame {frame}");
+    }
+    let after = times();
+    let is_made: Vec<bool> = before.iter().zip(&after).map(|(before, after)| before != after).collect();
+    assert_eq!(is_made, [true, true, true, true, true, false]);
+    // Another seed is another run.
+    shop.run(&line.replace("--seed 2", "--seed 3"), &[]);
+    assert!((0..6).all(|frame| shop.bytes(&format!("n/{frame}.exr")) != whole[frame][0]));
+    // Frames of a stream that are complete are passed over.
+    let stream = shop.run("add-noise scene.exr --seed 2 --frames 0..6", &[]);
+    fs::create_dir(shop.path("c")).unwrap();
+    shop.run("digitize -o c/{frame}.exr", &stream);
+    let codes = shop.bytes("c/5.exr");
+    fs::remove_file(shop.path("c/5.exr")).unwrap();
+    shop.run("digitize --resume -o c/{frame}.exr", &stream);
+    assert!(shop.bytes("c/5.exr") == codes);
+}
+
+/// What stands behind a frame is a frame, or the run fails; a stream that is cut fails too.
+#[test]
+fn what_is_no_frame_is_refused() {
+    let shop = with_scene();
+    let frame = shop.bytes("scene.exr");
+    let two = [frame.as_slice(), &frame].concat();
+    fs::write(shop.path("two.exr"), &two).unwrap();
+    fs::write(shop.path("junk.exr"), [two.as_slice(), b"junk"].concat()).unwrap();
+    let junk = "behind its last row come bytes that are no part of it, and no frame; cut them off";
+    for (line, input, status, wanted) in [
+        ("measure", [two.as_slice(), b"x"].concat(), BAD_DATA, junk),
+        ("measure junk.exr", Vec::new(), BAD_DATA, junk),
+        ("add-noise", two[..two.len() - 7].to_vec(), BAD_DATA, "frame 1: the file ends before its last row"),
+        ("add-noise", two[..frame.len() + 60].to_vec(), BAD_DATA, "frame 1"),
+        ("add-noise -o a.exr", two.clone(), BAD_USAGE, "a.exr: another frame of this run went there"),
+        ("add-noise -o b{frame}.exr", two.clone(), BAD_USAGE, "b0.exr: another frame of this run went there"),
+        ("add-noise --format tiff", two.clone(), BAD_USAGE, "each is an EXR"),
+        ("preview -o p.png", two.clone(), BAD_USAGE, "p.png: another frame of this run went there"),
+        ("color-difference - scene.exr --space xyz", two.clone(), BAD_DATA, ""),
+        (
+            "add-noise scene.exr -o none/{frame}.exr --frames 0..9",
+            Vec::new(),
+            BAD_DATA,
+            "there is no directory `none`; make it first",
+        ),
+        ("add-noise scene.exr --frames 3..3", Vec::new(), BAD_USAGE, "0..100 for 0 to 99"),
+        ("add-noise scene.exr --frames 0..3 --frame 1", Vec::new(), BAD_USAGE, "--frame"),
+        ("add-noise scene.exr --frames 0..3 -o same.exr", Vec::new(), BAD_DATA, "2 of 3 frames failed"),
+        (
+            "mosaic scene.exr none.exr -o m-{stem}.exr",
+            Vec::new(),
+            BAD_DATA,
+            "1 of 2 frames failed; the others are done",
+        ),
+        ("mosaic scene.exr - -o m-{stem}.exr", Vec::new(), BAD_USAGE, "the standard input cannot be one of several"),
+    ] {
+        let output = shop.attempt(line, &input);
+        let complaint = said(&output);
+        assert_eq!(output.status.code(), Some(status), "{line}: {complaint}");
+        assert!(complaint.contains(wanted), "{line}: {complaint}");
+    }
+    assert!(shop.path("m-scene.exr").exists());
+    // Frames of a file, and those of several files in one stream.
+    assert_eq!(lines(&shop.run("measure two.exr --output-format json", &[])).len(), 2);
+    let stream = shop.run("mosaic two.exr scene.exr", &[]);
+    assert_eq!(lines(&shop.run("measure --output-format json", &stream)).len(), 3);
+    // A crop reads on behind its last row.
+    assert_eq!(lines(&shop.run("measure --crop 2,2,4,4 --output-format json", &two)).len(), 2);
+    shop.run("preview -o p{index:02}.png", &two);
+    assert!(shop.path("p00.png").exists() && shop.path("p01.png").exists());
+}
+
+/// The first byte of a frame of a stream.
+fn start_of(stream: &[u8], frame: usize) -> usize {
+    const MAGIC: [u8; 4] = [0x76, 0x2F, 0x31, 0x01];
+    stream.windows(4).enumerate().filter(|(_, bytes)| *bytes == MAGIC).nth(frame).unwrap().0
+}
+
+/// A program that dies between two frames leaves a stream that tells how many are missing.
+#[test]
+fn a_stream_knows_how_many_frames_it_has() {
+    let shop = with_scene();
+    let stream = shop.run("add-noise scene.exr --frames 0..4", &[]);
+    let cut = &stream[..start_of(&stream, 2)];
+    let missing = "it ends behind 2 frames, and 2 more were to come: the program before has failed";
+    for line in ["measure", "digitize", "mosaic -o {index}.exr"] {
+        let output = shop.attempt(line, cut);
+        assert_eq!(output.status.code(), Some(BAD_DATA), "{line}");
+        assert!(said(&output).contains(missing), "{line}: {}", said(&output));
+    }
+    // Programs in between pass it on.
+    let digitized = shop.attempt("digitize", &stream);
+    let output = shop.attempt("measure", &digitized.stdout[..start_of(&digitized.stdout, 1)]);
+    assert!(said(&output).contains("it ends behind 1 frame, and 3 more were to come"), "{}", said(&output));
+    // Files say nothing of others.
+    shop.run("add-noise scene.exr --frames 0..2 -o {frame}.exr", &[]);
+    let files = [shop.bytes("0.exr"), shop.bytes("1.exr")].concat();
+    assert_eq!(lines(&shop.run("measure --output-format json", &files)).len(), 2);
+}
