@@ -45,9 +45,10 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     register::announce(&[arguments.output.as_deref(), arguments.measurement.plot.as_deref()])?;
     let frames = &arguments.input.frame;
+    let reports = Output { is_of_reports: true, ..Output::default() };
     let findings = Findings::new(arguments.output_format, frames.inputs.len() > 1, arguments.output.clone());
     let measured =
-        session.each_frame::<Arguments>(frames, &Output::default(), |turn| measure(arguments, turn, &findings));
+        session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
     measured.and(findings.end())
 }
 

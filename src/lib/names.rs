@@ -33,6 +33,12 @@ pub fn nearest<'a>(
     known: impl IntoIterator<Item = &'a str>,
     farthest: impl Fn(&str) -> usize,
 ) -> Option<&'a str> {
+    let known: Vec<&str> = known.into_iter().collect();
+    // One that goes on where another ends, as with its unit, is meant rather than one that looks like it.
+    let begin = typed.to_owned() + "_";
+    if let Some(longer) = known.iter().filter(|known| known.starts_with(&begin)).min_by_key(|known| known.len()) {
+        return Some(longer);
+    }
     let distances = known.into_iter().map(|known| (strsim::damerau_levenshtein(known, typed), known));
     distances
         .min_by_key(|(distance, _)| *distance)

@@ -16,7 +16,7 @@ const MOST_DCNU: f64 = 2.0;
 /// The same of the response.
 const MOST_PRNU: f64 = 0.5;
 /// The same of whole rows and columns: gains of amplifiers differ by less.
-const MOST_LINE_PRNU: f64 = 0.1;
+const MOST_LINE_PRNU: f64 = 0.05;
 /// The smallest full well in e⁻ that does not look like thousands of them.
 const LEAST_WELL_E: f64 = 100.0;
 /// So many times the range of the converter is beyond what amplifiers are set to.

@@ -3,6 +3,7 @@
 use super::session::Session;
 use super::{advice, complain};
 use crate::error::{Error, Result};
+use crate::formats::places::is_numbered;
 use crate::formats::sequence::Sequence;
 use crate::requests::batch::{self, Job};
 use crate::requests::options::{Following, Input, Output};
@@ -24,6 +25,17 @@ pub struct Turn<'a> {
     pub exposure: Option<u32>,
 }
 
+/// How several things are done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    /// Side by side.
+    Any,
+    /// One after another.
+    Kept,
+    /// One after another into a stream, in which nothing can follow what failed.
+    Stream,
+}
+
 impl Session {
     /// Does something for each of several inputs, of program `A`, side by side where threads are at hand and outputs allow it.
     /// Where one alone fails the others are done all the same, and each failure is told.
@@ -40,7 +52,8 @@ impl Session {
         if let [input] = inputs {
             return work(self, input);
         }
-        self.all::<A>(inputs.len(), "inputs", in_order, |session, index| work(session, &inputs[index]))
+        let order = if in_order { Order::Stream } else { Order::Any };
+        self.all::<A>(inputs.len(), "inputs", order, |session, index| work(session, &inputs[index]))
     }
 
     /// Does something with each frame of all inputs, of program `A`.
@@ -72,8 +85,13 @@ impl Session {
         let jobs = batch::jobs(&input.inputs, output.output.as_deref(), output.extension(), &[])?;
         let session = self.among(&input.inputs);
         let drawn = exposures.clone().map_or(1, |range| range.len());
+        if let Some(path) = output.output.as_deref().filter(|path| drawn > 1 && !output.is_stream() && !is_numbered(path)) {
+            let problem = format!("{}: {drawn} exposures would go there; name the output with {{frame}}", path.display());
+            return Err(Error::Usage(problem));
+        }
         // Frames of a stream, and those that go into one, have an order; so have those of a single file that holds several.
         let in_order = output.is_stream() || input.is_pipe();
+        let order = if output.is_of_reports { Order::Kept } else { Order::Stream };
         if in_order || jobs.len() * drawn == 1 {
             let all = || exposures.clone().map_or_else(|| vec![None], |range| range.map(Some).collect());
             let one = |session: &Self, index: usize| {
@@ -82,14 +100,14 @@ impl Session {
                 let output = Output { following: Following { inputs_left, ..Following::default() }, ..output.clone() };
                 session.on(job.input.as_deref()).frames(job, input, &output, &all(), &work)
             };
-            return if jobs.len() == 1 { one(&session, 0) } else { session.all::<A>(jobs.len(), "inputs", true, one) };
+            return if jobs.len() == 1 { one(&session, 0) } else { session.all::<A>(jobs.len(), "inputs", order, one) };
         }
         let one = |session: &Self, index: usize| {
             let job = &jobs[index / drawn];
             let exposure = exposures.clone().and_then(|mut range| range.nth(index % drawn));
             session.on(job.input.as_deref()).frames(job, input, output, &[exposure], &work)
         };
-        session.all::<A>(jobs.len() * drawn, "frames", false, one)
+        session.all::<A>(jobs.len() * drawn, "frames", Order::Any, one)
     }
 
     /// Works on all frames of an input, each exposed several times.
@@ -123,13 +141,12 @@ impl Session {
         }
     }
 
-    /// Does so many things, side by side unless `in_order`; what fails is told, and the rest is done. In a stream nothing can
-    /// follow what failed.
+    /// Does so many things; what fails is told, and the rest is done where it can be.
     fn all<A: CommandFactory>(
         &self,
         count: usize,
         what: &str,
-        in_order: bool,
+        order: Order,
         work: impl Fn(&Self, usize) -> Result<()> + Sync,
     ) -> Result<()> {
         let (next, failed, is_closed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
@@ -155,7 +172,7 @@ impl Session {
                 bar.inc(1);
             }
         };
-        let threads = if in_order { 1 } else { Self::threads().min(count) };
+        let threads = if order != Order::Any { 1 } else { Self::threads().min(count) };
         if threads > 1 {
             thread::scope(|scope| {
                 for _ in 0..threads {
@@ -171,7 +188,7 @@ impl Session {
             });
         }
         // What is left where no thread could be started, or all.
-        some(in_order);
+        some(order == Order::Stream);
         bar.finish_and_clear();
         let (failed, tried) = (failed.into_inner(), next.into_inner().min(count));
         if is_closed.into_inner() {

@@ -4,6 +4,7 @@ use super::files::read_file;
 use super::{csv, delimited, yaml};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// What a frame of a measurement shows.
@@ -34,6 +35,9 @@ pub struct ListedFrame {
     /// Temperature of the sensor in K.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_k: Option<f64>,
+    /// The same in °C, in lists alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
     /// Any word that tells levels of light of one exposure time apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub level: Option<String>,
@@ -53,6 +57,8 @@ pub struct FrameList {
 const COLUMNS: [&str; 7] = ["file", "kind", "exposure_s", "photons", "temperature_k", "temperature_c", "level"];
 /// 0 °C in K.
 const ZERO_CELSIUS_K: f64 = 273.15;
+/// Sensors are no colder.
+const LEAST_TEMPERATURE_K: f64 = 70.0;
 
 /// Reads a list; files are found beside it.
 ///
@@ -75,8 +81,15 @@ pub fn read(path: &Path) -> Result<FrameList> {
     if list.frames.is_empty() {
         return Err(Error::format(&name, "it lists no frames"));
     }
-    for frame in &list.frames {
+    let mut seen = HashSet::new();
+    for frame in &mut list.frames {
+        if let Some(celsius) = frame.temperature_c.take() {
+            frame.temperature_k = frame.temperature_k.or(Some(celsius + ZERO_CELSIUS_K));
+        }
         check(&name, frame)?;
+        if !seen.insert(frame.file.clone()) {
+            return Err(Error::format(&name, format!("{} is listed twice; frames of a pair are two files", frame.file.display())));
+        }
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     for frame in &mut list.frames {
@@ -98,6 +111,10 @@ fn check(name: &str, frame: &ListedFrame) -> Result<()> {
         if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
             return Err(Error::format(name, format!("`{key}` of {file} is {value}; it must be above 0")));
         }
+    }
+    if let Some(kelvin) = frame.temperature_k.filter(|kelvin| *kelvin < LEAST_TEMPERATURE_K) {
+        let problem = format!("`temperature_k` of {file} is {kelvin}, which looks like degrees Celsius; `temperature_c` takes these");
+        return Err(Error::format(name, problem));
     }
     match frame.photons {
         Some(photons) if !(0.0..f64::INFINITY).contains(&photons) => {
@@ -149,7 +166,8 @@ fn table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
             kind: kind_of(row)?,
             exposure_s: exposure_s[row],
             photons: photons[row],
-            temperature_k: kelvin[row].or(celsius[row].map(|celsius| celsius + ZERO_CELSIUS_K)),
+            temperature_k: kelvin[row],
+            temperature_c: celsius[row],
             level,
         })
     };
@@ -207,6 +225,7 @@ fn descriptor(name: &str, text: &str) -> Result<FrameList> {
                     exposure_s: Some(exposure_s),
                     photons,
                     temperature_k: None,
+                    temperature_c: None,
                     level: Some(level),
                 };
                 list.frames.push(frame);
@@ -241,6 +260,7 @@ mod tests {
             exposure_s: Some(0.01),
             photons,
             temperature_k: Some(293.15),
+            temperature_c: None,
             level: None,
         };
         assert_eq!(

@@ -106,6 +106,11 @@ pub fn numbered(pattern: &Path, frame: u64, index: u64) -> Option<PathBuf> {
     is_numbered.then(|| PathBuf::from(OsString::from_vec(name)))
 }
 
+/// Whether a name has places for numbers.
+pub fn is_numbered(name: &Path) -> bool {
+    numbered(name, 0, 0).is_some()
+}
+
 /// Where bytes begin with `{key}` or `{key:WIDTH}`: how long that is, and the number as it asks for.
 fn placeholder(bytes: &[u8], key: &str, number: u64) -> Option<(usize, String)> {
     /// Names of files are no longer.

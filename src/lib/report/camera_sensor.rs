@@ -37,7 +37,7 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     let top = metadata
         .white_level_adu
         .map(|white| white.largest())
-        .ok_or_else(|| lacking("the largest code is not known").give(&["white_level_adu"]))?;
+        .ok_or_else(|| lacking("the largest code is not known").give(&["white"]))?;
     let mut told = Told::default();
     let pooled = |key: &str| pooled(&camera.classes, key);
     let needed = |key: &str| pooled(key).ok_or_else(|| lacking(&reason(&camera.classes, key)));
@@ -49,7 +49,8 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     let of_bits =
         if f64::from(bits).exp2() - 1.0 == top { "the largest code" } else { "the least that hold the largest code" };
     told.tell("bits", Origin::Derived, of_bits);
-    let full_well_e = match pooled("full_well_e") {
+    // Wells are alike behind all filters: those that were filled tell.
+    let full_well_e = match pooled_of(&camera.classes, "full_well_e", false) {
         Some(full) => {
             told.tell("full_well_e", Origin::Measured, shown(full));
             full.value
@@ -57,12 +58,11 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         None => {
             let reached = |class: &ClassFindings| class.curve.iter().map(|point| point.signal_adu).fold(0.0, f64::max);
             let reached = camera.classes.iter().map(reached).fold(0.0, f64::max) / gain.value;
-            told.tell(
-                "full_well_e",
-                Origin::Assumed,
-                format!("no less than what was reached; {}", reason(&camera.classes, "full_well_e")),
-            );
-            reached.max((top - bias_adu.value) / gain.value)
+            let range = (top - bias_adu.value) / gain.value;
+            let why = reason(&camera.classes, "full_well_e");
+            let stands_in = if range > reached { "the range of the converter" } else { "what was reached" };
+            told.tell("full_well_e", Origin::Assumed, format!("{stands_in}; what was reached is {reached:.0}; {why}"));
+            reached.max(range)
         }
     };
     let mut taken = |key: &'static str, from: &'static str| match pooled(from) {
@@ -109,11 +109,9 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     }
     let geometry = &camera.head.geometry;
     let three = geometry.channels.len() > 1;
-    told.tell(
-        "cfa",
-        if metadata.cfa.is_some() || !three { Origin::Measured } else { Origin::Assumed },
-        "of the frames",
-    );
+    let is_told = metadata.cfa.is_some();
+    let of_cfa = if is_told { "said with the frames" } else { "no frame says it" };
+    told.tell("cfa", if is_told { Origin::Measured } else { Origin::Assumed }, of_cfa);
     let whole = |extent: usize| u32::try_from(extent).map_err(|_| lacking("the frames are too large"));
     let readout = ReadOut {
         width: whole(geometry.width)?,
@@ -177,6 +175,11 @@ fn bits_of(top: f64) -> u32 {
 
 /// A number over all classes, each weighted by its certainty.
 fn pooled(classes: &[ClassFindings], key: &str) -> Option<Interval> {
+    pooled_of(classes, key, true)
+}
+
+/// The same; where it need not be `of_all`, over those that have it.
+fn pooled_of(classes: &[ClassFindings], key: &str, of_all: bool) -> Option<Interval> {
     let found: Vec<Interval> = classes.iter().filter_map(|class| class.get(key)).collect();
     let weight = |interval: &Interval| 1.0 / ((interval.high - interval.low) / 2.0).powi(2).max(f64::MIN_POSITIVE);
     let all: f64 = found.iter().map(weight).sum();
@@ -185,7 +188,7 @@ fn pooled(classes: &[ClassFindings], key: &str) -> Option<Interval> {
     let value = mean(|interval| interval.value);
     let narrower = (found.len() as f64).sqrt();
     let [below, above] = [value - mean(|interval| interval.low), mean(|interval| interval.high) - value];
-    (found.len() == classes.len() && !found.is_empty()).then(|| Interval {
+    ((found.len() == classes.len() || !of_all) && !found.is_empty()).then(|| Interval {
         value,
         low: value - below / narrower,
         high: value + above / narrower,

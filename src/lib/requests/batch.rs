@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::formats::places::{STEM, named, numbered, output_of, place, sidecar_path};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// An input, and where what is made of it goes.
@@ -23,7 +23,9 @@ pub struct Job {
 ///
 /// [`Error::Usage`] where two outputs would have one place, or one of several inputs comes through a pipe.
 pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &[Option<&Path>]) -> Result<Vec<Job>> {
+    check_known(frame)?;
     let (Some(first), several) = (inputs.first(), inputs.len() > 1) else {
+        check_named(frame, beside)?;
         let beside = beside.iter().map(|path| path.map(Path::to_owned)).collect();
         let jobs = vec![Job { input: None, frame: frame.map(Path::to_owned), beside }];
         check_directories(&jobs)?;
@@ -32,11 +34,14 @@ pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &
     if several && inputs.iter().any(|input| named(Some(input)).is_none()) {
         return Err(Error::Usage("the standard input cannot be one of several inputs; name a file".into()));
     }
-    if named(Some(first)).is_none() && [&[frame], beside].concat().into_iter().flatten().any(takes_a_name) {
-        let problem =
-            format!("the standard input has no name for {STEM}; name the output, of several frames with {{frame}}");
-        return Err(Error::Usage(problem));
+    if named(Some(first)).is_none() {
+        check_named(frame, beside)?;
     }
+    // A sidecar beside its frame is no frame.
+    let frames: HashSet<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    let is_sidecar = |input: &Path| {
+        input.extension().is_some_and(|end| end == "yaml") && frames.contains(input.with_extension("").as_path())
+    };
     let job = |input: &PathBuf| {
         let of = |pattern: Option<&Path>, extension| {
             pattern.map(|pattern| {
@@ -49,7 +54,7 @@ pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &
             beside: beside.iter().map(|pattern| of(*pattern, "yaml")).collect(),
         }
     };
-    let jobs: Vec<Job> = inputs.iter().map(job).collect();
+    let jobs: Vec<Job> = inputs.iter().filter(|input| !is_sidecar(input)).map(job).collect();
     if several {
         check_apart(&jobs)?;
     }
@@ -67,6 +72,32 @@ fn check_directories(jobs: &[Job]) -> Result<()> {
             return Err(Error::Data(format!("there is no directory `{}`; make it first", directory.display())));
         }
         last = Some(directory);
+    }
+    Ok(())
+}
+
+/// Makes sure that outputs of what comes through a pipe do without its name.
+fn check_named(frame: Option<&Path>, beside: &[Option<&Path>]) -> Result<()> {
+    if !beside.iter().chain([&frame]).flatten().any(|output| takes_a_name(output)) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "the standard input has no name for {STEM} or a directory; name the output, of several frames with {{frame}}"
+    )))
+}
+
+/// Makes sure that a pattern has no places but those for names and numbers that there are.
+fn check_known(pattern: Option<&Path>) -> Result<()> {
+    let text = pattern.map(|pattern| pattern.to_string_lossy().into_owned()).unwrap_or_default();
+    let is_word = |place: &str| !place.is_empty() && place.chars().all(|c| c.is_ascii_alphanumeric() || c == ':');
+    let places = text.split('{').skip(1).filter_map(|rest| Some(rest.split_once('}')?.0));
+    for place in places.filter(|place| is_word(place)) {
+        let whole = format!("{{{place}}}");
+        if whole != STEM && numbered(Path::new(&whole), 0, 0).is_none() {
+            return Err(Error::Usage(format!(
+                "{text}: nothing stands for {whole}; there are {STEM}, {{frame}} and {{index}}, and {{frame:05}} for five digits"
+            )));
+        }
     }
     Ok(())
 }

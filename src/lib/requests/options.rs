@@ -183,6 +183,9 @@ pub struct Output {
     /// What follows it.
     #[arg(skip)]
     pub following: Following,
+    /// Whether no frames go out but reports of them, each of which can stand without the others.
+    #[arg(skip)]
+    pub is_of_reports: bool,
     /// Format; by default that of the file's extension, or EXR; DNG for one plane of ADU alone
     #[arg(long, value_parser = values::choice::<Format>())]
     pub format: Option<Format>,

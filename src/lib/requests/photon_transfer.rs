@@ -4,10 +4,11 @@ use super::described::Described;
 use super::notes::Note;
 use super::values;
 use crate::analysis::photon_transfer::{
-    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, of_class, pattern_view, survey,
+    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, left_in_mean, of_class, pattern_view, survey,
 };
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
+use crate::formats::format::SampleType;
 use crate::formats::frame_list::{self, FrameKind, FrameList, ListedFrame};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::many::OneOfMany;
@@ -76,8 +77,8 @@ impl PhotonTransfer {
     ///
     /// Those of the list and of the frames; [`Error::Data`] for frames that are no measurement.
     pub fn run(&self) -> Result<MeasuredCamera> {
-        if self.photon_error < 0.0 {
-            return Err(Error::Usage("an uncertainty is not negative".into()).give(&["photon_error"]));
+        if !(0.0..1.0).contains(&self.photon_error) {
+            return Err(Error::Usage("an uncertainty is a fraction: 0 or more, and below 1".into()).change(&["photon_error"]));
         }
         let list_name = self.list.display().to_string();
         let is_folder = self.list.is_dir();
@@ -128,6 +129,8 @@ impl PhotonTransfer {
         let surveys = groups.par_iter().enumerate();
         let surveys = surveys.map(|(place, group)| survey_of(group, &described, top, stacks.contains(&place)));
         let mut surveys = surveys.collect::<Result<Vec<_>>>()?;
+        check_array(first, &groups, &surveys)?;
+        notes.extend(doubt_of_codes(&list_name, first, &groups, &surveys));
         let settings = Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes };
         let temperature_k = main_temperature(&groups);
         let classes = classes(first, &groups, &surveys, temperature_k, &settings);
@@ -156,6 +159,58 @@ impl PhotonTransfer {
     }
 }
 
+/// Refuses a plane of unknown array whose sites differ as those behind filters do.
+fn check_array(head: &FrameHeader, groups: &[Group], surveys: &[Survey]) -> Result<()> {
+    /// Sites of one kind differ by less: amplifiers do by one or two in a hundred.
+    const LEAST: f64 = 0.1;
+    if head.metadata.cfa.is_some() || head.geometry.channels.len() > 1 || head.geometry.height < 2 {
+        return Ok(());
+    }
+    let of_kind = |is_lit: bool| {
+        let own = groups.iter().zip(surveys).filter(move |(group, _)| group.condition.is_lit == is_lit);
+        own.map(|(_, survey)| survey)
+    };
+    // The brightest that is not full, above what is there without light.
+    let is_whole = |survey: &&Survey| survey.sites.iter().all(|site| site.at_ends[0] == 0);
+    let brightest = of_kind(true).filter(is_whole).max_by(|a, b| a.sites[0].mean.total_cmp(&b.sites[0].mean));
+    let dark = of_kind(false).next().map_or([0.0; 4], |survey| survey.quad);
+    let Some(bright) = brightest else { return Ok(()) };
+    let signal: Vec<f64> = bright.quad.iter().zip(dark).map(|(bright, dark)| bright - dark).collect();
+    let mean = signal.iter().sum::<f64>() / 4.0;
+    let spread = signal.iter().copied().fold(f64::NEG_INFINITY, f64::max) - signal.iter().copied().fold(f64::INFINITY, f64::min);
+    if mean > 0.0 && spread > LEAST * mean {
+        let shares: Vec<String> = signal.iter().map(|signal| format!("{:.2}", signal / mean)).collect();
+        let problem = format!(
+            "{}: nothing says its filter array, and its photosites see unlike: those of each 2x2 have {} of their mean; for frames \
+             without filters it is monochrome",
+            head.name,
+            shares.join(", ")
+        );
+        return Err(Error::Usage(problem).give(&["cfa"]));
+    }
+    Ok(())
+}
+
+/// What codes look like that is not said of them: shifted, or ending below the code that is said to be the largest.
+fn doubt_of_codes(list: &str, head: &FrameHeader, groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
+    let shift = surveys.iter().fold(0, |bits, survey| bits | survey.bits).trailing_zeros();
+    let shifted = (shift > 0 && shift < u32::BITS).then(|| {
+        format!(
+            "{list}: all codes are multiples of {}, as those that were shifted left by {shift} bits; numbers in ADU are of such codes, and \
+             the error of rounding is taken as too small: shift them back",
+            1_u32 << shift
+        )
+    });
+    let top = head.metadata.white_level_adu.map(|white| white.largest());
+    let lit = groups.iter().zip(surveys).filter(|(group, _)| group.condition.is_lit);
+    let brightest = lit.flat_map(|(_, survey)| &survey.sites).map(|site| site.mean).fold(0.0, f64::max);
+    let end = (1..16).map(|bits| f64::from(bits).exp2() - 1.0).find(|end| (end - brightest).abs() < 0.01);
+    let ended = end.zip(top).filter(|(end, top)| end < top).map(|(end, top)| {
+        format!("{list}: the brightest flats are of the code {end} alone; that is the largest then, and not {top}, which is said to be")
+    });
+    shifted.into_iter().chain(ended).map(Note::Warning).collect()
+}
+
 /// Reads the frames of a condition.
 fn survey_of(group: &Group, described: &Described, top: Option<f64>, keeps: bool) -> Result<Survey> {
     /// Files that other groups may have open meanwhile.
@@ -166,6 +221,11 @@ fn survey_of(group: &Group, described: &Described, top: Option<f64>, keeps: bool
     }
     let found = survey(&mut frames, top, keeps)?;
     for site in &found.sites {
+        if let Some((frame, mean)) = site.frame_means.iter().enumerate().find(|(_, mean)| top.is_some_and(|top| **mean > top)) {
+            let (file, top) = (group.files[frame].display(), top.unwrap_or_default());
+            let problem = format!("{file}: its mean is {mean:.1}, above the largest code, {top}; name the right one");
+            return Err(Error::Usage(problem).change(&["white"]));
+        }
         check_same_light(group, &site.frame_means, top)?;
     }
     Ok(found)
@@ -191,9 +251,23 @@ fn patterns(head: &FrameHeader, class: &ClassFindings, surveys: &[Survey]) -> [O
         let (place, signal) = class.stacks[stack]?;
         surveys[place].picture.as_deref().map(|picture| (picture, signal))
     };
+    // Temporal noise of rows and columns that is left in the means is no pattern.
+    let left = |stack: usize| {
+        let (place, _) = class.stacks[stack]?;
+        let own = sites.iter().zip(&surveys[place].sites).filter(|(site, _)| site.class == class.name);
+        let level = Level::of(place, Condition::default(), own.map(|(_, survey)| survey.clone()).collect());
+        (level.frames >= 2).then(|| left_in_mean(&level))
+    };
+    let [of_flat, of_dark] = [0, 1].map(|stack| left(stack).unwrap_or_default());
+    let without = |mut view: PatternView, left: [f64; 2]| {
+        view.lines.iter_mut().zip(left).for_each(|([variance, _], left)| *variance -= left);
+        view
+    };
     let dark = picture(1).and_then(|(dark, _)| pattern_view(&own, size, &|index| f64::from(dark[index])));
+    let dark = dark.map(|view| without(view, of_dark));
     let light = picture(0).zip(picture(1)).and_then(|((flat, signal), (dark, _))| {
-        pattern_view(&own, size, &|index| (f64::from(flat[index]) - f64::from(dark[index])) / signal)
+        let view = pattern_view(&own, size, &|index| (f64::from(flat[index]) - f64::from(dark[index])) / signal);
+        view.map(|view| without(view, [0, 1].map(|axis| (of_flat[axis] + of_dark[axis]) / (signal * signal))))
     });
     [light, dark]
 }
@@ -229,7 +303,13 @@ fn options(file: &Path) -> InputOptions {
 
 /// The head of a frame, as it is described.
 fn head_of(frame: &ListedFrame, described: &Described) -> Result<FrameHeader> {
-    let mut head = FrameReader::open(&options(&frame.file))?.header().clone();
+    let reader = FrameReader::open(&options(&frame.file))?;
+    let holds_to = reader.sample_type().and_then(SampleType::full_scale).map(f64::from);
+    if let Some((white, full)) = described.white_level_adu.zip(holds_to).filter(|(white, full)| white > full) {
+        let problem = format!("{}: it holds codes to {full}, and the largest is said to be {white}", frame.file.display());
+        return Err(Error::Usage(problem).change(&["white"]));
+    }
+    let mut head = reader.header().clone();
     described.apply(&mut head)?;
     let metadata = &head.metadata;
     let holds = head.holds();
@@ -252,7 +332,10 @@ fn check_alike(first: &FrameHeader, other: &FrameHeader) -> Result<()> {
         let [w, h] = [other.geometry.width, other.geometry.height];
         return Err(other.refuse(format!("it is {w}x{h}, and {} is {width}x{height}", first.name)));
     }
-    if other.geometry.channels.len() != channels.len() || other.metadata.cfa != first.metadata.cfa {
+    if other.geometry.channels.len() != channels.len() {
+        return Err(other.refuse(format!("it holds {}, and {} {}", other.holds(), first.name, first.holds())));
+    }
+    if other.metadata.cfa != first.metadata.cfa {
         return differs("filter array");
     }
     if other.geometry.origin != first.geometry.origin {
@@ -337,6 +420,7 @@ fn in_folder(folder: &Path) -> Result<Vec<ListedFrame>> {
                 exposure_s: None,
                 photons: None,
                 temperature_k: None,
+                temperature_c: None,
                 level: None,
             });
         }

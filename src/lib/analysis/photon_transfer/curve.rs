@@ -11,6 +11,7 @@
 
 use super::fit::{Line, Point, variance_besides};
 use super::level::Level;
+use super::pattern::{Part, fixed};
 use crate::numerics::variance_components::Interval;
 
 /// Variance of the error of rounding, in codes² [EMVA1288, Sec. 2.5].
@@ -76,6 +77,8 @@ pub struct Curve {
     pub saturated: Option<usize>,
     /// Whether the variance of no light is left to the fit, as darks are silent beneath the rounding, clipped, or absent.
     pub is_offset_free: bool,
+    /// Whether there are darks, and their temporal noise is so small that rounding hides it.
+    pub is_silent: bool,
     /// Whether the darks are clipped at 0.
     pub are_darks_clipped: bool,
     rounding: f64,
@@ -121,6 +124,7 @@ impl Curve {
             fitted: Vec::new(),
             saturated: peak(flats),
             is_offset_free: is_silent || are_darks_clipped,
+            is_silent: is_silent && !darks.is_empty(),
             are_darks_clipped,
             rounding,
             weights: Weights::default(),
@@ -209,6 +213,17 @@ impl Curve {
     /// Mean above no light.
     pub fn signal(&self, flat: usize) -> f64 {
         self.flats[flat].mean.value - self.no_light(flat).map_or(0.0, |[mean, _]| mean)
+    }
+
+    /// Whether the mean of no light beneath a flat is known.
+    pub fn knows_black(&self, flat: usize) -> bool {
+        self.no_light(flat).is_some()
+    }
+
+    /// Whether rounding hides what the pattern of a dark is: temporal noise and pattern together do not spread codes enough.
+    pub fn hides(&self, dark: Option<&Level>, confidence: f64) -> bool {
+        let spread = |dark: &Level| dark.variance + fixed(dark, Part::Total, confidence).value;
+        self.is_silent && dark.is_some_and(|dark| spread(dark) < LEAST_VARIANCE)
     }
 
     /// Temporal variance above that of no light; of a curve whose offset is free, all of it.

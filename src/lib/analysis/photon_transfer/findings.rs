@@ -114,7 +114,10 @@ pub fn of_class(
             lacking("it takes two darks or more")
         }
     };
-    let no_photons = || lacking("the photons per photosite of the flats are not known");
+    let are_counted = flats.iter().any(|flat| flat.condition.photons.is_some());
+    let no_photons = || {
+        if are_counted { no_darks() } else { lacking("the photons per photosite of the flats are not known") }
+    };
     let few_times = || lacking("it takes darks at three exposure times or more");
     let gain = number(&|v| Some(v.gain), String::new());
     add("gain_adu_per_e", gain.clone());
@@ -128,9 +131,13 @@ pub fn of_class(
     let parts = [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)];
     let repeated: Vec<&Level> = darks.iter().filter(|dark| dark.frames >= 2).collect();
     let over_gain = |part: Found| -> Found { Ok(over(part?.root(), gain.clone()?)) };
+    // Photosites have the shot noise of dark current too: the shortest darks have the least. Rows and columns have none.
+    let time = |level: &&Level| level.condition.exposure_s.unwrap_or(0.0);
+    let shortest = repeated.iter().map(time).fold(f64::INFINITY, f64::min);
+    let short: Vec<&Level> = repeated.iter().filter(|dark| time(dark) <= shortest).copied().collect();
     for (key, part) in parts {
-        let off = if part == Part::Pixel { rounding } else { 0.0 };
-        let of_part = || temporal(&repeated, part, confidence).map(|variance| variance - off);
+        let (off, of) = if part == Part::Pixel { (rounding, &short) } else { (0.0, &repeated) };
+        let of_part = || temporal(of, part, confidence).map(|variance| variance - off);
         let is_told = !repeated.is_empty() && !curve.is_offset_free;
         add(key, if is_told { over_gain(Ok(of_part())) } else { Err(silent(&curve, no_darks())) });
     }
@@ -167,7 +174,8 @@ pub fn of_class(
     let why = || if curve.is_offset_free { silent(&curve, no_darks()) } else { few_times() };
     add("dark_current_from_variance_e_per_s", number(&from_variance, why()));
     add("dark_current_doubling_k", doubling_temperature(all_darks, confidence));
-    let parted = parted_pattern(darks, confidence);
+    let is_hidden = darks.iter().any(|dark| curve.hides(Some(dark), confidence));
+    let parted = if is_hidden { Err(silent(&curve, no_darks())) } else { parted_pattern(darks, confidence) };
     let offset = parted.clone().map(|[offset, _]| offset);
     add("dsnu_offset_e", over_gain(offset));
     let slope = curve.interval(|values| values.dark_slope, confidence).filter(|slope| slope.low > 0.0);
@@ -199,7 +207,7 @@ pub fn of_class(
 
 /// Why temporal noise of darks is not parted.
 fn silent(curve: &Curve, otherwise: String) -> String {
-    if curve.is_offset_free && !curve.are_darks_clipped {
+    if curve.is_silent && !curve.are_darks_clipped {
         format!("darks have a temporal variance below {LEAST_VARIANCE} codes², which rounding hides")
     } else {
         otherwise
@@ -266,6 +274,10 @@ fn saturation(curve: &Curve, flats: &[Level], gain: Found) -> [Found; 3] {
             || lacking("the variance still rises at the brightest flat: brighter ones, until it falls, would tell");
         return [Err(why()), Err(why()), Err(why())];
     };
+    if !curve.knows_black(peak) {
+        let why = || lacking("the black level is not known: it takes two darks or more");
+        return [Err(why()), Err(why()), Err(why())];
+    }
     // The largest variance lies between the neighbors of the level that has it.
     let [below, above] = [peak.saturating_sub(1), (peak + 1).min(flats.len() - 1)];
     let bracket =
@@ -353,7 +365,13 @@ fn add_patterns(
         ("dsnu_column_e", Part::Column),
         ("dsnu_pixel_e", Part::Pixel),
     ] {
-        add(key, dark.map_or_else(|| Err(no_darks()), |(_, dark)| over_gain(Ok(fixed(dark, part, confidence)))));
+        let hidden = || curve.hides(dark.map(|(_, dark)| dark), confidence);
+        let result = match dark {
+            Some(_) if hidden() => Err(silent(curve, no_darks())),
+            Some((_, dark)) => over_gain(Ok(fixed(dark, part, confidence))),
+            None => Err(no_darks()),
+        };
+        add(key, result);
     }
 }
 

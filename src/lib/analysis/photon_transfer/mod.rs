@@ -20,6 +20,7 @@ pub use findings::{ClassFindings, CurvePoint, Finding, KEYS, Settings, of_class}
 pub use fit::Line;
 pub use level::{Condition, Level};
 pub use linearity::Linearity;
+pub use pattern::left_in_mean;
 pub use sites::Site;
 pub use survey::{SiteSurvey, Survey, survey};
 pub use view::{OUTSTANDING, Outlier, PatternView, pattern_view};

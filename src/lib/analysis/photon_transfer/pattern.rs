@@ -74,6 +74,13 @@ pub fn of_light(flat: &Level, dark: &Level, part: Part, confidence: f64) -> Inte
     combination(&found, confidence)
 }
 
+/// What temporal noise of whole columns, and of whole rows, leaves in the mean of a level's frames: variances.
+pub fn left_in_mean(level: &Level) -> [f64; 2] {
+    /// The value hangs on none.
+    const ANY: f64 = 0.95;
+    [Part::Column, Part::Row].map(|part| temporal(&[level], part, ANY).value.max(0.0) / level.frames as f64)
+}
+
 /// Variance that a part of the temporal noise has, over several levels that have it alike.
 pub fn temporal(levels: &[&Level], part: Part, confidence: f64) -> Interval {
     let weight = |level: &Level| level.frames as f64 - 1.0;

@@ -60,6 +60,10 @@ pub struct Survey {
     pub sites: Vec<SiteSurvey>,
     /// The mean of the frames, laid out as `[row][channel][column]`, where it was kept.
     pub picture: Option<Vec<f32>>,
+    /// The bits that codes have, of the first rows.
+    pub bits: u32,
+    /// Means of the sites of each 2x2, row by row, of the first rows of the first frame's first plane.
+    pub quad: [f64; 4],
 }
 
 /// Reads all rows of frames of one condition, which are alike; at two or more. `top` is the largest code, where it is known; the
@@ -82,13 +86,17 @@ pub fn survey<S: RowSource>(frames: &mut [S], top: Option<f64>, keeps: bool) -> 
     let step = frames.iter().map(|frame| geometry.band_rows(frame.natural_rows(), 1)).max().unwrap_or(1).max(1);
     let mut bands: Vec<Vec<f32>> = vec![Vec::new(); frames.len()];
     let mut sums: Vec<f64> = Vec::new();
-    let mut done = 0;
+    let (mut done, mut bits, mut quad) = (0, 0, [0.0; 4]);
     while done < geometry.height {
         let rows = step.min(geometry.height - done);
         frames.par_iter_mut().zip(&mut bands).try_for_each(|(frame, band)| {
             band.clear();
             frame.read(rows, band)
         })?;
+        if done == 0 {
+            bits = bands.iter().flatten().fold(0, |bits, sample| bits | whole(*sample));
+            quad = quad_of(&bands[0], geometry.row_samples(), geometry.width);
+        }
         for row in 0..rows {
             for (site, tally) in sites.iter().zip(&mut tallies).filter(|(site, _)| site.is_in_row(done + row)) {
                 let from = (row * planes + site.plane) * geometry.width;
@@ -109,7 +117,27 @@ pub fn survey<S: RowSource>(frames: &mut [S], top: Option<f64>, keeps: bool) -> 
     if sites.iter().any(|site| !(site.mean.is_finite() && site.variance.is_finite())) {
         return Err(Error::format(&header.name, "it, or one with it, holds samples that are not finite"));
     }
-    Ok(Survey { geometry, sites, picture })
+    Ok(Survey { geometry, sites, picture, bits, quad })
+}
+
+/// A sample as a code; of what is no whole number all bits.
+fn whole(sample: f32) -> u32 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "what does not fit is no code")]
+    let code = sample as u32;
+    if f64::from(code) == f64::from(sample) { code } else { u32::MAX }
+}
+
+/// Means of the sites of each 2x2 of the first plane of some rows.
+fn quad_of(band: &[f32], row_samples: usize, width: usize) -> [f64; 4] {
+    let (mut sums, mut counts) = ([0.0; 4], [0_u32; 4]);
+    for (y, row) in band.chunks_exact(row_samples).enumerate() {
+        for (x, sample) in row[..width].iter().enumerate() {
+            let site = y % 2 * 2 + x % 2;
+            sums[site] += f64::from(*sample);
+            counts[site] += 1;
+        }
+    }
+    [0, 1, 2, 3].map(|site| sums[site] / f64::from(counts[site].max(1)))
 }
 
 /// Fewer rows or columns have no variance between them worth the name.
