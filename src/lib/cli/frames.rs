@@ -83,6 +83,7 @@ impl Session {
         work: impl Fn(&Turn<'_>) -> Result<()> + Sync,
     ) -> Result<()> {
         let jobs = batch::jobs(&input.inputs, output.output.as_deref(), output.extension(), &[])?;
+        batch::check_directories(&jobs)?;
         let session = self.among(&input.inputs);
         let drawn = exposures.clone().map_or(1, |range| range.len());
         if let Some(path) = output.output.as_deref().filter(|path| drawn > 1 && !output.is_stream() && !is_numbered(path)) {

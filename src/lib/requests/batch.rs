@@ -27,9 +27,7 @@ pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &
     let (Some(first), several) = (inputs.first(), inputs.len() > 1) else {
         check_named(frame, beside)?;
         let beside = beside.iter().map(|path| path.map(Path::to_owned)).collect();
-        let jobs = vec![Job { input: None, frame: frame.map(Path::to_owned), beside }];
-        check_directories(&jobs)?;
-        return Ok(jobs);
+        return Ok(vec![Job { input: None, frame: frame.map(Path::to_owned), beside }]);
     };
     if several && inputs.iter().any(|input| named(Some(input)).is_none()) {
         return Err(Error::Usage("the standard input cannot be one of several inputs; name a file".into()));
@@ -58,13 +56,16 @@ pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &
     if several {
         check_apart(&jobs)?;
     }
-    check_directories(&jobs)?;
     Ok(jobs)
 }
 
 /// Makes sure that the directories of frames are there, before each frame complains of its own; those whose names hold numbers are
 /// not known yet.
-fn check_directories(jobs: &[Job]) -> Result<()> {
+///
+/// # Errors
+///
+/// [`Error::Data`] that names the first which is not.
+pub fn check_directories(jobs: &[Job]) -> Result<()> {
     let mut last = None;
     for directory in jobs.iter().filter_map(|job| named(job.frame.as_deref())?.parent()) {
         let is_known = !directory.as_os_str().is_empty() && numbered(directory, 0, 0).is_none();
