@@ -47,8 +47,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let frames = &arguments.input.frame;
     let reports = Output { is_of_reports: true, ..Output::default() };
     let findings = Findings::new(arguments.output_format, frames.inputs.len() > 1, arguments.output.clone());
-    let measured =
-        session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
+    let measured = session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
     measured.and(findings.end())
 }
 

@@ -86,8 +86,11 @@ impl Session {
         batch::check_directories(&jobs)?;
         let session = self.among(&input.inputs);
         let drawn = exposures.clone().map_or(1, |range| range.len());
-        if let Some(path) = output.output.as_deref().filter(|path| drawn > 1 && !output.is_stream() && !is_numbered(path)) {
-            let problem = format!("{}: {drawn} exposures would go there; name the output with {{frame}}", path.display());
+        if let Some(path) =
+            output.output.as_deref().filter(|path| drawn > 1 && !output.is_stream() && !is_numbered(path))
+        {
+            let problem =
+                format!("{}: {drawn} exposures would go there; name the output with {{frame}}", path.display());
             return Err(Error::Usage(problem));
         }
         // Frames of a stream, and those that go into one, have an order; so have those of a single file that holds several.

@@ -88,7 +88,10 @@ pub fn read(path: &Path) -> Result<FrameList> {
         }
         check(&name, frame)?;
         if !seen.insert(frame.file.clone()) {
-            return Err(Error::format(&name, format!("{} is listed twice; frames of a pair are two files", frame.file.display())));
+            return Err(Error::format(
+                &name,
+                format!("{} is listed twice; frames of a pair are two files", frame.file.display()),
+            ));
         }
     }
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -113,7 +116,9 @@ fn check(name: &str, frame: &ListedFrame) -> Result<()> {
         }
     }
     if let Some(kelvin) = frame.temperature_k.filter(|kelvin| *kelvin < LEAST_TEMPERATURE_K) {
-        let problem = format!("`temperature_k` of {file} is {kelvin}, which looks like degrees Celsius; `temperature_c` takes these");
+        let problem = format!(
+            "`temperature_k` of {file} is {kelvin}, which looks like degrees Celsius; `temperature_c` takes these"
+        );
         return Err(Error::format(name, problem));
     }
     match frame.photons {

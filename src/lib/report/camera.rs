@@ -3,6 +3,7 @@
 use super::{in_digits, table, unwritable};
 use crate::analysis::photon_transfer::{ClassFindings, Finding, OUTSTANDING, PatternView};
 use crate::error::Result;
+use crate::formats::places::named;
 use crate::formats::plots::{PlotFormat, write_plot};
 use crate::formats::{output, register, yaml_writer};
 use crate::names::Named;
@@ -13,7 +14,7 @@ use crate::text::{counted, visible};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The form of a report of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +51,7 @@ pub struct CameraOutputs {
     /// Draw photon transfer, response, linearity, signal to noise, and the patterns, as SVG or PNG
     #[arg(long, value_name = "FILE.svg|png")]
     pub plot: Option<PathBuf>,
-    /// Write what was measured as a sensor file, for --sensor, which says of each number whether it was measured, derived or assumed
+    /// Write what was measured as a sensor file, for --sensor, by the name of the file, which says of each number whether it was measured, derived or assumed
     #[arg(long, value_name = "FILE")]
     pub sensor_out: Option<PathBuf>,
     /// File for the report; by default standard output
@@ -80,11 +81,14 @@ impl CameraOutputs {
         if let Some(plot) = &self.plot {
             write_plot(plot, &super::camera_page(camera))?;
         }
-        if let Some(path) = &self.sensor_out {
-            let sensor = super::sensor_of(camera)?;
-            output::write_text(Some(path), &yaml_writer::write("the sensor", &sensor)?)?;
+        // What was measured is told whether or not a sensor follows.
+        output::write_text(self.output.as_deref(), &camera_report(camera, self.output_format)?)?;
+        let Some(path) = &self.sensor_out else { return Ok(()) };
+        let mut sensor = super::sensor_of(camera)?;
+        if let Some(stem) = named(Some(path)).and_then(Path::file_stem) {
+            sensor.name = stem.to_string_lossy().into_owned();
         }
-        output::write_text(self.output.as_deref(), &camera_report(camera, self.output_format)?)
+        output::write_text(Some(path), &yaml_writer::write("the sensor", &sensor)?)
     }
 }
 

@@ -78,7 +78,9 @@ impl PhotonTransfer {
     /// Those of the list and of the frames; [`Error::Data`] for frames that are no measurement.
     pub fn run(&self) -> Result<MeasuredCamera> {
         if !(0.0..1.0).contains(&self.photon_error) {
-            return Err(Error::Usage("an uncertainty is a fraction: 0 or more, and below 1".into()).change(&["photon_error"]));
+            return Err(
+                Error::Usage("an uncertainty is a fraction: 0 or more, and below 1".into()).change(&["photon_error"])
+            );
         }
         let list_name = self.list.display().to_string();
         let is_folder = self.list.is_dir();
@@ -141,6 +143,15 @@ impl PhotonTransfer {
         }
         let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys)).collect();
         for class in &classes {
+            if let Some(efficiency) = class.get("quantum_efficiency").filter(|efficiency| efficiency.low > 1.0) {
+                notes.push(Note::Warning(format!(
+                    "{}: a quantum efficiency of {:.0} % cannot be: photons are those of a photosite during the exposure, and codes \
+                     proportional to light",
+                    class.name,
+                    efficiency.value * 100.0
+                )));
+            }
+            notes.extend(class.doubts.iter().map(|doubt| Note::Warning(format!("{}: {doubt}", class.name))));
             notes.extend(class.notes.iter().map(|note| Note::Remark(format!("{}: {note}", class.name))));
         }
         let count = |is_lit: bool| {
@@ -177,7 +188,8 @@ fn check_array(head: &FrameHeader, groups: &[Group], surveys: &[Survey]) -> Resu
     let Some(bright) = brightest else { return Ok(()) };
     let signal: Vec<f64> = bright.quad.iter().zip(dark).map(|(bright, dark)| bright - dark).collect();
     let mean = signal.iter().sum::<f64>() / 4.0;
-    let spread = signal.iter().copied().fold(f64::NEG_INFINITY, f64::max) - signal.iter().copied().fold(f64::INFINITY, f64::min);
+    let spread =
+        signal.iter().copied().fold(f64::NEG_INFINITY, f64::max) - signal.iter().copied().fold(f64::INFINITY, f64::min);
     if mean > 0.0 && spread > LEAST * mean {
         let shares: Vec<String> = signal.iter().map(|signal| format!("{:.2}", signal / mean)).collect();
         let problem = format!(
@@ -221,7 +233,9 @@ fn survey_of(group: &Group, described: &Described, top: Option<f64>, keeps: bool
     }
     let found = survey(&mut frames, top, keeps)?;
     for site in &found.sites {
-        if let Some((frame, mean)) = site.frame_means.iter().enumerate().find(|(_, mean)| top.is_some_and(|top| **mean > top)) {
+        if let Some((frame, mean)) =
+            site.frame_means.iter().enumerate().find(|(_, mean)| top.is_some_and(|top| **mean > top))
+        {
             let (file, top) = (group.files[frame].display(), top.unwrap_or_default());
             let problem = format!("{file}: its mean is {mean:.1}, above the largest code, {top}; name the right one");
             return Err(Error::Usage(problem).change(&["white"]));
@@ -306,7 +320,8 @@ fn head_of(frame: &ListedFrame, described: &Described) -> Result<FrameHeader> {
     let reader = FrameReader::open(&options(&frame.file))?;
     let holds_to = reader.sample_type().and_then(SampleType::full_scale).map(f64::from);
     if let Some((white, full)) = described.white_level_adu.zip(holds_to).filter(|(white, full)| white > full) {
-        let problem = format!("{}: it holds codes to {full}, and the largest is said to be {white}", frame.file.display());
+        let problem =
+            format!("{}: it holds codes to {full}, and the largest is said to be {white}", frame.file.display());
         return Err(Error::Usage(problem).change(&["white"]));
     }
     let mut head = reader.header().clone();

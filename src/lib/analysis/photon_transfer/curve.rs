@@ -215,6 +215,16 @@ impl Curve {
         self.flats[flat].mean.value - self.no_light(flat).map_or(0.0, |[mean, _]| mean)
     }
 
+    /// The exposure times in s of a flat and of the only darks, where these stand beneath it and are another's.
+    pub fn other_time(&self) -> Option<[f64; 2]> {
+        let differ = |(flat, beneath): (&Point4, &Beneath)| {
+            let Beneath::Dark(dark) = beneath else { return None };
+            let [of_flat, of_dark] = [flat.exposure_s?, self.darks[*dark].exposure_s?];
+            ((of_dark - of_flat).abs() > SAME_TIME * of_flat.abs()).then_some([of_flat, of_dark])
+        };
+        self.flats.iter().zip(&self.beneath).find_map(differ)
+    }
+
     /// Whether the mean of no light beneath a flat is known.
     pub fn knows_black(&self, flat: usize) -> bool {
         self.no_light(flat).is_some()

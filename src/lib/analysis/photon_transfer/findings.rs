@@ -66,6 +66,8 @@ pub struct ClassFindings {
     pub stacks: [Option<(usize, f64)>; 2],
     /// What a careful user should know.
     pub notes: Vec<String>,
+    /// What may make numbers wrong.
+    pub doubts: Vec<String>,
 }
 
 impl ClassFindings {
@@ -102,6 +104,7 @@ pub fn of_class(
             values: None,
             stacks: [None; 2],
             notes: Vec::new(),
+            doubts: Vec::new(),
         };
     };
     let mut found = Vec::new();
@@ -127,7 +130,10 @@ pub fn of_class(
     add("black_level_adu", number(&|v| v.dark_mean, no_darks()));
     add("dark_noise_adu", number(&|v| v.dark_variance, no_darks()).map(Interval::root));
     let read_variance = |v: &Values| Some((v.dark_variance? - rounding) / (v.gain * v.gain));
-    add("dark_noise_e", number(&read_variance, no_darks()).map(Interval::root));
+    // Beneath the rounding nothing is left to tell.
+    let read = number(&read_variance, no_darks());
+    let read = read.and_then(|read| if read.high > 0.0 { Ok(read) } else { Err(silent(&curve, no_darks())) });
+    add("dark_noise_e", read.map(Interval::root));
     let parts = [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)];
     let repeated: Vec<&Level> = darks.iter().filter(|dark| dark.frames >= 2).collect();
     let over_gain = |part: Found| -> Found { Ok(over(part?.root(), gain.clone()?)) };
@@ -194,6 +200,13 @@ pub fn of_class(
     });
     let (curve_points, values) = (points.collect(), curve.values());
     let notes = notes(&curve, flats);
+    let other_time = |[flat, dark]: [f64; 2]| {
+        format!(
+            "flats of {flat} s stand above darks of {dark} s, as there are none of their exposure: black level and dark noise are those \
+             of the darks"
+        )
+    };
+    let doubts = curve.other_time().map(other_time).into_iter().collect();
     ClassFindings {
         name: name.into(),
         findings: found,
@@ -202,6 +215,7 @@ pub fn of_class(
         values,
         stacks: places,
         notes,
+        doubts,
     }
 }
 
