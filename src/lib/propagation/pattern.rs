@@ -306,8 +306,8 @@ impl<'a> Temporal<'a> {
         }
         let elsewhere = other * across.rate;
         let noise_e = self.law.read_noise_e;
-        let [lower, upper] = self.reading.rails_e();
-        let levels = [(self.law.full_well_e, 0.0), (lower, noise_e), (upper, noise_e)];
+        let rails = self.law.jumps().into_iter().flat_map(|(_, offset_e)| self.reading.off_by(offset_e).rails_e());
+        let levels = std::iter::once((self.law.full_well_e, 0.0)).chain(rails.map(|rail| (rail, noise_e)));
         let knee = |(level, noise_e): (f64, f64)| {
             let own = (level - elsewhere).max(0.0);
             let shot = |axis: Axis, variance: f64| if axis.is_shot { variance } else { 0.0 };
@@ -316,7 +316,7 @@ impl<'a> Temporal<'a> {
             Knee { z, width: (of_shot + noise_e * noise_e + spread_e * spread_e).sqrt() / axis.spread() }
         };
         let is_near = |knee: &Knee| knee.z.abs() < REACH * (1.0 + knee.width) + 1.0;
-        levels.into_iter().filter(|(level, _)| level.is_finite()).map(knee).filter(is_near).collect()
+        levels.filter(|(level, _)| level.is_finite()).map(knee).filter(is_near).collect()
     }
 
     /// Moments at sensitivities x and y: of the median, or the mean and none else.
@@ -333,9 +333,20 @@ impl<'a> Temporal<'a> {
                 let near = ends.code(adc.level_at(expected_e));
                 median(count, near, at_least, |code| adc.sample(code) - self.reading.center)
             }
+            _ if self.law.trap_e > 0.0 => [self.over_jumps(x, y, is_affordable), 0.0, 0.0, 0.0],
             _ if is_affordable => [self.sum(self.reading, self.at_full, x, y), 0.0, 0.0, 0.0],
             _ => [self.edgeworth(x, y), 0.0, 0.0, 0.0],
         }
+    }
+
+    /// The mean of readings that jump.
+    fn over_jumps(&self, x: f64, y: f64, is_affordable: bool) -> f64 {
+        let law = Law { trap_e: 0.0, ..*self.law };
+        let mean = |(share, offset_e): (f64, f64)| {
+            let seen = Seen { law, reading: self.reading.off_by(offset_e), median_of: None, is_fine: self.is_fine };
+            share * Temporal::of(&seen).at(x, y, is_affordable)[0]
+        };
+        self.law.jumps().into_iter().map(mean).sum()
     }
 
     /// The probability that charge and read noise are no less than a level.
@@ -401,7 +412,7 @@ impl<'a> Temporal<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::noise::{LineNoise, NoiseModel};
+    use crate::stages::noise::{LineNoise, NoiseModel, Tails};
 
     /// Of dark current that fills three of four wells, and none in one: what is left of the variance beside the pattern is the
     /// mean variance of a photosite over exposures, which a fine sum over sensitivities gives by itself.
@@ -422,6 +433,7 @@ mod tests {
                 signal_shot: true,
                 poisson: PoissonKind::Exact,
                 lines: LineNoise::default(),
+                tails: Tails::default(),
             };
             let law = Law::of(&model, light_e);
             let reading = law.of_electrons();
