@@ -179,7 +179,7 @@ impl Photosite {
     /// The variance of its samples by cause, in e² or ADU².
     pub fn budget(&self, expected_e: f64) -> Budget {
         if self.has_tails() {
-            return self.mixed_budget(expected_e, |site| site.budget(expected_e));
+            return self.mixed_budget(expected_e);
         }
         match self.adc {
             Some(adc) if self.darks[0].is_some() => self.less_dark_budget(&adc, expected_e),

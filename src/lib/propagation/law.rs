@@ -238,7 +238,7 @@ impl Law {
     }
 
     /// The same with read noise.
-    fn reach(&self) -> [f64; 2] {
+    pub fn reach(&self) -> [f64; 2] {
         let (noise_e, [least, most]) = (REACH * self.read_noise_e + self.trap_e, self.extent());
         [least - noise_e, most + noise_e]
     }

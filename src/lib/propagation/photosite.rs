@@ -107,7 +107,7 @@ impl Photosite {
     /// Mean and variance of its samples over the photosites of a frame, before any division by a flat field.
     pub fn moments(&self, expected_e: f64) -> Prediction {
         if self.has_tails() {
-            return self.mixed(expected_e, |site| site.moments(expected_e));
+            return self.mixed(expected_e);
         }
         match self.adc {
             None => self.electrons(expected_e),

@@ -15,6 +15,7 @@ use super::charge::charge;
 use super::law::Law;
 use super::lines::blur_e;
 use super::masters::Dark;
+use super::memory::Memory;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::unpredictable::{Predicted, Unpredictable};
@@ -62,12 +63,20 @@ const REACH: f64 = 40.0;
 /// Values of what photosites differ in that are gone through at most.
 const MOST_NODES: usize = 6000;
 
-/// What a kind of photosites has beyond others, in units of the means, and its share.
+/// What a kind of photosites has beyond others, in units of the means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct State {
-    weight: f64,
     hot: f64,
     trap: f64,
+}
+
+/// What holds for a kind of photosites, and their share.
+#[derive(Debug, Clone, Copy)]
+struct Kind<T> {
+    weight: f64,
+    /// Whether jumps come to it as an error of its own.
+    is_free: bool,
+    value: T,
 }
 
 /// Where what is read bends, and over what width.
@@ -100,7 +109,7 @@ fn laguerre(nodes: usize) -> Vec<(f64, f64)> {
 /// Places and weights of an exponential number of mean 1 for a function that bends at `knees`; none of too many.
 fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
     static SMOOTH_NODES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(10));
-    const WIDEST: f64 = 3.0;
+    const WIDEST: f64 = 4.0;
     const NARROWEST: f64 = 1e-4;
     let near: Vec<&Knee> =
         knees.iter().filter(|knee| knee.at < REACH + 12.0 * knee.width && knee.at > -12.0 * knee.width).collect();
@@ -114,7 +123,7 @@ fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
         let mut distance = 2.5 * knee.width.max(NARROWEST);
         while distance < REACH {
             ends.extend([knee.at - distance, knee.at + distance]);
-            distance *= 2.5;
+            distance *= 3.0;
         }
     }
     if let Some(Codes { period, until }) = codes {
@@ -133,7 +142,7 @@ fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
     ends.dedup_by(|next, kept| *next - *kept < 1e-7);
     let of_panel = |pair: &[f64]| panel(pair[0], pair[1]).map(|(t, weight)| (t, weight * (-t).exp())).collect::<Vec<_>>();
     let mut found: Vec<(f64, f64)> = ends.windows(2).flat_map(of_panel).collect();
-    found.retain(|(_, weight)| *weight > 1e-18);
+    found.retain(|(_, weight)| *weight > 1e-14);
     Some(found)
 }
 
@@ -183,7 +192,12 @@ impl Photosite {
                 return beyond(FINE_DARKS);
             }
         }
-        if expected_e.iter().any(|expected_e| self.states(*expected_e).is_none()) {
+        let amplitude_e = self.most(|tails| tails.rts_e);
+        let is_too_fine = |expected_e: f64| {
+            self.hot_nodes(expected_e).is_none()
+                || self.trap_nodes(expected_e).is_none() && self.jumps_show(expected_e, amplitude_e)
+        };
+        if expected_e.into_iter().any(is_too_fine) {
             return beyond(TOO_FINE);
         }
         Ok(())
@@ -195,28 +209,72 @@ impl Photosite {
         Self { model: self.model.at(state), darks, ..*self }
     }
 
-    /// The kinds of photosites, as many as moments need; none where rounding would need too many.
-    fn states(&self, expected_e: f64) -> Option<Vec<State>> {
-        let share = |of: fn(&Tails) -> f64| self.models().map(|model| of(&model.tails)).fold(0.0, f64::max);
-        let [hot_share, trap_share] = [share(|tails| tails.hot_share), share(|tails| tails.rts_share)];
-        let hot = if hot_share > 0.0 { self.hot_nodes(expected_e)? } else { Vec::new() };
-        let traps = if trap_share > 0.0 { self.trap_nodes(expected_e)? } else { Vec::new() };
-        let few = laguerre(6);
-        let state = |weight: f64, hot: f64, trap: f64| State { weight, hot, trap };
-        let mut found = vec![state((1.0 - hot_share) * (1.0 - trap_share), 0.0, 0.0)];
-        found.extend(hot.iter().map(|(t, weight)| state(hot_share * (1.0 - trap_share) * weight, *t, 0.0)));
-        found.extend(traps.iter().map(|(s, weight)| state((1.0 - hot_share) * trap_share * weight, 0.0, *s)));
-        if trap_share > 0.0 {
-            let both = hot_share * trap_share;
-            let of_hot = |&(t, weight): &(f64, f64)| {
-                few.iter().map(move |(s, of_trap)| state(both * weight * of_trap, t, *s)).collect::<Vec<_>>()
-            };
-            found.extend(hot.iter().flat_map(of_hot));
+    /// That of the frames which have it.
+    fn most(&self, of: fn(&Tails) -> f64) -> f64 {
+        self.models().map(|model| of(&model.tails)).fold(0.0, f64::max)
+    }
+
+    /// What holds for each kind of photosites: those that jump apart only where jumps show how codes are rounded, or end.
+    fn each<T>(&self, expected_e: f64, of: impl Fn(&Self) -> T) -> Vec<Kind<T>> {
+        let [hot_share, trap_share] = [self.most(|tails| tails.hot_share), self.most(|tails| tails.rts_share)];
+        let mut kinds = vec![(0.0, 1.0 - hot_share)];
+        if hot_share > 0.0 {
+            let nodes = self.hot_nodes(expected_e).unwrap_or_default();
+            kinds.extend(nodes.iter().map(|(t, weight)| (*t, hot_share * weight)));
         }
-        found.retain(|state| state.weight > 1e-22);
-        let sum: f64 = found.iter().map(|state| state.weight).sum();
-        found.iter_mut().for_each(|state| state.weight /= sum);
-        Some(found)
+        let sum: f64 = kinds.iter().map(|(_, weight)| weight).sum();
+        let mut found = Vec::new();
+        for (hot, weight) in kinds.into_iter().map(|(t, weight)| (t, weight / sum)) {
+            let quiet = self.at(&State { hot, trap: 0.0 });
+            let jumps_apart = trap_share > 0.0 && quiet.jumps_show(expected_e, self.most(|tails| tails.rts_e));
+            let is_free = trap_share > 0.0 && !jumps_apart;
+            let share = if jumps_apart { 1.0 - trap_share } else { 1.0 };
+            found.push(Kind { weight: weight * share, is_free, value: of(&quiet) });
+            if !jumps_apart {
+                continue;
+            }
+            let traps = if hot == 0.0 { self.trap_nodes(expected_e).unwrap_or_default() } else { laguerre(6) };
+            let all: f64 = traps.iter().map(|(_, weight)| weight).sum();
+            for (trap, of_trap) in traps {
+                let weight = weight * trap_share * of_trap / all;
+                found.push(Kind { weight, is_free: false, value: of(&self.at(&State { hot, trap })) });
+            }
+        }
+        found
+    }
+
+    /// Whether jumps of this mean amplitude end with the codes, or show how these are rounded.
+    fn jumps_show(&self, expected_e: f64, amplitude_e: f64) -> bool {
+        /// Standard deviation of what blurs codes from which rounding is a uniform error to 3·10⁻⁶ of a squared code.
+        const BLURRED: f64 = 0.8;
+        let Some(adc) = self.adc else { return false };
+        let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
+        self.frames(expected_e).any(|(model, light_e)| {
+            let law = Law::of(model, light_e);
+            let own = if law.reaches_full_well() { model.added() } else { blur_e(model, &adc, light_e) };
+            let [low, high] = law.reach();
+            let high = high.min(model.full_well_e + 9.0 * model.added());
+            adc.adu_per_e * own < BLURRED || low - REACH * amplitude_e < lower || high + REACH * amplitude_e > upper
+        })
+    }
+
+    /// Cumulants 2, 4 and 6 of what jumps add to samples, those of averages that came off included: given its amplitude a, what is
+    /// drawn anew in a frame has a²/2, −a⁴/4 and a⁶/2.
+    fn jump_cumulants(&self) -> [f64; 3] {
+        let [rts_share, rts_e] = [self.most(|tails| tails.rts_share), self.most(|tails| tails.rts_e)];
+        let mut given = if self.model.tails.has_rts() { [0.5, -0.25, 0.5] } else { [0.0; 3] };
+        for dark in self.darks.iter().flatten().filter(|dark| dark.model.tails.has_rts()) {
+            let frames = f64::from(dark.frames.max(1));
+            given[0] += 0.5 * dark.weight.powi(2) / frames;
+            given[1] -= 0.25 * dark.weight.powi(4) / frames.powi(3);
+            given[2] += 0.5 * dark.weight.powi(6) / frames.powi(5);
+        }
+        let [second, fourth, sixth] = given;
+        let square = (rts_e * self.slope()).powi(2);
+        let m2 = rts_share * 2.0 * square * second;
+        let m4 = rts_share * 24.0 * square.powi(2) * (fourth + 3.0 * second * second);
+        let m6 = rts_share * 720.0 * square.powi(3) * (sixth + 15.0 * fourth * second + 15.0 * second.powi(3));
+        [m2, m4 - 3.0 * m2 * m2, m6 - 15.0 * m4 * m2 + 30.0 * m2.powi(3)]
     }
 
     /// The frames that a sample follows from: their noise, and the light in them.
@@ -269,7 +327,7 @@ impl Photosite {
             let width = (cold.variance + model.added().powi(2)).sqrt();
             let ends = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
             knees.extend(ends.map(|end| Knee { at: (end - mean_e).abs() / amplitude_e, width: width / amplitude_e }));
-            let quiet = model.at(&State { weight: 1.0, hot: 0.0, trap: 0.0 });
+            let quiet = model.at(&State { hot: 0.0, trap: 0.0 });
             if adc.adu_per_e * blur_e(&quiet, &adc, light_e) < SMOOTH {
                 codes = Some(Codes { period: 1.0 / adc.adu_per_e / amplitude_e, until: f64::INFINITY });
             }
@@ -277,35 +335,48 @@ impl Photosite {
         nodes(&knees, codes)
     }
 
-    /// The moments of all kinds of photosites together, `of` those of one.
-    pub(super) fn mixed(&self, expected_e: f64, of: impl Fn(&Self) -> Prediction) -> Prediction {
-        let parts: Vec<(f64, Prediction)> = self.each(expected_e, |site| {
-            let found = of(site);
+    /// Moments of the samples of all kinds of photosites together.
+    pub(super) fn mixed(&self, expected_e: f64) -> Prediction {
+        thread_local! { static KNOWN: Memory<(Photosite, f64), Prediction> = const { Memory::new() }; }
+        KNOWN.with(|known| known.recall((*self, expected_e), |(site, expected_e)| site.work_out(*expected_e)))
+    }
+
+    fn work_out(&self, expected_e: f64) -> Prediction {
+        let [second, fourth, sixth] = self.jump_cumulants();
+        let with_jumps = |kind: Kind<Prediction>| {
+            let Kind { weight, is_free, value } = kind;
+            if !is_free {
+                return (weight, value);
+            }
+            let (variance, of_fourth) = (value.moments.variance + second, value.fourth() + fourth);
+            let with = Prediction::of_cumulants(value.moments.mean, variance, value.third, of_fourth);
+            (weight, Prediction { sixth: value.sixth + sixth, ..with })
+        };
+        let kinds = self.each(expected_e, |site| {
             // Sixth cumulant of −a, 0 or a.
             let trap = 0.5 * (site.slope() * site.model.tails.trap_e).powi(6);
-            Prediction { sixth: found.sixth + trap, ..found }
+            Prediction { sixth: trap, ..site.moments(expected_e) }
         });
+        let parts: Vec<(f64, Prediction)> = kinds.into_iter().map(with_jumps).collect();
         mixture(&parts)
     }
 
-    /// What holds for each kind of photosites, and their weights; of the most where there are too many.
-    fn each<T>(&self, expected_e: f64, of: impl Fn(&Self) -> T) -> Vec<(f64, T)> {
-        let most = State { weight: 1.0, hot: 0.0, trap: 0.0 };
-        let states = self.states(expected_e).unwrap_or_else(|| vec![most]);
-        states.iter().map(|state| (state.weight, of(&self.at(state)))).collect()
-    }
-
-    /// The mean of a number over all kinds of photosites.
+    /// The mean over all kinds of photosites of a number that jumps do not change where they are free.
     pub(super) fn mean_of(&self, expected_e: f64, of: impl Fn(&Self) -> f64) -> f64 {
-        self.each(expected_e, of).iter().map(|(weight, value)| weight * value).sum()
+        self.each(expected_e, of).iter().map(|kind| kind.weight * kind.value).sum()
     }
 
     /// The variance by cause: the mean over all kinds of photosites, and that of their means, which hot pixels make.
-    pub(super) fn mixed_budget(&self, expected_e: f64, of: impl Fn(&Self) -> Budget) -> Budget {
-        let parts = self.each(expected_e, |site| (of(site), site.moments(expected_e).moments.mean));
-        let mean: f64 = parts.iter().map(|(weight, (_, mean))| weight * mean).sum();
-        let mut budget = Cause::ALL.map(|cause| parts.iter().map(|(w, (budget, _))| w * budget[cause as usize]).sum());
-        budget[Cause::HotPixels as usize] += parts.iter().map(|(w, (_, of))| w * (of - mean).powi(2)).sum::<f64>();
+    pub(super) fn mixed_budget(&self, expected_e: f64) -> Budget {
+        let [jumps, ..] = self.jump_cumulants();
+        let kinds = self.each(expected_e, |site| (site.budget(expected_e), site.moments(expected_e).moments.mean));
+        let mean: f64 = kinds.iter().map(|kind| kind.weight * kind.value.1).sum();
+        let mut budget =
+            Cause::ALL.map(|cause| kinds.iter().map(|kind| kind.weight * kind.value.0[cause as usize]).sum::<f64>());
+        for kind in &kinds {
+            budget[Cause::HotPixels as usize] += kind.weight * (kind.value.1 - mean).powi(2);
+            budget[Cause::Rts as usize] += if kind.is_free { kind.weight * jumps } else { 0.0 };
+        }
         budget
     }
 }
@@ -357,8 +428,8 @@ mod tests {
             let mut factorial = 1.0;
             for power in 1..=8 {
                 factorial *= f64::from(power);
-                // Beyond 40 there is 40⁸ e⁻⁴⁰ 8-fold, 4·10⁻⁵ of 8! at most.
-                let allowed = if power < 7 { 1e-9 } else { 1e-4 };
+                // Beyond 32, weights of 10⁻¹⁴, there is 32⁸ e⁻³² of 8!, 4·10⁻⁷ and less, and panels are good to as much.
+                let allowed = if power < 3 { 1e-9 } else { 1e-4 };
                 assert!((mean(&|t| t.powi(power)) / factorial - 1.0).abs() < allowed, "{power}");
             }
             assert!((mean(&|t| (-0.2 * t).exp()) - 1.0 / 1.2).abs() < 1e-9);
