@@ -126,7 +126,9 @@ impl Sites {
         let expected_e = scene.expected_electrons.ok_or(Unpredictable::Missing("scene.expected_electrons"))?;
         let model = noise_model(frame)?;
         let photosite = Photosite::of_electrons(model, equations);
-        if !model.tails.is_none() && (metadata.is_transferred() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some())) {
+        if !model.tails.is_none()
+            && (metadata.is_transferred() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()))
+        {
             return Err(Unpredictable::Beyond(tails::TRANSFERRED));
         }
         let (photosite, mut moments) = match quantity_of_sites(frame) {

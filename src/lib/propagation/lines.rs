@@ -188,8 +188,10 @@ impl Photosite {
             return Err(Unpredictable::Beyond(tails::WITH_LINES));
         }
         let slope = self.slope();
-        let of_offsets = expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_read(expected_e)));
-        let of_gains = expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_open(expected_e)));
+        let of_offsets =
+            expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_read(expected_e)));
+        let of_gains =
+            expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_open(expected_e)));
         let x = self.line_signals(expected_e);
         let of_axis = |axis: Axis| {
             let terms = self.terms(axis);

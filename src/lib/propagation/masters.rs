@@ -189,7 +189,8 @@ impl Drawn {
         let mean_e = x * expected_e + u * model.dark_e;
         Self {
             mean: k * mean_e,
-            variance: k * k * (charge + model.read_noise().powi(2) + model.tails.trap_variance()) + adc.rounding_at(mean_e),
+            variance: k * k * (charge + model.read_noise().powi(2) + model.tails.trap_variance())
+                + adc.rounding_at(mean_e),
             third: if model.poisson == PoissonKind::Exact { k.powi(3) * skew } else { 0.0 },
         }
     }

@@ -47,7 +47,8 @@ const TOO_FINE: &str = "hot pixels or random telegraph signals go over many code
                         them; give the sensor read noise";
 
 /// Why nothing is said of dark frames that show how codes are rounded.
-const FINE_DARKS: &str = "dark frames of less than a code of noise came off a frame with hot pixels or random telegraph signals";
+const FINE_DARKS: &str =
+    "dark frames of less than a code of noise came off a frame with hot pixels or random telegraph signals";
 
 /// Why nothing is said of what rows and columns share.
 pub(super) const WITH_LINES: &str = "full well or an end of the codes cuts off what rows or columns share, on a sensor that has hot \
@@ -59,6 +60,9 @@ pub(super) const CURVED: &str = "hot pixels and random telegraph signals reach t
 
 /// Excesses beyond which nothing counts, in units of their mean: e⁻⁴⁰ is 4·10⁻¹⁸.
 const REACH: f64 = 40.0;
+
+/// Standard deviation, in codes, of what blurs them from which rounding of jumps is a uniform error to 3·10⁻⁶ of a squared code.
+const BLURRED: f64 = 0.8;
 
 /// Values of what photosites differ in that are gone through at most.
 const MOST_NODES: usize = 6000;
@@ -106,6 +110,9 @@ fn laguerre(nodes: usize) -> Vec<(f64, f64)> {
     solved.eigenvalues.iter().enumerate().map(node).collect()
 }
 
+/// For photosites that are hot and have a trap: exact for polynomials of degree 9.
+static FEW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(5));
+
 /// Places and weights of an exponential number of mean 1 for a function that bends at `knees`; none of too many.
 fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
     static SMOOTH_NODES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(10));
@@ -140,9 +147,10 @@ fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
     ends.retain(|end| (0.0..=REACH).contains(end));
     ends.sort_by(f64::total_cmp);
     ends.dedup_by(|next, kept| *next - *kept < 1e-7);
-    let of_panel = |pair: &[f64]| panel(pair[0], pair[1]).map(|(t, weight)| (t, weight * (-t).exp())).collect::<Vec<_>>();
+    let of_panel =
+        |pair: &[f64]| panel(pair[0], pair[1]).map(|(t, weight)| (t, weight * (-t).exp())).collect::<Vec<_>>();
     let mut found: Vec<(f64, f64)> = ends.windows(2).flat_map(of_panel).collect();
-    found.retain(|(_, weight)| *weight > 1e-14);
+    found.retain(|(_, weight)| *weight > 1e-13);
     Some(found)
 }
 
@@ -233,7 +241,7 @@ impl Photosite {
             if !jumps_apart {
                 continue;
             }
-            let traps = if hot == 0.0 { self.trap_nodes(expected_e).unwrap_or_default() } else { laguerre(6) };
+            let traps = if hot == 0.0 { self.trap_nodes(expected_e).unwrap_or_default() } else { FEW.clone() };
             let all: f64 = traps.iter().map(|(_, weight)| weight).sum();
             for (trap, of_trap) in traps {
                 let weight = weight * trap_share * of_trap / all;
@@ -245,8 +253,6 @@ impl Photosite {
 
     /// Whether jumps of this mean amplitude end with the codes, or show how these are rounded.
     fn jumps_show(&self, expected_e: f64, amplitude_e: f64) -> bool {
-        /// Standard deviation of what blurs codes from which rounding is a uniform error to 3·10⁻⁶ of a squared code.
-        const BLURRED: f64 = 0.8;
         let Some(adc) = self.adc else { return false };
         let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
         self.frames(expected_e).any(|(model, light_e)| {
@@ -328,7 +334,7 @@ impl Photosite {
             let ends = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
             knees.extend(ends.map(|end| Knee { at: (end - mean_e).abs() / amplitude_e, width: width / amplitude_e }));
             let quiet = model.at(&State { hot: 0.0, trap: 0.0 });
-            if adc.adu_per_e * blur_e(&quiet, &adc, light_e) < SMOOTH {
+            if adc.adu_per_e * blur_e(&quiet, &adc, light_e) < BLURRED {
                 codes = Some(Codes { period: 1.0 / adc.adu_per_e / amplitude_e, until: f64::INFINITY });
             }
         }

@@ -334,9 +334,9 @@ fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
         {
             of_any_law(z)
         } else if law.has_tails() && !law.is_plane {
-            let skewness = law.pixel_variance_skewness().max(law.sampling.variance_thirds.map_or(0.0, |thirds| {
-                thirds[i] / scatter.powf(1.5)
-            }));
+            let skewness = law
+                .pixel_variance_skewness()
+                .max(law.sampling.variance_thirds.map_or(0.0, |thirds| thirds[i] / scatter.powf(1.5)));
             significance::of_skewed(z, skewness).max(significance::of_chi_square(freedom * found / expected, freedom))
         } else if law.sampling.variance_thirds.is_some() || (law.is_plane && law.site_kurtosis[i] > 0.0) {
             significance::of_skewed(z, law.variance_skewness(i, scatter))

@@ -319,8 +319,7 @@ impl Stage for AddNoise {
         };
         let mut counts = Counts::default();
         let [mut charge, mut noise] = [(); 2].map(|()| vec![0.0; input.width()]);
-        let has_read_noise =
-            self.model.read_noise_e > 0.0 || !self.model.lines.is_none() || self.model.tails.has_rts();
+        let has_read_noise = self.model.read_noise_e > 0.0 || !self.model.lines.is_none() || self.model.tails.has_rts();
         for channel in 0..input.channels() {
             let mut passage = transfer.passage();
             // The rows above are drawn again, and counted in the band that they belong to.
