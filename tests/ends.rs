@@ -40,6 +40,10 @@ const QUIET: NoiseModel = NoiseModel {
         dsnu_column_e: 0.0,
         prnu_row: 0.0,
         prnu_column: 0.0,
+        hot_pixel_share: 0.0,
+        hot_pixel_dark_current_e_per_s: 0.0,
+        rts_share: 0.0,
+        rts_amplitude_e: 0.0,
     },
 };
 

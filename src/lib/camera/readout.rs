@@ -71,6 +71,18 @@ pub struct ReadOut {
     /// Non-uniformity of the response from column to column: rms, fraction of 1.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub prnu_column: f64,
+    /// Share of photosites that are hot: fraction of 1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub hot_pixel_share: f64,
+    /// Mean excess of their dark current at `temperature_k`, exponentially distributed: e⁻ s⁻¹.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub hot_pixel_dark_current_e_per_s: f64,
+    /// Share of photosites whose reading jumps, random telegraph signals: fraction of 1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub rts_share: f64,
+    /// Mean amplitude of their jumps, exponentially distributed: e⁻.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub rts_amplitude_e: f64,
     /// Bits of the converter.
     pub bits: u32,
     /// What the converter adds, ADU.
@@ -120,10 +132,28 @@ impl ReadOut {
             ("dsnu_column_e", self.dsnu_column_e),
             ("prnu_row", self.prnu_row),
             ("prnu_column", self.prnu_column),
+            ("hot_pixel_share", self.hot_pixel_share),
+            ("hot_pixel_dark_current_e_per_s", self.hot_pixel_dark_current_e_per_s),
+            ("rts_share", self.rts_share),
+            ("rts_amplitude_e", self.rts_amplitude_e),
         ];
         for (key, value) in not_negative {
             if !(0.0..f64::INFINITY).contains(&value) {
                 return Err(format!("`{key}` is {value}; it must not be negative"));
+            }
+        }
+        let pairs = [
+            (
+                ("hot_pixel_share", self.hot_pixel_share),
+                ("hot_pixel_dark_current_e_per_s", self.hot_pixel_dark_current_e_per_s),
+            ),
+            (("rts_share", self.rts_share), ("rts_amplitude_e", self.rts_amplitude_e)),
+        ];
+        for (share, mean) in pairs {
+            for ((here, value), (other, missing)) in [(share, mean), (mean, share)] {
+                if value > 0.0 && missing == 0.0 {
+                    return Err(format!("`{here}` is {value}, which says nothing without `{other}`"));
+                }
             }
         }
         if !(1..=16).contains(&self.bits) {
@@ -162,6 +192,8 @@ impl ReadOut {
             ("prnu", self.prnu, MOST_PRNU),
             ("prnu_row", self.prnu_row, MOST_LINE_PRNU),
             ("prnu_column", self.prnu_column, MOST_LINE_PRNU),
+            ("hot_pixel_share", self.hot_pixel_share, 1.0),
+            ("rts_share", self.rts_share, 1.0),
         ];
         for (key, value, most) in patterns {
             if value > most {
@@ -184,6 +216,7 @@ impl ReadOut {
             ("dsnu_e", self.dsnu_e),
             ("dsnu_row_e", self.dsnu_row_e),
             ("dsnu_column_e", self.dsnu_column_e),
+            ("rts_amplitude_e", self.rts_amplitude_e),
         ];
         if let Some((key, noise)) = noises.into_iter().find(|(_, noise)| *noise >= self.full_well_e) {
             return Err(format!(
@@ -240,6 +273,14 @@ impl ReadOut {
             (None, None) => 0.0,
         }
     }
+
+    /// Mean excess of the dark current of hot photosites in e⁻ s⁻¹ at a temperature in K, by the same law.
+    pub fn hot_pixel_e_per_s(&self, temperature_k: f64) -> f64 {
+        match self.hot_pixel_dark_current_e_per_s {
+            0.0 => 0.0,
+            measured => measured * dark_current_law(temperature_k) / dark_current_law(self.temperature_k),
+        }
+    }
 }
 
 /// What Eq. 6 of \[HP2005] makes of temperature: T^1.5 exp(−E_g / 2kT), T in K.
@@ -281,6 +322,10 @@ pub(crate) mod tests {
             dsnu_column_e: 0.0,
             prnu_row: 0.0,
             prnu_column: 0.0,
+            hot_pixel_share: 0.0,
+            hot_pixel_dark_current_e_per_s: 0.0,
+            rts_share: 0.0,
+            rts_amplitude_e: 0.0,
             bits: 12,
             bias_adu: 1753.0,
             adu_per_e: 0.058824,

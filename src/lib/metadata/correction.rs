@@ -1,6 +1,6 @@
 //! What corrections took off a frame of codes, as its metadata keep it.
 
-use super::records::{NoiseRecord, PoissonKind, is_false};
+use super::records::{NoiseRecord, PoissonKind, is_false, is_no_charge};
 use crate::camera::levels::BlackLevel;
 use crate::names::{Named, serde_by_name};
 use crate::numerics::averages::Combine;
@@ -131,6 +131,9 @@ pub struct MasterNoise {
     pub sources: Vec<Source>,
     /// Mean dark signal before non-uniformity, e⁻.
     pub dark_e: f64,
+    /// Mean excess of the dark signal of hot photosites, e⁻; 0 where there are none.
+    #[serde(default, skip_serializing_if = "is_no_charge")]
+    pub hot_pixel_e: f64,
     /// How Poisson numbers were drawn.
     pub poisson: PoissonKind,
 }
@@ -138,13 +141,28 @@ pub struct MasterNoise {
 impl MasterNoise {
     /// That of a frame.
     pub fn of(noise: &NoiseRecord) -> Self {
-        Self { sources: noise.sources.clone(), dark_e: noise.dark_e, poisson: noise.poisson }
+        Self {
+            sources: noise.sources.clone(),
+            dark_e: noise.dark_e,
+            hot_pixel_e: noise.hot_pixel_e,
+            poisson: noise.poisson,
+        }
     }
 
     /// As a record of a frame; seeds and temperature, on which no moments hang, are 0.
     pub fn record(&self) -> NoiseRecord {
-        let Self { sources, dark_e, poisson } = self.clone();
-        NoiseRecord { sources, seed: 0, sensor_seed: 0, frame: 0, temperature_k: 0.0, dark_e, poisson, cte: None }
+        let Self { sources, dark_e, hot_pixel_e, poisson } = self.clone();
+        NoiseRecord {
+            sources,
+            seed: 0,
+            sensor_seed: 0,
+            frame: 0,
+            temperature_k: 0.0,
+            dark_e,
+            hot_pixel_e,
+            poisson,
+            cte: None,
+        }
     }
 }
 

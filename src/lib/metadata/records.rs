@@ -110,11 +110,19 @@ pub struct NoiseRecord {
     pub temperature_k: f64,
     /// Mean dark signal of a photosite before non-uniformity, Q_DC of Eq. 7, in e⁻.
     pub dark_e: f64,
+    /// Mean excess of the dark signal of hot photosites, in e⁻; 0 where there are none.
+    #[serde(default, skip_serializing_if = "is_no_charge")]
+    pub hot_pixel_e: f64,
     /// How Poisson numbers were drawn.
     pub poisson: PoissonKind,
     /// Share of a packet that each move to the output takes along, where charge transfer was simulated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cte: Option<f64>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+pub(super) fn is_no_charge(value: &f64) -> bool {
+    *value == 0.0
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]

@@ -47,6 +47,10 @@ pub enum Cause {
     Quantization,
     /// The ends of the range of codes, which take from the variance.
     Rails,
+    /// Differences of the dark signal of hot photosites, a fixed pattern.
+    HotPixels,
+    /// Random telegraph signals of some photosites.
+    Rts,
     /// What full well, rounding and the ends of the range take from the fixed patterns, or add to them.
     ClippedPattern,
     /// What is curved in a color takes from its variance, or adds to it.
@@ -55,7 +59,7 @@ pub enum Cause {
 
 impl Cause {
     /// All causes, in the order in which they act.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 20] = [
         Self::SignalShot,
         Self::Prnu,
         Self::PrnuRow,
@@ -72,6 +76,8 @@ impl Cause {
         Self::FullWell,
         Self::Quantization,
         Self::Rails,
+        Self::HotPixels,
+        Self::Rts,
         Self::ClippedPattern,
         Self::Curvature,
     ];
@@ -95,6 +101,8 @@ impl Cause {
             Self::FullWell => "full_well",
             Self::Quantization => "quantization",
             Self::Rails => "rails",
+            Self::HotPixels => "hot_pixels",
+            Self::Rts => "rts",
             Self::ClippedPattern => "clipped_pattern",
             Self::Curvature => "curvature",
         }
@@ -102,7 +110,7 @@ impl Cause {
 
     /// Whether it is the same in every exposure of one sensor.
     pub fn is_fixed_pattern(self) -> bool {
-        PATTERNS.contains(&self) || OFFSETS.contains(&self) || self == Self::ClippedPattern
+        PATTERNS.contains(&self) || OFFSETS.contains(&self) || matches!(self, Self::HotPixels | Self::ClippedPattern)
     }
 
     /// Whether photosites of a row (0), or of a column (1), share it; none where each has its own.
@@ -124,6 +132,8 @@ impl Cause {
             Self::DsnuColumn => Some(readout.dsnu_column_e),
             Self::PrnuRow => Some(readout.prnu_row),
             Self::PrnuColumn => Some(readout.prnu_column),
+            Self::HotPixels => Some(readout.hot_pixel_share),
+            Self::Rts => Some(readout.rts_share),
             _ => None,
         }
     }
@@ -133,8 +143,8 @@ impl Cause {
 const PATTERNS: [Cause; 4] = [Cause::Prnu, Cause::PrnuRow, Cause::PrnuColumn, Cause::Dcnu];
 
 /// What is added to the charge as it is read.
-const ADDED: [Cause; 6] =
-    [Cause::Read, Cause::RowNoise, Cause::ColumnNoise, Cause::Dsnu, Cause::DsnuRow, Cause::DsnuColumn];
+const ADDED: [Cause; 7] =
+    [Cause::Read, Cause::Rts, Cause::RowNoise, Cause::ColumnNoise, Cause::Dsnu, Cause::DsnuRow, Cause::DsnuColumn];
 
 /// Fixed patterns of it.
 const OFFSETS: [Cause; 3] = [Cause::Dsnu, Cause::DsnuRow, Cause::DsnuColumn];
@@ -168,6 +178,9 @@ fn share_what_is_left(mut budget: Budget, fixed: f64, whole: f64) -> Budget {
 impl Photosite {
     /// The variance of its samples by cause, in e² or ADU².
     pub fn budget(&self, expected_e: f64) -> Budget {
+        if self.has_tails() {
+            return self.mixed_budget(expected_e);
+        }
         match self.adc {
             Some(adc) if self.darks[0].is_some() => self.less_dark_budget(&adc, expected_e),
             Some(adc) => self.digitized_budget(&adc, expected_e),
@@ -255,6 +268,7 @@ impl Photosite {
         set(Cause::Dcnu, dark[1]);
         set(Cause::ShotTimesPattern, light[2] + dark[2]);
         set(Cause::Read, model.read_noise_e.powi(2));
+        set(Cause::Rts, model.tails.trap_variance());
         set(Cause::RowNoise, model.lines.row_noise_e.powi(2));
         set(Cause::ColumnNoise, model.lines.column_noise_e.powi(2));
         set(Cause::Dsnu, model.lines.dsnu_e.powi(2));

@@ -10,6 +10,7 @@ use super::moments::LineCovariance;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
+use super::tails;
 pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::levels::BlackLevel;
 use crate::color;
@@ -125,11 +126,17 @@ impl Sites {
         let expected_e = scene.expected_electrons.ok_or(Unpredictable::Missing("scene.expected_electrons"))?;
         let model = noise_model(frame)?;
         let photosite = Photosite::of_electrons(model, equations);
+        if !model.tails.is_none()
+            && (metadata.is_transferred() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()))
+        {
+            return Err(Unpredictable::Beyond(tails::TRANSFERRED));
+        }
         let (photosite, mut moments) = match quantity_of_sites(frame) {
             QuantityKind::ExpectedElectrons => {
                 (photosite, expected_e.map(|mean| Prediction::of_cumulants(mean, 0.0, 0.0, 0.0)))
             }
             QuantityKind::Electrons => {
+                photosite.check_tails(expected_e)?;
                 let classes = expected_e.map(|mean| photosite.moments(mean));
                 (photosite, transferred(frame, &photosite, classes, 0.0)?)
             }
@@ -164,8 +171,14 @@ impl Sites {
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
         let black = subtracted(record.black, record.black_deltas)?;
         let size = [frame.geometry.width, frame.geometry.height];
-        let camera = PixelMoments::demosaicked(record.cfa, black, method, self.moments, size, equations)
+        let mut camera = PixelMoments::demosaicked(record.cfa, black, method, self.moments, size, equations)
             .ok_or(Unpredictable::Beyond("the paper has no equations for its method of demosaicking"))?;
+        let has_tails = self.photosite.has_tails();
+        if has_tails && method == Method::SmoothHue {
+            camera.void = Some(tails::CURVED);
+        }
+        let is_curved =
+            matches!(metadata.quantity, QuantityKind::Xyy | QuantityKind::Lab | QuantityKind::Luv) && has_tails;
         let Some(record) = &metadata.color else {
             if metadata.quantity != quantity_of_sites(frame) {
                 return Err(Unpredictable::Missing("color"));
@@ -182,6 +195,7 @@ impl Sites {
             }
             _ => camera.through(&xyz_from_adu, record.black_adu),
         };
+        let xyz = if is_curved { PixelMoments { void: xyz.void.or(Some(tails::CURVED)), ..xyz } } else { xyz };
         let pixels = match metadata.quantity {
             QuantityKind::Xyz => xyz,
             QuantityKind::Xyy => {
@@ -259,6 +273,7 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
         ..prediction
     };
     let Some(correction) = &metadata.correction else {
+        codes.check_tails(expected_e)?;
         let bias_adu = codes.adc.map_or(0.0, |adc| adc.bias_adu);
         let above_bias = expected_e.map(|mean| shifted(codes.moments(mean), -bias_adu));
         let left = transferred(frame, &codes, above_bias, 1.0 / 12.0)?;
@@ -273,6 +288,7 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
         return Err(Unpredictable::Beyond("nothing says that the flat field by which it was divided was lit evenly"));
     }
     let corrected = corrected(frame, codes)?;
+    corrected.check_tails(expected_e)?;
     let black_adu = subtracted(correction.black_adu, correction.black_deltas)?;
     let mut averages = corrected.darks.iter().flatten();
     if averages.any(|dark| corrected.adc.is_some_and(|adc| dark.is_clipped_by_code(&adc, 0.0))) {
@@ -355,6 +371,11 @@ fn transferred(
     }))
 }
 
+/// Whether photosites of a frame are unlike each other.
+pub(super) fn has_tails(frame: &FrameHeader) -> bool {
+    noise_model(frame).is_ok_and(|model| !model.tails.is_none())
+}
+
 /// The noise model of a frame; one without noise record has no noise, and no dark signal.
 fn noise_model(frame: &FrameHeader) -> Predicted<NoiseModel> {
     let silent = NoiseRecord {
@@ -364,6 +385,7 @@ fn noise_model(frame: &FrameHeader) -> Predicted<NoiseModel> {
         frame: 0,
         temperature_k: 0.0,
         dark_e: 0.0,
+        hot_pixel_e: 0.0,
         poisson: PoissonKind::Exact,
         cte: None,
     };

@@ -41,7 +41,7 @@ impl Law {
             dark.rate = 0.0;
         }
         let full_well_e = f64::from(to_sample(model.full_well_e));
-        Self { light, dark, full_well_e, read_noise_e: model.added() }
+        Self { light, dark, full_well_e, read_noise_e: model.added(), trap_e: model.tails.trap_e }
     }
 
     /// Whether full well is within reach of any photosite.
@@ -137,8 +137,24 @@ impl Law {
 
     /// Expected moments of a reading.
     pub fn expect(&self, reading: &Reading) -> Moments {
+        if self.trap_e > 0.0 {
+            let mut sum = [0.0; 4];
+            for (share, offset_e) in self.jumps() {
+                let found = Self { trap_e: 0.0, ..*self }.expect(&reading.off_by(offset_e));
+                sum.iter_mut().zip(found).for_each(|(sum, moment)| *sum += share * moment);
+            }
+            return sum;
+        }
         thread_local! { static KNOWN: Memory<(Law, Reading), Moments> = const { Memory::new() }; }
         KNOWN.with(|known| known.recall((*self, *reading), |(law, reading)| law.work_out(reading)))
+    }
+
+    /// What readings are off by, and how often.
+    pub fn jumps(&self) -> Vec<(f64, f64)> {
+        match self.trap_e {
+            0.0 => vec![(1.0, 0.0)],
+            trap_e => vec![(0.25, -trap_e), (0.5, 0.0), (0.25, trap_e)],
+        }
     }
 
     fn work_out(&self, reading: &Reading) -> Moments {
@@ -212,7 +228,7 @@ impl Law {
     pub fn endless_variance(&self, adc: &AdcRecord) -> Option<f64> {
         let [low, high] = self.reach();
         let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
-        let is_within = lower < low && upper > high.min(self.full_well_e + REACH * self.read_noise_e);
+        let is_within = lower < low && upper > high.min(self.full_well_e + REACH * self.read_noise_e + self.trap_e);
         (!is_within).then(|| self.predict(&self.of_codes(adc, ENDLESS)).moments.variance)
     }
 
@@ -222,8 +238,8 @@ impl Law {
     }
 
     /// The same with read noise.
-    fn reach(&self) -> [f64; 2] {
-        let (noise_e, [least, most]) = (REACH * self.read_noise_e, self.extent());
+    pub fn reach(&self) -> [f64; 2] {
+        let (noise_e, [least, most]) = (REACH * self.read_noise_e + self.trap_e, self.extent());
         [least - noise_e, most + noise_e]
     }
 
@@ -236,6 +252,6 @@ impl Law {
 
     /// The probability that the charge, before full well and read noise, is no less than a level.
     pub fn reaches(&self, level_e: f64) -> f64 {
-        Self { read_noise_e: 0.0, full_well_e: f64::INFINITY, ..*self }.is_read_from(level_e)
+        Self { read_noise_e: 0.0, trap_e: 0.0, full_well_e: f64::INFINITY, ..*self }.is_read_from(level_e)
     }
 }

@@ -1,6 +1,8 @@
 //! Variance as a straight line of the signal: what raw converters are told of noise.
 
 use super::charge::{product, sensitivity};
+use super::moments::Equations;
+use super::photosite::Photosite;
 use crate::metadata::AdcRecord;
 use crate::stages::noise::NoiseModel;
 
@@ -25,9 +27,14 @@ impl LinearNoise {
     pub fn of(model: &NoiseModel, adc: &AdcRecord) -> Self {
         let (mean, pattern, ..) = sensitivity(model.response());
         let shot = if model.signal_shot { mean * mean + pattern } else { 0.0 };
-        let dark = product(model.dark_e, model.dark_shot, model.poisson, model.dcnu).variance;
+        let no_light = if model.tails.is_none() {
+            product(model.dark_e, model.dark_shot, model.poisson, model.dcnu).variance + model.added().powi(2)
+        } else {
+            let unlimited = NoiseModel { full_well_e: f64::INFINITY, ..*model };
+            Photosite::of_electrons(unlimited, Equations::Exact).moments(0.0).moments.variance
+        };
         let gain = adc.adu_per_e;
-        Self { slope_adu: gain * shot / mean, offset_adu2: gain * gain * (dark + model.added().powi(2)) + 1.0 / 12.0 }
+        Self { slope_adu: gain * shot / mean, offset_adu2: gain * gain * no_light + 1.0 / 12.0 }
     }
 }
 
@@ -35,8 +42,7 @@ impl LinearNoise {
 mod tests {
     use super::*;
     use crate::metadata::PoissonKind;
-    use crate::propagation::{Equations, Photosite};
-    use crate::stages::noise::LineNoise;
+    use crate::stages::noise::{LineNoise, Tails};
 
     /// The exact moments of codes, at three signals that no end of the range is near. Patterns that are cut off at zero have
     /// theirs by quadrature, good to 10⁻⁷ here; the others are formulas.
@@ -54,6 +60,7 @@ mod tests {
                 signal_shot: shot,
                 poisson: PoissonKind::Exact,
                 lines: LineNoise::default(),
+                tails: Tails::default(),
             };
             let line = LinearNoise::of(&model, &adc);
             let photosite = Photosite::of_electrons(model, Equations::Exact).digitized(adc);

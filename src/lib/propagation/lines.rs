@@ -31,6 +31,7 @@ use super::masters::Dark;
 use super::moments::{Equations, LineCovariance};
 use super::photosite::Photosite;
 use super::reading::{Reading, codes_of};
+use super::tails;
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::AdcRecord;
 use crate::numerics::averages::Combine;
@@ -101,7 +102,7 @@ fn own(model: &NoiseModel) -> NoiseModel {
 
 impl Photosite {
     /// All models of noise that its samples follow from.
-    fn models(&self) -> impl Iterator<Item = &NoiseModel> {
+    pub(super) fn models(&self) -> impl Iterator<Item = &NoiseModel> {
         let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
         std::iter::once(&self.model).chain(self.darks.iter().flatten().chain(flat).map(|dark| &dark.model))
     }
@@ -160,7 +161,11 @@ impl Photosite {
         if !self.has_lines() {
             return Ok([LineCovariance::default(); 3]);
         }
-        let [row, column] = match self.regime(expected_e) {
+        let regime = self.regime(expected_e);
+        if self.has_tails() {
+            return self.lines_of_unlike(regime, expected_e);
+        }
+        let [row, column] = match regime {
             Regime::Straight => Axis::ALL.map(|axis| self.straight(axis, expected_e, [self.slope(); 3])),
             Regime::OnAverage => {
                 let slopes = expected_e.map(|expected_e| self.mean_slope(expected_e));
@@ -174,6 +179,48 @@ impl Photosite {
         };
         let of_class = |matrix: &Matrix3<f64>, k: usize| [0, 1, 2].map(|l| matrix[(k, l)]);
         Ok([0, 1, 2].map(|k| LineCovariance { row: of_class(&row, k), column: of_class(&column, k) }))
+    }
+
+    /// The same of photosites that are unlike each other, to first order in what is shared: of hot ones that are full the gain of
+    /// a row is nothing, and of readings beyond the codes its noise.
+    fn lines_of_unlike(&self, regime: Regime, expected_e: [f64; 3]) -> Predicted<[LineCovariance; 3]> {
+        if regime != Regime::Straight {
+            return Err(Unpredictable::Beyond(tails::WITH_LINES));
+        }
+        let slope = self.slope();
+        let of_offsets =
+            expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_read(expected_e)));
+        let of_gains =
+            expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_open(expected_e)));
+        let x = self.line_signals(expected_e);
+        let of_axis = |axis: Axis| {
+            let terms = self.terms(axis);
+            Matrix3::from_fn(|k, l| {
+                of_offsets[k] * of_offsets[l] * terms.constant + of_gains[k] * of_gains[l] * terms.square * x[k] * x[l]
+            })
+        };
+        let [row, column] = Axis::ALL.map(of_axis);
+        let of_class = |matrix: &Matrix3<f64>, k: usize| [0, 1, 2].map(|l| matrix[(k, l)]);
+        Ok([0, 1, 2].map(|k| LineCovariance { row: of_class(&row, k), column: of_class(&column, k) }))
+    }
+
+    /// The share of readings that are within the codes.
+    fn share_read(&self, expected_e: f64) -> f64 {
+        let law = Law::of(&self.model, expected_e);
+        match self.adc {
+            Some(adc) if !law.is_within(&adc) => {
+                let [low, high] = [0.0, f64::from(adc.top_code())].map(|code| law.is_read_from(adc.electrons_at(code)));
+                low - high
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// The share of them whose charge is below full well too.
+    fn share_open(&self, expected_e: f64) -> f64 {
+        let law = Law::of(&self.model, expected_e);
+        let full = if law.reaches_full_well() { law.reaches(self.model.full_well_e) } else { 0.0 };
+        self.share_read(expected_e).min(1.0 - full)
     }
 
     fn mean_slope(&self, expected_e: f64) -> f64 {
@@ -335,7 +382,7 @@ enum Regime {
 const FINEST: f64 = 0.04;
 
 /// What of a photosite's own spread blurs codes, e⁻: shot noise counts as far as whole electrons are no whole codes.
-fn blur_e(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> f64 {
+pub(super) fn blur_e(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> f64 {
     /// ADU per electron up to which codes take several electrons.
     const FEW: f64 = 0.2;
     let law = Law::of(model, expected_e);

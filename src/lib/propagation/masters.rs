@@ -4,7 +4,7 @@ use super::charge::sensitivity;
 use super::moments::Prediction;
 use crate::metadata::{AdcRecord, AverageRecord, FlatRecord, FrameHeader, MasterKind, MasterRecord, PoissonKind};
 use crate::numerics::averages::{CLIP, Combine, Kept, is_clipped_by_code};
-use crate::stages::noise::NoiseModel;
+use crate::stages::noise::{NoiseModel, Tails};
 use std::sync::{Mutex, PoisonError};
 
 /// Averages that can come off a frame: of the dark frames on either side of it, and of the bias.
@@ -74,7 +74,7 @@ impl Dark {
     fn of(frame: &FrameHeader, record: &MasterRecord, of_sensor: Option<NoiseModel>) -> Option<Self> {
         let model = match &record.noise {
             Some(noise) => NoiseModel::of(frame, &noise.record()).ok()?,
-            None => NoiseModel { dark_e: dark_e(frame, record)?, ..of_sensor? },
+            None => dark_model(frame, record, of_sensor?)?,
         };
         let AverageRecord { frames, combine, clip } = record.average;
         let is_bias = record.kind == MasterKind::Bias;
@@ -140,15 +140,18 @@ impl Dark {
     }
 }
 
-/// The dark signal of frames whose noise is that of the sensor, e⁻; bias frames of unknown exposure have none.
-fn dark_e(frame: &FrameHeader, record: &MasterRecord) -> Option<f64> {
+/// The noise of frames that is that of the sensor, of which bias frames of unknown exposure have no dark signal.
+fn dark_model(frame: &FrameHeader, record: &MasterRecord, of_sensor: NoiseModel) -> Option<NoiseModel> {
     let readout = frame.readout().ok()?;
     let of_frame = || frame.metadata.exposure.map(|exposure| exposure.exposure_s);
     let exposure_s = match record.kind {
         MasterKind::Bias => record.exposure_s.or(Some(0.0)),
         MasterKind::Dark => record.exposure_s.or_else(of_frame),
     };
-    Some(readout.dark_current_e_per_s(record.temperature_k.unwrap_or(readout.temperature_k)) * exposure_s?)
+    let (temperature_k, exposure_s) = (record.temperature_k.unwrap_or(readout.temperature_k), exposure_s?);
+    let hot_e = readout.hot_pixel_e_per_s(temperature_k) * exposure_s;
+    let tails = Tails { hot_e, ..of_sensor.tails };
+    Some(NoiseModel { dark_e: readout.dark_current_e_per_s(temperature_k) * exposure_s, tails, ..of_sensor })
 }
 
 /// A flat field.
@@ -186,7 +189,8 @@ impl Drawn {
         let mean_e = x * expected_e + u * model.dark_e;
         Self {
             mean: k * mean_e,
-            variance: k * k * (charge + model.read_noise().powi(2)) + adc.rounding_at(mean_e),
+            variance: k * k * (charge + model.read_noise().powi(2) + model.tails.trap_variance())
+                + adc.rounding_at(mean_e),
             third: if model.poisson == PoissonKind::Exact { k.powi(3) * skew } else { 0.0 },
         }
     }

@@ -34,6 +34,7 @@ mod rectified;
 pub mod sampling;
 pub mod saturation;
 pub mod smooth_hue;
+mod tails;
 mod unpredictable;
 
 pub use frame::{FramePrediction, Unpredictable, of_frame};

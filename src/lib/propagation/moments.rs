@@ -36,6 +36,8 @@ pub struct Prediction {
     pub third: f64,
     /// Excess kurtosis, for the spread of a sample variance.
     pub excess_kurtosis: f64,
+    /// Sixth cumulant where photosites are unlike each other, for the law of a sample variance; 0 of others.
+    pub sixth: f64,
     /// Variance of what all samples of the class in a frame are off together, which no number of them averages away.
     pub common: f64,
     /// What it shares with others of its row and of its column.
@@ -51,6 +53,7 @@ impl Prediction {
             moments: MeanVariance { mean, variance },
             third: of_spread(third),
             excess_kurtosis,
+            sixth: 0.0,
             common: 0.0,
             lines: LineCovariance::default(),
         }

@@ -9,6 +9,8 @@ pub(super) struct Law {
     pub dark: Charge,
     pub full_well_e: f64,
     pub read_noise_e: f64,
+    /// Amplitude of what readings are off by in half of the exposures, up or down.
+    pub trap_e: f64,
 }
 
 /// A normal law among those that make up the law of the charge, before full well.

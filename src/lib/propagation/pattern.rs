@@ -248,9 +248,26 @@ struct Temporal<'a> {
     is_fine: bool,
     light: Vec<Count>,
     dark: Vec<Count>,
+    jumps: Vec<Jump>,
+}
+
+/// One of the ways in which a reading is off, and how often.
+#[derive(Debug, Clone, Copy)]
+struct Jump {
+    share: f64,
+    reading: Reading,
     at_full: f64,
     /// What rounding does to the mean at full well.
     rounding_at_full: f64,
+}
+
+impl Jump {
+    fn of((share, offset_e): (f64, f64), reading: &Reading, full: f64) -> Self {
+        let reading = reading.off_by(offset_e);
+        let (at_full, smooth) =
+            if full.is_finite() { (reading.at(full, 0.0)[0], reading.smooth_at(full)[0]) } else { (0.0, 0.0) };
+        Self { share, reading, at_full, rounding_at_full: at_full - smooth }
+    }
 }
 
 impl<'a> Temporal<'a> {
@@ -260,9 +277,6 @@ impl<'a> Temporal<'a> {
             counts.retain(|count| count.weight > 1e-15);
             counts
         };
-        let full = law.full_well_e;
-        let (at_full, smooth) =
-            if full.is_finite() { (reading.at(full, 0.0)[0], reading.smooth_at(full)[0]) } else { (0.0, 0.0) };
         Self {
             law,
             reading,
@@ -270,8 +284,7 @@ impl<'a> Temporal<'a> {
             is_fine: *is_fine,
             light: counts(&law.light),
             dark: counts(&law.dark),
-            at_full,
-            rounding_at_full: at_full - smooth,
+            jumps: law.jumps().into_iter().map(|jump| Jump::of(jump, reading, law.full_well_e)).collect(),
         }
     }
 
@@ -306,8 +319,8 @@ impl<'a> Temporal<'a> {
         }
         let elsewhere = other * across.rate;
         let noise_e = self.law.read_noise_e;
-        let [lower, upper] = self.reading.rails_e();
-        let levels = [(self.law.full_well_e, 0.0), (lower, noise_e), (upper, noise_e)];
+        let rails = self.law.jumps().into_iter().flat_map(|(_, offset_e)| self.reading.off_by(offset_e).rails_e());
+        let levels = std::iter::once((self.law.full_well_e, 0.0)).chain(rails.map(|rail| (rail, noise_e)));
         let knee = |(level, noise_e): (f64, f64)| {
             let own = (level - elsewhere).max(0.0);
             let shot = |axis: Axis, variance: f64| if axis.is_shot { variance } else { 0.0 };
@@ -316,7 +329,7 @@ impl<'a> Temporal<'a> {
             Knee { z, width: (of_shot + noise_e * noise_e + spread_e * spread_e).sqrt() / axis.spread() }
         };
         let is_near = |knee: &Knee| knee.z.abs() < REACH * (1.0 + knee.width) + 1.0;
-        levels.into_iter().filter(|(level, _)| level.is_finite()).map(knee).filter(is_near).collect()
+        levels.filter(|(level, _)| level.is_finite()).map(knee).filter(is_near).collect()
     }
 
     /// Moments at sensitivities x and y: of the median, or the mean and none else.
@@ -333,8 +346,17 @@ impl<'a> Temporal<'a> {
                 let near = ends.code(adc.level_at(expected_e));
                 median(count, near, at_least, |code| adc.sample(code) - self.reading.center)
             }
-            _ if is_affordable => [self.sum(self.reading, self.at_full, x, y), 0.0, 0.0, 0.0],
-            _ => [self.edgeworth(x, y), 0.0, 0.0, 0.0],
+            _ => {
+                let mean = |jump: &Jump| {
+                    let mean = if is_affordable {
+                        self.sum(&jump.reading, jump.at_full, x, y)
+                    } else {
+                        self.edgeworth(jump, x, y)
+                    };
+                    jump.share * mean
+                };
+                [self.jumps.iter().map(mean).sum(), 0.0, 0.0, 0.0]
+            }
         }
     }
 
@@ -380,10 +402,11 @@ impl<'a> Temporal<'a> {
         of(&self.law.light, x).plus(of(&self.law.dark, y))
     }
 
-    fn edgeworth(&self, x: f64, y: f64) -> f64 {
+    fn edgeworth(&self, jump: &Jump, x: f64, y: f64) -> f64 {
+        let Jump { reading, rounding_at_full, .. } = jump;
         let charge = self.charge(x, y);
         let full = self.law.full_well_e;
-        let [lower, upper] = self.reading.rails_e();
+        let [lower, upper] = reading.rails_e();
         let noise = NearlyNormal::normal(0.0, self.law.read_noise_e.powi(2));
         let (read, is_full) = if upper <= full { (charge.plus(noise), false) } else { (charge, full.is_finite()) };
         let above = |variable: NearlyNormal, limit: f64| if limit.is_finite() { variable.excess(limit) } else { 0.0 };
@@ -392,16 +415,16 @@ impl<'a> Temporal<'a> {
         let mirrored = NearlyNormal { mean: -whole.mean, third: -whole.third, ..whole };
         mean += above(mirrored, -lower);
         // Where it shows, rounding is that of a normal law.
-        let shows = self.is_fine && self.reading.is_free_at(mean, whole.variance);
-        let offset = if shows { self.reading.at(mean, charge.variance) } else { self.reading.smooth_at(mean) }[0];
-        if is_full { offset + self.rounding_at_full * charge.exceeds(full) } else { offset }
+        let shows = self.is_fine && reading.is_free_at(mean, whole.variance);
+        let offset = if shows { reading.at(mean, charge.variance) } else { reading.smooth_at(mean) }[0];
+        if is_full { offset + rounding_at_full * charge.exceeds(full) } else { offset }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::noise::{LineNoise, NoiseModel};
+    use crate::stages::noise::{LineNoise, NoiseModel, Tails};
 
     /// Of dark current that fills three of four wells, and none in one: what is left of the variance beside the pattern is the
     /// mean variance of a photosite over exposures, which a fine sum over sensitivities gives by itself.
@@ -422,6 +445,7 @@ mod tests {
                 signal_shot: true,
                 poisson: PoissonKind::Exact,
                 lines: LineNoise::default(),
+                tails: Tails::default(),
             };
             let law = Law::of(&model, light_e);
             let reading = law.of_electrons();

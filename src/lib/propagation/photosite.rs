@@ -28,7 +28,7 @@ const VISIBLE_IN_BOTH: f64 = 0.65;
 /// ```
 /// use cyanometer::metadata::PoissonKind;
 /// use cyanometer::propagation::{Equations, Photosite};
-/// use cyanometer::stages::noise::{LineNoise, NoiseModel};
+/// use cyanometer::stages::noise::{LineNoise, NoiseModel, Tails};
 ///
 /// let model = NoiseModel {
 ///     dark_e: 0.0,
@@ -40,6 +40,7 @@ const VISIBLE_IN_BOTH: f64 = 0.65;
 ///     signal_shot: true,
 ///     poisson: PoissonKind::Exact,
 ///     lines: LineNoise::default(),
+///     tails: Tails::default(),
 /// };
 /// let variance = |equations| Photosite::of_electrons(model, equations).moments(10_000.0).moments.variance;
 /// // Shot noise 10⁴, non-uniformity (10⁴ · 0.01)², read noise 10².
@@ -105,6 +106,9 @@ impl Photosite {
 
     /// Mean and variance of its samples over the photosites of a frame, before any division by a flat field.
     pub fn moments(&self, expected_e: f64) -> Prediction {
+        if self.has_tails() {
+            return self.mixed(expected_e);
+        }
         match self.adc {
             None => self.electrons(expected_e),
             Some(adc) if self.darks[0].is_some() => self.less_dark(&adc, expected_e, true),
@@ -130,7 +134,10 @@ impl Photosite {
                     return law.predict(&law.of_electrons());
                 }
                 let charge = charge(model, expected_e);
-                Prediction::of_cumulants(charge.mean, charge.variance + read, charge.third, charge.fourth)
+                let jumps = model.tails.trap_variance();
+                // Fourth cumulant of −a, 0 or a, a quarter, a half and a quarter: a⁴/2 − 3 (a²/2)².
+                let fourth = charge.fourth - jumps * jumps;
+                Prediction::of_cumulants(charge.mean, charge.variance + read + jumps, charge.third, fourth)
             }
         }
     }
@@ -283,7 +290,7 @@ mod tests {
     use crate::numerics::normal::{self, NearlyNormal};
     use crate::propagation::budget::Cause;
     use crate::propagation::charge::product;
-    use crate::stages::noise::LineNoise;
+    use crate::stages::noise::{LineNoise, Tails};
 
     /// Probabilities of the counts of a Poisson variable.
     fn counts(rate: f64) -> Vec<(f64, f64)> {
@@ -315,6 +322,7 @@ mod tests {
             signal_shot: true,
             poisson: PoissonKind::Exact,
             lines: LineNoise::default(),
+            tails: Tails::default(),
         }
     }
 

@@ -222,12 +222,15 @@ impl LevelVariance {
     fn new(photosite: &Photosite, class: usize, largest: f64) -> Self {
         // Patterns that are cut off at zero take long to predict, and their variances are smooth.
         let is_rectified = photosite.model.response().max(photosite.model.dcnu) > 0.2;
-        let steps = if is_rectified { STEPS / 8 } else { STEPS };
+        let steps = if is_rectified || photosite.has_tails() { STEPS / 8 } else { STEPS };
         let step = largest / steps as f64;
         let variance = |index: usize| {
             let expected_e = photosite.expected_at(index as f64 * step);
             if photosite.flat.is_some() {
                 return photosite.variance_divided(class, expected_e);
+            }
+            if photosite.has_tails() {
+                return photosite.moments(expected_e).moments.variance;
             }
             let Some(adc) = photosite.adc else { return photosite.moments(expected_e).moments.variance };
             if photosite.darks[0].is_some() {
@@ -284,6 +287,7 @@ impl PixelNoise {
         let gains = |gains: fn(&WeightTable, [usize; 2], &Geometry) -> PixelGains| -> Vec<PixelGains> {
             places().map(|at| gains(table, at, &frame.geometry)).collect()
         };
+        photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
         photosite.check_lines().map_err(|why| frame.refuse(why.to_string()))?;
         let of_lines = photosite.has_lines().then(|| PixelLines {
             gains: places().map(|at| PixelGains::of_lines(table, at, &frame.geometry)).collect(),
@@ -398,6 +402,7 @@ fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
         frame: 0,
         temperature_k,
         dark_e: readout.dark_current_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
+        hot_pixel_e: readout.hot_pixel_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
         poisson: crate::metadata::PoissonKind::Exact,
         cte: None,
     })

@@ -56,6 +56,11 @@ impl Reading {
         Self { asked: Asked::Beyond(level_e), noise_e, center: 0.0, offset_e: 0.0 }
     }
 
+    /// The same of charges that are off by so many electrons more.
+    pub fn off_by(&self, offset_e: f64) -> Self {
+        Self { offset_e: self.offset_e + offset_e, ..*self }
+    }
+
     /// Whether nothing that is told apart has an end.
     pub fn is_endless(&self) -> bool {
         self.rails_e() == [f64::NEG_INFINITY, f64::INFINITY]

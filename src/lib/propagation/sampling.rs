@@ -130,6 +130,7 @@ impl SamplingBasis {
                 moments: moments(class),
                 third: 0.0,
                 excess_kurtosis,
+                sixth: 0.0,
                 common: 0.0,
                 lines: LineCovariance::default(),
             });
@@ -423,6 +424,7 @@ mod tests {
             moments: MeanVariance { mean: 0.0, variance },
             third: 0.0,
             excess_kurtosis,
+            sixth: 0.0,
             common: 0.0,
             lines: LineCovariance::default(),
         })
@@ -435,6 +437,7 @@ mod tests {
             moments: MeanVariance { mean: 0.0, variance },
             third: 0.0,
             excess_kurtosis,
+            sixth: 0.0,
             common: 0.0,
             lines: LineCovariance::default(),
         });

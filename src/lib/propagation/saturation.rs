@@ -1,6 +1,6 @@
 //! How much of a frame is saturated, by the law of its scene.
 
-use super::frame::{FramePrediction, Sites, of_frame, quantity_of_sites};
+use super::frame::{FramePrediction, Sites, has_tails, of_frame, quantity_of_sites};
 use super::law::Law;
 use super::moments::Equations;
 use crate::cfa::CfaPattern;
@@ -25,6 +25,10 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
     {
         bounding.metadata.scene = Some(Scene::uniform(scene.source.clone(), [brightest_e; 3]));
     }
+    // Tails of hot pixels reach farther than any number of standard deviations.
+    if has_tails(frame) {
+        return true;
+    }
     let moments: [(f64, f64); 3] = match of_frame(&bounding, Equations::Exact) {
         Ok(FramePrediction::Planes(classes)) => classes.map(|class| (class.moments.mean, class.moments.std())),
         Ok(FramePrediction::Pixels(pixels)) => {
@@ -41,13 +45,18 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
 pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
     let Sites { photosite, expected_e, .. } = Sites::of(frame, Equations::Exact).ok()?;
     let full_well_e = photosite.model.full_well_e;
-    let law = |expected_e| Law::of(&photosite.model, expected_e);
-    let of_charge = |expected_e: f64| law(expected_e).reaches(full_well_e);
+    let share = |expected_e: f64, of: &dyn Fn(&Law) -> f64| {
+        if photosite.has_tails() {
+            return photosite.mean_of(expected_e, |site| of(&Law::of(&site.model, expected_e)));
+        }
+        of(&Law::of(&photosite.model, expected_e))
+    };
+    let of_charge = |expected_e: f64| share(expected_e, &|law| law.reaches(full_well_e));
     match (quantity_of_sites(frame), photosite.adc) {
         (QuantityKind::Electrons, _) => Some(expected_e.map(of_charge)),
         (QuantityKind::Adu, Some(adc)) => {
             let first_full_e = adc.electrons_at(adc.full_code(full_well_e) - 0.5);
-            Some(expected_e.map(|expected_e| law(expected_e).is_read_from(first_full_e)))
+            Some(expected_e.map(|expected_e| share(expected_e, &|law| law.is_read_from(first_full_e))))
         }
         _ => None,
     }

@@ -39,11 +39,15 @@ pub enum Source {
     PrnuRow,
     /// Photo-response non-uniformity of columns, a fixed pattern.
     PrnuColumn,
+    /// Hot pixels, a fixed pattern whose charge has shot noise.
+    HotPixels,
+    /// Random telegraph signals of some photosites, temporal.
+    Rts,
 }
 
 impl Source {
     /// All sources, first those of Eq. 9 in its order.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::Dcsn,
         Self::Dcnu,
         Self::Ssn,
@@ -56,11 +60,13 @@ impl Source {
         Self::DsnuColumn,
         Self::PrnuRow,
         Self::PrnuColumn,
+        Self::HotPixels,
+        Self::Rts,
     ];
 
     /// Whether the source repeats from frame to frame of one sensor.
     pub fn is_fixed_pattern(self) -> bool {
-        !matches!(self, Self::Dcsn | Self::Ssn | Self::Ron | Self::RowNoise | Self::ColumnNoise)
+        !matches!(self, Self::Dcsn | Self::Ssn | Self::Ron | Self::RowNoise | Self::ColumnNoise | Self::Rts)
     }
 }
 
@@ -81,6 +87,8 @@ impl Named for Source {
             Self::DsnuColumn => "dsnu_column",
             Self::PrnuRow => "prnu_row",
             Self::PrnuColumn => "prnu_column",
+            Self::HotPixels => "hot_pixels",
+            Self::Rts => "rts",
         }
     }
 }
@@ -99,6 +107,9 @@ serde_by_name!(Source);
 /// | sensor seed | column less bit 7 | 0 | 2²⁴ + class · 2¹⁶ + 1 | their low words |
 /// | sensor seed | column less bits 6 and 7 | 1 | 2²⁴ + class · 2¹⁶ | DSNU high where these bits are 0, 1, 2, 3 |
 /// | sensor seed | column less bits 6 and 7 | 1 | 2²⁴ + class · 2¹⁶ + 1 | their low words |
+/// | sensor seed | column less bits 6 and 7 | 2 | as of DSNU | hot pixels |
+/// | sensor seed | column less bits 6 and 7 | 3 | as of DSNU | traps |
+/// | seed | column | frame | class · 2¹⁶ + 2 | jumps of a photosite with a trap: the first word |
 ///
 /// The second word of the counter is the row; column and row are those on the sensor. Each draw has a 64-bit word of its
 /// own; low words that have a block of their own are made only where the high ones do not settle a number.
@@ -187,6 +198,16 @@ impl Default for RunWords {
 
 const PATTERN: u32 = 1 << 24;
 
+/// Third words of the counters of fixed offsets, hot pixels and traps.
+const OFFSET: u32 = 1;
+/// See [`OFFSET`].
+const HOT: u32 = 2;
+/// See [`OFFSET`].
+const TRAP: u32 = 3;
+
+/// A photosite of a run that is unlike most, and by how much: an exponential number of mean 1.
+pub type Unlike = (usize, f64);
+
 impl Run {
     fn fourth(&self) -> [u32; 2] {
         self.classes.map(|class| u32::from(class) << 16)
@@ -232,6 +253,12 @@ impl Run {
     /// Makes the high words of the fixed offsets of photosites.
     #[inline(always)]
     pub fn make_offsets(&self, words: &mut RunWords) {
+        self.make_single(words, OFFSET);
+    }
+
+    /// Makes high words of which each photosite has one, those of four in a block.
+    #[inline(always)]
+    fn make_single(&self, words: &mut RunWords, kind: u32) {
         let first = self.place[0].rem_euclid(COLUMNS) as usize;
         let end = (first + self.length).min(LONGEST_RUN);
         let is_in_one = first / QUARTER == (end - 1) / QUARTER;
@@ -241,7 +268,7 @@ impl Run {
         #[expect(clippy::cast_possible_truncation, reason = "below 256")]
         let x = (self.place[0].cast_unsigned() & !(LONGEST_RUN as u32 - 1)) + made.start as u32;
         let y = self.place[1].cast_unsigned();
-        philox::fill(&mut words.shared, made.len(), halves(self.sensor_seed), [x, y, 1], fourth);
+        philox::fill(&mut words.shared, made.len(), halves(self.sensor_seed), [x, y, kind], fourth);
         for quarter in first / QUARTER..=(end - 1) / QUARTER {
             let columns = first.max(quarter * QUARTER)..end.min((quarter + 1) * QUARTER);
             let before = quarter * QUARTER + made.start;
@@ -251,9 +278,9 @@ impl Run {
     }
 
     /// The low word of DSNU.
-    fn offset_low(&self, index: usize) -> u32 {
+    fn single_low(&self, index: usize, kind: u32) -> u32 {
         let [x, y] = self.counter(index);
-        let counter = [x & !QUARTER_BITS, y, 1, self.fourth()[index % 2] | PATTERN | 1];
+        let counter = [x & !QUARTER_BITS, y, kind, self.fourth()[index % 2] | PATTERN | 1];
         philox4x32_10(counter, halves(self.sensor_seed))[(x & QUARTER_BITS) as usize / QUARTER]
     }
 
@@ -283,7 +310,7 @@ impl Run {
             Source::Ron => gaussian::fill(numbers, &temporal[2][..length], |index| temporal[3][index]),
             Source::Dcnu => gaussian::fill(numbers, &pattern[0][..length], |index| self.pattern_low(index)[0]),
             Source::Prnu => gaussian::fill(numbers, &pattern[1][..length], |index| self.pattern_low(index)[1]),
-            Source::Dsnu => gaussian::fill(numbers, &words.offset[..length], |index| self.offset_low(index)),
+            Source::Dsnu => gaussian::fill(numbers, &words.offset[..length], |index| self.single_low(index, OFFSET)),
             _ => numbers.fill(0.0),
         }
     }
@@ -301,6 +328,64 @@ impl Run {
         let word = usize::from(source == Source::Dcsn);
         let low = |index: usize| self.low(index)[word];
         poisson::fill_by_tables(counts, tables, &words.temporal[word][..self.length], low);
+    }
+
+    /// The photosites of the run that are hot, or have a trap, of a sensor on which such a share is; in order.
+    ///
+    /// A photosite is one of them where its word, a place u in 0 to 1, is below the share; u over the share is as even, and
+    /// −ln of it the excess.
+    #[inline(always)]
+    pub fn find_unlike(&self, words: &mut RunWords, source: Source, share: f64, found: &mut Vec<Unlike>) {
+        let kind = if source == Source::HotPixels { HOT } else { TRAP };
+        self.make_single(words, kind);
+        found.clear();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, as is meant")]
+        let highest = (share * 2f64.powi(32)).floor() as u32;
+        for (index, &high) in words.offset[..self.length].iter().enumerate() {
+            if high <= highest {
+                let word = u64::from(high) << 32 | u64::from(self.single_low(index, kind));
+                let place = (word as f64 + 0.5) * 2f64.powi(-64) / share;
+                if place < 1.0 {
+                    found.push((index, -libm::log(place)));
+                }
+            }
+        }
+    }
+
+    /// Which way the reading of a photosite with a trap is off in the exposure: −1, 0 or 1, with probabilities ¼, ½ and ¼.
+    pub fn jump(&self, index: usize) -> f32 {
+        let [x, y] = self.counter(index);
+        let [word, ..] = philox4x32_10([x, y, self.frame, self.fourth()[index % 2] | 2], halves(self.seed));
+        match word >> 30 {
+            0 => -1.0,
+            3 => 1.0,
+            _ => 0.0,
+        }
+    }
+
+    /// Draws dark counts again at places of the run, each at its own rate: Poisson numbers, or normal ones of their variance.
+    pub fn recount(&self, words: &RunWords, is_exact: bool, places: &[(usize, f32)], numbers: &mut [f32]) {
+        let length = places.len().next_multiple_of(philox::VECTOR);
+        let Some(last) = places.len().checked_sub(1) else { return };
+        let place = |index: usize| places[index.min(last)];
+        let [mut rates, mut counts] = [[0.0; LONGEST_RUN]; 2];
+        let mut high = [0; LONGEST_RUN];
+        for index in 0..length {
+            (rates[index], high[index]) = (place(index).1, words.temporal[1][place(index).0]);
+        }
+        let low = |index: usize| self.low(place(index).0)[1];
+        let (rates, counts) = (&rates[..length], &mut counts[..length]);
+        if is_exact {
+            poisson::fill(counts, rates, &high[..length], low);
+        } else {
+            gaussian::fill(counts, &high[..length], low);
+            for (count, rate) in counts.iter_mut().zip(rates) {
+                *count = rate + rate.sqrt() * *count;
+            }
+        }
+        for ((index, _), count) in places.iter().zip(counts) {
+            numbers[*index] = *count;
+        }
     }
 }
 
@@ -382,7 +467,7 @@ mod tests {
                     let block = |last: u32| philox4x32_10([x & !192, y, 1, (1 << 24) | class | last], [0, 1 << 8]);
                     let slot = (x & 192) as usize / 64;
                     assert_eq!(words.offset[index], block(0)[slot], "{column} {index}");
-                    assert_eq!(run.offset_low(index), block(1)[slot]);
+                    assert_eq!(run.single_low(index, OFFSET), block(1)[slot]);
                 }
             }
             assert_eq!(covered, width);

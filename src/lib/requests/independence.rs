@@ -173,6 +173,7 @@ mod tests {
             frame: number,
             temperature_k: 293.0,
             dark_e: 1.0,
+            hot_pixel_e: 0.0,
             poisson: PoissonKind::Exact,
             cte: None,
         });

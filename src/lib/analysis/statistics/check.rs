@@ -125,6 +125,8 @@ pub(super) struct Expected {
     pub site_thirds: [f64; 3],
     /// Excess kurtosis of a photosite: where it is large, few of the samples make up the variance.
     pub site_kurtosis: [f64; 3],
+    /// Sixth cumulant of a photosite, where photosites are unlike each other; else 0.
+    pub site_sixths: [f64; 3],
     /// How samples scatter.
     pub sampling: Sampling,
     /// Whether the channels are the classes of the photosites themselves.
@@ -151,11 +153,12 @@ impl Expected {
     }
 
     /// Skewness of a sample variance of independent samples, but for their sixth cumulant:
-    /// (12 κ₄ κ₂ + 4 κ₃² + 8 κ₂³)⁄n² over the 3⁄2 power of its variance \[Fisher1930].
+    /// (12 κ₄ κ₂ + 4 κ₃² + 8 κ₂³)⁄n² over the 3⁄2 power of its variance \[Fisher1930]; of photosites that are unlike each other
+    /// with κ₆.
     fn variance_skewness(&self, channel: usize, scatter: f64) -> f64 {
         let (second, third) = (self.site_variances[channel], self.site_thirds[channel]);
         let fourth = self.site_kurtosis[channel] * second * second;
-        let of_sites = 12.0 * fourth * second + 4.0 * third * third;
+        let of_sites = 12.0 * fourth * second + 4.0 * third * third + self.site_sixths[channel];
         let square = self.sampling.count.powi(2);
         let cumulant = match self.sampling.variance_thirds {
             Some(thirds) if self.is_plane => of_sites.max(0.0) / square + thirds[channel],
@@ -163,6 +166,47 @@ impl Expected {
             None => (of_sites + 8.0 * second.powi(3)) / square,
         };
         cumulant / scatter.powf(1.5)
+    }
+
+    /// Whether photosites are unlike each other.
+    fn has_tails(&self) -> bool {
+        self.site_sixths.iter().any(|sixth| *sixth != 0.0)
+    }
+
+    /// The classes that a channel is made of, and the least number of photosites of each.
+    fn classes_of(&self, channel: usize) -> (std::ops::Range<usize>, f64) {
+        if self.is_plane { (channel..channel + 1, self.sampling.count) } else { (0..3, self.sampling.count / 4.0) }
+    }
+
+    /// Excess kurtosis of the mean of a channel of photosites that are unlike each other, at most.
+    fn mean_kurtosis(&self, channel: usize) -> f64 {
+        let (classes, count) = self.classes_of(channel);
+        classes.map(|k| self.site_kurtosis[k] / count).fold(0.0, f64::max)
+    }
+
+    /// The same of its variance, about: of N exponential numbers among many normal ones, N p⁻¹ of which there are and
+    /// κ₄ = 24 p h⁴, κ₆ = 720 p h⁶, it is 70 f²/N, with f the share of the scatter that they make.
+    fn variance_kurtosis(&self, channel: usize) -> f64 {
+        let (classes, count) = self.classes_of(channel);
+        let of_class = |k: usize| {
+            let fourth = self.site_kurtosis[k] * self.site_variances[k].powi(2);
+            let many = count * 37.5 * fourth.powi(3) / self.site_sixths[k].powi(2);
+            let share = self.site_kurtosis[k] / (self.site_kurtosis[k] + 2.0);
+            if fourth > 0.0 && self.site_sixths[k] > 0.0 { 70.0 * share * share / many } else { 0.0 }
+        };
+        classes.map(of_class).fold(0.0, f64::max)
+    }
+
+    /// Skewness of a sample variance of pixels, at most: that of as many photosites of one class as there are.
+    fn pixel_variance_skewness(&self) -> f64 {
+        let (classes, count) = self.classes_of(0);
+        let of_class = |k: usize| {
+            let (second, third) = (self.site_variances[k], self.site_thirds[k]);
+            let fourth = self.site_kurtosis[k] * second * second;
+            let cumulant = 12.0 * fourth * second + 4.0 * third * third + 8.0 * second.powi(3) + self.site_sixths[k];
+            cumulant / (fourth + 2.0 * second * second).powf(1.5) / count.sqrt()
+        };
+        classes.map(of_class).filter(|skewness| skewness.is_finite()).fold(0.0, f64::max)
     }
 
     /// What rounding may take a sample of a channel off by: pixels that are made of several samples are rounded as the largest of
@@ -192,6 +236,10 @@ const TIED: f64 = 1.0 - 1e-9;
 /// that of χ² to a few hundredths.
 const HEAVY: f64 = 1000.0;
 
+/// Excess kurtosis beyond which a statistic of photosites that are unlike each other follows no law that its third cumulant tells:
+/// at 4 standard deviations 0.05 makes tails half as large again.
+const FREE: f64 = 0.05;
+
 /// Tests the channels `0..count` and their correlations.
 pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     let sampling = &expected.sampling;
@@ -204,7 +252,7 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
         let is_enough = sampling.count * variance >= RARE;
         // Where samples scatter by less than their rounding, neither mean nor variance follows a law that is known.
         let is_rounded = sampling.covariance[(i, i)].max(0.0).sqrt() <= expected.rounding(i);
-        !is_enough || is_rounded || (kurtosis > 1.0 && sampling.count < HEAVY * kurtosis)
+        !is_enough || is_rounded || (kurtosis > 1.0 && sampling.count < HEAVY * kurtosis && !expected.has_tails())
     };
     let mut found = Vec::new();
     for i in 0..channels {
@@ -219,7 +267,8 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     }
     for (index, [i, j]) in PAIRS.into_iter().enumerate() {
         // Four pixels are the fewest whose correlation says anything.
-        if i != j && j < channels && !is_rare(i) && !is_rare(j) && sampling.count >= 4.0 {
+        let is_heavy = |i: usize| expected.has_tails() && expected.variance_kurtosis(i) > FREE;
+        if i != j && j < channels && ![i, j].into_iter().any(|i| is_rare(i) || is_heavy(i)) && sampling.count >= 4.0 {
             found.extend(correlation(measured, sampling, index));
         }
     }
@@ -247,12 +296,19 @@ fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
         expected: expected.mean[i],
         z: Some(z),
         degrees_of_freedom: None,
-        p: if expected.is_plane {
+        p: if expected.has_tails() && expected.mean_kurtosis(i) > FREE {
+            of_any_law(z)
+        } else if expected.is_plane {
             significance::of_skewed(z, skewness)
         } else {
             significance::of_skewed(z, skewness).max(significance::of_skewed(z, -skewness))
         },
     }
+}
+
+/// The bound of Chebyshev, 1/z².
+fn of_any_law(z: f64) -> f64 {
+    (1.0 / (z * z)).min(1.0)
 }
 
 /// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946]. Where ν is small, or
@@ -264,17 +320,26 @@ fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
     let scatter = law.sampling.spread[pair][pair];
     let freedom = 2.0 * expected * expected / scatter;
     let found = measured.covariance[(i, i)];
+    let z = (found - expected) / scatter.sqrt();
     Test {
         subject: Subject::Variance,
         channels: vec![measured.names[i].clone()],
         measured: found,
         expected,
-        z: Some((found - expected) / scatter.sqrt()),
+        z: Some(z),
         degrees_of_freedom: Some(freedom),
-        p: if freedom < FEW || (law.is_plane && law.site_kurtosis[i] < FLAT) {
-            (scatter / (found - expected).powi(2)).min(1.0)
+        p: if freedom < FEW
+            || (law.is_plane && law.site_kurtosis[i] < FLAT)
+            || (law.has_tails() && law.variance_kurtosis(i) > FREE)
+        {
+            of_any_law(z)
+        } else if law.has_tails() && !law.is_plane {
+            let skewness = law
+                .pixel_variance_skewness()
+                .max(law.sampling.variance_thirds.map_or(0.0, |thirds| thirds[i] / scatter.powf(1.5)));
+            significance::of_skewed(z, skewness).max(significance::of_chi_square(freedom * found / expected, freedom))
         } else if law.sampling.variance_thirds.is_some() || (law.is_plane && law.site_kurtosis[i] > 0.0) {
-            significance::of_skewed((found - expected) / scatter.sqrt(), law.variance_skewness(i, scatter))
+            significance::of_skewed(z, law.variance_skewness(i, scatter))
         } else {
             significance::of_chi_square(freedom * found / expected, freedom)
         },

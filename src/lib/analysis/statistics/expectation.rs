@@ -51,6 +51,7 @@ impl Predicted {
             site_variances: classes.map(|class| class.moments.variance),
             site_thirds: classes.map(|class| class.third),
             site_kurtosis: classes.map(|class| class.excess_kurtosis),
+            site_sixths: classes.map(|class| class.sixth),
             sampling,
             is_plane: true,
         };
@@ -67,8 +68,10 @@ impl Predicted {
         let site_variances = mixture.sites.map(|site| site.moments.variance);
         let site_kurtosis = mixture.sites.map(|site| site.excess_kurtosis);
         let site_thirds = mixture.sites.map(|site| site.third);
+        let site_sixths = mixture.sites.map(|site| site.sixth);
         let mean = mixture.mean;
-        let expected = Expected { mean, site_variances, site_thirds, site_kurtosis, sampling, is_plane: false };
+        let expected =
+            Expected { mean, site_variances, site_thirds, site_kurtosis, site_sixths, sampling, is_plane: false };
         Self::of_three(&mixture.covariance, expected)
     }
 
@@ -111,6 +114,7 @@ impl Predicted {
             site_variances: [prediction.moments.variance; 3],
             site_thirds: [prediction.third; 3],
             site_kurtosis: [prediction.excess_kurtosis; 3],
+            site_sixths: [prediction.sixth; 3],
             sampling,
             is_plane: true,
         };
@@ -213,6 +217,7 @@ fn mixed(classes: &[Prediction; 3], counts: [u64; 3]) -> Option<Prediction> {
         moments: MeanVariance { mean, variance },
         third: 0.0,
         excess_kurtosis,
+        sixth: 0.0,
         common,
         lines: LineCovariance::default(),
     })

@@ -191,7 +191,7 @@ mod tests {
             let lines = LineCovariance { row: line(0), column: line(1) };
             let variance = [1.0, 2.0, 0.5][k] + lines.row[k] + lines.column[k];
             let moments = MeanVariance { mean: [3.0, 7.0, 4.0][k], variance };
-            Prediction { moments, third: 0.0, excess_kurtosis: 0.3, common: 0.0, lines }
+            Prediction { moments, third: 0.0, excess_kurtosis: 0.3, sixth: 0.0, common: 0.0, lines }
         })
     }
 

@@ -178,6 +178,7 @@ fn with_noise(header: &mut FrameHeader) -> Photosite {
         frame: 0,
         temperature_k: 300.0,
         dark_e: 73.0,
+        hot_pixel_e: 0.0,
         poisson: PoissonKind::Exact,
         cte: None,
     });

@@ -9,7 +9,7 @@
 
 mod model;
 
-pub use model::{LineNoise, NoiseModel, NoiseSettings, rectified_mean, rectified_mean_square};
+pub use model::{LineNoise, NoiseModel, NoiseSettings, Tails, rectified_mean, rectified_mean_square};
 
 use crate::camera::readout::ReadOut;
 use crate::cfa::{CfaPattern, Class};
@@ -19,7 +19,7 @@ use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::random::philox::{LONGEST_RUN, VECTOR};
 use crate::random::poisson::Table;
-use crate::random::{LineDraws, Run, RunWords, Source, of_column, of_row, spans};
+use crate::random::{LineDraws, Run, RunWords, Source, Unlike, of_column, of_row, spans};
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
 use crate::units::{Electrons, ExpectedElectrons, QuantityKind};
@@ -128,7 +128,7 @@ impl Tables {
         let rates = scene.and_then(|scene| scene.expected_electrons);
         let is_slow = |rates: &[f64; 3]| instructions == Instructions::Avx512 && rates.iter().all(|&rate| rate >= FEW);
         let light = rates.filter(|rates| !is_slow(rates)).map(|rates| rates.map(table));
-        let dark = if model.dark_shot { table(model.dark_e) } else { None };
+        let dark = if model.dark_shot && model.dark_e > 0.0 { table(model.dark_e) } else { None };
         Self { dark, light: light.unwrap_or_default() }
     }
 }
@@ -164,27 +164,40 @@ impl AddNoise {
             None => None,
         };
         // Eq. 7: Q_DC = I_DC Δt.
-        let mut dark_e = readout.dark_current_e_per_s(temperature_k) * input.exposure()?.exposure_s;
+        let exposure_s = input.exposure()?.exposure_s;
+        let mut dark_e = readout.dark_current_e_per_s(temperature_k) * exposure_s;
+        let mut hot_pixel_e = readout.hot_pixel_e_per_s(temperature_k) * exposure_s;
+        let hot_share = readout.hot_pixel_share;
         let mut metadata = input.metadata.becoming(QuantityKind::Electrons);
         let mut sources: Vec<Source> =
             Source::ALL.into_iter().filter(|source| !settings.without.contains(source)).collect();
         // What the noisy frames leave out, the clean one does.
         let read_variance = if sources.contains(&Source::Ron) { readout.read_noise_e.powi(2) } else { 0.0 };
-        if dark_e > 0.0 && dark_e * (1.0 + readout.dcnu.powi(2)) < NEGLIGIBLE_DARK * read_variance {
+        let of_hot = hot_share * hot_pixel_e * (1.0 + 2.0 * hot_pixel_e);
+        let dark_variance = dark_e * (1.0 + readout.dcnu.powi(2)) + of_hot;
+        if dark_variance > 0.0 && dark_variance < NEGLIGIBLE_DARK * read_variance {
             metadata.leave_out(
                 "add-noise",
-                format!("dark signal of {dark_e:.1e} e-"),
+                format!("dark signal of {:.1e} e-", dark_e + hot_share * hot_pixel_e),
                 format!("its variance is below {NEGLIGIBLE_DARK:e} of that of the read noise"),
             );
-            dark_e = 0.0;
+            (dark_e, hot_pixel_e) = (0.0, 0.0);
+        }
+        if !sources.contains(&Source::HotPixels) {
+            dark_e += hot_share * hot_pixel_e;
+            hot_pixel_e = 0.0;
+        }
+        if hot_pixel_e == 0.0 {
+            sources.retain(|source| *source != Source::HotPixels);
         }
         if dark_e == 0.0 {
-            sources.retain(|source| !matches!(source, Source::Dcsn | Source::Dcnu));
+            sources.retain(|source| *source != Source::Dcnu && (*source != Source::Dcsn || hot_pixel_e > 0.0));
         }
         sources.retain(|source| has_noise(readout, *source));
         if settings.clean {
             // No source is drawn that would lift the mean where it is cut at zero.
-            dark_e *= rectified_mean(readout.dcnu);
+            dark_e = dark_e * rectified_mean(readout.dcnu) + hot_share * hot_pixel_e;
+            hot_pixel_e = 0.0;
             sources.clear();
         }
         let record = NoiseRecord {
@@ -194,11 +207,13 @@ impl AddNoise {
             frame: settings.frame,
             temperature_k,
             dark_e,
+            hot_pixel_e,
             poisson: settings.poisson,
             cte: settings.cte,
         };
         let model = NoiseModel::of(input, &record)?;
-        metadata.dark_signal_e = Some(dark_e * rectified_mean(model.dcnu) * settings.cte.map_or(1.0, uniform_share));
+        let mean_dark_e = dark_e * rectified_mean(model.dcnu) + model.tails.mean_hot_e();
+        metadata.dark_signal_e = Some(mean_dark_e * settings.cte.map_or(1.0, uniform_share));
         metadata.noise = Some(record.clone());
         let instructions = Instructions::widest();
         let tables = Tables::of(input, &model, instructions);
@@ -262,6 +277,8 @@ fn has_noise(readout: &ReadOut, source: Source) -> bool {
         Source::DsnuColumn => readout.dsnu_column_e > 0.0,
         Source::PrnuRow => readout.prnu_row > 0.0,
         Source::PrnuColumn => readout.prnu_column > 0.0,
+        Source::HotPixels => readout.hot_pixel_share > 0.0,
+        Source::Rts => readout.rts_share > 0.0,
         Source::Dcsn | Source::Ssn => true,
     }
 }
@@ -302,7 +319,7 @@ impl Stage for AddNoise {
         };
         let mut counts = Counts::default();
         let [mut charge, mut noise] = [(); 2].map(|()| vec![0.0; input.width()]);
-        let has_read_noise = self.model.read_noise_e > 0.0 || !self.model.lines.is_none();
+        let has_read_noise = self.model.read_noise_e > 0.0 || !self.model.lines.is_none() || self.model.tails.has_rts();
         for channel in 0..input.channels() {
             let mut passage = transfer.passage();
             // The rows above are drawn again, and counted in the band that they belong to.
@@ -399,6 +416,7 @@ impl Kernel for Expose<'_> {
                     if noise.model.read_noise_e > 0.0 {
                         add(noisy, line.read_noise(&run, &mut scratch));
                     }
+                    line.add_jumps(&run, &mut scratch, noisy);
                     line.add_offsets(&run, &mut scratch, span, noisy);
                     counts.not_finite += not_finite(noisy);
                 }
@@ -436,6 +454,7 @@ impl Kernel for Charges<'_> {
                 } else {
                     of_span.fill(0.0);
                 }
+                line.add_jumps(&run, &mut scratch, of_span);
                 line.add_offsets(&run, &mut scratch, span, of_span);
             }
         }
@@ -450,12 +469,15 @@ struct Scratch {
     light: [f32; LONGEST_RUN],
     dark: [f32; LONGEST_RUN],
     normals: [f32; LONGEST_RUN],
+    unlike: Vec<Unlike>,
+    hot: Vec<(usize, f32)>,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
         let empty = [0.0; LONGEST_RUN];
-        Self { words: RunWords::default(), rates: empty, light: empty, dark: empty, normals: empty }
+        let (unlike, hot) = (Vec::new(), Vec::new());
+        Self { words: RunWords::default(), rates: empty, light: empty, dark: empty, normals: empty, unlike, hot }
     }
 }
 
@@ -487,7 +509,7 @@ impl Line<'_> {
         counts: &mut Counts,
     ) {
         let model = self.model;
-        let Scratch { words, rates, light, dark, normals } = scratch;
+        let Scratch { words, rates, light, dark, normals, unlike, hot } = scratch;
         let [rates, light, dark, normals] = [rates, light, dark, normals].map(|numbers| &mut numbers[..run.length]);
         let mut negative = 0_u32;
         for (rate, &expected) in rates.iter_mut().zip(expected) {
@@ -516,11 +538,17 @@ impl Line<'_> {
         } else if model.prnu > 0.0 {
             scale(light, to_sample(model.prnu), normals);
         }
-        if model.dark_e > 0.0 {
+        if model.dark_e > 0.0 || model.tails.has_hot() {
             rates.fill(to_sample(model.dark_e));
-            self.shot(model.dark_shot, Source::Dcsn, run, words, rates, dark);
+            self.shot(model.dark_shot && model.dark_e > 0.0, Source::Dcsn, run, words, rates, dark);
             if model.dcnu > 0.0 {
                 run.normals(words, Source::Dcnu, normals);
+            }
+            if model.tails.has_hot() {
+                run.find_unlike(words, Source::HotPixels, model.tails.hot_share, unlike);
+                self.heat(run, words, (unlike, hot), dark, normals);
+            }
+            if model.dcnu > 0.0 {
                 scale(dark, to_sample(model.dcnu), normals);
             }
             for (light, &dark) in light.iter_mut().zip(&*dark) {
@@ -534,6 +562,45 @@ impl Line<'_> {
             *charge = if light > full_well { full_well } else { light };
         }
         counts.full_well += u64::from(full);
+    }
+
+    /// Draws the dark signal of hot photosites at their own rates, of which the non-uniformity of the others is a lesser share.
+    fn heat(
+        &self,
+        run: &Run,
+        words: &RunWords,
+        (unlike, hot): (&[Unlike], &mut Vec<(usize, f32)>),
+        dark: &mut [f32],
+        normals: &mut [f32],
+    ) {
+        let NoiseModel { dark_e, tails, poisson, .. } = self.model;
+        hot.clear();
+        for &(index, excess) in unlike {
+            let rate_e = dark_e + tails.hot_e * excess;
+            normals[index] *= to_sample(dark_e / rate_e);
+            hot.push((index, to_sample(rate_e)));
+        }
+        if self.model.dark_shot {
+            run.recount(words, *poisson == PoissonKind::Exact, hot, dark);
+        } else {
+            hot.iter().for_each(|(index, rate)| dark[*index] = *rate);
+        }
+    }
+
+    /// Adds what the readings of photosites with a trap are off by.
+    #[inline(always)]
+    fn add_jumps(&self, run: &Run, scratch: &mut Scratch, samples: &mut [f32]) {
+        let tails = &self.model.tails;
+        if !tails.has_rts() {
+            return;
+        }
+        let Scratch { words, unlike, .. } = scratch;
+        run.find_unlike(words, Source::Rts, tails.rts_share, unlike);
+        for &(index, excess) in &*unlike {
+            if let Some(sample) = samples.get_mut(index) {
+                *sample += to_sample(tails.rts_e * excess) * run.jump(index);
+            }
+        }
     }
 
     /// Fills `numbers` with counts at `rates`, or with the rates themselves where there is no shot noise.

@@ -25,6 +25,53 @@ pub struct NoiseModel {
     pub poisson: PoissonKind,
     /// What rows and columns share, and offsets of photosites.
     pub lines: LineNoise,
+    /// Photosites that are unlike most.
+    pub tails: Tails,
+}
+
+/// The tails of dark current and of read noise: photosites that are unlike most; 0 what is left out or not there.
+///
+/// The dark signal of a hot photosite is max(0, Q_DC (1 + dcnu n) + hot t), and the reading of one with a trap is off by −a, 0 or
+/// a, in a quarter, a half and a quarter of the exposures, a = rts t′; t and t′ are exponential numbers of mean 1.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Tails {
+    /// Share of hot photosites.
+    pub hot_share: f64,
+    /// Mean excess of their dark signal, e⁻.
+    pub hot_e: f64,
+    /// Share of photosites with a trap.
+    pub rts_share: f64,
+    /// Mean amplitude of their jumps, e⁻.
+    pub rts_e: f64,
+    /// Amplitude of the jumps of photosites that all have the same, e⁻.
+    pub trap_e: f64,
+}
+
+impl Tails {
+    /// Whether all photosites are alike.
+    pub fn is_none(&self) -> bool {
+        !self.has_hot() && !self.has_rts()
+    }
+
+    /// Whether some photosites are hot.
+    pub fn has_hot(&self) -> bool {
+        self.hot_share > 0.0 && self.hot_e > 0.0
+    }
+
+    /// Whether some photosites have a trap.
+    pub fn has_rts(&self) -> bool {
+        self.rts_share > 0.0 && self.rts_e > 0.0
+    }
+
+    /// Variance of jumps that are alike at all photosites, e².
+    pub fn trap_variance(&self) -> f64 {
+        0.5 * self.trap_e * self.trap_e
+    }
+
+    /// The mean of what hot photosites add to the dark signal, over all, e⁻.
+    pub fn mean_hot_e(&self) -> f64 {
+        self.hot_share * self.hot_e
+    }
 }
 
 /// Noise of sensors that are read by row and column, rms; 0 what is left out or not there.
@@ -104,6 +151,13 @@ impl NoiseModel {
                 dsnu_column_e: if_drawn(Source::DsnuColumn, readout.dsnu_column_e),
                 prnu_row: if_drawn(Source::PrnuRow, readout.prnu_row),
                 prnu_column: if_drawn(Source::PrnuColumn, readout.prnu_column),
+            },
+            tails: Tails {
+                hot_share: if_drawn(Source::HotPixels, readout.hot_pixel_share),
+                hot_e: if_drawn(Source::HotPixels, record.hot_pixel_e),
+                rts_share: if_drawn(Source::Rts, readout.rts_share),
+                rts_e: if_drawn(Source::Rts, readout.rts_amplitude_e),
+                trap_e: 0.0,
             },
         })
     }

@@ -1,0 +1,454 @@
+//! Photosites that are unlike most: hot ones, and those whose reading jumps.
+//!
+//! Each photosite of a sensor has its own excess of dark current t hot_e and amplitude of jumps s rts_e, t and s exponential
+//! numbers of mean 1 on a share of the photosites and 0 on the others, the same in all its frames. Given t and s it is a photosite
+//! like those of a sensor without tails, of a larger dark signal, whose reading is off by −a, 0 or a. So moments about the mean of
+//! all are those of a mixture,
+//!
+//! E (y − μ)ⁿ = Σ w Σ_k C(n, k) (μ_w − μ)ⁿ⁻ᵏ m_k,w
+//!
+//! with w the weights of quadrature in t and s: Gauss and Laguerre's, exact for polynomials of degree 19, where nothing ends or
+//! shows how codes are rounded as far as e^(−40); else panels that narrow towards full well and the ends of the codes.
+
+use super::budget::{Budget, Cause};
+use super::charge::charge;
+use super::law::Law;
+use super::lines::blur_e;
+use super::masters::Dark;
+use super::memory::Memory;
+use super::moments::{Equations, Prediction};
+use super::photosite::Photosite;
+use super::unpredictable::{Predicted, Unpredictable};
+use crate::numerics::averages::Combine;
+use crate::numerics::gauss::panel;
+use crate::numerics::rounding::SMOOTH;
+use crate::stages::noise::{NoiseModel, Tails};
+use nalgebra::DMatrix;
+use std::sync::LazyLock;
+
+/// Why the paper says nothing.
+const NOT_IN_THE_PAPER: &str = "the paper has no equations for hot pixels, nor for random telegraph signals";
+
+/// Why nothing is said of charge that moves.
+pub(super) const TRANSFERRED: &str = "charge transfer spreads hot pixels over their columns";
+
+/// Why nothing is said of averages that are no means.
+const NO_MEANS: &str = "medians and clipped means of frames with hot pixels or random telegraph signals follow no formula here; use \
+                        `--combine mean`";
+
+/// Why nothing is said of samples over a flat field.
+const DIVIDED: &str = "it was divided by a flat field of a sensor that has hot pixels or random telegraph signals";
+
+/// Why nothing is said of codes that are not straight.
+const BENT: &str = "hot pixels or random telegraph signals before a converter that is not straight";
+
+/// Why nothing is said where rounding shows.
+const TOO_FINE: &str = "hot pixels or random telegraph signals go over many codes, and what each photosite has of its own blurs none of \
+                        them; give the sensor read noise";
+
+/// Why nothing is said of dark frames that show how codes are rounded.
+const FINE_DARKS: &str =
+    "dark frames of less than a code of noise came off a frame with hot pixels or random telegraph signals";
+
+/// Why nothing is said of what rows and columns share.
+pub(super) const WITH_LINES: &str = "full well or an end of the codes cuts off what rows or columns share, on a sensor that has hot \
+                                     pixels or random telegraph signals";
+
+/// Why nothing is said of what is curved.
+pub(super) const CURVED: &str = "hot pixels and random telegraph signals reach too far for the series of what is curved in the \
+                                 photosites";
+
+/// Excesses beyond which nothing counts, in units of their mean: e⁻⁴⁰ is 4·10⁻¹⁸.
+const REACH: f64 = 40.0;
+
+/// Standard deviation, in codes, of what blurs them from which rounding of jumps is a uniform error to 3·10⁻⁶ of a squared code.
+const BLURRED: f64 = 0.8;
+
+/// Values of what photosites differ in that are gone through at most.
+const MOST_NODES: usize = 6000;
+
+/// What a kind of photosites has beyond others, in units of the means.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct State {
+    hot: f64,
+    trap: f64,
+}
+
+/// What holds for a kind of photosites, and their share.
+#[derive(Debug, Clone, Copy)]
+struct Kind<T> {
+    weight: f64,
+    /// Whether jumps come to it as an error of its own.
+    is_free: bool,
+    value: T,
+}
+
+/// Where what is read bends, and over what width.
+#[derive(Debug, Clone, Copy)]
+struct Knee {
+    at: f64,
+    width: f64,
+}
+
+/// Rounding that shows: the distance from code to code, and how far it does.
+#[derive(Debug, Clone, Copy)]
+struct Codes {
+    period: f64,
+    until: f64,
+}
+
+/// Gauss and Laguerre's nodes and weights: eigenvalues of the matrix of the polynomials' recurrence, with 2k + 1 on its diagonal
+/// and k beside it.
+fn laguerre(nodes: usize) -> Vec<(f64, f64)> {
+    let recurrence = DMatrix::from_fn(nodes, nodes, |i, j| match i.abs_diff(j) {
+        0 => 2.0 * i as f64 + 1.0,
+        1 => i.max(j) as f64,
+        _ => 0.0,
+    });
+    let solved = recurrence.symmetric_eigen();
+    let node = |(index, place): (usize, &f64)| (*place, solved.eigenvectors[(0, index)].powi(2));
+    solved.eigenvalues.iter().enumerate().map(node).collect()
+}
+
+/// For photosites that are hot and have a trap: exact for polynomials of degree 9.
+static FEW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(5));
+
+/// Places and weights of an exponential number of mean 1 for a function that bends at `knees`; none of too many.
+fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
+    static SMOOTH_NODES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(10));
+    const WIDEST: f64 = 4.0;
+    const NARROWEST: f64 = 1e-4;
+    let near: Vec<&Knee> =
+        knees.iter().filter(|knee| knee.at < REACH + 12.0 * knee.width && knee.at > -12.0 * knee.width).collect();
+    if near.is_empty() && codes.is_none() {
+        return Some(SMOOTH_NODES.clone());
+    }
+    let mut ends: Vec<f64> = (0..).map(|step| WIDEST * f64::from(step)).take_while(|end| *end < REACH).collect();
+    ends.push(REACH);
+    for knee in near {
+        ends.push(knee.at);
+        let mut distance = 2.5 * knee.width.max(NARROWEST);
+        while distance < REACH {
+            ends.extend([knee.at - distance, knee.at + distance]);
+            distance *= 3.0;
+        }
+    }
+    if let Some(Codes { period, until }) = codes {
+        let steps = (until.min(REACH) / period).ceil() * 2.0;
+        if steps * crate::numerics::gauss::NODES as f64 > MOST_NODES as f64 {
+            return None;
+        }
+        let mut end = 0.0;
+        while end < until.min(REACH) {
+            ends.push(end);
+            end += 0.5 * period;
+        }
+    }
+    ends.retain(|end| (0.0..=REACH).contains(end));
+    ends.sort_by(f64::total_cmp);
+    ends.dedup_by(|next, kept| *next - *kept < 1e-7);
+    let of_panel =
+        |pair: &[f64]| panel(pair[0], pair[1]).map(|(t, weight)| (t, weight * (-t).exp())).collect::<Vec<_>>();
+    let mut found: Vec<(f64, f64)> = ends.windows(2).flat_map(of_panel).collect();
+    found.retain(|(_, weight)| *weight > 1e-13);
+    Some(found)
+}
+
+impl NoiseModel {
+    /// That of the photosites of one kind.
+    fn at(&self, state: &State) -> Self {
+        let hot_e = self.tails.hot_e * state.hot;
+        let dark_e = self.dark_e + hot_e;
+        // The non-uniformity is that of the dark current which all have.
+        let dcnu = if hot_e > 0.0 { self.dcnu * self.dark_e / dark_e } else { self.dcnu };
+        let tails = Tails { trap_e: self.tails.rts_e * state.trap, ..Tails::default() };
+        Self { dark_e, dcnu, tails, ..*self }
+    }
+}
+
+impl Photosite {
+    /// Whether photosites are unlike each other.
+    pub(super) fn has_tails(&self) -> bool {
+        self.models().any(|model| !model.tails.is_none())
+    }
+
+    /// Makes sure that formulas are known for photosites that are unlike most.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`].
+    pub(super) fn check_tails(&self, expected_e: [f64; 3]) -> Predicted<()> {
+        if !self.has_tails() {
+            return Ok(());
+        }
+        let beyond = |why| Err(Unpredictable::Beyond(why));
+        if self.equations == Equations::Paper {
+            return beyond(NOT_IN_THE_PAPER);
+        }
+        if self.flat.is_some() {
+            return beyond(DIVIDED);
+        }
+        if self.adc.is_some_and(|adc| adc.is_bent()) {
+            return beyond(BENT);
+        }
+        if self.darks.iter().flatten().any(|dark| dark.frames > 2 && dark.combine != Combine::Mean) {
+            return beyond(NO_MEANS);
+        }
+        if let Some(adc) = self.adc.filter(|_| self.darks[0].is_some()) {
+            let is_fine = |dark: &Dark| self.rounds_as(&adc, 0.0, dark, &self.of_dark(dark));
+            if self.darks.iter().flatten().any(is_fine) {
+                return beyond(FINE_DARKS);
+            }
+        }
+        let amplitude_e = self.most(|tails| tails.rts_e);
+        let is_too_fine = |expected_e: f64| {
+            self.hot_nodes(expected_e).is_none()
+                || self.trap_nodes(expected_e).is_none() && self.jumps_show(expected_e, amplitude_e)
+        };
+        if expected_e.into_iter().any(is_too_fine) {
+            return beyond(TOO_FINE);
+        }
+        Ok(())
+    }
+
+    /// The same photosites, those of one kind.
+    fn at(&self, state: &State) -> Self {
+        let darks = self.darks.map(|dark| dark.map(|dark| Dark { model: dark.model.at(state), ..dark }));
+        Self { model: self.model.at(state), darks, ..*self }
+    }
+
+    /// That of the frames which have it.
+    fn most(&self, of: fn(&Tails) -> f64) -> f64 {
+        self.models().map(|model| of(&model.tails)).fold(0.0, f64::max)
+    }
+
+    /// What holds for each kind of photosites: those that jump apart only where jumps show how codes are rounded, or end.
+    fn each<T>(&self, expected_e: f64, of: impl Fn(&Self) -> T) -> Vec<Kind<T>> {
+        let [hot_share, trap_share] = [self.most(|tails| tails.hot_share), self.most(|tails| tails.rts_share)];
+        let mut kinds = vec![(0.0, 1.0 - hot_share)];
+        if hot_share > 0.0 {
+            let nodes = self.hot_nodes(expected_e).unwrap_or_default();
+            kinds.extend(nodes.iter().map(|(t, weight)| (*t, hot_share * weight)));
+        }
+        let sum: f64 = kinds.iter().map(|(_, weight)| weight).sum();
+        let mut found = Vec::new();
+        for (hot, weight) in kinds.into_iter().map(|(t, weight)| (t, weight / sum)) {
+            let quiet = self.at(&State { hot, trap: 0.0 });
+            let jumps_apart = trap_share > 0.0 && quiet.jumps_show(expected_e, self.most(|tails| tails.rts_e));
+            let is_free = trap_share > 0.0 && !jumps_apart;
+            let share = if jumps_apart { 1.0 - trap_share } else { 1.0 };
+            found.push(Kind { weight: weight * share, is_free, value: of(&quiet) });
+            if !jumps_apart {
+                continue;
+            }
+            let traps = if hot == 0.0 { self.trap_nodes(expected_e).unwrap_or_default() } else { FEW.clone() };
+            let all: f64 = traps.iter().map(|(_, weight)| weight).sum();
+            for (trap, of_trap) in traps {
+                let weight = weight * trap_share * of_trap / all;
+                found.push(Kind { weight, is_free: false, value: of(&self.at(&State { hot, trap })) });
+            }
+        }
+        found
+    }
+
+    /// Whether jumps of this mean amplitude end with the codes, or show how these are rounded.
+    fn jumps_show(&self, expected_e: f64, amplitude_e: f64) -> bool {
+        let Some(adc) = self.adc else { return false };
+        let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
+        self.frames(expected_e).any(|(model, light_e)| {
+            let law = Law::of(model, light_e);
+            let own = if law.reaches_full_well() { model.added() } else { blur_e(model, &adc, light_e) };
+            let [low, high] = law.reach();
+            let high = high.min(model.full_well_e + 9.0 * model.added());
+            adc.adu_per_e * own < BLURRED || low - REACH * amplitude_e < lower || high + REACH * amplitude_e > upper
+        })
+    }
+
+    /// Cumulants 2, 4 and 6 of what jumps add to samples, those of averages that came off included: given its amplitude a, what is
+    /// drawn anew in a frame has a²/2, −a⁴/4 and a⁶/2.
+    fn jump_cumulants(&self) -> [f64; 3] {
+        let [rts_share, rts_e] = [self.most(|tails| tails.rts_share), self.most(|tails| tails.rts_e)];
+        let mut given = if self.model.tails.has_rts() { [0.5, -0.25, 0.5] } else { [0.0; 3] };
+        for dark in self.darks.iter().flatten().filter(|dark| dark.model.tails.has_rts()) {
+            let frames = f64::from(dark.frames.max(1));
+            given[0] += 0.5 * dark.weight.powi(2) / frames;
+            given[1] -= 0.25 * dark.weight.powi(4) / frames.powi(3);
+            given[2] += 0.5 * dark.weight.powi(6) / frames.powi(5);
+        }
+        let [second, fourth, sixth] = given;
+        let square = (rts_e * self.slope()).powi(2);
+        let m2 = rts_share * 2.0 * square * second;
+        let m4 = rts_share * 24.0 * square.powi(2) * (fourth + 3.0 * second * second);
+        let m6 = rts_share * 720.0 * square.powi(3) * (sixth + 15.0 * fourth * second + 15.0 * second.powi(3));
+        [m2, m4 - 3.0 * m2 * m2, m6 - 15.0 * m4 * m2 + 30.0 * m2.powi(3)]
+    }
+
+    /// The frames that a sample follows from: their noise, and the light in them.
+    fn frames(&self, expected_e: f64) -> impl Iterator<Item = (&NoiseModel, f64)> {
+        let darks = self.darks.iter().flatten().map(|dark| (&dark.model, 0.0));
+        std::iter::once((&self.model, expected_e)).chain(darks)
+    }
+
+    /// Charges at which what is read bends: full well, and the ends of the codes.
+    fn levels_e(&self) -> impl Iterator<Item = f64> {
+        let ends = self.adc.map(|adc| [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code)));
+        std::iter::once(self.model.full_well_e).chain(ends.into_iter().flatten()).filter(|level| level.is_finite())
+    }
+
+    fn hot_nodes(&self, expected_e: f64) -> Option<Vec<(f64, f64)>> {
+        let mut knees = Vec::new();
+        let mut codes: Option<Codes> = None;
+        for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_hot()) {
+            let hot_e = model.tails.hot_e;
+            let cold = charge(model, light_e);
+            knees.extend(self.levels_e().map(|level_e| {
+                let shot = if model.dark_shot { (level_e - cold.mean).max(1.0) } else { 0.0 };
+                let width = (cold.variance + shot + model.added().powi(2) + model.tails.rts_e.powi(2)).sqrt();
+                Knee { at: (level_e - cold.mean) / hot_e, width: width / hot_e }
+            }));
+            let Some(adc) = self.adc else { continue };
+            let blur = adc.adu_per_e * model.added().hypot(Law::of(model, light_e).least_pattern_std());
+            if blur >= SMOOTH {
+                continue;
+            }
+            // Shot noise blurs codes beyond so many electrons.
+            let until = if model.dark_shot { (SMOOTH / adc.adu_per_e).powi(2) + 60.0 } else { f64::INFINITY };
+            let next = Codes { period: (1.0 / adc.adu_per_e).max(6.0) / hot_e, until: until / hot_e };
+            codes = Some(codes.map_or(next, |known| Codes {
+                period: known.period.min(next.period),
+                until: known.until.max(next.until),
+            }));
+        }
+        nodes(&knees, codes)
+    }
+
+    fn trap_nodes(&self, expected_e: f64) -> Option<Vec<(f64, f64)>> {
+        let Some(adc) = self.adc else { return nodes(&[], None) };
+        let mut knees = Vec::new();
+        let mut codes = None;
+        for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_rts()) {
+            let amplitude_e = model.tails.rts_e;
+            let cold = charge(model, light_e);
+            let mean_e = cold.mean.min(model.full_well_e);
+            let width = (cold.variance + model.added().powi(2)).sqrt();
+            let ends = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
+            knees.extend(ends.map(|end| Knee { at: (end - mean_e).abs() / amplitude_e, width: width / amplitude_e }));
+            let quiet = model.at(&State { hot: 0.0, trap: 0.0 });
+            if adc.adu_per_e * blur_e(&quiet, &adc, light_e) < BLURRED {
+                codes = Some(Codes { period: 1.0 / adc.adu_per_e / amplitude_e, until: f64::INFINITY });
+            }
+        }
+        nodes(&knees, codes)
+    }
+
+    /// Moments of the samples of all kinds of photosites together.
+    pub(super) fn mixed(&self, expected_e: f64) -> Prediction {
+        thread_local! { static KNOWN: Memory<(Photosite, f64), Prediction> = const { Memory::new() }; }
+        KNOWN.with(|known| known.recall((*self, expected_e), |(site, expected_e)| site.work_out(*expected_e)))
+    }
+
+    fn work_out(&self, expected_e: f64) -> Prediction {
+        let [second, fourth, sixth] = self.jump_cumulants();
+        let with_jumps = |kind: Kind<Prediction>| {
+            let Kind { weight, is_free, value } = kind;
+            if !is_free {
+                return (weight, value);
+            }
+            let (variance, of_fourth) = (value.moments.variance + second, value.fourth() + fourth);
+            let with = Prediction::of_cumulants(value.moments.mean, variance, value.third, of_fourth);
+            (weight, Prediction { sixth: value.sixth + sixth, ..with })
+        };
+        let kinds = self.each(expected_e, |site| {
+            // Sixth cumulant of −a, 0 or a.
+            let trap = 0.5 * (site.slope() * site.model.tails.trap_e).powi(6);
+            Prediction { sixth: trap, ..site.moments(expected_e) }
+        });
+        let parts: Vec<(f64, Prediction)> = kinds.into_iter().map(with_jumps).collect();
+        mixture(&parts)
+    }
+
+    /// The mean over all kinds of photosites of a number that jumps do not change where they are free.
+    pub(super) fn mean_of(&self, expected_e: f64, of: impl Fn(&Self) -> f64) -> f64 {
+        self.each(expected_e, of).iter().map(|kind| kind.weight * kind.value).sum()
+    }
+
+    /// The variance by cause: the mean over all kinds of photosites, and that of their means, which hot pixels make.
+    pub(super) fn mixed_budget(&self, expected_e: f64) -> Budget {
+        let [jumps, ..] = self.jump_cumulants();
+        let kinds = self.each(expected_e, |site| (site.budget(expected_e), site.moments(expected_e).moments.mean));
+        let mean: f64 = kinds.iter().map(|kind| kind.weight * kind.value.1).sum();
+        let mut budget =
+            Cause::ALL.map(|cause| kinds.iter().map(|kind| kind.weight * kind.value.0[cause as usize]).sum::<f64>());
+        for kind in &kinds {
+            budget[Cause::HotPixels as usize] += kind.weight * (kind.value.1 - mean).powi(2);
+            budget[Cause::Rts as usize] += if kind.is_free { kind.weight * jumps } else { 0.0 };
+        }
+        budget
+    }
+}
+
+/// Moments 2 to 6 about the mean from cumulants, the fifth taken as none.
+fn central(prediction: &Prediction) -> [f64; 5] {
+    let (k2, k3, k4) = (prediction.moments.variance, prediction.third, prediction.fourth());
+    let sixth = prediction.sixth + 15.0 * k4 * k2 + 10.0 * k3 * k3 + 15.0 * k2.powi(3);
+    [k2, k3, k4 + 3.0 * k2 * k2, 10.0 * k3 * k2, sixth]
+}
+
+/// The law of a variable that has each of these with its weight.
+fn mixture(parts: &[(f64, Prediction)]) -> Prediction {
+    let mean: f64 = parts.iter().map(|(weight, part)| weight * part.moments.mean).sum();
+    let mut sums = [0.0; 5];
+    for (weight, part) in parts {
+        let d = part.moments.mean - mean;
+        let [m2, m3, m4, m5, m6] = central(part);
+        let about = [
+            m2 + d * d,
+            m3 + 3.0 * d * m2 + d.powi(3),
+            m4 + 4.0 * d * m3 + 6.0 * d * d * m2 + d.powi(4),
+            m5 + 5.0 * d * m4 + 10.0 * d * d * m3 + 10.0 * d.powi(3) * m2 + d.powi(5),
+            m6 + 6.0 * d * m5 + 15.0 * d * d * m4 + 20.0 * d.powi(3) * m3 + 15.0 * d.powi(4) * m2 + d.powi(6),
+        ];
+        sums.iter_mut().zip(about).for_each(|(sum, moment)| *sum += weight * moment);
+    }
+    let [m2, m3, m4, _, m6] = sums;
+    let sixth = m6 - 15.0 * m4 * m2 - 10.0 * m3 * m3 + 30.0 * m2.powi(3);
+    Prediction { sixth, ..Prediction::of_cumulants(mean, m2, m3, m4 - 3.0 * m2 * m2) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// n! for moments; e^(−a t) for what is no polynomial, with knees and codes alike.
+    #[test]
+    fn nodes_integrate_exponential_numbers() {
+        let knee = |at: f64, width: f64| Knee { at, width };
+        let cases = [
+            (vec![], None),
+            (vec![knee(0.7, 0.01), knee(-0.1, 0.2), knee(30.0, 2.0)], None),
+            (vec![knee(2.0, 0.3)], Some(Codes { period: 0.3, until: 12.0 })),
+        ];
+        for (knees, codes) in cases {
+            let found = nodes(&knees, codes).unwrap();
+            let mean = |f: &dyn Fn(f64) -> f64| found.iter().map(|(t, weight)| weight * f(*t)).sum::<f64>();
+            let mut factorial = 1.0;
+            for power in 1..=8 {
+                factorial *= f64::from(power);
+                // Beyond 32, weights of 10⁻¹⁴, there is 32⁸ e⁻³² of 8!, 4·10⁻⁷ and less, and panels are good to as much.
+                let allowed = if power < 3 { 1e-9 } else { 1e-4 };
+                assert!((mean(&|t| t.powi(power)) / factorial - 1.0).abs() < allowed, "{power}");
+            }
+            assert!((mean(&|t| (-0.2 * t).exp()) - 1.0 / 1.2).abs() < 1e-9);
+        }
+        assert!(nodes(&[], Some(Codes { period: 1e-3, until: f64::INFINITY })).is_none());
+    }
+
+    /// Two values of a coin, by hand: variance 1, fourth cumulant −2, sixth 16.
+    #[test]
+    fn mixtures_have_the_cumulants_of_their_law() {
+        let at = |mean: f64| Prediction::of_cumulants(mean, 0.0, 0.0, 0.0);
+        let coin = mixture(&[(0.5, at(3.0)), (0.5, at(5.0))]);
+        assert_eq!((coin.moments.mean, coin.moments.variance, coin.third, coin.fourth()), (4.0, 1.0, 0.0, -2.0));
+        assert!((coin.sixth - 16.0).abs() < 1e-12);
+    }
+}
