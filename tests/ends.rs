@@ -11,7 +11,7 @@ use cyanometer::metadata::{AdcRecord, PoissonKind, Scene};
 use cyanometer::propagation::budget::Cause;
 use cyanometer::propagation::{Equations, Photosite, Prediction};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
-use cyanometer::stages::noise::{AddNoise, LineNoise, NoiseModel, NoiseSettings};
+use cyanometer::stages::noise::{AddNoise, LineNoise, NoiseModel, NoiseSettings, Tails};
 use cyanometer::stream::MemoryFrame;
 use support::{expected, through};
 
@@ -40,11 +40,8 @@ const QUIET: NoiseModel = NoiseModel {
         dsnu_column_e: 0.0,
         prnu_row: 0.0,
         prnu_column: 0.0,
-        hot_pixel_share: 0.0,
-        hot_pixel_dark_current_e_per_s: 0.0,
-        rts_share: 0.0,
-        rts_amplitude_e: 0.0,
     },
+    tails: Tails { hot_share: 0.0, hot_e: 0.0, rts_share: 0.0, rts_e: 0.0, trap_e: 0.0 },
 };
 
 const PAPER: AdcRecord = AdcRecord::new(12, 1753.0, 0.058824);

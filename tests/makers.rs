@@ -112,7 +112,6 @@ fn several_files_are_imported_at_once() {
             "import-raw a.nef b.dng -o x.tiff",
             "x.tiff: what is made of a.nef and of b.dng would both go there; give -o DIR/",
         ),
-        ("import-raw a.nef b.dng", "frames of several inputs go into files; give -o DIR/, or a name with {stem}"),
         ("import-raw a.nef b.dng -o {stem}.dng", "b.dng: it is the same file as the input b.dng"),
     ] {
         let done = shop.attempt(line, &[]);

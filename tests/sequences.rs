@@ -150,7 +150,7 @@ fn what_is_no_frame_is_refused() {
     let two = [frame.as_slice(), &frame].concat();
     fs::write(shop.path("two.exr"), &two).unwrap();
     fs::write(shop.path("junk.exr"), [two.as_slice(), b"junk"].concat()).unwrap();
-    let junk = "behind its last row come bytes that are no part of it, and no frame; cut them off";
+    let junk = "behind its last row come bytes that are no part of it; cut them off";
     for (line, input, status, wanted) in [
         ("measure", [two.as_slice(), b"x"].concat(), BAD_DATA, junk),
         ("measure junk.exr", Vec::new(), BAD_DATA, junk),

@@ -39,6 +39,7 @@ pub fn counted(count: u64, what: &str) -> String {
             ("wavelengths", "wavelength"),
             ("flats", "flat"),
             ("darks", "dark"),
+            ("frames", "frame"),
         ],
         &[
             ("are", "is"),

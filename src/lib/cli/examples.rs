@@ -56,7 +56,7 @@ pub const EXAMPLES: [(&str, &[Example]); 15] = [
             ),
             example(
                 "A hundred exposures in one stream, and the statistics of each",
-                "add-noise --frames 0..100 expected.exr | digitize | measure --output-format csv",
+                "add-noise --frames 0..100 expected.exr | digitize | measure",
             ),
             example(
                 "Another exposure by the same sensor, without read noise",

@@ -1,7 +1,8 @@
 //! The frames that a run goes through: of files and of streams, one exposure of each or several, on one thread or on many.
 
+use super::advice;
 use super::session::Session;
-use super::{advice, complain};
+use super::words::complain;
 use crate::error::{Error, Result};
 use crate::formats::places::is_numbered;
 use crate::formats::sequence::Sequence;

@@ -14,6 +14,7 @@ pub mod programs;
 mod session;
 mod signals;
 mod usage;
+mod words;
 
 pub use frames::Turn;
 pub use general::{General, ProgressWhen};
@@ -27,10 +28,10 @@ use crate::formats::places::STDOUT_NAME;
 use crate::formats::{keys, register, standard};
 use crate::metadata::METADATA_TEMPLATE;
 use crate::numerics::vectors::Instructions;
-use crate::text::one_line;
 use clap::{Command, CommandFactory, FromArgMatches};
 use std::io::Write;
 use std::process::ExitCode;
+use words::complain;
 
 /// Exit status after an internal error, as Rust's programs have it.
 const PANICKED: i32 = 101;
@@ -113,11 +114,4 @@ fn ended(program: &str, shown: Result<()>) -> ExitCode {
             ExitCode::from(error.exit_status())
         }
     }
-}
-
-/// Writes one line to the standard error.
-fn complain(program: &str, text: &str) {
-    // In one piece, so that the lines of several programs do not mix. Where the standard error is closed there is nobody to tell.
-    let line = format!("{program}: {}\n", one_line(text));
-    drop(std::io::stderr().write_all(line.as_bytes()));
 }

@@ -1,8 +1,8 @@
 //! What a running program does besides its computation: words, history, threads, outputs.
 
-use super::complain;
 use super::general::{General, ProgressWhen};
 use super::history::Signature;
+use super::words::complain;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
 use crate::formats::output::{Format, FrameWriter, OutputOptions};

@@ -397,7 +397,12 @@ impl FrameReader {
         match self.sequence.take() {
             Some(sequence) => {
                 self.pass_over(below, &mut Vec::new())?;
-                sequence.go_on(self.reader.rest()?);
+                let mut rest = self.reader.rest()?;
+                // What a file holds is known now; what a stream brings may take its time.
+                if let Rest::File(..) = rest {
+                    rest.begins_frame(&self.header.name)?;
+                }
+                sequence.go_on(rest);
             }
             None if below == 0 => self.reader.rest()?.end(&self.header.name)?,
             None => {}

@@ -221,7 +221,7 @@ impl Rest {
     /// # Errors
     ///
     /// [`Error::Format`] for bytes that are none; [`Error::Disk`].
-    fn begins_frame(&mut self, name: &str) -> Result<bool> {
+    pub(super) fn begins_frame(&mut self, name: &str) -> Result<bool> {
         let head = self.head(name)?;
         if head.is_empty() {
             return Ok(false);
@@ -244,6 +244,6 @@ impl Rest {
 }
 
 /// The complaint about bytes that are none.
-const NO_FRAME: &str = "behind its last row come bytes that are no part of it, and no frame; cut them off";
+const NO_FRAME: &str = "behind its last row come bytes that are no part of it; cut them off";
 /// The complaint about a frame that nobody asked for.
 const ANOTHER: &str = "behind it comes another frame, where one is wanted; give each a file of its own";

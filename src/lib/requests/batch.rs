@@ -67,10 +67,12 @@ pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &
 /// [`Error::Data`] that names the first which is not.
 pub fn check_directories(jobs: &[Job]) -> Result<()> {
     let mut last = None;
-    for directory in jobs.iter().filter_map(|job| named(job.frame.as_deref())?.parent()) {
+    let frames = || jobs.iter().filter_map(|job| named(job.frame.as_deref()));
+    for (frame, directory) in frames().filter_map(|frame| Some((frame, frame.parent()?))) {
         let is_known = !directory.as_os_str().is_empty() && numbered(directory, 0, 0).is_none();
         if is_known && last != Some(directory) && !directory.is_dir() {
-            return Err(Error::Data(format!("there is no directory `{}`; make it first", directory.display())));
+            let problem = format!("there is no directory `{}`; make it first", directory.display());
+            return Err(Error::format(&frame.display().to_string(), problem));
         }
         last = Some(directory);
     }
