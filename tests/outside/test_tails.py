@@ -59,7 +59,7 @@ class Tails(ProgramCase):
     def test_a_full_well_by_quadrature(self):
         """Without patterns and counts that matter: the mean charge of hot pixels that full well cuts off, H (1 − e^(−W/H))."""
         hot = READOUT["hot_pixel_dark_current_e_per_s"] * EXPOSURE_S * 10
-        sensor = self.sensor(dcnu=0, prnu=0, rts_share=0, rts_amplitude_e=0, hot_pixel_share=1, dark_current_e_per_s=0,
+        sensor = self.sensor(dcnu=0, prnu=0, rts_share=1e-9, rts_amplitude_e=1e-9, hot_pixel_share=1, dark_current_e_per_s=0,
                              hot_pixel_dark_current_e_per_s=hot / EXPOSURE_S)
         found = self.predicted(sensor)["electrons"]
         full, signal = READOUT["full_well_e"], ELECTRONS[0]
