@@ -33,6 +33,8 @@ pub fn photon_transfer(curve: &TransferCurve) -> Plot {
         Cause::DsnuColumn,
         Cause::DarkShot,
         Cause::Dcnu,
+        Cause::HotPixels,
+        Cause::Rts,
     ]);
     let shot = part(&[Cause::SignalShot]);
     let pattern = part(&[Cause::Prnu, Cause::PrnuRow, Cause::PrnuColumn]);
