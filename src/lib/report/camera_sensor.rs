@@ -191,7 +191,10 @@ fn pooled_of(classes: &[ClassFindings], key: &str, of_all: bool) -> Option<Inter
         |of: fn(&Interval) -> f64| found.iter().map(|interval| weight(interval) / all * of(interval)).sum::<f64>();
     let value = mean(|interval| interval.value);
     let narrower = (found.len() as f64).sqrt();
-    let [below, above] = [value - mean(|interval| interval.low), mean(|interval| interval.high) - value];
+    // Intervals that are cut off at 0 say nothing of how far below they reach.
+    let at_zero = found.iter().filter(|interval| interval.low <= 0.0).count();
+    let below = if 2 * at_zero >= found.len() { value * narrower } else { value - mean(|interval| interval.low) };
+    let above = mean(|interval| interval.high) - value;
     ((found.len() == classes.len() || !of_all) && !found.is_empty()).then(|| Interval {
         value,
         low: value - below / narrower,

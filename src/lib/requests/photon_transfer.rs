@@ -82,6 +82,12 @@ impl PhotonTransfer {
                 Error::Usage("an uncertainty is a fraction: 0 or more, and below 1".into()).change(&["photon_error"])
             );
         }
+        if self.confidence >= 1.0 {
+            return Err(Error::Usage("no interval holds its number for certain".into()).change(&["confidence"]));
+        }
+        if self.white_level_adu.is_some_and(|white| white <= 0.0) {
+            return Err(Error::Usage("the largest code is above 0".into()).change(&["white"]));
+        }
         let list_name = self.list.display().to_string();
         let is_folder = self.list.is_dir();
         let FrameList { frames, white_level_adu } = if is_folder {
@@ -290,9 +296,6 @@ fn patterns(head: &FrameHeader, class: &ClassFindings, surveys: &[Survey]) -> [O
 const SAME_LIGHT: f64 = 0.1;
 
 fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Result<()> {
-    if !group.condition.is_lit {
-        return Ok(());
-    }
     let [least, most] =
         [means.iter().copied().fold(f64::INFINITY, f64::min), means.iter().copied().fold(0.0, f64::max)];
     // Of codes near the black level a tenth is little light.
@@ -301,12 +304,18 @@ fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Result<()
         let at = |wanted: f64| {
             means.iter().position(|mean| *mean == wanted).map_or(Path::new("?"), |index| &group.files[index])
         };
-        return Err(Error::Data(format!(
-            "{} and {} are listed as of one light and exposure, and their means are {least:.4} and {most:.4}; tell levels of light \
-             apart by the column `photons` or `level`",
-            at(least).display(),
-            at(most).display()
-        )));
+        let (first, second) = (at(least).display(), at(most).display());
+        return Err(Error::Data(if group.condition.is_lit {
+            format!(
+                "{first} and {second} are taken to be of one light and exposure, and their means are {least:.4} and {most:.4}; tell \
+                 exposures apart in a list, by `exposure_s`, and levels of light by `photons` or `level`"
+            )
+        } else {
+            format!(
+                "{first} and {second} are taken to be darks of one exposure, and their means are {least:.4} and {most:.4}; one saw \
+                 light, or their times differ, which `exposure_s` of a list tells"
+            )
+        }));
     }
     Ok(())
 }

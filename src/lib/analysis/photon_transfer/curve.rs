@@ -230,10 +230,11 @@ impl Curve {
         self.no_light(flat).is_some()
     }
 
-    /// Whether rounding hides what the pattern of a dark is: temporal noise and pattern together do not spread codes enough.
+    /// Whether rounding hides what the pattern of a dark is, as temporal noise and pattern together do not spread codes enough, or
+    /// code 0 cuts it off.
     pub fn hides(&self, dark: Option<&Level>, confidence: f64) -> bool {
         let spread = |dark: &Level| dark.variance + fixed(dark, Part::Total, confidence).value;
-        self.is_silent && dark.is_some_and(|dark| spread(dark) < LEAST_VARIANCE)
+        self.are_darks_clipped || self.is_silent && dark.is_some_and(|dark| spread(dark) < LEAST_VARIANCE)
     }
 
     /// Temporal variance above that of no light; of a curve whose offset is free, all of it.

@@ -206,7 +206,10 @@ pub fn of_class(
              of the darks"
         )
     };
-    let doubts = curve.other_time().map(other_time).into_iter().collect();
+    let brighter = "the dark signal falls with exposure time beyond chance: is there a flat among the darks?";
+    let falls = curve.interval(|values| values.dark_slope, confidence).is_some_and(|slope| slope.high < 0.0);
+    let falling = falls.then(|| brighter.to_owned());
+    let doubts = curve.other_time().map(other_time).into_iter().chain(falling).collect();
     ClassFindings {
         name: name.into(),
         findings: found,

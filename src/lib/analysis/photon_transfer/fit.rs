@@ -45,6 +45,11 @@ impl Line {
             of += weight * y;
         }
         let (x_mean, y_mean) = (at / all, of / all);
+        // What rounding leaves of places that are one is no distance.
+        let spread: f64 = points.clone().into_iter().map(|point| point.weight * (point.x - x_mean).powi(2)).sum();
+        if spread <= 1e-20 * all * x_mean * x_mean {
+            return None;
+        }
         let centered = points.into_iter().map(|point| Point { x: point.x - x_mean, y: point.y - y_mean, ..point });
         let Self { slope, .. } = Self::through_zero(centered)?;
         Some(Self { offset: y_mean - slope * x_mean, slope })
@@ -84,6 +89,8 @@ mod tests {
         assert!(line.chi_square(points) < 1e-20);
         assert_eq!(Line::through_zero([Point { x: 2.0, y: 3.0, weight: 7.0 }]).unwrap().slope, 1.5);
         assert_eq!(Line::through([Point { x: 2.0, y: 3.0, weight: 7.0 }]), None);
+        let one_place = [1.0, 5.0, 9.0, 11.0].map(|y| Point { x: 0.033, y, weight: 1.0 / y });
+        assert_eq!(Line::through(one_place), None);
     }
 
     /// Deviations of 1 and −1 with no variance of their own, of two points and a known line: 1 each.
