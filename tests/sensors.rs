@@ -131,6 +131,15 @@ fn a_flat_file_is_the_same_sensor() {
     assert!(parse_sensor("s", format!("{HEAD}{MATRIX}").as_bytes()).unwrap().check().is_ok());
 }
 
+/// Keys of what is left out at 0 may be written out.
+#[test]
+fn what_is_nothing_may_be_said() {
+    let plain = format!("{HEAD}{READOUT}");
+    let said = plain.replace("  prnu:", "  row_noise_e: 0\n  rts_share: 0\n  prnu:");
+    assert_ne!(said, plain);
+    assert_eq!(parse_sensor("s", said.as_bytes()).unwrap(), parse_sensor("s", plain.as_bytes()).unwrap());
+}
+
 #[test]
 fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
     let parts = format!("{HEAD}{READOUT}{RESPONSE}{MATRIX}");

@@ -213,14 +213,16 @@ fn parse_parts<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8], parts:
     // A misspelled key first: that another is missing then follows from it.
     check_keys(name, &raw, field_names::<T>(), parts)?;
     let (typed, unknown) = parse::<T>(name, &raw, text)?;
-    match unknown.iter().next() {
-        None => Ok(typed),
-        Some((key, inner)) => {
-            let inner = inner.as_mapping().and_then(|inner| inner.keys().next()).and_then(Value::as_str);
-            let (key, inner) = (key.as_str().unwrap_or("?"), inner.unwrap_or("?"));
-            Err(Error::format(name, format!("`{key}` has an unknown key `{inner}`; remove it")))
+    // A key that is not written back may be one of those that are left out where they are 0.
+    let is_known = |key: &str, inner: &str| parts.iter().any(|(part, fields)| *part == key && fields.contains(&inner));
+    for (key, inner) in &unknown {
+        let key = key.as_str().unwrap_or("?");
+        let all = inner.as_mapping().into_iter().flatten().map(|(inner, value)| (inner.as_str().unwrap_or("?"), value));
+        if let Some((inner, _)) = all.into_iter().find(|(inner, value)| value.is_mapping() || !is_known(key, inner)) {
+            return Err(Error::format(name, format!("`{key}` has an unknown key `{inner}`; remove it")));
         }
     }
+    Ok(typed)
 }
 
 /// Reads metadata; keys that this version does not know are kept. A flat sensor gets its parts.
