@@ -367,6 +367,9 @@ fn frames_change_temporal_noise_and_sensors_change_patterns() {
     (readout.row_noise_e, readout.column_noise_e, readout.dsnu_e) = (3.0, 2.0, 4.0);
     (readout.dsnu_row_e, readout.dsnu_column_e) = (1.0, 5.0);
     (readout.prnu_row, readout.prnu_column) = (0.01, 0.02);
+    // Every photosite is hot, and has a trap, the amplitude of which stays with the sensor.
+    (readout.hot_pixel_share, readout.hot_pixel_dark_current_e_per_s) = (1.0, 500.0);
+    (readout.rts_share, readout.rts_amplitude_e) = (1.0, 8.0);
     let take = |kept: &[Source], seed, sensor_seed, frame| {
         let without = all_but(kept);
         noisy(&light, &NoiseSettings { seed, sensor_seed, frame, without, ..Default::default() })
@@ -378,7 +381,10 @@ fn frames_change_temporal_noise_and_sensors_change_patterns() {
             let changed = bits(&base).iter().zip(bits(other)).filter(|(a, b)| **a != *b).count();
             changed as f64 / base.samples.len() as f64
         };
-        let (temporal, fixed) = (!source.is_fixed_pattern(), source.is_fixed_pattern());
+        let jumps = source == Source::Rts;
+        let (temporal, fixed) = (!source.is_fixed_pattern(), source.is_fixed_pattern() || jumps);
+        // Of jumps to three levels, the middle one in half of the frames, three in eight are to the same.
+        let least = if jumps { 0.4 } else { 0.9 };
         for (other, changes) in [
             (take(&[source], 9, 2, 3), temporal),
             (take(&[source], 1, 2, 4), temporal),
@@ -387,7 +393,7 @@ fn frames_change_temporal_noise_and_sensors_change_patterns() {
             let share = share_changed(&other);
             // Where noise is drawn anew, Poisson counts of the least light, 20 e⁻, agree by chance in 1/(2 √(π·20)) =
             // 6 % of photosites; so do dark counts of 73 e⁻ in 3 %.
-            assert!(if changes { share > 0.9 } else { share == 0.0 }, "{source:?}: {share}");
+            assert!(if changes { share > least } else { share == 0.0 }, "{source:?}: {share}");
         }
     }
     assert_same(&take(&FIXED, 1, 2, 3), &take(&FIXED, 8, 2, 7), "fixed patterns of one sensor");

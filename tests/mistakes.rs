@@ -310,7 +310,11 @@ const MISTAKES: [(&str, i32, &str); 103] = [
         BAD_USAGE,
         "--patches[=<WxH>] and --region <X,Y,W,H> exclude each other; see `measure --help`",
     ),
-    ("measure noisy.exr codes.exr", BAD_USAGE, "unknown option or extra argument `codes.exr`; see `measure --help`"),
+    (
+        "color-difference a.exr b.exr c.exr",
+        BAD_USAGE,
+        "unknown option or extra argument `c.exr`; see `color-difference --help`",
+    ),
     (
         "measure noisy.exr --output-format xml",
         BAD_USAGE,

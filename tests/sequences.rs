@@ -169,7 +169,9 @@ fn what_is_no_frame_is_refused() {
         ),
         ("add-noise scene.exr --frames 3..3", Vec::new(), BAD_USAGE, "0..100 for 0 to 99"),
         ("add-noise scene.exr --frames 0..3 --frame 1", Vec::new(), BAD_USAGE, "--frame"),
-        ("add-noise scene.exr --frames 0..3 -o same.exr", Vec::new(), BAD_DATA, "2 of 3 frames failed"),
+        ("add-noise scene.exr --frames 0..3 -o same.exr", Vec::new(), BAD_USAGE, "3 exposures would go there"),
+        ("digitize -o n/{stem}.exr", two.clone(), BAD_USAGE, "the standard input has no name for {stem}"),
+        ("digitize scene.exr -o a{n}.exr", Vec::new(), BAD_USAGE, "nothing stands for {n}"),
         (
             "mosaic scene.exr none.exr -o m-{stem}.exr",
             Vec::new(),

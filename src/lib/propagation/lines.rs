@@ -31,7 +31,6 @@ use super::masters::Dark;
 use super::moments::{Equations, LineCovariance};
 use super::photosite::Photosite;
 use super::reading::{Reading, codes_of};
-use super::tails;
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::AdcRecord;
 use crate::numerics::averages::Combine;
@@ -185,7 +184,7 @@ impl Photosite {
     /// a row is nothing, and of readings beyond the codes its noise.
     fn lines_of_unlike(&self, regime: Regime, expected_e: [f64; 3]) -> Predicted<[LineCovariance; 3]> {
         if regime != Regime::Straight {
-            return Err(Unpredictable::Beyond(tails::WITH_LINES));
+            return Err(Unpredictable::Beyond(WITH_LINES));
         }
         let slope = self.slope();
         let of_offsets =
@@ -377,6 +376,10 @@ enum Regime {
     Curved,
     Unknown,
 }
+
+/// Why nothing is said of what rows and columns share.
+const WITH_LINES: &str = "full well or an end of the codes cuts off what rows or columns share, on a sensor that has hot \
+                                     pixels or random telegraph signals";
 
 /// Codes that are told apart, in codes.
 const FINEST: f64 = 0.04;

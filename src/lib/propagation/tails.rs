@@ -50,10 +50,6 @@ const TOO_FINE: &str = "hot pixels or random telegraph signals go over many code
 const FINE_DARKS: &str =
     "dark frames of less than a code of noise came off a frame with hot pixels or random telegraph signals";
 
-/// Why nothing is said of what rows and columns share.
-pub(super) const WITH_LINES: &str = "full well or an end of the codes cuts off what rows or columns share, on a sensor that has hot \
-                                     pixels or random telegraph signals";
-
 /// Why nothing is said of what is curved.
 pub(super) const CURVED: &str = "hot pixels and random telegraph signals reach too far for the series of what is curved in the \
                                  photosites";

@@ -178,7 +178,7 @@ mod tests {
                 "x.exr.yaml: what is made of x.nef and of x.nef",
             ),
             (&["x.nef", "-"], Some("out/"), None, "the standard input cannot be one of several inputs; name a file"),
-            (&["-"], Some("out/"), None, "the standard input has no name for {stem}; name the output"),
+            (&["-"], Some("out/"), None, "the standard input has no name for {stem} or a directory; name the output"),
         ] {
             let complaint = planned(inputs, frame, &[beside]).unwrap_err();
             assert!(complaint.starts_with(wanted), "{complaint}");
