@@ -310,9 +310,11 @@ class Usage(Errors):
         self.refused(["measure", "in.exr", "--region", "0,0,0,1"], (1, 2), "0,0,0,1")
 
     def test_unknown_option_and_missing_source(self):
+        of_several = {"add-noise", "correct-frame", "demosaic", "digitize", "import-raw", "measure", "mosaic", "to-xyz"}
         for program in PROGRAMS:
             self.refused([program, "--colour-of-the-sky"], BAD_USAGE, "--colour-of-the-sky")
-            self.refused([program, "a", "b", "c", "d"], BAD_USAGE)
+            if program not in of_several:
+                self.refused([program, "a", "b", "c", "d"], BAD_USAGE)
         self.refused(["render-radiance", "--size", "4x4", "--dark", "--electrons", "1,2,3"], BAD_USAGE)
 
     def test_negative_counts_are_values(self):

@@ -58,7 +58,7 @@ impl Measurement {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`](crate::error::Error::Usage) for a plot of another format or of several regions; those of [`measure`].
+    /// [`Error::Usage`](crate::error::Error::Usage) for a plot of another format or of several regions; those of [`measure_among`].
     pub fn of(&self, source: &mut dyn RowSource, laws: &mut Laws) -> Result<(Report, Option<Portrait>)> {
         let level = self.check.then_some(self.level);
         let saturated = if self.keep_saturated { Saturated::Kept } else { Saturated::LeftOut };
