@@ -3,11 +3,12 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::{plots, register};
+use cyanometer::formats::{output, plots, register};
 use cyanometer::report::{self, Findings, ReportFormat};
+use cyanometer::requests::measurement::{Measurement, SharedFrames};
 use cyanometer::requests::options::Output;
-use cyanometer::requests::{self, described::DescribedInput, measurement::Measurement, values};
-use cyanometer::stream::RowSource;
+use cyanometer::requests::{self, described::DescribedInput, values};
+use cyanometer::stream::{Counts, RowSink, RowSource};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -19,7 +20,8 @@ static MEMORY: cli::Memory = cli::Memory;
 /// Predictions are made for uniform scenes, from electrons to XYZ, xyY and L*a*b*. Planes behind a color filter array
 /// are also measured class by class. With --check, means are tested by z, variances by chi-square with the effective
 /// degrees of freedom of correlated pixels, correlations by Fisher's z. With --patches, the spread of each patch is
-/// predicted at the level of its own means.
+/// predicted at the level of its own means. With --over frames, what is drawn anew in each of several exposures of a scene is
+/// told from what is the same in all.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -43,12 +45,35 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    register::announce(&[arguments.output.as_deref(), arguments.measurement.plot.as_deref()])?;
+    let Measurement { plot, pixels, .. } = &arguments.measurement;
+    register::announce(&[arguments.output.as_deref(), plot.as_deref(), pixels.as_deref()])?;
     let frames = &arguments.input.frame;
     let reports = Output { is_of_reports: true, ..Output::default() };
+    if let Some(statistics) = arguments.measurement.over_frames() {
+        let measured = session.each_frame::<Arguments>(frames, &reports, |turn| {
+            let mut reader = arguments.input.with(turn.input.clone()).open_all()?;
+            turn.session.report_reader(&reader);
+            statistics.add(&mut reader)
+        });
+        return measured.and(tell(arguments, session, statistics));
+    }
     let findings = Findings::new(arguments.output_format, frames.inputs.len() > 1, arguments.output.clone());
     let measured = session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
     measured.and(findings.end())
+}
+
+fn tell(arguments: &Arguments, session: &cli::Session, statistics: SharedFrames) -> Result<()> {
+    let (report, mut pixels) = statistics.finish()?;
+    if let Some(path) = &arguments.measurement.pixels {
+        session.sign(&mut pixels.header);
+        let output = Output { output: Some(path.clone()), ..Output::default() };
+        session
+            .write(&pixels.header, &output, |writer, _| writer.write(&pixels.samples).map(|()| Counts::default()))?;
+    }
+    session.tell(&requests::of_over_frames(&report));
+    let text = report::over_frames(&report, arguments.output_format)?;
+    output::write_text(arguments.output.as_deref(), &text)?;
+    report.check.map_or(Ok(()), |verdict| verdict.judge(&pixels.header.name))
 }
 
 fn measure(arguments: &Arguments, turn: &cli::Turn<'_>, findings: &Findings) -> Result<()> {

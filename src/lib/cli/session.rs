@@ -18,6 +18,7 @@ use crate::stages::saturation::with_mask;
 use crate::stream::{Counts, RowSource, Stage};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashSet;
+use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -27,6 +28,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub struct Session {
     pub(super) program: &'static str,
     pub(super) general: General,
+    /// The command line behind the program's name, wildcards expanded.
+    words: Arc<[OsString]>,
     signature: Arc<Signature>,
     /// The input that is worked on, where there are several.
     input: Option<PathBuf>,
@@ -43,14 +46,14 @@ struct Run {
 }
 
 impl Session {
-    pub(super) fn new(program: &'static str, general: General) -> Self {
-        let signature = Arc::new(Signature::of(std::env::args_os().skip(1), &[]));
-        Self { program, general, signature, input: None, run: Arc::default() }
+    pub(super) fn new(program: &'static str, words: Vec<OsString>, general: General) -> Self {
+        let signature = Arc::new(Signature::of(words.iter().cloned(), &[]));
+        Self { program, words: words.into(), general, signature, input: None, run: Arc::default() }
     }
 
     /// The same for a run of several inputs.
     pub fn among(&self, inputs: &[PathBuf]) -> Self {
-        let signature = Arc::new(Signature::of(std::env::args_os().skip(1), inputs));
+        let signature = Arc::new(Signature::of(self.words.iter().cloned(), inputs));
         Self { signature, ..self.clone() }
     }
 

@@ -5,6 +5,7 @@ use crate::camera::levels::BlackLevel;
 use crate::names::{Named, serde_by_name};
 use crate::numerics::averages::Combine;
 use crate::random::Source;
+use crate::units::QuantityKind;
 use serde::{Deserialize, Serialize};
 
 /// What was taken back of a frame of codes.
@@ -104,6 +105,19 @@ pub struct AverageRecord {
     pub clip: Option<f64>,
 }
 
+/// The exposures of one scene that a frame is the average of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExposuresRecord {
+    /// How they were averaged.
+    #[serde(flatten)]
+    pub average: AverageRecord,
+    /// What their samples were.
+    pub quantity: QuantityKind,
+    /// Whether each was demosaicked before.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub demosaicked: bool,
+}
+
 /// An average that was subtracted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MasterRecord {
@@ -187,6 +201,9 @@ pub struct FlatRecord {
     /// The averages that were subtracted from it first; none where a level was.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masters: Vec<MasterRecord>,
+    /// Whether the dark frames among them came off the frame that was divided too.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub shares_masters: bool,
 }
 
 /// How defective photosites were told.

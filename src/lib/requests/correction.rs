@@ -12,7 +12,7 @@ use crate::formats::input::{FrameReader, InputOptions, Linearizing};
 use crate::formats::many::OneOfMany;
 use crate::formats::register::check_inputs;
 use crate::masking::Corrections;
-use crate::metadata::{DefectsRecord, FrameHeader};
+use crate::metadata::{DefectsRecord, FlatRecord, FrameHeader};
 use crate::numerics::averages::{CLIP, Combine};
 use crate::stages::black::Black;
 use crate::stages::correct::{CorrectFrame, CorrectionSettings};
@@ -345,7 +345,14 @@ impl Correction {
             .flatten()
             .collect(),
         });
-        stage.note_further(flats.as_ref().map(|(flats, means)| flats.record(means)), defects);
+        let shares_masters = company.shares_darks().unwrap_or_else(|| {
+            let problem =
+                "some of the dark frames come off both frame and flats: predictions take their noise for independent";
+            warnings.push(format!("{}: {problem}; give the same to both, or to each its own", frame.name));
+            false
+        });
+        let of_flats = flats.as_ref().map(|(flats, means)| FlatRecord { shares_masters, ..flats.record(means) });
+        stage.note_further(of_flats, defects);
         let map = self.map(frame, input)?;
         let list = self.defects.as_deref().map(|path| path.display().to_string()).unwrap_or_default();
         warnings.extend(map.as_ref().and_then(|map| map.doubt(&list, frame)));

@@ -236,6 +236,7 @@ impl<S: RowSource> FlatFrames<S> {
             noise: self.head.metadata.noise.as_ref().map(MasterNoise::of),
             black_adu,
             masters,
+            shares_masters: false,
         }
     }
 }

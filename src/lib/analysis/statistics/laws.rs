@@ -32,7 +32,7 @@ impl Laws {
 }
 
 /// The head of a frame without what tells it from other exposures: its name, its number, what its samples were counted to be.
-fn without_exposure(frame: &FrameHeader) -> FrameHeader {
+pub(super) fn without_exposure(frame: &FrameHeader) -> FrameHeader {
     let mut head = FrameHeader { name: String::new(), ..frame.clone() };
     head.metadata.history.clear();
     head.metadata.samples = None;
