@@ -37,6 +37,7 @@ pub mod response_table;
 pub mod resume;
 pub mod sequence;
 pub mod spectral;
+pub mod stack;
 pub mod standard;
 mod storing;
 pub mod table;

@@ -293,6 +293,18 @@ impl FrameHeader {
         }
     }
 
+    /// The same without what tells it from other exposures of its scene: its name, its number, what its samples were counted to be.
+    #[must_use]
+    pub fn without_exposure(&self) -> Self {
+        let mut head = Self { name: String::new(), ..self.clone() };
+        head.metadata.history.clear();
+        head.metadata.samples = None;
+        if let Some(noise) = &mut head.metadata.noise {
+            noise.frame = 0;
+        }
+        head
+    }
+
     /// Whether the frame has the three planes R, G and B (or what was made of them).
     pub fn has_three_planes(&self) -> bool {
         self.geometry.channels.iter().map(|name| bare_name(name)).eq(["R", "G", "B"])

@@ -156,13 +156,13 @@ fn is_noisy(frame: &FrameHeader) -> bool {
 }
 
 /// Whether two frames have the same noisy samples, as their sidecars tell.
-fn are_copies(a: &FrameHeader, b: &FrameHeader) -> bool {
+pub(super) fn are_copies(a: &FrameHeader, b: &FrameHeader) -> bool {
     let digest = |frame: &FrameHeader| frame.metadata.samples.as_ref().map(|samples| samples.digest.clone());
     digest(a).is_some() && digest(a) == digest(b) && is_noisy(a) && is_noisy(b)
 }
 
 /// The noise that was drawn in both of two frames.
-fn shared_noise<'a>(a: &'a FrameHeader, b: &FrameHeader) -> Option<&'a NoiseRecord> {
+pub(super) fn shared_noise<'a>(a: &'a FrameHeader, b: &FrameHeader) -> Option<&'a NoiseRecord> {
     let (a, b) = (a.metadata.noise.as_ref()?, b.metadata.noise.as_ref()?);
     let is_in = |noise: &NoiseRecord, source: Source| noise.sources.contains(&source);
     let is_shared = TEMPORAL.into_iter().any(|source| is_in(a, source) && is_in(b, source));

@@ -16,6 +16,7 @@
 //! # Ok::<(), cyanometer::error::Error>(())
 //! ```
 
+pub mod averaging;
 pub mod batch;
 pub mod border;
 pub mod comparison;

@@ -11,7 +11,7 @@
 
 use super::assessment::Assessment;
 use super::check::Verdict;
-use super::laws::{Samplings, without_exposure};
+use super::laws::Samplings;
 use super::levels::Levels;
 use super::measure::check_testable;
 use super::region::Region;
@@ -19,12 +19,13 @@ use super::repeated_report::{RepeatedChannel, RepeatedRegion, RepeatedReport};
 use super::report::{ChannelReport, RegionReport, coverage};
 use super::tally::{Tally, tallies};
 use super::watch::{Saturated, Watch};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::metadata::{AverageRecord, ExposuresRecord, FrameHeader};
 use crate::numerics::averages::Combine;
 use crate::numerics::moments::Moments;
 use crate::numerics::running::Running;
 use crate::propagation::{Equations, FramePrediction, Repeated, Unpredictable};
+use crate::stages::exposures::{Exposures, too_few};
 use crate::stages::saturation::with_mask;
 use crate::stream::{MemoryFrame, RowSource};
 
@@ -52,13 +53,7 @@ pub struct OverFrames {
 /// What was seen so far.
 #[derive(Debug)]
 struct Seen {
-    /// The first frame, without the layers that may follow its planes.
-    frame: FrameHeader,
-    head: FrameHeader,
-    /// Whether all frames had its head, but for the number of the exposure.
-    are_alike: bool,
-    /// Seed and number of each exposure.
-    drawn: Vec<(u64, u32)>,
+    exposures: Exposures,
     regions: Vec<Region>,
     pixels: Running,
     marks: Vec<u8>,
@@ -94,7 +89,6 @@ impl OverFrames {
     /// [`Error::Usage`] for a region outside the frame; [`Error::Format`] for one that shows another scene or other pixels than the
     /// first, or the same exposure as another; those of the source.
     pub fn add(&mut self, source: &mut dyn RowSource) -> Result<()> {
-        let name = source.header().name.clone();
         let whole = [Region::whole(source.header())];
         let regions = if self.settings.regions.is_empty() { &whole[..] } else { &self.settings.regions };
         regions.iter().try_for_each(|region| region.check(source.header()))?;
@@ -103,19 +97,11 @@ impl OverFrames {
         let frame = watch.header().clone();
         let seen = match &mut self.seen {
             Some(seen) => {
-                seen.check(&frame)?;
+                seen.exposures.take(&frame)?;
                 seen
             }
             none => none.insert(Seen::of(&frame, regions)),
         };
-        let noise = frame.metadata.noise.as_ref().filter(|noise| !noise.sources.is_empty());
-        if let Some(exposure) = noise.map(|noise| (noise.seed, noise.frame)) {
-            if seen.drawn.contains(&exposure) {
-                let problem = format!("{name}: exposure {} of seed {} comes twice", exposure.1, exposure.0);
-                return Err(Error::Data(problem + "; as another it would count its noise twice"));
-            }
-            seen.drawn.push(exposure);
-        }
         let levels = Levels::of(&frame)?;
         seen.pixels.begin();
         let mut adding = Adding { source: &mut watch, pixels: &mut seen.pixels, at: 0 };
@@ -137,9 +123,7 @@ impl OverFrames {
     pub fn finish(self) -> Result<(RepeatedReport, MemoryFrame)> {
         let Self { settings, seen } = self;
         let Some(seen) = seen.filter(|seen| seen.pixels.count() > 1) else {
-            return Err(Error::Data(
-                "statistics over frames need two frames of a scene or more; there is no second".into(),
-            ));
+            return too_few("statistics over frames are");
         };
         Ok((seen.report(&settings)?, seen.pixels_frame()))
     }
@@ -214,10 +198,7 @@ impl FrameTallies {
 impl Seen {
     fn of(frame: &FrameHeader, regions: &[Region]) -> Self {
         Self {
-            frame: frame.clone(),
-            head: without_exposure(frame),
-            are_alike: true,
-            drawn: Vec::new(),
+            exposures: Exposures::of(frame),
             regions: regions.to_vec(),
             pixels: Running::new(frame.geometry.row_samples() * frame.geometry.height),
             marks: Vec::new(),
@@ -225,69 +206,16 @@ impl Seen {
         }
     }
 
-    /// Makes sure that a frame shows the pixels of the first.
-    fn check(&mut self, frame: &FrameHeader) -> Result<()> {
-        let (first, name) = (&self.frame, &self.frame.name);
-        let differs = |what: &str, its: String, theirs: String| {
-            let problem = format!("its {what} is {its}, but that of {name} is {theirs}");
-            Err(frame.refuse(problem + "; statistics over frames are of one scene and one camera"))
-        };
-        let (a, b) = (&first.geometry, &frame.geometry);
-        if [a.width, a.height] != [b.width, b.height] {
-            return differs("size", format!("{}x{}", b.width, b.height), format!("{}x{}", a.width, a.height));
-        }
-        if a.channels != b.channels || a.origin != b.origin {
-            let place = |[x, y]: [i32; 2]| format!("at {x},{y}");
-            let planes = |frame: &FrameHeader| {
-                let geometry = &frame.geometry;
-                format!("{} {}", geometry.channels.join(", "), place(geometry.origin))
-            };
-            return differs("layout", planes(frame), planes(first));
-        }
-        let (a, b) = (&first.metadata, &frame.metadata);
-        if (a.quantity, &a.unit) != (b.quantity, &b.unit) {
-            return differs(
-                "quantity",
-                format!("{} in {}", b.quantity, b.unit),
-                format!("{} in {}", a.quantity, a.unit),
-            );
-        }
-        let sensor = |frame: &FrameHeader| {
-            let metadata = &frame.metadata;
-            let seed = metadata.noise.as_ref().map_or(String::new(), |noise| format!(" of seed {}", noise.sensor_seed));
-            metadata.sensor.as_ref().map_or("unknown".to_owned(), |sensor| format!("{}{seed}", sensor.name))
-        };
-        if sensor(first) != sensor(frame) {
-            return differs("sensor", sensor(frame), sensor(first));
-        }
-        let exposure = |frame: &FrameHeader| {
-            frame.metadata.exposure.map_or("unknown".to_owned(), |exposure| {
-                format!("{} s at f/{}", exposure.exposure_s, exposure.f_number)
-            })
-        };
-        if exposure(first) != exposure(frame) {
-            return differs("exposure", exposure(frame), exposure(first));
-        }
-        if a.scene != b.scene {
-            let scene = |frame: &FrameHeader| {
-                frame.metadata.scene.as_ref().map_or("unknown".to_owned(), |scene| scene.source.clone())
-            };
-            return differs("scene", scene(frame), scene(first));
-        }
-        self.are_alike &= without_exposure(frame) == self.head;
-        Ok(())
-    }
-
     /// The means or variances of pixels as a frame.
     fn plane(&self, of: impl Fn(usize) -> f64) -> MemoryFrame {
         #[expect(clippy::cast_possible_truncation, reason = "samples are single precision")]
         let samples = (0..self.pixels.means().len()).map(|index| of(index) as f32).collect();
-        MemoryFrame::new(self.frame.clone(), samples)
+        MemoryFrame::new(self.exposures.first().clone(), samples)
     }
 
     /// Means and variances together.
     fn pixels_frame(&self) -> MemoryFrame {
-        let mut header = self.frame.clone();
+        let mut header = self.exposures.first().clone();
         let (channels, width) = (header.geometry.channels.clone(), header.geometry.width);
         header.geometry.channels.extend(channels.iter().map(|name| format!("variance.{name}")));
         let has_marks = self.marks.iter().any(|marks| *marks != 0);
@@ -299,7 +227,7 @@ impl Seen {
         let (quantity, demosaicked) = (metadata.quantity, metadata.demosaic.is_some());
         metadata.average = Some(ExposuresRecord { average, quantity, demosaicked });
         (metadata.predicted, metadata.uncertainty, metadata.saturated_share) = (None, None, None);
-        let row_samples = self.frame.geometry.row_samples();
+        let row_samples = self.exposures.first().geometry.row_samples();
         let mut samples = Vec::with_capacity(header.geometry.row_samples() * header.geometry.height);
         for y in 0..header.geometry.height {
             let row = y * row_samples..(y + 1) * row_samples;
@@ -316,14 +244,14 @@ impl Seen {
     }
 
     fn report(&self, settings: &OverFramesSettings) -> Result<RepeatedReport> {
-        let frame = &self.frame;
+        let frame = self.exposures.first();
         let levels = Levels::of(frame)?;
         let count = self.pixels.count();
         let mut means = self.plane(|index| self.pixels.means()[index]);
         let means = tallies(&mut means, &self.regions, &levels)?;
         let mut variances = self.plane(|index| self.pixels.variance(index));
         let variances = tallies(&mut variances, &self.regions, &levels)?;
-        let predicted = match self.are_alike {
+        let predicted = match self.exposures.are_alike() {
             true => Repeated::of(frame, settings.equations, count),
             false => Err(Unpredictable::Beyond("frames differ in more than the number of the exposure")),
         };
