@@ -3,6 +3,7 @@
 //! The noise of each pixel follows from the sensor's noise model at the pixel's own level ([`PixelNoise`]), so that scenes
 //! need not be uniform.
 
+use crate::camera::levels::BlackLevel;
 use crate::color::Space;
 use crate::error::Result;
 use crate::frame::{Rows, Window, to_sample};
@@ -137,8 +138,8 @@ impl PixelLayers {
     /// Those of [`PixelNoise::of`]; [`crate::error::Error::Format`] for other colors than XYZ.
     pub fn of(frame: &FrameHeader) -> Result<Self> {
         let metadata = &frame.metadata;
-        let noise = PixelNoise::of(frame)?;
         let Some(record) = &metadata.color else {
+            let noise = PixelNoise::of(frame)?;
             return Ok(Self { noise, names: vec!["sigma.R", "sigma.G", "sigma.B"], color: None });
         };
         if metadata.quantity != QuantityKind::Xyz {
@@ -149,6 +150,10 @@ impl PixelLayers {
         }
         let xyz_from_adu = record.xyz_from_adu(metadata.exposure).ok_or_else(|| frame.missing("exposure"))?;
         let adu_from_xyz = xyz_from_adu.try_inverse().ok_or_else(|| frame.refuse("its matrix has no inverse"))?;
+        // The levels are those of the camera's signals.
+        let mut camera = frame.clone();
+        camera.metadata.set_black_adu(Some(BlackLevel::from(record.black_adu)));
+        let noise = PixelNoise::of(&camera)?;
         let color = Color { xyz_from_adu, adu_from_xyz, black_adu: record.black_adu };
         Ok(Self { noise, names: layers_of(Space::Xyz)?, color: Some(color) })
     }
