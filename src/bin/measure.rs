@@ -3,12 +3,11 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::{output, plots, register};
+use cyanometer::formats::plots;
 use cyanometer::report::{self, Findings, ReportFormat};
-use cyanometer::requests::measurement::{Measurement, SharedFrames};
 use cyanometer::requests::options::Output;
-use cyanometer::requests::{self, described::DescribedInput, values};
-use cyanometer::stream::{Counts, RowSink, RowSource};
+use cyanometer::requests::{self, described::DescribedInput, measurement::Measurement, values};
+use cyanometer::stream::RowSource;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -45,9 +44,8 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let Measurement { plot, pixels, .. } = &arguments.measurement;
-    register::announce(&[arguments.output.as_deref(), plot.as_deref(), pixels.as_deref()])?;
     let frames = &arguments.input.frame;
+    arguments.measurement.announce(&frames.inputs, arguments.output.as_deref())?;
     let reports = Output { is_of_reports: true, ..Output::default() };
     if let Some(statistics) = arguments.measurement.over_frames() {
         let measured = session.each_frame::<Arguments>(frames, &reports, |turn| {
@@ -55,25 +53,13 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
             turn.session.report_reader(&reader);
             statistics.add(&mut reader)
         });
-        return measured.and(tell(arguments, session, statistics));
+        let pixels = arguments.measurement.pixels.as_deref();
+        let format = arguments.output_format;
+        return measured.and(session.tell_over_frames(statistics, pixels, format, arguments.output.as_deref()));
     }
     let findings = Findings::new(arguments.output_format, frames.inputs.len() > 1, arguments.output.clone());
     let measured = session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
     measured.and(findings.end())
-}
-
-fn tell(arguments: &Arguments, session: &cli::Session, statistics: SharedFrames) -> Result<()> {
-    let (report, mut pixels) = statistics.finish()?;
-    if let Some(path) = &arguments.measurement.pixels {
-        session.sign(&mut pixels.header);
-        let output = Output { output: Some(path.clone()), ..Output::default() };
-        session
-            .write(&pixels.header, &output, |writer, _| writer.write(&pixels.samples).map(|()| Counts::default()))?;
-    }
-    session.tell(&requests::of_over_frames(&report));
-    let text = report::over_frames(&report, arguments.output_format)?;
-    output::write_text(arguments.output.as_deref(), &text)?;
-    report.check.map_or(Ok(()), |verdict| verdict.judge(&pixels.header.name))
 }
 
 fn measure(arguments: &Arguments, turn: &cli::Turn<'_>, findings: &Findings) -> Result<()> {

@@ -9,6 +9,7 @@ mod general;
 mod help;
 mod history;
 mod memory;
+mod over_frames;
 pub mod pages;
 pub mod programs;
 mod session;

@@ -15,7 +15,7 @@ use crate::requests::options::Output;
 use crate::requests::{self, Note};
 use crate::stages::darks::DarkFrames;
 use crate::stages::saturation::with_mask;
-use crate::stream::{Counts, RowSource, Stage};
+use crate::stream::{Counts, MemoryFrame, RowSink, RowSource, Stage};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -241,6 +241,18 @@ impl Session {
             self.warn(&format!("{did_not_fit} samples do not fit 16 bits; they are stored as 0 or 65535, NaN as 0"));
         }
         Ok(Some(counts))
+    }
+
+    /// Signs a frame in memory, and writes it.
+    ///
+    /// # Errors
+    ///
+    /// Those of the writer.
+    pub fn write_whole(&self, frame: &mut MemoryFrame, path: &Path) -> Result<()> {
+        self.sign(&mut frame.header);
+        let output = Output { output: Some(path.to_owned()), ..Output::default() };
+        self.write(&frame.header, &output, |writer, _| writer.write(&frame.samples).map(|()| Counts::default()))?;
+        Ok(())
     }
 
     /// Where and how a frame is written.

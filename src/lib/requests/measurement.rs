@@ -1,7 +1,7 @@
 //! Statistics of a frame beside what propagation predicts.
 
 use super::options::Output;
-use super::values;
+use super::{batch, values};
 use crate::analysis::statistics::portrait::Portrait;
 use crate::analysis::statistics::{
     Laws, OverFrames, OverFramesSettings, Region, RepeatedReport, Report, Saturated, measure_among,
@@ -10,6 +10,7 @@ use crate::analysis::statistics::{
 use crate::error::Result;
 use crate::formats::places::output_of;
 use crate::formats::plots::PlotFormat;
+use crate::formats::register;
 use crate::metadata::FrameHeader;
 use crate::names::Named;
 use crate::propagation::Equations;
@@ -94,6 +95,17 @@ impl Named for Over {
 }
 
 impl Measurement {
+    /// Registers what will be written, and makes sure that its names do for so many inputs.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`register::announce`], [`batch::check_each_named`] and [`batch::check_one_report`].
+    pub fn announce(&self, inputs: &[PathBuf], report: Option<&Path>) -> Result<()> {
+        register::announce(&[report, self.plot.as_deref(), self.pixels.as_deref()])?;
+        batch::check_each_named(inputs, self.plot.as_deref())?;
+        batch::check_one_report(report)
+    }
+
     /// What is asked of all frames together, where that is.
     pub fn over_frames(&self) -> Option<SharedFrames> {
         let settings = OverFramesSettings {
