@@ -223,3 +223,32 @@ fn a_stream_knows_how_many_frames_it_has() {
     let files = [shop.bytes("0.exr"), shop.bytes("1.exr")].concat();
     assert_eq!(lines(&shop.run("measure --output-format json", &files)).len(), 2);
 }
+
+/// Names in quotes are expanded by the program: the same bytes as by a shell; numbers of frames do for several inputs, and two that meet
+/// are told. A report of all goes to one file, and figures of each do not.
+#[test]
+fn names_stand_for_several_files() {
+    let shop = with_scene();
+    fs::create_dir(shop.path("n")).unwrap();
+    fs::create_dir(shop.path("m")).unwrap();
+    shop.run("add-noise scene.exr --seed 5 --frames 0..3 -o n/{frame}.exr", &[]);
+    let by_shell = shop.run("digitize n/0.exr n/1.exr n/2.exr", &[]);
+    assert!(shop.run("digitize n/*.exr", &[]) == by_shell);
+    shop.run("digitize n/*.exr -o m/c-{frame:02}.tiff", &[]);
+    assert!(shop.path("m/c-02.tiff").exists());
+    let index = shop.attempt("digitize n/*.exr -o m/i-{index}.tiff", &[]);
+    assert!(index.status.code() == Some(BAD_DATA) && said(&index).contains("another frame of this run went there"));
+    let darks = "correct-frame n/0.exr --dark n/[12].exr -o m/less.exr";
+    // Electrons are no codes; that both were found is what counts.
+    assert!(said(&shop.attempt(darks, &[])).contains("electrons"));
+    for (line, wanted) in [
+        ("measure n/0.exr n/1.exr --plot m/p.svg", "one of each of 2 frames would go there"),
+        ("measure n/0.exr n/1.exr -o {stem}.csv", "go to one file"),
+        ("add-noise scene.exr --frames 4294967290..4294967300", "numbers are 0 to 4294967295"),
+    ] {
+        let refused = shop.attempt(line, &[]);
+        assert_eq!(refused.status.code(), Some(BAD_USAGE), "{line}: {}", said(&refused));
+        assert!(said(&refused).contains(wanted), "{line}: {}", said(&refused));
+        assert!(!shop.path("m/p.svg").exists());
+    }
+}
