@@ -140,6 +140,39 @@ fn a_run_is_resumed() {
     fs::remove_file(shop.path("c/5.exr")).unwrap();
     shop.run("digitize --resume -o c/{frame}.exr", &stream);
     assert!(shop.bytes("c/5.exr") == codes);
+    // So do other dark frames of the same names, other defects of one list, another type of samples.
+    shop.run("render-radiance --dark --size 24x16 -o dark-scene.exr", &[]);
+    let correct = "correct-frame c/5.exr --dark dark.exr --defects list.csv --resume -o less.exr";
+    let (mut made, mut kept) = (Vec::new(), Vec::new());
+    for (seed, list) in [(3, "3,4"), (4, "3,4"), (4, "7,8"), (4, "7,8")] {
+        let electrons = shop.run(&format!("add-noise dark-scene.exr --seed {seed}"), &[]);
+        shop.run("digitize -o dark.exr", &electrons);
+        fs::write(shop.path("list.csv"), list).unwrap();
+        let before = fs::metadata(shop.path("less.exr")).and_then(|file| file.modified()).ok();
+        shop.run(correct, &[]);
+        kept.push(before == fs::metadata(shop.path("less.exr")).and_then(|file| file.modified()).ok());
+        made.push(shop.bytes("less.exr"));
+    }
+    assert_eq!(kept, [false, false, false, true]);
+    assert!(made[0] != made[1] && made[1] != made[2] && made[2] == made[3]);
+    shop.run("digitize n/5.exr --resume --sample-type f16 -o half.exr", &[]);
+    let half = shop.bytes("half.exr");
+    shop.run("digitize n/5.exr --resume -o half.exr", &[]);
+    assert!(shop.bytes("half.exr") != half);
+}
+
+/// Two frames that links bring to one place are told.
+#[test]
+fn links_lead_to_one_place() {
+    let shop = with_scene();
+    fs::create_dir(shop.path("r1")).unwrap();
+    std::os::unix::fs::symlink(shop.path("r1"), shop.path("r0")).unwrap();
+    let done = shop.attempt("add-noise scene.exr --frames 0..2 -o r{frame}/x.exr", &[]);
+    assert!(
+        done.status.code() == Some(BAD_DATA) && said(&done).contains("another frame of this run"),
+        "{}",
+        said(&done)
+    );
 }
 
 /// What stands behind a frame is a frame, or the run fails; a stream that is cut fails too.

@@ -6,7 +6,7 @@ use super::words::complain;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
 use crate::formats::output::{Format, FrameWriter, OutputOptions};
-use crate::formats::places::{FRAME_OF, named};
+use crate::formats::places::{FRAME_OF, named, place};
 use crate::formats::{register, resume};
 use crate::masking::Masking;
 use crate::metadata::FrameHeader;
@@ -228,7 +228,7 @@ impl Session {
         run: impl FnOnce(&mut FrameWriter, &mut dyn FnMut(usize)) -> Result<Counts>,
     ) -> Result<Option<Counts>> {
         let options = self.place(made, output)?;
-        if output.resume && resume::is_complete(options.path.as_deref(), made)? {
+        if output.resume && resume::is_complete(&options, made)? {
             self.note(&format!("{} is complete", options.path.unwrap_or_default().display()));
             return Ok(None);
         }
@@ -263,7 +263,7 @@ impl Session {
     pub fn place(&self, made: &FrameHeader, output: &Output) -> Result<OutputOptions> {
         let options = output.options_for(made);
         let path = named(options.path.as_deref()).filter(|_| !output.is_stream());
-        if self.run().written.insert(path.map(Path::to_owned)) {
+        if self.run().written.insert(place(path)) {
             return Ok(options);
         }
         match path {

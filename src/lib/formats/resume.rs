@@ -1,6 +1,7 @@
 //! What an earlier run has left complete.
 
-use super::input::FrameReader;
+use super::input::{FrameReader, InputOptions};
+use super::output::OutputOptions;
 use super::places::{named, sidecar_path};
 use super::yaml::{parse_metadata, write_metadata};
 use crate::error::Result;
@@ -14,8 +15,8 @@ use std::path::Path;
 /// # Errors
 ///
 /// Those of [`write_metadata`].
-pub fn is_complete(path: Option<&Path>, made: &FrameHeader) -> Result<bool> {
-    let Some(path) = named(path) else { return Ok(false) };
+pub fn is_complete(options: &OutputOptions, made: &FrameHeader) -> Result<bool> {
+    let Some(path) = named(options.path.as_deref()) else { return Ok(false) };
     let sidecar = sidecar_path(path);
     let Some(found) = std::fs::read_to_string(&sidecar)
         .ok()
@@ -27,9 +28,19 @@ pub fn is_complete(path: Option<&Path>, made: &FrameHeader) -> Result<bool> {
     if write_metadata(&lasting(found))? != write_metadata(&lasting(made.metadata.clone()))? {
         return Ok(false);
     }
+    if !is_stored_so(path, options, made)? {
+        return Ok(false);
+    }
     let holds =
         |digest: String| FrameReader::holds(File::open(path).ok()?, &path.display().to_string(), made, &digest).ok();
     Ok(digest.and_then(holds).unwrap_or(false))
+}
+
+/// Whether the file stores samples as the options ask for; one that stores channels in several ways is not looked into.
+fn is_stored_so(path: &Path, options: &OutputOptions, made: &FrameHeader) -> Result<bool> {
+    let wanted = options.sample_type(made)?;
+    let found = FrameReader::open(&InputOptions { path: Some(path.to_owned()), ..InputOptions::default() });
+    Ok(found.is_ok_and(|found| found.sample_type().is_none_or(|found| found == wanted)))
 }
 
 /// What of the metadata is known before the samples are, and does not hang on how they are stored.

@@ -2,6 +2,7 @@
 
 use super::dng;
 use super::exr::{ExrCompression, ExrSamples};
+use super::format::SampleType;
 use super::places::{STDOUT_NAME, named};
 use super::tiff::{TiffCompression, TiffSamples};
 use super::viewable;
@@ -164,6 +165,21 @@ impl OutputOptions {
                 Ok(Encoding::Dng(samples, dng_compression(compression, samples)?))
             }
         }
+    }
+
+    /// The type in which samples of a frame are stored.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::encoding`].
+    pub(super) fn sample_type(&self, header: &FrameHeader) -> Result<SampleType> {
+        Ok(match self.encoding(header)? {
+            Encoding::Exr(ExrSamples::F32, _)
+            | Encoding::Tiff(TiffSamples::F32, _)
+            | Encoding::Dng(TiffSamples::F32, _) => SampleType::F32,
+            Encoding::Exr(ExrSamples::F16, _) => SampleType::F16,
+            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) => SampleType::U16,
+        })
     }
 
     /// What stored samples are multiplied with.

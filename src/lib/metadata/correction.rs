@@ -136,6 +136,9 @@ pub struct MasterRecord {
     /// The noise that was drawn in them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<MasterNoise>,
+    /// What tells its frames from others: a digest of theirs, or of the seeds and numbers of their exposures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identity: Option<String>,
 }
 
 /// The noise that was drawn in averaged frames, but for seeds and numbers.
@@ -212,6 +215,9 @@ pub struct DefectsRecord {
     /// The map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<String>,
+    /// A digest of a list of defects.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub digest: Option<String>,
     /// Standard deviations beyond which photosites were found defective.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub found_beyond: Option<f64>,

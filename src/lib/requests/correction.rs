@@ -335,6 +335,7 @@ impl Correction {
         let found_in = |is_there: bool, what: &str| is_there.then(|| what.to_owned());
         let defects = (self.defects.is_some() || beyond.is_some()).then(|| DefectsRecord {
             map: self.defects.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned()),
+            digest: self.defects.as_deref().and_then(digest_of),
             found_beyond: beyond,
             found_in: [
                 found_in(dark_limits.is_some(), "level of dark frames"),
@@ -360,6 +361,11 @@ impl Correction {
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
         Ok(OpenCorrection { stage, corrections, notes })
     }
+}
+
+/// A digest of a list or map of defects; none of one that cannot be read, which is told elsewhere.
+fn digest_of(path: &Path) -> Option<String> {
+    read_file(path).ok().map(|bytes| format!("blake3:{}", blake3::hash(&bytes).to_hex()))
 }
 
 impl OpenCorrection {

@@ -63,6 +63,7 @@ impl Master {
             exposure_s: metadata.exposure.map(|exposure| exposure.exposure_s),
             temperature_k: temperature_k(first),
             noise: metadata.noise.as_ref().map(MasterNoise::of),
+            identity: identity(members.iter().map(|member| heads[*member])),
         };
         Ok(Self { record, members })
     }
@@ -71,6 +72,22 @@ impl Master {
         self.record.weight = weight;
         self
     }
+}
+
+/// What tells frames from others, as far as their metadata do: digests of their samples, or seeds and numbers of exposures.
+fn identity<'a>(frames: impl Iterator<Item = &'a FrameHeader>) -> Option<String> {
+    let mut digest = blake3::Hasher::new();
+    for frame in frames {
+        let metadata = &frame.metadata;
+        let own = match (&metadata.samples, &metadata.noise) {
+            (Some(samples), _) => samples.digest.clone(),
+            (None, Some(noise)) => format!("{} {} {}", noise.seed, noise.sensor_seed, noise.frame),
+            (None, None) => return None,
+        };
+        digest.update(own.as_bytes());
+        digest.update(b"\n");
+    }
+    Some(format!("blake3:{}", digest.finalize().to_hex()))
 }
 
 /// Frames of one kind whose dark signals are alike.
