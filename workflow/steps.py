@@ -11,7 +11,7 @@ import os
 import pathlib
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pyarrow as pa
@@ -68,16 +68,16 @@ def make_table(planned: plan.Plan) -> None:
     )
 
 
-def plots(planned: plan.Plan) -> None:
+def draw_plots(planned: plan.Plan) -> None:
     """Draws the figures."""
-    from sweep import plots as figures  # matplotlib takes a second to start
+    from sweep import plots  # noqa: PLC0415, matplotlib takes a second to start
 
     if planned.summary.endswith(".parquet"):
         rows = pa.parquet.read_table(planned.summary)
     else:
         convert = pa.csv.ConvertOptions(column_types=summary.schema(), strings_can_be_null=True)
         rows = pa.csv.read_csv(planned.summary, convert_options=convert)
-    figures.draw(rows, planned.plots)
+    plots.draw(rows, planned.plots)
 
 
 def checksums(planned: plan.Plan) -> None:
@@ -101,7 +101,9 @@ def _write(name: str, text: str) -> None:
 def main() -> int:
     """Runs a step; mistakes are told without a traceback."""
     sweep, step, *arguments = sys.argv[1:]
-    steps = {"part": part, "kept": kept, "table": make_table, "plots": plots, "checksums": checksums}
+    steps: dict[str, Callable[..., None]] = {
+        "part": part, "kept": kept, "table": make_table, "plots": draw_plots, "checksums": checksums,
+    }  # fmt: skip
     try:
         steps[step](plan.read(sweep), *arguments)
     except (Mistakes, ValueError, OSError) as error:

@@ -47,7 +47,7 @@ def of(sweep: Sweep) -> list[Condition]:
     exposures = [(s, None) for s in sweep.exposures_s] + [(None, share) for share in sweep.exposures_to]
     axes = itertools.product(sweep.sensors, exposures, sweep.temperatures_k, sweep.skies, sweep.methods)
     return [
-        Condition(number, sensor, *exposure, kelvin, sky, method, _seed(sweep, sensor, exposure, kelvin, sky))
+        Condition(number, sensor, exposure[0], exposure[1], kelvin, sky, method, _seed(sweep, sensor, exposure, kelvin, sky))
         for number, (sensor, exposure, kelvin, sky, method) in enumerate(axes)
     ]
 

@@ -29,7 +29,7 @@ def load(name: str, text: str) -> tuple[Any, dict[Path, int]]:
             return found
         if isinstance(node, yaml.SequenceNode):
             return [value(item, (*path, number)) for number, item in enumerate(node.value)]
-        return loader.construct_object(node, deep=True)  # type: ignore[no-untyped-call]
+        return loader.construct_object(node, deep=True)
 
     try:
         node = loader.get_single_node()
@@ -38,7 +38,7 @@ def load(name: str, text: str) -> tuple[Any, dict[Path, int]]:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise Mistakes([f"{name}:{line}: this is no YAML: {error.problem}"]) from error
     finally:
-        loader.dispose()  # type: ignore[no-untyped-call]
+        loader.dispose()
     if twice:
         raise Mistakes(twice)
     return result, lines

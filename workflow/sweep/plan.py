@@ -5,8 +5,9 @@ import functools
 import itertools
 import pathlib
 
-from . import conditions, files, programs, request
+from . import conditions, files, programs, reading, request
 from .conditions import Condition
+from .mistakes import Mistakes
 
 FORMAT = "2"  # of the files in the work directory; another number, and all are made again
 RIM = 2  # photosites at each side that no statistic counts: demosaicking has fewer neighbors there than predictions suppose
@@ -165,7 +166,7 @@ def read(path: str) -> Plan:
     try:
         text = pathlib.Path(path).read_text()
     except OSError as error:
-        raise request.Mistakes([f"{path}: cannot read: {error.strerror}"]) from error
+        raise Mistakes([f"{path}: cannot read: {error.strerror}"]) from error
     programs.check()
-    sweep = request.read(path, text)
+    sweep = reading.read(path, text)
     return Plan(sweep, conditions.of(sweep))

@@ -114,7 +114,7 @@ class Gathered:
 def cube_root_z(ratio: float, degrees: float) -> float:
     """The normal deviate of a variance over its expectation, by Wilson and Hilferty."""
     share = 2 / (9 * degrees)
-    return (ratio ** (1 / 3) - (1 - share)) / math.sqrt(share)
+    return (math.pow(ratio, 1 / 3) - (1 - share)) / math.sqrt(share)
 
 
 def chance(z: float) -> float:
