@@ -71,10 +71,12 @@ def sky(reader: Reader, path: lines.Path, value: Any) -> Sky:
 def _name(reader: Reader, path: lines.Path, given: dict[str, Any], otherwise: str) -> str:
     """A name that stands in the table and in the names of files."""
     if "name" not in given:
-        return re.sub(r"[^A-Za-z0-9._+-]+", "-", otherwise).lstrip(".+-")
+        return re.sub(r"_{2,}", "_", re.sub(r"[^A-Za-z0-9._+-]+", "-", otherwise)).strip("._+-")
     name = reader.text((*path, "name"), given["name"])
-    if not NAME.fullmatch(name):
-        raise reader.refuse((*path, "name"), f"`{name}` is no name: letters, digits, `.`, `_`, `+` and `-` make one")
+    if not NAME.fullmatch(name) or "__" in name or name.endswith("_"):
+        raise reader.refuse(
+            (*path, "name"), f"`{name}` is no name: letters, digits, `.`, `+`, `-` and single `_` within make one"
+        )
     return name
 
 
@@ -114,7 +116,7 @@ def axes(reader: Reader, value: Any) -> dict[str, Any]:
         names = [one.name for one in axes[axis]]
         for number, name in enumerate(names):
             if name in names[:number]:
-                reader.note(("sweep", key, number), f"two are called {name}; give one of them another `name`")
+                reader.note(("sweep", key), f"two are called {name}; give one of them another `name`")
     return axes
 
 

@@ -22,8 +22,8 @@ class Condition:
 
     @property
     def name(self) -> str:
-        """What tells it from the others of its sweep, as part of the name of a file."""
-        return ",".join([self.sensor.name, self._exposure, self._temperature, self.sky.name, self.method])
+        """What tells it from the others of its sweep, as part of the name of a file: no name in it has two underlines."""
+        return "__".join([self.sensor.name, self._exposure, self._temperature, self.sky.name, self.method])
 
     @property
     def _exposure(self) -> str:

@@ -27,7 +27,7 @@ def read(name: str, text: str) -> Sweep:
     try:
         top = reader.keys((), reader.value, KEYS)
     except Refused:
-        raise Mistakes(reader.told) from None
+        raise Mistakes(reader.in_order()) from None
     for key in ("schema", "output", "seed", "frames", "size", "sweep"):
         if key not in top:
             reader.note((), f"the key `{key}` is missing")
@@ -68,7 +68,7 @@ def read(name: str, text: str) -> Sweep:
     )
     _together(reader, sweep)
     if reader.told:
-        raise Mistakes(reader.told)
+        raise Mistakes(reader.in_order())
     return sweep
 
 
@@ -93,8 +93,8 @@ def _together(reader: Reader, sweep: Sweep) -> None:
     known = programs.sensors()
     colors = bool({"xyz", "lab"} & set(sweep.stages)) or (sweep.keep is not None and sweep.keep.stage == "xyz")
     spectra = [sky.name for sky in sweep.skies if sky.file]
-    for number, sensor in enumerate(sweep.sensors):
-        here = ("sweep", "sensor", number)
+    here = ("sweep", "sensor")
+    for sensor in sweep.sensors:
         about = known.get(sensor.sensor)
         readout = known.get(sensor.readout) if sensor.readout else about
         if readout and not readout.has_readout:
@@ -121,10 +121,10 @@ def _together(reader: Reader, sweep: Sweep) -> None:
                 f"{sensor.sensor} has no matrix of its own; name a library of spectra as `matrix`, from which one is fitted",
             )
     if sweep.exposures_to:
-        for number, sky in enumerate(sweep.skies):
+        for sky in sweep.skies:
             if sky.electrons:
                 reader.note(
-                    ("sweep", "sky", number), "electrons given outright do not follow `expose_to`; give `exposure_s`"
+                    ("sweep", "sky"), f"{sky.name}: electrons given outright do not follow `expose_to`; give `exposure_s`"
                 )
     if sweep.matrix.endswith((".yaml", ".yml")):
         if len(sweep.sensors) > 1:

@@ -45,7 +45,7 @@ class Reader:
     def __init__(self, name: str, text: str) -> None:
         self.name = name
         self.value, self.lines = lines.load(name, text)
-        self.told: list[str] = []
+        self.told: list[tuple[int, str]] = []
 
     def note(self, path: lines.Path, what: str) -> None:
         """Notes a mistake at a place, or at the nearest around it."""
@@ -53,7 +53,12 @@ class Reader:
         while near not in self.lines and near:
             near = near[:-1]
         where = ".".join(str(key + 1 if isinstance(key, int) else key) for key in path)
-        self.told.append(f"{self.name}:{self.lines.get(near, 1)}: {where + ': ' if where else ''}{what}")
+        line = self.lines.get(near, 1)
+        self.told.append((line, f"{self.name}:{line}: {where + ': ' if where else ''}{what}"))
+
+    def in_order(self) -> list[str]:
+        """The mistakes, in the order of their lines."""
+        return [what for _, what in sorted(self.told, key=lambda told: told[0])]
 
     def refuse(self, path: lines.Path, what: str) -> Refused:
         self.note(path, what)
