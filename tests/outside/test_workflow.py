@@ -93,7 +93,10 @@ class SameBytes(SweepCase):
         self.run_sweep(one)
         two = self.place("two", 500)
         running = subprocess.Popen(
-            **self.snakemake(two, "--cores", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+            **self.snakemake(two, "--cores", "1"),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
         )
         parts = self.complete_parts(two, running)
         time.sleep(0.5)  # into the next job
@@ -139,6 +142,14 @@ class SameBytes(SweepCase):
         expected = self.run_pipe(["add-noise", *seed], ["digitize"], stdin=scene)
         kept = next((place / "out-frames").glob("*/adu-0000000500.exr"))
         self.same_planes(self.planes(kept.read_bytes()), self.planes(expected))
+
+
+class Pins(unittest.TestCase):
+    """What the tests run is what users are told to install."""
+
+    def test_the_same_versions(self):
+        wanted, tested = ((path / "requirements.txt").read_text().split() for path in (WORKFLOW, ROOT / "tests/outside"))
+        self.assertEqual([line for line in wanted if line not in tested and "slurm" not in line], [])
 
 
 @unittest.skipIf(MISSING, WITHOUT)

@@ -11,7 +11,7 @@ from . import files, reports
 
 matplotlib.use("Agg")
 matplotlib.rcParams["svg.hashsalt"] = "cyanometer"  # so that an SVG has the same bytes each time
-from matplotlib import pyplot  # noqa: E402
+from matplotlib import pyplot, ticker  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
 Row = dict[str, Any]
@@ -20,6 +20,7 @@ COLORS = {"R": "#c1272d", "G": "#2e8b57", "B": "#2a52be", "X": "#c1272d", "Y": "
 }  # fmt: skip
 MARKS = "osD^v<>phX"
 NAMED = 24  # conditions that an axis can name
+TICKS = 8  # exposure times that an axis can name
 
 
 def draw(summary: pa.Table, plots: dict[str, str]) -> None:
@@ -134,8 +135,14 @@ def _against_exposure(
                 named = label if values == 1 else None
                 axis.plot(*zip(*pairs, strict=True), style, color=color, lw=0.8, ms=4.5, mfc="none", label=named)
     axis.set_xscale("log")
+    exposures = sorted({row["exposure_s"] for rows, _, _ in curves.values() for row in rows})
+    if len(exposures) <= TICKS:
+        axis.set_xticks(exposures, [f"{exposure:.3g}" for exposure in exposures])
+        axis.set_xticks([], minor=True)
     if logarithmic:
         axis.set_yscale("log")
+        for set_formatter in (axis.yaxis.set_major_formatter, axis.yaxis.set_minor_formatter):
+            set_formatter(ticker.LogFormatter(labelOnlyBase=False, minor_thresholds=(1.5, 0.5)))
     axis.set_xlabel("exposure time / s")
     axis.set_ylabel(what)
     axis.set_title(f"{title}: points measured, lines predicted", fontsize="medium")
@@ -166,7 +173,9 @@ def _named(row: Row, rows: list[Row], axes: list[str]) -> str:
     units = {"exposure_s": " s", "temperature_k": " K", "expose_to": " of full well"}
     told = []
     for axis in axes:
-        if len({other[axis] for other in rows}) > 1:
+        # Sensors that have their own temperatures are told apart by their names.
+        beside = [other for other in rows if axis != "temperature_k" or other["sensor"] == row["sensor"]]
+        if len({other[axis] for other in beside}) > 1:
             value = row[axis]
             told.append(f"{value:.4g}{units[axis]}" if isinstance(value, float) else str(value))
     return ", ".join(told)
