@@ -313,7 +313,7 @@ fn frames_of_other_scenes_are_refused() {
     let mut longer = next.clone();
     longer.header.metadata.exposure.as_mut().unwrap().exposure_s *= 1.5;
     assert!(complaint(&longer).contains("exposure"));
-    assert!(over_frames(&[first.clone()], None).unwrap_err().to_string().contains("two frames"));
+    assert!(over_frames(std::slice::from_ref(&first), None).unwrap_err().to_string().contains("two exposures"));
     // Of another read-out nothing is predicted.
     let (report, _) = over_frames(&[first.clone(), other.plane(camera.electrons, 1)], None).unwrap();
     assert!(report.unpredicted.unwrap().to_string().contains("differ"), "{:?}", report.unpredicted);
