@@ -106,16 +106,37 @@ pub struct AverageRecord {
 }
 
 /// The exposures of one scene that a frame is the average of.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ExposuresRecord {
+    /// How many.
+    pub frames: u32,
     /// How they were averaged.
-    #[serde(flatten)]
-    pub average: AverageRecord,
+    pub combine: Combine,
+    /// Standard deviations beyond which samples were clipped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clip: Option<f64>,
     /// What their samples were.
     pub quantity: QuantityKind,
     /// Whether each was demosaicked before.
     #[serde(default, skip_serializing_if = "is_false")]
     pub demosaicked: bool,
+}
+
+impl ExposuresRecord {
+    /// That of an average of frames of such a quantity.
+    pub fn of(
+        AverageRecord { frames, combine, clip }: AverageRecord,
+        quantity: QuantityKind,
+        demosaicked: bool,
+    ) -> Self {
+        Self { frames, combine, clip, quantity, demosaicked }
+    }
+
+    /// How they were averaged.
+    pub fn average(&self) -> AverageRecord {
+        let Self { frames, combine, clip, .. } = *self;
+        AverageRecord { frames, combine, clip }
+    }
 }
 
 /// An average that was subtracted.

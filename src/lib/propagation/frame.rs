@@ -161,7 +161,7 @@ impl Sites {
             None => Ok(sites),
             Some(record) => {
                 let average = repeated::average_of(frame, record, quantity_of_sites(frame))?;
-                Ok(Self { moments: photosite.averaged(moments, expected_e, average)?, ..sites })
+                Ok(Self { moments: photosite.averaged(moments, expected_e, &average)?, ..sites })
             }
         }
     }

@@ -298,21 +298,21 @@ impl PixelNoise {
             Some(record) => {
                 let record =
                     average_of(frame, record, quantity_of_sites(frame)).map_err(|why| frame.refuse(why.to_string()))?;
-                photosite.check_average(record).map_err(|why| frame.refuse(why.to_string()))?;
+                photosite.check_average(&record).map_err(|why| frame.refuse(why.to_string()))?;
                 Some(record)
             }
             None => None,
         };
         let of_lines = photosite.has_lines().then(|| PixelLines {
             gains: places().map(|at| PixelGains::of_lines(table, at, &frame.geometry)).collect(),
-            terms: photosite.line_terms(average),
+            terms: photosite.line_terms(average.as_ref()),
             photosite,
         });
         let of_black = metadata
             .black_noise
             .map(|noise| (gains(PixelGains::of_black), [noise.row_adu2, noise.column_adu2, noise.site_adu2]));
         let gains = gains(PixelGains::new);
-        let variances = LevelVariance::of_classes(&photosite, average, largest);
+        let variances = LevelVariance::of_classes(&photosite, average.as_ref(), largest);
         Ok(Self { columns, rows, gains, of_black, of_lines, depends_on_hue: table.depends_on_hue(), variances, black })
     }
 

@@ -70,11 +70,11 @@ pub(super) fn is_linear(frame: &FrameHeader) -> bool {
 /// # Errors
 ///
 /// [`Unpredictable::Beyond`] where no formula follows the average through what was done since.
-pub(super) fn average_of<'a>(
+pub(super) fn average_of(
     frame: &FrameHeader,
-    record: &'a ExposuresRecord,
+    record: &ExposuresRecord,
     of_sites: QuantityKind,
-) -> Predicted<&'a AverageRecord> {
+) -> Predicted<AverageRecord> {
     let is_before = matches!(record.quantity, QuantityKind::Electrons | QuantityKind::ExpectedElectrons);
     let mut averaged = frame.clone();
     averaged.metadata.quantity = record.quantity;
@@ -84,10 +84,10 @@ pub(super) fn average_of<'a>(
     if record.demosaicked && !is_linear(&averaged) {
         return Err(Unpredictable::Beyond(CURVED));
     }
-    if record.demosaicked && !is_mean(&record.average) {
+    if record.demosaicked && !is_mean(&record.average()) {
         return Err(Unpredictable::Beyond(NO_MEANS_OF_PIXELS));
     }
-    Ok(&record.average)
+    Ok(record.average())
 }
 
 /// Whether an average is the mean of its frames.

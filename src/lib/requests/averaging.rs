@@ -225,11 +225,10 @@ impl Averaged {
         let mut warnings = Vec::new();
         let metadata = &mut header.metadata;
         if let Some(before) = &metadata.average {
-            record = AverageRecord { frames: before.average.frames.saturating_mul(record.frames), ..record };
+            record = AverageRecord { frames: before.frames.saturating_mul(record.frames), ..record };
         }
         let name = averaging.name();
-        let (quantity, demosaicked) = (metadata.quantity, metadata.demosaic.is_some());
-        metadata.average = Some(ExposuresRecord { average: record, quantity, demosaicked });
+        metadata.average = Some(ExposuresRecord::of(record, metadata.quantity, metadata.demosaic.is_some()));
         (metadata.predicted, metadata.uncertainty, metadata.saturated_share, metadata.samples) =
             (None, None, None, None);
         metadata.mask_bits.clear();

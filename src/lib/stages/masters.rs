@@ -42,7 +42,7 @@ impl Averaging {
     pub fn record_of<'a>(self, frames: impl IntoIterator<Item = &'a FrameHeader>) -> Result<AverageRecord> {
         let mut frames = frames.into_iter();
         let Some(first) = frames.next() else { return Ok(self.record(0)) };
-        let before = |frame: &FrameHeader| frame.metadata.average.as_ref().map(|record| record.average);
+        let before = |frame: &FrameHeader| frame.metadata.average.map(|record| record.average());
         let (own, mut count) = (before(first), 1);
         for frame in frames {
             count += 1;

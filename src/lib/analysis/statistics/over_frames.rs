@@ -224,8 +224,7 @@ impl Seen {
         }
         let average = AverageRecord { frames: self.pixels.count(), combine: Combine::Mean, clip: None };
         let metadata = &mut header.metadata;
-        let (quantity, demosaicked) = (metadata.quantity, metadata.demosaic.is_some());
-        metadata.average = Some(ExposuresRecord { average, quantity, demosaicked });
+        metadata.average = Some(ExposuresRecord::of(average, metadata.quantity, metadata.demosaic.is_some()));
         (metadata.predicted, metadata.uncertainty, metadata.saturated_share) = (None, None, None);
         let row_samples = self.exposures.first().geometry.row_samples();
         let mut samples = Vec::with_capacity(header.geometry.row_samples() * header.geometry.height);
