@@ -247,7 +247,7 @@ fn statistics_over_frames_are_as_predicted() {
 fn false_alarms_are_no_more_than_the_level() {
     let factor: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(1, |_| 4);
     for (what, size, frames) in [("small", [16, 12], 3), ("many", [24, 20], 30), ("two", [70, 60], 2)] {
-        let seeds = factor * 150;
+        let seeds = factor * 60;
         let trials: Vec<Vec<Option<f64>>> = (0..seeds)
             .into_par_iter()
             .map(|seed| {

@@ -1,6 +1,6 @@
 //! What an earlier run has left complete.
 
-use super::input::{FrameReader, InputOptions};
+use super::input::FrameReader;
 use super::output::OutputOptions;
 use super::places::{named, sidecar_path};
 use super::yaml::{parse_metadata, write_metadata};
@@ -28,19 +28,11 @@ pub fn is_complete(options: &OutputOptions, made: &FrameHeader) -> Result<bool> 
     if write_metadata(&lasting(found))? != write_metadata(&lasting(made.metadata.clone()))? {
         return Ok(false);
     }
-    if !is_stored_so(path, options, made)? {
-        return Ok(false);
-    }
-    let holds =
-        |digest: String| FrameReader::holds(File::open(path).ok()?, &path.display().to_string(), made, &digest).ok();
+    let stored = options.sample_type(made)?;
+    let holds = |digest: String| {
+        FrameReader::holds(File::open(path).ok()?, &path.display().to_string(), made, (&digest, stored)).ok()
+    };
     Ok(digest.and_then(holds).unwrap_or(false))
-}
-
-/// Whether the file stores samples as the options ask for; one that stores channels in several ways is not looked into.
-fn is_stored_so(path: &Path, options: &OutputOptions, made: &FrameHeader) -> Result<bool> {
-    let wanted = options.sample_type(made)?;
-    let found = FrameReader::open(&InputOptions { path: Some(path.to_owned()), ..InputOptions::default() });
-    Ok(found.is_ok_and(|found| found.sample_type().is_none_or(|found| found == wanted)))
 }
 
 /// What of the metadata is known before the samples are, and does not hang on how they are stored.
