@@ -7,7 +7,6 @@ use super::yaml::{parse_metadata, write_metadata};
 use crate::error::Result;
 use crate::metadata::{FrameHeader, Metadata};
 use std::fs::File;
-use std::path::Path;
 
 /// Whether the frame `made` lies at a place already, whole: its sidecar says of it what this run would, and describes the samples
 /// that the file holds. What is damaged, or cannot be read, is not complete.
