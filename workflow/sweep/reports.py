@@ -3,6 +3,7 @@
 import pathlib
 
 import pyarrow as pa
+import pyarrow.compute
 import pyarrow.csv
 import pyarrow.parquet
 
