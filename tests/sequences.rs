@@ -142,7 +142,7 @@ fn a_run_is_resumed() {
     assert!(shop.bytes("c/5.exr") == codes);
     // So do other dark frames of the same names, other defects of one list, another type of samples.
     shop.run("render-radiance --dark --size 24x16 -o dark-scene.exr", &[]);
-    let correct = "correct-frame c/5.exr --dark dark.exr --defects list.csv --resume -o less.exr";
+    let correct = "correct-frame -q c/5.exr --dark dark.exr --defects list.csv --resume -o less.exr";
     let (mut made, mut kept) = (Vec::new(), Vec::new());
     for (seed, list) in [(3, "3,4"), (4, "3,4"), (4, "7,8"), (4, "7,8")] {
         let electrons = shop.run(&format!("add-noise dark-scene.exr --seed {seed}"), &[]);
@@ -155,9 +155,9 @@ fn a_run_is_resumed() {
     }
     assert_eq!(kept, [false, false, false, true]);
     assert!(made[0] != made[1] && made[1] != made[2] && made[2] == made[3]);
-    shop.run("digitize n/5.exr --resume --sample-type f16 -o half.exr", &[]);
+    shop.run("digitize -q n/5.exr --resume --sample-type f16 -o half.exr", &[]);
     let half = shop.bytes("half.exr");
-    shop.run("digitize n/5.exr --resume -o half.exr", &[]);
+    shop.run("digitize -q n/5.exr --resume -o half.exr", &[]);
     assert!(shop.bytes("half.exr") != half);
 }
 

@@ -38,7 +38,7 @@ impl Averaging {
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] for averages that do not go into another: medians, and means of other numbers of frames.
+    /// [`Error::Format`](crate::error::Error::Format) for averages that do not go into another: medians, and means of other numbers of frames.
     pub fn record_of<'a>(self, frames: impl IntoIterator<Item = &'a FrameHeader>) -> Result<AverageRecord> {
         let mut frames = frames.into_iter();
         let Some(first) = frames.next() else { return Ok(self.record(0)) };

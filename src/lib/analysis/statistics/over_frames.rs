@@ -86,7 +86,7 @@ impl OverFrames {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] for a region outside the frame; [`Error::Format`] for one that shows another scene or other pixels than the
+    /// [`Error::Usage`](crate::error::Error::Usage) for a region outside the frame; [`Error::Format`](crate::error::Error::Format) for one that shows another scene or other pixels than the
     /// first, or the same exposure as another; those of the source.
     pub fn add(&mut self, source: &mut dyn RowSource) -> Result<()> {
         let whole = [Region::whole(source.header())];
@@ -119,7 +119,7 @@ impl OverFrames {
     ///
     /// # Errors
     ///
-    /// [`Error::Data`] of fewer than two frames, or where nothing can be tested that should be.
+    /// [`Error::Data`](crate::error::Error::Data) of fewer than two frames, or where nothing can be tested that should be.
     pub fn finish(self) -> Result<(RepeatedReport, MemoryFrame)> {
         let Self { settings, seen } = self;
         let Some(seen) = seen.filter(|seen| seen.pixels.count() > 1) else {
