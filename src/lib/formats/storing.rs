@@ -7,7 +7,7 @@ use super::places::{STDOUT_NAME, named};
 use super::tiff::{TiffCompression, TiffSamples};
 use super::viewable;
 use crate::error::{Error, Result};
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, Metadata};
 use crate::names::Named;
 use crate::units::QuantityKind;
 use std::path::{Path, PathBuf};
@@ -141,7 +141,9 @@ impl OutputOptions {
                 "a TIFF has no names for the channels of a map of differences; write an EXR".into(),
             ));
         }
-        let changed = header.metadata.demosaic.is_some() || header.metadata.correction.is_some();
+        // An average of codes lies between them.
+        let Metadata { demosaic, correction, average, .. } = &header.metadata;
+        let changed = demosaic.is_some() || correction.is_some() || average.is_some();
         let fits_u16 = quantity == QuantityKind::Adu && !changed || quantity == QuantityKind::Srgb;
         let compression = self.compression.unwrap_or(CompressionKind::None);
         match format {
