@@ -203,7 +203,7 @@ fn what_is_no_frame_is_refused() {
         ("add-noise scene.exr --frames 3..3", Vec::new(), BAD_USAGE, "0..100 for 0 to 99"),
         ("add-noise scene.exr --frames 0..3 --frame 1", Vec::new(), BAD_USAGE, "--frame"),
         ("add-noise scene.exr --frames 0..3 -o same.exr", Vec::new(), BAD_USAGE, "3 exposures would go there"),
-        ("digitize -o n/{stem}.exr", two.clone(), BAD_USAGE, "the standard input has no name for {stem}"),
+        ("digitize -o n/{stem}.exr", two.clone(), BAD_USAGE, "the standard input tells no name for {stem}"),
         ("digitize scene.exr -o a{n}.exr", Vec::new(), BAD_USAGE, "nothing stands for {n}"),
         (
             "mosaic scene.exr none.exr -o m-{stem}.exr",
@@ -235,6 +235,17 @@ fn start_of(stream: &[u8], frame: usize) -> usize {
     stream.windows(4).enumerate().filter(|(_, bytes)| *bytes == MAGIC).nth(frame).unwrap().0
 }
 
+/// The byte behind the last of a frame of a stream.
+fn end_of(stream: &[u8], frame: usize) -> usize {
+    const MAGIC: [u8; 4] = [0x76, 0x2F, 0x31, 0x01];
+    stream
+        .windows(4)
+        .enumerate()
+        .filter(|(_, bytes)| *bytes == MAGIC)
+        .nth(frame + 1)
+        .map_or(stream.len(), |found| found.0)
+}
+
 /// A program that dies between two frames leaves a stream that tells how many are missing.
 #[test]
 fn a_stream_knows_how_many_frames_it_has() {
@@ -247,6 +258,13 @@ fn a_stream_knows_how_many_frames_it_has() {
         assert_eq!(output.status.code(), Some(BAD_DATA), "{line}");
         assert!(said(&output).contains(missing), "{line}: {}", said(&output));
     }
+    // So does one whose frames are dropped from the middle, or change places.
+    let frame = |number: usize| &stream[start_of(&stream, number)..stream.len().min(end_of(&stream, number))];
+    for order in [[0, 2, 3], [1, 0, 2]] {
+        let output = shop.attempt("digitize", &order.map(frame).concat());
+        assert_eq!(output.status.code(), Some(BAD_DATA), "{order:?}");
+        assert!(said(&output).contains("between them some are missing"), "{order:?}: {}", said(&output));
+    }
     // Programs in between pass it on.
     let digitized = shop.attempt("digitize", &stream);
     let output = shop.attempt("measure", &digitized.stdout[..start_of(&digitized.stdout, 1)]);
@@ -255,6 +273,43 @@ fn a_stream_knows_how_many_frames_it_has() {
     shop.run("add-noise scene.exr --frames 0..2 -o {frame}.exr", &[]);
     let files = [shop.bytes("0.exr"), shop.bytes("1.exr")].concat();
     assert_eq!(lines(&shop.run("measure --output-format json", &files)).len(), 2);
+}
+
+/// Names of several files go through pipes: outputs are named by them, and reports name them. The form of a report is that of which its
+/// name ends, and CSV has what a check says.
+#[test]
+fn names_go_through_pipes() {
+    let shop = with_scene();
+    fs::create_dir(shop.path("n")).unwrap();
+    fs::create_dir(shop.path("m")).unwrap();
+    shop.run("add-noise scene.exr --seed 5 --frames 0..3 -o n/a{frame}.exr", &[]);
+    let codes = shop.run("digitize n/a0.exr n/a1.exr n/a2.exr", &[]);
+    let planes = shop.run("mosaic", &codes);
+    shop.run("demosaic -o m/", &planes);
+    shop.run("demosaic -o m/x-{stem}-{index}.exr", &planes);
+    let named = ["a0.exr", "a1.exr", "a2.exr", "x-a0-0.exr", "x-a1-1.exr", "x-a2-2.exr"];
+    assert!(named.iter().all(|name| shop.path("m").join(name).exists()));
+    assert!(shop.bytes("m/a1.exr") == shop.bytes("m/x-a1-1.exr"));
+    // Files say nothing of it; they are those of programs that were run one by one.
+    assert!(!String::from_utf8_lossy(&shop.bytes("m/a1.exr.yaml")).contains("file:"));
+    assert!(shop.run("digitize n/a1.exr", &[]) == shop.run("digitize", &shop.bytes("n/a1.exr")));
+    shop.run("measure --check --level 1e-9 -o rows.csv", &planes);
+    let table = String::from_utf8(shop.bytes("rows.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
+    assert_eq!(rows.len(), 1 + 3 * 4);
+    for (row, name) in rows[1..].chunks(4).zip(["n/a0.exr", "n/a1.exr", "n/a2.exr"]) {
+        assert!(row.iter().all(|row| row[column("file")] == name && row[column("as_predicted")] == "true"), "{table}");
+    }
+    for (ending, begins) in
+        [("json", "{"), ("yml", "---"), ("txt", "n/a0.exr, frame 0:"), ("report", "n/a0.exr, frame 0:")]
+    {
+        shop.run(&format!("measure -o r.{ending}"), &planes);
+        let text = shop.bytes(&format!("r.{ending}"));
+        assert!(text.starts_with(begins.as_bytes()), "{ending}");
+    }
+    shop.run("measure --output-format json -o r.csv", &planes);
+    assert!(shop.bytes("r.csv").starts_with(b"{"));
 }
 
 /// Names in quotes are expanded by the program: the same bytes as by a shell; numbers of frames do for several inputs, and two that meet

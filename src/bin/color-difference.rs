@@ -28,9 +28,9 @@ struct Arguments {
     /// EXR file for the differences of each pixel, channels delta_e_76, jnd, delta_e_94, delta_e_2000
     #[arg(long, value_name = "FILE.exr", value_parser = values::exr_file())]
     map: Option<PathBuf>,
-    /// Form of the report
-    #[arg(long, default_value = "text", value_parser = values::choice::<ReportFormat>())]
-    output_format: ReportFormat,
+    /// Form of the report; by default that of the ending of its file, or text
+    #[arg(long, value_parser = values::choice::<ReportFormat>())]
+    output_format: Option<ReportFormat>,
     /// File for the report; by default standard output
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -66,7 +66,8 @@ fn run(Arguments { pair, map, output, output_format, .. }: &Arguments, session: 
     if let Some(writer) = writer {
         writer.finish(Counts { not_finite: report.not_finite, ..Default::default() })?;
     }
-    output::write_text(output.as_deref(), &report::difference(&report, *output_format)?)?;
+    let form = report::form_of(*output_format, output.as_deref()).unwrap_or(ReportFormat::Text);
+    output::write_text(output.as_deref(), &report::difference(&report, form)?)?;
     session.tell(Note::not_finite(report.not_finite).as_slice());
     comparison.frames().for_each(|frame| session.tell(&requests::of_marks(frame)));
     Ok(())

@@ -28,9 +28,9 @@ struct Arguments {
     input: DescribedInput,
     #[command(flatten)]
     measurement: Measurement,
-    /// Form of the report
-    #[arg(long, default_value = "text", value_parser = values::choice::<ReportFormat>())]
-    output_format: ReportFormat,
+    /// Form of the report; by default that of the ending of its file, or text
+    #[arg(long, value_parser = values::choice::<ReportFormat>())]
+    output_format: Option<ReportFormat>,
     /// File for the report; by default standard output
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -46,6 +46,8 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let frames = &arguments.input.frame;
     arguments.measurement.announce(&frames.inputs, arguments.output.as_deref())?;
+    let output = arguments.output.as_deref();
+    let format = report::form_of(arguments.output_format, output).unwrap_or(ReportFormat::Text);
     let reports = Output { is_of_reports: true, ..Output::default() };
     if let Some(statistics) = arguments.measurement.over_frames() {
         let measured = session.each_frame::<Arguments>(frames, &reports, |turn| {
@@ -54,10 +56,9 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
             statistics.add(&mut reader)
         });
         let pixels = arguments.measurement.pixels.as_deref();
-        let format = arguments.output_format;
-        return measured.and(session.tell_over_frames(statistics, pixels, format, arguments.output.as_deref()));
+        return measured.and(session.tell_over_frames(statistics, pixels, format, output));
     }
-    let findings = Findings::new(arguments.output_format, frames.inputs.len() > 1, arguments.output.clone());
+    let findings = Findings::new(format, frames.inputs.len() > 1, arguments.output.clone());
     let measured = session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
     measured.and(findings.end())
 }

@@ -10,6 +10,7 @@ use crate::formats::places::{FRAME_OF, named, place};
 use crate::formats::{register, resume};
 use crate::masking::Masking;
 use crate::metadata::FrameHeader;
+use crate::requests::batch;
 use crate::requests::correction::OpenCorrection;
 use crate::requests::options::Output;
 use crate::requests::{self, Note};
@@ -259,9 +260,13 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] where another frame of this run went to the same place, and cannot be followed there.
+    /// [`Error::Usage`] where another frame of this run went to the same place, and cannot be followed there; those of
+    /// [`batch::check_named`].
     pub fn place(&self, made: &FrameHeader, output: &Output) -> Result<OutputOptions> {
         let options = output.options_for(made);
+        if made.metadata.file.is_none() {
+            batch::check_named(options.path.as_deref())?;
+        }
         let path = named(options.path.as_deref()).filter(|_| !output.is_stream());
         if self.run().written.insert(place(path)) {
             return Ok(options);

@@ -157,8 +157,11 @@ impl FrameReader {
             Some(Rest::Pipe(pipe)) => Self::of(open_piped(pipe, &name, options.part)?, &name, path, options),
             Some(Rest::Nothing) => Err(Error::format(&name, "it is empty")),
         };
-        let frame = frame?;
-        sequence.expect(frame.to_come);
+        let mut frame = frame?;
+        sequence.expect(frame.to_come, &name)?;
+        if let Some(path) = next.path.filter(|_| next.is_of_several_files) {
+            frame.header.metadata.file = Some(path.display().to_string());
+        }
         Ok(Self { sequence: Some(sequence.clone()), ..frame })
     }
 

@@ -87,6 +87,7 @@ impl FrameWriter {
         let name = target.name().to_owned();
         let follow = options.frames_to_come > 0 && target.named_file().is_none();
         header.metadata.frames_to_come = follow.then_some(options.frames_to_come);
+        header.metadata.file = header.metadata.file.filter(|_| target.named_file().is_none());
         let header = &header;
         if matches!(encoding, Encoding::Exr(ExrSamples::F16, _)) {
             doubt_of_codes(&name, header);

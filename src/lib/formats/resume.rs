@@ -15,7 +15,8 @@ use std::fs::File;
 ///
 /// Those of [`write_metadata`].
 pub fn is_complete(options: &OutputOptions, made: &FrameHeader) -> Result<bool> {
-    let Some(path) = named(options.path.as_deref()) else { return Ok(false) };
+    // What is no file, such as a named pipe, keeps nothing.
+    let Some(path) = named(options.path.as_deref()).filter(|path| path.is_file()) else { return Ok(false) };
     let sidecar = sidecar_path(path);
     let Some(found) = std::fs::read_to_string(&sidecar)
         .ok()
@@ -36,5 +37,5 @@ pub fn is_complete(options: &OutputOptions, made: &FrameHeader) -> Result<bool> 
 
 /// What of the metadata is known before the samples are, and does not hang on how they are stored.
 fn lasting(metadata: Metadata) -> Metadata {
-    Metadata { samples: None, sample_scale: None, ..metadata }
+    Metadata { samples: None, sample_scale: None, file: None, ..metadata }
 }

@@ -63,6 +63,7 @@ struct State {
     to_come: u64,
     /// The frame that was taken last, where it can be taken again.
     last: Option<(File, u64)>,
+    is_of_several_files: bool,
 }
 
 enum At {
@@ -82,13 +83,22 @@ pub(super) struct Next {
     pub path: Option<PathBuf>,
     /// Its number, counted from 0.
     pub number: u64,
+    /// Whether its metadata are to tell which file it comes from.
+    pub is_of_several_files: bool,
 }
 
 impl Sequence {
     /// The frames of a file, or of the standard input for `-` or none; nothing is opened yet.
     pub fn of(path: Option<&Path>) -> Self {
         let path = named(path).map(Path::to_owned);
-        Self(Arc::new(Mutex::new(State { path, at: At::Start, taken: 0, to_come: 0, last: None })))
+        let state = State { path, at: At::Start, taken: 0, to_come: 0, last: None, is_of_several_files: false };
+        Self(Arc::new(Mutex::new(state)))
+    }
+
+    /// The same of one of several files: metadata of its frames tell which.
+    pub fn among_others(self) -> Self {
+        self.state().is_of_several_files = true;
+        self
     }
 
     /// The same, of which each frame can be taken [again](Self::again): what comes of a stream is copied to a temporary file
@@ -143,8 +153,20 @@ impl Sequence {
     }
 
     /// Notes how many frames at least follow the one that was taken last.
-    pub(super) fn expect(&self, to_come: u64) {
-        self.state().to_come = to_come;
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] where these are fewer than the frame before has left: some are missing between them, or their order is another.
+    pub(super) fn expect(&self, to_come: u64, name: &str) -> Result<()> {
+        let wanted = std::mem::replace(&mut self.state().to_come, to_come).saturating_sub(1);
+        if to_come < wanted {
+            let problem = format!(
+                "{to_come} frames follow it, by what it says, where {wanted} should, by the frame before: between them some are missing, or \
+                 their order is not that in which they were written"
+            );
+            return Err(Error::format(name, problem));
+        }
+        Ok(())
     }
 
     /// How many frames at least follow the one that was taken last, by what it says itself.
@@ -177,7 +199,7 @@ impl Sequence {
         };
         let number = state.taken;
         state.taken += 1;
-        Ok(Next { place, path: state.path.clone(), number })
+        Ok(Next { place, path: state.path.clone(), number, is_of_several_files: state.is_of_several_files })
     }
 
     /// Goes on behind a frame that was read to its end.

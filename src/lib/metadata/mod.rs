@@ -132,6 +132,9 @@ pub struct Metadata {
     /// How many frames at least follow this one in its stream, where that was known; programs that read it take it out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames_to_come: Option<u64>,
+    /// Which of several files the frame was read from, as the user named it, by the first program of a pipe; in streams alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
     /// What is known only after the last row; in sidecars alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub samples: Option<SamplesRecord>,
@@ -175,6 +178,7 @@ impl Metadata {
             history: Vec::new(),
             sample_scale: None,
             frames_to_come: None,
+            file: None,
             samples: None,
             unknown: Mapping::new(),
         }

@@ -1,6 +1,6 @@
 //! Reports of measured cameras: as text, JSON, YAML and Markdown.
 
-use super::{in_digits, table, unwritable};
+use super::{form_of, in_digits, table, unwritable};
 use crate::analysis::photon_transfer::{ClassFindings, Finding, OUTSTANDING, PatternView};
 use crate::error::Result;
 use crate::formats::places::named;
@@ -40,14 +40,23 @@ impl Named for CameraFormat {
             Self::Markdown => "markdown",
         }
     }
+
+    fn other_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Text => &["txt"],
+            Self::Yaml => &["yml"],
+            Self::Markdown => &["md"],
+            Self::Json => &[],
+        }
+    }
 }
 
 /// Where a report of a camera goes, and in which form.
 #[derive(Debug, Clone, Args)]
 pub struct CameraOutputs {
-    /// Form of the report
-    #[arg(long, default_value = CameraFormat::Text.name(), value_parser = values::choice::<CameraFormat>())]
-    pub output_format: CameraFormat,
+    /// Form of the report; by default that of the ending of its file, or text
+    #[arg(long, value_parser = values::choice::<CameraFormat>())]
+    pub output_format: Option<CameraFormat>,
     /// Draw photon transfer, response, linearity, signal to noise, and the patterns, as SVG or PNG
     #[arg(long, value_name = "FILE.svg|png")]
     pub plot: Option<PathBuf>,
@@ -82,7 +91,8 @@ impl CameraOutputs {
             write_plot(plot, &super::camera_page(camera))?;
         }
         // What was measured is told whether or not a sensor follows.
-        output::write_text(self.output.as_deref(), &camera_report(camera, self.output_format)?)?;
+        let form = form_of(self.output_format, self.output.as_deref()).unwrap_or(CameraFormat::Text);
+        output::write_text(self.output.as_deref(), &camera_report(camera, form)?)?;
         let Some(path) = &self.sensor_out else { return Ok(()) };
         let mut sensor = super::sensor_of(camera)?;
         if let Some(stem) = named(Some(path)).and_then(Path::file_stem) {

@@ -31,10 +31,12 @@ pub use trade_off::trade_off;
 use crate::analysis::statistics::check::{Subject, Test, Verdict};
 use crate::analysis::statistics::{ChannelReport, RegionReport, Report};
 use crate::error::{Error, Result};
+use crate::formats::places::named;
 use crate::formats::yaml_writer;
 use crate::names::Named;
 use crate::text::visible;
 use std::fmt::Write;
+use std::path::Path;
 
 /// The form of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +62,19 @@ impl Named for ReportFormat {
             Self::Csv => "csv",
         }
     }
+
+    fn other_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Text => &["txt"],
+            Self::Yaml => &["yml"],
+            Self::Json | Self::Csv => &[],
+        }
+    }
+}
+
+/// The form of a report: what was asked for, or that of which the name of its file ends.
+pub fn form_of<F: Named>(asked: Option<F>, output: Option<&Path>) -> Option<F> {
+    asked.or_else(|| F::named(named(output)?.extension()?.to_str()?))
 }
 
 fn unwritable(error: impl std::fmt::Display) -> Error {
@@ -113,6 +128,15 @@ fn values(channel: &ChannelReport) -> [Option<f64>; 12] {
     ]
 }
 
+/// What the check of a frame says, by column: the same in all rows of the frame.
+fn verdict_cells(verdict: Verdict) -> [(&'static str, String); 3] {
+    [
+        ("as_predicted", verdict.passed.to_string()),
+        ("tests", verdict.tests.to_string()),
+        ("smallest_p", verdict.smallest_p.to_string()),
+    ]
+}
+
 fn csv(report: &Report) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     // Columns that were there first keep their places.
@@ -121,7 +145,9 @@ fn csv(report: &Report) -> Result<String> {
     let head = ["x", "y", "width", "height", "channel", "count"].into_iter().chain(keys(first));
     let of_patches = report.regions.iter().any(|region| region.patch.is_some());
     let last: &[&str] = if of_patches { &["sample", "patch_column", "patch_row"] } else { &[] };
-    writer.write_record(head.chain(last.iter().copied()).chain(keys(errors))).map_err(unwritable)?;
+    let verdict = report.check.map(verdict_cells);
+    let of_verdict = verdict.iter().flatten().map(|(key, _)| *key);
+    writer.write_record(head.chain(last.iter().copied()).chain(keys(errors)).chain(of_verdict)).map_err(unwritable)?;
     for region in &report.regions {
         for channel in region.channels.iter().chain(&region.classes) {
             let numbers = values(channel).map(|value| value.map_or(String::new(), |v| v.to_string()));
@@ -136,7 +162,8 @@ fn csv(report: &Report) -> Result<String> {
                     let sample = region.sample.map_or(String::new(), |sample| sample.to_string());
                     [sample, column.to_string(), row.to_string()]
                 }))
-                .chain(errors.iter().cloned());
+                .chain(errors.iter().cloned())
+                .chain(verdict.iter().flatten().map(|(_, cell)| cell.clone()));
             writer.write_record(cells).map_err(unwritable)?;
         }
     }

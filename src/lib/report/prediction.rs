@@ -1,7 +1,7 @@
 //! Reports of noise budgets.
 
 use super::photon_transfer::photon_transfer;
-use super::{ReportFormat, shown, table, unwritable};
+use super::{ReportFormat, form_of, shown, table, unwritable};
 use crate::camera::optics::Exposure;
 use crate::chain::{ChainPrediction, StagePrediction};
 use crate::error::Result;
@@ -19,7 +19,7 @@ use std::path::PathBuf;
 /// Where a report of noise budgets goes, in which form, and its plot.
 #[derive(Debug, Clone, Default, Args)]
 pub struct BudgetOutputs {
-    /// Form of the report; by default text, and csv for a sweep or all samples
+    /// Form of the report; by default that of the ending of its file, or text, and csv for a sweep or all samples
     #[arg(long, value_parser = values::choice::<ReportFormat>())]
     pub output_format: Option<ReportFormat>,
     /// Draw the photon transfer curve, with its read, shot and fixed-pattern regimes, as SVG or PNG
@@ -49,7 +49,7 @@ impl BudgetOutputs {
     ///
     /// Those of [`prediction`], of the curve and of the disk.
     pub fn write(&self, found: &mut PredictedNoise) -> Result<()> {
-        let text = prediction(found, self.output_format)?;
+        let text = prediction(found, form_of(self.output_format, self.output.as_deref()))?;
         if let Some(plot) = &self.plot {
             write_plot(plot, &photon_transfer(&found.transfer_curve()?))?;
         }

@@ -13,7 +13,7 @@ use std::sync::{Mutex, PoisonError};
 /// What a report is about.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Subject {
-    /// The file as the user named it, or the standard input.
+    /// The file as the user named it, here or in the first program of the pipe, or the standard input.
     pub file: String,
     /// The number of the exposure, or, where the frame does not tell it, that in its stream.
     pub frame: u64,
@@ -23,7 +23,8 @@ impl Subject {
     /// A frame, which is the one of this number in its stream.
     pub fn of(frame: &FrameHeader, index: u64) -> Self {
         let exposure = frame.metadata.noise.as_ref().map(|noise| u64::from(noise.frame));
-        Self { file: in_stream(&frame.name).to_owned(), frame: exposure.unwrap_or(index) }
+        let file = frame.metadata.file.clone().unwrap_or_else(|| in_stream(&frame.name).to_owned());
+        Self { file, frame: exposure.unwrap_or(index) }
     }
 }
 

@@ -17,15 +17,16 @@ pub struct Job {
 }
 
 /// The jobs for some inputs by patterns of their outputs ([`output_of`]): that of frames, which end in `extension` where it is a
-/// directory, and those of what is written beside them.
+/// directory, and those of what is written beside them. Names of what comes through a pipe are told by its frames, if at all.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] where two outputs would have one place, or one of several inputs comes through a pipe.
+/// [`Error::Usage`] where two outputs would have one place, one of several inputs comes through a pipe, or what is written beside
+/// the frames of a pipe needs a name.
 pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &[Option<&Path>]) -> Result<Vec<Job>> {
     check_known(frame)?;
     let (Some(first), several) = (inputs.first(), inputs.len() > 1) else {
-        check_named(frame, beside)?;
+        beside.iter().try_for_each(|path| check_named(*path))?;
         let beside = beside.iter().map(|path| path.map(Path::to_owned)).collect();
         return Ok(vec![Job { input: None, frame: frame.map(Path::to_owned), beside }]);
     };
@@ -33,7 +34,7 @@ pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &
         return Err(Error::Usage("the standard input cannot be one of several inputs; name a file".into()));
     }
     if named(Some(first)).is_none() {
-        check_named(frame, beside)?;
+        beside.iter().try_for_each(|path| check_named(*path))?;
     }
     // A sidecar beside its frame is no frame.
     let frames: HashSet<&Path> = inputs.iter().map(PathBuf::as_path).collect();
@@ -43,7 +44,8 @@ pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &
     let job = |input: &PathBuf| {
         let of = |pattern: Option<&Path>, extension| {
             pattern.map(|pattern| {
-                if named(Some(pattern)).is_none() { pattern.to_owned() } else { output_of(pattern, input, extension) }
+                let is_kept = named(Some(pattern)).is_none() || named(Some(input)).is_none();
+                if is_kept { pattern.to_owned() } else { output_of(pattern, input, extension) }
             })
         };
         Job {
@@ -79,13 +81,17 @@ pub fn check_directories(jobs: &[Job]) -> Result<()> {
     Ok(())
 }
 
-/// Makes sure that outputs of what comes through a pipe do without its name.
-fn check_named(frame: Option<&Path>, beside: &[Option<&Path>]) -> Result<()> {
-    if !beside.iter().chain([&frame]).flatten().any(|output| takes_a_name(output)) {
+/// Makes sure that the output of what has no name does without.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_named(output: Option<&Path>) -> Result<()> {
+    if !named(output).is_some_and(takes_a_name) {
         return Ok(());
     }
     Err(Error::Usage(format!(
-        "the standard input has no name for {STEM} or a directory; name the output, of several frames with {{frame}}"
+        "the standard input tells no name for {STEM} or a directory; name the output, of several frames with {{frame}}"
     )))
 }
 
@@ -182,7 +188,8 @@ mod tests {
         // One input goes where it is told, or through a pipe.
         assert_eq!(planned(&["x.nef"], Some("{stem}.tiff"), &[]).unwrap()[0].frame, Some(PathBuf::from("x.tiff")));
         assert_eq!(planned(&["x.nef"], None, &[]).unwrap()[0].frame, None);
-        // Numbers of frames come later.
+        // Names of what comes through a pipe come with it, and numbers of frames.
+        assert_eq!(planned(&["-"], Some("{stem}.exr"), &[]).unwrap()[0].frame, Some(PathBuf::from("{stem}.exr")));
         assert!(planned(&["x.nef", "y.nef"], Some("o-{frame}.tiff"), &[]).is_ok());
         let several = ["x.nef", "y.nef"].map(PathBuf::from);
         assert!(check_each_named(&several, Some(Path::new("p.svg"))).is_err());
@@ -221,7 +228,12 @@ mod tests {
                 "x.exr.yaml: what is made of x.nef and of x.nef",
             ),
             (&["x.nef", "-"], Some("out/"), None, "the standard input cannot be one of several inputs; name a file"),
-            (&["-"], Some("out/"), None, "the standard input has no name for {stem} or a directory; name the output"),
+            (
+                &["-"],
+                Some("out/"),
+                Some("{stem}.yaml"),
+                "the standard input tells no name for {stem} or a directory; name",
+            ),
         ] {
             let complaint = planned(inputs, frame, &[beside]).unwrap_err();
             assert!(complaint.starts_with(wanted), "{complaint}");

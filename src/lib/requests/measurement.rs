@@ -121,10 +121,11 @@ impl Measurement {
         if self.keep_saturated { Saturated::Kept } else { Saturated::LeftOut }
     }
 
-    /// The same for a frame of several, with a plot of its own: that of a file, and of this number in its stream.
+    /// The same for a frame of several, with a plot of its own: that of its file, and of this number in its stream.
     pub fn for_frame(&self, path: Option<&Path>, index: u64, frame: &FrameHeader) -> Self {
         let Some(plot) = &self.plot else { return self.clone() };
-        let plot = path.map_or_else(|| plot.clone(), |path| output_of(plot, path, "svg"));
+        let file = path.or(frame.metadata.file.as_deref().map(Path::new));
+        let plot = file.map_or_else(|| plot.clone(), |file| output_of(plot, file, "svg"));
         let plot = Output { output: Some(plot), index, ..Output::default() }.options_for(frame).path;
         Self { plot, ..self.clone() }
     }

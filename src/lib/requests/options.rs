@@ -16,7 +16,7 @@ use crate::formats::headerless::Layout;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::formats::pipe;
-use crate::formats::places::{named, numbered};
+use crate::formats::places::{named, numbered, output_of};
 use crate::formats::sequence::Sequence;
 use crate::metadata::{FrameHeader, PoissonKind};
 use crate::names::Named;
@@ -230,9 +230,14 @@ impl Output {
     pub fn options_for(&self, made: &FrameHeader) -> OutputOptions {
         let options = self.options();
         let exposure = made.metadata.noise.as_ref().map(|noise| u64::from(noise.frame));
-        let path = options.path.as_deref().and_then(|path| numbered(path, exposure.unwrap_or(self.index), self.index));
+        let file = made.metadata.file.as_deref().map(Path::new);
+        let named = |path: PathBuf| match file.filter(|_| named(Some(&path)).is_some()) {
+            Some(file) => output_of(&path, file, self.extension()),
+            None => path,
+        };
+        let numbered = |path: PathBuf| numbered(&path, exposure.unwrap_or(self.index), self.index).unwrap_or(path);
         let frames_to_come = self.following.frames();
-        OutputOptions { path: path.or_else(|| options.path.clone()), frames_to_come, ..options }
+        OutputOptions { path: options.path.map(named).map(numbered), frames_to_come, ..options }
     }
 
     /// Where and how to write.
