@@ -140,6 +140,39 @@ fn a_run_is_resumed() {
     fs::remove_file(shop.path("c/5.exr")).unwrap();
     shop.run("digitize --resume -o c/{frame}.exr", &stream);
     assert!(shop.bytes("c/5.exr") == codes);
+    // So do other dark frames of the same names, other defects of one list, another type of samples.
+    shop.run("render-radiance --dark --size 24x16 -o dark-scene.exr", &[]);
+    let correct = "correct-frame -q c/5.exr --dark dark.exr --defects list.csv --resume -o less.exr";
+    let (mut made, mut kept) = (Vec::new(), Vec::new());
+    for (seed, list) in [(3, "3,4"), (4, "3,4"), (4, "7,8"), (4, "7,8")] {
+        let electrons = shop.run(&format!("add-noise dark-scene.exr --seed {seed}"), &[]);
+        shop.run("digitize -o dark.exr", &electrons);
+        fs::write(shop.path("list.csv"), list).unwrap();
+        let before = fs::metadata(shop.path("less.exr")).and_then(|file| file.modified()).ok();
+        shop.run(correct, &[]);
+        kept.push(before == fs::metadata(shop.path("less.exr")).and_then(|file| file.modified()).ok());
+        made.push(shop.bytes("less.exr"));
+    }
+    assert_eq!(kept, [false, false, false, true]);
+    assert!(made[0] != made[1] && made[1] != made[2] && made[2] == made[3]);
+    shop.run("digitize -q n/5.exr --resume --sample-type f16 -o half.exr", &[]);
+    let half = shop.bytes("half.exr");
+    shop.run("digitize -q n/5.exr --resume -o half.exr", &[]);
+    assert!(shop.bytes("half.exr") != half);
+}
+
+/// Two frames that links bring to one place are told.
+#[test]
+fn links_lead_to_one_place() {
+    let shop = with_scene();
+    fs::create_dir(shop.path("r1")).unwrap();
+    std::os::unix::fs::symlink(shop.path("r1"), shop.path("r0")).unwrap();
+    let done = shop.attempt("add-noise scene.exr --frames 0..2 -o r{frame}/x.exr", &[]);
+    assert!(
+        done.status.code() == Some(BAD_DATA) && said(&done).contains("another frame of this run"),
+        "{}",
+        said(&done)
+    );
 }
 
 /// What stands behind a frame is a frame, or the run fails; a stream that is cut fails too.
@@ -222,4 +255,33 @@ fn a_stream_knows_how_many_frames_it_has() {
     shop.run("add-noise scene.exr --frames 0..2 -o {frame}.exr", &[]);
     let files = [shop.bytes("0.exr"), shop.bytes("1.exr")].concat();
     assert_eq!(lines(&shop.run("measure --output-format json", &files)).len(), 2);
+}
+
+/// Names in quotes are expanded by the program: the same bytes as by a shell; numbers of frames do for several inputs, and two that meet
+/// are told. A report of all goes to one file, and figures of each do not.
+#[test]
+fn names_stand_for_several_files() {
+    let shop = with_scene();
+    fs::create_dir(shop.path("n")).unwrap();
+    fs::create_dir(shop.path("m")).unwrap();
+    shop.run("add-noise scene.exr --seed 5 --frames 0..3 -o n/{frame}.exr", &[]);
+    let by_shell = shop.run("digitize n/0.exr n/1.exr n/2.exr", &[]);
+    assert!(shop.run("digitize n/*.exr", &[]) == by_shell);
+    shop.run("digitize n/*.exr -o m/c-{frame:02}.tiff", &[]);
+    assert!(shop.path("m/c-02.tiff").exists());
+    let index = shop.attempt("digitize n/*.exr -o m/i-{index}.tiff", &[]);
+    assert!(index.status.code() == Some(BAD_DATA) && said(&index).contains("another frame of this run went there"));
+    let darks = "correct-frame n/0.exr --dark n/[12].exr -o m/less.exr";
+    // Electrons are no codes; that both were found is what counts.
+    assert!(said(&shop.attempt(darks, &[])).contains("electrons"));
+    for (line, wanted) in [
+        ("measure n/0.exr n/1.exr --plot m/p.svg", "one of each of 2 frames would go there"),
+        ("measure n/0.exr n/1.exr -o {stem}.csv", "go to one file"),
+        ("add-noise scene.exr --frames 4294967290..4294967300", "numbers are 0 to 4294967295"),
+    ] {
+        let refused = shop.attempt(line, &[]);
+        assert_eq!(refused.status.code(), Some(BAD_USAGE), "{line}: {}", said(&refused));
+        assert!(said(&refused).contains(wanted), "{line}: {}", said(&refused));
+        assert!(!shop.path("m/p.svg").exists());
+    }
 }

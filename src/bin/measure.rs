@@ -3,7 +3,7 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::formats::{plots, register};
+use cyanometer::formats::plots;
 use cyanometer::report::{self, Findings, ReportFormat};
 use cyanometer::requests::options::Output;
 use cyanometer::requests::{self, described::DescribedInput, measurement::Measurement, values};
@@ -19,7 +19,8 @@ static MEMORY: cli::Memory = cli::Memory;
 /// Predictions are made for uniform scenes, from electrons to XYZ, xyY and L*a*b*. Planes behind a color filter array
 /// are also measured class by class. With --check, means are tested by z, variances by chi-square with the effective
 /// degrees of freedom of correlated pixels, correlations by Fisher's z. With --patches, the spread of each patch is
-/// predicted at the level of its own means.
+/// predicted at the level of its own means. With --over frames, what is drawn anew in each of several exposures of a scene is
+/// told from what is the same in all.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -43,9 +44,19 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    register::announce(&[arguments.output.as_deref(), arguments.measurement.plot.as_deref()])?;
     let frames = &arguments.input.frame;
+    arguments.measurement.announce(&frames.inputs, arguments.output.as_deref())?;
     let reports = Output { is_of_reports: true, ..Output::default() };
+    if let Some(statistics) = arguments.measurement.over_frames() {
+        let measured = session.each_frame::<Arguments>(frames, &reports, |turn| {
+            let mut reader = arguments.input.with(turn.input.clone()).open_all()?;
+            turn.session.report_reader(&reader);
+            statistics.add(&mut reader)
+        });
+        let pixels = arguments.measurement.pixels.as_deref();
+        let format = arguments.output_format;
+        return measured.and(session.tell_over_frames(statistics, pixels, format, arguments.output.as_deref()));
+    }
     let findings = Findings::new(arguments.output_format, frames.inputs.len() > 1, arguments.output.clone());
     let measured = session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
     measured.and(findings.end())

@@ -3,6 +3,7 @@
 //! The noise of each pixel follows from the sensor's noise model at the pixel's own level ([`PixelNoise`]), so that scenes
 //! need not be uniform.
 
+use crate::camera::levels::BlackLevel;
 use crate::color::Space;
 use crate::error::Result;
 use crate::frame::{Rows, Window, to_sample};
@@ -14,6 +15,8 @@ pub use crate::stages::from_xyz::COVARIANCE_LAYER;
 use crate::stages::from_xyz::layers_of;
 use crate::stages::to_xyz::ToXyz;
 use crate::stream::{Counts, Footprint, Stage};
+use crate::units::QuantityKind;
+use nalgebra::{Matrix3, Vector3};
 
 /// A stage that makes three planes of pixels whose noise can be told from the noise of demosaicked R, G and B.
 pub trait Propagating: Stage {
@@ -108,6 +111,75 @@ impl<S: Propagating> Stage for WithSigma<S> {
                 self.stage.fill_layers(&self.noise, &input, y, made.map(|plane| &*plane), layers);
         }
         counts
+    }
+}
+
+/// The layers that tell how uncertain pixels are of a frame whose own samples tell their levels: demosaicked, or XYZ of it.
+#[derive(Debug, Clone)]
+pub struct PixelLayers {
+    noise: PixelNoise,
+    names: Vec<&'static str>,
+    color: Option<Color>,
+}
+
+/// How XYZ follow from R, G and B of the camera, and these from XYZ.
+#[derive(Debug, Clone)]
+struct Color {
+    xyz_from_adu: Matrix3<f64>,
+    adu_from_xyz: Matrix3<f64>,
+    black_adu: f64,
+}
+
+impl PixelLayers {
+    /// Those of a frame.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`PixelNoise::of`]; [`crate::error::Error::Format`] for other colors than XYZ.
+    pub fn of(frame: &FrameHeader) -> Result<Self> {
+        let metadata = &frame.metadata;
+        let Some(record) = &metadata.color else {
+            let noise = PixelNoise::of(frame)?;
+            return Ok(Self { noise, names: vec!["sigma.R", "sigma.G", "sigma.B"], color: None });
+        };
+        if metadata.quantity != QuantityKind::Xyz {
+            return Err(frame.refuse(format!(
+                "it holds {}, of whose average no standard deviations can be told; average XYZ",
+                frame.holds()
+            )));
+        }
+        let xyz_from_adu = record.xyz_from_adu(metadata.exposure).ok_or_else(|| frame.missing("exposure"))?;
+        let adu_from_xyz = xyz_from_adu.try_inverse().ok_or_else(|| frame.refuse("its matrix has no inverse"))?;
+        // The levels are those of the camera's signals.
+        let mut camera = frame.clone();
+        camera.metadata.set_black_adu(Some(BlackLevel::from(record.black_adu)));
+        let noise = PixelNoise::of(&camera)?;
+        let color = Color { xyz_from_adu, adu_from_xyz, black_adu: record.black_adu };
+        Ok(Self { noise, names: layers_of(Space::Xyz)?, color: Some(color) })
+    }
+
+    /// Their names, in the order in which files have them.
+    pub fn names(&self) -> &[&'static str] {
+        &self.names
+    }
+
+    /// Fills the layers of row `y`, one plane after another, from its three planes; gives the number of pixels where propagation is
+    /// void.
+    pub fn fill(&self, y: usize, planes: &[f32], layers: &mut [f32]) -> u64 {
+        let width = planes.len() / 3;
+        let at = |x: usize| [0, 1, 2].map(|plane| f64::from(planes[plane * width + x]));
+        match &self.color {
+            None => fill(width, layers, |x| {
+                let (covariance, holds) = self.noise.covariance([x, y], at(x));
+                (stds(&covariance).into_iter(), holds)
+            }),
+            Some(color) => fill(width, layers, |x| {
+                let rgb = color.adu_from_xyz * Vector3::from(at(x));
+                let (camera, holds) = self.noise.covariance([x, y], [0, 1, 2].map(|k| rgb[k] + color.black_adu));
+                let covariance = through(&camera, &color.xyz_from_adu);
+                (covariance.into_iter().chain(stds(&covariance)), holds)
+            }),
+        }
     }
 }
 

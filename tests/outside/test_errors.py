@@ -310,7 +310,9 @@ class Usage(Errors):
         self.refused(["measure", "in.exr", "--region", "0,0,0,1"], (1, 2), "0,0,0,1")
 
     def test_unknown_option_and_missing_source(self):
-        of_several = {"add-noise", "correct-frame", "demosaic", "digitize", "import-raw", "measure", "mosaic", "to-xyz"}
+        of_several = {
+            "add-noise", "average-frames", "correct-frame", "demosaic", "digitize", "import-raw", "measure", "mosaic", "to-xyz",
+        }
         for program in PROGRAMS:
             self.refused([program, "--colour-of-the-sky"], BAD_USAGE, "--colour-of-the-sky")
             if program not in of_several:

@@ -14,7 +14,7 @@ const fn example(reason: &'static str, command: &'static str) -> Example {
 }
 
 /// The examples of each program, in an order in which they can be run.
-pub const EXAMPLES: [(&str, &[Example]); 15] = [
+pub const EXAMPLES: [(&str, &[Example]); 16] = [
     (
         "fit-matrix",
         &[
@@ -119,12 +119,30 @@ pub const EXAMPLES: [(&str, &[Example]); 15] = [
         ],
     ),
     (
+        "average-frames",
+        &[
+            example("The mean of ten exposures", "average-frames noisy-*.exr -o mean.exr"),
+            example(
+                "Their median, codes made first; names in quotes are expanded too",
+                "digitize 'noisy-*.exr' | average-frames --combine median -o median.tiff",
+            ),
+            example(
+                "XYZ of a mean, whose standard deviations know what has averaged out",
+                "digitize noisy-*.exr | average-frames | mosaic | demosaic | to-xyz --sigma -o still.exr",
+            ),
+        ],
+    ),
+    (
         "measure",
         &[
             example("Mean, spread and covariance, beside what the formulas predict", "measure plane.tiff"),
             example(
                 "The same of a rectangle, for another program",
                 "measure --region 100,100,64,64 --output-format json xyz.exr -o xyz.json",
+            ),
+            example(
+                "What scatters from frame to frame, and what is the same in all",
+                "add-noise --frames 0..20 expected.exr | digitize | measure --over frames",
             ),
             example(
                 "Exit with status 1 where noise is not as predicted",

@@ -110,7 +110,8 @@ impl Session {
         let one = |session: &Self, index: usize| {
             let job = &jobs[index / drawn];
             let exposure = exposures.clone().and_then(|mut range| range.nth(index % drawn));
-            session.on(job.input.as_deref()).frames(job, input, output, &[exposure], &work)
+            let output = Output { index: (index % drawn) as u64, ..output.clone() };
+            session.on(job.input.as_deref()).frames(job, input, &output, &[exposure], &work)
         };
         session.all::<A>(jobs.len() * drawn, "frames", Order::Any, one)
     }

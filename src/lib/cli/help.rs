@@ -50,6 +50,7 @@ const GROUPS: [(&str, &[&str]); 10] = [
             "viewable",
             "output-format",
             "plot",
+            "pixels",
             "map",
             "write-matrix",
             "write-readout",

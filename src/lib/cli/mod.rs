@@ -9,11 +9,13 @@ mod general;
 mod help;
 mod history;
 mod memory;
+mod over_frames;
 pub mod pages;
 pub mod programs;
 mod session;
 mod signals;
 mod usage;
+mod wildcards;
 mod words;
 
 pub use frames::Turn;
@@ -61,7 +63,10 @@ pub fn start<A: CommandFactory + FromArgMatches>(
             return ended(program, show(|| std::io::stdout().write_all(text.as_bytes())));
         }
     }
-    let parsed = command.version(version(program)).try_get_matches().and_then(|matches| A::from_arg_matches(&matches));
+    let words = wildcards::expanded(std::env::args_os().skip(1), &command);
+    let all = std::iter::once(program.into()).chain(words.iter().cloned());
+    let parsed = command.version(version(program)).try_get_matches_from(all);
+    let parsed = parsed.and_then(|matches| A::from_arg_matches(&matches));
     let arguments = match parsed {
         Ok(arguments) => arguments,
         Err(error) if !error.use_stderr() => return ended(program, show(|| error.print())),
@@ -70,7 +75,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
             return ExitCode::from(2);
         }
     };
-    let session = Session::new(program, general(&arguments));
+    let session = Session::new(program, words, general(&arguments));
     session.settle_threads();
     let done = Instructions::allowed().and_then(|_| body(&arguments, &session));
     session.warn_of_doubts();

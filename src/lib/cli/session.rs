@@ -6,7 +6,7 @@ use super::words::complain;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
 use crate::formats::output::{Format, FrameWriter, OutputOptions};
-use crate::formats::places::{FRAME_OF, named};
+use crate::formats::places::{FRAME_OF, named, place};
 use crate::formats::{register, resume};
 use crate::masking::Masking;
 use crate::metadata::FrameHeader;
@@ -15,9 +15,10 @@ use crate::requests::options::Output;
 use crate::requests::{self, Note};
 use crate::stages::darks::DarkFrames;
 use crate::stages::saturation::with_mask;
-use crate::stream::{Counts, RowSource, Stage};
+use crate::stream::{Counts, MemoryFrame, RowSink, RowSource, Stage};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashSet;
+use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -27,6 +28,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub struct Session {
     pub(super) program: &'static str,
     pub(super) general: General,
+    /// The command line behind the program's name, wildcards expanded.
+    words: Arc<[OsString]>,
     signature: Arc<Signature>,
     /// The input that is worked on, where there are several.
     input: Option<PathBuf>,
@@ -43,14 +46,14 @@ struct Run {
 }
 
 impl Session {
-    pub(super) fn new(program: &'static str, general: General) -> Self {
-        let signature = Arc::new(Signature::of(std::env::args_os().skip(1), &[]));
-        Self { program, general, signature, input: None, run: Arc::default() }
+    pub(super) fn new(program: &'static str, words: Vec<OsString>, general: General) -> Self {
+        let signature = Arc::new(Signature::of(words.iter().cloned(), &[]));
+        Self { program, words: words.into(), general, signature, input: None, run: Arc::default() }
     }
 
     /// The same for a run of several inputs.
     pub fn among(&self, inputs: &[PathBuf]) -> Self {
-        let signature = Arc::new(Signature::of(std::env::args_os().skip(1), inputs));
+        let signature = Arc::new(Signature::of(self.words.iter().cloned(), inputs));
         Self { signature, ..self.clone() }
     }
 
@@ -225,7 +228,7 @@ impl Session {
         run: impl FnOnce(&mut FrameWriter, &mut dyn FnMut(usize)) -> Result<Counts>,
     ) -> Result<Option<Counts>> {
         let options = self.place(made, output)?;
-        if output.resume && resume::is_complete(options.path.as_deref(), made)? {
+        if output.resume && resume::is_complete(&options, made)? {
             self.note(&format!("{} is complete", options.path.unwrap_or_default().display()));
             return Ok(None);
         }
@@ -240,6 +243,18 @@ impl Session {
         Ok(Some(counts))
     }
 
+    /// Signs a frame in memory, and writes it.
+    ///
+    /// # Errors
+    ///
+    /// Those of the writer.
+    pub fn write_whole(&self, frame: &mut MemoryFrame, path: &Path) -> Result<()> {
+        self.sign(&mut frame.header);
+        let output = Output { output: Some(path.to_owned()), ..Output::default() };
+        self.write(&frame.header, &output, |writer, _| writer.write(&frame.samples).map(|()| Counts::default()))?;
+        Ok(())
+    }
+
     /// Where and how a frame is written.
     ///
     /// # Errors
@@ -248,7 +263,7 @@ impl Session {
     pub fn place(&self, made: &FrameHeader, output: &Output) -> Result<OutputOptions> {
         let options = output.options_for(made);
         let path = named(options.path.as_deref()).filter(|_| !output.is_stream());
-        if self.run().written.insert(path.map(Path::to_owned)) {
+        if self.run().written.insert(place(path)) {
             return Ok(options);
         }
         match path {

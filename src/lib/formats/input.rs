@@ -342,15 +342,22 @@ impl FrameReader {
         self.mismatch.as_deref()
     }
 
-    /// Whether a file holds a frame of the same size and place as `made`, the digest of whose samples is this.
+    /// Whether a file holds a frame of the same size and place as `made`, the digest of whose samples is this, stored in one type, or
+    /// channels in several.
     ///
     /// # Errors
     ///
     /// Those of [`Self::open_file`] and of reading.
-    pub fn holds(input: File, name: &str, made: &FrameHeader, digest: &str) -> Result<bool> {
+    pub(super) fn holds(
+        input: File,
+        name: &str,
+        made: &FrameHeader,
+        (digest, stored): (&str, SampleType),
+    ) -> Result<bool> {
         let options = InputOptions { all_channels: true, ..InputOptions::default() };
         let mut reader = Self::open_file(input, name, None, &options)?;
-        if reader.header.geometry != made.geometry {
+        let is_stored_so = reader.sample_type().is_none_or(|found| found == stored);
+        if reader.header.geometry != made.geometry || !is_stored_so {
             return Ok(false);
         }
         let (expected, digest) = (digest.to_owned(), SamplesDigest::like(digest));

@@ -38,6 +38,7 @@ pub mod resume;
 pub mod sequence;
 mod settings;
 pub mod spectral;
+pub mod stack;
 pub mod standard;
 mod storing;
 pub mod table;

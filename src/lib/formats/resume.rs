@@ -1,12 +1,12 @@
 //! What an earlier run has left complete.
 
 use super::input::FrameReader;
+use super::output::OutputOptions;
 use super::places::{named, sidecar_path};
 use super::yaml::{parse_metadata, write_metadata};
 use crate::error::Result;
 use crate::metadata::{FrameHeader, Metadata};
 use std::fs::File;
-use std::path::Path;
 
 /// Whether the frame `made` lies at a place already, whole: its sidecar says of it what this run would, and describes the samples
 /// that the file holds. What is damaged, or cannot be read, is not complete.
@@ -14,8 +14,8 @@ use std::path::Path;
 /// # Errors
 ///
 /// Those of [`write_metadata`].
-pub fn is_complete(path: Option<&Path>, made: &FrameHeader) -> Result<bool> {
-    let Some(path) = named(path) else { return Ok(false) };
+pub fn is_complete(options: &OutputOptions, made: &FrameHeader) -> Result<bool> {
+    let Some(path) = named(options.path.as_deref()) else { return Ok(false) };
     let sidecar = sidecar_path(path);
     let Some(found) = std::fs::read_to_string(&sidecar)
         .ok()
@@ -27,8 +27,10 @@ pub fn is_complete(path: Option<&Path>, made: &FrameHeader) -> Result<bool> {
     if write_metadata(&lasting(found))? != write_metadata(&lasting(made.metadata.clone()))? {
         return Ok(false);
     }
-    let holds =
-        |digest: String| FrameReader::holds(File::open(path).ok()?, &path.display().to_string(), made, &digest).ok();
+    let stored = options.sample_type(made)?;
+    let holds = |digest: String| {
+        FrameReader::holds(File::open(path).ok()?, &path.display().to_string(), made, (&digest, stored)).ok()
+    };
     Ok(digest.and_then(holds).unwrap_or(false))
 }
 

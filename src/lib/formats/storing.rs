@@ -2,11 +2,12 @@
 
 use super::dng;
 use super::exr::{ExrCompression, ExrSamples};
+use super::format::SampleType;
 use super::places::{STDOUT_NAME, named};
 use super::tiff::{TiffCompression, TiffSamples};
 use super::viewable;
 use crate::error::{Error, Result};
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, Metadata};
 use crate::names::Named;
 use crate::units::QuantityKind;
 use std::path::{Path, PathBuf};
@@ -140,7 +141,9 @@ impl OutputOptions {
                 "a TIFF has no names for the channels of a map of differences; write an EXR".into(),
             ));
         }
-        let changed = header.metadata.demosaic.is_some() || header.metadata.correction.is_some();
+        // An average of codes lies between them.
+        let Metadata { demosaic, correction, average, .. } = &header.metadata;
+        let changed = demosaic.is_some() || correction.is_some() || average.is_some();
         let fits_u16 = quantity == QuantityKind::Adu && !changed || quantity == QuantityKind::Srgb;
         let compression = self.compression.unwrap_or(CompressionKind::None);
         match format {
@@ -164,6 +167,21 @@ impl OutputOptions {
                 Ok(Encoding::Dng(samples, dng_compression(compression, samples)?))
             }
         }
+    }
+
+    /// The type in which samples of a frame are stored.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::encoding`].
+    pub(super) fn sample_type(&self, header: &FrameHeader) -> Result<SampleType> {
+        Ok(match self.encoding(header)? {
+            Encoding::Exr(ExrSamples::F32, _)
+            | Encoding::Tiff(TiffSamples::F32, _)
+            | Encoding::Dng(TiffSamples::F32, _) => SampleType::F32,
+            Encoding::Exr(ExrSamples::F16, _) => SampleType::F16,
+            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) => SampleType::U16,
+        })
     }
 
     /// What stored samples are multiplied with.

@@ -5,6 +5,7 @@ use crate::camera::levels::BlackLevel;
 use crate::names::{Named, serde_by_name};
 use crate::numerics::averages::Combine;
 use crate::random::Source;
+use crate::units::QuantityKind;
 use serde::{Deserialize, Serialize};
 
 /// What was taken back of a frame of codes.
@@ -104,6 +105,40 @@ pub struct AverageRecord {
     pub clip: Option<f64>,
 }
 
+/// The exposures of one scene that a frame is the average of.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ExposuresRecord {
+    /// How many.
+    pub frames: u32,
+    /// How they were averaged.
+    pub combine: Combine,
+    /// Standard deviations beyond which samples were clipped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clip: Option<f64>,
+    /// What their samples were.
+    pub quantity: QuantityKind,
+    /// Whether each was demosaicked before.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub demosaicked: bool,
+}
+
+impl ExposuresRecord {
+    /// That of an average of frames of such a quantity.
+    pub fn of(
+        AverageRecord { frames, combine, clip }: AverageRecord,
+        quantity: QuantityKind,
+        demosaicked: bool,
+    ) -> Self {
+        Self { frames, combine, clip, quantity, demosaicked }
+    }
+
+    /// How they were averaged.
+    pub fn average(&self) -> AverageRecord {
+        let Self { frames, combine, clip, .. } = *self;
+        AverageRecord { frames, combine, clip }
+    }
+}
+
 /// An average that was subtracted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MasterRecord {
@@ -122,6 +157,9 @@ pub struct MasterRecord {
     /// The noise that was drawn in them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<MasterNoise>,
+    /// What tells its frames from others: a digest of theirs, or of the seeds and numbers of their exposures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identity: Option<String>,
 }
 
 /// The noise that was drawn in averaged frames, but for seeds and numbers.
@@ -187,6 +225,9 @@ pub struct FlatRecord {
     /// The averages that were subtracted from it first; none where a level was.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masters: Vec<MasterRecord>,
+    /// Whether the dark frames among them came off the frame that was divided too.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub shares_masters: bool,
 }
 
 /// How defective photosites were told.
@@ -195,6 +236,9 @@ pub struct DefectsRecord {
     /// The map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<String>,
+    /// A digest of a list of defects.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub digest: Option<String>,
     /// Standard deviations beyond which photosites were found defective.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub found_beyond: Option<f64>,

@@ -6,7 +6,7 @@ mod records;
 
 pub use converter::AdcRecord;
 pub use correction::{
-    AverageRecord, CorrectionRecord, DefectsRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
+    AverageRecord, CorrectionRecord, DefectsRecord, ExposuresRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
 };
 pub use records::{
     AdaptationRecord, BlackNoise, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
@@ -95,6 +95,9 @@ pub struct Metadata {
     /// The converter, as it was set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adc: Option<AdcRecord>,
+    /// The exposures that the frame is the average of, where it is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub average: Option<ExposuresRecord>,
     /// What was taken back before demosaicking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correction: Option<CorrectionRecord>,
@@ -160,6 +163,7 @@ impl Metadata {
             quadrature_error: None,
             noise: None,
             adc: None,
+            average: None,
             correction: None,
             demosaic: None,
             color: None,
@@ -298,6 +302,18 @@ impl FrameHeader {
             "B" => third,
             other => other,
         }
+    }
+
+    /// The same without what tells it from other exposures of its scene: its name, its number, what its samples were counted to be.
+    #[must_use]
+    pub fn without_exposure(&self) -> Self {
+        let mut head = Self { name: String::new(), ..self.clone() };
+        head.metadata.history.clear();
+        head.metadata.samples = None;
+        if let Some(noise) = &mut head.metadata.noise {
+            noise.frame = 0;
+        }
+        head
     }
 
     /// Whether the frame has the three planes R, G and B (or what was made of them).

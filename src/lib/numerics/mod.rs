@@ -11,6 +11,7 @@ pub mod planes;
 pub mod quadrature;
 pub mod quantiles;
 pub mod rounding;
+pub mod running;
 pub mod significance;
 pub mod sums;
 pub mod variance_components;

@@ -84,6 +84,16 @@ impl Moments {
         }
     }
 
+    /// What is known otherwise of so many observations: means and covariances (divisor n − 1) of their channels, and nothing of
+    /// their extremes.
+    pub fn known(count: u64, mean: Vec<f64>, covariance: impl Fn(usize, usize) -> f64) -> Self {
+        let channels = mean.len();
+        let free = count.saturating_sub(1) as f64;
+        let pair = |i: usize| partners(i, channels).map(move |j| (i, j));
+        let comoments = (0..channels).flat_map(pair).map(|(i, j)| free * covariance(i, j)).collect();
+        Self { count, origin: mean.clone(), mean, comoments, ..Self::new(channels) }
+    }
+
     /// Forgets all observations, and keeps its memory.
     pub fn clear(&mut self) {
         (self.count, self.not_finite) = (0, 0);

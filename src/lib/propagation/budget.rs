@@ -188,6 +188,12 @@ impl Photosite {
         }
     }
 
+    /// The variance, over photosites, of the means that each has over exposures.
+    pub(super) fn fixed_variance(&self, expected_e: f64) -> f64 {
+        let budget = self.budget(expected_e);
+        Cause::ALL.iter().filter(|cause| cause.is_fixed_pattern()).map(|cause| budget[*cause as usize]).sum()
+    }
+
     /// Less averages of dark frames: what is drawn anew in each adds, of dark frames what the average keeps; of the pattern,
     /// which is the same in all, stays what the two do not share.
     fn less_dark_budget(&self, adc: &AdcRecord, expected_e: f64) -> Budget {

@@ -1,7 +1,8 @@
 //! Cumulants of the charge of a photosite, light and dark, before full well and read-out.
 
 use crate::metadata::PoissonKind;
-use crate::numerics::normal::NearlyNormal;
+use crate::numerics::gauss::panel;
+use crate::numerics::normal::{NearlyNormal, cumulative, density};
 use crate::stages::noise::{NoiseModel, rectified_mean, rectified_mean_square};
 
 /// Central moments 2, 3 and 4 of a photosite's sensitivity max(0, N), N normal with mean 1 and standard deviation σ.
@@ -56,4 +57,34 @@ pub(super) fn product(rate: f64, shot: bool, kind: PoissonKind, sigma: f64) -> N
 pub(super) fn charge(model: &NoiseModel, expected_e: f64) -> NearlyNormal {
     let light = product(expected_e, model.signal_shot, model.poisson, model.response());
     light.plus(product(model.dark_e, model.dark_shot, model.poisson, model.dcnu))
+}
+
+/// Sensitivities max(0, 1 + σ z) and their weights.
+pub(super) fn sensitivities(sigma: f64) -> Vec<(f64, f64)> {
+    /// Standard deviations beyond which nothing counts.
+    const REACH: f64 = 8.0;
+    const PANELS: u32 = 4;
+    if sigma <= 0.0 {
+        return vec![(1.0, 1.0)];
+    }
+    let lowest = (-1.0 / sigma).max(-REACH);
+    let width = (REACH - lowest) / f64::from(PANELS);
+    let mut found = vec![(0.0, cumulative(lowest))];
+    for index in 0..PANELS {
+        let low = lowest + width * f64::from(index);
+        found.extend(panel(low, low + width).map(|(z, weight)| (1.0 + sigma * z, weight * density(z))));
+    }
+    found.retain(|(_, weight)| *weight > 1e-14);
+    found
+}
+
+/// Cumulants of the charge over exposures at a photosite of sensitivities x to light and u to dark current.
+pub(super) fn charge_at(model: &NoiseModel, expected_e: f64, [x, u]: [f64; 2]) -> NearlyNormal {
+    let count = |rate: f64, is_shot: bool| {
+        let counted = if is_shot { rate } else { 0.0 };
+        let beyond = if model.poisson == PoissonKind::Exact { counted } else { 0.0 };
+        NearlyNormal { mean: rate, variance: counted, third: beyond, fourth: beyond }
+    };
+    let light = count(expected_e, model.signal_shot).scaled(x);
+    light.plus(count(model.dark_e, model.dark_shot).scaled(u))
 }

@@ -1,33 +1,13 @@
 //! Moments of photosites that were divided by a flat field.
 
-use super::charge::charge;
+use super::charge::{charge, sensitivities};
 use super::masters::{Dark, Drawn, Flat};
-use super::moments::Prediction;
+use super::moments::{LineCovariance, Prediction};
 use super::photosite::Photosite;
+use super::unlike::{Temporal, Unlike, UnlikeSums};
 use crate::metadata::AdcRecord;
 use crate::numerics::averages::Combine;
-use crate::numerics::gauss::panel;
-use crate::numerics::normal::{cumulative, density};
 use crate::stages::noise::{LineNoise, NoiseModel};
-
-/// Sensitivities max(0, 1 + σ z) and their weights.
-fn sensitivities(sigma: f64) -> Vec<(f64, f64)> {
-    /// Standard deviations beyond which nothing counts.
-    const REACH: f64 = 8.0;
-    const PANELS: u32 = 4;
-    if sigma <= 0.0 {
-        return vec![(1.0, 1.0)];
-    }
-    let lowest = (-1.0 / sigma).max(-REACH);
-    let width = (REACH - lowest) / f64::from(PANELS);
-    let mut found = vec![(0.0, cumulative(lowest))];
-    for index in 0..PANELS {
-        let low = lowest + width * f64::from(index);
-        found.extend(panel(low, low + width).map(|(z, weight)| (1.0 + sigma * z, weight * density(z))));
-    }
-    found.retain(|(_, weight)| *weight > 1e-14);
-    found
-}
 
 /// Why nothing is predicted of samples that were divided by a flat field.
 pub(super) const NARROW: &str = "what was divided by a flat field, or the flat field, reaches full well or an end of the codes, or \
@@ -47,9 +27,15 @@ impl Photosite {
     /// y = A ⟨F⟩ / F,  E\[1/F] = (1 + ρ − s + 3ρ²)/f,  E\[1/F²] = (1 + 3ρ − 4s + 15ρ²)/f²
     ///
     /// f, ρ and s are mean, relative variance and κ₃/f³ of F over exposures; all is averaged over the sensitivities of
-    /// photosites, which A and F share. Noise of bias frames that came off both is in both. None where samples are clipped
+    /// photosites, which A and F share. Noise of bias or dark frames that came off both is in both. None where samples are clipped
     /// or scatter over less than a code.
     pub fn divided(&self, class: usize, expected_e: f64) -> Option<Prediction> {
+        self.divided_over(class, expected_e).map(|(prediction, _)| prediction)
+    }
+
+    /// The same beside what is drawn anew in each frame that is divided by one flat field, less the same dark frames; what it
+    /// differs by among photosites has the noise of the flat field in it.
+    pub(super) fn divided_over(&self, class: usize, expected_e: f64) -> Option<(Prediction, Temporal)> {
         let (adc, flat) = (self.adc?, self.flat?);
         let light_e = flat.expected_e[class];
         let mut averages = self.darks.iter().chain(&flat.darks).flatten();
@@ -61,13 +47,14 @@ impl Photosite {
         if !is_open {
             return None;
         }
-        let bias = |darks: &[Option<Dark>]| darks.iter().flatten().find(|dark| dark.is_bias).copied();
-        let in_both = bias(&self.darks).zip(bias(&flat.darks)).filter(|(a, b)| a.frames == b.frames);
+        let in_both: Vec<[Dark; 2]> = flat.in_both(&self.darks).collect();
         let [lights, darks] = [self.model.response(), self.model.dcnu].map(sensitivities);
         let mut sums = [0.0; 7];
+        let (mut unlike, mut of_flat_noise, mut rounding) = (UnlikeSums::default(), 0.0, 0.0);
         for (&(x, of_x), &(u, of_u)) in lights.iter().flat_map(|x| darks.iter().map(move |u| (x, u))) {
             let site = [x, u];
-            let mut above = Drawn::codes(&self.model, &adc, expected_e, site).less(&self.darks, &adc, site);
+            let drawn = Drawn::codes(&self.model, &adc, expected_e, site);
+            let mut above = drawn.less(&self.darks, &adc, site);
             let mut below = flat.frames.drawn(&adc, light_e, site).less(&flat.darks, &adc, site);
             above.mean -= flat.levels_adu[0];
             below.mean -= flat.levels_adu[1];
@@ -80,16 +67,21 @@ impl Photosite {
             if rho > MOST_NOISE {
                 return None;
             }
-            let both = in_both.map_or(0.0, |(a, b)| a.weight * b.weight * a.drawn(&adc, 0.0, site).variance) / f;
+            let of_both = |[a, b]: &[Dark; 2]| a.weight * b.weight * a.drawn(&adc, 0.0, site).variance;
+            let both = in_both.iter().map(of_both).sum::<f64>() / f;
             let first = (above.mean * (1.0 + rho - skew + 3.0 * rho * rho) - both) / f;
             let of_square = 1.0 + 3.0 * rho - 4.0 * skew + 15.0 * rho * rho;
             let square = ((above.mean.powi(2) + above.variance) * of_square - 4.0 * above.mean * both) / (f * f);
             // Third cumulant of the quotient, of its own noise and of the curvature of 1/F.
             let noise = above.variance / (f * f);
-            let offset = self.offsets_left(&adc, &flat, above.mean / f) / f;
+            let offset = self.offsets_left(&adc, &flat, above.mean / f) / (f * f);
             let square = square + offset;
             let third = (above.third - above.mean.powi(3) * skew) / f.powi(3)
                 + 6.0 * first * rho * (noise + first * first * rho);
+            let anew = drawn.variance * of_square / (f * f);
+            unlike.add(of_x * of_u, [first, anew, drawn.third / f.powi(3), 0.0]);
+            of_flat_noise += of_x * of_u * 4.0 * rho * anew * anew;
+            rounding += of_x * of_u * adc.rounding_at(x * expected_e + u * self.model.dark_e) * of_square / (f * f);
             let of_flat = f * f + below.variance;
             for (sum, value) in sums.iter_mut().zip([1.0, first, square, f, third, above.mean, of_flat]) {
                 *sum += of_x * of_u * value;
@@ -104,7 +96,16 @@ impl Photosite {
         let of_both = 2.0 * scale * first * (above - scale * first);
         let off = of_both + first * first * (of_flat - scale * scale);
         let prediction = Prediction::of_cumulants(mean, variance, third * scale.powi(3), 0.0);
-        Some(Prediction { common: off / flat.photosites[class].max(1.0), ..prediction })
+        let (anew, unlike) = unlike.found();
+        let unlike = Unlike { spread: unlike.spread + of_flat_noise / weight, ..unlike };
+        let square = scale * scale;
+        let temporal = Temporal {
+            variance: anew * square,
+            rounding: rounding / weight * square,
+            unlike: Some(unlike.scaled(scale)),
+            lines: LineCovariance::default(),
+        };
+        Some((Prediction { common: off / flat.photosites[class].max(1.0), ..prediction }, temporal))
     }
 
     /// The variance, in ADU², of the fixed offsets that darks leave of the codes and of the flat field, which counts by the

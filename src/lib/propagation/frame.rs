@@ -10,6 +10,7 @@ use super::moments::LineCovariance;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
+use super::repeated;
 use super::tails;
 pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::levels::BlackLevel;
@@ -155,7 +156,14 @@ impl Sites {
             }
             moments.iter_mut().zip(lines).for_each(|(moments, lines)| moments.lines = lines);
         }
-        Ok(Self { photosite, expected_e, moments })
+        let sites = Self { photosite, expected_e, moments };
+        match &metadata.average {
+            None => Ok(sites),
+            Some(record) => {
+                let average = repeated::average_of(frame, record, quantity_of_sites(frame))?;
+                Ok(Self { moments: photosite.averaged(moments, expected_e, &average)?, ..sites })
+            }
+        }
     }
 
     /// Predicts a frame that was made of these photosites; pixels say where their moments are void.

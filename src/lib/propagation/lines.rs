@@ -32,7 +32,7 @@ use super::moments::{Equations, LineCovariance};
 use super::photosite::Photosite;
 use super::reading::{Reading, codes_of};
 use super::unpredictable::{Predicted, Unpredictable};
-use crate::metadata::AdcRecord;
+use crate::metadata::{AdcRecord, AverageRecord};
 use crate::numerics::averages::Combine;
 use crate::numerics::normal::density;
 use crate::stages::noise::{LineNoise, NoiseModel};
@@ -275,20 +275,19 @@ impl Photosite {
         let of_flat = averages(&flat.darks);
         let divisor = temporal(&flat.frames) + of_flat.iter().map(temporal).sum::<f64>();
         let of_divisor = left(&flat.frames.model, &of_flat);
-        let bias = |darks: &[Dark]| darks.iter().find(|dark| dark.is_bias).copied();
-        let in_both = match (bias(&darks), bias(&of_flat)) {
-            (Some(a), Some(b)) if a.frames == b.frames => {
-                a.weight * b.weight * a.kept()[0] * parts(&a.model)[0].powi(2)
-            }
-            _ => 0.0,
-        };
+        let of_both = |[a, b]: [Dark; 2]| a.weight * b.weight * a.kept()[0] * parts(&a.model)[0].powi(2);
+        let in_both: f64 = flat.in_both(&self.darks).map(of_both).sum();
         let square = divisor + of_divisor * of_divisor;
         LineTerms { constant, linear: -in_both - offset * of_divisor, square }
     }
 
-    /// The terms of rows and of columns.
-    pub(super) fn line_terms(&self) -> [LineTerms; 2] {
-        Axis::ALL.map(|axis| self.terms(axis))
+    /// The terms of rows and of columns, of an average of exposures where there is one.
+    pub(super) fn line_terms(&self, average: Option<&AverageRecord>) -> [LineTerms; 2] {
+        Axis::ALL.map(|axis| {
+            let terms = self.terms(axis);
+            let of_one = 1.0 - average.map_or(1.0, |record| 1.0 / f64::from(record.frames.max(1)));
+            LineTerms { constant: terms.constant - of_one * axis.parts(&self.model.lines)[0].powi(2), ..terms }
+        })
     }
 
     /// R by sums over what is shared.

@@ -42,7 +42,7 @@ struct Average {
 type Asked = (Combine, u32, u64, u64);
 
 /// What averages keep, worked out once for each.
-fn kept(combine: Combine, frames: u32, clip: f64, std_codes: f64) -> Kept {
+pub(super) fn kept(combine: Combine, frames: u32, clip: f64, std_codes: f64) -> Kept {
     static KNOWN: Mutex<Vec<(Asked, Kept)>> = Mutex::new(Vec::new());
     if combine == Combine::Mean {
         return Kept::of_mean(frames);
@@ -165,6 +165,8 @@ pub struct Flat {
     pub frames: Dark,
     /// What came off them first.
     pub darks: [Option<Dark>; MOST_DARKS],
+    /// Whether what came off them came off the frame that is divided too.
+    pub shares_masters: bool,
     /// What came off as a level, beyond the bias of the converter, ADU: of the frame that is divided, and of the flat field.
     pub levels_adu: [f64; 2],
 }
@@ -239,7 +241,15 @@ impl Flat {
             photosites: three(&photosites)?,
             frames: Dark { weight: 1.0, is_bias: false, model, frames, combine, clip: clip.unwrap_or(CLIP) },
             darks,
+            shares_masters: record.shares_masters,
             levels_adu: [0.0, level_adu],
         })
+    }
+
+    /// The averages of the same frames that came off both, as they came off a frame and off the flat field: the bias, or all.
+    pub(super) fn in_both<'a>(&'a self, of_frame: &'a [Option<Dark>]) -> impl Iterator<Item = [Dark; 2]> + 'a {
+        let of_flat = |dark: &Dark| self.darks.iter().flatten().find(|other| other.is_bias == dark.is_bias).copied();
+        let pairs = of_frame.iter().flatten().filter_map(move |dark| Some([*dark, of_flat(dark)?]));
+        pairs.filter(|[a, b]| a.frames == b.frames && (a.is_bias || self.shares_masters))
     }
 }

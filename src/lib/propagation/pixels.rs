@@ -6,15 +6,16 @@
 
 use super::charge;
 use super::covariance::{Covariance, PAIRS};
-use super::frame::corrected;
+use super::frame::{corrected, quantity_of_sites};
 use super::lines::LineTerms;
 use super::moments::Equations;
 use super::photosite::Photosite;
+use super::repeated::average_of;
 use super::smooth_hue;
 use crate::cfa::Class;
 use crate::error::Result;
 use crate::frame::Geometry;
-use crate::metadata::{AdcRecord, FrameHeader, NoiseRecord};
+use crate::metadata::{AdcRecord, AverageRecord, FrameHeader, NoiseRecord};
 use crate::names::Named;
 use crate::random::Source;
 use crate::stages::demosaic::Method;
@@ -209,23 +210,22 @@ const STEPS: usize = 1024;
 
 impl LevelVariance {
     /// Of R, G and B, which differ where flat fields do.
-    fn of_classes(photosite: &Photosite, largest: f64) -> [Self; 3] {
+    fn of_classes(photosite: &Photosite, average: Option<&AverageRecord>, largest: f64) -> [Self; 3] {
         match photosite.flat {
             None => {
-                let all = Self::new(photosite, 0, largest);
+                let all = Self::new(photosite, 0, average, largest);
                 [all.clone(), all.clone(), all]
             }
-            Some(_) => [0, 1, 2].map(|class| Self::new(photosite, class, largest)),
+            Some(_) => [0, 1, 2].map(|class| Self::new(photosite, class, average, largest)),
         }
     }
 
-    fn new(photosite: &Photosite, class: usize, largest: f64) -> Self {
+    fn new(photosite: &Photosite, class: usize, average: Option<&AverageRecord>, largest: f64) -> Self {
         // Patterns that are cut off at zero take long to predict, and their variances are smooth.
         let is_rectified = photosite.model.response().max(photosite.model.dcnu) > 0.2;
         let steps = if is_rectified || photosite.has_tails() { STEPS / 8 } else { STEPS };
         let step = largest / steps as f64;
-        let variance = |index: usize| {
-            let expected_e = photosite.expected_at(index as f64 * step);
+        let one = |expected_e: f64| {
             if photosite.flat.is_some() {
                 return photosite.variance_divided(class, expected_e);
             }
@@ -245,6 +245,11 @@ impl LevelVariance {
             } else {
                 photosite.moments(expected_e).moments.variance
             }
+        };
+        let variance = |index: usize| {
+            let expected_e = photosite.expected_at(index as f64 * step);
+            let one = one(expected_e);
+            average.map_or(one, |record| photosite.variance_of_average(class, expected_e, one, record))
         };
         Self { step, values: (0..=steps).into_par_iter().map(variance).collect() }
     }
@@ -289,16 +294,25 @@ impl PixelNoise {
         };
         photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
         photosite.check_lines().map_err(|why| frame.refuse(why.to_string()))?;
+        let average = match &metadata.average {
+            Some(record) => {
+                let record =
+                    average_of(frame, record, quantity_of_sites(frame)).map_err(|why| frame.refuse(why.to_string()))?;
+                photosite.check_average(&record).map_err(|why| frame.refuse(why.to_string()))?;
+                Some(record)
+            }
+            None => None,
+        };
         let of_lines = photosite.has_lines().then(|| PixelLines {
             gains: places().map(|at| PixelGains::of_lines(table, at, &frame.geometry)).collect(),
-            terms: photosite.line_terms(),
+            terms: photosite.line_terms(average.as_ref()),
             photosite,
         });
         let of_black = metadata
             .black_noise
             .map(|noise| (gains(PixelGains::of_black), [noise.row_adu2, noise.column_adu2, noise.site_adu2]));
         let gains = gains(PixelGains::new);
-        let variances = LevelVariance::of_classes(&photosite, largest);
+        let variances = LevelVariance::of_classes(&photosite, average.as_ref(), largest);
         Ok(Self { columns, rows, gains, of_black, of_lines, depends_on_hue: table.depends_on_hue(), variances, black })
     }
 

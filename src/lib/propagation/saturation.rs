@@ -43,7 +43,9 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
 /// The expected shares of the samples of R, G and B that are full; of electrons, of photosites whose charge reaches full
 /// well, before read noise. None where the scene is not uniform, or the samples are not those of photosites.
 pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
-    let Sites { photosite, expected_e, .. } = Sites::of(frame, Equations::Exact).ok()?;
+    // Which exposures of an average a full photosite was full in is not told.
+    let Sites { photosite, expected_e, .. } =
+        Sites::of(frame, Equations::Exact).ok().filter(|_| frame.metadata.average.is_none())?;
     let full_well_e = photosite.model.full_well_e;
     let share = |expected_e: f64, of: &dyn Fn(&Law) -> f64| {
         if photosite.has_tails() {

@@ -8,6 +8,7 @@ mod camera_page;
 mod camera_sensor;
 mod difference;
 mod matrix_text;
+mod over_frames;
 mod photon_transfer;
 mod portrait;
 mod prediction;
@@ -19,6 +20,7 @@ pub use camera::CameraOutputs;
 pub use camera_page::camera_page;
 pub use camera_sensor::sensor_of;
 pub use difference::difference;
+pub use over_frames::over_frames;
 pub use photon_transfer::photon_transfer;
 pub use portrait::portrait;
 pub use prediction::{BudgetOutputs, prediction};
@@ -26,7 +28,7 @@ pub use raw_outputs::RawOutputs;
 pub use sequence::{Findings, Reports};
 pub use trade_off::trade_off;
 
-use crate::analysis::statistics::check::{Subject, Test};
+use crate::analysis::statistics::check::{Subject, Test, Verdict};
 use crate::analysis::statistics::{ChannelReport, RegionReport, Report};
 use crate::error::{Error, Result};
 use crate::formats::yaml_writer;
@@ -149,21 +151,23 @@ fn text(report: &Report) -> String {
     } else {
         for region in &report.regions {
             region_text(region, &mut out);
-            tests_text(region, &mut out);
+            tests_text(&region.tests, &mut out);
         }
     }
     if tells_uncertainty(report) {
         let _ = writeln!(out, "{}", report.uncertainty.in_words());
     }
-    if let Some(verdict) = report.check {
-        let outcome = if verdict.passed { "as predicted" } else { "not as predicted" };
-        let _ = writeln!(
-            out,
-            "{outcome}: {} tests, smallest p {:.3e}, corrected {:.3e}, level {:e}",
-            verdict.tests, verdict.smallest_p, verdict.corrected_p, verdict.level
-        );
-    }
+    report.check.iter().for_each(|verdict| verdict_text(verdict, &mut out));
     out
+}
+
+fn verdict_text(verdict: &Verdict, out: &mut String) {
+    let outcome = if verdict.passed { "as predicted" } else { "not as predicted" };
+    let _ = writeln!(
+        out,
+        "{outcome}: {} tests, smallest p {:.3e}, corrected {:.3e}, level {:e}",
+        verdict.tests, verdict.smallest_p, verdict.corrected_p, verdict.level
+    );
 }
 
 /// Whether a report has predicted standard deviations, or layers of them.
@@ -294,18 +298,23 @@ fn patches_text(regions: &[RegionReport], out: &mut String) {
     table(&columns, out);
 }
 
-fn tests_text(region: &RegionReport, out: &mut String) {
-    if region.tests.is_empty() {
+fn tests_text(tests: &[Test], out: &mut String) {
+    if tests.is_empty() {
         return;
     }
     let column = |heading: &str, cell: &dyn Fn(&Test) -> String| -> Vec<String> {
-        std::iter::once(heading.to_owned()).chain(region.tests.iter().map(cell)).collect()
+        std::iter::once(heading.to_owned()).chain(tests.iter().map(cell)).collect()
     };
     let subject = |test: &Test| match test.subject {
         Subject::Mean => "mean".to_owned(),
         Subject::Variance => "variance".to_owned(),
         Subject::Correlation => "correlation".to_owned(),
         Subject::Deviation => "deviation".to_owned(),
+        Subject::VarianceOfMeans => "variance of means".to_owned(),
+        Subject::CorrelationOfMeans => "correlation of means".to_owned(),
+        Subject::TemporalVariance => "temporal variance".to_owned(),
+        Subject::TemporalCorrelation => "temporal correlation".to_owned(),
+        Subject::VarianceOfFrameMeans => "variance of frame means".to_owned(),
     };
     let columns = [
         column("test", &subject),

@@ -1,7 +1,7 @@
 //! Several inputs, each with outputs of its own.
 
 use crate::error::{Error, Result};
-use crate::formats::places::{STEM, named, numbered, output_of, place, sidecar_path};
+use crate::formats::places::{STEM, is_numbered, named, numbered, output_of, place, sidecar_path};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -115,9 +115,9 @@ fn check_apart(jobs: &[Job]) -> Result<()> {
     for Job { input, frame, beside } in jobs {
         let input = input.as_deref().unwrap_or(Path::new("-")).display();
         let sidecar = frame.as_deref().map(sidecar_path);
-        for output in
-            [frame, &sidecar].into_iter().chain(beside).flatten().filter(|output| named(Some(output)).is_some())
-        {
+        // Numbers of frames are not known yet; two that meet are told then.
+        let is_known = |output: &&PathBuf| named(Some(output)).is_some() && !is_numbered(output);
+        for output in [frame, &sidecar].into_iter().chain(beside).flatten().filter(is_known) {
             if let Some(other) = taken.insert(place(Some(output)), input.to_string()) {
                 return Err(Error::Usage(format!(
                     "{}: what is made of {other} and of {input} would both go there; give -o DIR/, or names with {STEM}, and inputs \
@@ -128,6 +128,39 @@ fn check_apart(jobs: &[Job]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Makes sure that a file for each of several frames has a pattern for a name, before any is read.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_each_named(inputs: &[PathBuf], output: Option<&Path>) -> Result<()> {
+    check_known(output)?;
+    match output.filter(|output| inputs.len() > 1 && !takes_a_name(output) && !is_numbered(output)) {
+        Some(output) => Err(Error::Usage(format!(
+            "{}: one of each of {} frames would go there; give a directory, or a name with {STEM}, {{frame}} or {{index}}",
+            output.display(),
+            inputs.len()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Makes sure that a report of all frames, which goes to one file, is not named by a pattern.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_one_report(output: Option<&Path>) -> Result<()> {
+    let is_pattern = |output: &&Path| is_numbered(output) || output.to_string_lossy().contains(STEM);
+    match output.filter(is_pattern) {
+        Some(output) => Err(Error::Usage(format!(
+            "{}: the reports of all frames go to one file, which has a plain name; each says which frame it is of",
+            output.display()
+        ))),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -149,6 +182,16 @@ mod tests {
         // One input goes where it is told, or through a pipe.
         assert_eq!(planned(&["x.nef"], Some("{stem}.tiff"), &[]).unwrap()[0].frame, Some(PathBuf::from("x.tiff")));
         assert_eq!(planned(&["x.nef"], None, &[]).unwrap()[0].frame, None);
+        // Numbers of frames come later.
+        assert!(planned(&["x.nef", "y.nef"], Some("o-{frame}.tiff"), &[]).is_ok());
+        let several = ["x.nef", "y.nef"].map(PathBuf::from);
+        assert!(check_each_named(&several, Some(Path::new("p.svg"))).is_err());
+        assert!(check_each_named(&several, Some(Path::new("{stem}.svg"))).is_ok());
+        assert!(check_each_named(&several[..1], Some(Path::new("p.svg"))).is_ok());
+        assert!(
+            check_one_report(Some(Path::new("{stem}.csv"))).is_err()
+                && check_one_report(Some(Path::new("a.csv"))).is_ok()
+        );
         assert_eq!(
             planned(&[], Some("x.tiff"), &[None]).unwrap(),
             [Job { frame: Some("x.tiff".into()), beside: vec![None], ..Job::default() }]

@@ -12,7 +12,7 @@ use crate::formats::input::{FrameReader, InputOptions, Linearizing};
 use crate::formats::many::OneOfMany;
 use crate::formats::register::check_inputs;
 use crate::masking::Corrections;
-use crate::metadata::{DefectsRecord, FrameHeader};
+use crate::metadata::{DefectsRecord, FlatRecord, FrameHeader};
 use crate::numerics::averages::{CLIP, Combine};
 use crate::stages::black::Black;
 use crate::stages::correct::{CorrectFrame, CorrectionSettings};
@@ -335,6 +335,7 @@ impl Correction {
         let found_in = |is_there: bool, what: &str| is_there.then(|| what.to_owned());
         let defects = (self.defects.is_some() || beyond.is_some()).then(|| DefectsRecord {
             map: self.defects.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned()),
+            digest: self.defects.as_deref().and_then(digest_of),
             found_beyond: beyond,
             found_in: [
                 found_in(dark_limits.is_some(), "level of dark frames"),
@@ -345,7 +346,14 @@ impl Correction {
             .flatten()
             .collect(),
         });
-        stage.note_further(flats.as_ref().map(|(flats, means)| flats.record(means)), defects);
+        let shares_masters = company.shares_darks().unwrap_or_else(|| {
+            let problem =
+                "some of the dark frames come off both frame and flats: predictions take their noise for independent";
+            warnings.push(format!("{}: {problem}; give the same to both, or to each its own", frame.name));
+            false
+        });
+        let of_flats = flats.as_ref().map(|(flats, means)| FlatRecord { shares_masters, ..flats.record(means) });
+        stage.note_further(of_flats, defects);
         let map = self.map(frame, input)?;
         let list = self.defects.as_deref().map(|path| path.display().to_string()).unwrap_or_default();
         warnings.extend(map.as_ref().and_then(|map| map.doubt(&list, frame)));
@@ -353,6 +361,11 @@ impl Correction {
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
         Ok(OpenCorrection { stage, corrections, notes })
     }
+}
+
+/// A digest of a list or map of defects; none of one that cannot be read, which is told elsewhere.
+fn digest_of(path: &Path) -> Option<String> {
+    read_file(path).ok().map(|bytes| format!("blake3:{}", blake3::hash(&bytes).to_hex()))
 }
 
 impl OpenCorrection {

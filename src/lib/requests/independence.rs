@@ -107,6 +107,20 @@ impl Company {
         Ok(warnings)
     }
 
+    /// Whether the dark frames of the flats are those that come off the frame; none where some are.
+    pub fn shares_darks(&self) -> Option<bool> {
+        let of = |role: Role| self.0.iter().filter(move |(its, _)| *its == role).map(|(_, frame)| frame);
+        let is_same =
+            |a: &FrameHeader, b: &FrameHeader| a.name == b.name || are_copies(a, b) || shared_noise(a, b).is_some();
+        let of_flats: Vec<&FrameHeader> = of(Role::FlatDark).collect();
+        let shared = of_flats.iter().filter(|dark| of(Role::Dark).any(|other| is_same(dark, other))).count();
+        match shared {
+            0 => Some(false),
+            _ if shared == of_flats.len() && shared == of(Role::Dark).count() => Some(true),
+            _ => None,
+        }
+    }
+
     /// A warning for each bias frame that is exposed for longer than a frame from which it comes off.
     fn long_biases(&self) -> impl Iterator<Item = String> {
         let exposure_s = |frame: &FrameHeader| frame.metadata.exposure.map(|exposure| exposure.exposure_s);
@@ -142,13 +156,13 @@ fn is_noisy(frame: &FrameHeader) -> bool {
 }
 
 /// Whether two frames have the same noisy samples, as their sidecars tell.
-fn are_copies(a: &FrameHeader, b: &FrameHeader) -> bool {
+pub(super) fn are_copies(a: &FrameHeader, b: &FrameHeader) -> bool {
     let digest = |frame: &FrameHeader| frame.metadata.samples.as_ref().map(|samples| samples.digest.clone());
     digest(a).is_some() && digest(a) == digest(b) && is_noisy(a) && is_noisy(b)
 }
 
 /// The noise that was drawn in both of two frames.
-fn shared_noise<'a>(a: &'a FrameHeader, b: &FrameHeader) -> Option<&'a NoiseRecord> {
+pub(super) fn shared_noise<'a>(a: &'a FrameHeader, b: &FrameHeader) -> Option<&'a NoiseRecord> {
     let (a, b) = (a.metadata.noise.as_ref()?, b.metadata.noise.as_ref()?);
     let is_in = |noise: &NoiseRecord, source: Source| noise.sources.contains(&source);
     let is_shared = TEMPORAL.into_iter().any(|source| is_in(a, source) && is_in(b, source));

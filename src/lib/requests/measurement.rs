@@ -1,18 +1,23 @@
 //! Statistics of a frame beside what propagation predicts.
 
 use super::options::Output;
-use super::values;
+use super::{batch, values};
 use crate::analysis::statistics::portrait::Portrait;
-use crate::analysis::statistics::{Laws, Region, Report, Saturated, measure_among, measure_with_portrait, patches};
+use crate::analysis::statistics::{
+    Laws, OverFrames, OverFramesSettings, Region, RepeatedReport, Report, Saturated, measure_among,
+    measure_with_portrait, patches,
+};
 use crate::error::Result;
 use crate::formats::places::output_of;
 use crate::formats::plots::PlotFormat;
+use crate::formats::register;
 use crate::metadata::FrameHeader;
 use crate::names::Named;
 use crate::propagation::Equations;
-use crate::stream::RowSource;
+use crate::stream::{MemoryFrame, RowSource};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// What to measure of a frame, and what to make of it.
 #[derive(Debug, Clone, Args)]
@@ -37,6 +42,13 @@ pub struct Measurement {
     /// Chance of a false alarm that --check accepts, all tests together
     #[arg(long, value_name = "P", default_value_t = 1e-4, value_parser = values::fraction, requires = "check")]
     level: f64,
+    /// Measure over all frames that come, exposures of one scene, in place of each by itself: what scatters from frame to frame, and
+    /// what is the same in all
+    #[arg(long, value_name = "WHAT", value_parser = values::choice::<Over>(), conflicts_with_all = ["patches", "plot"])]
+    over: Option<Over>,
+    /// Write an EXR of the mean of each pixel over frames, and of its variance as the layer `variance.NAME`, divisor N − 1
+    #[arg(long, value_name = "FILE", requires = "over")]
+    pub pixels: Option<PathBuf>,
     /// Draw the region as an SVG or PNG file: histogram with the predicted law over it, means of columns and rows with the predicted
     /// band of one standard deviation, autocorrelation beside the predicted, of XYZ chromaticities with the ellipses of the measured
     /// and of the predicted covariance
@@ -44,7 +56,71 @@ pub struct Measurement {
     pub plot: Option<PathBuf>,
 }
 
+/// Statistics over frames that come one after another.
+pub struct SharedFrames(Mutex<OverFrames>);
+
+impl SharedFrames {
+    /// Takes in the next frame.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`OverFrames::add`].
+    pub fn add(&self, source: &mut dyn RowSource) -> Result<()> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).add(source)
+    }
+
+    /// What is known of all, and the frame of means and variances.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`OverFrames::finish`].
+    pub fn finish(self) -> Result<(RepeatedReport, MemoryFrame)> {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner).finish()
+    }
+}
+
+/// What statistics are taken over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Over {
+    /// The frames that come.
+    Frames,
+}
+
+impl Named for Over {
+    const ALL: &'static [Self] = &[Self::Frames];
+
+    fn name(self) -> &'static str {
+        "frames"
+    }
+}
+
 impl Measurement {
+    /// Registers what will be written, and makes sure that its names do for so many inputs.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`register::announce`], [`batch::check_each_named`] and [`batch::check_one_report`].
+    pub fn announce(&self, inputs: &[PathBuf], report: Option<&Path>) -> Result<()> {
+        register::announce(&[report, self.plot.as_deref(), self.pixels.as_deref()])?;
+        batch::check_each_named(inputs, self.plot.as_deref())?;
+        batch::check_one_report(report)
+    }
+
+    /// What is asked of all frames together, where that is.
+    pub fn over_frames(&self) -> Option<SharedFrames> {
+        let settings = OverFramesSettings {
+            regions: self.region.clone(),
+            saturated: self.saturated(),
+            equations: self.equations,
+            level: self.check.then_some(self.level),
+        };
+        self.over.map(|Over::Frames| SharedFrames(Mutex::new(OverFrames::new(settings))))
+    }
+
+    fn saturated(&self) -> Saturated {
+        if self.keep_saturated { Saturated::Kept } else { Saturated::LeftOut }
+    }
+
     /// The same for a frame of several, with a plot of its own: that of a file, and of this number in its stream.
     pub fn for_frame(&self, path: Option<&Path>, index: u64, frame: &FrameHeader) -> Self {
         let Some(plot) = &self.plot else { return self.clone() };
@@ -61,7 +137,7 @@ impl Measurement {
     /// [`Error::Usage`](crate::error::Error::Usage) for a plot of another format or of several regions; those of [`measure_among`].
     pub fn of(&self, source: &mut dyn RowSource, laws: &mut Laws) -> Result<(Report, Option<Portrait>)> {
         let level = self.check.then_some(self.level);
-        let saturated = if self.keep_saturated { Saturated::Kept } else { Saturated::LeftOut };
+        let saturated = self.saturated();
         match (self.patches, &self.plot) {
             (Some(size), _) => Ok((patches::measure(source, size, saturated, self.equations)?, None)),
             (None, None) => Ok((measure_among(laws, source, &self.region, saturated, self.equations, level)?, None)),

@@ -16,6 +16,7 @@
 //! # Ok::<(), cyanometer::error::Error>(())
 //! ```
 
+pub mod averaging;
 pub mod batch;
 pub mod border;
 pub mod comparison;
@@ -39,7 +40,7 @@ mod scene;
 pub use comparison::ColorPair;
 pub use conversion::Conversion;
 pub use fit::Fit;
-pub use notes::{Note, of_bent_codes, of_levels, of_marks, of_reader, of_slope, of_statistics};
+pub use notes::{Note, of_bent_codes, of_levels, of_marks, of_over_frames, of_reader, of_slope, of_statistics};
 pub use options::SignalLevel;
 pub use prediction::NoisePrediction;
 pub use raw_files::RawFiles;

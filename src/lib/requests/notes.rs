@@ -1,6 +1,6 @@
 //! What comes up on the way, for the user to hear.
 
-use crate::analysis::statistics::Report;
+use crate::analysis::statistics::{RepeatedReport, Report};
 use crate::formats::input::FrameReader;
 use crate::metadata::{AdcRecord, FrameHeader};
 use crate::stream::RowSource;
@@ -41,6 +41,13 @@ pub fn of_marks(reader: &FrameReader) -> Vec<Note> {
     ];
     let text = |(pixels, what)| format!("{name}: {pixels} of the pixels read {what}; they are taken as they are");
     kinds.into_iter().filter(|(pixels, _)| *pixels > 0).map(text).map(Note::Warning).collect()
+}
+
+/// What came up among statistics over frames.
+pub fn of_over_frames(report: &RepeatedReport) -> Vec<Note> {
+    let left_out = report.regions.iter().map(|region| region.left_out).sum();
+    let text = "pixels are saturated, otherwise marked, NaN or infinite in one of the frames or more; they are left out of all";
+    (left_out > 0).then(|| Note::Warning(counted(left_out, text))).into_iter().collect()
 }
 
 /// What came up among statistics.

@@ -1,10 +1,12 @@
 //! A camera measured from flats and darks.
 
 use super::described::Described;
+use super::independence::{are_copies, shared_noise};
 use super::notes::Note;
 use super::values;
 use crate::analysis::photon_transfer::{
-    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, left_in_mean, of_class, pattern_view, survey,
+    ClassFindings, Condition, Level, PatternView, Settings, Site, SiteSurvey, Survey, left_in_mean, of_class,
+    pattern_view, survey,
 };
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
@@ -19,6 +21,7 @@ use crate::text::counted;
 use crate::units::QuantityKind;
 use clap::Args;
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Flats and darks, and what is asked of them.
@@ -114,6 +117,7 @@ impl PhotonTransfer {
                 None => groups.push(Group { condition, level, files: vec![frame.file.clone()] }),
             }
         }
+        notes.extend(check_apart(&heads)?.map(Note::Warning));
         let single: Vec<&Group> = groups.iter().filter(|group| group.files.len() < 2).collect();
         if let Some(one) = single.first() {
             let others = if single.len() > 1 { format!(" and {} more", single.len() - 1) } else { String::new() };
@@ -174,6 +178,36 @@ impl PhotonTransfer {
             notes,
         })
     }
+}
+
+/// Makes sure that no exposure comes twice; gives a warning where noise of one is that of another, taken under other conditions.
+fn check_apart(heads: &[FrameHeader]) -> Result<Option<String>> {
+    let mut warning = None;
+    let (mut by_digest, mut by_number) = (HashMap::new(), HashMap::new());
+    for head in heads {
+        let metadata = &head.metadata;
+        let digest = metadata.samples.as_ref().map(|samples| samples.digest.as_str());
+        let same = digest.and_then(|digest| by_digest.insert(digest, head)).filter(|other| are_copies(head, other));
+        if let Some(other) = same {
+            let problem = format!("its samples are those of {}", other.name);
+            return Err(head.refuse(problem + "; copies of one exposure do not count as two"));
+        }
+        let Some(noise) = &metadata.noise else { continue };
+        let before: Option<&FrameHeader> = by_number.insert((noise.seed, noise.sensor_seed, noise.frame), head);
+        let Some(other) = before.filter(|other| shared_noise(head, other).is_some()) else { continue };
+        let (seed, frame) = (noise.seed, noise.frame);
+        if metadata.scene == other.metadata.scene && metadata.exposure == other.metadata.exposure {
+            return Err(head.refuse(format!("its noise is that of {}, of seed {seed} and frame {frame}", other.name)));
+        }
+        warning.get_or_insert_with(|| {
+            format!(
+                "{}: its noise is drawn from the numbers of {}, of seed {seed} and frame {frame}: levels are not independent, and \
+                 intervals too narrow; draw each level with a --seed or --frames of its own",
+                head.name, other.name
+            )
+        });
+    }
+    Ok(warning)
 }
 
 /// Refuses a plane of unknown array whose sites differ as those behind filters do.
@@ -247,6 +281,13 @@ fn survey_of(group: &Group, described: &Described, top: Option<f64>, keeps: bool
             return Err(Error::Usage(problem).change(&["white"]));
         }
         check_same_light(group, &site.frame_means, top)?;
+    }
+    let within = |mean: f64| mean > 0.0 && top.is_none_or(|top| mean < top);
+    let is_same = |site: &SiteSurvey| site.variance == 0.0 && within(site.mean) && site.spatial.rest.value > 0.0;
+    if found.sites.iter().all(is_same) {
+        let problem =
+            format!("{} and {}: their samples are the same", group.files[0].display(), group.files[1].display());
+        return Err(Error::Data(problem + "; copies of one exposure do not count as two"));
     }
     Ok(found)
 }
@@ -378,6 +419,18 @@ fn check_alike(first: &FrameHeader, other: &FrameHeader) -> Result<()> {
     }
     if are_others(Metadata::bias_adu) {
         return differs("bias");
+    }
+    let body = |frame: &FrameHeader| {
+        let metadata = &frame.metadata;
+        let name = metadata.sensor.as_ref().map(|sensor| sensor.name.clone()).or_else(|| metadata.camera.clone());
+        (name, metadata.noise.as_ref().map(|noise| noise.sensor_seed))
+    };
+    let [(own, seed), (theirs, other_seed)] = [first, other].map(body);
+    if own.is_some() && theirs.is_some() && own != theirs {
+        return differs("camera");
+    }
+    if seed.is_some() && other_seed.is_some() && seed != other_seed {
+        return Err(other.refuse(format!("its sensor seed is not that of {}: it is another camera's", first.name)));
     }
     Ok(())
 }

@@ -117,7 +117,10 @@ fn file_of_kind(end: &'static str, advice: &'static str) -> impl TypedValueParse
 ///
 /// What is wrong with the text, in words.
 pub fn exposures(text: &str) -> Result<Range<u32>, String> {
-    let wrong = || "give the first number and the one behind the last, as in 0..100 for 0 to 99".to_owned();
+    let wrong = || {
+        let most = u32::MAX;
+        format!("give the first number and the one behind the last, as in 0..100 for 0 to 99; numbers are 0 to {most}")
+    };
     let (first, end) = text.split_once("..").ok_or_else(wrong)?;
     let number = |text: &str| whole::<u32>(text).map_err(|_| wrong());
     let range = number(first)?..number(end)?;

@@ -54,24 +54,41 @@ struct Master {
 }
 
 impl Master {
-    fn of(kind: MasterKind, heads: &[&FrameHeader], members: Vec<usize>, averaging: Averaging) -> Self {
+    fn of(kind: MasterKind, heads: &[&FrameHeader], members: Vec<usize>, averaging: Averaging) -> Result<Self> {
         let first = heads[members[0]];
         let metadata = &first.metadata;
         let record = MasterRecord {
             kind,
-            average: averaging.record(members.len()),
+            average: averaging.record_of(members.iter().map(|member| heads[*member]))?,
             weight: 1.0,
             exposure_s: metadata.exposure.map(|exposure| exposure.exposure_s),
             temperature_k: temperature_k(first),
             noise: metadata.noise.as_ref().map(MasterNoise::of),
+            identity: identity(members.iter().map(|member| heads[*member])),
         };
-        Self { record, members }
+        Ok(Self { record, members })
     }
 
     fn weighing(mut self, weight: f64) -> Self {
         self.record.weight = weight;
         self
     }
+}
+
+/// What tells frames from others, as far as their metadata do: digests of their samples, or seeds and numbers of exposures.
+fn identity<'a>(frames: impl Iterator<Item = &'a FrameHeader>) -> Option<String> {
+    let mut digest = blake3::Hasher::new();
+    for frame in frames {
+        let metadata = &frame.metadata;
+        let own = match (&metadata.samples, &metadata.noise) {
+            (Some(samples), _) => samples.digest.clone(),
+            (None, Some(noise)) => format!("{} {} {}", noise.seed, noise.sensor_seed, noise.frame),
+            (None, None) => return None,
+        };
+        digest.update(own.as_bytes());
+        digest.update(b"\n");
+    }
+    Some(format!("blake3:{}", digest.finalize().to_hex()))
 }
 
 /// Frames of one kind whose dark signals are alike.
@@ -90,7 +107,7 @@ impl DarkStack {
     pub fn alike(head: FrameHeader, frames: u32) -> Result<Self> {
         check_codes(&head)?;
         let (lit, silent) = (lit(&head), if says_enough(&head) { Vec::new() } else { vec![head.name.clone()] });
-        let mut master = Master::of(MasterKind::Dark, &[&head], vec![0], Averaging::default());
+        let mut master = Master::of(MasterKind::Dark, &[&head], vec![0], Averaging::default())?;
         master.record.average = AverageRecord { frames, combine: Combine::Mean, clip: None };
         let (warnings, remarks) = (Vec::new(), Vec::new());
         Ok(Self { head, frames, masters: vec![master], level: None, warnings, remarks, lit, silent })
@@ -125,7 +142,7 @@ impl DarkStack {
             2 => stack.head.name = format!("the {name} of {} and 1 other", first.name),
             frames => stack.head.name = format!("the {name} of {} and {} others", first.name, frames - 1),
         }
-        stack.masters = vec![Master::of(MasterKind::Dark, heads, (0..heads.len()).collect(), averaging)];
+        stack.masters = vec![Master::of(MasterKind::Dark, heads, (0..heads.len()).collect(), averaging)?];
         Ok(Some(stack))
     }
 
@@ -151,7 +168,7 @@ impl DarkStack {
             }
             // Their exposures are short, whatever they are.
             stack.warnings.clear();
-            stack.masters = vec![master(MasterKind::Bias, (0..heads.len()).collect())];
+            stack.masters = vec![master(MasterKind::Bias, (0..heads.len()).collect())?];
             return Ok(Some(stack));
         }
         if !settings.is_scaled {
@@ -177,13 +194,13 @@ impl DarkStack {
         let above = groups.iter().position(|group| group.dose > wanted || is_same(group.dose, wanted));
         let nearest_below = above.unwrap_or(groups.len()).checked_sub(1).map(|index| &groups[index]);
         stack.masters = match (nearest_below, above.map(|index| &groups[index])) {
-            (_, Some(same)) if is_same(same.dose, wanted) => vec![of_group(same)],
+            (_, Some(same)) if is_same(same.dose, wanted) => vec![of_group(same)?],
             (Some(below), Some(above)) => {
                 let share = (wanted - below.dose) / (above.dose - below.dose);
-                vec![of_group(below).weighing(1.0 - share), of_group(above).weighing(share)]
+                vec![of_group(below)?.weighing(1.0 - share), of_group(above)?.weighing(share)]
             }
             (Some(nearest), None) | (None, Some(nearest)) => {
-                let mut masters = vec![of_group(nearest)];
+                let mut masters = vec![of_group(nearest)?];
                 let of_bias = match biases.first() {
                     // One whose exposure is not known counts as one of none.
                     Some(bias) => bias.metadata.exposure.map_or(Ok(0.0), |_| dose.at(bias))?,
@@ -197,7 +214,8 @@ impl DarkStack {
                 if biases.is_empty() {
                     stack.level = Some(bias_level(frame, &mut stack.warnings)?.map(|level| level * (1.0 - scale)));
                 } else {
-                    masters.push(master(MasterKind::Bias, (darks.len()..heads.len()).collect()).weighing(1.0 - scale));
+                    let bias = master(MasterKind::Bias, (darks.len()..heads.len()).collect())?;
+                    masters.push(bias.weighing(1.0 - scale));
                 }
                 masters
             }
@@ -217,7 +235,7 @@ impl DarkStack {
         };
         let sum: Vec<String> = self.masters.iter().map(each).collect();
         self.remarks.push(format!("{}: what comes off is {}", frame.name, sum.join(" and ")));
-        let unused = given - self.frames as usize;
+        let unused = given - self.masters.iter().map(|master| master.members.len()).sum::<usize>();
         if unused > 0 {
             self.remarks.push(format!("{unused} frames do not count: others are nearer in exposure and temperature"));
         }

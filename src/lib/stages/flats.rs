@@ -7,7 +7,7 @@
 use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
-use crate::metadata::{FlatRecord, FrameHeader, MasterNoise};
+use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise};
 use crate::stages::darks::{DarkFrames, DarkSettings, check_alike, check_codes};
 use crate::stages::defects::{Survey, add};
 use crate::stages::masters::Frames;
@@ -29,11 +29,10 @@ pub struct FlatFrames<S> {
     frames: Frames<S>,
     head: FrameHeader,
     is_even: bool,
-    count: usize,
+    average: AverageRecord,
     pedestal: Pedestal<S>,
     classes: SiteClasses,
     full: Option<FullLevels>,
-    settings: DarkSettings,
     transfer: Option<Transfer>,
     passages: Vec<Passage<Transfer>>,
     rows_made: usize,
@@ -96,6 +95,7 @@ impl<S: RowSource> FlatFrames<S> {
                 Pedestal::Level(known.ok_or_else(|| head.missing("black_level_adu"))?)
             }
         };
+        let average = settings.averaging.record_of(flats.iter().map(RowSource::header))?;
         let count = flats.len();
         if count > 1 {
             head.name = format!("the {} of {} and {} more", settings.averaging.name(), head.name, count - 1);
@@ -113,11 +113,10 @@ impl<S: RowSource> FlatFrames<S> {
             frames,
             head,
             is_even,
-            count,
+            average,
             pedestal,
             classes,
             full,
-            settings,
             transfer,
             passages,
             rows_made: 0,
@@ -229,13 +228,14 @@ impl<S: RowSource> FlatFrames<S> {
             Pedestal::Level(level) => (Vec::new(), level.uniform()),
         };
         FlatRecord {
-            average: self.settings.averaging.record(self.count),
+            average: self.average,
             means_adu: means.means.clone(),
             photosites: means.photosites.clone(),
             even: self.is_even,
             noise: self.head.metadata.noise.as_ref().map(MasterNoise::of),
             black_adu,
             masters,
+            shares_masters: false,
         }
     }
 }

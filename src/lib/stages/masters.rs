@@ -1,7 +1,8 @@
 //! Frames of one kind that count as one: their average, sample by sample, while all are read in step.
 
 use crate::error::Result;
-use crate::metadata::AverageRecord;
+use crate::metadata::{AverageRecord, FrameHeader};
+use crate::names::Named;
 use crate::numerics::averages::{CLIP, Combine, average};
 use crate::stream::RowSource;
 use rayon::prelude::*;
@@ -28,12 +29,44 @@ impl Averaging {
     }
 
     /// The record of so many frames.
-    pub(super) fn record(self, frames: usize) -> AverageRecord {
+    pub fn record(self, frames: usize) -> AverageRecord {
         let clip = (self.combine == Combine::Clipped).then_some(self.clip);
         AverageRecord { frames: u32::try_from(frames).unwrap_or(u32::MAX), combine: self.combine, clip }
     }
 
-    pub(super) fn name(self) -> &'static str {
+    /// The record of some frames, each of which may be an average of exposures itself.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`](crate::error::Error::Format) for averages that do not go into another: medians, and means of other numbers of frames.
+    pub fn record_of<'a>(self, frames: impl IntoIterator<Item = &'a FrameHeader>) -> Result<AverageRecord> {
+        let mut frames = frames.into_iter();
+        let Some(first) = frames.next() else { return Ok(self.record(0)) };
+        let before = |frame: &FrameHeader| frame.metadata.average.map(|record| record.average());
+        let (own, mut count) = (before(first), 1);
+        for frame in frames {
+            count += 1;
+            let differs = own.or(before(frame)).filter(|_| own != before(frame));
+            let no_means = own.is_some_and(|own| [own.combine, self.combine].iter().any(|how| *how != Combine::Mean));
+            if differs.is_some() || no_means {
+                let how = differs.or(own).map_or("mean", |record| record.combine.name());
+                return Err(frame.refuse(format!(
+                    "it is to go with {} into an average, and one of the two is the {how} of several frames already; only means of as \
+                     many frames make a mean again",
+                    first.name
+                )));
+            }
+        }
+        let record = self.record(count);
+        Ok(match own {
+            None => record,
+            Some(own) if count == 1 => own,
+            Some(own) => AverageRecord { frames: own.frames.saturating_mul(record.frames), ..record },
+        })
+    }
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
         match self.combine {
             Combine::Mean => "mean",
             Combine::Median => "median",

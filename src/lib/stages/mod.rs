@@ -13,6 +13,7 @@ pub mod adc;
 pub mod correct;
 pub mod darks;
 pub mod defects;
+pub mod exposures;
 pub mod flats;
 pub mod masters;
 pub mod sites;

@@ -120,7 +120,8 @@ pub fn samples_tell(frame: &FrameHeader) -> bool {
         QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu | QuantityKind::Unspecified
     );
     let is_shifted = metadata.correction.as_ref().is_none_or(CorrectionRecord::is_a_shift);
-    is_of_photosites && is_shifted && metadata.demosaic.is_none()
+    // Of an average some samples may have been full.
+    is_of_photosites && is_shifted && metadata.demosaic.is_none() && metadata.average.is_none()
 }
 
 /// The head of a frame that has the layer of marks behind its channels.

@@ -93,20 +93,28 @@ pub fn of_class(
 ) -> ClassFindings {
     let Settings { confidence, photon_error, are_codes } = *settings;
     let rounding = if are_codes { ROUNDING } else { 0.0 };
+    let nothing = |why: String| ClassFindings {
+        name: name.into(),
+        findings: vec![finding("gain_adu_per_e", Err(why))],
+        curve: Vec::new(),
+        linearity: None,
+        values: None,
+        stacks: [None; 2],
+        notes: Vec::new(),
+        doubts: Vec::new(),
+    };
     let Some(curve) = Curve::of(flats, darks, rounding, photon_error) else {
         let why = "no gain follows: it takes two flats of one light below saturation, with darks of their exposure time, or flats at \
                    several levels";
-        return ClassFindings {
-            name: name.into(),
-            findings: vec![finding("gain_adu_per_e", Err(why.into()))],
-            curve: Vec::new(),
-            linearity: None,
-            values: None,
-            stacks: [None; 2],
-            notes: Vec::new(),
-            doubts: Vec::new(),
-        };
+        return nothing(why.into());
     };
+    if let Some(gain) = curve.interval(|values| Some(values.gain), confidence).filter(|gain| gain.low <= 0.0) {
+        return nothing(format!(
+            "no gain follows: by the flats it is {:.3e} to {:.3e}, as their variance does not rise with their mean beyond chance; are \
+             they exchanged with the darks, or all saturated?",
+            gain.low, gain.high
+        ));
+    }
     let mut found = Vec::new();
     let mut add = |key: &'static str, result: Found| found.push(finding(key, result));
     let number = |of: &dyn Fn(&Values) -> Option<f64>, why: String| curve.interval(of, confidence).ok_or(why);

@@ -1,6 +1,6 @@
 //! What was seen of a region, beside what is predicted of it.
 
-use super::check::{self, Measured, Test};
+use super::check::{self, Expected, Measured, Test};
 use super::expectation::{Expectation, Predicted};
 use super::grids::Array;
 use super::levels::Levels;
@@ -20,6 +20,8 @@ pub(super) struct Assessment<'a> {
     channels: Group<'a>,
     /// The classes of a CFA plane, each by itself; none of other frames.
     classes: Vec<Group<'a>>,
+    /// Frames' worth of samples whose covariances are averaged.
+    repeats: f64,
 }
 
 /// Channels that were observed together.
@@ -69,7 +71,7 @@ impl<'a> Assessment<'a> {
             moments,
             predicted,
         });
-        Self { channels, classes: classes.collect() }
+        Self { channels, classes: classes.collect(), repeats: 1.0 }
     }
 
     /// What is said of the region, without tests.
@@ -117,9 +119,43 @@ impl<'a> Assessment<'a> {
         }
     }
 
+    /// The same where samples are what is drawn anew in frames of so many degrees of freedom.
+    #[must_use]
+    pub fn repeated(mut self, freedom: f64) -> Self {
+        for group in std::iter::once(&mut self.channels).chain(&mut self.classes) {
+            group.predicted = std::mem::take(&mut group.predicted).repeated(freedom);
+        }
+        self.repeats = freedom;
+        self
+    }
+
+    /// Tests of means over frames.
+    pub fn tests_of_means(&self) -> Vec<Test> {
+        self.groups().flat_map(|group| group.tested(check::tests_of_means)).collect()
+    }
+
+    /// Tests of what is drawn anew in so many frames, whose own means have variances: of all channels, and of each class.
+    pub fn tests_over_frames(&self, variances_of_means: &[Vec<f64>], frames: u32) -> Vec<Test> {
+        let groups = self.groups().zip(variances_of_means);
+        let of_group = |(group, variances): (&Group<'_>, &Vec<f64>)| {
+            group.tested(|measured, expected| check::tests_over_frames(measured, variances, expected, frames))
+        };
+        groups.flat_map(of_group).collect()
+    }
+
+    /// Standard deviations by formula of the means of the channels, and of each class.
+    pub fn mean_stds(&self) -> Vec<Vec<f64>> {
+        let of_group = |group: &Group<'_>| group.predicted.channels.iter().map(|channel| channel.mean_error).collect();
+        self.groups().map(of_group).collect()
+    }
+
+    fn groups(&self) -> impl Iterator<Item = &Group<'a>> {
+        std::iter::once(&self.channels).chain(&self.classes)
+    }
+
     /// Tests of everything that is predicted.
     pub fn tests(&self) -> Vec<Test> {
-        std::iter::once(&self.channels).chain(&self.classes).flat_map(Group::tests).collect()
+        self.groups().flat_map(|group| group.tested(check::tests)).collect()
     }
 
     /// Whether a prediction says that photosites share rows or columns.
@@ -141,7 +177,8 @@ impl<'a> Assessment<'a> {
             let (n, offset) = (class.count as f64, class.mean[0] - plane.mean[0]);
             let share = (n / total).powi(2);
             of_mean += share * variance / n;
-            of_variance += share * (2.0 * variance * variance / (n - 1.0) + 4.0 * offset * offset * variance / n);
+            of_variance +=
+                share * (2.0 * variance * variance / (n - 1.0) / self.repeats + 4.0 * offset * offset * variance / n);
         }
         let std = plane.std(0);
         let of_std = std.map(|std| if std > 0.0 { of_variance.sqrt() / (2.0 * std) } else { 0.0 });
@@ -188,7 +225,7 @@ impl Group<'_> {
     }
 
     /// Tests of what is predicted of the channels.
-    fn tests(&self) -> Vec<Test> {
+    fn tested(&self, tests: impl Fn(&Measured<'_>, &Expected) -> Vec<Test>) -> Vec<Test> {
         let Some(expected) = &self.predicted.tested else { return Vec::new() };
         let tested = self.predicted.channels.len();
         // The one channel of a class stands for all three.
@@ -199,6 +236,6 @@ impl Group<'_> {
             mean: [0, 1, 2].map(|i| self.moments.mean[place(i)]),
             covariance: Matrix3::from_fn(covariance),
         };
-        check::tests(&measured, expected)
+        tests(&measured, expected)
     }
 }

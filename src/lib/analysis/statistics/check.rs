@@ -10,7 +10,7 @@ use serde::Serialize;
 
 /// What a test is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum Subject {
     /// The mean of a channel: z.
     Mean,
@@ -21,6 +21,27 @@ pub enum Subject {
     /// Mean and variance together of a channel of which hardly a sample should leave its code, or whose variance hangs on
     /// few samples: Markov's inequality.
     Deviation,
+    /// The variance of a channel over pixels of their means over frames: χ².
+    VarianceOfMeans,
+    /// The correlation of two channels in these means: Fisher's z.
+    CorrelationOfMeans,
+    /// The variance of a channel from frame to frame: χ².
+    TemporalVariance,
+    /// The correlation of two channels from frame to frame: Fisher's z.
+    TemporalCorrelation,
+    /// The variance over frames of the mean of a channel: χ².
+    VarianceOfFrameMeans,
+}
+
+impl Subject {
+    /// The same of means over frames.
+    fn of_means(self) -> Self {
+        match self {
+            Self::Variance => Self::VarianceOfMeans,
+            Self::Correlation => Self::CorrelationOfMeans,
+            other => other,
+        }
+    }
 }
 
 /// One test of one prediction.
@@ -168,6 +189,11 @@ impl Expected {
         cumulant / scatter.powf(1.5)
     }
 
+    /// The least variance of a photosite.
+    fn least_variance(&self) -> f64 {
+        self.site_variances.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
     /// Whether photosites are unlike each other.
     fn has_tails(&self) -> bool {
         self.site_sixths.iter().any(|sixth| *sixth != 0.0)
@@ -244,7 +270,7 @@ const FREE: f64 = 0.05;
 pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     let sampling = &expected.sampling;
     let channels = measured.names.len();
-    let least = expected.site_variances.iter().copied().fold(f64::INFINITY, f64::min);
+    let least = expected.least_variance();
     let heaviest = expected.site_kurtosis.iter().copied().fold(0.0, f64::max);
     let is_rare = |i: usize| {
         let (variance, kurtosis) =
@@ -270,6 +296,56 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
         let is_heavy = |i: usize| expected.has_tails() && expected.variance_kurtosis(i) > FREE;
         if i != j && j < channels && ![i, j].into_iter().any(|i| is_rare(i) || is_heavy(i)) && sampling.count >= 4.0 {
             found.extend(correlation(measured, sampling, index));
+        }
+    }
+    found
+}
+
+/// Tests the means over frames of pixels.
+pub(super) fn tests_of_means(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
+    let tests = tests(measured, expected);
+    tests.into_iter().map(|test| Test { subject: test.subject.of_means(), ..test }).collect()
+}
+
+/// Tests what is drawn anew in each of so many frames: variances and correlations of the channels `0..count` within frames, whose
+/// scatter `expected` has, and the variances of the means of frames.
+pub(super) fn tests_over_frames(
+    measured: &Measured<'_>,
+    variances_of_means: &[f64],
+    expected: &Expected,
+    frames: u32,
+) -> Vec<Test> {
+    let sampling = &expected.sampling;
+    let (channels, freedom) = (measured.names.len(), f64::from(frames) - 1.0);
+    // Sums over few samples off their usual step are like no normal law.
+    let is_rare = |i: usize| {
+        let site = if expected.is_plane { expected.site_variances[i] } else { expected.least_variance() };
+        sampling.count * freedom * site < RARE || sampling.covariance[(i, i)].max(0.0).sqrt() <= expected.rounding(i)
+    };
+    let mut found = Vec::new();
+    for i in (0..channels).filter(|i| !is_rare(*i)) {
+        if sampling.count > 1.0 {
+            found.push(temporal_variance(measured, expected, i, freedom));
+        }
+        let law = sampling.mean_covariance[(i, i)];
+        if sampling.count * expected.least_variance() >= RARE {
+            let of_means = variances_of_means[i];
+            found.push(Test {
+                subject: Subject::VarianceOfFrameMeans,
+                channels: vec![measured.names[i].clone()],
+                measured: of_means,
+                expected: law,
+                z: Some((of_means / law - 1.0) * (freedom / 2.0).sqrt()),
+                degrees_of_freedom: Some(freedom),
+                // Sums of codes of few frames may be equal: less than is expected says nothing.
+                p: if of_means > law { significance::of_chi_square(freedom * of_means / law, freedom) } else { 1.0 },
+            });
+        }
+    }
+    for (index, [i, j]) in PAIRS.into_iter().enumerate() {
+        if i != j && j < channels && ![i, j].into_iter().any(is_rare) && sampling.count >= 4.0 {
+            let test = correlation(measured, sampling, index);
+            found.extend(test.map(|test| Test { subject: Subject::TemporalCorrelation, ..test }));
         }
     }
     found
@@ -344,6 +420,21 @@ fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
             significance::of_chi_square(freedom * found / expected, freedom)
         },
     }
+}
+
+/// The same of what N frames make of it, of which each degree of freedom of the frames is as good as a frame: what rows and columns
+/// share makes the law skewer by 1/(N − 1)² of its third cumulant.
+fn temporal_variance(measured: &Measured<'_>, law: &Expected, i: usize, frames: f64) -> Test {
+    let test = variance(measured, law, i);
+    let scatter = law.sampling.spread[pair([i, i])][pair([i, i])];
+    let (z, freedom) = (test.z.unwrap_or_default(), test.degrees_of_freedom.unwrap_or_default());
+    let thirds = law.sampling.variance_thirds.map(|thirds| thirds[i] / (frames * frames));
+    let p = match thirds {
+        _ if freedom < FEW || law.site_kurtosis[i] < FLAT => of_any_law(z),
+        Some(third) => significance::of_skewed(z, third / scatter.powf(1.5)),
+        None => significance::of_chi_square(freedom * test.measured / test.expected, freedom),
+    };
+    Test { subject: Subject::TemporalVariance, p, ..test }
 }
 
 /// artanh r about artanh ρ + ρ/2ν, with variance 1/(ν − 2), as of ν + 1 independent normal pairs \[Fisher1921].

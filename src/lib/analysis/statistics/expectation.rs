@@ -75,6 +75,16 @@ impl Predicted {
         Self::of_three(&mixture.covariance, expected)
     }
 
+    /// The same where so many frames' worth of samples are averaged.
+    #[must_use]
+    pub fn repeated(mut self, frames: f64) -> Self {
+        self.channels.iter_mut().for_each(|channel| channel.std_error /= frames.sqrt());
+        if let Some(expected) = &mut self.tested {
+            expected.sampling.spread.iter_mut().flatten().for_each(|spread| *spread /= frames);
+        }
+        self
+    }
+
     fn of_three(covariance: &Matrix3<f64>, expected: Expected) -> Self {
         let sampling = &expected.sampling;
         let channel = |i: usize| {

@@ -20,7 +20,7 @@ pub(super) struct Known {
 impl Laws {
     /// Those of a frame.
     pub(super) fn of(&mut self, frame: &FrameHeader, equations: Equations) -> &mut Known {
-        let head = without_exposure(frame);
+        let head = frame.without_exposure();
         let known = self.0.take().filter(|known| known.equations == equations && known.head == head);
         self.0.insert(known.unwrap_or_else(|| Known {
             prediction: propagation::of_frame(frame, equations),
@@ -29,17 +29,6 @@ impl Laws {
             equations,
         }))
     }
-}
-
-/// The head of a frame without what tells it from other exposures: its name, its number, what its samples were counted to be.
-fn without_exposure(frame: &FrameHeader) -> FrameHeader {
-    let mut head = FrameHeader { name: String::new(), ..frame.clone() };
-    head.metadata.history.clear();
-    head.metadata.samples = None;
-    if let Some(noise) = &mut head.metadata.noise {
-        noise.frame = 0;
-    }
-    head
 }
 
 /// Sampling laws by place: regions of one size and phase share one.

@@ -119,9 +119,9 @@ impl Rails {
     /// Codes at or beyond either end, electrons at full well or above.
     fn of(frame: &FrameHeader) -> Self {
         let metadata = &frame.metadata;
-        // What transfer or its undoing has mixed lies at no rail any more; nor does a code less a dark frame's.
-        if metadata.correction.is_some() || (metadata.is_transferred() && metadata.quantity == QuantityKind::Electrons)
-        {
+        // What transfer or its undoing has mixed lies at no rail any more; nor does a code less a dark frame's, or an average.
+        let is_mixed = metadata.correction.is_some() || metadata.average.is_some();
+        if is_mixed || (metadata.is_transferred() && metadata.quantity == QuantityKind::Electrons) {
             return Self::All(Limits::NONE);
         }
         let codes = |white: f64| Limits { low: 0.0, high: to_sample(white) };

@@ -10,6 +10,7 @@ use super::report::{RegionReport, Report, coverage};
 use super::tally::{Tally, tallies};
 use super::watch::{Marks, Saturated, Watch};
 use crate::error::{Error, Result};
+use crate::metadata::FrameHeader;
 use crate::propagation::{Equations, FramePrediction, PixelMoments};
 use crate::stream::RowSource;
 
@@ -101,11 +102,8 @@ fn measure_all(
         None => tallies(&mut watch, regions, &levels)?,
     };
     let (counts, left_out) = watch.seen();
-    if level.is_some() && frame.metadata.is_transferred() {
-        return Err(Error::Data(format!(
-            "{}: nothing can be checked: charge transfer mixes neighbors, differently from place to place",
-            frame.name
-        )));
+    if level.is_some() {
+        check_testable(&frame)?;
     }
     let saturated = counts.iter().map(|marks| marks.saturated).find(|count| *count > 0);
     if let (Some(_), true, Some(pixels)) = (level, left_out, saturated) {
@@ -135,6 +133,17 @@ fn measure_all(
         report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted)?);
     }
     Ok((report, portrait))
+}
+
+/// Makes sure that samples are not mixed in a way that no test knows.
+pub(super) fn check_testable(frame: &FrameHeader) -> Result<()> {
+    if frame.metadata.is_transferred() {
+        return Err(Error::Data(format!(
+            "{}: nothing can be checked: charge transfer mixes neighbors, differently from place to place",
+            frame.name
+        )));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -49,6 +49,8 @@ pub(super) struct Watch<'a> {
     counts: Vec<Marks>,
     rows_read: usize,
     buffer: Vec<f32>,
+    /// Marks of all pixels, where they are kept: those that any frame had.
+    seen: Option<&'a mut Vec<u8>>,
 }
 
 /// Rows as they come, or with the layer that their samples tell.
@@ -145,7 +147,26 @@ impl<'a> Watch<'a> {
             counts: vec![Marks::default(); regions.len()],
             rows_read: 0,
             buffer: Vec::new(),
+            seen: None,
         }
+    }
+
+    /// The same without the layers that may follow three planes.
+    #[must_use]
+    pub fn without_layers(mut self) -> Self {
+        if self.header.leads_with_three_planes() {
+            self.header.geometry.channels.truncate(3);
+        }
+        self
+    }
+
+    /// Adds the marks of all pixels to those that are there.
+    #[must_use]
+    pub fn keeping(mut self, seen: &'a mut Vec<u8>) -> Self {
+        let geometry = &self.header.geometry;
+        seen.resize(geometry.width * geometry.height, 0);
+        self.seen = Some(seen);
+        self
     }
 
     /// Marked pixels of each region, and whether saturated ones were left out.
@@ -159,6 +180,11 @@ impl<'a> Watch<'a> {
         self.rows_read += 1;
         if marks.iter().all(|mark| *mark == 0.0) {
             return;
+        }
+        if let Some(seen) = &mut self.seen {
+            let seen = &mut seen[y * marks.len()..][..marks.len()];
+            // All that have a meaning are below 256.
+            seen.iter_mut().zip(marks).for_each(|(seen, mark)| *seen |= bits(*mark).to_le_bytes()[0]);
         }
         for (region, count) in self.regions.iter().zip(&mut self.counts) {
             if (region.y..region.y + region.height).contains(&y) {
@@ -188,7 +214,10 @@ impl RowSource for Watch<'_> {
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
-        let Some(layer) = self.source.layer else { return self.source.read(rows, samples) };
+        let is_whole = self.source.header().geometry.channels.len() == self.header.geometry.channels.len();
+        if self.source.layer.is_none() && is_whole {
+            return self.source.read(rows, samples);
+        }
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
         self.source.read(rows, &mut buffer)?;
@@ -197,7 +226,9 @@ impl RowSource for Watch<'_> {
         for row in buffer.chunks_exact(buffer.len() / rows.max(1)) {
             let start = samples.len();
             samples.extend_from_slice(&row[..kept]);
-            self.take(&row[layer * width..][..width], &mut samples[start..]);
+            if let Some(layer) = self.source.layer {
+                self.take(&row[layer * width..][..width], &mut samples[start..]);
+            }
         }
         self.buffer = buffer;
         Ok(())

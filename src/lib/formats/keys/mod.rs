@@ -138,6 +138,7 @@ mod tests {
                 ("noise.", field_names::<NoiseRecord>()),
                 ("adc.", field_names::<AdcRecord>()),
                 ("adc.linearization.", field_names::<Linearization>()),
+                ("average.", field_names::<ExposuresRecord>()),
                 ("correction.", field_names::<CorrectionRecord>()),
                 ("correction.masters.", field_names::<MasterRecord>()),
                 ("correction.masters.average.", field_names::<AverageRecord>()),

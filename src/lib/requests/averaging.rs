@@ -1,0 +1,342 @@
+//! The average of exposures of one scene, and what stays uncertain in it.
+
+use super::options::Input;
+use super::values;
+use crate::analysis::statistics::{MarkedRows, Saturated};
+use crate::error::{Error, Result};
+use crate::formats::input::FrameReader;
+use crate::formats::stack::FrameStack;
+use crate::frame::to_sample;
+use crate::metadata::{AverageRecord, Coverage, ExposuresRecord, FrameHeader};
+use crate::numerics::averages::{CLIP, Combine, average};
+use crate::numerics::running::Running;
+use crate::sigma::PixelLayers;
+use crate::stages::exposures::{Exposures, too_few};
+use crate::stages::masters::Averaging;
+use crate::stages::saturation::{SATURATED, bits, with_mask};
+use crate::stream::{RowSink, RowSource};
+use crate::units::QuantityKind;
+use clap::Args;
+use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
+
+/// How exposures are averaged.
+#[derive(Debug, Clone, Args)]
+pub struct AverageRequest {
+    /// How frames are averaged: mean, median, or clipped, the mean without outliers
+    #[arg(long, default_value = "mean", value_parser = values::choice::<Combine>())]
+    combine: Combine,
+    /// Standard deviations from the median beyond which `clipped` leaves samples out, again and again; of N samples none
+    /// lies farther off than the root of N; by default 3
+    #[arg(long, value_name = "KAPPA", value_parser = values::positive)]
+    clip: Option<f64>,
+    /// Add the standard deviation of each pixel as layers, by formula: what is drawn anew in each exposure averages out, fixed
+    /// patterns do not. Frames that come with such layers leave with them anyway
+    #[arg(long)]
+    sigma: bool,
+}
+
+impl AverageRequest {
+    /// Nothing averaged yet.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for limits of what clips nothing.
+    pub fn begin(&self) -> Result<SharedAverage> {
+        if self.clip.is_some() && self.combine != Combine::Clipped {
+            return Err(
+                Error::Usage("only the clipped mean has limits; give --combine clipped".into()).leave_out(&["clip"])
+            );
+        }
+        let averaging = Averaging { combine: self.combine, clip: self.clip.unwrap_or(CLIP) };
+        Ok(SharedAverage(Mutex::new(Average { averaging, wants_layers: self.sigma, seen: None })))
+    }
+
+    /// Opens the next frame with its marks, and the layers of its uncertainty where they are the only ones.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`FrameReader::open`].
+    pub fn open(input: &Input) -> Result<FrameReader> {
+        FrameReader::open(&input.options_for_all())
+    }
+}
+
+/// An average that grows frame by frame.
+pub struct SharedAverage(Mutex<Average>);
+
+struct Average {
+    averaging: Averaging,
+    wants_layers: bool,
+    seen: Option<Seen>,
+}
+
+struct Seen {
+    exposures: Exposures,
+    /// Whether frames came with layers of their uncertainty.
+    had_layers: bool,
+    samples: Samples,
+    /// How often each pixel was saturated, and what else it was marked with.
+    full: Vec<u32>,
+    marks: Vec<u8>,
+}
+
+/// What is kept of the samples.
+enum Samples {
+    Mean(Running),
+    All(FrameStack),
+}
+
+impl Samples {
+    fn frames(&self) -> usize {
+        match self {
+            Self::Mean(running) => running.count() as usize,
+            Self::All(stack) => stack.frames(),
+        }
+    }
+}
+
+impl SharedAverage {
+    /// Takes in the next frame.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Exposures::take`], of the frame and of the disk; [`Error::Format`] for what has no meaningful average.
+    pub fn add(&self, frame: &mut FrameReader) -> Result<()> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).add(frame)
+    }
+
+    /// The average.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Data`] of fewer than two frames; [`Error::Usage`] and others where its uncertainty cannot be told.
+    pub fn finish(self) -> Result<Averaged> {
+        let Average { averaging, wants_layers, seen } = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
+        match seen.filter(|seen| seen.samples.frames() > 1) {
+            Some(seen) => Averaged::of(seen, averaging, wants_layers),
+            None => too_few("an average is"),
+        }
+    }
+}
+
+/// Names of layers that tell how uncertain pixels are.
+fn is_layer(name: &str) -> bool {
+    name.starts_with("sigma.") || name.starts_with("covariance.") || name.starts_with("variance.")
+}
+
+/// Makes sure that the mean of such samples means something.
+fn check(frame: &FrameHeader) -> Result<()> {
+    let advice = match frame.metadata.quantity {
+        QuantityKind::Xyy | QuantityKind::Lab | QuantityKind::Luv | QuantityKind::Cct | QuantityKind::Srgb => {
+            "which are not linear in light; average XYZ, and convert the average"
+        }
+        QuantityKind::ColorDifference => "which has no sign; average the colors",
+        QuantityKind::ExpectedElectrons => "without noise, which has nothing to average",
+        _ => return Ok(()),
+    };
+    Err(frame.refuse(format!("it holds {}, {advice}", frame.holds())))
+}
+
+impl Average {
+    fn add(&mut self, frame: &mut FrameReader) -> Result<()> {
+        check(frame.header())?;
+        let mut rows = MarkedRows::of(frame, Saturated::Kept);
+        let all = rows.header().clone();
+        let mut header = rows.unmarked();
+        let planes = header.geometry.channels.iter().position(|name| is_layer(name));
+        header.geometry.channels.truncate(planes.unwrap_or(header.geometry.channels.len()));
+        let (kept, width, height) = (header.geometry.row_samples(), header.geometry.width, header.geometry.height);
+        let layer = rows.layer;
+        let averaging = self.averaging;
+        let seen = match &mut self.seen {
+            Some(seen) => {
+                averaging.record_of([seen.exposures.first(), &header])?;
+                seen.exposures.take(&header)?;
+                seen.had_layers |= planes.is_some();
+                seen
+            }
+            none => {
+                let samples = match averaging.combine {
+                    Combine::Mean => Samples::Mean(Running::new(kept * height)),
+                    _ => Samples::All(FrameStack::new(kept * height)?),
+                };
+                let (full, marks) = (vec![0; width * height], vec![0; width * height]);
+                none.insert(Seen {
+                    exposures: Exposures::of(&header),
+                    had_layers: planes.is_some(),
+                    samples,
+                    full,
+                    marks,
+                })
+            }
+        };
+        if let Samples::Mean(running) = &mut seen.samples {
+            running.begin();
+        }
+        let step = rows.natural_rows().max(64).min(height.max(1));
+        let (mut buffer, mut band) = (Vec::new(), Vec::new());
+        let mut y = 0;
+        while y < height {
+            let count = step.min(height - y);
+            buffer.clear();
+            band.clear();
+            rows.read(count, &mut buffer)?;
+            for (index, row) in buffer.chunks_exact(all.geometry.row_samples()).enumerate() {
+                band.extend_from_slice(&row[..kept]);
+                let Some(layer) = layer else { continue };
+                let pixels = (y + index) * width..(y + index + 1) * width;
+                let counts = seen.full[pixels.clone()].iter_mut().zip(&mut seen.marks[pixels]);
+                for ((full, marks), mark) in counts.zip(&row[layer * width..][..width]) {
+                    let bits = bits(*mark);
+                    *full += u32::from(bits & SATURATED != 0);
+                    *marks |= (bits & !SATURATED).to_le_bytes()[0];
+                }
+            }
+            match &mut seen.samples {
+                Samples::Mean(running) => running.add(y * kept, &band),
+                Samples::All(stack) => stack.add(&band)?,
+            }
+            y += count;
+        }
+        Ok(())
+    }
+}
+
+/// What an average is made of, ready to be written.
+pub struct Averaged {
+    /// Its head.
+    pub header: FrameHeader,
+    seen: Seen,
+    averaging: Averaging,
+    layers: Option<PixelLayers>,
+    has_marks: bool,
+    /// Saturated pixels.
+    pub saturated: u64,
+    /// Warnings.
+    pub warnings: Vec<String>,
+}
+
+impl Averaged {
+    fn of(mut seen: Seen, averaging: Averaging, wants_layers: bool) -> Result<Self> {
+        let mut header = seen.exposures.first().clone();
+        let frames = seen.samples.frames();
+        let mut record = averaging.record(frames);
+        let mut warnings = Vec::new();
+        let metadata = &mut header.metadata;
+        if let Some(before) = &metadata.average {
+            record = AverageRecord { frames: before.frames.saturating_mul(record.frames), ..record };
+        }
+        let name = averaging.name();
+        metadata.average = Some(ExposuresRecord::of(record, metadata.quantity, metadata.demosaic.is_some()));
+        (metadata.predicted, metadata.uncertainty, metadata.saturated_share, metadata.samples) =
+            (None, None, None, None);
+        metadata.mask_bits.clear();
+        if !seen.exposures.are_alike() {
+            metadata.scene = None;
+            warnings.push(format!(
+                "{}: frames differ in more than the number of the exposure; nothing is predicted of their average",
+                header.name
+            ));
+        }
+        // A median is what it would be while fewer than half of its samples are full.
+        let least = if averaging.combine == Combine::Median { frames.div_ceil(2) } else { 1 };
+        let mut saturated = 0;
+        for (marks, full) in seen.marks.iter_mut().zip(&seen.full) {
+            if *full as usize >= least {
+                *marks |= SATURATED.to_le_bytes()[0];
+                saturated += 1;
+            }
+        }
+        header.name = format!("the {name} of {frames} frames, the first {}", header.name);
+        let layers = match wants_layers || seen.had_layers {
+            true => Some(PixelLayers::of(&header)?),
+            false => None,
+        };
+        if let Some(layers) = &layers {
+            header.geometry.channels.extend(layers.names().iter().map(|name| (*name).to_owned()));
+            let residual = header.metadata.color.as_ref().and_then(|color| color.matrix_residual.clone());
+            header.metadata.uncertainty = Some(Coverage::noise_only(residual));
+        }
+        let has_marks = seen.marks.iter().any(|marks| *marks != 0);
+        Ok(Self { header, seen, averaging, layers, has_marks, saturated, warnings })
+    }
+
+    /// The head of the frame that is written: with the layer of marks where there are any, and the format holds it.
+    pub fn marked(&self, holds_layers: bool) -> FrameHeader {
+        if self.has_marks && holds_layers { with_mask(self.header.clone()) } else { self.header.clone() }
+    }
+
+    /// Writes all rows; `progress` hears the rows done. Gives the number of pixels where propagation is void.
+    ///
+    /// # Errors
+    ///
+    /// Those of the sink and of the disk.
+    pub fn write(
+        &mut self,
+        holds_layers: bool,
+        sink: &mut dyn RowSink,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<u64> {
+        /// What the rows of all frames may take at a time.
+        const ALL_BYTES: usize = 64 << 20;
+        let first = &self.seen.exposures.first().geometry;
+        let (kept, width, height) = (first.row_samples(), first.width, first.height);
+        let row_bytes = self.seen.samples.frames() * kept * size_of::<f32>();
+        let step = (ALL_BYTES / row_bytes.max(1)).clamp(1, 256);
+        let (mut void, mut made, mut all, mut out) = (0, Vec::new(), Vec::new(), Vec::new());
+        let row_out = self.marked(holds_layers).geometry.row_samples();
+        let has_marks = self.has_marks && holds_layers;
+        let mut y = 0;
+        while y < height {
+            let rows = step.min(height - y);
+            made.clear();
+            match &mut self.seen.samples {
+                Samples::Mean(running) => {
+                    made.extend(running.means()[y * kept..(y + rows) * kept].iter().map(|mean| to_sample(*mean)));
+                }
+                Samples::All(stack) => {
+                    stack.read(y * kept, rows * kept, &mut all)?;
+                    made.resize(rows * kept, 0.0);
+                    across(&all, self.averaging, &mut made);
+                }
+            }
+            out.clear();
+            out.resize(rows * row_out, 0.0);
+            let layers = self.layers.as_ref();
+            let marks = &self.seen.marks;
+            let of_row = |(index, (made, out)): (usize, (&[f32], &mut [f32]))| {
+                let at = y + index;
+                out[..kept].copy_from_slice(made);
+                let end = out.len() - if has_marks { width } else { 0 };
+                let void = layers.map_or(0, |layers| layers.fill(at, made, &mut out[kept..end]));
+                if has_marks {
+                    let of_row = marks[at * width..(at + 1) * width].iter();
+                    out[end..].iter_mut().zip(of_row).for_each(|(out, marks)| *out = f32::from(*marks));
+                }
+                void
+            };
+            let rows_made = made.par_chunks_exact(kept).zip(out.par_chunks_exact_mut(row_out));
+            void += rows_made.enumerate().map(of_row).sum::<u64>();
+            sink.write(&out)?;
+            y += rows;
+            progress(y);
+        }
+        Ok(void)
+    }
+}
+
+/// The averages of samples of which all frames' are given, one frame behind another.
+fn across(all: &[f32], averaging: Averaging, made: &mut [f32]) {
+    /// Samples that are worth a task of their own.
+    const SHARE: usize = 1 << 10;
+    let (count, samples) = (all.len() / made.len().max(1), made.len());
+    made.par_chunks_mut(SHARE).enumerate().for_each(|(share, made)| {
+        let mut of_site = Vec::with_capacity(count);
+        for (index, made) in made.iter_mut().enumerate() {
+            of_site.clear();
+            of_site.extend((0..count).map(|frame| all[frame * samples + share * SHARE + index]));
+            *made = to_sample(average(averaging.combine, &mut of_site, averaging.clip).0);
+        }
+    });
+}

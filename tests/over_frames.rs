@@ -1,0 +1,341 @@
+//! Exposures of one scene: what scatters from frame to frame and what is the same in all, beside what is predicted of both.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::analysis::statistics::{
+    OverFrames, OverFramesSettings, RepeatedRegion, RepeatedReport, Saturated, measure,
+};
+use cyanometer::camera::readout::ReadOut;
+use cyanometer::cfa::CfaPattern;
+use cyanometer::color::{Space, White};
+use cyanometer::frame::{Geometry, to_sample};
+use cyanometer::masking::Corrections;
+use cyanometer::metadata::{FrameHeader, Metadata, Scene};
+use cyanometer::numerics::significance::of_smallest;
+use cyanometer::propagation::Equations;
+use cyanometer::random::philox::philox4x32_10;
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::black::Black;
+use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
+use cyanometer::stages::darks::{DarkFrames, DarkSettings};
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::flats::FlatFrames;
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stream::{MemoryFrame, Stage};
+use cyanometer::units::QuantityKind;
+use rayon::prelude::*;
+use support::{sensor, through};
+
+/// Even numbers.
+struct Random(u32, u32);
+
+impl Random {
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        self.1 += 1;
+        let [word, ..] = philox4x32_10([self.1, 0, 0, 0], [self.0, 78]);
+        low + (high - low) * f64::from(word) * 2f64.powi(-32)
+    }
+
+    fn log(&mut self, low: f64, high: f64) -> f64 {
+        self.within(low.ln(), high.ln()).exp()
+    }
+
+    fn one_in(&mut self, many: f64) -> bool {
+        self.within(0.0, many) < 1.0
+    }
+}
+
+/// A camera and a scene.
+struct Camera {
+    readout: ReadOut,
+    electrons: [f64; 3],
+    size: [usize; 2],
+    seed: u64,
+}
+
+impl Camera {
+    /// Cameras of any kind: patterns from none to many times the noise; rows and columns; codes coarse and fine; levels at full
+    /// well and below code 0.
+    fn random(seed: u64, size: [usize; 2]) -> Self {
+        let mut random = Random(u32::try_from(seed).unwrap(), 0);
+        let mut readout = support::readout();
+        readout.dark_current_na_per_cm2 = None;
+        readout.dark_current_e_per_s = Some(random.log(10.0, 10_000.0));
+        readout.dcnu = random.log(0.01, 0.3);
+        readout.prnu = random.log(0.001, 0.05);
+        readout.read_noise_e = random.log(1.0, 20.0);
+        readout.full_well_e = 15_000.0;
+        (readout.bits, readout.bias_adu) = (14, 600.0);
+        readout.adu_per_e = random.log(0.2, 1.0);
+        let level = random.log(30.0, 9000.0);
+        let electrons = [1.0, random.within(0.5, 1.2), random.within(0.5, 1.2)].map(|share| level * share);
+        if random.one_in(3.0) {
+            let share = readout.read_noise_e.max(2.0);
+            (readout.row_noise_e, readout.column_noise_e) = (random.within(0.0, share), random.within(0.0, share));
+            (readout.dsnu_row_e, readout.dsnu_column_e) = (random.within(0.0, 3.0), random.within(0.0, 3.0));
+            (readout.prnu_row, readout.prnu_column) = (random.within(0.0, 0.003), random.within(0.0, 0.003));
+            readout.dsnu_e = random.within(0.0, 5.0);
+            readout.read_noise_e = readout.read_noise_e.max(1.0 / readout.adu_per_e);
+        }
+        readout.check().unwrap();
+        Self { readout, electrons, size, seed }
+    }
+
+    fn scene(&self, electrons: [f64; 3]) -> MemoryFrame {
+        let mut metadata = Metadata::new(QuantityKind::ExpectedElectrons);
+        let mut camera = sensor();
+        camera.readout = Some(self.readout.clone());
+        metadata.sensor = Some(camera);
+        metadata.exposure = support::expected(2, 2, |_, _, _| 0.0).header.metadata.exposure;
+        metadata.scene = Some(Scene::uniform("test", electrons));
+        let geometry = Geometry::new(self.size[0], self.size[1], &["R", "G", "B"]);
+        let header = FrameHeader { name: "test".into(), geometry, metadata };
+        support::frame(header, |_, _, channel| to_sample(electrons[channel]))
+    }
+
+    fn electrons(&self, electrons: [f64; 3], frame: u32) -> MemoryFrame {
+        let scene = self.scene(electrons);
+        let settings = NoiseSettings { seed: self.seed, sensor_seed: self.seed, frame, ..Default::default() };
+        through(&scene, &AddNoise::new(&scene.header, &settings).unwrap())
+    }
+
+    fn codes(&self, electrons: [f64; 3], frame: u32) -> MemoryFrame {
+        let noisy = self.electrons(electrons, frame);
+        through(&noisy, &Digitize::new(&noisy.header, &AdcSettings::default()).unwrap())
+    }
+
+    fn plane(&self, electrons: [f64; 3], frame: u32) -> MemoryFrame {
+        let codes = self.codes(electrons, frame);
+        through(&codes, &Mosaic::new(&codes.header, Some(CfaPattern::Grbg)).unwrap())
+    }
+}
+
+/// A plane less darks and, where there are any, over flats.
+fn corrected(plane: &MemoryFrame, darks: &[MemoryFrame], [flats, flat_darks]: [&[MemoryFrame]; 2]) -> MemoryFrame {
+    let dark_frames = DarkFrames::of(darks.to_vec()).unwrap();
+    let settings = CorrectionSettings { black: Black::None, cte: None };
+    let mut stage =
+        CorrectFrame::of(&plane.header, &settings, dark_frames.as_ref().map(DarkFrames::stack), false).unwrap();
+    let flat_frames = || {
+        let settings = DarkSettings::default();
+        FlatFrames::of(&plane.header, flats.to_vec(), [flat_darks.to_vec(), Vec::new()], None, settings, None).unwrap()
+    };
+    let flats = flat_frames().map(|surveyed| (flat_frames().unwrap(), surveyed.survey(None).unwrap()));
+    stage.note_further(flats.as_ref().map(|(flats, means)| flats.record(means)), None);
+    let mut corrections = Corrections { darks: dark_frames, dark_limits: None, flats, map: None, found: [0; 3] };
+    let mut source = MemoryFrame::new(plane.header.clone(), plane.samples.clone());
+    let mut made = MemoryFrame::new(stage.header().clone(), Vec::new());
+    corrections.run(&stage, &mut source, [false, false], &mut made, &mut |_| ()).unwrap();
+    made
+}
+
+fn demosaicked(plane: &MemoryFrame, method: Method) -> MemoryFrame {
+    through(plane, &Demosaic::new(&plane.header, method, Black::Auto, None).unwrap())
+}
+
+fn colored(camera: &MemoryFrame) -> MemoryFrame {
+    let settings = ColorSettings {
+        is_relative: false,
+        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
+        method: None,
+        residual: None,
+        space: Space::Xyz,
+        white: White::D65,
+        white_luminance: None,
+    };
+    through(camera, &ToXyz::new(&camera.header, &settings).unwrap())
+}
+
+fn over_frames(frames: &[MemoryFrame], level: Option<f64>) -> cyanometer::error::Result<(RepeatedReport, MemoryFrame)> {
+    let settings =
+        OverFramesSettings { regions: Vec::new(), saturated: Saturated::Kept, equations: Equations::Exact, level };
+    let mut statistics = OverFrames::new(settings);
+    for frame in frames {
+        statistics.add(&mut MemoryFrame::new(frame.header.clone(), frame.samples.clone()))?;
+    }
+    statistics.finish()
+}
+
+const STAGES: [&str; 8] = ["electrons", "ADU", "CFA plane", "less 3 darks", "over 5 flats", "BI", "ECI", "XYZ"];
+
+/// Frames of every stage.
+fn chain(camera: &Camera, frames: u32) -> Vec<Vec<MemoryFrame>> {
+    let darks: Vec<MemoryFrame> = (1000..1003).map(|frame| camera.plane([0.0; 3], frame)).collect();
+    let flat_darks: Vec<MemoryFrame> = (3000..3003).map(|frame| camera.plane([0.0; 3], frame)).collect();
+    let flats: Vec<MemoryFrame> = (2000..2005).map(|frame| camera.plane([6000.0; 3], frame)).collect();
+    let planes: Vec<MemoryFrame> = (0..frames).map(|frame| camera.plane(camera.electrons, frame)).collect();
+    let electrons = (0..frames).map(|frame| camera.electrons(camera.electrons, frame)).collect();
+    let codes = (0..frames).map(|frame| camera.codes(camera.electrons, frame)).collect();
+    let less: Vec<MemoryFrame> = planes.iter().map(|plane| corrected(plane, &darks, [&[], &[]])).collect();
+    let flattened = planes.iter().map(|plane| corrected(plane, &darks, [&flats, &flat_darks])).collect();
+    let of = |method| planes.iter().map(|plane| demosaicked(plane, method)).collect();
+    let eci: Vec<MemoryFrame> = less.iter().map(|plane| demosaicked(plane, Method::EffectiveColor)).collect();
+    let xyz = eci.iter().map(colored).collect();
+    vec![electrons, codes, planes.clone(), less, flattened, of(Method::Bilinear), eci, xyz]
+}
+
+fn corrected_p(region: &RepeatedRegion) -> f64 {
+    let smallest = region.tests.iter().map(|test| test.p).fold(1.0, f64::min);
+    of_smallest(smallest, region.tests.len())
+}
+
+/// Subjects and deviates of the tests of a stage; none where nothing is predicted.
+type Deviates = Vec<(String, f64)>;
+
+/// Random cameras, 2 to 24 frames of every stage: deviates have rms 1 within 4 standard errors, and none is above 5.
+/// CYANOMETER_CAMERAS sets how many.
+#[test]
+fn statistics_over_frames_are_as_predicted() {
+    let cameras: u64 = std::env::var("CYANOMETER_CAMERAS").ok().and_then(|count| count.parse().ok()).unwrap_or(24);
+    let trials: Vec<(u64, Vec<Deviates>)> = (0..cameras)
+        .into_par_iter()
+        .map(|seed| {
+            let camera = Camera::random(seed, [120, 100]);
+            let frames = [2, 3, 5, 9, 24][usize::try_from(seed % 5).unwrap()];
+            let of = |frames: &Vec<MemoryFrame>| {
+                let Ok((report, _)) = over_frames(frames, Some(1e-9)) else { return Vec::new() };
+                let tests = report.regions[0].tests.iter();
+                tests.filter_map(|test| test.z.map(|z| (format!("{:?}", test.subject), z))).collect()
+            };
+            (seed, chain(&camera, frames).iter().map(of).collect())
+        })
+        .collect();
+    let mut failures = Vec::new();
+    for (stage, name) in STAGES.iter().enumerate() {
+        for subject in [
+            "Mean",
+            "VarianceOfMeans",
+            "TemporalVariance",
+            "VarianceOfFrameMeans",
+            "CorrelationOfMeans",
+            "TemporalCorrelation",
+        ] {
+            let mut deviates: Vec<(u64, f64)> = Vec::new();
+            for (seed, stages) in &trials {
+                let of_stage = stages[stage].iter().filter(|(of, _)| *of == subject);
+                deviates.extend(of_stage.map(|(_, z)| (*seed, *z)));
+            }
+            let n = deviates.len() as f64;
+            if subject.contains("Correlation") && (2..5).contains(&stage) {
+                assert!(deviates.is_empty(), "{name}: a plane has one channel");
+                continue;
+            }
+            assert!(n >= cameras as f64, "{name}, {subject}: {n} of {cameras}");
+            let rms = (deviates.iter().map(|(_, z)| z * z).sum::<f64>() / n).sqrt();
+            let (worst, most) =
+                deviates.iter().fold((0, 0.0_f64), |at, (seed, z)| if z.abs() > at.1.abs() { (*seed, *z) } else { at });
+            // Channels that are made of the same photosites, or share rows, are as good as one; of few frames the variance of
+            // their means has the tails of χ² with one degree of freedom, whose fourth cumulant makes 6 of 0.5.
+            let apart = if stage < 5 { n } else { n / 3.0 };
+            let error = (if subject == "VarianceOfFrameMeans" { 2.5 } else { 0.5 } / apart).sqrt();
+            eprintln!("{name}, {subject}: rms {rms:.3} of {n}, ±{error:.3}; largest {most:.2} of camera {worst}");
+            let farthest = if subject == "VarianceOfFrameMeans" { 12.0 } else { 5.0 };
+            if (rms - 1.0).abs() > 4.0 * error || most.abs() > farthest {
+                failures.push(format!("{name}, {subject}: rms {rms}, largest {most} of camera {worst}"));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// Checks raise false alarms no more often than the level.
+#[test]
+fn false_alarms_are_no_more_than_the_level() {
+    let factor: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(1, |_| 4);
+    for (what, size, frames) in [("small", [16, 12], 3), ("many", [24, 20], 30), ("two", [70, 60], 2)] {
+        let seeds = factor * 60;
+        let trials: Vec<Vec<Option<f64>>> = (0..seeds)
+            .into_par_iter()
+            .map(|seed| {
+                let camera = Camera::random(10_000 + seed, size);
+                let of = |frames: &Vec<MemoryFrame>| {
+                    over_frames(frames, Some(0.05)).ok().map(|(report, _)| corrected_p(&report.regions[0]))
+                };
+                chain(&camera, frames).iter().map(of).collect()
+            })
+            .collect();
+        for (stage, name) in STAGES.iter().enumerate() {
+            let told: Vec<f64> = trials.iter().filter_map(|trial| trial[stage]).collect();
+            for level in [0.05, 0.01] {
+                let alarms = told.iter().filter(|p| **p < level).count() as f64;
+                let n = told.len() as f64;
+                eprintln!("{what}, {name}: {alarms} alarms in {n} at level {level}");
+                assert!(
+                    alarms <= n * level + 3.9 * (n * level * (1.0 - level)).sqrt() + 1.0,
+                    "{what}, {name}: {alarms} of {n}"
+                );
+            }
+        }
+    }
+}
+
+/// Two numbers of each pixel by hand, in two frames of two pixels.
+#[test]
+fn the_analysis_of_variance_is_that_of_two_ways() {
+    let mut metadata = Metadata::new(QuantityKind::Adu);
+    metadata.exposure = None;
+    let header = FrameHeader { name: "test".into(), geometry: Geometry::new(2, 1, &["Y"]), metadata };
+    let frames = [[1.0, 7.0], [5.0, 9.0], [3.0, 5.0]].map(|samples| MemoryFrame::new(header.clone(), samples.to_vec()));
+    let (report, pixels) = over_frames(&frames, None).unwrap();
+    let channel = &report.regions[0].channels[0];
+    // Means of pixels 3 and 7, of frames 4, 7 and 4; residuals about 5 + (m − 5) + (f − 5): −1, 1; 0, 0; 1, −1; and 4/2 of them.
+    assert_eq!((report.frames, channel.count, channel.mean), (3, 2, Some(5.0)));
+    let near =
+        |value: Option<f64>, expected: f64| assert!((value.unwrap() - expected).abs() < 1e-12, "{value:?} {expected}");
+    near(channel.temporal_std, 2_f64.sqrt());
+    near(channel.std_of_means, 8_f64.sqrt());
+    near(channel.fixed_std, (8.0_f64 - 2.0 / 3.0).sqrt());
+    near(channel.std_of_frame_means, 3_f64.sqrt());
+    assert_eq!(pixels.header.geometry.channels, ["Y", "variance.Y"]);
+    assert_eq!(pixels.samples, [3.0, 7.0, 4.0, 4.0]);
+}
+
+/// Frames of other sizes, exposures, cameras and scenes are refused, and so is an exposure that comes twice.
+#[test]
+fn frames_of_other_scenes_are_refused() {
+    let camera = Camera::random(3, [12, 10]);
+    let other =
+        Camera { readout: ReadOut { read_noise_e: 9.0, ..camera.readout.clone() }, ..Camera::random(3, [12, 10]) };
+    let first = camera.plane(camera.electrons, 0);
+    let next = camera.plane(camera.electrons, 1);
+    let complaint = |second: &MemoryFrame| over_frames(&[first.clone(), second.clone()], None).unwrap_err().to_string();
+    assert!(complaint(&first).contains("exposure 0 of seed 3 comes twice"));
+    assert!(complaint(&camera.plane([9.0; 3], 1)).contains("scene"));
+    assert!(complaint(&Camera::random(3, [12, 8]).plane(camera.electrons, 1)).contains("12x8"));
+    assert!(complaint(&camera.codes(camera.electrons, 1)).contains("layout"));
+    assert!(
+        complaint(&Camera { seed: 4, ..Camera::random(3, [12, 10]) }.plane(camera.electrons, 1)).contains("sensor")
+    );
+    let mut longer = next.clone();
+    longer.header.metadata.exposure.as_mut().unwrap().exposure_s *= 1.5;
+    assert!(complaint(&longer).contains("exposure"));
+    assert!(over_frames(std::slice::from_ref(&first), None).unwrap_err().to_string().contains("two exposures"));
+    // Of another read-out nothing is predicted.
+    let (report, _) = over_frames(&[first.clone(), other.plane(camera.electrons, 1)], None).unwrap();
+    assert!(report.unpredicted.unwrap().to_string().contains("differ"), "{:?}", report.unpredicted);
+    let (report, _) = over_frames(&[first, next], None).unwrap();
+    assert!(report.unpredicted.is_none() && report.regions[0].classes[0].predicted_fixed_std.is_some());
+}
+
+/// What is known of the frame of means is what is known of the means: `measure` of the one tests what that of all does.
+#[test]
+fn the_frame_of_means_is_predicted_too() {
+    for seed in 0..6 {
+        let camera = Camera::random(seed, [60, 50]);
+        let planes: Vec<MemoryFrame> = (0..8).map(|frame| camera.plane(camera.electrons, frame)).collect();
+        let (report, pixels) = over_frames(&planes, None).unwrap();
+        let mut mean = MemoryFrame::new(pixels.header.clone(), Vec::new());
+        mean.header.geometry.channels.truncate(1);
+        mean.samples = pixels.samples.chunks_exact(120).flat_map(|row| row[..60].to_vec()).collect();
+        let alone = measure(&mut mean, &[], Saturated::Kept, Equations::Exact, None).unwrap();
+        for (class, of_all) in alone.regions[0].classes.iter().zip(&report.regions[0].classes) {
+            assert_eq!(class.predicted_mean, of_all.predicted_mean);
+            assert_eq!(class.predicted_std, of_all.predicted_std_of_means);
+            assert!((class.std.unwrap() / of_all.std_of_means.unwrap() - 1.0).abs() < 1e-6);
+        }
+    }
+}
