@@ -25,6 +25,9 @@ const MOST_RANGES: f64 = 100.0;
 /// What a sensor makes of charge, in numbers: what photon transfer measures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReadOut {
+    /// Name of the setting, of gain, ISO or conversion gain, that the numbers are of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub setting: Option<String>,
     /// Photosites in a row.
     pub width: u32,
     /// Rows of photosites.
@@ -209,16 +212,7 @@ impl ReadOut {
                 format!("thousands of them, which is {electrons}"),
             );
         }
-        let noises = [
-            ("read_noise_e", self.read_noise_e),
-            ("row_noise_e", self.row_noise_e),
-            ("column_noise_e", self.column_noise_e),
-            ("dsnu_e", self.dsnu_e),
-            ("dsnu_row_e", self.dsnu_row_e),
-            ("dsnu_column_e", self.dsnu_column_e),
-            ("rts_amplitude_e", self.rts_amplitude_e),
-        ];
-        if let Some((key, noise)) = noises.into_iter().find(|(_, noise)| *noise >= self.full_well_e) {
+        if let Some((key, noise)) = self.added_e().into_iter().find(|(_, noise)| *noise >= self.full_well_e) {
             return Err(format!(
                 "`{key}` is {noise}, no less than `full_well_e`, {}; both are in electrons",
                 self.full_well_e
@@ -235,6 +229,19 @@ impl ReadOut {
             curve.check_rises([-0.5, top_code + 0.5].map(|edge| edge - self.bias_adu))?;
         }
         Ok(())
+    }
+
+    /// What is added to charge when it is read, rms or mean in e⁻, by key.
+    pub fn added_e(&self) -> [(&'static str, f64); 7] {
+        [
+            ("read_noise_e", self.read_noise_e),
+            ("row_noise_e", self.row_noise_e),
+            ("column_noise_e", self.column_noise_e),
+            ("dsnu_e", self.dsnu_e),
+            ("dsnu_row_e", self.dsnu_row_e),
+            ("dsnu_column_e", self.dsnu_column_e),
+            ("rts_amplitude_e", self.rts_amplitude_e),
+        ]
     }
 
     /// What is possible, but may not be meant: a warning each.
@@ -304,6 +311,7 @@ pub(crate) mod tests {
     /// That of the default sensor.
     pub(crate) fn kaf5101ce() -> ReadOut {
         ReadOut {
+            setting: None,
             width: 2654,
             height: 1996,
             pixel_pitch_um: Some(6.8),

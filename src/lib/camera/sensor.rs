@@ -331,6 +331,7 @@ impl From<FlatSensor> for Sensor {
             source: flat.source,
             provenance: BTreeMap::new(),
             readout: Some(ReadOut {
+                setting: None,
                 width: flat.width,
                 height: flat.height,
                 pixel_pitch_um: Some(flat.pixel_pitch_um),

@@ -16,6 +16,7 @@ const GROUPS: [(&str, &[&str]); 10] = [
         &[
             "sensor",
             "readout",
+            "setting",
             "counts",
             "peak-quantum-efficiency",
             "expose-to",

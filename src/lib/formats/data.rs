@@ -50,6 +50,8 @@ pub struct LoadedSensor {
     pub response: Option<SpectralResponse>,
     /// What was assumed, and what in its response may mislead: a warning each.
     doubts: Vec<String>,
+    /// How it was read.
+    remarks: Vec<String>,
 }
 
 /// What a user says of a sensor in place of what its file says.
@@ -57,6 +59,8 @@ pub struct LoadedSensor {
 pub struct SensorChanges {
     /// The sensor whose read-out counts in place of its own: a name or a file.
     pub readout: Option<String>,
+    /// The setting of its read-out, or of the other sensor's: one of those that the file names.
+    pub setting: Option<String>,
     /// What its relative response counts.
     pub counts: Option<Counts>,
     /// The largest quantum efficiency that its relative response stands for.
@@ -89,6 +93,11 @@ impl LoadedSensor {
     /// What was assumed, and what is possible but may not be meant: a warning each.
     pub fn doubts(&self) -> Vec<String> {
         self.doubts.iter().cloned().chain(self.sensor.doubts()).collect()
+    }
+
+    /// How it was read.
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     /// The curves of R, G and B.
@@ -132,10 +141,14 @@ pub fn load_sensor(name: &str) -> Result<LoadedSensor> {
 ///
 /// Those of [`load_sensor`], and [`Error::Format`] for changes that the sensor does not take.
 pub fn load_changed_sensor(name: &str, changes: &SensorChanges) -> Result<LoadedSensor> {
-    let Described { mut sensor, place, shown, mut doubts } = described(name)?;
+    let setting = changes.setting.as_deref();
+    let own = setting.filter(|_| changes.readout.is_none());
+    let Described { mut sensor, place, shown, mut doubts, mut remarks } = described(name, own)?;
     let mut replaced = Vec::new();
     if let Some(readout) = &changes.readout {
-        replaced = sensor.replace_readout(&load_description(readout)?)?;
+        let (other, of_other) = load_description(readout, setting)?;
+        replaced = sensor.replace_readout(&other)?;
+        remarks = of_other;
     }
     changes.apply(&mut sensor)?;
     sensor.check().map_err(|problem| Error::format(&shown, problem))?;
@@ -146,18 +159,18 @@ pub fn load_changed_sensor(name: &str, changes: &SensorChanges) -> Result<Loaded
     sensor.description = sensor.description.or(curves.about);
     let doubts = doubts.into_iter().map(|doubt| format!("sensor {}: {doubt}", sensor.name));
     let doubts = doubts.chain(replaced).collect();
-    Ok(LoadedSensor { sensor, response: response.flatten(), doubts })
+    Ok(LoadedSensor { sensor, response: response.flatten(), doubts, remarks })
 }
 
-/// A sensor as [`load_sensor`] finds it, without the curves that it names.
+/// A sensor as [`load_sensor`] finds it, in a setting of its read-out, without the curves that it names; with how it was read.
 ///
 /// # Errors
 ///
 /// Those of [`load_sensor`].
-pub fn load_description(name: &str) -> Result<Sensor> {
-    let Described { sensor, shown, .. } = described(name)?;
+pub fn load_description(name: &str, setting: Option<&str>) -> Result<(Sensor, Vec<String>)> {
+    let Described { sensor, shown, remarks, .. } = described(name, setting)?;
     sensor.check().map_err(|problem| Error::format(&shown, problem))?;
-    Ok(sensor)
+    Ok((sensor, remarks))
 }
 
 /// A sensor as its file describes it.
@@ -167,20 +180,27 @@ struct Described {
     /// The file in messages.
     shown: String,
     doubts: Vec<String>,
+    remarks: Vec<String>,
 }
 
-fn described(name: &str) -> Result<Described> {
+fn described(name: &str, setting: Option<&str>) -> Result<Described> {
     let path = Path::new(name);
     let of_file = |place: Place, shown: String, bytes: &[u8]| {
-        let sensor = yaml::parse_sensor(&shown, bytes)?;
-        Ok(Described { sensor, place, shown, doubts: Vec::new() })
+        let (sensor, told) = yaml::parse_sensor_at(&shown, bytes, setting)?;
+        let remarks = told.into_iter().map(|told| format!("sensor {}: {told}", sensor.name)).collect();
+        Ok(Described { sensor, place, shown, doubts: Vec::new(), remarks })
+    };
+    let alone = |found: Described| {
+        let check = |setting| yaml::check_only_setting(&found.shown, &found.sensor, setting);
+        setting.map_or(Ok(()), check).map(|()| found)
     };
     if path.components().count() > 1 || ends_in(path, &["yaml", "yml"]) || ends_in(path, &TABLES) {
         let place = Place::Directory(path.parent().map(Path::to_owned).unwrap_or_default());
         let bytes = read_file(path)?;
         let is_table = ends_in(path, &TABLES) || path.extension().is_none() && !has_schema(&bytes);
         if is_table {
-            return Ok(Described { sensor: of_table(path), place, shown: name.to_owned(), doubts: Vec::new() });
+            let (shown, none) = (name.to_owned(), Vec::new);
+            return alone(Described { sensor: of_table(path), place, shown, doubts: none(), remarks: none() });
         }
         return of_file(place, name.to_owned(), &bytes);
     }
@@ -192,7 +212,7 @@ fn described(name: &str) -> Result<Described> {
             of_file(Place::Directory(directory.join("sensors")), shown, &bytes)
         }
         Some((Place::BuiltIn, bytes)) => of_file(Place::BuiltIn, format!("sensor {name}"), &bytes),
-        None => of_camera(&typed)?.ok_or_else(|| unknown_sensor(name, &typed)),
+        None => of_camera(&typed)?.ok_or_else(|| unknown_sensor(name, &typed)).and_then(alone),
     }
 }
 
@@ -232,7 +252,8 @@ fn of_camera(typed: &str) -> Result<Option<Described>> {
     };
     let another = || format!("{typed} is another model, of which it is said that its sensor is the same");
     let doubts = camera.is_another(typed).then(another).into_iter().collect();
-    Ok(Some(Described { shown: format!("sensor {}", camera.name), sensor: camera.sensor(), place, doubts }))
+    let shown = format!("sensor {}", camera.name);
+    Ok(Some(Described { shown, sensor: camera.sensor(), place, doubts, remarks: Vec::new() }))
 }
 
 /// The cameras of the table of responses, and where it is.

@@ -189,8 +189,16 @@ fn of_bytes(kind: Kind, path: &Path, bytes: &[u8], place: &str) -> Option<Known>
     let is_table = ends_in(path, &["csv"]);
     match kind {
         Kind::Sensors if !is_table => {
-            let sensor: Sensor = yaml::parse_sensor(&shown, bytes).ok()?;
-            let has = parts(&sensor);
+            let settings = yaml::settings_of(bytes);
+            let own = yaml::parse_sensor(&shown, bytes);
+            let sensor = match (own, settings.first()) {
+                (Err(_), Some(first)) => yaml::parse_sensor_at(&shown, bytes, Some(first)).ok()?.0,
+                (own, _) => own.ok()?,
+            };
+            let mut has = parts(&sensor);
+            if let (false, Some(readout)) = (settings.is_empty(), has.last_mut()) {
+                readout.push_str(&format!(", settings {}", settings.join(", ")));
+            }
             named(stem, sensor.description.unwrap_or(sensor.name)).map(|known| Known { has, ..known })
         }
         Kind::Matrices if !is_table => {

@@ -36,6 +36,7 @@ mod response_import;
 pub mod response_table;
 pub mod resume;
 pub mod sequence;
+mod settings;
 pub mod spectral;
 pub mod stack;
 pub mod standard;

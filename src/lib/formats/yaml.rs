@@ -2,6 +2,7 @@
 
 use super::foreign::{yaml_complaint, yaml_problem};
 use super::keys::KeyPage;
+use super::settings::{self, Settings};
 use super::{yaml_guard, yaml_writer};
 use crate::analysis::characterization::{CameraMatrix, MATRIX_SCHEMA};
 use crate::camera::readout::ReadOut;
@@ -51,21 +52,128 @@ pub fn parse_strict<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8]) -
     parse_parts(name, bytes, &[])
 }
 
-/// Reads a sensor file, with its parts or flat; unknown keys are errors as for [`parse_strict`], in the parts too.
+/// Reads a sensor file, with its parts or flat, in the setting of its own; unknown keys are errors as for [`parse_strict`], in the
+/// parts too.
 ///
 /// # Errors
 ///
-/// As [`parse_strict`].
+/// As [`parse_strict`]; [`Error::Format`] where it has several settings and none of its own.
 pub fn parse_sensor(name: &str, bytes: &[u8]) -> Result<Sensor> {
+    parse_sensor_at(name, bytes, None).map(|(sensor, _)| sensor)
+}
+
+/// The same in a setting that it has, with what came up.
+///
+/// # Errors
+///
+/// As [`parse_sensor`]; [`Error::Format`] where it has no such setting.
+pub fn parse_sensor_at(name: &str, bytes: &[u8], setting: Option<&str>) -> Result<(Sensor, Vec<String>)> {
     let raw = parse_raw(name, checked_text(name, bytes)?)?;
     check_schema(name, &raw, KeyPage::Sensor)?;
-    if !is_flat(&raw) {
-        let schema = raw.get("schema").and_then(Value::as_str);
-        if let Some(other) = schema.filter(|schema| *schema != SENSOR_SCHEMA) {
-            let problem = format!("schema is `{other}`, not `{SENSOR_SCHEMA}` or `{FLAT_SENSOR_SCHEMA}`");
-            return Err(Error::format(name, problem));
+    let settings =
+        if is_flat(&raw) { None } else { Settings::of(&raw).map_err(|problem| Error::format(name, problem))? };
+    if let Some(settings) = settings {
+        check_sensor(name, &raw)?;
+        return at_setting(name, &settings, setting);
+    }
+    let sensor = parse_plain_sensor(name, bytes, &raw)?;
+    if let Some(setting) = setting {
+        check_only_setting(name, &sensor, setting)?;
+    }
+    Ok((sensor, Vec::new()))
+}
+
+/// The names of the settings that a sensor file has.
+pub fn settings_of(bytes: &[u8]) -> Vec<String> {
+    let raw = checked_text("", bytes).and_then(|text| parse_raw("", text));
+    raw.ok().and_then(|raw| Settings::of(&raw).ok().flatten()).map_or_else(Vec::new, |settings| settings.names())
+}
+
+/// Makes sure that a setting is the one of a sensor that has no others.
+///
+/// # Errors
+///
+/// [`Error::Format`].
+pub fn check_only_setting(name: &str, sensor: &Sensor, setting: &str) -> Result<()> {
+    let own = sensor.readout.as_ref().and_then(|readout| readout.setting.as_deref());
+    match own {
+        Some(own) if own.eq_ignore_ascii_case(setting.trim()) => Ok(()),
+        Some(own) => {
+            Err(Error::format(name, format!("it has the setting `{own}` alone, not `{setting}`")).change(&["setting"]))
         }
-        check_provenance(name, &raw)?;
+        None => Err(Error::format(name, "it has no settings").leave_out(&["setting"])),
+    }
+}
+
+/// A sensor in one of the settings of its file, all of which are looked at.
+fn at_setting(name: &str, settings: &Settings, wanted: Option<&str>) -> Result<(Sensor, Vec<String>)> {
+    let read = |called: &str, raw: &Mapping| {
+        let sensor: Sensor = parse_made(called, raw, &sensor_parts())?;
+        sensor.check().map_err(|problem| Error::format(called, problem))?;
+        Ok(sensor)
+    };
+    let of_setting = |(setting, raw): (&str, Mapping)| read(&format!("{name}, in the setting `{setting}`"), &raw);
+    // What is missing in all is told of the file itself.
+    let own = read(name, &settings.base());
+    if own.is_err() && settings.left_open().is_none() {
+        return own.map(|sensor| (sensor, Vec::new()));
+    }
+    let all = settings.each().map(of_setting).collect::<Result<Vec<Sensor>>>()?;
+    let names = settings.names().join("`, `");
+    let place = match wanted {
+        Some(wanted) => settings.find(wanted).map_err(|problem| Error::format(name, problem).change(&["setting"]))?,
+        None => None,
+    };
+    let Some(chosen) = place.and_then(|place| all.into_iter().nth(place)) else {
+        return match (own, settings.left_open(), wanted) {
+            (Ok(own), _, Some(_)) => Ok((own, Vec::new())),
+            (Ok(own), _, None) => Ok((
+                own,
+                vec![format!("its `readout` counts as it stands; it has the settings `{names}` too (--setting)")],
+            )),
+            (Err(_), Some(key), None) => {
+                let problem = format!("its `readout` has no `{key}` but in its settings: `{names}`");
+                Err(Error::format(name, problem).give(&["setting"]))
+            }
+            (Err(error), ..) => Err(error),
+        };
+    };
+    let gain = settings.base().get("readout").and_then(|readout| readout.get("adu_per_e")).and_then(Value::as_f64);
+    Ok(with_own_matrix(chosen, gain))
+}
+
+/// A sensor whose matrix is that of its file, where the gain was `gain`: XYZ of an ADU go with its inverse.
+fn with_own_matrix(mut sensor: Sensor, gain: Option<f64>) -> (Sensor, Vec<String>) {
+    let chosen = sensor.readout.as_ref().map(|readout| readout.adu_per_e);
+    let told = match (&mut sensor.xyz_from_camera, gain, chosen) {
+        (None, ..) => None,
+        (Some(matrix), Some(gain), Some(chosen)) if gain > 0.0 => {
+            if gain != chosen {
+                matrix.as_flattened_mut().iter_mut().for_each(|element| *element *= gain / chosen);
+            }
+            None
+        }
+        (matrix, ..) => {
+            *matrix = None;
+            Some("its `xyz_from_camera` is of a gain that its file does not tell, and is left out".to_owned())
+        }
+    };
+    (sensor, told.into_iter().collect())
+}
+
+/// Refuses another schema than ours, and a provenance of what there is not.
+fn check_sensor(name: &str, raw: &Mapping) -> Result<()> {
+    let schema = raw.get("schema").and_then(Value::as_str);
+    if let Some(other) = schema.filter(|schema| *schema != SENSOR_SCHEMA) {
+        let problem = format!("schema is `{other}`, not `{SENSOR_SCHEMA}` or `{FLAT_SENSOR_SCHEMA}`");
+        return Err(Error::format(name, problem));
+    }
+    check_provenance(name, raw)
+}
+
+fn parse_plain_sensor(name: &str, bytes: &[u8], raw: &Mapping) -> Result<Sensor> {
+    if !is_flat(raw) {
+        check_sensor(name, raw)?;
         return parse_parts(name, bytes, &sensor_parts());
     }
     if let Some((part, _)) = sensor_parts().iter().find(|(part, _)| raw.contains_key(*part)) {
@@ -81,7 +189,8 @@ fn check_provenance(name: &str, raw: &Mapping) -> Result<()> {
     let known = field_names::<Provenance>();
     for (key, origin) in told {
         let key = key.as_str().unwrap_or("?");
-        if !of_sensors().any(|path| path == key) {
+        let of_setting = key.strip_prefix(settings::IN_PROVENANCE).map(|key| format!("readout.{key}"));
+        if !of_sensors().any(|path| path == of_setting.as_deref().unwrap_or(key)) {
             let near = nearest(key, of_sensors(), |path| path.len() / 2);
             let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
             let problem = format!("`provenance` tells of `{key}`, which no sensor file has{near}");
@@ -213,16 +322,32 @@ fn parse_parts<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8], parts:
     // A misspelled key first: that another is missing then follows from it.
     check_keys(name, &raw, field_names::<T>(), parts)?;
     let (typed, unknown) = parse::<T>(name, &raw, text)?;
+    check_unknown(name, &unknown, parts)?;
+    Ok(typed)
+}
+
+/// The same of a document that was made of another, whose places it does not know.
+fn parse_made<T: DeserializeOwned + Serialize>(name: &str, raw: &Mapping, parts: &[(&str, Keys)]) -> Result<T> {
+    check_keys(name, raw, field_names::<T>(), parts)?;
+    let typed: T = serde_yaml::from_value(Value::Mapping(raw.clone())).map_err(|error| yaml_complaint(name, &error))?;
+    let known = serde_yaml::to_value(&typed).map_err(|error| yaml_complaint(name, &error))?;
+    let unknown = known.as_mapping().map(|known| unknown_keys(raw, known)).unwrap_or_default();
+    check_unknown(name, &unknown, parts)?;
+    Ok(typed)
+}
+
+/// Refuses keys that are not written back, unless they are known.
+fn check_unknown(name: &str, unknown: &Mapping, parts: &[(&str, Keys)]) -> Result<()> {
     // A key that is not written back may be one of those that are left out where they are 0.
     let is_known = |key: &str, inner: &str| parts.iter().any(|(part, fields)| *part == key && fields.contains(&inner));
-    for (key, inner) in &unknown {
+    for (key, inner) in unknown {
         let key = key.as_str().unwrap_or("?");
         let all = inner.as_mapping().into_iter().flatten().map(|(inner, value)| (inner.as_str().unwrap_or("?"), value));
         if let Some((inner, _)) = all.into_iter().find(|(inner, value)| value.is_mapping() || !is_known(key, inner)) {
             return Err(Error::format(name, format!("`{key}` has an unknown key `{inner}`; remove it")));
         }
     }
-    Ok(typed)
+    Ok(())
 }
 
 /// Reads metadata; keys that this version does not know are kept. A flat sensor gets its parts.

@@ -214,6 +214,18 @@ impl Metadata {
         level.filter(|_| is_level(&self.black_by_row) && is_level(&self.black_by_column))
     }
 
+    /// Slope of the converter in ADU per e⁻: as it was set, or as the sensor has it.
+    pub fn adu_per_e(&self) -> Option<f64> {
+        let of_sensor = || self.sensor.as_ref()?.readout.as_ref().map(|readout| readout.adu_per_e);
+        self.adc.map(|adc| adc.adu_per_e).or_else(of_sensor)
+    }
+
+    /// What the converter adds, in ADU: as it was set, or as the sensor has it.
+    pub fn bias_adu(&self) -> Option<f64> {
+        let of_sensor = || self.sensor.as_ref()?.readout.as_ref().map(|readout| readout.bias_adu);
+        self.adc.map(|adc| adc.bias_adu).or_else(of_sensor)
+    }
+
     /// Whether charge transfer was simulated, which mixes neighbors.
     pub fn is_transferred(&self) -> bool {
         self.noise.as_ref().is_some_and(|noise| noise.cte.is_some())
@@ -242,9 +254,8 @@ impl Metadata {
                 self.quantity.unit()
             )
         });
-        let of_sensor = || self.sensor.as_ref()?.readout.as_ref().map(|readout| readout.bias_adu);
         let are_codes = self.quantity == QuantityKind::Adu && self.correction.is_none() && self.demosaic.is_none();
-        let bias = self.adc.map(|adc| adc.bias_adu).or_else(of_sensor).filter(|_| are_codes);
+        let bias = self.bias_adu().filter(|_| are_codes);
         let black = self.black_level_adu.map(|level| level.sites().into_iter().fold(f64::INFINITY, f64::min));
         let level = black.zip(bias).filter(|(black, bias)| *black < bias - 1.0).map(|(black, bias)| {
             format!("its black level, {black} ADU, is below the bias of its converter, {bias} ADU")

@@ -114,6 +114,7 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     told.tell("cfa", if is_told { Origin::Measured } else { Origin::Assumed }, of_cfa);
     let whole = |extent: usize| u32::try_from(extent).map_err(|_| lacking("the frames are too large"));
     let readout = ReadOut {
+        setting: None,
         width: whole(geometry.width)?,
         height: whole(geometry.height)?,
         pixel_pitch_um: None,

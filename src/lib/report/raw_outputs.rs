@@ -126,6 +126,7 @@ fn read_out(reader: &FrameReader) -> Result<String> {
     let [width, height] =
         [raw.geometry.width, raw.geometry.height].map(|extent| u32::try_from(extent).unwrap_or(u32::MAX));
     let readout = ReadOut {
+        setting: None,
         width,
         height,
         pixel_pitch_um: None,

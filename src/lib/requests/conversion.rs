@@ -219,6 +219,11 @@ impl Conversion {
             let text = format!("{shown} was fitted for the sensor {of_matrix}, but the frame comes from {of_frame}");
             notes.push(Note::Warning(text));
         }
+        if let Some(doubt) = matrix.doubt_of_gain(frame.metadata.adu_per_e()) {
+            let shown =
+                self.matrix.as_ref().map_or("the matrix of its sensor".into(), |file| file.display().to_string());
+            notes.push(Note::Warning(format!("{}: {shown} {doubt}", frame.name)));
+        }
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
         notes
     }
@@ -247,11 +252,11 @@ pub(super) fn doubt_of_white(white: White, is_relative: bool) -> Option<Note> {
 /// [`Error::Usage`] where there is none.
 pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
     let Metadata { sensor, relative_matrix, exposure, .. } = &frame.metadata;
-    let measured = sensor.as_ref().and_then(|sensor| Some((sensor.name.clone(), sensor.xyz_from_camera?)));
+    let measured = sensor.as_ref().and_then(|sensor| Some((sensor, sensor.xyz_from_camera?)));
     match (measured, relative_matrix) {
-        (Some((name, xyz_from_camera)), relative) if exposure.is_some() || relative.is_none() => {
-            let note = format!("{}: no --matrix is named; that of its sensor, {name}, counts", frame.name);
-            Ok((CameraMatrix::of_sensor(name, xyz_from_camera), Note::Remark(note)))
+        (Some((sensor, xyz_from_camera)), relative) if exposure.is_some() || relative.is_none() => {
+            let note = format!("{}: no --matrix is named; that of its sensor, {}, counts", frame.name, sensor.name);
+            Ok((CameraMatrix::of_sensor(sensor, xyz_from_camera), Note::Remark(note)))
         }
         (_, Some(relative)) => {
             let note = format!("{}: no --matrix is named; XYZ are relative, by {}", frame.name, relative.method);

@@ -108,6 +108,9 @@ pub struct SensorChoice {
     /// Sensor whose read-out counts in place of that of the frame's sensor, or of --sensor
     #[arg(long, value_name = "NAME|FILE")]
     pub readout: Option<String>,
+    /// Setting of the read-out of --readout, or of --sensor: one of those that its file has
+    #[arg(long, value_name = "NAME")]
+    pub setting: Option<String>,
 }
 
 impl SensorChoice {
@@ -119,27 +122,34 @@ impl SensorChoice {
     /// Those of [`data::load_sensor`].
     pub fn apply(&self, reader: &mut FrameReader) -> Result<Vec<Note>> {
         let own = reader.header_mut().metadata.sensor.clone();
-        let (loaded, doubts) = match (&self.sensor, &self.readout, own) {
+        let setting = self.setting.as_deref();
+        let (loaded, doubts, remarks) = match (&self.sensor, &self.readout, own) {
+            (None, None, _) if setting.is_some() => {
+                let problem = "a frame has the numbers of one setting, and files of sensors those of others";
+                return Err(Error::Usage(problem.into()).give(&["sensor", "readout"]));
+            }
             (None, None, _) => return Ok(Vec::new()),
             (Some(sensor), readout, _) => {
-                let changes = SensorChanges { readout: readout.clone(), ..SensorChanges::default() };
+                let (readout, setting) = (readout.clone(), self.setting.clone());
+                let changes = SensorChanges { readout, setting, ..SensorChanges::default() };
                 let loaded = data::load_changed_sensor(sensor, &changes)?;
-                (loaded.sensor.clone(), loaded.doubts())
+                (loaded.sensor.clone(), loaded.doubts(), loaded.remarks().to_vec())
             }
             (None, Some(readout), Some(mut own)) => {
-                let lost = own.replace_readout(&data::load_description(readout)?)?;
+                let (other, remarks) = data::load_description(readout, setting)?;
+                let lost = own.replace_readout(&other)?;
                 let doubts = lost.into_iter().chain(own.doubts()).collect();
-                (own, doubts)
+                (own, doubts, remarks)
             }
             (None, Some(readout), None) => {
-                let other = data::load_description(readout)?;
+                let (other, remarks) = data::load_description(readout, setting)?;
                 other.readout()?;
                 let doubts = other.doubts();
-                (other, doubts)
+                (other, doubts, remarks)
             }
         };
         let doubts = doubts.into_iter().chain(contradictions(reader.header_mut(), &loaded));
-        let notes = doubts.map(Note::Warning).collect();
+        let notes = doubts.map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)).collect();
         reader.header_mut().metadata.sensor = Some(loaded);
         Ok(notes)
     }

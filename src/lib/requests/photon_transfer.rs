@@ -15,7 +15,7 @@ use crate::formats::frame_list::{self, FrameKind, FrameList, ListedFrame};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::many::OneOfMany;
 use crate::frame::Geometry;
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, Metadata};
 use crate::stream::RowSource;
 use crate::text::counted;
 use crate::units::QuantityKind;
@@ -411,6 +411,14 @@ fn check_alike(first: &FrameHeader, other: &FrameHeader) -> Result<()> {
     }
     if other.metadata.white_level_adu != first.metadata.white_level_adu {
         return differs("white level");
+    }
+    let are_others =
+        |of: fn(&Metadata) -> Option<f64>| of(&first.metadata).zip(of(&other.metadata)).is_some_and(|(a, b)| a != b);
+    if are_others(Metadata::adu_per_e) {
+        return differs("setting of the gain");
+    }
+    if are_others(Metadata::bias_adu) {
+        return differs("bias");
     }
     let body = |frame: &FrameHeader| {
         let metadata = &frame.metadata;

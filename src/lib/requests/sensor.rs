@@ -16,6 +16,9 @@ pub struct SensorRequest {
     /// Sensor whose read-out counts in place of the sensor's own
     #[arg(long, value_name = "NAME|FILE")]
     pub readout: Option<String>,
+    /// Setting of the read-out, of gain, ISO or conversion gain: one of those that the sensor file has
+    #[arg(long, value_name = "NAME")]
+    pub setting: Option<String>,
     /// What a relative response counts: energy, signal per watt, or quanta, signal per photon; by default what the sensor
     /// file says, or energy
     #[arg(long, value_parser = values::choice::<Counts>())]
@@ -28,7 +31,13 @@ pub struct SensorRequest {
 impl Default for SensorRequest {
     /// The default sensor as its file has it.
     fn default() -> Self {
-        Self { sensor: data::DEFAULT_SENSOR.into(), readout: None, counts: None, peak_quantum_efficiency: None }
+        Self {
+            sensor: data::DEFAULT_SENSOR.into(),
+            readout: None,
+            setting: None,
+            counts: None,
+            peak_quantum_efficiency: None,
+        }
     }
 }
 
@@ -39,10 +48,11 @@ impl SensorRequest {
     ///
     /// Those of [`data::load_changed_sensor`].
     pub fn load(&self) -> Result<(LoadedSensor, Vec<Note>)> {
-        let Self { sensor, readout, counts, peak_quantum_efficiency } = self.clone();
-        let changes = SensorChanges { readout, counts, peak_quantum_efficiency };
+        let Self { sensor, readout, setting, counts, peak_quantum_efficiency } = self.clone();
+        let changes = SensorChanges { readout, setting, counts, peak_quantum_efficiency };
         let loaded = data::load_changed_sensor(&sensor, &changes)?;
-        let notes = loaded.doubts().into_iter().map(Note::Warning).collect();
+        let remarks = loaded.remarks().iter().cloned().map(Note::Remark);
+        let notes = loaded.doubts().into_iter().map(Note::Warning).chain(remarks).collect();
         Ok((loaded, notes))
     }
 }

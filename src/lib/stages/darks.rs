@@ -1,6 +1,7 @@
 //! Dark and bias frames that count as one: what they make of it comes off a frame while its rows are read.
 
 use crate::camera::levels::BlackLevels;
+use crate::camera::readout::ReadOut;
 use crate::camera::readout::dark_current_law;
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
@@ -420,11 +421,22 @@ pub(super) fn check_alike(frame: &FrameHeader, dark: &FrameHeader) -> Result<()>
     {
         return differs("sensor", b, a);
     }
+    if let Some((key, unit, its, theirs)) = other_codes(&frame.metadata, &dark.metadata) {
+        return differs(key, format!("{theirs} {unit}"), format!("{its} {unit}"));
+    }
     let seed = |metadata: &Metadata| metadata.noise.as_ref().map(|noise| noise.sensor_seed);
     match (seed(&frame.metadata), seed(&dark.metadata)) {
         (Some(a), Some(b)) if a != b => differs("sensor seed", b.to_string(), a.to_string()),
         _ => Ok(()),
     }
+}
+
+/// What makes the codes of two frames of one sensor mean other charges, as far as both tell: its key and unit, and both numbers.
+fn other_codes(a: &Metadata, b: &Metadata) -> Option<(&'static str, &'static str, f64, f64)> {
+    let both = |of: fn(&Metadata) -> Option<f64>| of(a).zip(of(b));
+    let slopes = both(Metadata::adu_per_e).map(|(a, b)| ("adu_per_e", "ADU per electron", a, b));
+    let biases = both(Metadata::bias_adu).map(|(a, b)| ("bias_adu", "ADU", a, b));
+    slopes.into_iter().chain(biases).find(|(.., a, b)| !is_same(*a, *b))
 }
 
 /// What makes the dark signal of two frames differ.
@@ -441,7 +453,16 @@ pub(super) fn differences(frame: &FrameHeader, dark: &FrameHeader) -> Vec<String
             dark.name, frame.name
         ))
     };
-    pairs.into_iter().filter_map(warn).collect()
+    let added = |frame: &FrameHeader| frame.readout().map(ReadOut::added_e).ok();
+    let other = added(dark).zip(added(frame)).and_then(|(its, theirs)| {
+        let mut both = its.into_iter().zip(theirs);
+        let ((key, its), (_, theirs)) = both.find(|((_, its), (_, theirs))| its != theirs)?;
+        Some(format!(
+            "{}: its {key} is {its}, but that of {} is {theirs}, which predictions take for both",
+            dark.name, frame.name
+        ))
+    });
+    pairs.into_iter().filter_map(warn).chain(other).collect()
 }
 
 /// Dark frames read in step; memory is some rows of them, and what comes off.

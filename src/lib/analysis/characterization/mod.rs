@@ -39,6 +39,9 @@ pub struct CameraMatrix {
     /// Method of the fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
+    /// Slope of the converter that it is for, ADU per e⁻, where it is known; XYZ that are relative do not depend on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adu_per_e: Option<f64>,
     /// Unit of the elements.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
@@ -86,9 +89,23 @@ impl CameraMatrix {
     }
 
     /// That of a sensor's description.
-    pub fn of_sensor(sensor: String, xyz_from_camera: [[f64; 3]; 3]) -> Self {
+    pub fn of_sensor(sensor: &Sensor, xyz_from_camera: [[f64; 3]; 3]) -> Self {
         let method = Some("xyz_from_camera of the sensor".into());
-        Self { sensor: Some(sensor), method, ..Self::bare(MATRIX_UNIT, xyz_from_camera) }
+        let adu_per_e = sensor.readout.as_ref().map(|readout| readout.adu_per_e);
+        Self { sensor: Some(sensor.name.clone()), method, adu_per_e, ..Self::bare(MATRIX_UNIT, xyz_from_camera) }
+    }
+
+    /// What XYZ are off by, in words, of codes of such a slope in ADU per e⁻; none where it is that of the matrix, or nobody knows.
+    pub fn doubt_of_gain(&self, adu_per_e: Option<f64>) -> Option<String> {
+        /// Slopes that differ by no more are one, written with other digits.
+        const SAME_SLOPE: f64 = 1e-6;
+        let (own, other) = self.adu_per_e.filter(|_| !self.is_relative()).zip(adu_per_e)?;
+        let ratio = other / own;
+        ((ratio - 1.0).abs() > SAME_SLOPE).then(|| {
+            format!(
+                "is for {own} ADU per electron, and the codes have {other}: XYZ come out {ratio:.4} times what they are"
+            )
+        })
     }
 
     /// A matrix of which no more is known.
@@ -98,6 +115,7 @@ impl CameraMatrix {
             sensor: None,
             filter: None,
             method: None,
+            adu_per_e: None,
             unit: Some(unit.into()),
             xyz_from_camera,
             white_xy: None,
@@ -246,6 +264,9 @@ impl CameraMatrix {
             self.unit.as_ref().filter(|unit| ![MATRIX_UNIT, RELATIVE_MATRIX_UNIT].contains(&unit.as_str()))
         {
             return Err(format!("its unit is `{unit}`; understood are `{MATRIX_UNIT}` and `{RELATIVE_MATRIX_UNIT}`"));
+        }
+        if let Some(slope) = self.adu_per_e.filter(|slope| !(*slope > 0.0 && slope.is_finite())) {
+            return Err(format!("`adu_per_e` is {slope}; it must be above 0"));
         }
         if crate::color::matrix(&self.xyz_from_camera).try_inverse().is_none() {
             return Err("its `xyz_from_camera` is singular: three signals would not give three stimuli".into());

@@ -110,6 +110,8 @@ mod tests {
                 ("provenance.", &["KEY"]),
                 ("provenance.KEY.", field_names::<Provenance>()),
                 ("readout.", field_names::<ReadOut>()),
+                ("readout.", &["settings"]),
+                ("readout.settings.", &["name", "KEY"]),
                 ("readout.linearization.", field_names::<Linearization>()),
                 ("response.", field_names::<ResponseFiles>()),
                 ("response.quantum_efficiency.", field_names::<CurveFile>()),

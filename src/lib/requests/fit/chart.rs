@@ -265,6 +265,7 @@ impl ChartFit {
         Ok(CameraMatrix {
             method: Some(format!("chart, total least squares; XYZ in the light {}", expected.light)),
             sensor: seen.frame.as_ref().and_then(|frame| frame.metadata.camera_names().next().map(str::to_owned)),
+            adu_per_e: self.luminance.and_then(|_| seen.frame.as_ref()?.metadata.adu_per_e()),
             white_xy: Some(chromaticity(expected.white)),
             condition: Some(found.condition),
             rank: Some(3),

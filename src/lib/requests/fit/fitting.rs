@@ -79,6 +79,7 @@ impl Fitting<'_> {
                 None => glass.file.clone(),
             }),
             method: Some(self.fit.regression.name().into()),
+            adu_per_e: self.sensor.readout.as_ref().map(|readout| readout.adu_per_e),
             unit: Some(MATRIX_UNIT.into()),
             xyz_from_camera: fitted.xyz_from_camera,
             white_xy: None,

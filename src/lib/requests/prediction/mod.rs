@@ -109,6 +109,9 @@ impl Default for NoisePrediction {
 pub struct Conditions {
     /// Name of the sensor.
     pub sensor: String,
+    /// Name of the setting of its read-out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub setting: Option<String>,
     /// Exposure time and lens; of a library that of the samples which have none of their own.
     pub exposure_s: f64,
     /// Relative aperture.
@@ -286,6 +289,7 @@ impl NoisePrediction {
     fn conditions(&self, sensor: &Sensor, exposure: Exposure, color: Option<&ColorSettings>) -> Result<Conditions> {
         Ok(Conditions {
             sensor: sensor.name.clone(),
+            setting: sensor.readout()?.setting.clone(),
             exposure_s: exposure.exposure_s,
             f_number: exposure.f_number,
             temperature_k: self.noise.temperature_k.unwrap_or(sensor.readout()?.temperature_k),
@@ -331,6 +335,9 @@ impl NoisePrediction {
             let text = format!("{} was fitted for the sensor {of_matrix}, not {}", path.display(), sensor.name);
             notes.push(Note::Warning(text));
         }
+        let adu_per_e = sensor.readout.as_ref().map(|readout| readout.adu_per_e);
+        let doubt = matrix.doubt_of_gain(adu_per_e).map(|doubt| format!("{} {doubt}", path.display()));
+        notes.extend(doubt.map(Note::Warning));
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
         Ok(Some(ColorSettings {
             is_relative: matrix.is_relative(),
