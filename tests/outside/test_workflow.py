@@ -153,6 +153,20 @@ class Pins(unittest.TestCase):
 
 
 @unittest.skipIf(MISSING, WITHOUT)
+class Given(SweepCase):
+    """What results hang on, besides the sweep itself."""
+
+    def test_tables_that_a_sensor_file_names_count(self):
+        from sweep import files
+
+        (self.directory / "qe.csv").write_text("wavelength_nm,R,G,B\n400,1,1,1\n700,1,1,1\n")
+        sensor = self.directory / "s.yaml"
+        sensor.write_text("response:\n  quantum_efficiency: {file: qe.csv}\n  cover_glass: {file: not-here.csv}\n")
+        self.assertEqual(files.of_sensor(sensor), [str(sensor), str(self.directory / "qe.csv")])
+        self.assertEqual(files.of_sensor(pathlib.Path("kaf-5101ce")), [])
+
+
+@unittest.skipIf(MISSING, WITHOUT)
 class Mistakes(SweepCase):
     """What is wrong with a sweep is told before anything runs."""
 
