@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::numerics::quadrature::{self, Rule};
-use ndarray::{Array2, ArrayView1};
+use ndarray::{Array1, Array2, ArrayView1, Axis};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -254,6 +254,12 @@ pub struct SpectralLibrary {
 }
 
 impl SpectralLibrary {
+    /// One radiance, a sample for each wavelength.
+    pub fn of_one(wavelength_nm: Vec<f64>, radiance: Vec<f64>) -> Self {
+        let samples = Array1::from_vec(radiance).insert_axis(Axis(0));
+        Self { wavelength_nm, radiance: samples, columns: 1 }
+    }
+
     /// One radiance of the library.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use super::photon_transfer::photon_transfer;
 use super::{ReportFormat, form_of, shown, table, unwritable};
 use crate::camera::optics::Exposure;
-use crate::chain::{ChainPrediction, StagePrediction};
+use crate::chain::{ChainPrediction, ChainStage, StagePrediction};
 use crate::error::Result;
 use crate::formats::plots::{PlotFormat, write_plot};
 use crate::formats::{output, register, yaml_writer};
@@ -94,17 +94,22 @@ pub fn prediction(found: &PredictedNoise, format: Option<ReportFormat>) -> Resul
         (ReportFormat::Json, _) => serde_json::to_string_pretty(&whole).map(|text| text + "\n").map_err(unwritable),
         (ReportFormat::Yaml, _) => yaml_writer::document("the report", &whole),
         (ReportFormat::Text, Budgets::Scene(scene)) => {
-            let text = text(scene, conditions.quadrature_error) + "\n" + &conditions.uncertainty.in_words() + "\n";
+            let own = conditions.true_xyz.map_or(String::new(), |own| own_xyz(scene, own));
+            let text =
+                text(scene, conditions.quadrature_error) + "\n" + &own + &conditions.uncertainty.in_words() + "\n";
             Ok(visible(&text).into_owned())
         }
         (ReportFormat::Csv, Budgets::Scene(scene)) => stages_csv(scene),
-        (_, Budgets::Sweep(levels)) => scenes_csv(&[], levels.iter().map(|scene| (Vec::new(), scene))),
+        (_, Budgets::Sweep(levels)) => scenes_csv(&[], levels.iter().map(|scene| (Vec::new(), scene, None))),
         (_, Budgets::Samples(samples)) => {
             let lead = |one: &SamplePrediction| {
                 let Exposure { exposure_s, f_number, .. } = one.exposure;
                 vec![one.sample.to_string(), cell(Some(exposure_s)), cell(Some(f_number))]
             };
-            scenes_csv(&["sample", "exposure_s", "f_number"], samples.iter().map(|one| (lead(one), &one.prediction)))
+            scenes_csv(
+                &["sample", "exposure_s", "f_number"],
+                samples.iter().map(|one| (lead(one), &one.prediction, one.true_xyz)),
+            )
         }
     }
 }
@@ -146,10 +151,13 @@ fn stages_csv(found: &ChainPrediction) -> Result<String> {
 /// One row per scene, `lead` in front.
 fn scenes_csv<'a>(
     lead: &[&str],
-    found: impl Iterator<Item = (Vec<String>, &'a ChainPrediction)> + Clone,
+    found: impl Iterator<Item = (Vec<String>, &'a ChainPrediction, Option<[f64; 3]>)> + Clone,
 ) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let first = found.clone().next().map(|(_, scene)| scene);
+    let first = found.clone().next();
+    let own = first.as_ref().and_then(|(.., own)| *own).map(|_| ["true_X", "true_Y", "true_Z"]);
+    let own = own.into_iter().flatten().map(str::to_owned);
+    let first = first.map(|(_, scene, _)| scene);
     let stages = first.map(|scene| scene.stages.as_slice()).unwrap_or_default();
     let each = |stage: &StagePrediction| {
         let name = stage.stage.name();
@@ -161,8 +169,8 @@ fn scenes_csv<'a>(
     let head = lead.iter().copied().chain(["electrons_R", "electrons_G", "electrons_B"]).map(str::to_owned);
     let delta_e = first.and_then(|scene| scene.noise_delta_e).map(|_| ["noise_delta_e", "noise_delta_e_std"]);
     let delta_e = delta_e.into_iter().flatten().map(str::to_owned);
-    writer.write_record(head.chain(stages.iter().flat_map(each)).chain(delta_e)).map_err(unwritable)?;
-    for (lead, scene) in found {
+    writer.write_record(head.chain(stages.iter().flat_map(each)).chain(delta_e).chain(own)).map_err(unwritable)?;
+    for (lead, scene, own) in found {
         let signal = scene.electrons.map(|e| cell(Some(e)));
         let cells = scene.stages.iter().flat_map(|stage| {
             (0..3).flat_map(move |i| {
@@ -171,10 +179,22 @@ fn scenes_csv<'a>(
             })
         });
         let delta_e = scene.noise_delta_e.map(|found| [found.mean, found.std].map(|value| cell(Some(value))));
-        let row = lead.into_iter().chain(signal).chain(cells).chain(delta_e.into_iter().flatten());
+        let own = own.into_iter().flatten().map(|value| cell(Some(value)));
+        let row = lead.into_iter().chain(signal).chain(cells).chain(delta_e.into_iter().flatten()).chain(own);
         writer.write_record(row).map_err(unwritable)?;
     }
     finish(writer)
+}
+
+/// XYZ of a spectrum itself, and how far those of the camera are off without noise.
+fn own_xyz(found: &ChainPrediction, own: [f64; 3]) -> String {
+    let Some(stage) = found.stages.iter().find(|stage| stage.stage == ChainStage::Xyz) else { return String::new() };
+    let [x, y, z] = own.map(|value| shown("mean", Some(value)));
+    let off: [String; 3] = std::array::from_fn(|i| match stage.mean[i] / own[i] - 1.0 {
+        off if off.is_finite() => format!("{:+.2} %", 100.0 * off),
+        _ => "?".into(),
+    });
+    format!("XYZ of the spectrum itself: {x} {y} {z}; those of the camera are off by {}\n", off.join(", "))
 }
 
 fn text(found: &ChainPrediction, quadrature_error: Option<[f64; 3]>) -> String {

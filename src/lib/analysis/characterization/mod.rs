@@ -301,16 +301,49 @@ pub fn signals(
     observer: &Observer,
     grid: &WavelengthGrid,
 ) -> Result<Signals> {
-    let at = if grid.is_coarser_than(&library.wavelength_nm) {
-        let knots = observer.matching.iter().flat_map(|curve| curve.wavelengths_nm().iter().copied());
-        grid.points_between(knots.chain(response.knots_nm()).chain(library.wavelength_nm.iter().copied()))
-    } else {
-        grid.points()?
-    };
-    let wavelengths = at.0.clone();
-    let (camera, matching) = weights(sensor, response, observer, at)?;
-    let project = |weights: &[f64], what: &str| -> Result<Vec<f64>> {
-        let folded = fold(&library.wavelength_nm, &wavelengths, weights);
+    let at = points(library, observer, response.knots_nm(), grid)?;
+    let camera = electron_weights(sensor, response, &at)?;
+    Ok(Signals {
+        camera: sums(library, &at.0, &camera, "the camera", grid)?,
+        xyz: sums(library, &at.0, &matching_weights(observer, &at), "the observer", grid)?,
+    })
+}
+
+/// Works out the absolute XYZ of every radiance of a library, shape samples × 3, as [`signals`] does.
+///
+/// # Errors
+///
+/// Those of the grid; [`Error::Data`] where the library leaves out more than 10⁻³ of what the observer responds to.
+pub fn stimuli(library: &SpectralLibrary, observer: &Observer, grid: &WavelengthGrid) -> Result<DMatrix<f64>> {
+    let at = points(library, observer, Vec::new(), grid)?;
+    sums(library, &at.0, &matching_weights(observer, &at), "the observer", grid)
+}
+
+/// Wavelengths and their widths: those of the grid, or, where the library's are closer, all between which curves are straight.
+fn points(
+    library: &SpectralLibrary,
+    observer: &Observer,
+    others: impl IntoIterator<Item = f64>,
+    grid: &WavelengthGrid,
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    if !grid.is_coarser_than(&library.wavelength_nm) {
+        return grid.points();
+    }
+    let knots = observer.matching.iter().flat_map(|curve| curve.wavelengths_nm().iter().copied());
+    Ok(grid.points_between(knots.chain(others).chain(library.wavelength_nm.iter().copied())))
+}
+
+/// Three sums over the wavelengths of every radiance of a library, shape samples × 3.
+fn sums(
+    library: &SpectralLibrary,
+    wavelengths: &[f64],
+    weights: &Three,
+    what: &str,
+    grid: &WavelengthGrid,
+) -> Result<DMatrix<f64>> {
+    let mut made = DMatrix::zeros(library.radiance.nrows(), 3);
+    for (j, weights) in weights.iter().enumerate() {
+        let folded = fold(&library.wavelength_nm, wavelengths, weights);
         if folded.uncovered > 1e-3 {
             return Err(Error::Data(format!(
                 "the library does not cover {:.1} % of what {what} responds to between {} and {} nm",
@@ -319,19 +352,11 @@ pub fn signals(
                 grid.end_nm
             )));
         }
-        let dot = |row: ndarray::ArrayView1<'_, f64>| row.iter().zip(&folded.weights).map(|(l, w)| l * w).sum();
-        Ok(library.radiance.rows().into_iter().map(dot).collect())
-    };
-    let columns = |all: [Vec<f64>; 3], what: &str| -> Result<DMatrix<f64>> {
-        let mut made = DMatrix::zeros(library.radiance.nrows(), 3);
-        for (j, weights) in all.iter().enumerate() {
-            for (i, value) in project(weights, what)?.into_iter().enumerate() {
-                made[(i, j)] = value;
-            }
+        for (i, row) in library.radiance.rows().into_iter().enumerate() {
+            made[(i, j)] = row.iter().zip(&folded.weights).map(|(l, w)| l * w).sum();
         }
-        Ok(made)
-    };
-    Ok(Signals { camera: columns(camera, "the camera")?, xyz: columns(matching, "the observer")? })
+    }
+    Ok(made)
 }
 
 /// Camera and observer at single wavelengths: what maximum ignorance is fitted on.
@@ -347,7 +372,7 @@ pub fn responses(
 ) -> Result<Signals> {
     let at = grid.points()?;
     let count = at.0.len();
-    let (camera, xyz) = weights(sensor, response, observer, at)?;
+    let (camera, xyz) = (electron_weights(sensor, response, &at)?, matching_weights(observer, &at));
     let columns = |weights: [Vec<f64>; 3]| DMatrix::from_fn(count, 3, |i, j| weights[j][i]);
     Ok(Signals { camera: columns(camera), xyz: columns(xyz) })
 }
@@ -355,22 +380,22 @@ pub fn responses(
 /// Weights of three sums over wavelengths.
 type Three = [Vec<f64>; 3];
 
-/// What a radiance of 1 W cm⁻² sr⁻¹ nm⁻¹ at each of some wavelengths, with their weights, adds to the signals of R, G, B and
-/// to X, Y, Z.
-fn weights(
+/// What a radiance of 1 W cm⁻² sr⁻¹ nm⁻¹ at each of some wavelengths, with their weights, adds to the signals of R, G and B.
+fn electron_weights(
     sensor: &Sensor,
     response: &SpectralResponse,
-    observer: &Observer,
-    (wavelengths, widths): (Vec<f64>, Vec<f64>),
-) -> Result<(Three, Three)> {
+    (wavelengths, widths): &(Vec<f64>, Vec<f64>),
+) -> Result<Three> {
     let unit = Exposure { exposure_s: 1.0, f_number: 1.0, lens_transmittance: 1.0 };
     let per_exposure = sensor.readout()?.adu_per_e / unit.exposure_s_sr();
-    let camera = response
-        .electron_weights(sensor, &unit, &wavelengths, &widths)?
-        .map(|class| class.into_iter().map(|electrons| electrons * per_exposure).collect());
-    let matching = observer.matching.each_ref().map(|curve| -> Vec<f64> {
+    let classes = response.electron_weights(sensor, &unit, wavelengths, widths)?;
+    Ok(classes.map(|class| class.into_iter().map(|electrons| electrons * per_exposure).collect()))
+}
+
+/// What the same adds to X, Y, Z.
+fn matching_weights(observer: &Observer, (wavelengths, widths): &(Vec<f64>, Vec<f64>)) -> Three {
+    observer.matching.each_ref().map(|curve| -> Vec<f64> {
         let weight = |(&nm, width): (&f64, &f64)| LUMINOUS_EFFICACY_LM_PER_W * CM2_PER_M2 * curve.at(nm) * width;
-        wavelengths.iter().zip(&widths).map(weight).collect()
-    });
-    Ok((camera, matching))
+        wavelengths.iter().zip(widths).map(weight).collect()
+    })
 }

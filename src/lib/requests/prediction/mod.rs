@@ -11,7 +11,7 @@ use super::options::{ExposureChoice, NoiseChoice, SignalLevel, SpectrumChoice, S
 use super::scene::{Scene, Uniform};
 use super::values;
 use crate::analysis::characterization::evaluation::{Filling, SampleExposure, of_sample, per_exposure};
-use crate::analysis::characterization::signals;
+use crate::analysis::characterization::{signals, stimuli};
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::{CfaPattern, Class};
@@ -130,6 +130,9 @@ pub struct Conditions {
     /// Of the expected electrons of R, G and B, relative; where a spectrum was summed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature_error: Option<[f64; 3]>,
+    /// Absolute XYZ of the spectrum itself, Y in cd m⁻², which no matrix has come near; where one leads to absolute XYZ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub true_xyz: Option<[f64; 3]>,
     /// What standard deviations count.
     pub uncertainty: Coverage,
 }
@@ -142,6 +145,9 @@ pub struct SamplePrediction {
     /// Its exposure.
     #[serde(flatten)]
     pub exposure: Exposure,
+    /// Absolute XYZ of its spectrum itself, Y in cd m⁻²; where a matrix leads to absolute XYZ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub true_xyz: Option<[f64; 3]>,
     /// The prediction.
     #[serde(flatten)]
     pub prediction: ChainPrediction,
@@ -222,12 +228,20 @@ impl NoisePrediction {
 
     /// One scene, or one after another level of it.
     fn of_scene(&self) -> Result<PredictedNoise> {
-        let Uniform { sensor, exposure, electrons, quadrature_error, mut notes } = self.scene()?.uniform()?;
+        let Uniform { sensor, exposure, electrons, quadrature_error, radiance, mut notes } = self.scene()?.uniform()?;
         if self.sweep.is_some() && electrons == [0.0; 3] {
             return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
         }
         let color = self.color(&sensor, &mut notes)?;
-        let conditions = Conditions { quadrature_error, ..self.conditions(&sensor, exposure, color.as_ref())? };
+        let is_absolute = color.as_ref().is_some_and(|color| !color.is_relative) && self.sweep.is_none();
+        let true_xyz = radiance.filter(|_| is_absolute).and_then(|radiance| {
+            let grid = WavelengthGrid::default();
+            let found = data::load_observer().and_then(|observer| stimuli(&radiance, &observer, &grid));
+            found.map_err(|why| notes.push(Note::Remark(format!("no XYZ of the spectrum itself: {why}")))).ok()
+        });
+        let true_xyz = true_xyz.map(|xyz| [xyz[(0, 0)], xyz[(0, 1)], xyz[(0, 2)]]);
+        let conditions =
+            Conditions { quadrature_error, true_xyz, ..self.conditions(&sensor, exposure, color.as_ref())? };
         let mut predictor = self.predictor(&sensor, exposure, color)?;
         let budgets = match self.sweep {
             Some(sweep) => Budgets::Sweep(predictions(&mut predictor, sweep.levels(), electrons)?),
@@ -271,7 +285,9 @@ impl NoisePrediction {
             let exposure = exposing.of(per_exposure, loaded.sensor.readout()?.full_well_e)?;
             let mut predictor = self.predictor(&loaded.sensor, exposure, color.clone())?;
             let prediction = predictor.predict(per_exposure.map(|e| e * exposure.exposure_s_sr()))?;
-            Ok(SamplePrediction { sample, exposure, prediction })
+            let is_absolute = color.as_ref().is_some_and(|color| !color.is_relative);
+            let true_xyz = is_absolute.then(|| std::array::from_fn(|i| signals.xyz[(sample, i)]));
+            Ok(SamplePrediction { sample, exposure, true_xyz, prediction })
         };
         let found = (0..library.radiance.nrows())
             .into_par_iter()
@@ -298,6 +314,7 @@ impl NoisePrediction {
             equations: self.equations,
             patch: self.patch,
             quadrature_error: None,
+            true_xyz: None,
             uncertainty: Coverage::noise_only(color.and_then(|color| color.residual.clone())),
         })
     }
@@ -412,6 +429,37 @@ mod tests {
         let conditions = &found.conditions;
         assert_eq!((conditions.method, conditions.exposure_s, conditions.quadrature_error), ("eci", 0.033, None));
         assert_eq!(found.notes, []);
+    }
+
+    /// The XYZ of the spectrum itself: of a flat one the sums of the color matching functions [CIE15, 1931, 1 nm]. They hang on neither
+    /// exposure nor matrix.
+    #[test]
+    fn a_spectrum_has_xyz_of_its_own() {
+        let directory = tempfile::tempdir().unwrap();
+        let flat: String = (360..=830).map(|nm| format!("{nm},0.001\n")).collect();
+        let path = directory.path().join("flat.csv");
+        std::fs::write(&path, format!("wavelength_nm,radiance W m-2 sr-1 nm-1\n{flat}")).unwrap();
+        let mut wanted = NoisePrediction::default();
+        let matrix = directory.path().join("m.yaml");
+        let text = "schema: cyanometer-matrix/1\nunit: cd m-2 per (ADU s-1 sr-1)\n\
+                    xyz_from_camera: [[2, 0, 0], [0, 3, 0], [0, 0, 4]]\n";
+        std::fs::write(&matrix, text).unwrap();
+        wanted.matrix = Some(matrix);
+        wanted.subject.input = Some(path);
+        for fraction in [0.2, 0.6] {
+            wanted.level.expose_to = Some(fraction);
+            let own = wanted.run().unwrap().conditions.true_xyz.unwrap();
+            for (value, sum) in own.iter().zip([106.8655, 106.8569, 106.8922]) {
+                // Sums are printed to seven digits.
+                assert!((value / (0.683 * sum) - 1.0).abs() < 1e-6, "{value} {sum}");
+            }
+        }
+        wanted.sweep = Some(Sweep { start_e: 10.0, end_e: 1000.0, count: 3, is_logarithmic: true });
+        wanted.level.expose_to = None;
+        assert_eq!(wanted.run().unwrap().conditions.true_xyz, None);
+        wanted.sweep = None;
+        wanted.matrix = None;
+        assert_eq!(wanted.run().unwrap().conditions.true_xyz, None);
     }
 
     #[test]

@@ -15,6 +15,7 @@ use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
+use crate::spectrum::SpectralLibrary;
 use crate::stages::render::Rendering;
 use crate::stages::saturation::{Counted, FullLevels};
 use crate::stream::{Counts, MemoryFrame, RowSink};
@@ -43,6 +44,8 @@ pub struct Uniform {
     pub electrons: [f64; 3],
     /// Relative error of them by the sum over wavelengths; none where no spectrum was summed or none is possible.
     pub quadrature_error: Option<[f64; 3]>,
+    /// Its radiance, where a spectrum was summed.
+    pub radiance: Option<SpectralLibrary>,
     /// What came up.
     pub notes: Vec<Note>,
 }
@@ -86,7 +89,8 @@ impl Scene {
             Light::Uniform { electrons, .. } => {
                 let (quadrature_error, mut notes) = (found.metadata.quadrature_error, found.notes);
                 notes.extend(found.losses.note());
-                Ok(Uniform { sensor, exposure, electrons, quadrature_error, notes })
+                let radiance = found.radiance;
+                Ok(Uniform { sensor, exposure, electrons, quadrature_error, radiance, notes })
             }
             Light::Image { source, .. } => {
                 Err(Error::Usage(format!("{source}: it holds many spectra; choose one with --sample N")))

@@ -16,7 +16,7 @@ use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::frame::Geometry;
 use crate::requests::notes::{self, Note};
-use crate::spectrum::chart_columns;
+use crate::spectrum::{SpectralLibrary, chart_columns};
 use crate::stream::RowSource;
 
 /// Error of a sum over wavelengths from which it is a warning.
@@ -127,7 +127,9 @@ impl Scene {
         let index = self.choose(table)?;
         warn(index, &mut found.notes)?;
         let electrons = electrons_of(index)?;
-        found.metadata.quadrature_error = seen.quadrature_error(&radiance_of(index)?);
+        let radiance = radiance_of(index)?;
+        found.metadata.quadrature_error = seen.quadrature_error(&radiance);
+        found.radiance = Some(SpectralLibrary::of_one(table.wavelength_nm.clone(), radiance));
         let source = if count > 1 { format!("{name}: {}", table.columns[index]) } else { name };
         Ok(Light::Uniform { electrons, source })
     }
@@ -161,6 +163,7 @@ impl Scene {
         }
         let (electrons, radiance) = image.pixel([sample % width, sample / width], &spectral)?;
         found.metadata.quadrature_error = seen.quadrature_error(&radiance);
+        found.radiance = Some(SpectralLibrary::of_one(spectral.wavelength_nm.clone(), radiance));
         Ok(Light::Uniform { electrons, source: format!("{}: sample {sample}", header.name) })
     }
 

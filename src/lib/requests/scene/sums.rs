@@ -9,7 +9,7 @@ use crate::formats::data::LoadedSensor;
 use crate::metadata::{Metadata, UpsamplingRecord};
 use crate::numerics::quadrature::Rule;
 use crate::requests::notes::Note;
-use crate::spectrum::WavelengthGrid;
+use crate::spectrum::{SpectralLibrary, WavelengthGrid};
 use crate::units::QuantityKind;
 
 /// Share of a sensor's response beyond the summed wavelengths from which it is told.
@@ -20,6 +20,8 @@ pub(super) struct Found {
     /// What is left out, and the error of the sum over wavelengths.
     pub(super) metadata: Metadata,
     pub(super) notes: Vec<Note>,
+    /// The radiance of a uniform scene, where a spectrum was summed.
+    pub(super) radiance: Option<SpectralLibrary>,
     /// How the spectra of a picture are made up, and what is lost of its colors on the way.
     pub(super) upsampling: Option<UpsamplingRecord>,
     pub(super) losses: Losses,
@@ -29,7 +31,7 @@ impl Found {
     /// Nothing yet.
     pub(super) fn none() -> Self {
         let metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-        Self { metadata, notes: Vec::new(), upsampling: None, losses: Losses::default() }
+        Self { metadata, notes: Vec::new(), radiance: None, upsampling: None, losses: Losses::default() }
     }
 }
 
