@@ -318,8 +318,8 @@ const MISTAKES: [(&str, i32, &str); 103] = [
     (
         "measure noisy.exr --output-format xml",
         BAD_USAGE,
-        "`xml` is no value for --output-format <OUTPUT_FORMAT>; it is one of text, json, yaml, csv; did you mean `yaml`? See \
-         `measure --help`",
+        "`xml` is no value for --output-format <OUTPUT_FORMAT>; it is one of text, txt, json, yaml, yml, csv; did you mean `yml`? \
+         See `measure --help`",
     ),
     ("color-difference xyz.exr", BAD_USAGE, "<B> is missing; see `color-difference --help`"),
     ("color-difference xyz.exr missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),

@@ -313,7 +313,7 @@ impl FrameHeader {
     pub fn without_exposure(&self) -> Self {
         let mut head = Self { name: String::new(), ..self.clone() };
         head.metadata.history.clear();
-        head.metadata.samples = None;
+        (head.metadata.samples, head.metadata.file) = (None, None);
         if let Some(noise) = &mut head.metadata.noise {
             noise.frame = 0;
         }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
+use std::collections::HashSet;
 
 /// What is known of exposures that came so far.
 #[derive(Debug, Clone)]
@@ -10,14 +11,14 @@ pub struct Exposures {
     head: FrameHeader,
     are_alike: bool,
     /// Seed and number of each that tells them.
-    drawn: Vec<(u64, u32)>,
+    drawn: HashSet<(u64, u32)>,
 }
 
 impl Exposures {
     /// Those that `first` begins.
     pub fn of(first: &FrameHeader) -> Self {
         let mut exposures =
-            Self { first: first.clone(), head: first.without_exposure(), are_alike: true, drawn: Vec::new() };
+            Self { first: first.clone(), head: first.without_exposure(), are_alike: true, drawn: HashSet::new() };
         exposures.drawn.extend(drawn(first));
         exposures
     }
@@ -41,12 +42,11 @@ impl Exposures {
     pub fn take(&mut self, frame: &FrameHeader) -> Result<()> {
         self.check(frame)?;
         if let Some((seed, number)) = drawn(frame) {
-            if self.drawn.contains(&(seed, number)) {
+            if !self.drawn.insert((seed, number)) {
                 let problem =
                     format!("exposure {number} of seed {seed} comes twice; its noise would count as that of two");
                 return Err(frame.refuse(problem));
             }
-            self.drawn.push((seed, number));
         }
         self.are_alike &= frame.without_exposure() == self.head;
         Ok(())
