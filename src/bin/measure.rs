@@ -5,7 +5,7 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::plots;
 use cyanometer::report::{self, Findings, ReportFormat};
-use cyanometer::requests::options::Output;
+use cyanometer::requests::options::{Makes, Output};
 use cyanometer::requests::{self, described::DescribedInput, measurement::Measurement, values};
 use cyanometer::stream::RowSource;
 use std::path::PathBuf;
@@ -48,7 +48,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     arguments.measurement.announce(&frames.inputs, arguments.output.as_deref())?;
     let output = arguments.output.as_deref();
     let format = report::form_of(arguments.output_format, output).unwrap_or(ReportFormat::Text);
-    let reports = Output { is_of_reports: true, ..Output::default() };
+    let reports = Output { makes: Makes::Reports, ..Output::default() };
     if let Some(statistics) = arguments.measurement.over_frames() {
         let measured = session.each_frame::<Arguments>(frames, &reports, |turn| {
             let mut reader = arguments.input.with(turn.input.clone()).open_all()?;

@@ -18,6 +18,11 @@ use crate::stream::{Counts, Footprint, Stage};
 use crate::units::QuantityKind;
 use nalgebra::{Matrix3, Vector3};
 
+/// Whether a channel is a layer that tells how uncertain pixels are, by its name.
+pub fn is_layer(name: &str) -> bool {
+    ["sigma.", "covariance.", "variance."].iter().any(|kind| name.starts_with(kind))
+}
+
 /// A stage that makes three planes of pixels whose noise can be told from the noise of demosaicked R, G and B.
 pub trait Propagating: Stage {
     /// Names of the layers, in the order in which files have them.

@@ -311,7 +311,8 @@ class Usage(Errors):
 
     def test_unknown_option_and_missing_source(self):
         of_several = {
-            "add-noise", "average-frames", "correct-frame", "demosaic", "digitize", "import-raw", "measure", "mosaic", "to-xyz",
+            "add-noise", "average-frames", "correct-frame", "demosaic", "digitize", "import-raw", "measure", "mosaic", "stack-frames",
+            "to-xyz",
         }
         for program in PROGRAMS:
             self.refused([program, "--colour-of-the-sky"], BAD_USAGE, "--colour-of-the-sky")

@@ -14,7 +14,7 @@ const fn example(reason: &'static str, command: &'static str) -> Example {
 }
 
 /// The examples of each program, in an order in which they can be run.
-pub const EXAMPLES: [(&str, &[Example]); 16] = [
+pub const EXAMPLES: [(&str, &[Example]); 17] = [
     (
         "fit-matrix",
         &[
@@ -116,6 +116,13 @@ pub const EXAMPLES: [(&str, &[Example]); 16] = [
                 "L*a*b* of what is there already as XYZ, under D50",
                 "to-xyz --space lab --white d50 --white-luminance 5000 xyz.exr -o lab.exr",
             ),
+        ],
+    ),
+    (
+        "stack-frames",
+        &[
+            example("Many frames in one Zarr store, which xarray reads", "stack-frames noisy-*.exr -o night.zarr"),
+            example("Some of them out of it, into a pipe", "stack-frames night.zarr --frames 2..5 | measure"),
         ],
     ),
     (

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::formats::places::is_numbered;
 use crate::formats::sequence::Sequence;
 use crate::requests::batch::{self, Job};
-use crate::requests::options::{Following, Input, Output};
+use crate::requests::options::{Following, Input, Makes, Output};
 use clap::CommandFactory;
 use std::ops::Range;
 use std::path::Path;
@@ -35,6 +35,8 @@ enum Order {
     Kept,
     /// One after another into a stream, in which nothing can follow what failed.
     Stream,
+    /// One after another into what is made of all, or not at all.
+    Whole,
 }
 
 impl Session {
@@ -96,7 +98,11 @@ impl Session {
         }
         // Frames of a stream, and those that go into one, have an order; so have those of a single file that holds several.
         let in_order = output.is_stream() || input.is_pipe();
-        let order = if output.is_of_reports { Order::Kept } else { Order::Stream };
+        let order = match output.makes {
+            Makes::Frames => Order::Stream,
+            Makes::Reports => Order::Kept,
+            Makes::One => Order::Whole,
+        };
         if in_order || jobs.len() * drawn == 1 {
             let all = || exposures.clone().map_or_else(|| vec![None], |range| range.map(Some).collect());
             let one = |session: &Self, index: usize| {
@@ -114,6 +120,28 @@ impl Session {
             session.on(job.input.as_deref()).frames(job, input, &output, &[exposure], &work)
         };
         session.all::<A>(jobs.len() * drawn, "frames", Order::Any, one)
+    }
+
+    /// Does something with one thing after another, so many, until one fails.
+    ///
+    /// # Errors
+    ///
+    /// Those of `work`.
+    pub fn one_by_one<T>(
+        &self,
+        count: u64,
+        things: impl IntoIterator<Item = T>,
+        work: impl Fn(&Self, T) -> Result<()>,
+    ) -> Result<()> {
+        let bar = self.progress(usize::try_from(count).unwrap_or(usize::MAX));
+        let quiet = self.without_progress();
+        for thing in things {
+            work(&quiet, thing)?;
+            self.warn_of_doubts();
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        Ok(())
     }
 
     /// Works on all frames of an input, each exposed several times.
@@ -195,17 +223,18 @@ impl Session {
             });
         }
         // What is left where no thread could be started, or all.
-        some(order == Order::Stream);
+        some(matches!(order, Order::Stream | Order::Whole));
         bar.finish_and_clear();
         let (failed, tried) = (failed.into_inner(), next.into_inner().min(count));
         if is_closed.into_inner() {
             return Err(Error::ClosedPipe);
         }
         if failed > 0 {
-            let rest = match (tried < count, failed < count) {
-                (true, _) => "; the stream ends there",
-                (false, true) => "; the others are done",
-                (false, false) => "",
+            let rest = match (order, failed < count) {
+                (Order::Whole, _) => "; nothing is made of the others",
+                (Order::Stream, _) if tried < count => "; the stream ends there",
+                (_, true) => "; the others are done",
+                (_, false) => "",
             };
             return Err(Error::Data(format!("{failed} of {count} {what} failed{rest}")));
         }

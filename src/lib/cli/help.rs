@@ -66,7 +66,7 @@ const GENERAL: &str = "General";
 /// What a user may say of a frame, in programs that read one.
 const OF_A_FRAME: [&str; 6] = ["cfa", "white", "black", "exposure", "f-number", "lens-transmittance"];
 /// Options that mean more to a program than to others; none is what the program is for.
-const APART: [(&str, &str, Option<&str>); 20] = [
+const APART: [(&str, &str, Option<&str>); 21] = [
     ("demosaic", "black", None),
     ("correct-frame", "black", None),
     ("correct-frame", "dark", None),
@@ -74,6 +74,7 @@ const APART: [(&str, &str, Option<&str>); 20] = [
     ("mosaic", "cfa", None),
     ("import-raw", "crop", None),
     ("predict-noise", "dark-frames", None),
+    ("stack-frames", "frames", Some(READ)),
     ("photon-transfer", "cfa", Some(READ)),
     ("photon-transfer", "white", Some(READ)),
     ("render-radiance", "part", Some("The scene")),

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};
 
 /// All programs but the front door, about in the order in which a frame meets them.
-pub const PROGRAMS: [&str; 15] = [
+pub const PROGRAMS: [&str; 16] = [
     "render-radiance",
     "add-noise",
     "digitize",
@@ -20,6 +20,7 @@ pub const PROGRAMS: [&str; 15] = [
     "demosaic",
     "fit-matrix",
     "to-xyz",
+    "stack-frames",
     "average-frames",
     "measure",
     "predict-noise",

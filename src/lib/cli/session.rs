@@ -8,6 +8,7 @@ use crate::formats::input::FrameReader;
 use crate::formats::output::{Format, FrameWriter, OutputOptions};
 use crate::formats::places::{FRAME_OF, named, place};
 use crate::formats::{register, resume};
+use crate::frame::Geometry;
 use crate::masking::Masking;
 use crate::metadata::FrameHeader;
 use crate::requests::batch;
@@ -15,7 +16,7 @@ use crate::requests::correction::OpenCorrection;
 use crate::requests::options::Output;
 use crate::requests::{self, Note};
 use crate::stages::darks::DarkFrames;
-use crate::stages::saturation::with_mask;
+use crate::stages::saturation::{MASK_LAYER, with_mask};
 use crate::stream::{Counts, MemoryFrame, RowSink, RowSource, Stage};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashSet;
@@ -179,6 +180,38 @@ impl Session {
         let counts =
             self.write(&made, output, |writer, progress| masking.run(stage, &mut reader, no_darks, writer, progress))?;
         self.ended(reader, counts).map(drop)
+    }
+
+    /// Passes a frame from an open reader on to a new output as it is; what its sidecar counted is counted on.
+    ///
+    /// # Errors
+    ///
+    /// Those of reader and writer; [`Error::Usage`] where the output has no place for marks of pixels.
+    pub fn pass(&self, mut reader: FrameReader, output: &Output) -> Result<()> {
+        let mut made = reader.header().clone();
+        let has_marks =
+            made.geometry.channels.len() > 1 && made.geometry.channels.last().is_some_and(|last| last == MASK_LAYER);
+        if has_marks && !output.options().holds_layers()? {
+            return Err(Error::Usage(format!(
+                "{}: only an EXR has a layer for the marks of its pixels; write one",
+                made.name
+            )));
+        }
+        let counts = made.metadata.samples.take().map_or_else(Counts::default, |record| Counts::recorded(&record));
+        let counts = self.write(&made, output, |writer, progress| {
+            let Geometry { height, .. } = made.geometry;
+            let step = made.geometry.step_rows(reader.natural_rows()).max(1);
+            let (mut rows, mut done) = (Vec::new(), 0);
+            while done < height {
+                rows.clear();
+                reader.read(step.min(height - done), &mut rows)?;
+                writer.write(&rows)?;
+                done += step.min(height - done);
+                progress(done);
+            }
+            Ok(counts)
+        })?;
+        if counts.is_some() { Ok(()) } else { reader.drain() }
     }
 
     /// Corrects a frame from an open reader to a new output; tells whether it had to be.

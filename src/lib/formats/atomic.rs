@@ -42,9 +42,22 @@ pub fn remove_pending_now() {
 
 fn remove(pending: &[PathBuf]) {
     for path in pending {
-        // The file may be gone already; there is nobody left to tell.
-        drop(std::fs::remove_file(path));
+        // It may be gone already; there is nobody left to tell.
+        drop(std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path)));
     }
+}
+
+/// Where an output goes that will be called `target`, symbolic links followed, and the directory that it is in.
+fn place_of(target: &Path, name: &str) -> Result<(PathBuf, PathBuf)> {
+    let resolved = std::fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
+    let directory = match resolved.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    if directory.is_dir() {
+        return Ok((resolved, directory));
+    }
+    Err(Error::format(name, format!("there is no directory `{}`; make it first", directory.display())))
 }
 
 /// A named file that gets its name when it is complete.
@@ -73,20 +86,10 @@ impl AtomicFile {
         let name = target.display().to_string();
         let existing = std::fs::metadata(target).ok();
         existing.as_ref().map_or(Ok(()), |about| register::check_output(about, &name))?;
-        let resolved = std::fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
-        if resolved.is_dir() {
+        if target.is_dir() {
             return Err(Error::format(&name, "it is a directory; name a file in it"));
         }
-        let directory = match resolved.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-            _ => PathBuf::from("."),
-        };
-        if !directory.is_dir() {
-            return Err(Error::format(
-                &name,
-                format!("there is no directory `{}`; make it first", directory.display()),
-            ));
-        }
+        let (resolved, directory) = place_of(target, &name)?;
         let permissions = existing.map_or(Permissions::from_mode(0o666), |about| about.permissions());
         let (file, temporary) = match nameless(&directory, permissions.mode()) {
             Some(file) => (file, None),
@@ -135,6 +138,89 @@ impl AtomicFile {
         }
         Ok(())
     }
+}
+
+/// A directory that gets its name when all in it is complete.
+#[derive(Debug)]
+pub struct AtomicDirectory {
+    /// The name that it has meanwhile; none once it has its own.
+    temporary: Option<PathBuf>,
+    target: PathBuf,
+    name: String,
+}
+
+impl AtomicDirectory {
+    /// Makes a directory beside `target`; a symbolic link is followed.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Disk`] and [`Error::Format`] where there is no place for it.
+    pub fn create(target: &Path) -> Result<Self> {
+        let name = target.display().to_string();
+        let (target, directory) = place_of(target, &name)?;
+        let mut pending = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+        let permissions = Permissions::from_mode(0o777);
+        let made = tempfile::Builder::new().prefix(PREFIX).permissions(permissions).tempdir_in(directory);
+        let temporary = made.map_err(|e| Error::disk(&name, "write", plain(&e)))?.keep();
+        pending.push(temporary.clone());
+        Ok(Self { temporary: Some(temporary), target, name })
+    }
+
+    /// Where it is while it is filled.
+    pub fn path(&self) -> &Path {
+        self.temporary.as_deref().unwrap_or(&self.target)
+    }
+
+    /// The directory as messages call it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Gives it its name; what has that name already is removed.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Disk`]; nothing is left behind then.
+    pub fn commit(mut self) -> Result<()> {
+        let mut pending = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(temporary) = self.temporary.take() else { return Ok(()) };
+        let is_there = self.target.symlink_metadata().is_ok();
+        let named =
+            if is_there { exchange(&temporary, &self.target) } else { std::fs::rename(&temporary, &self.target) };
+        // Under the temporary name is now what was there before, or what could not get its name.
+        if is_there || named.is_err() {
+            drop(std::fs::remove_dir_all(&temporary));
+        }
+        pending.retain(|path| *path != temporary);
+        named.map_err(|e| Error::disk(&self.name, "write", plain(&e)))
+    }
+}
+
+impl Drop for AtomicDirectory {
+    fn drop(&mut self) {
+        let Some(temporary) = self.temporary.take() else { return };
+        let mut pending = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+        // What cannot be removed is told by its name.
+        drop(std::fs::remove_dir_all(&temporary));
+        pending.retain(|path| *path != temporary);
+    }
+}
+
+/// Exchanges the names of two directories: at once where the system can.
+fn exchange(one: &Path, other: &Path) -> io::Result<()> {
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        if renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE).is_ok() {
+            return Ok(());
+        }
+    }
+    let directory = other.parent().unwrap_or(Path::new("."));
+    let aside = tempfile::Builder::new().prefix(PREFIX).tempdir_in(directory)?;
+    let kept = aside.path().join("kept");
+    std::fs::rename(other, &kept)?;
+    std::fs::rename(one, other)?;
+    std::fs::rename(&kept, one)
 }
 
 /// A file with a temporary name in a directory.

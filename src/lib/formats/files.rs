@@ -2,6 +2,7 @@
 
 pub use super::places::{STDIN_NAME, STDOUT_NAME, named, sidecar_path};
 
+use super::places::is_stack;
 use super::register;
 use super::standard::open_stdin;
 use crate::error::{Error, Result};
@@ -19,6 +20,11 @@ fn open_path(path: &Path) -> Result<File> {
     let failed = |e| Error::disk(&name, "open", e);
     let file = File::open(path).map_err(failed)?;
     let about = file.metadata().map_err(failed)?;
+    if about.is_dir() && is_stack(path) {
+        let problem =
+            "it is a stack of frames; `stack-frames` takes them out, as in `stack-frames NAME.zarr | measure`";
+        return Err(Error::format(&name, problem));
+    }
     if about.is_dir() {
         return Err(Error::format(&name, "it is a directory; name a file in it"));
     }

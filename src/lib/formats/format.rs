@@ -30,6 +30,11 @@ pub trait SampleReader: Send {
     /// The project's metadata that the file carries, YAML.
     fn embedded(&self) -> Option<&str>;
 
+    /// Whether those were written when the samples were known, as a sidecar is, so that they describe them.
+    fn describes_samples(&self) -> bool {
+        false
+    }
+
     /// What the format's own tags say, in the project's terms, the rest as in [`Metadata::new`]: where no metadata of ours
     /// are found, they stand in.
     fn own_tags(&self) -> &Metadata;

@@ -10,6 +10,7 @@ use super::makers::{MakersReader, Worker};
 use super::read_ahead::Pipe;
 use super::sequence::Sequence;
 use super::viewable::{Scaling, is_scale};
+use super::zarr::{Stack, StackedFrame};
 use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
 use crate::camera::noise_profile::NoiseProfile;
@@ -25,6 +26,7 @@ use crate::units::QuantityKind;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What to open.
 #[derive(Debug, Clone, Default)]
@@ -206,6 +208,17 @@ impl FrameReader {
             return Err(Error::format(&name, "it is no raw file of a camera; the other programs read it as it is"));
         }
         Self::of(Box::new(DngReader::open(input, &name, part)?), &name, path, options)
+    }
+
+    /// Opens a frame of a stack, counted from 0. Of the options its place does not count.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`]; [`Error::Usage`] for a frame that the stack has not.
+    pub fn of_stack(stack: &Arc<Stack>, index: u64, options: &InputOptions) -> Result<Self> {
+        let frame = StackedFrame::open(stack, index)?;
+        let name = frame.name();
+        Self::of(Box::new(frame), &name, None, options)
     }
 
     /// A frame of what a reader gives.
@@ -633,7 +646,8 @@ fn find_metadata(
         return Ok((metadata, Some(shown)));
     }
     if let Some(text) = reader.embedded() {
-        return Ok((yaml::parse_metadata(name, text)?, None));
+        let describes = reader.describes_samples().then(|| "its metadata".to_owned());
+        return Ok((yaml::parse_metadata(name, text)?, describes));
     }
     Ok((reader.own_tags().clone(), None))
 }

@@ -48,3 +48,4 @@ mod viewable;
 pub mod yaml;
 pub mod yaml_guard;
 pub mod yaml_writer;
+pub mod zarr;

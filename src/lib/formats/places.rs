@@ -32,6 +32,32 @@ pub fn sidecar_path(path: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
+/// What the name of a stack of frames ends in, a Zarr store.
+pub const STACK_EXTENSION: &str = "zarr";
+
+/// The file in which Zarr describes a group or an array.
+pub const STACK_DESCRIPTION: &str = "zarr.json";
+
+/// Whether a name is that of a stack.
+///
+/// # Examples
+///
+/// ```
+/// use cyanometer::formats::places::names_stack;
+/// use std::path::Path;
+///
+/// assert!(names_stack(Path::new("night.zarr")) && names_stack(Path::new("night.zarr/")));
+/// assert!(!names_stack(Path::new("night.exr")));
+/// ```
+pub fn names_stack(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case(STACK_EXTENSION))
+}
+
+/// Whether a Zarr group or array, of version 3 or 2, lies at a place.
+pub fn is_stack(path: &Path) -> bool {
+    path.is_dir() && [STACK_DESCRIPTION, ".zarray", ".zgroup"].iter().any(|name| path.join(name).is_file())
+}
+
 /// What stands for the name of an input, without its directory and the part behind its last dot, in the name of an output.
 pub const STEM: &str = "{stem}";
 

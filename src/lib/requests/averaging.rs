@@ -10,7 +10,7 @@ use crate::frame::to_sample;
 use crate::metadata::{AverageRecord, Coverage, ExposuresRecord, FrameHeader};
 use crate::numerics::averages::{CLIP, Combine, average};
 use crate::numerics::running::Running;
-use crate::sigma::PixelLayers;
+use crate::sigma::{PixelLayers, is_layer};
 use crate::stages::exposures::{Exposures, too_few};
 use crate::stages::masters::Averaging;
 use crate::stages::saturation::{SATURATED, bits, with_mask};
@@ -118,11 +118,6 @@ impl SharedAverage {
             None => too_few("an average is"),
         }
     }
-}
-
-/// Names of layers that tell how uncertain pixels are.
-fn is_layer(name: &str) -> bool {
-    name.starts_with("sigma.") || name.starts_with("covariance.") || name.starts_with("variance.")
 }
 
 /// Makes sure that the mean of such samples means something.

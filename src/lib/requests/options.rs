@@ -193,9 +193,9 @@ pub struct Output {
     /// What follows it.
     #[arg(skip)]
     pub following: Following,
-    /// Whether no frames go out but reports of them, each of which can stand without the others.
+    /// What is made of several frames.
     #[arg(skip)]
-    pub is_of_reports: bool,
+    pub makes: Makes,
     /// Format; by default that of the file's extension, or EXR; DNG for one plane of ADU alone
     #[arg(long, value_parser = values::choice::<Format>())]
     pub format: Option<Format>,
@@ -261,6 +261,18 @@ impl Output {
             frames_to_come: 0,
         }
     }
+}
+
+/// What is made of several frames.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Makes {
+    /// A frame of each, one behind another.
+    #[default]
+    Frames,
+    /// A report of each, which can stand without the others.
+    Reports,
+    /// One thing of all, which is whole or not at all.
+    One,
 }
 
 /// What is made behind a frame in the same run, as far as it is known.

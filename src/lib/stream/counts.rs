@@ -82,6 +82,28 @@ impl Counts {
         }
     }
 
+    /// What a sidecar says of samples; whether those or pixels were saturated it does not tell.
+    pub fn recorded(record: &SamplesRecord) -> Self {
+        let count = Option::unwrap_or_default;
+        Self {
+            full_well: count(record.full_well),
+            clipped_low: count(record.clipped_low),
+            clipped_high: count(record.clipped_high),
+            not_finite: count(record.not_finite),
+            negative: count(record.negative),
+            undefined_hue: count(record.undefined_hue),
+            dim_green: count(record.dim_green),
+            out_of_gamut: count(record.out_of_gamut),
+            off_locus: count(record.off_locus),
+            propagation_void: count(record.propagation_void),
+            saturated_samples: count(record.saturated),
+            saturated_pixels: 0,
+            defective: count(record.defective),
+            corrected: count(record.corrected),
+            marked_pixels: count(record.marked),
+        }
+    }
+
     /// What a user should hear about, one sentence each.
     pub fn warnings(self) -> Vec<String> {
         // What was clipped here is saturated; that is said once.
