@@ -10,7 +10,6 @@ use super::makers::{MakersReader, Worker};
 use super::read_ahead::Pipe;
 use super::sequence::Sequence;
 use super::viewable::{Scaling, is_scale};
-use super::zarr::{Stack, StackedFrame};
 use super::{headerless, pipe, register, table, tiff, yaml};
 use crate::analysis::statistics::Region;
 use crate::camera::noise_profile::NoiseProfile;
@@ -26,7 +25,6 @@ use crate::units::QuantityKind;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// What to open.
 #[derive(Debug, Clone, Default)]
@@ -210,19 +208,12 @@ impl FrameReader {
         Self::of(Box::new(DngReader::open(input, &name, part)?), &name, path, options)
     }
 
-    /// Opens a frame of a stack, counted from 0. Of the options its place does not count.
+    /// A frame of what a reader gives, whatever it reads; `path` leads to its sidecar. Of the options its place does not count.
     ///
     /// # Errors
     ///
-    /// As [`Self::open`]; [`Error::Usage`] for a frame that the stack has not.
-    pub fn of_stack(stack: &Arc<Stack>, index: u64, options: &InputOptions) -> Result<Self> {
-        let frame = StackedFrame::open(stack, index)?;
-        let name = frame.name();
-        Self::of(Box::new(frame), &name, None, options)
-    }
-
-    /// A frame of what a reader gives.
-    fn of(reader: Box<dyn SampleReader>, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
+    /// Those of its metadata; [`Error::Usage`] where it has not the channel or the rectangle that is wanted.
+    pub fn of(reader: Box<dyn SampleReader>, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
         let (mut metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
         let stored = reader.geometry();

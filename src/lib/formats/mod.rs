@@ -48,4 +48,3 @@ mod viewable;
 pub mod yaml;
 pub mod yaml_guard;
 pub mod yaml_writer;
-pub mod zarr;

@@ -46,7 +46,7 @@ pub fn keep() {
 /// # Errors
 ///
 /// [`Error::Usage`] where it is one of the outputs that were announced.
-pub(super) fn note_input(about: &Metadata, name: &str) -> Result<()> {
+pub fn note_input(about: &Metadata, name: &str) -> Result<()> {
     match &mut *register() {
         Some(register) if about.is_file() => register.note_input(file_id(about), name),
         _ => Ok(()),
@@ -92,7 +92,7 @@ fn read_twice() -> Error {
 /// # Errors
 ///
 /// [`Error::Usage`].
-pub(super) fn check_output(about: &Metadata, name: &str) -> Result<()> {
+pub fn check_output(about: &Metadata, name: &str) -> Result<()> {
     match &*register() {
         Some(register) if about.is_file() => register.check_output(file_id(about), name),
         _ => Ok(()),

@@ -31,7 +31,6 @@ pub mod photon_transfer;
 pub mod picture;
 pub mod prediction;
 pub mod sensor;
-pub mod stacking;
 pub mod values;
 
 mod notes;

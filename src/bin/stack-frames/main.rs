@@ -1,12 +1,21 @@
 //! `stack-frames`: many frames in one Zarr store, and out of it.
+//!
+//! What reads and writes the store stands here and not in the library: the crate for it registers its codecs when a program starts, and
+//! would be part of every other program.
 
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
 use cyanometer::requests::options;
-use cyanometer::requests::stacking::{SharedStack, StackRequest};
 use std::process::ExitCode;
+
+mod layout;
+mod read;
+mod stacking;
+mod write;
+
+use stacking::{SharedStack, StackRequest};
 
 #[global_allocator]
 static MEMORY: cli::Memory = cli::Memory;

@@ -1,10 +1,28 @@
-//! How frames are laid out in arrays, chunks and shards.
+//! Stacks of frames on disk: Zarr stores of version 3, whose chunks lie together in shards, so that a million frames are some
+//! thousand files. numpy's world reads them as they are (xarray, dask, napari).
+//!
+//! A store is a group with the attributes `schema`, [`SCHEMA`], `origin`, the column and row on the sensor of the first sample, and
+//! `channels`, the names of all channels of a frame as its file has them; and with these arrays, the names of whose axes are given:
+//!
+//! | array | axes | |
+//! |---|---|---|
+//! | `samples` | frame, row, column, channel | samples, `float32`, `float16` or `uint16` |
+//! | `channel` | channel | what its channels are: X, Y, Z of XYZ, which files keep as R, G, B |
+//! | `sigma` | frame, row, column, layer | what tells how uncertain samples are, `float32`; where frames have it |
+//! | `layer` | layer | names of its layers |
+//! | `mask` | frame, row, column | marks of pixels, `uint8`; where frames have them |
+//! | `metadata` | frame | the metadata of each frame, YAML, as a sidecar has them |
+//!
+//! An inner chunk is some rows of one frame; a shard holds many frames where they are small, and a part of one where they are large.
 
-use crate::formats::format::SampleType;
-use crate::frame::Geometry;
-use crate::sigma::is_layer;
-use crate::stages::saturation::MASK_LAYER;
+use cyanometer::formats::format::SampleType;
+use cyanometer::frame::Geometry;
+use cyanometer::sigma::is_layer;
+use cyanometer::stages::saturation::MASK_LAYER;
 use std::ops::Range;
+
+/// The schema of a store of ours, an attribute of its group.
+pub const SCHEMA: &str = "cyanometer-stack/1";
 
 /// The size that an inner chunk aims at: what is decoded together.
 const CHUNK_BYTES: usize = 1 << 20;
@@ -13,7 +31,7 @@ const SHARD_BYTES: usize = 16 << 20;
 
 /// An array of a stack, which has some channels of each frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Part {
+pub struct Part {
     pub name: &'static str,
     /// The name of its last axis; none where it has no such axis.
     pub axis: Option<&'static str>,
@@ -23,20 +41,20 @@ pub(super) struct Part {
 }
 
 /// The samples of a frame.
-pub(super) const SAMPLES: &str = "samples";
+pub const SAMPLES: &str = "samples";
 /// What tells how uncertain they are.
-pub(super) const SIGMA: &str = "sigma";
+pub const SIGMA: &str = "sigma";
 /// Marks of pixels.
-pub(super) const MASK: &str = "mask";
+pub const MASK: &str = "mask";
 /// The metadata of each frame.
-pub(super) const METADATA: &str = "metadata";
+pub const METADATA: &str = "metadata";
 /// The axis of channels, and the array of their names.
-pub(super) const CHANNEL: &str = "channel";
+pub const CHANNEL: &str = "channel";
 /// The axis of layers, and the array of their names.
-pub(super) const LAYER: &str = "layer";
+pub const LAYER: &str = "layer";
 
 /// The parts of frames with these channels: samples, then layers of their uncertainty, then, in frames of ours, marks.
-pub(super) fn parts(channels: &[String], is_ours: bool, stored: SampleType) -> Vec<Part> {
+pub fn parts(channels: &[String], is_ours: bool, stored: SampleType) -> Vec<Part> {
     let has_mask = is_ours && channels.len() > 1 && channels.last().is_some_and(|last| last == MASK_LAYER);
     let unmarked = channels.len() - usize::from(has_mask);
     let planes = channels[..unmarked].iter().position(|name| is_layer(name)).unwrap_or(unmarked);
@@ -72,7 +90,7 @@ impl Part {
 
 /// Rows and frames of inner chunks and shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Shards {
+pub struct Shards {
     /// Rows of an inner chunk, which is of one frame.
     pub chunk_rows: usize,
     /// Rows of a shard.

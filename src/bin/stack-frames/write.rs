@@ -1,19 +1,19 @@
 //! Writes stacks: frame after frame, a shard of each array in memory at a time, whole or not at all.
 
-use super::SCHEMA;
-use super::layout::{CHANNEL, LAYER, MASK, METADATA, Part, SAMPLES, SIGMA, Shards, parts};
-use crate::error::{Error, Result};
-use crate::formats::atomic::AtomicDirectory;
-use crate::formats::digest::SamplesDigest;
-use crate::formats::format::SampleType;
-use crate::formats::places::STACK_DESCRIPTION;
-use crate::formats::storing::SampleKind;
-use crate::formats::{register, yaml};
-use crate::frame::Geometry;
-use crate::metadata::{FrameHeader, SamplesRecord};
-use crate::stages::saturation::bits;
-use crate::stream::{Counts, RowSource};
-use crate::units::QuantityKind;
+use crate::layout::SCHEMA;
+use crate::layout::{CHANNEL, LAYER, MASK, METADATA, Part, SAMPLES, SIGMA, Shards, parts};
+use cyanometer::error::{Error, Result};
+use cyanometer::formats::atomic::AtomicDirectory;
+use cyanometer::formats::digest::SamplesDigest;
+use cyanometer::formats::format::SampleType;
+use cyanometer::formats::output::SampleKind;
+use cyanometer::formats::places::STACK_DESCRIPTION;
+use cyanometer::formats::{register, yaml};
+use cyanometer::frame::Geometry;
+use cyanometer::metadata::{FrameHeader, SamplesRecord};
+use cyanometer::stages::saturation::bits;
+use cyanometer::stream::{Counts, RowSource};
+use cyanometer::units::QuantityKind;
 use half::f16;
 use serde_json::{Map, Value, json};
 use std::fmt;
@@ -43,37 +43,6 @@ pub struct StackOptions {
 }
 
 /// A stack that is being written.
-///
-/// # Examples
-///
-/// ```
-/// use cyanometer::formats::input::{FrameReader, InputOptions};
-/// use cyanometer::formats::zarr::{Stack, StackOptions, StackWriter};
-/// use cyanometer::stream::{MemoryFrame, RowSource};
-/// # use cyanometer::frame::Geometry;
-/// # use cyanometer::metadata::{FrameHeader, Metadata};
-/// # use cyanometer::units::QuantityKind;
-/// # let metadata = Metadata::new(QuantityKind::Adu);
-/// # let header = FrameHeader { name: "example".into(), geometry: Geometry::new(2, 2, &["Y"]), metadata };
-///
-/// let directory = tempfile::tempdir().unwrap();
-/// let path = directory.path().join("night.zarr");
-/// let mut writer = StackWriter::create(&path, StackOptions::default())?;
-/// for level in [7.0, 8.0, 9.0] {
-///     writer.add(&mut MemoryFrame::new(header.clone(), vec![level; 4]))?;
-/// }
-/// // The stack has its name once it is complete.
-/// assert!(!path.exists());
-/// assert_eq!(writer.finish()?, 3);
-///
-/// let stack = Stack::open(&path)?;
-/// assert_eq!(stack.frames(), 3);
-/// let mut frame = FrameReader::of_stack(&stack, 2, &InputOptions::default())?;
-/// let mut samples = Vec::new();
-/// frame.read(2, &mut samples)?;
-/// assert_eq!(samples, [9.0; 4]);
-/// # Ok::<(), cyanometer::error::Error>(())
-/// ```
 pub struct StackWriter {
     directory: AtomicDirectory,
     store: Arc<FilesystemStore>,

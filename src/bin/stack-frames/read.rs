@@ -1,15 +1,15 @@
 //! Reads stacks, and frames out of arrays that others have written.
 
-use super::SCHEMA;
-use super::layout::{CHANNEL, LAYER, MASK, METADATA, Part, SAMPLES, SIGMA};
-use crate::error::{Error, Result};
-use crate::formats::format::{SampleReader, SampleType};
-use crate::formats::places::{FRAME_OF, STACK_DESCRIPTION};
-use crate::formats::register;
-use crate::frame::{Geometry, to_sample};
-use crate::metadata::Metadata;
-use crate::text::counted;
-use crate::units::QuantityKind;
+use crate::layout::SCHEMA;
+use crate::layout::{CHANNEL, LAYER, MASK, METADATA, Part, SAMPLES, SIGMA};
+use cyanometer::error::{Error, Result};
+use cyanometer::formats::format::{SampleReader, SampleType};
+use cyanometer::formats::places::{FRAME_OF, STACK_DESCRIPTION};
+use cyanometer::formats::register;
+use cyanometer::frame::{Geometry, to_sample};
+use cyanometer::metadata::Metadata;
+use cyanometer::text::counted;
+use cyanometer::units::QuantityKind;
 use half::f16;
 use serde_json::Value;
 use std::collections::VecDeque;

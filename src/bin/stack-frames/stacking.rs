@@ -1,14 +1,15 @@
 //! Frames into stacks, and out of them.
 
-use super::options::{Following, Input, Output};
-use super::values;
-use crate::error::{Error, Result};
-use crate::formats::input::FrameReader;
-use crate::formats::output::CompressionKind;
-use crate::formats::places::{is_pattern, is_stack, named, names_stack};
-use crate::formats::zarr::{Stack, StackOptions, StackWriter};
-use crate::stream::RowSource;
+use crate::read::{Stack, StackedFrame};
+use crate::write::{StackOptions, StackWriter};
 use clap::Args;
+use cyanometer::error::{Error, Result};
+use cyanometer::formats::input::FrameReader;
+use cyanometer::formats::output::CompressionKind;
+use cyanometer::formats::places::{is_pattern, is_stack, named, names_stack};
+use cyanometer::requests::options::{Following, Input, Output};
+use cyanometer::requests::values;
+use cyanometer::stream::RowSource;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -95,9 +96,11 @@ impl StackedTurn<'_> {
     ///
     /// # Errors
     ///
-    /// Those of [`FrameReader::of_stack`].
+    /// Those of [`StackedFrame::open`] and [`FrameReader::of`].
     pub fn open(&self, input: &Input, output: &Output) -> Result<(FrameReader, Output)> {
-        let reader = FrameReader::of_stack(self.stack, self.index, &input.options_for_all())?;
+        let frame = StackedFrame::open(self.stack, self.index)?;
+        let name = frame.name();
+        let reader = FrameReader::of(Box::new(frame), &name, None, &input.options_for_all())?;
         let following = Following { exposures: 1, inputs_left: self.left, ..Following::default() };
         Ok((reader, Output { index: self.number, following, ..output.clone() }))
     }
