@@ -10,7 +10,27 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 103] = [
+const MISTAKES: [(&str, i32, &str); 107] = [
+    (
+        "measure codes.exr -o codes.xlsx",
+        BAD_USAGE,
+        "no report is written as .xlsx; there are text, json, yaml, csv; give another --output",
+    ),
+    (
+        "predict-noise --dark -o noise.png",
+        BAD_USAGE,
+        "no report is written as .png; there are text, json, yaml, csv; give another --output",
+    ),
+    (
+        "average-frames codes.exr plane.exr -o DIR/",
+        BAD_USAGE,
+        "DIR/: one frame is made of all; name a single file; give another --output",
+    ),
+    (
+        "digitize noisy.exr --resume",
+        BAD_USAGE,
+        "a stream keeps nothing of an earlier run; name files for what is made; leave out --resume",
+    ),
     (
         "digitize noisy.exr -o x.dng",
         BAD_DATA,
@@ -501,16 +521,17 @@ fn inputs_and_devices_are_not_written_over() {
     for (line, input) in [
         ("add-noise", "expected.exr"),
         ("mosaic", "noisy.exr"),
-        ("measure", "noisy.exr"),
+        ("measure --output-format text", "noisy.exr"),
         ("preview", "noisy.png"),
         ("fit-matrix", "library.exr"),
     ] {
         let before = shop.bytes(input);
+        let program = line.split(' ').next().unwrap();
         for output in [input.to_owned(), format!("./{input}")] {
             let done = shop.attempt(&format!("{line} {input} -o {output}"), &[]);
             assert_eq!(
                 String::from_utf8_lossy(&done.stderr),
-                format!("{line}: {output}: it is the same file as the input {input}; name another output\n")
+                format!("{program}: {output}: it is the same file as the input {input}; name another output\n")
             );
             assert_eq!(done.status.code(), Some(BAD_USAGE), "{line}");
             assert!(shop.bytes(input) == before, "{line} has written over its input");

@@ -5,14 +5,15 @@
 mod support;
 
 use cyanometer::analysis::statistics::{
-    OverFrames, OverFramesSettings, RepeatedRegion, RepeatedReport, Saturated, measure,
+    OverFrames, OverFramesSettings, RepeatedChannel, RepeatedRegion, RepeatedReport, Saturated, measure,
 };
+use cyanometer::camera::levels::BlackLevel;
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::color::{Space, White};
 use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::masking::Corrections;
-use cyanometer::metadata::{FrameHeader, Metadata, Scene};
+use cyanometer::metadata::{FrameHeader, LeftOut, Metadata, Scene};
 use cyanometer::numerics::significance::of_smallest;
 use cyanometer::propagation::Equations;
 use cyanometer::random::philox::philox4x32_10;
@@ -314,11 +315,63 @@ fn frames_of_other_scenes_are_refused() {
     longer.header.metadata.exposure.as_mut().unwrap().exposure_s *= 1.5;
     assert!(complaint(&longer).contains("exposure"));
     assert!(over_frames(std::slice::from_ref(&first), None).unwrap_err().to_string().contains("two exposures"));
-    // Of another read-out nothing is predicted.
-    let (report, _) = over_frames(&[first.clone(), other.plane(camera.electrons, 1)], None).unwrap();
-    assert!(report.unpredicted.unwrap().to_string().contains("differ"), "{:?}", report.unpredicted);
-    let (report, _) = over_frames(&[first, next], None).unwrap();
+    // Whatever the camera was set to in another way, and whatever else of the same sensor is another.
+    let said = complaint(&other.plane(camera.electrons, 1));
+    let theirs = camera.readout.read_noise_e;
+    assert!(
+        said.contains(&format!("its `sensor.readout.read_noise_e` is 9.0, but that of test is {theirs}")),
+        "{said}"
+    );
+    type Change = fn(&mut Metadata);
+    let changes: [(&str, Change); 6] = [
+        ("`adc.adu_per_e`", |metadata| metadata.adc.as_mut().unwrap().adu_per_e *= 2.0),
+        ("`adc.bias_adu`", |metadata| metadata.adc.as_mut().unwrap().bias_adu += 1.0),
+        ("`sensor.readout.temperature_k`", |metadata| {
+            metadata.sensor.as_mut().unwrap().readout.as_mut().unwrap().temperature_k -= 20.0;
+        }),
+        ("`noise.dark_e`", |metadata| metadata.noise.as_mut().unwrap().dark_e += 3.0),
+        ("`black_level_adu`", |metadata| metadata.black_level_adu = Some(BlackLevel::Uniform(3.0))),
+        ("`white_level_adu`", |metadata| metadata.white_level_adu = None),
+    ];
+    for (key, change) in changes {
+        let mut second = next.clone();
+        change(&mut second.header.metadata);
+        let said = complaint(&second);
+        assert!(said.contains(key) && said.contains("only exposures of one scene by one camera"), "{key}: {said}");
+    }
+    // Of what was done to them in other ways nothing is predicted, and the reason is told.
+    let mut second = next.clone();
+    second.header.name = "second".into();
+    second.header.metadata.left_out.push(LeftOut { program: "x".into(), what: "y".into(), why: "z".into() });
+    let (report, _) = over_frames(&[first.clone(), second], None).unwrap();
+    assert!(report.unpredicted.as_ref().unwrap().contains("`left_out` of second"), "{:?}", report.unpredicted);
+    assert_eq!(report.unlike, report.unpredicted);
+    // Seeds, numbers and files tell exposures apart; what this version does not know is nothing.
+    let mut second = next;
+    second.header.metadata.noise.as_mut().unwrap().seed += 1;
+    second.header.metadata.file = Some("b.exr".into());
+    second.header.metadata.unknown.insert("lens".into(), "wide".into());
+    let (report, _) = over_frames(&[first, second], None).unwrap();
     assert!(report.unpredicted.is_none() && report.regions[0].classes[0].predicted_fixed_std.is_some());
+}
+
+/// Errors of what is not predicted are those of as many independent samples: about what they are where it is.
+#[test]
+fn errors_are_told_without_a_prediction_too() {
+    let camera = Camera::random(3, [60, 50]);
+    let mut planes: Vec<MemoryFrame> = (0..8).map(|frame| camera.plane(camera.electrons, frame)).collect();
+    let (known, _) = over_frames(&planes, None).unwrap();
+    planes.iter_mut().for_each(|plane| plane.header.metadata.scene = None);
+    let (unknown, _) = over_frames(&planes, None).unwrap();
+    assert!(unknown.unpredicted.is_some());
+    let channels = |report: &RepeatedReport| {
+        let region = report.regions[0].clone();
+        region.channels.into_iter().chain(region.classes).collect::<Vec<_>>()
+    };
+    for (known, unknown) in channels(&known).iter().zip(&channels(&unknown)) {
+        let of = |channel: &RepeatedChannel| channel.temporal_std_error.unwrap();
+        assert!((of(unknown) / of(known) - 1.0).abs() < 0.1, "{}: {} {}", known.name, of(unknown), of(known));
+    }
 }
 
 /// What is known of the frame of means is what is known of the means: `measure` of the one tests what that of all does.

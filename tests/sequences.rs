@@ -96,6 +96,46 @@ fn each_frame_is_measured() {
     assert!(complaint.contains("1 of 3 frames are not as predicted, the first of them frame 5"), "{complaint}");
 }
 
+/// What was made of a file that was changed since is made anew, whatever tells its name; what was made of others stays.
+#[test]
+fn what_is_made_of_a_changed_file_is_made_anew() {
+    let shop = Workshop::new();
+    fs::create_dir(shop.path("r")).unwrap();
+    fs::create_dir(shop.path("p")).unwrap();
+    for (name, electrons) in [("a", "400,600,800"), ("b", "500,500,500"), ("c", "900,800,700")] {
+        shop.run(&format!("render-radiance --electrons {electrons} --size 24x16 -o {name}.exr"), &[]);
+        shop.run(&format!("preview {name}.exr --range 0,1000 -o {name}.png"), &[]);
+    }
+    let lines = [
+        "render-radiance a.png b.png --illuminant d65 --white-luminance 100 --resume -o r/",
+        "mosaic r/a.exr r/b.exr --resume -o p/",
+    ];
+    let all = ["r/a.exr", "r/b.exr", "p/a.exr", "p/b.exr", "p/a-noisy.exr", "p/b-noisy.exr"];
+    let run = || {
+        lines.iter().for_each(|line| drop(shop.run(line, &[])));
+        let planes = shop.run("mosaic r/a.exr r/b.exr", &[]);
+        shop.run("add-noise --seed 3 --resume -o p/{stem}-noisy.exr", &planes);
+        all.map(|name| (shop.bytes(name), fs::metadata(shop.path(name)).unwrap().modified().unwrap()))
+    };
+    let first = run();
+    assert!(run() == first);
+    fs::copy(shop.path("c.png"), shop.path("a.png")).unwrap();
+    let second = run();
+    for (index, name) in all.iter().enumerate() {
+        let is_of_a = name.contains("/a");
+        assert_eq!(first[index].0 != second[index].0, is_of_a, "{name}");
+        assert_eq!(first[index].1 != second[index].1, is_of_a, "{name}");
+    }
+    let output = shop.attempt("mosaic r/a.exr --resume", &[]);
+    assert_eq!(
+        (output.status.code(), said(&output).trim_end()),
+        (
+            Some(BAD_USAGE),
+            "mosaic: a stream keeps nothing of an earlier run; name files for what is made; leave out --resume"
+        )
+    );
+}
+
 /// What is complete stays as it is; what is damaged, missing, or would be another is made, and all is as in one run.
 #[test]
 fn a_run_is_resumed() {

@@ -37,6 +37,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let average = arguments.request.begin()?;
+    arguments.output.check_one()?;
     let in_order = options::Output { makes: options::Makes::One, ..options::Output::default() };
     session.each_frame::<Arguments>(&arguments.input, &in_order, |turn| {
         let mut reader = AverageRequest::open(turn.input)?;

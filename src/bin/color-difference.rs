@@ -66,7 +66,7 @@ fn run(Arguments { pair, map, output, output_format, .. }: &Arguments, session: 
     if let Some(writer) = writer {
         writer.finish(Counts { not_finite: report.not_finite, ..Default::default() })?;
     }
-    let form = report::form_of(*output_format, output.as_deref()).unwrap_or(ReportFormat::Text);
+    let form = report::form_of(*output_format, output.as_deref())?.unwrap_or(ReportFormat::Text);
     output::write_text(output.as_deref(), &report::difference(&report, form)?)?;
     session.tell(Note::not_finite(report.not_finite).as_slice());
     comparison.frames().for_each(|frame| session.tell(&requests::of_marks(frame)));

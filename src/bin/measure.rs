@@ -47,7 +47,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let frames = &arguments.input.frame;
     arguments.measurement.announce(&frames.inputs, arguments.output.as_deref())?;
     let output = arguments.output.as_deref();
-    let format = report::form_of(arguments.output_format, output).unwrap_or(ReportFormat::Text);
+    let format = report::form_of(arguments.output_format, output)?.unwrap_or(ReportFormat::Text);
     let reports = Output { makes: Makes::Reports, ..Output::default() };
     if let Some(statistics) = arguments.measurement.over_frames() {
         let measured = session.each_frame::<Arguments>(frames, &reports, |turn| {

@@ -17,7 +17,7 @@ from programs import BINARIES, TIMEOUT_S, ProgramCase, read_planes, sample_data,
 
 BAD_DATA, BAD_USAGE = 1, 2
 
-PROGRAMS = sorted(path.stem for path in (pathlib.Path(__file__).parents[2] / "src" / "bin").glob("*.rs"))
+PROGRAMS = sorted(path.stem for path in (pathlib.Path(__file__).parents[2] / "src" / "bin").iterdir())
 
 
 def naming(option, value):

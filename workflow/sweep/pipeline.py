@@ -21,7 +21,9 @@ def scene(plan: Plan, condition: Condition, output: str) -> str:
 def predicted(plan: Plan, condition: Condition, output: str) -> str:
     """Predicts a condition's noise by formula; the table has its exposure time and temperature from there."""
     options = conditions.scene_options(plan.sweep, condition) + conditions.temperature_options(condition)
-    options += ["--method", condition.method, *_matrix(plan, condition)]
+    options += ["--method", condition.method]
+    if {"xyz", "lab"} & set(plan.sweep.stages):
+        options += ["--matrix", plan.matrix(condition.sensor) or "sensor"]
     if plan.sweep.white_luminance_cd_per_m2 is not None:
         options += _white(plan)
     return _words("predict-noise", *options, "--quiet", "--output-format", "json", "-o", output) + "\n"

@@ -6,7 +6,7 @@ use super::words::complain;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
 use crate::formats::output::{Format, FrameWriter, OutputOptions};
-use crate::formats::places::{FRAME_OF, named, place};
+use crate::formats::places::{FRAME_OF, named, place, sidecar_path};
 use crate::formats::{register, resume};
 use crate::frame::Geometry;
 use crate::masking::Masking;
@@ -24,6 +24,7 @@ use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
 
 /// What a running program says besides its output.
 #[derive(Debug, Clone)]
@@ -33,6 +34,8 @@ pub struct Session {
     /// The command line behind the program's name, wildcards expanded.
     words: Arc<[OsString]>,
     signature: Arc<Signature>,
+    /// All frames that are worked on, and their sidecars, where there are several.
+    frames: Arc<HashSet<String>>,
     /// The input that is worked on, where there are several.
     input: Option<PathBuf>,
     run: Arc<Mutex<Run>>,
@@ -50,13 +53,26 @@ struct Run {
 impl Session {
     pub(super) fn new(program: &'static str, words: Vec<OsString>, general: General) -> Self {
         let signature = Arc::new(Signature::of(words.iter().cloned(), &[]));
-        Self { program, words: words.into(), general, signature, input: None, run: Arc::default() }
+        Self {
+            program,
+            words: words.into(),
+            general,
+            signature,
+            frames: Arc::default(),
+            input: None,
+            run: Arc::default(),
+        }
     }
 
     /// The same for a run of several inputs.
     pub fn among(&self, inputs: &[PathBuf]) -> Self {
         let signature = Arc::new(Signature::of(self.words.iter().cloned(), inputs));
-        Self { signature, ..self.clone() }
+        let frames = if inputs.len() > 1 {
+            inputs.iter().flat_map(|input| with_sidecar(input)).collect()
+        } else {
+            HashSet::new()
+        };
+        Self { signature, frames: Arc::new(frames), ..self.clone() }
     }
 
     /// The same for one of them.
@@ -262,8 +278,12 @@ impl Session {
         run: impl FnOnce(&mut FrameWriter, &mut dyn FnMut(usize)) -> Result<Counts>,
     ) -> Result<Option<Counts>> {
         let options = self.place(made, output)?;
-        if output.resume && resume::is_complete(&options, made)? {
-            self.note(&format!("{} is complete", options.path.unwrap_or_default().display()));
+        if output.resume && output.is_stream() {
+            let problem = "a stream keeps nothing of an earlier run; name files for what is made";
+            return Err(Error::Usage(problem.into()).leave_out(&["resume"]));
+        }
+        if output.resume && !self.is_outdated(&options, made) && resume::is_complete(&options, made)? {
+            self.note(&format!("{} is complete", place_of(&options)));
             return Ok(None);
         }
         let mut writer = FrameWriter::create(&options, made)?;
@@ -275,6 +295,23 @@ impl Session {
             self.warn(&format!("{did_not_fit} samples do not fit 16 bits; they are stored as 0 or 65535, NaN as 0"));
         }
         Ok(Some(counts))
+    }
+
+    /// Whether one of the files that the frame `made` is made of was changed after it was written.
+    fn is_outdated(&self, options: &OutputOptions, made: &FrameHeader) -> bool {
+        let Some(written) = named(options.path.as_deref()).and_then(modified) else { return false };
+        let own = |path: &Path| with_sidecar(path).into_iter().collect::<HashSet<String>>();
+        let of_it = self.input.as_deref().map(own).unwrap_or_default();
+        let changed = register::changed_after(written, |name| !self.frames.contains(name) || of_it.contains(name));
+        // Of what comes through a pipe the first program has read the file.
+        let file = made.metadata.file.as_deref().map(Path::new);
+        let names = file.into_iter().flat_map(with_sidecar);
+        let changed = changed
+            .or_else(|| names.into_iter().find(|name| modified(Path::new(name)).is_some_and(|time| time > written)));
+        changed
+            .iter()
+            .for_each(|name| self.note(&format!("{name} was changed since; {} is made anew", place_of(options))));
+        changed.is_some()
     }
 
     /// Signs a frame in memory, and writes it.
@@ -314,6 +351,21 @@ impl Session {
             None => Err(Error::Usage("of several frames in one stream each is an EXR; leave out --format".into())),
         }
     }
+}
+
+/// When a file was changed last.
+fn modified(path: &Path) -> Option<SystemTime> {
+    std::fs::metadata(path).and_then(|about| about.modified()).ok()
+}
+
+/// The names of a frame and of its sidecar.
+fn with_sidecar(frame: &Path) -> [String; 2] {
+    [frame, &sidecar_path(frame)].map(|path| path.display().to_string())
+}
+
+/// How messages call a file that is written.
+fn place_of(options: &OutputOptions) -> String {
+    options.path.as_deref().map(|path| path.display().to_string()).unwrap_or_default()
 }
 
 /// A text without the number of the frame in its stream.

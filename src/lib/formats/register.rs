@@ -11,6 +11,7 @@ use std::collections::{HashMap, HashSet};
 use std::fs::Metadata;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
 
 /// Identity of a file: device and inode.
 type FileId = (u64, u64);
@@ -25,10 +26,17 @@ static REGISTER: Mutex<Option<Register>> = Mutex::new(None);
 
 #[derive(Debug, Default)]
 struct Register {
-    inputs: HashMap<FileId, String>,
+    inputs: HashMap<FileId, Input>,
     outputs: Vec<(FileId, String)>,
     reads_stdin: bool,
     doubts: Vec<String>,
+}
+
+/// A file that is read.
+#[derive(Debug)]
+struct Input {
+    name: String,
+    modified: Option<SystemTime>,
 }
 
 fn register() -> MutexGuard<'static, Option<Register>> {
@@ -48,9 +56,20 @@ pub fn keep() {
 /// [`Error::Usage`] where it is one of the outputs that were announced.
 pub fn note_input(about: &Metadata, name: &str) -> Result<()> {
     match &mut *register() {
-        Some(register) if about.is_file() => register.note_input(file_id(about), name),
+        Some(register) if about.is_file() => {
+            let modified = about.modified().ok();
+            register.note_input(file_id(about), Input { name: name.to_owned(), modified })
+        }
         _ => Ok(()),
     }
+}
+
+/// The name of an input that was changed after `made`, among those whose names are `of_it`.
+pub fn changed_after(made: SystemTime, of_it: impl Fn(&str) -> bool) -> Option<String> {
+    let register = register();
+    let mut inputs = register.iter().flat_map(|register| register.inputs.values());
+    let is_newer = |input: &&Input| input.modified.is_some_and(|modified| modified > made) && of_it(&input.name);
+    inputs.find(is_newer).map(|input| input.name.clone())
 }
 
 /// Notes the sidecar of a frame that is read, whether or not it is looked at.
@@ -135,16 +154,16 @@ pub fn doubts() -> Vec<String> {
 }
 
 impl Register {
-    fn note_input(&mut self, id: FileId, name: &str) -> Result<()> {
+    fn note_input(&mut self, id: FileId, input: Input) -> Result<()> {
         if let Some((_, output)) = self.outputs.iter().find(|(output, _)| *output == id) {
-            return Err(same_file(output, name));
+            return Err(same_file(output, &input.name));
         }
-        self.inputs.entry(id).or_insert_with(|| name.to_owned());
+        self.inputs.entry(id).or_insert(input);
         Ok(())
     }
 
     fn check_output(&self, id: FileId, name: &str) -> Result<()> {
-        self.inputs.get(&id).map_or(Ok(()), |input| Err(same_file(name, input)))
+        self.inputs.get(&id).map_or(Ok(()), |input| Err(same_file(name, &input.name)))
     }
 }
 
@@ -160,12 +179,13 @@ mod tests {
     #[test]
     fn an_input_is_known_whichever_comes_first() {
         let mut register = Register::default();
-        register.note_input((1, 1), "sky.csv").unwrap();
+        let input = |name: &str| Input { name: name.into(), modified: None };
+        register.note_input((1, 1), input("sky.csv")).unwrap();
         register.check_output((1, 2), "out.csv").unwrap();
         let complaint = register.check_output((1, 1), "link.csv").unwrap_err().to_string();
         assert_eq!(complaint, "link.csv: it is the same file as the input sky.csv; name another output");
         register.outputs.push(((1, 3), "plot.svg".into()));
-        let complaint = register.note_input((1, 3), "s.yaml").unwrap_err().to_string();
+        let complaint = register.note_input((1, 3), input("s.yaml")).unwrap_err().to_string();
         assert_eq!(complaint, "plot.svg: it is the same file as the input s.yaml; name another output");
     }
 }

@@ -2,12 +2,14 @@
 
 mod converter;
 mod correction;
+mod difference;
 mod records;
 
 pub use converter::AdcRecord;
 pub use correction::{
     AverageRecord, CorrectionRecord, DefectsRecord, ExposuresRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
 };
+pub use difference::Difference;
 pub use records::{
     AdaptationRecord, BlackNoise, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
     NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene, UpsamplingRecord,
@@ -308,15 +310,17 @@ impl FrameHeader {
         }
     }
 
-    /// The same without what tells it from other exposures of its scene: its name, its number, what its samples were counted to be.
+    /// The same without what tells it from other exposures of its scene: its name, its seed and number, what its samples were
+    /// counted to be, and what this version does not know.
     #[must_use]
     pub fn without_exposure(&self) -> Self {
         let mut head = Self { name: String::new(), ..self.clone() };
         head.metadata.history.clear();
         (head.metadata.samples, head.metadata.file) = (None, None);
         if let Some(noise) = &mut head.metadata.noise {
-            noise.frame = 0;
+            (noise.seed, noise.frame) = (0, 0);
         }
+        head.metadata.unknown.clear();
         head
     }
 

@@ -78,6 +78,7 @@ impl CameraOutputs {
         if let Some(plot) = &self.plot {
             PlotFormat::of_path(plot)?;
         }
+        form_of(self.output_format, self.output.as_deref())?;
         register::announce(&[self.output.as_deref(), self.plot.as_deref(), self.sensor_out.as_deref()])
     }
 
@@ -91,7 +92,7 @@ impl CameraOutputs {
             write_plot(plot, &super::camera_page(camera))?;
         }
         // What was measured is told whether or not a sensor follows.
-        let form = form_of(self.output_format, self.output.as_deref()).unwrap_or(CameraFormat::Text);
+        let form = form_of(self.output_format, self.output.as_deref())?.unwrap_or(CameraFormat::Text);
         output::write_text(self.output.as_deref(), &camera_report(camera, form)?)?;
         let Some(path) = &self.sensor_out else { return Ok(()) };
         let mut sensor = super::sensor_of(camera)?;

@@ -73,9 +73,30 @@ impl Named for ReportFormat {
 }
 
 /// The form of a report: what was asked for, or that of which the name of its file ends.
-pub fn form_of<F: Named>(asked: Option<F>, output: Option<&Path>) -> Option<F> {
-    asked.or_else(|| F::named(named(output)?.extension()?.to_str()?))
+///
+/// # Errors
+///
+/// [`Error::Usage`] for a name that ends like that of another form.
+pub fn form_of<F: Named>(asked: Option<F>, output: Option<&Path>) -> Result<Option<F>> {
+    let ending = named(output).and_then(Path::extension).map(|ending| ending.to_string_lossy().to_lowercase());
+    match ending.filter(|_| asked.is_none()) {
+        None => Ok(asked),
+        Some(ending) => match F::named(&ending) {
+            None if OF_OTHERS.contains(&ending.as_str()) => {
+                let known: Vec<&str> = F::ALL.iter().map(|form| form.name()).collect();
+                let problem = format!("no report is written as .{ending}; there are {}", known.join(", "));
+                Err(Error::Usage(problem).change(&["output"]))
+            }
+            found => Ok(found),
+        },
+    }
 }
+
+/// What names of files end in that no report should be written to.
+const OF_OTHERS: [&str; 21] = [
+    "json", "yaml", "yml", "csv", "tsv", "xls", "xlsx", "ods", "parquet", "html", "md", "tex", "pdf", "svg", "png",
+    "jpg", "jpeg", "exr", "tif", "tiff", "dng",
+];
 
 fn unwritable(error: impl std::fmt::Display) -> Error {
     Error::Data(format!("the report cannot be written: {error}"))
@@ -128,6 +149,9 @@ fn values(channel: &ChannelReport) -> [Option<f64>; 12] {
     ]
 }
 
+/// What samples are, in the CSV forms.
+const UNIT_COLUMNS: [&str; 2] = ["quantity", "unit"];
+
 /// What the check of a frame says, by column: the same in all rows of the frame.
 fn verdict_cells(verdict: Verdict) -> [(&'static str, String); 3] {
     [
@@ -147,7 +171,9 @@ fn csv(report: &Report) -> Result<String> {
     let last: &[&str] = if of_patches { &["sample", "patch_column", "patch_row"] } else { &[] };
     let verdict = report.check.map(verdict_cells);
     let of_verdict = verdict.iter().flatten().map(|(key, _)| *key);
-    writer.write_record(head.chain(last.iter().copied()).chain(keys(errors)).chain(of_verdict)).map_err(unwritable)?;
+    writer
+        .write_record(head.chain(last.iter().copied()).chain(keys(errors)).chain(UNIT_COLUMNS).chain(of_verdict))
+        .map_err(unwritable)?;
     for region in &report.regions {
         for channel in region.channels.iter().chain(&region.classes) {
             let numbers = values(channel).map(|value| value.map_or(String::new(), |v| v.to_string()));
@@ -163,6 +189,7 @@ fn csv(report: &Report) -> Result<String> {
                     [sample, column.to_string(), row.to_string()]
                 }))
                 .chain(errors.iter().cloned())
+                .chain([region.quantity.to_string(), region.unit.clone()])
                 .chain(verdict.iter().flatten().map(|(_, cell)| cell.clone()));
             writer.write_record(cells).map_err(unwritable)?;
         }

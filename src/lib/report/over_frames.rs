@@ -1,6 +1,6 @@
 //! Statistics over frames as text, JSON, YAML and CSV.
 
-use super::{ReportFormat, shown, table, tests_text, unwritable, verdict_text};
+use super::{ReportFormat, UNIT_COLUMNS, shown, table, tests_text, unwritable, verdict_cells, verdict_text};
 use crate::analysis::statistics::{RepeatedChannel, RepeatedRegion, RepeatedReport};
 use crate::error::Result;
 use crate::formats::yaml_writer;
@@ -67,7 +67,11 @@ pub fn over_frames(report: &RepeatedReport, format: ReportFormat) -> Result<Stri
 fn csv(report: &RepeatedReport) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let head = ["x", "y", "width", "height", "frames", "channel", "count"].into_iter();
-    writer.write_record(head.chain(COLUMNS.map(|(key, _)| key))).map_err(unwritable)?;
+    let verdict = report.check.map(verdict_cells);
+    let of_verdict = verdict.iter().flatten().map(|(key, _)| *key);
+    writer
+        .write_record(head.chain(COLUMNS.map(|(key, _)| key)).chain(UNIT_COLUMNS).chain(of_verdict))
+        .map_err(unwritable)?;
     for region in &report.regions {
         for channel in region.channels.iter().chain(&region.classes) {
             let place = [region.region.x, region.region.y, region.region.width, region.region.height];
@@ -75,7 +79,9 @@ fn csv(report: &RepeatedReport) -> Result<String> {
                 .map(|place| place.to_string())
                 .into_iter()
                 .chain([report.frames.to_string(), channel.name.clone(), channel.count.to_string()])
-                .chain(values(channel).map(|value| value.map_or(String::new(), |v| v.to_string())));
+                .chain(values(channel).map(|value| value.map_or(String::new(), |v| v.to_string())))
+                .chain([region.quantity.to_string(), region.unit.clone()])
+                .chain(verdict.iter().flatten().map(|(_, cell)| cell.clone()));
             writer.write_record(cells).map_err(unwritable)?;
         }
     }
@@ -91,7 +97,7 @@ fn text(report: &RepeatedReport) -> String {
     let channels = || report.regions.iter().flat_map(|region| region.channels.iter().chain(&region.classes));
     if channels().any(|channel| channel.predicted_temporal_std.is_some()) {
         let _ = writeln!(out, "{}", report.uncertainty.in_words());
-    } else if let Some(why) = report.unpredicted {
+    } else if let Some(why) = &report.unpredicted {
         let _ = writeln!(out, "nothing is predicted: {why}");
     }
     report.check.iter().for_each(|verdict| verdict_text(verdict, &mut out));

@@ -40,6 +40,7 @@ impl BudgetOutputs {
         if let Some(plot) = &self.plot {
             PlotFormat::of_path(plot)?;
         }
+        form_of(self.output_format, self.output.as_deref())?;
         register::announce(&[self.output.as_deref(), self.plot.as_deref()])
     }
 
@@ -49,7 +50,7 @@ impl BudgetOutputs {
     ///
     /// Those of [`prediction`], of the curve and of the disk.
     pub fn write(&self, found: &mut PredictedNoise) -> Result<()> {
-        let text = prediction(found, form_of(self.output_format, self.output.as_deref()))?;
+        let text = prediction(found, form_of(self.output_format, self.output.as_deref())?)?;
         if let Some(plot) = &self.plot {
             write_plot(plot, &photon_transfer(&found.transfer_curve()?))?;
         }

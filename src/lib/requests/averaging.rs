@@ -227,12 +227,9 @@ impl Averaged {
         (metadata.predicted, metadata.uncertainty, metadata.saturated_share, metadata.samples) =
             (None, None, None, None);
         metadata.mask_bits.clear();
-        if !seen.exposures.are_alike() {
+        if let Some(differs) = seen.exposures.unlike() {
             metadata.scene = None;
-            warnings.push(format!(
-                "{}: frames differ in more than the number of the exposure; nothing is predicted of their average",
-                header.name
-            ));
+            warnings.push(format!("{differs}; nothing is predicted of their average"));
         }
         // A median is what it would be while fewer than half of its samples are full.
         let least = if averaging.combine == Combine::Median { frames.div_ceil(2) } else { 1 };

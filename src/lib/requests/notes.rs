@@ -47,7 +47,10 @@ pub fn of_marks(reader: &FrameReader) -> Vec<Note> {
 pub fn of_over_frames(report: &RepeatedReport) -> Vec<Note> {
     let left_out = report.regions.iter().map(|region| region.left_out).sum();
     let text = "pixels are saturated, otherwise marked, NaN or infinite in one of the frames or more; they are left out of all";
-    (left_out > 0).then(|| Note::Warning(counted(left_out, text))).into_iter().collect()
+    let left_out = (left_out > 0).then(|| Note::Warning(counted(left_out, text)));
+    let unlike =
+        report.unlike.as_ref().map(|differs| Note::Warning(format!("{differs}; nothing is predicted of them")));
+    left_out.into_iter().chain(unlike).collect()
 }
 
 /// What came up among statistics.

@@ -16,7 +16,7 @@ use crate::formats::headerless::Layout;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::formats::pipe;
-use crate::formats::places::{named, numbered, output_of};
+use crate::formats::places::{is_pattern, named, numbered, output_of};
 use crate::formats::sequence::Sequence;
 use crate::metadata::{FrameHeader, PoissonKind};
 use crate::names::Named;
@@ -223,6 +223,21 @@ impl Output {
     pub fn is_stream(&self) -> bool {
         let takes_any = |path: &Path| std::fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir());
         named(self.output.as_deref()).is_none_or(takes_any)
+    }
+
+    /// Makes sure that one frame, made of all that come, has one place.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for a directory or a pattern.
+    pub fn check_one(&self) -> Result<()> {
+        match named(self.output.as_deref()).filter(|path| is_pattern(path)) {
+            Some(path) => {
+                let problem = format!("{}: one frame is made of all; name a single file", path.display());
+                Err(Error::Usage(problem).change(&["output"]))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Whether a file is named whose format is EXR.

@@ -1,7 +1,7 @@
 //! Exposures of one scene by one camera: whether frames that come one after another are.
 
 use crate::error::{Error, Result};
-use crate::metadata::FrameHeader;
+use crate::metadata::{Difference, FrameHeader, Metadata};
 use std::collections::HashSet;
 
 /// What is known of exposures that came so far.
@@ -9,7 +9,8 @@ use std::collections::HashSet;
 pub struct Exposures {
     first: FrameHeader,
     head: FrameHeader,
-    are_alike: bool,
+    /// What the first that differs in more than the exposure differs in.
+    unlike: Option<String>,
     /// Seed and number of each that tells them.
     drawn: HashSet<(u64, u32)>,
 }
@@ -18,7 +19,7 @@ impl Exposures {
     /// Those that `first` begins.
     pub fn of(first: &FrameHeader) -> Self {
         let mut exposures =
-            Self { first: first.clone(), head: first.without_exposure(), are_alike: true, drawn: HashSet::new() };
+            Self { first: first.clone(), head: first.without_exposure(), unlike: None, drawn: HashSet::new() };
         exposures.drawn.extend(drawn(first));
         exposures
     }
@@ -28,27 +29,35 @@ impl Exposures {
         &self.first
     }
 
-    /// Whether all have the same head but for what tells exposures apart.
-    pub fn are_alike(&self) -> bool {
-        self.are_alike
+    /// What they differ in beside what tells exposures apart, in words; none where that is nothing.
+    pub fn unlike(&self) -> Option<&str> {
+        self.unlike.as_deref()
     }
 
     /// Takes in the next.
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] for a frame that shows another scene or other pixels than the first, or is the same exposure as another, as
-    /// far as metadata tell.
+    /// [`Error::Format`] for a frame that shows another scene or other pixels than the first, by another camera or one that was set
+    /// in another way, or is the same exposure as another, as far as metadata tell.
     pub fn take(&mut self, frame: &FrameHeader) -> Result<()> {
         self.check(frame)?;
-        if let Some((seed, number)) = drawn(frame) {
-            if !self.drawn.insert((seed, number)) {
-                let problem =
-                    format!("exposure {number} of seed {seed} comes twice; its noise would count as that of two");
-                return Err(frame.refuse(problem));
-            }
+        if let Some((seed, number)) = drawn(frame)
+            && !self.drawn.insert((seed, number))
+        {
+            let problem = format!("exposure {number} of seed {seed} comes twice; its noise would count as that of two");
+            return Err(frame.refuse(problem));
         }
-        self.are_alike &= frame.without_exposure() == self.head;
+        let head = frame.without_exposure();
+        if self.unlike.is_none() && head != self.head {
+            let differs = match Difference::of([&head.metadata, &self.head.metadata]) {
+                Some(Difference { key, values: [its, theirs] }) => {
+                    format!("`{key}` of {} is {its}, but that of {} is {theirs}", frame.name, self.first.name)
+                }
+                None => format!("{} and {} differ in more than the exposure", frame.name, self.first.name),
+            };
+            self.unlike = Some(differs);
+        }
         Ok(())
     }
 
@@ -87,7 +96,37 @@ impl Exposures {
                 first.name
             )));
         }
-        Ok(())
+        let Some(Difference { key, values: [its, theirs] }) = Difference::of([frame, first].map(camera).each_ref())
+        else {
+            return Ok(());
+        };
+        let advice = match key.starts_with("black") {
+            true => "; take them back first (correct-frame)",
+            false => "",
+        };
+        Err(frame.refuse(format!(
+            "its `{key}` is {its}, but that of {} is {theirs}; only exposures of one scene by one camera go together{advice}",
+            first.name
+        )))
+    }
+}
+
+/// What is known of the camera and of how it was set, and nothing else.
+fn camera(frame: &FrameHeader) -> Metadata {
+    let Metadata { quantity, sensor, camera, exposure, adc, noise, .. } = frame.without_exposure().metadata;
+    let known = &frame.metadata;
+    Metadata {
+        sensor,
+        camera,
+        exposure,
+        adc,
+        noise,
+        dark_signal_e: known.dark_signal_e,
+        black_level_adu: known.black_level_adu,
+        black_by_row: known.black_by_row.clone(),
+        black_by_column: known.black_by_column.clone(),
+        white_level_adu: known.white_level_adu,
+        ..Metadata::new(quantity)
     }
 }
 

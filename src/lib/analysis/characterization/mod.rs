@@ -346,7 +346,7 @@ fn sums(
         let folded = fold(&library.wavelength_nm, wavelengths, weights);
         if folded.uncovered > 1e-3 {
             return Err(Error::Data(format!(
-                "the library does not cover {:.1} % of what {what} responds to between {} and {} nm",
+                "the radiance does not cover {:.1} % of what {what} responds to between {} and {} nm",
                 100.0 * folded.uncovered,
                 grid.start_nm,
                 grid.end_nm

@@ -80,7 +80,7 @@ impl<'a> Assessment<'a> {
         let black = levels.mean_black(frame, region.x..region.x + region.width, region.y..region.y + region.height);
         let has_rails = levels.has_rails();
         let reports = |group: &Group<'_>, black: f64| -> Vec<ChannelReport> {
-            (0..group.names.len()).map(|index| group.channel(index, black, has_rails)).collect()
+            (0..group.names.len()).map(|index| group.channel(index, black, has_rails, self.repeats)).collect()
         };
         let mut channels = reports(&self.channels, black.whole);
         // Errors of what is known to share rows or columns are those of the prediction.
@@ -187,8 +187,8 @@ impl<'a> Assessment<'a> {
 }
 
 impl Group<'_> {
-    /// What is said of a channel.
-    fn channel(&self, index: usize, black: f64, has_rails: bool) -> ChannelReport {
+    /// What is said of a channel, of so many frames' worth of samples.
+    fn channel(&self, index: usize, black: f64, has_rails: bool, repeats: f64) -> ChannelReport {
         let moments = self.moments;
         let expectation = self.predicted.channels.get(index);
         let count = moments.count;
@@ -202,7 +202,7 @@ impl Group<'_> {
         let spread = expectation.filter(|expected| expected.is_resolved());
         let n = count as f64;
         // Errors of independent normal samples, relative to their standard deviation.
-        let independent = (1.0 / n.sqrt(), (2.0 * (n - 1.0)).sqrt().recip());
+        let independent = (1.0 / n.sqrt(), (2.0 * (n - 1.0) * repeats).sqrt().recip());
         let known = |expected: &Expectation| (expected.mean_error / expected.sample_std, expected.std_error);
         let is_known = |errors: &(f64, f64)| errors.0.is_finite() && errors.1.is_finite();
         let (mean_error, std_error) = expectation.map(known).filter(is_known).unwrap_or(independent);

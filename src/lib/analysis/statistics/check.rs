@@ -2,7 +2,6 @@
 
 use crate::error::{Error, Result};
 use crate::numerics::significance;
-use crate::propagation::Unpredictable;
 use crate::propagation::covariance::PAIRS;
 use crate::propagation::sampling::Sampling;
 use nalgebra::Matrix3;
@@ -89,7 +88,7 @@ impl Verdict {
         regions: impl Iterator<Item = (&'a [Test], u64)> + Clone,
         level: f64,
         frame: &str,
-        why: Option<Unpredictable>,
+        why: Option<&str>,
     ) -> Result<Self> {
         if regions.clone().next().is_none() || regions.clone().any(|(tests, _)| tests.is_empty()) {
             let why = why.map_or(String::new(), |why| format!("; here {why}"));

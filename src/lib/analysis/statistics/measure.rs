@@ -126,11 +126,11 @@ fn measure_all(
         RegionReport { tests, ..assessment.report(&frame, *region, &levels).with_marks(*marks, left_out) }
     };
     let regions = regions.iter().zip(&tallies).zip(&counts).map(report).collect();
-    let mut report =
-        Report { regions, check: None, uncertainty: coverage(&frame), unpredicted: prediction.as_ref().err().copied() };
+    let unpredicted = prediction.as_ref().err().map(ToString::to_string);
+    let mut report = Report { regions, check: None, uncertainty: coverage(&frame), unpredicted };
     if let Some(level) = level {
         let regions = report.regions.iter().map(|region| (&region.tests[..], region.not_finite));
-        report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted)?);
+        report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted.as_deref())?);
     }
     Ok((report, portrait))
 }

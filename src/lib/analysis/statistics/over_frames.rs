@@ -19,12 +19,12 @@ use super::repeated_report::{RepeatedChannel, RepeatedRegion, RepeatedReport};
 use super::report::{ChannelReport, RegionReport, coverage};
 use super::tally::{Tally, tallies};
 use super::watch::{Saturated, Watch};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::metadata::{AverageRecord, ExposuresRecord, FrameHeader};
 use crate::numerics::averages::Combine;
 use crate::numerics::moments::Moments;
 use crate::numerics::running::Running;
-use crate::propagation::{Equations, FramePrediction, Repeated, Unpredictable};
+use crate::propagation::{Equations, FramePrediction, Repeated};
 use crate::stages::exposures::{Exposures, too_few};
 use crate::stages::saturation::with_mask;
 use crate::stream::{MemoryFrame, RowSource};
@@ -86,7 +86,7 @@ impl OverFrames {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`](crate::error::Error::Usage) for a region outside the frame; [`Error::Format`](crate::error::Error::Format) for one that shows another scene or other pixels than the
+    /// [`Error::Usage`] for a region outside the frame; [`Error::Format`] for one that shows another scene or other pixels than the
     /// first, or the same exposure as another; those of the source.
     pub fn add(&mut self, source: &mut dyn RowSource) -> Result<()> {
         let whole = [Region::whole(source.header())];
@@ -119,7 +119,7 @@ impl OverFrames {
     ///
     /// # Errors
     ///
-    /// [`Error::Data`](crate::error::Error::Data) of fewer than two frames, or where nothing can be tested that should be.
+    /// [`Error::Data`] of fewer than two frames, or where nothing can be tested that should be.
     pub fn finish(self) -> Result<(RepeatedReport, MemoryFrame)> {
         let Self { settings, seen } = self;
         let Some(seen) = seen.filter(|seen| seen.pixels.count() > 1) else {
@@ -250,9 +250,10 @@ impl Seen {
         let means = tallies(&mut means, &self.regions, &levels)?;
         let mut variances = self.plane(|index| self.pixels.variance(index));
         let variances = tallies(&mut variances, &self.regions, &levels)?;
-        let predicted = match self.exposures.are_alike() {
-            true => Repeated::of(frame, settings.equations, count),
-            false => Err(Unpredictable::Beyond("frames differ in more than the number of the exposure")),
+        let predicted = Repeated::of(frame, settings.equations, count).map_err(|why| why.to_string());
+        let predicted = match self.exposures.unlike() {
+            Some(differs) if predicted.is_ok() => Err(differs.to_owned()),
+            _ => predicted,
         };
         let mut samplings = [Samplings::default(), Samplings::default()];
         let mut regions = Vec::new();
@@ -278,20 +279,24 @@ impl Seen {
             regions.push(made.region(&self.of_frames[index], &of_variances.mean_stds(), tests));
         }
         let unpredicted = match &predicted {
-            Ok(known) => known.scatter.err().filter(|_| settings.level.is_some()),
-            Err(why) => Some(*why),
+            Ok(known) => known.scatter.err().filter(|_| settings.level.is_some()).map(|why| why.to_string()),
+            Err(why) => Some(why.clone()),
         };
         if settings.level.is_some() {
             check_testable(frame)?;
+            if let Some(why) = &unpredicted {
+                return Err(Error::Data(format!("{}: nothing can be checked: {why}", frame.name)));
+            }
         }
         let check = match settings.level {
             Some(level) => {
                 let tested = regions.iter().map(|region| (&region.tests[..], region.left_out));
-                Some(Verdict::of(tested, level, &frame.name, unpredicted)?)
+                Some(Verdict::of(tested, level, &frame.name, None)?)
             }
             None => None,
         };
-        Ok(RepeatedReport { frames: count, regions, check, uncertainty: coverage(frame), unpredicted })
+        let unlike = self.exposures.unlike().map(str::to_owned);
+        Ok(RepeatedReport { frames: count, regions, check, uncertainty: coverage(frame), unlike, unpredicted })
     }
 }
 
@@ -409,17 +414,8 @@ impl Made {
             z_temporal_std: known(variances.z_std),
             z_std_of_means: known(means.z_std),
             mean_error: means.mean_error,
-            temporal_std_error: variances.std_error.map(|error| self.alone(error)),
+            temporal_std_error: variances.std_error,
             fixed_std_error: of_fixed(),
-        }
-    }
-
-    /// The error of a standard deviation that was taken for one of a single frame, where no prediction told better.
-    fn alone(&self, error: f64) -> f64 {
-        if self.variances.predicted_covariance.is_some() {
-            error
-        } else {
-            error / (f64::from(self.frames) - 1.0).sqrt()
         }
     }
 }

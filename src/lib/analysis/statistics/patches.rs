@@ -170,7 +170,7 @@ pub fn measure(
                 .collect()
         }
         Err(why) => {
-            unpredicted = Some(why);
+            unpredicted = Some(why.to_string());
             let laws = Laws::of(&frame, &regions);
             let tallies = tallies.par_iter().zip(&regions);
             tallies

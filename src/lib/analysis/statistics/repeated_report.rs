@@ -3,7 +3,6 @@
 use super::check::{Test, Verdict};
 use super::region::Region;
 use crate::metadata::Coverage;
-use crate::propagation::Unpredictable;
 use crate::units::QuantityKind;
 use serde::Serialize;
 
@@ -19,9 +18,12 @@ pub struct RepeatedReport {
     pub check: Option<Verdict>,
     /// What predicted standard deviations count.
     pub uncertainty: Coverage,
+    /// What frames differ in beside what tells exposures apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unlike: Option<String>,
     /// Why nothing is predicted, or nothing can be tested, where that is so.
-    #[serde(skip)]
-    pub unpredicted: Option<Unpredictable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unpredicted: Option<String>,
 }
 
 /// What is said of a region.

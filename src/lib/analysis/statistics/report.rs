@@ -4,7 +4,6 @@ use super::check::{Test, Verdict};
 use super::region::Region;
 use super::watch::Marks;
 use crate::metadata::{Coverage, FrameHeader};
-use crate::propagation::Unpredictable;
 use crate::units::QuantityKind;
 use serde::Serialize;
 
@@ -19,8 +18,8 @@ pub struct Report {
     /// What predicted standard deviations, and layers of them, count.
     pub uncertainty: Coverage,
     /// Why nothing is predicted of the frame as a whole, where that is so.
-    #[serde(skip)]
-    pub unpredicted: Option<Unpredictable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unpredicted: Option<String>,
 }
 
 /// What standard deviations of a frame count.

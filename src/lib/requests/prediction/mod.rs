@@ -11,7 +11,7 @@ use super::options::{ExposureChoice, NoiseChoice, SignalLevel, SpectrumChoice, S
 use super::scene::{Scene, Uniform};
 use super::values;
 use crate::analysis::characterization::evaluation::{Filling, SampleExposure, of_sample, per_exposure};
-use crate::analysis::characterization::{signals, stimuli};
+use crate::analysis::characterization::{CameraMatrix, signals, stimuli};
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::{CfaPattern, Class};
@@ -28,8 +28,11 @@ use crate::stages::to_xyz::ColorSettings;
 use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use sweep::uncertainty;
+
+/// What stands for the matrix of the sensor in place of the name of a file.
+const OF_SENSOR: &str = "sensor";
 
 /// What is to be predicted, and how.
 #[derive(Debug, Clone, Args)]
@@ -68,8 +71,9 @@ pub struct NoisePrediction {
     /// The same by its other name.
     #[arg(long, hide = true, value_name = "PATTERN", value_parser = values::pattern)]
     pub pattern: Option<CfaPattern>,
-    /// Matrix file, as fit-matrix makes it, for XYZ and L*a*b*
-    #[arg(long, value_name = "FILE")]
+    /// Matrix file, as fit-matrix makes it, for XYZ and L*a*b*; `sensor` for that of the sensor itself, which to-xyz takes by
+    /// default
+    #[arg(long, value_name = "FILE|sensor")]
     pub matrix: Option<PathBuf>,
     /// The white of L\*a\*b\*.
     #[command(flatten)]
@@ -237,7 +241,9 @@ impl NoisePrediction {
         let true_xyz = radiance.filter(|_| is_absolute).and_then(|radiance| {
             let grid = WavelengthGrid::default();
             let found = data::load_observer().and_then(|observer| stimuli(&radiance, &observer, &grid));
-            found.map_err(|why| notes.push(Note::Remark(format!("no XYZ of the spectrum itself: {why}")))).ok()
+            found
+                .map_err(|why| notes.push(Note::Warning(format!("the XYZ of the spectrum itself are not told: {why}"))))
+                .ok()
         });
         let true_xyz = true_xyz.map(|xyz| [xyz[(0, 0)], xyz[(0, 1)], xyz[(0, 2)]]);
         let conditions =
@@ -340,14 +346,21 @@ impl NoisePrediction {
     fn color(&self, sensor: &Sensor, notes: &mut Vec<Note>) -> Result<Option<ColorSettings>> {
         let Some(path) = &self.matrix else {
             return match self.uncertainty {
-                Some(Uncertainty::Jnd(_)) => {
-                    Err(Error::Usage("an uncertainty in jnd needs colors; give --matrix FILE".into()))
-                }
+                Some(Uncertainty::Jnd(_)) => Err(Error::Usage(
+                    "an uncertainty in jnd needs colors; give --matrix FILE, or --matrix sensor".into(),
+                )),
                 _ => Ok(None),
             };
         };
         self.white.check()?;
-        let matrix = data::load_matrix(path)?;
+        let matrix = match (path == Path::new(OF_SENSOR), sensor.xyz_from_camera) {
+            (true, Some(xyz_from_camera)) => CameraMatrix::of_sensor(sensor, xyz_from_camera),
+            (true, None) => {
+                let problem = format!("sensor {} has no matrix of its own; name a file of one", sensor.name);
+                return Err(Error::Usage(problem).change(&["matrix"]));
+            }
+            (false, _) => data::load_matrix(path)?,
+        };
         if let Some(of_matrix) = matrix.sensor.as_ref().filter(|name| **name != sensor.name) {
             let text = format!("{} was fitted for the sensor {of_matrix}, not {}", path.display(), sensor.name);
             notes.push(Note::Warning(text));
