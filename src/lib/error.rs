@@ -65,6 +65,10 @@ pub enum Error {
         advice: Advice,
     },
 
+    /// The program before this one in a pipe has failed, and has said why.
+    #[error("the program before it in the pipe has failed")]
+    Upstream,
+
     /// Whoever read our output has closed the pipe: no error, the program ends quietly.
     #[error("the output pipe was closed")]
     ClosedPipe,

@@ -197,7 +197,9 @@ impl Session {
                     Err(Error::ClosedPipe) => is_closed.store(true, Ordering::Relaxed),
                     Err(error) => {
                         failed.fetch_add(1, Ordering::Relaxed);
-                        bar.suspend(|| complain(self.program, &advice::advised(&error, &A::command())));
+                        if !matches!(error, Error::Upstream) {
+                            bar.suspend(|| complain(self.program, &advice::advised(&error, &A::command())));
+                        }
                         if stop_at_failure {
                             return;
                         }

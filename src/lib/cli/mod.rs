@@ -27,7 +27,7 @@ pub use session::Session;
 use crate::error::{Error, Result};
 use crate::formats::atomic::remove_pending_now;
 use crate::formats::places::STDOUT_NAME;
-use crate::formats::{keys, register, standard};
+use crate::formats::{keys, pipe, register, standard};
 use crate::metadata::METADATA_TEMPLATE;
 use crate::numerics::vectors::Instructions;
 use clap::{Command, CommandFactory, FromArgMatches};
@@ -72,6 +72,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         Err(error) if !error.use_stderr() => return ended(program, show(|| error.print())),
         Err(error) => {
             complain(program, &usage::one_line(program, &error, &A::command()));
+            pipe::pass_failure_on();
             return ExitCode::from(2);
         }
     };
@@ -82,7 +83,10 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     match done {
         Ok(()) | Err(Error::ClosedPipe) => ExitCode::SUCCESS,
         Err(error) => {
-            complain(program, &advice::advised(&error, &A::command()));
+            if !matches!(error, Error::Upstream) {
+                complain(program, &advice::advised(&error, &A::command()));
+            }
+            pipe::pass_failure_on();
             ExitCode::from(error.exit_status())
         }
     }

@@ -7,6 +7,7 @@ use super::format::{
     ColorTags, HEAD_BYTES, Opened, Readers, Rest, SampleReader, SampleType, Streaming, U16_FULL_SCALE,
 };
 use super::makers::{MakersReader, Worker};
+use super::places::in_stream;
 use super::read_ahead::Pipe;
 use super::sequence::Sequence;
 use super::viewable::{Scaling, is_scale};
@@ -215,10 +216,10 @@ impl FrameReader {
     /// Those of its metadata; [`Error::Usage`] where it has not the channel or the rectangle that is wanted.
     pub fn of(reader: Box<dyn SampleReader>, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
-        let (mut metadata, sidecar) = find_metadata(reader.as_ref(), name, path, options)?;
+        let Found { mut metadata, sidecar, is_embedded } = find_metadata(reader.as_ref(), name, path, options)?;
         let stored = reader.geometry();
         let to_come = metadata.frames_to_come.take().unwrap_or_default();
-        let scaling = take_scaling(reader.as_ref(), &mut metadata, name)?;
+        let scaling = take_scaling(reader.as_ref(), &mut metadata, is_embedded, name)?;
         let (first_channel, geometry) = match &options.channel {
             Some(channel) => take_channel(stored, channel, name)?,
             None => (0, keep_planes(stored, options.all_channels, metadata.quantity)),
@@ -466,7 +467,8 @@ impl RowSource for FrameReader {
         let start = if direct { first } else { 0 };
         let into: &mut Vec<f32> = if direct { samples } else { &mut buffer };
         into.truncate(start);
-        self.reader.read(rows, into)?;
+        let read = self.reader.read(rows, into);
+        read.map_err(|error| of_upstream(error, &self.header.name))?;
         if let Some(scaling) = &self.scaling {
             scaling.undo(&mut into[start..]);
         }
@@ -548,7 +550,7 @@ fn open_unseekable(input: File, name: &str, part: usize) -> Opened {
 /// file.
 fn open_piped(mut input: Pipe, name: &str, part: usize) -> Opened {
     let head = input.head(HEAD_BYTES).map_err(|e| Error::disk(name, "read", e))?.to_vec();
-    not_empty(&head, name)?;
+    check_begun(&head, name)?;
     let readers = readers_of(&head, name)?;
     let is_streamed = |stream: &Streaming| (stream.is_streamable)(&head) && !(stream.has_parts && part != 0);
     if let Some(stream) = readers.stream.filter(is_streamed) {
@@ -571,17 +573,26 @@ fn open_whole(readers: Readers, head: &[u8], input: File, name: &str, part: usiz
 fn head_of(input: &mut File, name: &str) -> Result<Vec<u8>> {
     let mut head = Vec::new();
     input.take(HEAD_BYTES as u64).read_to_end(&mut head).map_err(|e| Error::disk(name, "read", e))?;
-    not_empty(&head, name)?;
+    check_begun(&head, name)?;
     Ok(head)
 }
 
 /// Makes sure that something comes.
-fn not_empty(head: &[u8], name: &str) -> Result<()> {
+fn check_begun(head: &[u8], name: &str) -> Result<()> {
     if !head.is_empty() {
         return Ok(());
     }
+    if name == STDIN_NAME && pipe::has_failed() {
+        return Err(Error::Upstream);
+    }
     let hint = if name == STDIN_NAME { "; the program before it wrote nothing" } else { "" };
     Err(Error::format(name, format!("it is empty{hint}")))
+}
+
+/// An error in reading a stream, which is not worth telling where the program before has failed in the midst of a frame.
+fn of_upstream(error: Error, name: &str) -> Error {
+    let is_told = matches!(error, Error::Format { .. }) && in_stream(name) == STDIN_NAME && pipe::has_failed();
+    if is_told { Error::Upstream } else { error }
 }
 
 /// The readers of what a file begins as.
@@ -608,15 +619,19 @@ fn is_text(head: &[u8]) -> bool {
     whole.chars().all(|character| !character.is_control() || character.is_whitespace())
 }
 
-/// The metadata in order of trust: `--metadata`, sidecar, embedded, the format's own tags; and the sidecar's name where
-/// it is the one.
-fn find_metadata(
-    reader: &dyn SampleReader,
-    name: &str,
-    path: Option<&Path>,
-    options: &InputOptions,
-) -> Result<(Metadata, Option<String>)> {
+/// The metadata of a frame, and where they were found.
+struct Found {
+    metadata: Metadata,
+    /// What describes the samples, as messages call it: the sidecar, or what the frame itself holds.
+    sidecar: Option<String>,
+    /// Whether they are those that the file itself holds.
+    is_embedded: bool,
+}
+
+/// The metadata in order of trust: `--metadata`, sidecar, embedded, the format's own tags.
+fn find_metadata(reader: &dyn SampleReader, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Found> {
     path.map_or(Ok(()), register::note_sidecar)?;
+    let beside = |metadata, sidecar| Found { metadata, sidecar, is_embedded: false };
     let from_file = |path: &Path| -> Result<Metadata> {
         let shown = path.display().to_string();
         let bytes = read_file(path)?;
@@ -628,19 +643,19 @@ fn find_metadata(
         let shown = path.display().to_string();
         yaml::check_misspelt(&shown, &metadata)?;
         doubt_of_metadata(&shown, metadata.contradictions());
-        return Ok((metadata, None));
+        return Ok(beside(metadata, None));
     }
     if let Some(sidecar) = path.map(sidecar_path).filter(|sidecar| sidecar.is_file()) {
         let (metadata, shown) = (from_file(&sidecar)?, sidecar.display().to_string());
         // Another version may have written it: what is unknown is kept.
         doubt_of_metadata(&shown, yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()));
-        return Ok((metadata, Some(shown)));
+        return Ok(beside(metadata, Some(shown)));
     }
     if let Some(text) = reader.embedded() {
         let describes = reader.describes_samples().then(|| "its metadata".to_owned());
-        return Ok((yaml::parse_metadata(name, text)?, describes));
+        return Ok(Found { metadata: yaml::parse_metadata(name, text)?, sidecar: describes, is_embedded: true });
     }
-    Ok((reader.own_tags().clone(), None))
+    Ok(beside(reader.own_tags().clone(), None))
 }
 
 /// Warnings of what a file of metadata says.
@@ -654,10 +669,15 @@ fn doubt_of_metadata(name: &str, problems: impl IntoIterator<Item = String>) {
 /// # Errors
 ///
 /// [`Error::Format`] for what is no power of two.
-fn take_scaling(reader: &dyn SampleReader, metadata: &mut Metadata, name: &str) -> Result<Option<Scaling>> {
-    let beside = metadata.sample_scale.take();
-    let embedded = reader.embedded().and_then(|text| yaml::parse_metadata(name, text).ok());
-    let scale = embedded.map_or(beside, |embedded| embedded.sample_scale).unwrap_or(1.0);
+fn take_scaling(
+    reader: &dyn SampleReader,
+    metadata: &mut Metadata,
+    is_embedded: bool,
+    name: &str,
+) -> Result<Option<Scaling>> {
+    let found = metadata.sample_scale.take();
+    let embedded = reader.embedded().filter(|_| !is_embedded).and_then(|text| yaml::parse_metadata(name, text).ok());
+    let scale = embedded.map_or(found, |embedded| embedded.sample_scale).unwrap_or(1.0);
     if !is_scale(scale) {
         let problem = format!("its `sample_scale`, {scale}, is no power of two, as 0.25 and 16 are");
         return Err(Error::format(name, problem));

@@ -3,7 +3,7 @@
 use super::files::{STDIN_NAME, named, open_named, spool};
 use super::format::{HEAD_BYTES, Rest};
 use super::places::FRAME_OF;
-use super::table;
+use super::{pipe, table};
 use crate::error::{Error, Result};
 use crate::text::counted;
 use std::fmt;
@@ -144,6 +144,9 @@ impl Sequence {
             At::Behind(rest) => rest.begins_frame(&name),
         };
         if *to_come > 0 && matches!(comes, Ok(false)) {
+            if path.is_none() && pipe::has_failed() {
+                return Err(Error::Upstream);
+            }
             let came = counted(*taken, "frames");
             let problem =
                 format!("it ends behind {came}, and {to_come} more were to come: the program before has failed");

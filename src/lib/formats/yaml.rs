@@ -36,7 +36,9 @@ fn parse_raw(name: &str, text: &str) -> Result<Mapping> {
 ///
 /// [`Error::Format`] when the text is not of this type. The place is named where the parser knows it.
 fn parse<T: DeserializeOwned + Serialize>(name: &str, raw: &Mapping, text: &str) -> Result<(T, Mapping)> {
-    let typed: T = serde_yaml::from_str(text).map_err(|error| yaml_complaint(name, &error))?;
+    // The raw form is quicker to read; only the text tells the place of what is wrong.
+    let typed = serde_yaml::from_value(Value::Mapping(raw.clone())).or_else(|_| serde_yaml::from_str(text));
+    let typed: T = typed.map_err(|error| yaml_complaint(name, &error))?;
     let known = serde_yaml::to_value(&typed).map_err(|error| yaml_complaint(name, &error))?;
     let unknown = known.as_mapping().map(|known| unknown_keys(raw, known)).unwrap_or_default();
     Ok((typed, unknown))
@@ -401,7 +403,7 @@ pub fn write_metadata(metadata: &Metadata) -> Result<String> {
             "the metadata cannot be written: `{key}` is not a finite number; choose less extreme settings"
         )));
     }
-    yaml_writer::write("the metadata", &value)
+    yaml_writer::write_value("the metadata", &value)
 }
 
 /// The text of a document that a parser may see.

@@ -50,7 +50,7 @@ pub fn checked_text(bytes: &[u8]) -> Result<&str, &'static str> {
     }
     let indent =
         |line: &str| line.len() - line.trim_start_matches(|c| c == ' ' || c == '\t' || INDENTING.contains(&c)).len();
-    if text.lines().any(|line| indent(line) > MAX_INDENT) {
+    if text.lines().any(|line| line.len() > MAX_INDENT && indent(line) > MAX_INDENT) {
         return Err("its lines nest too deep");
     }
     if REFERENCES.iter().any(|mark| references(text, *mark) > MAX_REFERENCES) {
@@ -59,8 +59,13 @@ pub fn checked_text(bytes: &[u8]) -> Result<&str, &'static str> {
     Ok(text)
 }
 
-/// How often a mark stands where an anchor, an alias or a tag may begin.
+/// How often a mark stands where an anchor, an alias or a tag may begin; where it stands nowhere else too often, how often at all.
 fn references(text: &str, mark: char) -> usize {
+    // Where there are none, or few, it does not matter where they stand.
+    let all = text.bytes().filter(|byte| char::from(*byte) == mark).count();
+    if all <= MAX_REFERENCES {
+        return all;
+    }
     let mut before = '\n';
     let mut count = 0;
     for character in text.chars() {

@@ -18,11 +18,20 @@ const DIGITS: usize = 8;
 ///
 /// [`Error::Data`] when `what` cannot be written as YAML, or not so that it could be read again: it is too long or too deep.
 pub fn write(what: &str, document: &impl Serialize) -> Result<String> {
-    let text = self::document(what, document)?;
+    write_value(what, &value_of(what, document)?)
+}
+
+/// The same of a document in its raw form.
+///
+/// # Errors
+///
+/// As [`write`].
+pub fn write_value(what: &str, value: &Value) -> Result<String> {
+    let text = escaping(what, value, &is_unprintable)?;
     if checked_text(text.as_bytes()).is_ok() {
         return Ok(text);
     }
-    let text = escaping(what, document, &|c| is_unprintable(c) || may_count(c))?;
+    let text = escaping(what, value, &|c| is_unprintable(c) || may_count(c))?;
     checked_text(text.as_bytes()).map_err(|problem| unwritable(what, problem))?;
     Ok(text)
 }
@@ -33,11 +42,15 @@ pub fn write(what: &str, document: &impl Serialize) -> Result<String> {
 ///
 /// [`Error::Data`] when `what` cannot be written as YAML.
 pub fn document(what: &str, document: &impl Serialize) -> Result<String> {
-    escaping(what, document, &is_unprintable)
+    escaping(what, &value_of(what, document)?, &is_unprintable)
 }
 
-fn escaping(what: &str, document: &impl Serialize, escaped: &dyn Fn(char) -> bool) -> Result<String> {
-    let text = serde_yaml::to_value(document).and_then(|value| written(&value, escaped));
+fn value_of(what: &str, document: &impl Serialize) -> Result<Value> {
+    serde_yaml::to_value(document).map_err(|error| unwritable(what, &error.to_string()))
+}
+
+fn escaping(what: &str, value: &Value, escaped: &dyn Fn(char) -> bool) -> Result<String> {
+    let text = if has_escaped(value, escaped) { written(value, escaped) } else { serde_yaml::to_string(value) };
     text.map_err(|error| unwritable(what, &error.to_string()))
 }
 
@@ -67,12 +80,30 @@ fn written(value: &Value, escaped: &dyn Fn(char) -> bool) -> std::result::Result
 /// What makes a stand-in as long as the string that it stands for: a key that is long is written in another way.
 const PADDING: char = '_';
 
+/// Whether a string has to be stood in for.
+fn is_escaped(string: &str, escaped: &dyn Fn(char) -> bool) -> bool {
+    let wants_quotes = escaped('[') && may_indent(string);
+    wants_quotes || string.contains(escaped) || string.contains(STAND_IN)
+}
+
+/// Whether any of the strings of a value has to be.
+fn has_escaped(value: &Value, escaped: &dyn Fn(char) -> bool) -> bool {
+    match value {
+        Value::String(string) => is_escaped(string, escaped),
+        Value::Sequence(items) => items.iter().any(|item| has_escaped(item, escaped)),
+        Value::Mapping(mapping) => {
+            mapping.iter().any(|(key, value)| has_escaped(key, escaped) || has_escaped(value, escaped))
+        }
+        Value::Tagged(tagged) => has_escaped(&tagged.value, escaped),
+        Value::Null | Value::Bool(_) | Value::Number(_) => false,
+    }
+}
+
 /// A value whose strings with something to be `escaped` are stood in for by numbers in `quoted`.
 fn stood_in(value: &Value, escaped: &dyn Fn(char) -> bool, quoted: &mut Vec<String>) -> Value {
     match value {
         Value::String(string) => {
-            let wants_quotes = escaped('[') && may_indent(string);
-            if !wants_quotes && !string.contains(escaped) && !string.contains(STAND_IN) {
+            if !is_escaped(string, escaped) {
                 return value.clone();
             }
             let whole = in_quotes(string, escaped);
