@@ -99,7 +99,7 @@ fn inputs_are_never_written() {
         ("mosaic noisy.exr --metadata q.txt -o noisy.exr.yaml --format exr", "noisy.exr.yaml", "noisy.exr.yaml"),
         ("mosaic noisy.exr -o new.exr", "new.exr.yaml", "noisy.exr.yaml"),
         ("mosaic noisy.exr -o hard.exr", "hard.exr", "noisy.exr"),
-        ("measure soft.exr -o hard.exr", "hard.exr", "soft.exr"),
+        ("measure soft.exr --output-format text -o hard.exr", "hard.exr", "soft.exr"),
         ("correct-frame codes.exr --dark d.exr -o d.exr", "d.exr", "d.exr"),
         ("color-difference xyz.exr x.exr --map x.exr", "x.exr", "x.exr"),
         ("color-difference xyz.exr x.exr -o xyz.exr.yaml", "xyz.exr.yaml", "xyz.exr.yaml"),
@@ -353,7 +353,8 @@ fn a_directory_that_goes_away_takes_nothing_along() {
     assert_eq!(shop.files(), files);
 }
 
-/// Every stage behind one that is killed fails, and says why in a line; no name is given to anything.
+/// Every stage behind one that is killed fails; the first of them says why in a line, the others have nothing to add. No name is given
+/// to anything.
 #[test]
 fn a_stage_that_is_killed_fails_all_behind_it() {
     let (shop, ..) = with_large_frame();
@@ -368,11 +369,13 @@ fn a_stage_that_is_killed_fails_all_behind_it() {
     }
     signal_to(&killed, Signal::SIGKILL);
     killed.wait().unwrap();
-    for (line, mut child) in behind {
+    for (index, (line, mut child)) in behind.into_iter().enumerate() {
         let mut complaint = String::new();
         child.stderr.take().unwrap().read_to_string(&mut complaint).unwrap();
         assert_eq!(child.wait().unwrap().code(), Some(BAD_DATA), "{line}");
-        assert!(complaint.contains("cut short") || complaint.contains("it is empty"), "{line}: {complaint}");
+        let is_told = complaint.contains("cut short") || complaint.contains("it is empty");
+        // What is on its way to a slow reader when a program fails does not let the pipe be marked.
+        assert!(is_told || (index > 0 && complaint.is_empty()), "{line}: {complaint}");
     }
     assert_eq!(shop.files(), files);
 }

@@ -167,11 +167,16 @@ fn patches_of_a_library_are_as_noisy_as_predicted() {
     // Title, heading, patches, and what standard deviations count.
     assert_eq!(text.lines().count(), 915);
     let csv = String::from_utf8(shop.run("measure --patches=20x16 rgb.exr --output-format csv", &[])).unwrap();
-    assert!(csv.lines().next().unwrap().ends_with(",z_std,sample,patch_column,patch_row,mean_error,std_error"));
+    assert!(
+        csv.lines()
+            .next()
+            .unwrap()
+            .ends_with(",z_std,sample,patch_column,patch_row,mean_error,std_error,quantity,unit")
+    );
     assert!(csv.lines().last().unwrap().contains(",911,37,23,"));
     assert_eq!(csv.lines().count(), 1 + 3 * 912);
     let plain = String::from_utf8(shop.run("measure rgb.exr --output-format csv", &[])).unwrap();
-    assert!(plain.lines().next().unwrap().ends_with(",z_std,mean_error,std_error"));
+    assert!(plain.lines().next().unwrap().ends_with(",z_std,mean_error,std_error,quantity,unit"));
     for line in ["measure --patches lab.exr --output-format json", "measure --patches plane.exr --output-format json"] {
         assert_eq!(shop.run(&format!("{line} --threads 1"), &[]), shop.run(&format!("{line} --threads 3"), &[]));
     }
@@ -350,7 +355,11 @@ fn noise_is_predicted_checked_and_carried_along() {
             2,
             "the paper has no equations for the method mhc; choose bi, shti or eci",
         ),
-        ("predict-noise --dark --uncertainty 1jnd", 2, "an uncertainty in jnd needs colors; give --matrix FILE"),
+        (
+            "predict-noise --dark --uncertainty 1jnd",
+            2,
+            "an uncertainty in jnd needs colors; give --matrix FILE, or --matrix sensor",
+        ),
         (
             "predict-noise --dark --plot curve.jpg",
             2,

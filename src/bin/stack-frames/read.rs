@@ -64,8 +64,11 @@ struct StoredArray {
     shards: Option<Shards>,
     /// Whether every chunk must be there.
     is_ours: bool,
-    kept: Mutex<VecDeque<(Vec<u64>, Arc<Vec<u8>>)>>,
+    kept: Mutex<VecDeque<Decoded>>,
 }
+
+/// A chunk by its indices, and its bytes.
+type Decoded = (Vec<u64>, Arc<Vec<u8>>);
 
 /// How inner chunks are found and decoded.
 struct Shards {
