@@ -99,7 +99,7 @@ fn inputs_are_never_written() {
         ("mosaic noisy.exr --metadata q.txt -o noisy.exr.yaml --format exr", "noisy.exr.yaml", "noisy.exr.yaml"),
         ("mosaic noisy.exr -o new.exr", "new.exr.yaml", "noisy.exr.yaml"),
         ("mosaic noisy.exr -o hard.exr", "hard.exr", "noisy.exr"),
-        ("measure soft.exr --output-format text -o hard.exr", "hard.exr", "soft.exr"),
+        ("measure soft.exr -o hard.exr", "hard.exr", "soft.exr"),
         ("correct-frame codes.exr --dark d.exr -o d.exr", "d.exr", "d.exr"),
         ("color-difference xyz.exr x.exr --map x.exr", "x.exr", "x.exr"),
         ("color-difference xyz.exr x.exr -o xyz.exr.yaml", "xyz.exr.yaml", "xyz.exr.yaml"),

@@ -64,6 +64,19 @@ pub fn note_input(about: &Metadata, name: &str) -> Result<()> {
     }
 }
 
+/// Notes files that will be read, before any is opened; what does not exist is told when it is.
+///
+/// # Errors
+///
+/// As [`note_input`].
+pub fn note_inputs<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+    let noted = |path: &Path| match std::fs::metadata(path) {
+        Ok(about) => note_input(&about, &path.display().to_string()),
+        Err(_) => Ok(()),
+    };
+    paths.into_iter().filter_map(|path| named(Some(path))).try_for_each(noted)
+}
+
 /// The name of an input that was changed after `made`, among those whose names are `of_it`.
 pub fn changed_after(made: SystemTime, of_it: impl Fn(&str) -> bool) -> Option<String> {
     let register = register();

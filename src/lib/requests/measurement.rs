@@ -99,9 +99,10 @@ impl Measurement {
     ///
     /// # Errors
     ///
-    /// Those of [`register::announce`], [`batch::check_each_named`] and [`batch::check_one_report`].
+    /// Those of [`register::announce`], [`register::note_inputs`], [`batch::check_each_named`] and [`batch::check_one_report`].
     pub fn announce(&self, inputs: &[PathBuf], report: Option<&Path>) -> Result<()> {
         register::announce(&[report, self.plot.as_deref(), self.pixels.as_deref()])?;
+        register::note_inputs(inputs.iter().map(PathBuf::as_path))?;
         batch::check_each_named(inputs, self.plot.as_deref())?;
         batch::check_one_report(report)
     }
