@@ -131,6 +131,23 @@ fn a_failure_is_told_once() {
     assert_eq!(said, "mosaic: standard input: it is empty; the program before it wrote nothing\n");
 }
 
+/// Of frames of which one was taken at another temperature nothing is made, and the complaint names what was set, not what follows of it.
+#[test]
+fn statistics_are_of_all_frames_or_none() {
+    let shop = with_scene();
+    for (name, options) in [("a", "--frame 0"), ("b", "--frame 1"), ("warm", "--frame 2 --temperature 310")] {
+        let electrons = shop.run(&format!("add-noise scene.exr --seed 3 {options}"), &[]);
+        shop.run(&format!("digitize -o {name}.exr"), &electrons);
+    }
+    for line in ["measure --over frames", "average-frames -o mean.exr"] {
+        let done = shop.attempt(&format!("{line} a.exr b.exr warm.exr"), &[]);
+        let said = said(&done);
+        assert!(said.contains("warm.exr: its `noise.temperature_k` is 310.0, but that of a.exr is 333.0"), "{said}");
+        assert!(said.ends_with("1 of 3 inputs failed; nothing is made of the others\n"), "{said}");
+        assert!(done.stdout.is_empty() && done.status.code() == Some(BAD_DATA) && !shop.path("mean.exr").exists());
+    }
+}
+
 /// What was made of a file that was changed since is made anew, whatever tells its name; what was made of others stays.
 #[test]
 fn what_is_made_of_a_changed_file_is_made_anew() {

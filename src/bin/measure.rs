@@ -48,16 +48,17 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     arguments.measurement.announce(&frames.inputs, arguments.output.as_deref())?;
     let output = arguments.output.as_deref();
     let format = report::form_of(arguments.output_format, output)?.unwrap_or(ReportFormat::Text);
-    let reports = Output { makes: Makes::Reports, ..Output::default() };
     if let Some(statistics) = arguments.measurement.over_frames() {
-        let measured = session.each_frame::<Arguments>(frames, &reports, |turn| {
+        let one = Output { makes: Makes::One, ..Output::default() };
+        session.each_frame::<Arguments>(frames, &one, |turn| {
             let mut reader = arguments.input.with(turn.input.clone()).open_all()?;
             turn.session.report_reader(&reader);
             statistics.add(&mut reader)
-        });
+        })?;
         let pixels = arguments.measurement.pixels.as_deref();
-        return measured.and(session.tell_over_frames(statistics, pixels, format, output));
+        return session.tell_over_frames(statistics, pixels, format, output);
     }
+    let reports = Output { makes: Makes::Reports, ..Output::default() };
     let findings = Findings::new(format, frames.inputs.len() > 1, arguments.output.clone());
     let measured = session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
     measured.and(findings.end())

@@ -96,14 +96,10 @@ impl Exposures {
                 first.name
             )));
         }
-        let Some(Difference { key, values: [its, theirs] }) = Difference::of([frame, first].map(camera).each_ref())
-        else {
-            return Ok(());
-        };
-        let advice = match key.starts_with("black") {
-            true => "; take them back first (correct-frame)",
-            false => "",
-        };
+        // What a camera was set to tells more than the black level that follows from it.
+        let differs = [camera, blacks].into_iter().find_map(|of| Difference::of([frame, first].map(of).each_ref()));
+        let Some(Difference { key, values: [its, theirs] }) = differs else { return Ok(()) };
+        let advice = if key.starts_with("black") { "; take them back first (correct-frame)" } else { "" };
         Err(frame.refuse(format!(
             "its `{key}` is {its}, but that of {} is {theirs}; only exposures of one scene by one camera go together{advice}",
             first.name
@@ -113,20 +109,20 @@ impl Exposures {
 
 /// What is known of the camera and of how it was set, and nothing else.
 fn camera(frame: &FrameHeader) -> Metadata {
-    let Metadata { quantity, sensor, camera, exposure, adc, noise, .. } = frame.without_exposure().metadata;
+    let Metadata { quantity, sensor, camera, exposure, adc, noise, white_level_adu, .. } =
+        frame.without_exposure().metadata;
+    Metadata { sensor, camera, exposure, adc, noise, white_level_adu, ..Metadata::new(quantity) }
+}
+
+/// What is known of its black level.
+fn blacks(frame: &FrameHeader) -> Metadata {
     let known = &frame.metadata;
     Metadata {
-        sensor,
-        camera,
-        exposure,
-        adc,
-        noise,
         dark_signal_e: known.dark_signal_e,
         black_level_adu: known.black_level_adu,
         black_by_row: known.black_by_row.clone(),
         black_by_column: known.black_by_column.clone(),
-        white_level_adu: known.white_level_adu,
-        ..Metadata::new(quantity)
+        ..Metadata::new(known.quantity)
     }
 }
 
