@@ -25,7 +25,7 @@ pub fn write(what: &str, document: &impl Serialize) -> Result<String> {
 ///
 /// # Errors
 ///
-/// As [`write`].
+/// As [`write()`].
 pub fn write_value(what: &str, value: &Value) -> Result<String> {
     let text = escaping(what, value, &is_unprintable)?;
     if checked_text(text.as_bytes()).is_ok() {
