@@ -404,6 +404,29 @@ fn programs_are_thin() {
     );
 }
 
+/// A file has one subject; beyond this many lines before its tests it has several.
+const FILE_LINES: usize = 500;
+
+/// Files that are longer, and why: tables, of which a part is none.
+const LONG_FILES: &[(&str, &str)] = &[];
+
+#[test]
+fn files_are_short() {
+    let mut wrong = Vec::new();
+    for source in
+        ["src", "studies/src"].into_iter().flat_map(sources).filter(|source| !source.path.ends_with("tests.rs"))
+    {
+        let lines = without_tests(&source.code).trim_end().lines().count();
+        let reason = LONG_FILES.iter().find(|(path, _)| *path == source.path);
+        match reason {
+            None if lines > FILE_LINES => wrong.push(format!("{}: {lines} lines; split it by subject", source.path)),
+            Some(_) if lines <= FILE_LINES => wrong.push(format!("{}: {lines} lines; it is no exception", source.path)),
+            _ => {}
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
 #[test]
 fn nothing_is_left_to_do_in_the_sources() {
     for source in sources("src") {
