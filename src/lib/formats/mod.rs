@@ -39,6 +39,7 @@ pub mod sequence;
 mod settings;
 pub mod spectral;
 pub mod stack;
+pub mod stored_rows;
 pub mod standard;
 mod storing;
 pub mod table;

@@ -149,6 +149,8 @@ fn read_out(reader: &FrameReader) -> Result<String> {
         hot_pixel_dark_current_e_per_s: 0.0,
         rts_share: 0.0,
         rts_amplitude_e: 0.0,
+        smear_line_s: 0.0,
+        blooming: 0.0,
         bits: (1..16).find(|bits| f64::from((1_u32 << bits) - 1) >= white).unwrap_or(16),
         bias_adu: black,
         adu_per_e,

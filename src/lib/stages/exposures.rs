@@ -24,7 +24,7 @@ impl Exposures {
         exposures
     }
 
-    /// The first frame.
+    /// The first frame; where charge has spilled in others, it tells of the one that has most.
     pub fn first(&self) -> &FrameHeader {
         &self.first
     }
@@ -58,6 +58,8 @@ impl Exposures {
             };
             self.unlike = Some(differs);
         }
+        let spilled = &mut self.first.metadata.bloomed_photosites;
+        *spilled = (*spilled).max(frame.metadata.bloomed_photosites);
         Ok(())
     }
 
