@@ -217,7 +217,10 @@ fn smear_is_the_light_of_the_column() {
             for y in 0..30 {
                 let wanted = (f64::from(at(frame, x, y, channel)) + share * sum).min(20_000.0);
                 let found = f64::from(at(&made, x, y, channel));
-                assert!((found - wanted).abs() <= 20_000.0 * 2.0 * f64::from(f32::EPSILON), "{x} {y}: {found} {wanted}");
+                assert!(
+                    (found - wanted).abs() <= 20_000.0 * 2.0 * f64::from(f32::EPSILON),
+                    "{x} {y}: {found} {wanted}"
+                );
             }
         }
     }
@@ -348,7 +351,7 @@ fn spilling_is_the_same_on_every_way() {
     assert!(Mosaic::new(noisy.header(), Some(CfaPattern::Bggr)).unwrap_err().to_string().contains("not bggr"));
 }
 
-/// Simulated frames with smear beside what is predicted, electrons, codes and demosaicked: in 40 frames of each no p-value of
+/// Simulated frames with smear beside what is predicted, electrons, codes and demosaicked: in 12 frames of each no p-value of
 /// some hundred is below 10⁻⁶, nor is half of them below a quarter.
 #[test]
 fn predictions_know_smear() {
@@ -357,12 +360,13 @@ fn predictions_know_smear() {
         light.header.metadata.scene = Some(Scene::uniform("test", electrons.map(f64::from)));
         ccd(&mut light, |readout| readout.smear_line_s = 8e-5);
         let mut ps = Vec::new();
-        for seed in 0..40 {
+        for seed in 0..12 {
             let settings = NoiseSettings { seed, sensor_seed: seed, ..NoiseSettings::default() };
             let charge = through(&light, &noise_of(&light, &settings));
             let codes = through(&charge, &Digitize::new(&charge.header, &AdcSettings::default()).unwrap());
             let plane = mosaicked(&codes);
-            let rgb = through(&plane, &Demosaic::new(&plane.header, Method::EffectiveColor, Black::Auto, None).unwrap());
+            let rgb =
+                through(&plane, &Demosaic::new(&plane.header, Method::EffectiveColor, Black::Auto, None).unwrap());
             for mut frame in [charge, codes, plane, rgb] {
                 let report = measure(&mut frame, &[], Saturated::Kept, Equations::Exact, Some(0.5)).unwrap();
                 assert!(!report.regions[0].tests.is_empty());
@@ -371,9 +375,10 @@ fn predictions_know_smear() {
         }
         let below = |level: f64| ps.iter().filter(|p| **p < level).count() as f64 / ps.len() as f64;
         assert!(below(1e-6) == 0.0 && below(0.25) < 0.5, "{} {} {}", ps.len(), below(1e-6), below(0.25));
-            let mut other = light.clone();
+        let mut other = light.clone();
         ccd(&mut other, |readout| readout.smear_line_s = 0.0);
-        let mean = |frame: &MemoryFrame| match of_frame(noise_of(frame, &seeded()).header(), Equations::Exact).unwrap() {
+        let mean = |frame: &MemoryFrame| match of_frame(noise_of(frame, &seeded()).header(), Equations::Exact).unwrap()
+        {
             FramePrediction::Planes(planes) => planes[0].moments.mean,
             FramePrediction::Pixels(_) => f64::NAN,
         };
@@ -449,7 +454,9 @@ fn programs_let_columns_wait() {
         let done = child.wait_with_output().unwrap();
         (done.status.success(), String::from_utf8_lossy(&done.stderr).into_owned())
     };
-    for (threads, input, bytes) in [(1, "plane.exr", vec![]), (3, "plane.exr", vec![]), (2, "-", shop.bytes("plane.exr"))] {
+    for (threads, input, bytes) in
+        [(1, "plane.exr", vec![]), (3, "plane.exr", vec![]), (2, "-", shop.bytes("plane.exr"))]
+    {
         let (is_done, said) =
             run(&format!("add-noise {input} --seed 3 --sensor-seed 4 --threads {threads} -o made.exr"), &bytes);
         assert!(is_done && said.contains("photosites took up charge that spilled over"), "{said}");

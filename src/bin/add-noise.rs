@@ -4,7 +4,6 @@ use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::requests::{described::DescribedInput, options};
-use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
 #[global_allocator]

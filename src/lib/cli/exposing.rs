@@ -6,7 +6,8 @@ use crate::formats::input::FrameReader;
 use crate::formats::stored_rows::StoredRows;
 use crate::propagation::{self, Equations};
 use crate::requests::options::Output;
-use crate::stages::noise::{AddNoise, ColumnLight, NoiseSettings, Spilling};
+use crate::stages::noise::bloom::Spilling;
+use crate::stages::noise::{AddNoise, ColumnLight, NoiseSettings};
 use crate::stream::{Counts, RowSink, RowSource, Stage, run};
 
 /// Rows that are in memory at a time on their way up.
@@ -45,7 +46,7 @@ impl Session {
         }
         self.report_reader(&reader);
         let head = reader.header().clone();
-        let (mut stored, mut spilled);
+        let mut stored;
         let mut rows: &mut dyn RowSource = &mut reader;
         if let Some(mut light) = light {
             self.note("the frame waits in a temporary file until the light of its columns is known, for their smear");
@@ -55,11 +56,10 @@ impl Session {
         }
         let counts = if stage.blooms() {
             self.note("charge waits in a temporary file until all of it has spilled along its columns");
-            let before;
-            (spilled, before) = spill(&mut stage, rows)?;
+            let (mut charges, before) = spill(&mut stage, rows)?;
             self.warn_of_bloomed(&stage);
             announce(&mut stage);
-            self.drive_rows(&head, (&mut spilled, before), &stage.reading(), output)?
+            self.drive_rows(&head, (&mut charges, before), &stage.reading(), output)?
         } else {
             announce(&mut stage);
             self.drive_rows(&head, (rows, Counts::default()), &stage, output)?

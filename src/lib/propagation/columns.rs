@@ -4,7 +4,7 @@ use super::law::Law;
 use super::moments::Prediction;
 use super::photosite::Photosite;
 use super::unpredictable::{Predicted, Unpredictable};
-use crate::cfa::{CfaPattern, Class};
+use crate::cfa::{CfaPattern, Class, FilterArray};
 use crate::metadata::FrameHeader;
 use crate::stages::noise::smear::uniform_columns;
 
@@ -12,7 +12,8 @@ use crate::stages::noise::smear::uniform_columns;
 const OVERFLOWING: f64 = 1e-9;
 
 /// Why nothing is predicted where charge may spill.
-const BLOOMS: &str = "charge spills over along columns from photosites beyond full well, more than one in 10⁹, into their neighbors";
+const BLOOMS: &str =
+    "charge spills over along columns from photosites beyond full well, more than one in 10⁹, into their neighbors";
 
 /// Why nothing is predicted where charge has spilled.
 pub(super) const BLOOMED: &str = "photosites are saturated by neighbors: charge has spilled over along their columns";
@@ -27,6 +28,10 @@ const UNEVEN: &str = "the smear of columns with red photosites and of those with
 
 /// Why nothing is predicted of another array's mosaic.
 const OF_ANOTHER: &str = "it is behind another filter array than its sensor has, by which its columns have smear";
+
+/// Why nothing is predicted over a flat field.
+const DIVIDED: &str = "it was divided by a flat field of a sensor with smear, in which columns with red photosites and those with blue \
+                       ones may differ";
 
 /// What photosites expect with smear.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +48,9 @@ impl Smeared {
         let share = frame.metadata.noise.as_ref().map_or(0.0, |noise| noise.smear_per_row);
         if share <= 0.0 {
             return Ok(Self { expected_e, off_e: 0.0 });
+        }
+        if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
+            return Err(Unpredictable::Beyond(DIVIDED));
         }
         let sensor = frame.metadata.sensor.as_ref().ok_or(Unpredictable::Missing("sensor"))?;
         let readout = sensor.readout.as_ref().ok_or(Unpredictable::Missing("sensor.readout"))?;
@@ -72,7 +80,7 @@ impl Smeared {
 /// The pattern of the plane that a frame is, or was demosaicked from; none of three planes.
 fn plane_of(frame: &FrameHeader) -> Option<CfaPattern> {
     let metadata = &frame.metadata;
-    metadata.demosaic.as_ref().map(|record| record.cfa).or_else(|| metadata.cfa.and_then(|cfa| cfa.bayer()))
+    metadata.demosaic.as_ref().map(|record| record.cfa).or_else(|| metadata.cfa.and_then(FilterArray::bayer))
 }
 
 /// The parity of the columns that have red or blue photosites.

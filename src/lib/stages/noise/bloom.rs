@@ -11,10 +11,11 @@
 //! e what a photosite has beyond full well, r the room that it has, r′ what is left of it. Charge is conserved: what is drained,
 //! what leaves at the ends, and what is in the wells at last is what was collected. [`Spill`] does it, row by row.
 
+use super::smear::check_whole;
 use super::{AddNoise, Charges, Line, Scratch, add, not_finite};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, PoissonKind};
 use crate::numerics::vectors::{self, Kernel};
 use crate::random::spans;
 use crate::stages::transfer::Transfer;
@@ -30,7 +31,7 @@ use crate::units::{Electrons, ExpectedElectrons};
 /// # Examples
 ///
 /// ```
-/// use cyanometer::stages::noise::Spill;
+/// use cyanometer::stages::noise::bloom::Spill;
 ///
 /// // One column: of 60 electrons beyond full well half spill, 15 each way; the neighbors have room for 10 and 20.
 /// let mut rows = [[80.0], [90.0], [160.0], [80.0], [0.0]];
@@ -213,7 +214,11 @@ impl Stage for Reading<'_> {
             for y in rows.start.saturating_sub(self.reach())..rows.end {
                 let charges = input.row(y.cast_signed(), channel).iter().map(|charge| charge.abs());
                 if let Some(passage) = &mut passage {
-                    passage.entering(y).iter_mut().zip(charges.clone()).for_each(|(to, charge)| *to = f64::from(charge));
+                    passage
+                        .entering(y)
+                        .iter_mut()
+                        .zip(charges.clone())
+                        .for_each(|(to, charge)| *to = f64::from(charge));
                 }
                 if y < rows.start {
                     continue;
@@ -267,12 +272,50 @@ impl Kernel for Read<'_> {
 }
 
 impl AddNoise {
+    /// Whether charge beyond full well spills, so that rows wait for each other: those that [`Self::collected`] makes go through
+    /// [`Self::spill`], down and up, and then through [`Self::reading`]. In one piece a band needs all rows of the frame.
+    pub fn blooms(&self) -> bool {
+        self.blooming > 0.0
+    }
+
+    /// The charges that are collected, whatever full well holds.
+    pub fn collected(&self) -> Collected {
+        Collected::of(self)
+    }
+
+    /// What reads charges that have spilled.
+    pub fn reading(&self) -> Reading<'_> {
+        Reading(self)
+    }
+
+    /// Makes sure that charge, where it spills, does between photosites that are there: not in three planes, of which each would be by
+    /// itself, nor where rows of the sensor are missing.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for such frames; [`Error::Usage`] where charges are drawn that may be negative.
+    pub fn check_columns(&self) -> Result<()> {
+        if !self.blooms() {
+            return Ok(());
+        }
+        if self.header.metadata.cfa.is_none() {
+            return Err(self.header.refuse(
+                "its sensor blooms: charge spills between photosites of all classes of a column, which three planes do not have; \
+                 run `mosaic` first",
+            ));
+        }
+        check_whole(&self.header, "charge beyond full well spills along whole columns", "blooming")?;
+        if self.record.poisson == PoissonKind::Gaussian {
+            return Err(Error::Usage(
+                "the sensor blooms, and charges that `--poisson gaussian` draws may be negative, of which none spills; draw them exactly"
+                    .into(),
+            ));
+        }
+        Ok(())
+    }
+
     /// The whole exposure of a sensor whose charge spills, from a window that has all rows.
-    pub(super) fn apply_to_all(
-        &self,
-        input: Window<'_, ExpectedElectrons>,
-        output: Rows<'_, Electrons>,
-    ) -> Counts {
+    pub(super) fn apply_to_all(&self, input: Window<'_, ExpectedElectrons>, output: Rows<'_, Electrons>) -> Counts {
         let (width, height) = (input.width(), input.frame_height());
         let row_samples = width * self.header.geometry.channels.len();
         let mut charges = vec![0.0; row_samples * height];

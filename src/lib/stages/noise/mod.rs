@@ -12,7 +12,6 @@ pub mod bloom;
 mod model;
 pub mod smear;
 
-pub use bloom::{Collected, Reading, Spill, Spilling};
 pub use model::{LineNoise, NoiseModel, NoiseSettings, Tails, rectified_mean, rectified_mean_square};
 pub use smear::ColumnLight;
 
@@ -116,6 +115,19 @@ impl Columns {
             gains: if prnu_column > 0.0 { gains } else { Vec::new() },
             smear: Vec::new(),
         }
+    }
+}
+
+impl Columns {
+    /// Adds smear, of which packets take such a share of the light; tells whether the head of the frame says enough.
+    fn add_smear(&mut self, frame: &FrameHeader, share: f64) -> Result<bool> {
+        if share > 0.0 {
+            match smear::known(frame, frame.sensor()?.bayer()?, share)? {
+                Known::Smear(smear) => self.smear = smear,
+                Known::Nothing => return Ok(false),
+            }
+        }
+        Ok(true)
     }
 }
 
@@ -233,14 +245,8 @@ impl AddNoise {
         let instructions = Instructions::widest();
         let tables = Tables::of(input, &model, instructions);
         let mut columns = Columns::of(input, &model, &record);
+        let lacks_light = !columns.add_smear(input, record.smear_per_row)?;
         let blooming = readout.blooming;
-        let mut lacks_light = false;
-        if record.smear_per_row > 0.0 {
-            match smear::known(input, input.sensor()?.bayer()?, record.smear_per_row)? {
-                Known::Smear(smear) => columns.smear = smear,
-                Known::Nothing => lacks_light = true,
-            }
-        }
         let header = FrameHeader { metadata, ..input.clone() };
         Ok(Self { header, pattern, model, record, transfer, tables, columns, instructions, blooming, lacks_light })
     }
@@ -261,48 +267,6 @@ impl AddNoise {
         self.columns.smear = light.smear(self.record.smear_per_row);
         self.lacks_light = false;
         self
-    }
-
-    /// Whether charge beyond full well spills, so that rows wait for each other: those that [`Self::collected`] makes go through
-    /// [`Self::spill`], down and up, and then through [`Self::reading`]. In one piece a band needs all rows of the frame.
-    pub fn blooms(&self) -> bool {
-        self.blooming > 0.0
-    }
-
-    /// The charges that are collected, whatever full well holds.
-    pub fn collected(&self) -> Collected {
-        Collected::of(self)
-    }
-
-    /// What reads charges that have spilled.
-    pub fn reading(&self) -> Reading<'_> {
-        Reading(self)
-    }
-
-    /// Makes sure that charge, where it spills, does between photosites that are there: not in three planes, of which each would be by
-    /// itself, nor where rows of the sensor are missing.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Format`] for such frames; [`Error::Usage`] where charges are drawn that may be negative.
-    pub fn check_columns(&self) -> Result<()> {
-        if !self.blooms() {
-            return Ok(());
-        }
-        if self.header.metadata.cfa.is_none() {
-            return Err(self.header.refuse(
-                "its sensor blooms: charge spills between photosites of all classes of a column, which three planes do not have; \
-                 run `mosaic` first",
-            ));
-        }
-        smear::check_whole(&self.header, "charge beyond full well spills along whole columns", "blooming")?;
-        if self.record.poisson == PoissonKind::Gaussian {
-            return Err(Error::Usage(
-                "the sensor blooms, and charges that `--poisson gaussian` draws may be negative, of which none spills; draw them exactly"
-                    .into(),
-            ));
-        }
-        Ok(())
     }
 
     /// Draws on a narrower set of instructions than the widest there is; the noise is the same.

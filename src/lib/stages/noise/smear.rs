@@ -9,7 +9,7 @@
 //! the sum over the whole column, whichever way it is read [Ruyten1999]. Behind a filter array the column is that of the plane:
 //! what a photosite would record of another class, as in three planes, has the smear of the photosites that are there.
 
-use crate::cfa::CfaPattern;
+use crate::cfa::{CfaPattern, Class};
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
@@ -81,7 +81,8 @@ impl ColumnLight {
 
 /// The light of the sensor's even and odd columns of so many rows, where the scene is uniform: of each class so many electrons.
 pub fn uniform_columns(pattern: CfaPattern, height: u32, electrons: [f64; 3]) -> [f64; 2] {
-    let of_class = |class| Some(electrons[class as usize]).filter(|e| *e > 0.0 && e.is_finite()).unwrap_or_default();
+    let of_class =
+        |class: Class| Some(electrons[class as usize]).filter(|e| *e > 0.0 && e.is_finite()).unwrap_or_default();
     let [first, second] = [0, 1].map(|row| pattern.row_classes([0, 0], row));
     let rows = [f64::from(height.div_ceil(2)), f64::from(height / 2)];
     [0, 1].map(|column| rows[0] * of_class(first[column]) + rows[1] * of_class(second[column]))
