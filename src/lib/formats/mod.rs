@@ -2,6 +2,7 @@
 
 pub mod atomic;
 pub mod cameras;
+mod cells;
 pub mod chart;
 pub mod csv;
 pub mod data;
