@@ -30,6 +30,7 @@ pub mod pipe;
 pub mod places;
 pub mod plots;
 pub mod png;
+mod positioned;
 pub mod radiance_unit;
 pub mod read_ahead;
 pub mod register;

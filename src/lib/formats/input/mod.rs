@@ -210,6 +210,10 @@ impl FrameReader {
         });
         let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
+        if let Some(file) = &metadata.file {
+            // The first program of the pipe reads it.
+            register::note_inputs([Path::new(file)])?;
+        }
         let mut header = FrameHeader { name: name.into(), geometry, metadata };
         doubt_of_marks(&header, stored);
         let corner = options.crop.map_or(Ok([0, 0]), |crop| cut(&mut header, crop))?;
