@@ -391,9 +391,9 @@ fn predictions_know_smear() {
 /// What is refused, and why.
 #[test]
 fn what_columns_have_is_told_where_nothing_is_predicted() {
-    let of = |electrons: [f64; 3], change: &dyn Fn(&mut ReadOut)| {
-        let mut light = mosaicked(&expected(12, 80, |_, _, class| electrons[class as usize] as f32));
-        light.header.metadata.scene = Some(Scene::uniform("test", electrons));
+    let of = |electrons: [f32; 3], change: &dyn Fn(&mut ReadOut)| {
+        let mut light = mosaicked(&expected(12, 80, |_, _, class| electrons[class as usize]));
+        light.header.metadata.scene = Some(Scene::uniform("test", electrons.map(f64::from)));
         ccd(&mut light, change);
         noise_of(&light, &seeded()).header().clone()
     };
