@@ -17,6 +17,8 @@ const MOST_DCNU: f64 = 2.0;
 const MOST_PRNU: f64 = 0.5;
 /// The same of whole rows and columns: gains of amplifiers differ by less.
 const MOST_LINE_PRNU: f64 = 0.05;
+/// The longest time that a packet stays at a photosite which it passes that does not look like µs, s.
+const MOST_SMEAR_LINE_S: f64 = 0.01;
 /// The smallest full well in e⁻ that does not look like thousands of them.
 const LEAST_WELL_E: f64 = 100.0;
 /// So many times the range of the converter is beyond what amplifiers are set to.
@@ -86,6 +88,12 @@ pub struct ReadOut {
     /// Mean amplitude of their jumps, exponentially distributed: e⁻.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub rts_amplitude_e: f64,
+    /// Time for which the light of each photosite that a packet passes on its way along its column counts, smear: s.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub smear_line_s: f64,
+    /// Share of the charge beyond full well that spills along its column, and is not drained: fraction of 1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub blooming: f64,
     /// Bits of the converter.
     pub bits: u32,
     /// What the converter adds, ADU.
@@ -139,6 +147,8 @@ impl ReadOut {
             ("hot_pixel_dark_current_e_per_s", self.hot_pixel_dark_current_e_per_s),
             ("rts_share", self.rts_share),
             ("rts_amplitude_e", self.rts_amplitude_e),
+            ("smear_line_s", self.smear_line_s),
+            ("blooming", self.blooming),
         ];
         for (key, value) in not_negative {
             if !(0.0..f64::INFINITY).contains(&value) {
@@ -197,11 +207,16 @@ impl ReadOut {
             ("prnu_column", self.prnu_column, MOST_LINE_PRNU),
             ("hot_pixel_share", self.hot_pixel_share, 1.0),
             ("rts_share", self.rts_share, 1.0),
+            ("blooming", self.blooming, 1.0),
         ];
         for (key, value, most) in patterns {
             if value > most {
                 return suspect(key, value, "fractions of 1", format!("per cent, which is {}", value / 100.0));
             }
+        }
+        if self.smear_line_s > MOST_SMEAR_LINE_S {
+            let seconds = self.smear_line_s / 1e6;
+            return suspect("smear_line_s", self.smear_line_s, "s", format!("us, which is {seconds:e} s"));
         }
         if self.full_well_e < LEAST_WELL_E {
             let electrons = self.full_well_e * 1000.0;
@@ -334,6 +349,8 @@ pub(crate) mod tests {
             hot_pixel_dark_current_e_per_s: 0.0,
             rts_share: 0.0,
             rts_amplitude_e: 0.0,
+            smear_line_s: 0.0,
+            blooming: 0.0,
             bits: 12,
             bias_adu: 1753.0,
             adu_per_e: 0.058824,
@@ -389,6 +406,8 @@ pub(crate) mod tests {
                 "`prnu` is 5; it is in fractions of 1, and 5 looks like per cent, which is 0.05",
             ),
             (ReadOut { dcnu: 20.0, ..kaf5101ce() }, "20 looks like per cent, which is 0.2"),
+            (ReadOut { blooming: 30.0, ..kaf5101ce() }, "30 looks like per cent, which is 0.3"),
+            (ReadOut { smear_line_s: 1.2, ..kaf5101ce() }, "it is in s, and 1.2 looks like us, which is 1.2e-6 s"),
             (ReadOut { full_well_e: 40.0, ..kaf5101ce() }, "40 looks like thousands of them, which is 40000"),
             (ReadOut { read_noise_e: 50_000.0, ..kaf5101ce() }, "no less than `full_well_e`"),
             (ReadOut { bits: 8, ..kaf5101ce() }, "the largest code of 8 bits is 255"),

@@ -354,6 +354,8 @@ impl From<FlatSensor> for Sensor {
                 hot_pixel_dark_current_e_per_s: 0.0,
                 rts_share: 0.0,
                 rts_amplitude_e: 0.0,
+                smear_line_s: 0.0,
+                blooming: 0.0,
                 bits: flat.bits,
                 bias_adu: flat.bias_adu,
                 adu_per_e: flat.adu_per_e,

@@ -91,8 +91,8 @@ pub struct Predictor {
 /// the light.
 const SATURATED: f64 = 1e-3;
 
-/// What photosites are: their quantity, and how they were corrected.
-type Plane = (QuantityKind, Option<CorrectionRecord>);
+/// What photosites are: their quantity, how they were corrected, and whether their columns have smear of a plane.
+type Plane = (QuantityKind, Option<CorrectionRecord>, bool);
 
 fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)]))
@@ -153,6 +153,7 @@ impl Predictor {
         let mut first_order = None;
         // Photosites are the same from the converter, or the subtraction of dark frames, on.
         let mut known: Option<(Plane, Sites, [Budget; 3])> = None;
+        let has_smear = self.sensor().readout.as_ref().is_some_and(|readout| readout.smear_line_s > 0.0);
         for (stage, head) in &mut self.heads {
             if let Some(scene) = &mut head.metadata.scene {
                 scene.expected_electrons = Some(electrons);
@@ -160,12 +161,13 @@ impl Predictor {
             let none = |why| {
                 Error::Data(format!("nothing can be predicted of {} at {electrons:?} electrons: {why}", stage.name()))
             };
-            let plane = (quantity_of_sites(head), head.metadata.correction.clone());
+            let is_plane = head.metadata.cfa.is_some() || head.metadata.demosaic.is_some();
+            let plane = (quantity_of_sites(head), head.metadata.correction.clone(), is_plane && has_smear);
             let (sites, causes) = match known.take().filter(|(of, ..)| *of == plane) {
                 Some((_, sites, causes)) => (sites, causes),
                 None => {
                     let sites = Sites::of(head, self.settings.equations).map_err(none)?;
-                    let causes = electrons.map(|e| sites.photosite.budget(e));
+                    let causes = sites.expected_e.map(|e| sites.photosite.budget(e));
                     (sites, causes)
                 }
             };

@@ -261,6 +261,7 @@ impl MasterNoise {
             hot_pixel_e,
             poisson,
             cte: None,
+            smear_per_row: 0.0,
         }
     }
 }

@@ -125,6 +125,9 @@ pub struct Metadata {
     /// Expected share of the pixels that were made of saturated samples, by the law of a uniform scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturated_share: Option<f64>,
+    /// Photosites of the exposure that took up charge which spilled over along their columns, where its sensor blooms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bloomed_photosites: Option<u64>,
     /// What the bits of the layer `mask` mean, where the frame has one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mask_bits: Vec<String>,
@@ -184,6 +187,7 @@ impl Metadata {
             predicted: None,
             uncertainty: None,
             saturated_share: None,
+            bloomed_photosites: None,
             mask_bits: Vec::new(),
             left_out: Vec::new(),
             history: Vec::new(),
@@ -337,12 +341,12 @@ impl FrameHeader {
     }
 
     /// The same without what tells it from other exposures of its scene: its name, its seed and number, what its samples were
-    /// counted to be, and what this version does not know.
+    /// counted to be, where charge spilled, and what this version does not know.
     #[must_use]
     pub fn without_exposure(&self) -> Self {
         let mut head = Self { name: String::new(), ..self.clone() };
         head.metadata.history.clear();
-        (head.metadata.samples, head.metadata.file) = (None, None);
+        (head.metadata.samples, head.metadata.file, head.metadata.bloomed_photosites) = (None, None, None);
         head.metadata.averaged.clear();
         if let Some(noise) = &mut head.metadata.noise {
             (noise.seed, noise.frame) = (0, 0);

@@ -3,6 +3,7 @@
 //! The way goes down once: from the head to the photosites that the frame was made of ([`Sites`]), from these to its
 //! pixels ([`PixelMoments`]).
 
+use super::columns::{Smeared, check_wells};
 use super::curved;
 use super::divided::NARROW;
 use super::masters::{Dark, Flat};
@@ -106,7 +107,7 @@ pub(crate) fn quantity_of_sites(frame: &FrameHeader) -> QuantityKind {
 pub struct Sites {
     /// What their samples follow from.
     pub photosite: Photosite,
-    /// Signal electrons that they expect.
+    /// Signal electrons that they expect, those of smear among them.
     pub expected_e: [f64; 3],
     /// Moments of their samples.
     pub moments: [Prediction; 3],
@@ -127,6 +128,9 @@ impl Sites {
         let expected_e = scene.expected_electrons.ok_or(Unpredictable::Missing("scene.expected_electrons"))?;
         let model = noise_model(frame)?;
         let photosite = Photosite::of_electrons(model, equations);
+        let smeared = Smeared::of(frame, expected_e)?;
+        let expected_e = smeared.expected_e;
+        check_wells(frame, &photosite, expected_e)?;
         if !model.tails.is_none()
             && (metadata.is_transferred() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()))
         {
@@ -157,13 +161,15 @@ impl Sites {
             moments.iter_mut().zip(lines).for_each(|(moments, lines)| moments.lines = lines);
         }
         let sites = Self { photosite, expected_e, moments };
-        match &metadata.average {
-            None => Ok(sites),
+        let sites = match &metadata.average {
+            None => sites,
             Some(record) => {
                 let average = repeated::average_of(frame, record, quantity_of_sites(frame))?;
-                Ok(Self { moments: photosite.averaged(moments, expected_e, &average)?, ..sites })
+                Self { moments: photosite.averaged(moments, expected_e, &average)?, ..sites }
             }
-        }
+        };
+        smeared.check_even(photosite.slope(), &sites.moments)?;
+        Ok(sites)
     }
 
     /// Predicts a frame that was made of these photosites; pixels say where their moments are void.
@@ -396,6 +402,7 @@ fn noise_model(frame: &FrameHeader) -> Predicted<NoiseModel> {
         hot_pixel_e: 0.0,
         poisson: PoissonKind::Exact,
         cte: None,
+        smear_per_row: 0.0,
     };
     let record = frame.metadata.noise.as_ref().unwrap_or(&silent);
     let mut model = NoiseModel::of(frame, record).map_err(|error| match error {

@@ -7,6 +7,7 @@
 mod bent;
 pub mod budget;
 mod charge;
+mod columns;
 mod counts;
 pub mod covariance;
 mod curved;

@@ -368,6 +368,12 @@ fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
              deviations can be told",
         ));
     }
+    if let Some(count) = metadata.bloomed_photosites.filter(|count| *count > 0) {
+        return Err(frame.refuse(format!(
+            "charge has spilled over into {count} of its photosites from others of their columns; nothing tells which, so that no \
+             standard deviations can be told"
+        )));
+    }
     let readout = frame.readout()?;
     let noise = match &metadata.noise {
         Some(noise) => noise.clone(),
@@ -419,5 +425,6 @@ fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
         hot_pixel_e: readout.hot_pixel_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
         poisson: crate::metadata::PoissonKind::Exact,
         cte: None,
+        smear_per_row: 0.0,
     })
 }

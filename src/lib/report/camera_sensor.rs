@@ -141,6 +141,8 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         hot_pixel_dark_current_e_per_s: 0.0,
         rts_share: 0.0,
         rts_amplitude_e: 0.0,
+        smear_line_s: 0.0,
+        blooming: 0.0,
         bits,
         bias_adu: bias_adu.value,
         adu_per_e: gain.value,

@@ -193,6 +193,7 @@ mod tests {
             hot_pixel_e: 0.0,
             poisson: PoissonKind::Exact,
             cte: None,
+            smear_per_row: 0.0,
         });
         FrameHeader { name: name.into(), geometry: Geometry::new(4, 4, &["Y"]), metadata }
     }

@@ -33,7 +33,7 @@ impl Exposures {
         self.drawn.runs()
     }
 
-    /// The first frame.
+    /// The first frame; where charge has spilled in others, it tells of the one that has most.
     pub fn first(&self) -> &FrameHeader {
         &self.first
     }
@@ -74,6 +74,8 @@ impl Exposures {
             };
             self.unlike = Some(differs);
         }
+        let spilled = &mut self.first.metadata.bloomed_photosites;
+        *spilled = (*spilled).max(frame.metadata.bloomed_photosites);
         Ok(())
     }
 

@@ -229,9 +229,11 @@ impl Laws {
     }
 }
 
-/// Whether the frame was rendered and nothing was done to it that leaves a patch without a level of its own.
+/// Whether the frame was rendered and nothing was done to it that leaves a patch without a level of its own: smear hangs on
+/// what else is in its columns.
 fn is_rendered(frame: &FrameHeader) -> bool {
-    frame.metadata.scene.is_some() && !frame.metadata.is_transferred()
+    let has_smear = frame.metadata.noise.as_ref().is_some_and(|noise| noise.smear_per_row > 0.0);
+    frame.metadata.scene.is_some() && !frame.metadata.is_transferred() && !has_smear
 }
 
 /// What is predicted of a uniform scene whose means are those of a tally.

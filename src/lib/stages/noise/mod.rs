@@ -5,13 +5,18 @@
 //! DCNU and PRNU are fixed patterns: they hang on the sensor's seed alone. DCSN, SSN and RON are temporal: they hang on
 //! seed and frame. Where charge transfer is simulated, it takes light and dark charge to the output before RON is added.
 //! Sensors that are read by row and column have noise of these besides ([`LineNoise`]): gains beside PRNU, and offsets, fixed
-//! and temporal, beside RON.
+//! and temporal, beside RON. Columns of a CCD may have [smear], which goes into what light is expected, and charge beyond full
+//! well that spills along them ([bloom]).
 
+pub mod bloom;
 mod model;
+pub mod smear;
 
 pub use model::{LineNoise, NoiseModel, NoiseSettings, Tails, rectified_mean, rectified_mean_square};
+pub use smear::ColumnLight;
 
 use crate::camera::readout::ReadOut;
+use crate::camera::sensor::Sensor;
 use crate::cfa::{CfaPattern, Class};
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
@@ -23,6 +28,7 @@ use crate::random::{LineDraws, Run, RunWords, Source, Unlike, of_column, of_row,
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
 use crate::units::{Electrons, ExpectedElectrons, QuantityKind};
+use smear::Known;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -67,6 +73,10 @@ pub struct AddNoise {
     tables: Tables,
     columns: Columns,
     instructions: Instructions,
+    /// Share of what is beyond full well that spills along its column.
+    blooming: f64,
+    /// Whether columns have smear that their rows must tell first.
+    lacks_light: bool,
 }
 
 /// What the frame's columns have by themselves; empty where they have nothing.
@@ -76,6 +86,8 @@ struct Columns {
     offsets: Vec<f32>,
     /// Relative gains less 1.
     gains: Vec<f32>,
+    /// Smear, expected electrons.
+    smear: Vec<f32>,
 }
 
 impl Columns {
@@ -101,7 +113,21 @@ impl Columns {
         Self {
             offsets: if has_offsets { offsets } else { Vec::new() },
             gains: if prnu_column > 0.0 { gains } else { Vec::new() },
+            smear: Vec::new(),
         }
+    }
+}
+
+impl Columns {
+    /// Adds smear, of which packets take such a share of the light; tells whether the head of the frame says enough.
+    fn add_smear(&mut self, frame: &FrameHeader, share: f64) -> Result<bool> {
+        if share > 0.0 {
+            match smear::known(frame, frame.sensor()?.bayer()?, share)? {
+                Known::Smear(smear) => self.smear = smear,
+                Known::Nothing => return Ok(false),
+            }
+        }
+        Ok(true)
     }
 }
 
@@ -210,6 +236,7 @@ impl AddNoise {
             hot_pixel_e,
             poisson: settings.poisson,
             cte: settings.cte,
+            smear_per_row: if exposure_s > 0.0 { readout.smear_line_s / exposure_s } else { 0.0 },
         };
         let model = NoiseModel::of(input, &record)?;
         let mean_dark_e = dark_e * rectified_mean(model.dcnu) + model.tails.mean_hot_e();
@@ -217,9 +244,29 @@ impl AddNoise {
         metadata.noise = Some(record.clone());
         let instructions = Instructions::widest();
         let tables = Tables::of(input, &model, instructions);
-        let columns = Columns::of(input, &model, &record);
+        let mut columns = Columns::of(input, &model, &record);
+        let lacks_light = !columns.add_smear(input, record.smear_per_row)?;
+        let blooming = readout.blooming;
         let header = FrameHeader { metadata, ..input.clone() };
-        Ok(Self { header, pattern, model, record, transfer, tables, columns, instructions })
+        Ok(Self { header, pattern, model, record, transfer, tables, columns, instructions, blooming, lacks_light })
+    }
+
+    /// What adds up the light of the frame's columns, where smear hangs on rows that are not read yet: the whole frame goes
+    /// through it, and then into [`Self::with_light`]. Without it a band needs all rows of the frame.
+    pub fn light_wanted(&self) -> Option<ColumnLight> {
+        self.lacks_light.then(|| self.column_light())
+    }
+
+    fn column_light(&self) -> ColumnLight {
+        let of_sensor = self.header.sensor().and_then(Sensor::bayer).ok();
+        ColumnLight::of(&self.header, of_sensor.or(self.pattern).unwrap_or(CfaPattern::Rggb))
+    }
+
+    /// The same with smear of the light of its columns, all of whose rows were added up.
+    pub fn with_light(mut self, light: &ColumnLight) -> Self {
+        self.columns.smear = light.smear(self.record.smear_per_row);
+        self.lacks_light = false;
+        self
     }
 
     /// Draws on a narrower set of instructions than the widest there is; the noise is the same.
@@ -308,10 +355,20 @@ impl Stage for AddNoise {
     }
 
     fn reach(&self) -> usize {
+        if self.lacks_light || self.blooms() {
+            return self.header.geometry.height;
+        }
         self.transfer.as_ref().map_or(0, Transfer::reach)
     }
 
     fn apply(&self, input: Window<'_, ExpectedElectrons>, mut output: Rows<'_, Electrons>) -> Counts {
+        if let Some(mut light) = self.light_wanted() {
+            (0..input.frame_height()).for_each(|y| light.add(input.all_channels(y)));
+            return self.clone().with_light(&light).apply(input, output);
+        }
+        if self.blooms() {
+            return self.apply_to_all(input, output);
+        }
         let rows = output.range();
         let Some(transfer) = &self.transfer else {
             let draw = Expose { noise: self, input, output };
@@ -515,6 +572,9 @@ impl Line<'_> {
         for (rate, &expected) in rates.iter_mut().zip(expected) {
             negative += u32::from(expected < 0.0);
             *rate = if expected < 0.0 { 0.0 } else { expected };
+        }
+        if let Some(smear) = self.columns.smear.get(span.clone()) {
+            add(rates, smear);
         }
         // What fills the run up looks like the rest, so that it takes no path of its own.
         for index in expected.len()..run.length {
