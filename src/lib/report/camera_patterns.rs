@@ -35,8 +35,11 @@ pub fn pattern_panels(camera: &MeasuredCamera) -> Vec<Panel> {
         });
         Pattern { name, unit, classes: shown.collect() }
     });
-    let kinds: [fn(&Pattern) -> [Panel; 2]; 3] = [Pattern::spectrograms, Pattern::profiles, Pattern::histograms];
-    kinds.iter().flat_map(|kind| patterns.iter().flat_map(kind)).collect()
+    let of = |kind: fn(&Pattern<'_>) -> [Panel; 2]| patterns.iter().flat_map(kind);
+    of(|pattern| pattern.spectrograms())
+        .chain(of(|pattern| pattern.profiles()))
+        .chain(of(|pattern| pattern.histograms()))
+        .collect()
 }
 
 /// The color of a class, that of its filter where it has one.

@@ -8,6 +8,7 @@ use crate::formats::input::{FrameReader, InputOptions};
 use crate::metadata::FrameHeader;
 use crate::requests::described::Described;
 use crate::requests::notes::Note;
+use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use std::path::{Path, PathBuf};
 
