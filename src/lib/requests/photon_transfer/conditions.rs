@@ -217,3 +217,19 @@ pub fn in_folder(folder: &Path) -> Result<Vec<ListedFrame>> {
     }
     Ok(found)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sensor that tells its temperature frame by frame stays at one setting; 5 K on is another.
+    #[test]
+    fn temperatures_near_each_other_are_one() {
+        let found = settings(vec![293.2, 298.0, 293.0, 293.4, 298.0]);
+        assert_eq!(found, [[293.0, 293.4], [298.0, 298.0]]);
+        assert_eq!(setting_of(293.4, &found), 293.2);
+        assert_eq!(setting_of(298.0, &found), 298.0);
+        assert!(matches!(taken_as_one(&found[0]), Note::Remark(_)));
+        assert!(matches!(taken_as_one(&[293.0, 294.5]), Note::Warning(_)));
+    }
+}
