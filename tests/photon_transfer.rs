@@ -308,7 +308,7 @@ fn relit(flat: &Level, dark: &Level, times: f64) -> Level {
 }
 
 /// A lamp whose light scatters by 0.5 % from level to level, alike in proportion at all: of 60 measurements 3 responsivities may
-/// lie outside their intervals, and 10 by chance, 4 standard deviations. With an error that is as large at all levels in ADU, 15 do.
+/// lie outside their intervals, and 10 by chance, 4 standard deviations.
 #[test]
 fn a_lamp_that_flickers_widens_the_responsivity() {
     const COUNT: u32 = 60;
