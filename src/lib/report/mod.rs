@@ -5,6 +5,7 @@ pub mod characterization;
 pub mod chart;
 
 mod camera_page;
+mod camera_patterns;
 mod camera_sensor;
 mod difference;
 mod matrix_text;

@@ -272,6 +272,11 @@ impl FrameReader {
         self.reader.stored_as()
     }
 
+    /// The exposure time in s that the file's tags tell, with an f-number or without.
+    pub fn exposure_s(&self) -> Option<f64> {
+        self.reader.exposure_s()
+    }
+
     /// What the file's tags say of its colors.
     pub fn colors(&self) -> ColorTags {
         self.reader.colors()
