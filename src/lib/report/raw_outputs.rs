@@ -140,6 +140,8 @@ fn read_out(reader: &FrameReader) -> Result<String> {
         read_noise_e: noise_adu / adu_per_e,
         row_noise_e: 0.0,
         column_noise_e: 0.0,
+        black_drift_e: 0.0,
+        black_drift_rows: 0.0,
         dsnu_e: 0.0,
         dsnu_row_e: 0.0,
         dsnu_column_e: 0.0,
@@ -153,6 +155,7 @@ fn read_out(reader: &FrameReader) -> Result<String> {
         bias_adu: black,
         adu_per_e,
         linearization: None,
+        taps: None,
     };
     let sensor = Sensor {
         schema: SENSOR_SCHEMA.into(),

@@ -144,7 +144,8 @@ impl Company {
 const SAME_EXPOSURE: f64 = 1e-6;
 
 /// Sources that every exposure draws anew.
-const TEMPORAL: [Source; 5] = [Source::Dcsn, Source::Ssn, Source::Ron, Source::RowNoise, Source::ColumnNoise];
+const TEMPORAL: [Source; 6] =
+    [Source::Dcsn, Source::Ssn, Source::Ron, Source::RowNoise, Source::ColumnNoise, Source::BlackDrift];
 
 /// Whether noise that an exposure draws anew may be in a frame; not in one that was simulated without.
 fn is_noisy(frame: &FrameHeader) -> bool {
