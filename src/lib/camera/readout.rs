@@ -291,7 +291,8 @@ impl ReadOut {
     /// The read noise of each of its taps, e⁻.
     pub fn read_noises_e(&self) -> impl Iterator<Item = f64> {
         let count = self.taps.as_ref().map_or(1, Taps::count);
-        (0..count).map(|tap| self.taps.as_ref().map_or(self.read_noise_e, |taps| taps.read_noise_e(tap, self.read_noise_e)))
+        (0..count)
+            .map(|tap| self.taps.as_ref().map_or(self.read_noise_e, |taps| taps.read_noise_e(tap, self.read_noise_e)))
     }
 
     /// What is added to charge when it is read, rms or mean in e⁻, by key.

@@ -153,19 +153,19 @@ impl Taps {
 }
 
 fn check_number(key: &str, tap: usize, value: f64, full_well_e: f64) -> Result<(), String> {
-        let problem = match key {
-            "gain" if !GAINS.contains(&value) => {
-                format!("it is relative to `adu_per_e`, {} to {}", GAINS.start(), GAINS.end())
-            }
-            "read_noise_e" if !(0.0..full_well_e).contains(&value) => {
-                format!("it must be 0 to less than `full_well_e`, {full_well_e}")
-            }
-            "offset_e" if !(-full_well_e..full_well_e).contains(&value) => {
-                format!("it must be smaller than `full_well_e`, {full_well_e}")
-            }
-            _ => return Ok(()),
-        };
-        Err(format!("`taps.{key}` is {value} for tap {tap}; {problem}"))
+    let problem = match key {
+        "gain" if !GAINS.contains(&value) => {
+            format!("it is relative to `adu_per_e`, {} to {}", GAINS.start(), GAINS.end())
+        }
+        "read_noise_e" if !(0.0..full_well_e).contains(&value) => {
+            format!("it must be 0 to less than `full_well_e`, {full_well_e}")
+        }
+        "offset_e" if !(-full_well_e..full_well_e).contains(&value) => {
+            format!("it must be smaller than `full_well_e`, {full_well_e}")
+        }
+        _ => return Ok(()),
+    };
+    Err(format!("`taps.{key}` is {value} for tap {tap}; {problem}"))
 }
 
 #[cfg(test)]

@@ -122,8 +122,11 @@ impl Drift {
 
     /// Σ (Σ x)² of what the drift makes of a sum over photosites, `sum` telling that of the weights of each row.
     pub fn of_sums(all: &[DriftRows], rows_per_knot: f64, weights: &[f64]) -> f64 {
-        let weighted: Vec<DriftRows> =
-            all.iter().zip(weights).map(|(rows, weight)| DriftRows { columns: rows.columns * weight, ..*rows }).collect();
+        let weighted: Vec<DriftRows> = all
+            .iter()
+            .zip(weights)
+            .map(|(rows, weight)| DriftRows { columns: rows.columns * weight, ..*rows })
+            .collect();
         Self::of(&weighted, rows_per_knot).square()
     }
 }
@@ -162,12 +165,19 @@ mod tests {
             .enumerate()
             .flat_map(|(grid, rows)| {
                 let columns = 0..rows.columns as usize;
-                (0..rows.count).flat_map(move |i| columns.clone().map(move |x| (rows.first + rows.step * i as i64, x, grid)))
+                (0..rows.count)
+                    .flat_map(move |i| columns.clone().map(move |x| (rows.first + rows.step * i as i64, x, grid)))
             })
             .collect();
         let level = |y: i64, knot: i64| {
             let (first, [a, b]) = knots(y, per_knot);
-            if knot == first { a } else if knot == first + 1 { b } else { 0.0 }
+            if knot == first {
+                a
+            } else if knot == first + 1 {
+                b
+            } else {
+                0.0
+            }
         };
         let v = DMatrix::from_fn(sites.len(), sites.len(), |a, b| {
             (-40..40).map(|knot| level(sites[a].0, knot) * level(sites[b].0, knot)).sum()
@@ -183,7 +193,8 @@ mod tests {
             DriftRows { first: -6, step: 2, count: 9, columns: 4.0 },
             DriftRows { first: -5, step: 2, count: 8, columns: 3.0 },
         ];
-        for (rows, per_knot) in [(&one[..], 4.0), (&one[..], 5.5), (&one[..], 1000.0), (&two[..], 3.2), (&two[..], 2.0)] {
+        for (rows, per_knot) in [(&one[..], 4.0), (&one[..], 5.5), (&one[..], 1000.0), (&two[..], 3.2), (&two[..], 2.0)]
+        {
             let (sites, v) = matrix(rows, per_knot);
             let n = sites.len();
             let p = DMatrix::identity(n, n) - DMatrix::from_element(n, n, 1.0 / n as f64);
@@ -228,7 +239,8 @@ mod tests {
             assert!((mean - covariance(lag as f64 / per_knot as f64)).abs() < 1e-5, "{lag}: {mean}");
         }
         let rows = DriftRows { first: 0, step: 1, count: 40, columns: 1.0 };
-        let over_places = (0..7).map(|first| Drift::of(&[DriftRows { first, ..rows }], 7.0).of_mean()).sum::<f64>() / 7.0;
+        let over_places =
+            (0..7).map(|first| Drift::of(&[DriftRows { first, ..rows }], 7.0).of_mean()).sum::<f64>() / 7.0;
         assert!((over_places / of_mean_of_rows(40, 7.0) - 1.0).abs() < 2e-2, "{over_places}");
     }
 }

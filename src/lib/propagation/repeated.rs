@@ -168,7 +168,8 @@ impl Photosite {
     pub(super) fn temporal_of(&self, expected_e: [f64; 3]) -> Predicted<[Temporal; 3]> {
         let lines = if self.has_lines() {
             let mut one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
-            let temporal = LineNoise { dsnu_row_e: 0.0, dsnu_column_e: 0.0, prnu_row: 0.0, prnu_column: 0.0, ..self.model.lines };
+            let temporal =
+                LineNoise { dsnu_row_e: 0.0, dsnu_column_e: 0.0, prnu_row: 0.0, prnu_column: 0.0, ..self.model.lines };
             one.model.lines = temporal;
             one.lines(expected_e)?
         } else {

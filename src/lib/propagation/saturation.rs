@@ -58,7 +58,9 @@ fn shares_of_taps(frame: &FrameHeader) -> Option<[f64; 3]> {
     let full_well_e = frame.readout().ok()?.full_well_e;
     let full_code = |adc: AdcRecord| adc.full_code(full_well_e);
     let lowest = match (frame.metadata.adc, frame.taps()) {
-        (Some(adc), Some(taps)) => (0..taps.count()).map(|tap| full_code(adc.of_tap(taps, tap))).fold(f64::INFINITY, f64::min),
+        (Some(adc), Some(taps)) => {
+            (0..taps.count()).map(|tap| full_code(adc.of_tap(taps, tap))).fold(f64::INFINITY, f64::min)
+        }
         _ => f64::INFINITY,
     };
     let [mut sums, mut counts] = [[0.0; 3]; 2];

@@ -68,8 +68,7 @@ impl Predicted {
     /// Of three planes that several amplifiers have read.
     pub fn of_groups(groups: &[Group]) -> Self {
         let sampling = groups::sampling(&groups::of_planes(groups));
-        let population = sampling.covariance * ((sampling.count - 1.0) / sampling.count)
-            + sampling.mean_covariance;
+        let population = sampling.covariance * ((sampling.count - 1.0) / sampling.count) + sampling.mean_covariance;
         Self::of_three(&population, Self::grouped(&pooled(groups), groups, sampling))
     }
 
@@ -83,14 +82,16 @@ impl Predicted {
         let sampling = groups::sampling(&parts);
         let count = sampling.count;
         let one = Self::of_one_with(Expectation::of_sampling(&prediction, &sampling), &prediction, count > 0.0);
-        let alone: Vec<Group> = parts.iter().map(|(count, sites)| Group { counts: [*count; 3], sites: *sites }).collect();
+        let alone: Vec<Group> =
+            parts.iter().map(|(count, sites)| Group { counts: [*count; 3], sites: *sites }).collect();
         Self { tested: Some(Self::grouped(&[prediction; 3], &alone, sampling)), ..one }
     }
 
     /// Of a plane behind a filter array that several amplifiers have read.
     pub fn of_plane_in_groups(groups: &[Group]) -> Self {
         let parts = groups::of_plane(groups);
-        let alone: Vec<Group> = parts.iter().map(|(count, sites)| Group { counts: [*count; 3], sites: *sites }).collect();
+        let alone: Vec<Group> =
+            parts.iter().map(|(count, sites)| Group { counts: [*count; 3], sites: *sites }).collect();
         let prediction = pooled(&alone)[0];
         let sampling = groups::sampling(&parts);
         Self::of_one_with(Expectation::of_sampling(&prediction, &sampling), &prediction, sampling.count > 0.0)

@@ -227,7 +227,8 @@ fn add_drift(found: &mut Sampling, sites: &SiteCovariance, grids: &[Grid]) {
     let columns = grids.iter().map(Grid::count).sum::<f64>() / grids.iter().map(|grid| grid.rows).sum::<f64>();
     for (i, third) in found.variance_thirds.iter_mut().flatten().enumerate() {
         let (value, of_drift) = (own[(i, i)] + columns * row[(i, i)], sites.drift[(i, i)]);
-        let cubes = 3.0 * value * value * of_drift * one + 3.0 * value * of_drift.powi(2) * two + of_drift.powi(3) * three;
+        let cubes =
+            3.0 * value * value * of_drift * one + 3.0 * value * of_drift.powi(2) * two + of_drift.powi(3) * three;
         *third += 8.0 * cubes / free.powi(3);
     }
 }

@@ -92,9 +92,9 @@ fn measure_all(
     // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
     let Known { prediction, samplings, .. } = laws.of(&frame, equations);
     // What several amplifiers have read differs from region to region.
-    let of_regions: Option<Vec<std::result::Result<FramePrediction, Unpredictable>>> = frame.taps().map(|_| {
-        regions.iter().map(|region| propagation::of_frame(&region.header(&frame), equations)).collect()
-    });
+    let of_regions: Option<Vec<std::result::Result<FramePrediction, Unpredictable>>> = frame
+        .taps()
+        .map(|_| regions.iter().map(|region| propagation::of_frame(&region.header(&frame), equations)).collect());
     if let Ok(FramePrediction::Pixels(mixture)) = prediction {
         for region in regions {
             samplings.of(mixture, &frame, *region);

@@ -292,8 +292,7 @@ impl Foreseen {
             FramePrediction::Pixels(mixture) => Self::of_pixels(mixture, index, patches),
         };
         // Of a level that drifts from row to row no profile is told.
-        let drifts =
-            matches!(prediction, FramePrediction::Planes(classes) if classes[index].lines.drift != [0.0; 3]);
+        let drifts = matches!(prediction, FramePrediction::Planes(classes) if classes[index].lines.drift != [0.0; 3]);
         let is_moved = is_moved || drifts;
         if is_moved { Self { profile_std: None, correlations: None, ..foreseen } } else { foreseen }
     }

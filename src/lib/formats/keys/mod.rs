@@ -94,8 +94,8 @@ mod tests {
     use crate::camera::linearity::Linearization;
     use crate::camera::optics::Exposure;
     use crate::camera::readout::ReadOut;
-    use crate::camera::taps::Taps;
     use crate::camera::sensor::{CurveFile, Provenance, ResponseFiles, Sensor};
+    use crate::camera::taps::Taps;
     use crate::color::difference::DifferenceReport;
     use crate::formats::yaml::{Keys, field_names, parse_matrix, parse_metadata, parse_sensor};
     use crate::metadata::*;
