@@ -12,6 +12,7 @@ use std::process::ExitCode;
 
 mod layout;
 mod read;
+mod samples;
 mod stacking;
 mod write;
 

@@ -101,7 +101,15 @@ impl FrameWriter {
             Encoding::Exr(samples, compression) => {
                 let (metadata, software) = (Some(description), Some(software));
                 let tags = ExrTags { metadata, software, ..native_tags(header) };
-                Encoder::Exr(Box::new(ExrWriter::create(target, &name, geometry, samples, compression, &tags)?))
+                Encoder::Exr(Box::new(ExrWriter::create(
+                    target,
+                    &name,
+                    geometry,
+                    samples,
+                    compression,
+                    options.layers()?,
+                    &tags,
+                )?))
             }
             Encoding::Tiff(samples, compression) => {
                 let scale = u16_scale(header.metadata.quantity, samples);
@@ -181,6 +189,7 @@ fn native_tags(header: &FrameHeader) -> ExrTags {
     ExrTags {
         exposure_s: metadata.exposure.map(|e| e.exposure_s),
         f_number: metadata.exposure.map(|e| e.f_number),
+        iso_speed: metadata.iso_speed,
         // Absolute XYZ: unscaled (1, 1, 1) has Y = 1 cd m⁻². Of relative ones no luminance is known.
         white_luminance: (metadata.quantity == QuantityKind::Xyz && metadata.unit != RELATIVE_UNIT)
             .then(|| metadata.sample_scale.unwrap_or(1.0).recip()),

@@ -78,6 +78,9 @@ pub struct Metadata {
     /// The camera, as its raw file calls it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
+    /// The sensitivity that the camera was set to, ISO, as its raw file tells it; no number of ours hangs on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iso_speed: Option<f64>,
     /// Exposure time and lens.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
@@ -163,6 +166,7 @@ impl Metadata {
             white_level_adu: None,
             sensor: None,
             camera: None,
+            iso_speed: None,
             exposure: None,
             relative_matrix: None,
             scene: None,

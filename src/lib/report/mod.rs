@@ -102,18 +102,33 @@ fn unwritable(error: impl std::fmt::Display) -> Error {
     Error::Data(format!("the report cannot be written: {error}"))
 }
 
+/// A report in one of the forms that all have: by its keys, or as its own table or text.
+fn in_form(
+    report: &impl serde::Serialize,
+    format: ReportFormat,
+    csv: impl FnOnce() -> Result<String>,
+    text: impl FnOnce() -> String,
+) -> Result<String> {
+    match format {
+        ReportFormat::Json => serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable),
+        ReportFormat::Yaml => yaml_writer::document("the report", report),
+        ReportFormat::Csv => csv(),
+        ReportFormat::Text => Ok(visible(&text()).into_owned()),
+    }
+}
+
+/// The text of a table whose rows are all written.
+fn finished(writer: csv::Writer<Vec<u8>>) -> Result<String> {
+    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+}
+
 /// Writes statistics.
 ///
 /// # Errors
 ///
 /// [`Error::Data`] when the form cannot hold them.
 pub fn render(report: &Report, format: ReportFormat) -> Result<String> {
-    match format {
-        ReportFormat::Json => serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable),
-        ReportFormat::Yaml => yaml_writer::document("the report", report),
-        ReportFormat::Csv => csv(report),
-        ReportFormat::Text => Ok(visible(&text(report)).into_owned()),
-    }
+    in_form(report, format, || csv(report), || text(report))
 }
 
 /// Column headings of the text and CSV forms, with the number of significant digits of text.
@@ -194,8 +209,7 @@ fn csv(report: &Report) -> Result<String> {
             writer.write_record(cells).map_err(unwritable)?;
         }
     }
-    let bytes = writer.into_inner().map_err(unwritable)?;
-    String::from_utf8(bytes).map_err(unwritable)
+    finished(writer)
 }
 
 fn text(report: &Report) -> String {
