@@ -11,6 +11,7 @@ use cyanometer::cfa::CfaPattern;
 use cyanometer::chain::{CameraSetup, Predictor, PredictorSettings};
 use cyanometer::color::{Space, White};
 use cyanometer::metadata::Scene;
+use cyanometer::names::Named;
 use cyanometer::numerics::significance::{of_chi_square, of_smallest};
 use cyanometer::numerics::vectors::Instructions;
 use cyanometer::propagation::covariance::symmetric;
