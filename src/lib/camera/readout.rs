@@ -371,6 +371,7 @@ pub fn silicon_band_gap_ev(temperature_k: f64) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::camera::taps::TapLayout;
     use crate::cfa::CfaPattern;
 
     /// That of the default sensor.
@@ -467,5 +468,27 @@ pub(crate) mod tests {
         let [doubt] = &ReadOut { adu_per_e: 17.0, ..kaf5101ce() }.doubts()[..] else { panic!("no doubt") };
         assert!(doubt.contains("166 times the range of 12 bits; it looks like electrons per ADU"), "{doubt}");
         assert!(kaf5101ce().doubts().is_empty());
+    }
+
+    #[test]
+    fn impossible_taps_are_refused_by_key() {
+        let taps = |layout, gain: &[f64]| Taps { layout, gain: gain.to_vec(), offset_e: vec![], read_noise_e: vec![] };
+        let complaint = |taps: Taps| ReadOut { taps: Some(taps), ..kaf5101ce() }.check().unwrap_err();
+        let halves = taps(TapLayout::LeftRight, &[1.0, 1.01]);
+        for (wrong, said) in [
+            (taps(TapLayout::LeftRight, &[]), "`taps` has none of `gain`, `offset_e` and `read_noise_e`"),
+            (taps(TapLayout::Columns, &[1.0; 5]), "`taps` has numbers of 5 taps; the layout `columns` has 2 to 4"),
+            (taps(TapLayout::Quadrants, &[1.0; 2]), "the layout `quadrants` has 4"),
+            (taps(TapLayout::TopBottom, &[1.0, 101.0]), "`taps.gain` is 101 for tap 1; it is relative to `adu_per_e`"),
+            (taps(TapLayout::TopBottom, &[f64::NAN, 1.0]), "`taps.gain` is NaN for tap 0"),
+            (Taps { offset_e: vec![0.0], ..halves.clone() }, "`taps.offset_e` has 1 numbers, but there are 2 taps"),
+            (Taps { offset_e: vec![0.0, -1e5], ..halves.clone() }, "`taps.offset_e` is -100000 for tap 1"),
+            (Taps { offset_e: vec![39_990.0, 0.0], ..halves.clone() }, "`taps.offset_e` of tap 0 makes its bias 4105"),
+            (Taps { read_noise_e: vec![15.0, -1.0], ..halves.clone() }, "`taps.read_noise_e` is -1 for tap 1"),
+        ] {
+            let found = complaint(wrong);
+            assert!(found.contains(said), "{found}");
+        }
+        assert_eq!(ReadOut { taps: Some(halves), ..kaf5101ce() }.check(), Ok(()));
     }
 }
