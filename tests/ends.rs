@@ -35,6 +35,8 @@ const QUIET: NoiseModel = NoiseModel {
     lines: LineNoise {
         row_noise_e: 0.0,
         column_noise_e: 0.0,
+        black_drift_e: 0.0,
+        black_drift_rows: 0.0,
         dsnu_e: 0.0,
         dsnu_row_e: 0.0,
         dsnu_column_e: 0.0,

@@ -1,6 +1,7 @@
 //! The read-out of a sensor: geometry, wells, noise, converter; and its dark current.
 
 use super::linearity::Linearization;
+use super::taps::Taps;
 use crate::cfa::FilterArray;
 use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, kelvin};
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,8 @@ const MOST_SMEAR_LINE_S: f64 = 0.01;
 const LEAST_WELL_E: f64 = 100.0;
 /// So many times the range of the converter is beyond what amplifiers are set to.
 const MOST_RANGES: f64 = 100.0;
+/// Rows over which a level can drift.
+const LEAST_DRIFT_ROWS: f64 = 2.0;
 
 /// What a sensor makes of charge, in numbers: what photon transfer measures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,6 +64,12 @@ pub struct ReadOut {
     /// The same of a column.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub column_noise_e: f64,
+    /// Drift of the black level along the rows of one exposure: rms, e⁻.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub black_drift_e: f64,
+    /// Rows from one level that is drawn to the next, between which it drifts smoothly.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub black_drift_rows: f64,
     /// Fixed offsets of photosites, read out with their charge whatever the exposure: rms, e⁻.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub dsnu_e: f64,
@@ -103,6 +112,9 @@ pub struct ReadOut {
     /// What makes its codes proportional to charge; none where they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub linearization: Option<Linearization>,
+    /// The amplifiers that it is read through; none where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taps: Option<Taps>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
@@ -138,6 +150,8 @@ impl ReadOut {
             ("read_noise_e", self.read_noise_e),
             ("row_noise_e", self.row_noise_e),
             ("column_noise_e", self.column_noise_e),
+            ("black_drift_e", self.black_drift_e),
+            ("black_drift_rows", self.black_drift_rows),
             ("dsnu_e", self.dsnu_e),
             ("dsnu_row_e", self.dsnu_row_e),
             ("dsnu_column_e", self.dsnu_column_e),
@@ -161,6 +175,7 @@ impl ReadOut {
                 ("hot_pixel_dark_current_e_per_s", self.hot_pixel_dark_current_e_per_s),
             ),
             (("rts_share", self.rts_share), ("rts_amplitude_e", self.rts_amplitude_e)),
+            (("black_drift_e", self.black_drift_e), ("black_drift_rows", self.black_drift_rows)),
         ];
         for (share, mean) in pairs {
             for ((here, value), (other, missing)) in [(share, mean), (mean, share)] {
@@ -168,6 +183,12 @@ impl ReadOut {
                     return Err(format!("`{here}` is {value}, which says nothing without `{other}`"));
                 }
             }
+        }
+        if self.black_drift_e > 0.0 && self.black_drift_rows < LEAST_DRIFT_ROWS {
+            return Err(format!(
+                "`black_drift_rows` is {}; it must be {LEAST_DRIFT_ROWS} at least, what changes from row to row is `row_noise_e`",
+                self.black_drift_rows
+            ));
         }
         if !(1..=16).contains(&self.bits) {
             return Err(format!("`bits` is {}; it must be 1 to 16", self.bits));
@@ -243,15 +264,59 @@ impl ReadOut {
         if let Some(curve) = self.linearization {
             curve.check_rises([-0.5, top_code + 0.5].map(|edge| edge - self.bias_adu))?;
         }
+        self.taps.as_ref().map_or(Ok(()), |taps| self.check_taps(taps, top_code))
+    }
+
+    fn check_taps(&self, taps: &Taps, top_code: f64) -> Result<(), String> {
+        taps.check(self.full_well_e)?;
+        for tap in 0..taps.count() {
+            let bias_adu = self.of_tap(tap).bias_adu;
+            if bias_adu > top_code {
+                return Err(format!(
+                    "`taps.offset_e` of tap {tap} makes its bias {bias_adu}; the largest code of {} bits is {top_code}",
+                    self.bits
+                ));
+            }
+            if let Some(curve) = self.linearization {
+                curve.check_rises([-0.5, top_code + 0.5].map(|edge| edge - bias_adu))?;
+            }
+        }
         Ok(())
     }
 
+    /// The tap of a photosite, by column and row on the sensor; 0 of sensors that have one.
+    pub fn tap(&self, at: [i64; 2]) -> usize {
+        self.taps.as_ref().map_or(0, |taps| taps.tap([self.width, self.height], at))
+    }
+
+    /// The read-out as if all went through one of its taps.
+    #[must_use]
+    pub fn of_tap(&self, tap: usize) -> Self {
+        let Some(taps) = &self.taps else { return self.clone() };
+        let adu_per_e = self.adu_per_e * taps.gain(tap);
+        Self {
+            read_noise_e: taps.read_noise_e(tap, self.read_noise_e),
+            bias_adu: self.bias_adu + adu_per_e * taps.offset_e(tap),
+            adu_per_e,
+            taps: None,
+            ..self.clone()
+        }
+    }
+
+    /// The read noise of each of its taps, e⁻.
+    pub fn read_noises_e(&self) -> impl Iterator<Item = f64> {
+        let count = self.taps.as_ref().map_or(1, Taps::count);
+        (0..count)
+            .map(|tap| self.taps.as_ref().map_or(self.read_noise_e, |taps| taps.read_noise_e(tap, self.read_noise_e)))
+    }
+
     /// What is added to charge when it is read, rms or mean in e⁻, by key.
-    pub fn added_e(&self) -> [(&'static str, f64); 7] {
+    pub fn added_e(&self) -> [(&'static str, f64); 8] {
         [
             ("read_noise_e", self.read_noise_e),
             ("row_noise_e", self.row_noise_e),
             ("column_noise_e", self.column_noise_e),
+            ("black_drift_e", self.black_drift_e),
             ("dsnu_e", self.dsnu_e),
             ("dsnu_row_e", self.dsnu_row_e),
             ("dsnu_column_e", self.dsnu_column_e),
@@ -321,6 +386,7 @@ pub fn silicon_band_gap_ev(temperature_k: f64) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::camera::taps::TapLayout;
     use crate::cfa::CfaPattern;
 
     /// That of the default sensor.
@@ -340,6 +406,8 @@ pub(crate) mod tests {
             read_noise_e: 15.7,
             row_noise_e: 0.0,
             column_noise_e: 0.0,
+            black_drift_e: 0.0,
+            black_drift_rows: 0.0,
             dsnu_e: 0.0,
             dsnu_row_e: 0.0,
             dsnu_column_e: 0.0,
@@ -355,6 +423,7 @@ pub(crate) mod tests {
             bias_adu: 1753.0,
             adu_per_e: 0.058824,
             linearization: None,
+            taps: None,
         }
     }
 
@@ -418,5 +487,27 @@ pub(crate) mod tests {
         let [doubt] = &ReadOut { adu_per_e: 17.0, ..kaf5101ce() }.doubts()[..] else { panic!("no doubt") };
         assert!(doubt.contains("166 times the range of 12 bits; it looks like electrons per ADU"), "{doubt}");
         assert!(kaf5101ce().doubts().is_empty());
+    }
+
+    #[test]
+    fn impossible_taps_are_refused_by_key() {
+        let taps = |layout, gain: &[f64]| Taps { layout, gain: gain.to_vec(), offset_e: vec![], read_noise_e: vec![] };
+        let complaint = |taps: Taps| ReadOut { taps: Some(taps), ..kaf5101ce() }.check().unwrap_err();
+        let halves = taps(TapLayout::LeftRight, &[1.0, 1.01]);
+        for (wrong, said) in [
+            (taps(TapLayout::LeftRight, &[]), "`taps` has none of `gain`, `offset_e` and `read_noise_e`"),
+            (taps(TapLayout::Columns, &[1.0; 5]), "`taps` has numbers of 5 taps; the layout `columns` has 2 to 4"),
+            (taps(TapLayout::Quadrants, &[1.0; 2]), "the layout `quadrants` has 4"),
+            (taps(TapLayout::TopBottom, &[1.0, 101.0]), "`taps.gain` is 101 for tap 1; it is relative to `adu_per_e`"),
+            (taps(TapLayout::TopBottom, &[f64::NAN, 1.0]), "`taps.gain` is NaN for tap 0"),
+            (Taps { offset_e: vec![0.0], ..halves.clone() }, "`taps.offset_e` has 1 numbers, but there are 2 taps"),
+            (Taps { offset_e: vec![0.0, -1e5], ..halves.clone() }, "`taps.offset_e` is -100000 for tap 1"),
+            (Taps { offset_e: vec![39_990.0, 0.0], ..halves.clone() }, "`taps.offset_e` of tap 0 makes its bias 4105"),
+            (Taps { read_noise_e: vec![15.0, -1.0], ..halves.clone() }, "`taps.read_noise_e` is -1 for tap 1"),
+        ] {
+            let found = complaint(wrong);
+            assert!(found.contains(said), "{found}");
+        }
+        assert_eq!(ReadOut { taps: Some(halves), ..kaf5101ce() }.check(), Ok(()));
     }
 }

@@ -345,6 +345,8 @@ impl From<FlatSensor> for Sensor {
                 read_noise_e: flat.read_noise_e,
                 row_noise_e: 0.0,
                 column_noise_e: 0.0,
+                black_drift_e: 0.0,
+                black_drift_rows: 0.0,
                 dsnu_e: 0.0,
                 dsnu_row_e: 0.0,
                 dsnu_column_e: 0.0,
@@ -360,6 +362,7 @@ impl From<FlatSensor> for Sensor {
                 bias_adu: flat.bias_adu,
                 adu_per_e: flat.adu_per_e,
                 linearization: None,
+                taps: None,
             }),
             response: Some(ResponseFiles {
                 quantum_efficiency: Some(flat.quantum_efficiency),

@@ -20,6 +20,7 @@ use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
 use crate::camera::optics::Exposure;
 use crate::camera::readout::ReadOut;
 use crate::camera::sensor::Sensor;
+use crate::camera::taps::Taps;
 use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, bare_name};
@@ -459,6 +460,25 @@ impl FrameHeader {
             "it starts at column {column}, row {row} of the sensor; charge of the photosites before these is missing, \
              so that transfer cannot be followed"
         )))
+    }
+
+    /// The amplifiers that its sensor is read through; none where there is one, or nothing is known.
+    pub fn taps(&self) -> Option<&Taps> {
+        self.metadata.sensor.as_ref()?.readout.as_ref()?.taps.as_ref()
+    }
+
+    /// Makes sure that all charge goes to one output, as charge transfer is simulated and undone.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for a sensor that is read through several amplifiers.
+    pub fn check_one_output(&self) -> Result<()> {
+        match self.taps() {
+            None => Ok(()),
+            Some(_) => Err(self.refuse(
+                "its sensor is read through several `taps`, but charge transfer is that to one output, in the sensor's corner",
+            )),
+        }
     }
 
     /// An [`Error::MissingKey`] about this frame.

@@ -6,6 +6,7 @@
 use super::columns::{Smeared, check_wells};
 use super::curved;
 use super::divided::NARROW;
+use super::lines::DRIFTING;
 use super::masters::{Dark, Flat};
 use super::moments::LineCovariance;
 use super::moments::{Equations, Prediction};
@@ -13,6 +14,7 @@ use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
 use super::repeated;
 use super::tails;
+use super::taps::{self, Group};
 pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::levels::BlackLevel;
 use crate::color;
@@ -33,6 +35,8 @@ use nalgebra::Matrix3;
 pub enum FramePrediction {
     /// Classes that are drawn apart: R, G and B before demosaicking.
     Planes([Prediction; 3]),
+    /// Such classes in groups, one for each of the amplifiers that have read the frame.
+    Groups(Vec<Group>),
     /// Pixels that are weighted sums of photosites.
     Pixels(Box<PixelMoments>),
 }
@@ -86,10 +90,14 @@ pub enum FramePrediction {
 /// # Ok::<(), cyanometer::error::Error>(())
 /// ```
 pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
+    let moments = |frame: &FrameHeader, equations| Ok(Sites::of(frame, equations)?.moments);
+    if let Some(groups) = taps::groups(frame, equations, moments)? {
+        return Ok(FramePrediction::Groups(groups));
+    }
     let prediction = Sites::of(frame, equations)?.frame(frame)?;
     match &prediction {
         FramePrediction::Pixels(pixels) => pixels.void.map_or(Ok(()), |why| Err(Unpredictable::Beyond(why)))?,
-        FramePrediction::Planes(_) => {}
+        FramePrediction::Planes(_) | FramePrediction::Groups(_) => {}
     }
     Ok(prediction)
 }
@@ -120,6 +128,7 @@ impl Sites {
     ///
     /// As [`of_frame`].
     pub fn of(frame: &FrameHeader, equations: Equations) -> Predicted<Self> {
+        let frame = &*taps::of_one(frame)?;
         let metadata = &frame.metadata;
         let scene = metadata.scene.as_ref().ok_or(Unpredictable::Missing("scene"))?;
         if !scene.uniform {
@@ -172,6 +181,16 @@ impl Sites {
         Ok(sites)
     }
 
+    /// The photosites of each of the amplifiers that read a frame, with the numbers of R, G and B.
+    ///
+    /// # Errors
+    ///
+    /// As [`of_frame`].
+    pub fn of_taps(frame: &FrameHeader, equations: Equations) -> Predicted<Vec<([f64; 3], Self)>> {
+        let parts = taps::parts(frame).into_iter();
+        parts.map(|part| Ok((part.counts, Self::of(&part.frame, equations)?))).collect()
+    }
+
     /// Predicts a frame that was made of these photosites; pixels say where their moments are void.
     ///
     /// # Errors
@@ -180,6 +199,9 @@ impl Sites {
     pub fn frame(&self, frame: &FrameHeader) -> Predicted<FramePrediction> {
         let metadata = &frame.metadata;
         let Some(record) = &metadata.demosaic else { return Ok(FramePrediction::Planes(self.moments)) };
+        if self.photosite.drifts() {
+            return Err(Unpredictable::Beyond(DRIFTING));
+        }
         let equations = self.photosite.equations;
         let method = Method::named(&record.method)
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;

@@ -132,6 +132,8 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         read_noise_e,
         row_noise_e,
         column_noise_e,
+        black_drift_e: 0.0,
+        black_drift_rows: 0.0,
         dsnu_e,
         dsnu_row_e,
         dsnu_column_e,
@@ -147,6 +149,7 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         bias_adu: bias_adu.value,
         adu_per_e: gain.value,
         linearization: None,
+        taps: None,
     };
     let percent = camera.confidence * 100.0;
     let source = format!("photon-transfer of {}; intervals hold with {percent} %", frames_in_words(camera.frames));

@@ -165,6 +165,8 @@ fn mean_read_out(raw: &FrameHeader, cfa: FilterArray, [black, white]: [f64; 2], 
         read_noise_e: noise_adu / adu_per_e,
         row_noise_e: 0.0,
         column_noise_e: 0.0,
+        black_drift_e: 0.0,
+        black_drift_rows: 0.0,
         dsnu_e: 0.0,
         dsnu_row_e: 0.0,
         dsnu_column_e: 0.0,
@@ -180,6 +182,7 @@ fn mean_read_out(raw: &FrameHeader, cfa: FilterArray, [black, white]: [f64; 2], 
         bias_adu: black,
         adu_per_e,
         linearization: None,
+        taps: None,
     }
 }
 

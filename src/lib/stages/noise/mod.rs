@@ -11,8 +11,9 @@
 pub mod bloom;
 mod model;
 pub mod smear;
+mod taps;
 
-pub use model::{LineNoise, NoiseModel, NoiseSettings, Tails, rectified_mean, rectified_mean_square};
+pub use model::{LineNoise, NoiseModel, NoiseSettings, Tails, knots, rectified_mean, rectified_mean_square};
 pub use smear::ColumnLight;
 
 use crate::camera::readout::ReadOut;
@@ -24,13 +25,14 @@ use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::random::philox::{LONGEST_RUN, VECTOR};
 use crate::random::poisson::Table;
-use crate::random::{LineDraws, Run, RunWords, Source, Unlike, of_column, of_row, spans};
+use crate::random::{LineDraws, Run, RunWords, Source, Unlike, of_column, of_knot, of_row, spans};
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
 use crate::units::{Electrons, ExpectedElectrons, QuantityKind};
 use smear::Known;
 use std::ops::Range;
 use std::sync::Arc;
+use taps::ReadNoise;
 
 /// Draws one noisy exposure.
 ///
@@ -72,6 +74,7 @@ pub struct AddNoise {
     transfer: Option<Transfer>,
     tables: Tables,
     columns: Columns,
+    taps: ReadNoise,
     instructions: Instructions,
     /// Share of what is beyond full well that spills along its column.
     blooming: f64,
@@ -185,6 +188,7 @@ impl AddNoise {
         let transfer = match settings.cte {
             Some(cte) => {
                 input.check_corner()?;
+                input.check_one_output()?;
                 Some(Transfer::new(cte, &input.geometry)?)
             }
             None => None,
@@ -198,7 +202,8 @@ impl AddNoise {
         let mut sources: Vec<Source> =
             Source::ALL.into_iter().filter(|source| !settings.without.contains(source)).collect();
         // What the noisy frames leave out, the clean one does.
-        let read_variance = if sources.contains(&Source::Ron) { readout.read_noise_e.powi(2) } else { 0.0 };
+        let least_read_noise_e = readout.read_noises_e().fold(f64::INFINITY, f64::min);
+        let read_variance = if sources.contains(&Source::Ron) { least_read_noise_e.powi(2) } else { 0.0 };
         let of_hot = hot_share * hot_pixel_e * (1.0 + 2.0 * hot_pixel_e);
         let dark_variance = dark_e * (1.0 + readout.dcnu.powi(2)) + of_hot;
         if dark_variance > 0.0 && dark_variance < NEGLIGIBLE_DARK * read_variance {
@@ -238,7 +243,11 @@ impl AddNoise {
             cte: settings.cte,
             smear_per_row: if exposure_s > 0.0 { readout.smear_line_s / exposure_s } else { 0.0 },
         };
-        let model = NoiseModel::of(input, &record)?;
+        let mut model = NoiseModel::of(input, &record)?;
+        let taps = ReadNoise::of(input, readout, &record);
+        if record.sources.contains(&Source::Ron) {
+            model.read_noise_e = readout.read_noises_e().fold(0.0, f64::max);
+        }
         let mean_dark_e = dark_e * rectified_mean(model.dcnu) + model.tails.mean_hot_e();
         metadata.dark_signal_e = Some(mean_dark_e * settings.cte.map_or(1.0, uniform_share));
         metadata.noise = Some(record.clone());
@@ -248,7 +257,19 @@ impl AddNoise {
         let lacks_light = !columns.add_smear(input, record.smear_per_row)?;
         let blooming = readout.blooming;
         let header = FrameHeader { metadata, ..input.clone() };
-        Ok(Self { header, pattern, model, record, transfer, tables, columns, instructions, blooming, lacks_light })
+        Ok(Self {
+            header,
+            pattern,
+            model,
+            record,
+            transfer,
+            tables,
+            columns,
+            taps,
+            instructions,
+            blooming,
+            lacks_light,
+        })
     }
 
     /// What adds up the light of the frame's columns, where smear hangs on rows that are not read yet: the whole frame goes
@@ -316,7 +337,7 @@ fn has_noise(readout: &ReadOut, source: Source) -> bool {
     match source {
         Source::Dcnu => readout.dcnu > 0.0,
         Source::Prnu => readout.prnu > 0.0,
-        Source::Ron => readout.read_noise_e > 0.0,
+        Source::Ron => readout.read_noises_e().any(|noise| noise > 0.0),
         Source::RowNoise => readout.row_noise_e > 0.0,
         Source::ColumnNoise => readout.column_noise_e > 0.0,
         Source::Dsnu => readout.dsnu_e > 0.0,
@@ -326,6 +347,7 @@ fn has_noise(readout: &ReadOut, source: Source) -> bool {
         Source::PrnuColumn => readout.prnu_column > 0.0,
         Source::HotPixels => readout.hot_pixel_share > 0.0,
         Source::Rts => readout.rts_share > 0.0,
+        Source::BlackDrift => readout.black_drift_e > 0.0,
         Source::Dcsn | Source::Ssn => true,
     }
 }
@@ -416,6 +438,8 @@ struct Line<'a> {
     /// Electrons that are added to the row, and its relative gain less 1.
     offset: f32,
     gain: f32,
+    /// Read noise of each column, e⁻; empty where all have that of the model.
+    read_noise: &'a [f32],
     /// Row of the sensor, and column of the frame's first.
     row: i32,
     first_column: i32,
@@ -434,14 +458,21 @@ impl AddNoise {
         #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
         let row = y0.wrapping_add(y as i32);
         let Self { model, record, tables, columns, .. } = self;
-        let LineNoise { row_noise_e, dsnu_row_e, prnu_row, .. } = model.lines;
+        let LineNoise { row_noise_e, dsnu_row_e, prnu_row, black_drift_e, .. } = model.lines;
         let (mut offset, mut gain) = (0.0, 0.0);
         if row_noise_e > 0.0 || dsnu_row_e > 0.0 || prnu_row > 0.0 {
             let draws = of_row([record.seed, record.sensor_seed], record.frame, row);
             offset = to_sample(row_noise_e * draws.temporal + dsnu_row_e * draws.offset);
             gain = to_sample(prnu_row * draws.response);
         }
-        Line { model, record, tables, columns, offset, gain, row, first_column, classes }
+        if black_drift_e > 0.0 {
+            let (knot, [of_this, of_next]) = knots(row.into(), model.lines.black_drift_rows);
+            #[expect(clippy::cast_possible_truncation, reason = "knots are fewer than rows, and one more")]
+            let level = |knot: i64| of_knot(record.seed, record.frame, knot as i32);
+            offset += to_sample(black_drift_e * (of_this * level(knot) + of_next * level(knot + 1)));
+        }
+        let read_noise = self.taps.row(row);
+        Line { model, record, tables, columns, offset, gain, read_noise, row, first_column, classes }
     }
 }
 
@@ -471,7 +502,7 @@ impl Kernel for Expose<'_> {
                     run.make_temporal(&mut scratch.words);
                     line.charges(&run, &mut scratch, &span, expected, noisy, &mut counts);
                     if noise.model.read_noise_e > 0.0 {
-                        add(noisy, line.read_noise(&run, &mut scratch));
+                        add(noisy, line.read_noise(&run, &mut scratch, &span));
                     }
                     line.add_jumps(&run, &mut scratch, noisy);
                     line.add_offsets(&run, &mut scratch, span, noisy);
@@ -506,7 +537,7 @@ impl Kernel for Charges<'_> {
             if let Some(read_noise) = &mut read_noise {
                 let of_span = &mut read_noise[span.clone()];
                 if line.model.read_noise_e > 0.0 {
-                    let made = line.read_noise(&run, &mut scratch);
+                    let made = line.read_noise(&run, &mut scratch, &span);
                     of_span.copy_from_slice(&made[..of_span.len()]);
                 } else {
                     of_span.fill(0.0);
@@ -735,9 +766,13 @@ impl Line<'_> {
 
     /// Draws the read noise of each photosite. The run's temporal words are made.
     #[inline(always)]
-    fn read_noise<'a>(&self, run: &Run, scratch: &'a mut Scratch) -> &'a [f32] {
+    fn read_noise<'a>(&self, run: &Run, scratch: &'a mut Scratch, span: &Range<usize>) -> &'a [f32] {
         let noise = &mut scratch.normals[..run.length];
         run.normals(&scratch.words, Source::Ron, noise);
+        if let Some(of_columns) = self.read_noise.get(span.clone()) {
+            noise.iter_mut().zip(of_columns).for_each(|(noise, rms)| *noise *= rms);
+            return noise;
+        }
         let rms = to_sample(self.model.read_noise_e);
         noise.iter_mut().for_each(|noise| *noise *= rms);
         noise
