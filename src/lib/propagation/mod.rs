@@ -36,6 +36,7 @@ mod repeated;
 pub mod sampling;
 pub mod saturation;
 pub mod smooth_hue;
+mod steps;
 mod tails;
 mod unlike;
 mod unpredictable;
