@@ -245,9 +245,8 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
     // Codes are gone through as far as laws reach that are narrow.
     let spreads = counts.iter().map(|count| count.spread);
     let narrow = spreads.filter(|spread| *spread < MANY * code.unwrap_or(0.0)).fold(0.0, f64::max);
-    let few_left = !is_shared && others.len() > 8;
-    let table = few_left.then(|| Table::new(&base, &counts));
-    let mut steps = few_left.then(|| Steps::new(&base, &counts, reading)).flatten();
+    let mut steps = if is_shared { None } else { Steps::new(charge, &base, &counts, reading) };
+    let mut table = None;
     let is_only = others.windows(2).all(|pair| pair[0].spread == pair[1].spread);
     if is_shared {
         let gone: f64 = shared.iter().map(|(_, weight)| weight).sum();
@@ -280,6 +279,9 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
         }
         let still = reading.at(other.electrons.min(full), other.spread * other.spread);
         let blurred = Reading { noise_e, ..*reading };
+        if table.is_none() && others.len() > 8 {
+            table = Some(Table::new(&base, &counts));
+        }
         let widest_narrow = if is_hidden { 0.0 } else { narrow };
         let stretch = Stretch { from: other.electrons, widest_narrow, noise_e, ..base };
         for place in stretch.places(&blurred, &[]) {

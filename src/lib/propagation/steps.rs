@@ -8,13 +8,16 @@
 //! by parts. Edges are gone through near k and near the lowest code; between, where they are many to S, their sum is an
 //! integral. From the one to the other leads a weight that is as smooth as a normal law, so that nothing is seen of the seam.
 
-use super::counts::Count;
+use super::counts::{Charge, Count};
 use super::curved::NODES as HERMITE;
 use super::ends::{MANY, Stretch};
 use super::reading::{Asked, Moments, Reading};
 use crate::numerics::gauss::{NODES, interpolated, panel};
 use crate::numerics::normal::{cumulative, density};
 use crate::numerics::rounding::{REACH, Rounding};
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
 
 /// Codes that are gone through one by one at either end, beyond what narrow laws need.
 const ABOUT_ENDS: f64 = 15.0;
@@ -85,6 +88,35 @@ impl Below {
     }
 }
 
+/// What is below zero of a charge, with noise, e⁻; and T about 0, where there is noise, by panels.
+struct Blurred {
+    charge: Charge,
+    noise_e: f64,
+    below: Below,
+    near: Vec<[f64; NODES]>,
+}
+
+impl Blurred {
+    /// As many as one scene asks for.
+    const KEPT: usize = 12;
+
+    /// What is known of a charge, or is worked out: stages, causes and kinds of photosites ask for the same.
+    fn recall(charge: &Charge, noise_e: f64, work_out: impl FnOnce() -> Self) -> Rc<Self> {
+        thread_local! { static KNOWN: RefCell<VecDeque<Rc<Blurred>>> = const { RefCell::new(VecDeque::new()) }; }
+        let is_same = |known: &&Rc<Self>| known.charge == *charge && known.noise_e == noise_e;
+        KNOWN.with(|known| {
+            let found = known.borrow().iter().find(is_same).cloned();
+            found.unwrap_or_else(|| {
+                let found = Rc::new(work_out());
+                let mut kept = known.borrow_mut();
+                kept.truncate(Self::KEPT - 1);
+                kept.push_front(found.clone());
+                found
+            })
+        })
+    }
+}
+
 /// Charges below zero that leave, as codes see it.
 pub(super) struct Steps<'a> {
     stretch: &'a Stretch,
@@ -93,16 +125,17 @@ pub(super) struct Steps<'a> {
     /// Electrons to a code.
     code_e: f64,
     reading: &'a Reading,
-    sharp: Below,
+    charge: &'a Charge,
+    sharp: Rc<Blurred>,
     /// The same with the noise that was asked for last, and the step that it blurs.
-    blurred: Option<(f64, Below, Vec<[f64; NODES]>)>,
+    blurred: Option<Rc<Blurred>>,
     /// Distance, in codes, up to which narrow laws need all codes.
     fine: f64,
 }
 
 impl<'a> Steps<'a> {
     /// None where codes are not straight.
-    pub fn new(stretch: &'a Stretch, counts: &'a [Count], reading: &'a Reading) -> Option<Self> {
+    pub fn new(charge: &'a Charge, stretch: &'a Stretch, counts: &'a [Count], reading: &'a Reading) -> Option<Self> {
         let Asked::Codes(adc, ends) = reading.asked else { return None };
         if adc.linearization.is_some() {
             return None;
@@ -110,16 +143,18 @@ impl<'a> Steps<'a> {
         let code_e = 1.0 / adc.adu_per_e;
         let narrow = counts.iter().map(|count| count.spread).filter(|spread| *spread < MANY * code_e);
         let fine = ABOUT_ENDS + 2.0 * REACH * narrow.fold(0.0, f64::max) / code_e;
-        let sharp = Below::new(stretch, counts, 0.0);
-        Some(Self { stretch, counts, ends, code_e, reading, sharp, blurred: None, fine })
+        let sharp = Blurred::recall(charge, 0.0, || {
+            let below = Below::new(stretch, counts, 0.0);
+            Blurred { charge: *charge, noise_e: 0.0, below, near: Vec::new() }
+        });
+        Some(Self { charge, stretch, counts, ends, code_e, reading, sharp, blurred: None, fine })
     }
 
     /// Gets ready for a noise, e⁻.
     fn prepare(&mut self, noise_e: f64) {
-        if noise_e <= 0.0 || self.blurred.as_ref().is_some_and(|(known, ..)| *known == noise_e) {
+        if noise_e <= 0.0 || self.blurred.as_ref().is_some_and(|known| known.noise_e == noise_e) {
             return;
         }
-        let below = Below::new(self.stretch, self.counts, noise_e);
         let width = 2.0 * REACH * noise_e / PANELS as f64;
         let of_panel = |index: usize| {
             let low = -REACH * noise_e + width * index as f64;
@@ -128,8 +163,11 @@ impl<'a> Steps<'a> {
             values.iter_mut().zip(places).for_each(|(value, (x, _))| *value = self.blur(x, noise_e));
             values
         };
-        let near = (0..PANELS).map(of_panel).collect();
-        self.blurred = Some((noise_e, below, near));
+        let found = Blurred::recall(self.charge, noise_e, || {
+            let below = Below::new(self.stretch, self.counts, noise_e);
+            Blurred { charge: *self.charge, noise_e, below, near: (0..PANELS).map(of_panel).collect() }
+        });
+        self.blurred = Some(found);
     }
 
     /// T near 0 by sums: what lies below 0 of the noise about x.
@@ -142,7 +180,8 @@ impl<'a> Steps<'a> {
         let mut index = 0.0;
         while index < panels {
             let of_panel = panel(low + index * width, low + (index + 1.0) * width);
-            sum += of_panel.map(|(v, weight)| weight * self.sharp.at(v) * density((x - v) / noise_e)).sum::<f64>();
+            sum +=
+                of_panel.map(|(v, weight)| weight * self.sharp.below.at(v) * density((x - v) / noise_e)).sum::<f64>();
             index += 1.0;
         }
         sum / noise_e
@@ -151,20 +190,20 @@ impl<'a> Steps<'a> {
     /// T at so many electrons above the charge.
     fn step(&self, x: f64, noise_e: f64) -> f64 {
         if noise_e <= 0.0 {
-            return if x <= 0.0 { self.sharp.at(x) } else { 0.0 };
+            return if x <= 0.0 { self.sharp.below.at(x) } else { 0.0 };
         }
         let reach = REACH * noise_e;
-        match &self.blurred {
+        match self.blurred.as_deref().filter(|known| known.noise_e == noise_e) {
             _ if x >= reach => 0.0,
-            Some((known, below, _)) if *known == noise_e && x <= -reach => below.at(x),
-            Some((known, _, near)) if *known == noise_e => {
+            Some(Blurred { below, .. }) if x <= -reach => below.at(x),
+            Some(Blurred { near, .. }) => {
                 let place = (x + reach) / (2.0 * reach) * PANELS as f64;
                 let index = place.floor().min(PANELS as f64 - 1.0);
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "one of the panels")]
                 let values = &near[index as usize];
                 interpolated(values, 2.0 * (place - index) - 1.0)
             }
-            _ if x <= -reach => HERMITE.iter().map(|(z, weight)| weight * self.sharp.at(x + noise_e * z)).sum(),
+            _ if x <= -reach => HERMITE.iter().map(|(z, weight)| weight * self.sharp.below.at(x + noise_e * z)).sum(),
             _ => self.blur(x, noise_e),
         }
     }
