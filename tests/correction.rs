@@ -154,6 +154,7 @@ impl Chance {
 }
 
 /// A camera and a chain of corrections as chance has them, and the corrected frame.
+#[allow(clippy::too_many_lines, reason = "a camera and its frames, setting after setting")]
 fn chain(seed: u64) -> (String, MemoryFrame) {
     let mut chance = Chance(seed);
     for _ in 0..4 {

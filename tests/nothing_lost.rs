@@ -59,6 +59,7 @@ impl Dice {
 
 /// Each line would write what it reads: by the name of a sidecar, by a link, through an option.
 #[test]
+#[allow(clippy::too_many_lines, reason = "a table of cases")]
 fn inputs_are_never_written() {
     let shop = Workshop::with_frames();
     let copy = |from: &str, to: &str| fs::copy(shop.path(from), shop.path(to)).map(drop).unwrap();

@@ -107,6 +107,7 @@ fn named_output_is_the_standard_output_byte_for_byte() {
 
 /// The sky library as a chart, from radiance to L*a*b*: each of 912 patches is as noisy as its own level predicts.
 #[test]
+#[allow(clippy::too_many_lines, reason = "a session at the shell, in its order")]
 fn patches_of_a_library_are_as_noisy_as_predicted() {
     let shop = Workshop::new();
     shop.run("fit-matrix SAMPLES/skies/sky912.exr -o matrix.yaml", &[]);
@@ -313,6 +314,7 @@ fn darks_and_transfer_are_taken_back() {
 
 /// Predictions, checks and layers of uncertainty as a shell sees them, and the likely mistakes.
 #[test]
+#[allow(clippy::too_many_lines, reason = "a session at the shell, in its order")]
 fn noise_is_predicted_checked_and_carried_along() {
     let shop = Workshop::new();
     shop.pipe(

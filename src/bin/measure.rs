@@ -5,6 +5,7 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::plots;
 use cyanometer::report::{self, Findings, ReportFormat};
+use cyanometer::requests::independence::check_exposures;
 use cyanometer::requests::options::{Makes, Output};
 use cyanometer::requests::{self, described::DescribedInput, measurement::Measurement, values};
 use cyanometer::stream::RowSource;
@@ -49,6 +50,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let output = arguments.output.as_deref();
     let format = report::form_of(arguments.output_format, output)?.unwrap_or(ReportFormat::Text);
     if let Some(statistics) = arguments.measurement.over_frames() {
+        check_exposures(&frames.inputs)?;
         let one = Output { makes: Makes::One, ..Output::default() };
         session.each_frame::<Arguments>(frames, &one, |turn| {
             let mut reader = arguments.input.with(turn.input.clone()).open_all()?;

@@ -79,6 +79,7 @@ impl File {
 }
 
 /// The file of a plane of codes of 12 bits.
+#[allow(clippy::too_many_lines, reason = "a file, directory after directory")]
 pub fn nef([width, height]: [u32; 2], codes: &[u16]) -> Vec<u8> {
     // Two codes in three bytes.
     let strip: Vec<u8> = codes

@@ -4,10 +4,9 @@
 //! formula.
 
 pub mod camera;
+pub mod predicted;
 pub mod predictor;
 
 pub use camera::{CameraSetup, CameraStages, uniform_frame};
-pub use predictor::{
-    CauseVariance, ChainPrediction, ChainStage, NoiseDeltaE, PhaseCovariance, Predictor, PredictorSettings,
-    StagePrediction, Uncertainty,
-};
+pub use predicted::{CauseVariance, ChainPrediction, ChainStage, NoiseDeltaE, PhaseCovariance, StagePrediction};
+pub use predictor::{Predictor, PredictorSettings, Uncertainty};

@@ -4,12 +4,13 @@
 //! is predicted here is what `measure` compares such frames with.
 
 use super::camera::CameraSetup;
+use super::predicted::{CauseVariance, ChainPrediction, ChainStage, NoiseDeltaE, PhaseCovariance, StagePrediction};
 use crate::camera::sensor::Sensor;
 use crate::color::Space;
 use crate::color::difference::DELTA_E_PER_JND;
 use crate::error::{Error, Result};
 use crate::metadata::{CorrectionRecord, FrameHeader, Scene};
-use crate::names::{Named, serde_by_name};
+use crate::names::Named;
 use crate::numerics::normal;
 use crate::propagation::budget::{Budget, Cause};
 use crate::propagation::frame::{Sites, quantity_of_sites};
@@ -23,7 +24,6 @@ use crate::stages::to_xyz::ColorSettings;
 use crate::stream::Stage;
 use crate::units::QuantityKind;
 use nalgebra::{Matrix3, Vector3};
-use serde::Serialize;
 
 /// What a prediction follows.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,41 +49,6 @@ impl PredictorSettings {
         Self { camera, color: None, equations, patch: None, patch_at: None, wanted: None }
     }
 }
-
-/// A stage of the chain that is predicted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ChainStage {
-    /// Electrons of one exposure.
-    Electrons,
-    /// Codes.
-    Adu,
-    /// Codes less the mean of dark frames.
-    DarkSubtracted,
-    /// Sensor RGB.
-    Demosaicked,
-    /// CIE XYZ.
-    Xyz,
-    /// CIE L\*a\*b\*.
-    Lab,
-}
-
-impl Named for ChainStage {
-    const ALL: &'static [Self] =
-        &[Self::Electrons, Self::Adu, Self::DarkSubtracted, Self::Demosaicked, Self::Xyz, Self::Lab];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Electrons => "electrons",
-            Self::Adu => "adu",
-            Self::DarkSubtracted => "dark_subtracted",
-            Self::Demosaicked => "demosaicked",
-            Self::Xyz => "xyz",
-            Self::Lab => "lab",
-        }
-    }
-}
-
-serde_by_name!(ChainStage);
 
 /// A wanted uncertainty of a mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,109 +85,6 @@ pub enum Uncertainty {
 pub struct Predictor {
     settings: PredictorSettings,
     heads: Vec<(ChainStage, FrameHeader)>,
-}
-
-/// What is predicted of one scene.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ChainPrediction {
-    /// Expected signal electrons of R, G and B.
-    pub electrons: [f64; 3],
-    /// One entry per stage.
-    pub stages: Vec<StagePrediction>,
-    /// Color difference that noise makes at a pixel, where there is a matrix.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub noise_delta_e: Option<NoiseDeltaE>,
-    /// How far to trust the linearization of smooth hue transition, where that is the method.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub first_order: Option<FirstOrder>,
-}
-
-/// Moments of one stage.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StagePrediction {
-    /// `electrons`, `adu`, `dark_subtracted` (where dark frames are), `demosaicked`, `xyz` or `lab`.
-    pub stage: ChainStage,
-    /// Unit of the samples.
-    pub unit: String,
-    /// Names of the channels.
-    pub channels: Vec<String>,
-    /// Why its numbers, which are those of the first order, are void; none where they hold.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub void: Option<&'static str>,
-    /// Mean of each.
-    pub mean: [f64; 3],
-    /// The part of the mean that noise brings about because the stage is curved.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bias: Option<[f64; 3]>,
-    /// Standard deviation over the pixels of a frame, fixed patterns included.
-    pub std: [f64; 3],
-    /// The part that differs from exposure to exposure; none where it is not known apart.
-    pub temporal_std: Option<[f64; 3]>,
-    /// The part that is the same in every exposure of one sensor.
-    pub fixed_pattern_std: Option<[f64; 3]>,
-    /// 20 log₁₀ of the mean above black over the standard deviation; none where the mean is no signal, or saturated.
-    pub snr_db: [Option<f64>; 3],
-    /// Share of the samples that are saturated, or of the pixels that were made of such; none below 10⁻¹².
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub saturated: Option<[f64; 3]>,
-    /// Covariance of the channels of a pixel, over the phases of the filter array.
-    pub covariance: [[f64; 3]; 3],
-    /// The same to second order, of smooth hue transition; `covariance` and `std` are its first.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub second_order_covariance: Option<[[f64; 3]; 3]>,
-    /// The covariance for each of the four phases, of a demosaicked frame.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub phases: Vec<PhaseCovariance>,
-    /// Variance by cause; the causes add up to the variance.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub causes: Vec<CauseVariance>,
-    /// Standard deviation of the mean of the patch.
-    pub patch_mean_std: Option<[f64; 3]>,
-    /// Covariance of the mean of the patch.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub patch_mean_covariance: Option<[[f64; 3]; 3]>,
-    /// Pixels of the smallest square patch whose mean is as certain as wanted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pixels_needed: Option<[Option<u64>; 3]>,
-}
-
-/// Variance that one cause gives to the channels.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CauseVariance {
-    /// The cause.
-    pub cause: Cause,
-    /// Variance of each channel.
-    pub variance: [f64; 3],
-}
-
-/// Covariance of the pixels of one phase.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PhaseCovariance {
-    /// Parity of the sensor's column.
-    pub column: isize,
-    /// Parity of the sensor's row.
-    pub row: isize,
-    /// Class of the photosite there.
-    pub class: &'static str,
-    /// Covariance of the channels.
-    pub covariance: [[f64; 3]; 3],
-}
-
-/// Color difference that noise makes: the distance in L*a*b* between a pixel and the color without noise.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct NoiseDeltaE {
-    /// Expected ΔE*ab.
-    pub mean: f64,
-    /// Its standard deviation.
-    pub std: f64,
-    /// Expected difference in just noticeable ones.
-    pub jnd: f64,
-    /// Expected ΔE*ab of the mean of the patch.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub patch_mean: Option<f64>,
-    /// Pixels of the smallest square patch whose mean differs by no more than wanted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pixels_needed: Option<u64>,
 }
 
 /// The share of saturated samples from which a signal has no ratio to its noise: what is left of the noise says nothing of
@@ -354,11 +216,6 @@ impl PredictorSettings {
         let signal = mean.map(|mean| mean - black);
         let saturated = saturation::expected(head);
         let is_signal = metadata.quantity != QuantityKind::Lab;
-        let snr_db = [0, 1, 2].map(|i| {
-            let ratio = signal[i] / std[i];
-            let is_clear = saturated.is_none_or(|shares| shares[i] < SATURATED);
-            (is_signal && is_clear && ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
-        });
         let patch = self.patch.map(|size| self.patch_mean(prediction, &covariance, size));
         let certain_enough = |wanted: f64, i: usize, side: usize| {
             let variance = self.patch_mean(prediction, &covariance, [side; 2])[(i, i)];
@@ -387,7 +244,7 @@ impl PredictorSettings {
             std,
             temporal_std: part(false),
             fixed_pattern_std: part(true),
-            snr_db,
+            snr_db: if is_signal { snr_db(signal, std, saturated) } else { [None; 3] },
             saturated,
             covariance: rows(&covariance),
             second_order_covariance: second_order.filter(|_| self.equations == Equations::Exact),
@@ -520,6 +377,15 @@ impl PredictorSettings {
             pixels_needed,
         }
     }
+}
+
+/// Ratios of signals to their noise; none where that is void, or the signal is saturated.
+fn snr_db(signal: [f64; 3], std: [f64; 3], saturated: Option<[f64; 3]>) -> [Option<f64>; 3] {
+    [0, 1, 2].map(|i| {
+        let ratio = signal[i] / std[i];
+        let is_clear = saturated.is_none_or(|shares| shares[i] < SATURATED);
+        (is_clear && ratio > 0.0 && ratio.is_finite()).then(|| 20.0 * ratio.log10())
+    })
 }
 
 /// Standard deviations of the causes that are fixed patterns, or of those that are not; none where causes are not kept apart.

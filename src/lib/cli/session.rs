@@ -343,8 +343,8 @@ impl Session {
         }
         match path {
             Some(path) => Err(Error::Usage(format!(
-                "{}: another frame of this run went there; give names with {{frame}}, the number of the exposure, or {{index}}, \
-                 that in the stream",
+                "{}: another frame of this run went there; give names with {{stem}}, that of its file, {{frame}}, the number of \
+                 the exposure, or {{index}}, that in the stream",
                 path.display()
             ))),
             None if options.format.is_none_or(|format| format == Format::Exr) => Ok(options),

@@ -2,6 +2,7 @@
 
 pub mod atomic;
 pub mod cameras;
+mod cells;
 pub mod chart;
 pub mod csv;
 pub mod data;
@@ -29,6 +30,7 @@ pub mod pipe;
 pub mod places;
 pub mod plots;
 pub mod png;
+mod positioned;
 pub mod radiance_unit;
 pub mod read_ahead;
 pub mod register;

@@ -7,7 +7,8 @@ mod records;
 
 pub use converter::AdcRecord;
 pub use correction::{
-    AverageRecord, CorrectionRecord, DefectsRecord, ExposuresRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
+    AverageRecord, CorrectionRecord, DefectsRecord, DrawnExposures, ExposureSet, ExposuresRecord, FlatRecord,
+    MasterKind, MasterNoise, MasterRecord,
 };
 pub use difference::Difference;
 pub use records::{
@@ -77,6 +78,9 @@ pub struct Metadata {
     /// The camera, as its raw file calls it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
+    /// The sensitivity that the camera was set to, ISO, as its raw file tells it; no number of ours hangs on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iso_speed: Option<f64>,
     /// Exposure time and lens.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
@@ -100,6 +104,9 @@ pub struct Metadata {
     /// The exposures that the frame is the average of, where it is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub average: Option<ExposuresRecord>,
+    /// Which exposures these are, as far as their metadata tell.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub averaged: Vec<DrawnExposures>,
     /// What was taken back before demosaicking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correction: Option<CorrectionRecord>,
@@ -162,6 +169,7 @@ impl Metadata {
             white_level_adu: None,
             sensor: None,
             camera: None,
+            iso_speed: None,
             exposure: None,
             relative_matrix: None,
             scene: None,
@@ -169,6 +177,7 @@ impl Metadata {
             noise: None,
             adc: None,
             average: None,
+            averaged: Vec::new(),
             correction: None,
             demosaic: None,
             color: None,
@@ -310,6 +319,23 @@ impl FrameHeader {
         }
     }
 
+    /// Seeds and numbers of the exposures in which its noise was drawn: its own, or those that it is the average of.
+    pub fn drawn(&self) -> Vec<DrawnExposures> {
+        let noise = self.metadata.noise.as_ref().filter(|noise| !noise.sources.is_empty());
+        match noise.map(|noise| (noise.seed, noise.frame)) {
+            Some((seed, frame)) if self.metadata.averaged.is_empty() => vec![DrawnExposures::one(seed, frame)],
+            _ => self.metadata.averaged.clone(),
+        }
+    }
+
+    /// Whether noise that an exposure draws anew may be in it; not where it was simulated without.
+    pub fn is_noisy(&self) -> bool {
+        match &self.metadata.noise {
+            Some(noise) => noise.sources.iter().any(|source| !source.is_fixed_pattern()),
+            None => self.metadata.scene.is_none(),
+        }
+    }
+
     /// The same without what tells it from other exposures of its scene: its name, its seed and number, what its samples were
     /// counted to be, and what this version does not know.
     #[must_use]
@@ -317,6 +343,7 @@ impl FrameHeader {
         let mut head = Self { name: String::new(), ..self.clone() };
         head.metadata.history.clear();
         (head.metadata.samples, head.metadata.file) = (None, None);
+        head.metadata.averaged.clear();
         if let Some(noise) = &mut head.metadata.noise {
             (noise.seed, noise.frame) = (0, 0);
         }

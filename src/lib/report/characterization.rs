@@ -3,7 +3,7 @@
 use super::chart;
 use super::matrix_text::{differences_text, matrix_text};
 use super::trade_off::trade_off;
-use super::{ReportFormat, shown, table, unwritable};
+use super::{ReportFormat, finished, in_form, shown, table, unwritable};
 use crate::analysis::characterization::CameraMatrix;
 use crate::analysis::characterization::noise_aware::TradeOff;
 use crate::color::difference::{Difference, DifferenceReport};
@@ -14,7 +14,6 @@ use crate::requests::fit::{
     Characterization, ChartFound, Conditions, Evaluation, Fit, Group, MatrixFound, MatrixRequest, NoiseReport,
 };
 use crate::requests::values;
-use crate::text::visible;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
@@ -135,18 +134,14 @@ impl MatrixOutputs {
 ///
 /// [`crate::error::Error::Data`] when the form cannot hold it.
 pub fn characterization(found: &Characterization, format: ReportFormat) -> Result<String> {
-    match format {
-        ReportFormat::Yaml if found.evaluation.is_none() && found.trade_off.is_empty() => matrix(&found.matrix),
-        ReportFormat::Yaml => yaml_writer::document("the report", &Whole::of(found)),
-        ReportFormat::Json => {
-            serde_json::to_string_pretty(&Whole::of(found)).map(|text| text + "\n").map_err(unwritable)
-        }
-        ReportFormat::Csv => match &found.evaluation {
-            Some(evaluation) => samples_csv(evaluation),
-            None => trade_off_csv(&found.trade_off),
-        },
-        ReportFormat::Text => Ok(visible(&text(found)).into_owned()),
+    if format == ReportFormat::Yaml && found.evaluation.is_none() && found.trade_off.is_empty() {
+        return matrix(&found.matrix);
     }
+    let csv = || match &found.evaluation {
+        Some(evaluation) => samples_csv(evaluation),
+        None => trade_off_csv(&found.trade_off),
+    };
+    in_form(&Whole::of(found), format, csv, || text(found))
 }
 
 /// Writes a matrix file.
@@ -207,7 +202,7 @@ fn trade_off_csv(curve: &[TradeOff]) -> Result<String> {
     for point in curve {
         writer.serialize(point).map_err(unwritable)?;
     }
-    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+    finished(writer)
 }
 
 /// One row per sample.
@@ -267,7 +262,7 @@ fn samples_csv(evaluation: &Evaluation) -> Result<String> {
         }
         writer.write_record(&row).map_err(unwritable)?;
     }
-    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+    finished(writer)
 }
 
 fn text(found: &Characterization) -> String {

@@ -1,14 +1,12 @@
 //! Reports of matrices that were fitted to charts.
 
 use super::matrix_text::{differences_text, matrix_text};
-use super::{ReportFormat, table, unwritable};
+use super::{ReportFormat, finished, in_form, table, unwritable};
 use crate::analysis::characterization::CameraMatrix;
 use crate::analysis::chart::judgment::JudgedPatch;
 use crate::color::difference::DifferenceReport;
 use crate::error::Result;
-use crate::formats::yaml_writer;
 use crate::requests::fit::ChartFound;
-use crate::text::visible;
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -55,14 +53,7 @@ impl<'a> Whole<'a> {
 ///
 /// [`crate::error::Error::Data`] when the form cannot hold it.
 pub fn chart(found: &ChartFound, format: ReportFormat) -> Result<String> {
-    match format {
-        ReportFormat::Yaml => yaml_writer::document("the report", &Whole::of(found)),
-        ReportFormat::Json => {
-            serde_json::to_string_pretty(&Whole::of(found)).map(|text| text + "\n").map_err(unwritable)
-        }
-        ReportFormat::Csv => csv(&found.judgment.patches),
-        ReportFormat::Text => Ok(visible(&text(found)).into_owned()),
-    }
+    in_form(&Whole::of(found), format, || csv(&found.judgment.patches), || text(found))
 }
 
 fn csv(patches: &[JudgedPatch]) -> Result<String> {
@@ -78,7 +69,7 @@ fn csv(patches: &[JudgedPatch]) -> Result<String> {
         row.extend(maybe.map(|value| value.map_or(String::new(), |value| value.to_string())));
         writer.write_record(&row).map_err(unwritable)?;
     }
-    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+    finished(writer)
 }
 
 fn text(found: &ChartFound) -> String {

@@ -1,11 +1,9 @@
 //! Reports of color differences.
 
-use super::{ReportFormat, in_digits, table, unwritable};
+use super::{ReportFormat, finished, in_digits, in_form, table, unwritable};
 use crate::analysis::comparison::ComparisonReport;
 use crate::color::difference::DifferenceSummary;
 use crate::error::Result;
-use crate::formats::yaml_writer;
-use crate::text::visible;
 use std::fmt::Write;
 
 /// The numbers of a formula by their keys, with the headings of the table.
@@ -28,12 +26,7 @@ fn values(formula: &DifferenceSummary) -> [(&'static str, &'static str, f64); 8]
 ///
 /// [`crate::error::Error::Data`] when the form cannot hold it.
 pub fn difference(report: &ComparisonReport, format: ReportFormat) -> Result<String> {
-    match format {
-        ReportFormat::Json => serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable),
-        ReportFormat::Yaml => yaml_writer::document("the report", report),
-        ReportFormat::Csv => csv(report),
-        ReportFormat::Text => Ok(visible(&text(report)).into_owned()),
-    }
+    in_form(report, format, || csv(report), || text(report))
 }
 
 /// One row per formula.
@@ -50,7 +43,7 @@ fn csv(report: &ComparisonReport) -> Result<String> {
         let cells = [name.to_owned()].into_iter().chain(numbers).chain(counts).chain(white.clone());
         writer.write_record(cells).map_err(unwritable)?;
     }
-    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+    finished(writer)
 }
 
 fn text(report: &ComparisonReport) -> String {

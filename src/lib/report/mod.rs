@@ -79,6 +79,8 @@ impl Named for ReportFormat {
 /// [`Error::Usage`] for a name that ends like that of another form.
 pub fn form_of<F: Named>(asked: Option<F>, output: Option<&Path>) -> Result<Option<F>> {
     let ending = named(output).and_then(Path::extension).map(|ending| ending.to_string_lossy().to_lowercase());
+    // Of several frames JSON has a line each.
+    let ending = ending.map(|ending| if LINES.contains(&ending.as_str()) { "json".into() } else { ending });
     match ending.filter(|_| asked.is_none()) {
         None => Ok(asked),
         Some(ending) => match F::named(&ending) {
@@ -92,6 +94,9 @@ pub fn form_of<F: Named>(asked: Option<F>, output: Option<&Path>) -> Result<Opti
     }
 }
 
+/// What names of files of JSON lines end in.
+const LINES: [&str; 2] = ["jsonl", "ndjson"];
+
 /// What names of files end in that no report should be written to.
 const OF_OTHERS: [&str; 21] = [
     "json", "yaml", "yml", "csv", "tsv", "xls", "xlsx", "ods", "parquet", "html", "md", "tex", "pdf", "svg", "png",
@@ -102,18 +107,33 @@ fn unwritable(error: impl std::fmt::Display) -> Error {
     Error::Data(format!("the report cannot be written: {error}"))
 }
 
+/// A report in one of the forms that all have: by its keys, or as its own table or text.
+fn in_form(
+    report: &impl serde::Serialize,
+    format: ReportFormat,
+    csv: impl FnOnce() -> Result<String>,
+    text: impl FnOnce() -> String,
+) -> Result<String> {
+    match format {
+        ReportFormat::Json => serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable),
+        ReportFormat::Yaml => yaml_writer::document("the report", report),
+        ReportFormat::Csv => csv(),
+        ReportFormat::Text => Ok(visible(&text()).into_owned()),
+    }
+}
+
+/// The text of a table whose rows are all written.
+fn finished(writer: csv::Writer<Vec<u8>>) -> Result<String> {
+    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+}
+
 /// Writes statistics.
 ///
 /// # Errors
 ///
 /// [`Error::Data`] when the form cannot hold them.
 pub fn render(report: &Report, format: ReportFormat) -> Result<String> {
-    match format {
-        ReportFormat::Json => serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable),
-        ReportFormat::Yaml => yaml_writer::document("the report", report),
-        ReportFormat::Csv => csv(report),
-        ReportFormat::Text => Ok(visible(&text(report)).into_owned()),
-    }
+    in_form(report, format, || csv(report), || text(report))
 }
 
 /// Column headings of the text and CSV forms, with the number of significant digits of text.
@@ -194,8 +214,7 @@ fn csv(report: &Report) -> Result<String> {
             writer.write_record(cells).map_err(unwritable)?;
         }
     }
-    let bytes = writer.into_inner().map_err(unwritable)?;
-    String::from_utf8(bytes).map_err(unwritable)
+    finished(writer)
 }
 
 fn text(report: &Report) -> String {

@@ -1,10 +1,10 @@
 //! Statistics over frames as text, JSON, YAML and CSV.
 
-use super::{ReportFormat, UNIT_COLUMNS, shown, table, tests_text, unwritable, verdict_cells, verdict_text};
+use super::{
+    ReportFormat, UNIT_COLUMNS, finished, in_form, shown, table, tests_text, unwritable, verdict_cells, verdict_text,
+};
 use crate::analysis::statistics::{RepeatedChannel, RepeatedRegion, RepeatedReport};
 use crate::error::Result;
-use crate::formats::yaml_writer;
-use crate::text::visible;
 use std::fmt::Write;
 
 /// Columns of the CSV form and of text, with their headings.
@@ -56,12 +56,7 @@ fn values(channel: &RepeatedChannel) -> [Option<f64>; 17] {
 ///
 /// [`crate::error::Error::Data`] when the form cannot hold them.
 pub fn over_frames(report: &RepeatedReport, format: ReportFormat) -> Result<String> {
-    match format {
-        ReportFormat::Json => serde_json::to_string_pretty(report).map(|text| text + "\n").map_err(unwritable),
-        ReportFormat::Yaml => yaml_writer::document("the report", report),
-        ReportFormat::Csv => csv(report),
-        ReportFormat::Text => Ok(visible(&text(report)).into_owned()),
-    }
+    in_form(report, format, || csv(report), || text(report))
 }
 
 fn csv(report: &RepeatedReport) -> Result<String> {
@@ -85,7 +80,7 @@ fn csv(report: &RepeatedReport) -> Result<String> {
             writer.write_record(cells).map_err(unwritable)?;
         }
     }
-    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+    finished(writer)
 }
 
 fn text(report: &RepeatedReport) -> String {

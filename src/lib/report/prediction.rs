@@ -1,7 +1,7 @@
 //! Reports of noise budgets.
 
 use super::photon_transfer::photon_transfer;
-use super::{ReportFormat, form_of, shown, table, unwritable};
+use super::{ReportFormat, finished, form_of, shown, table, unwritable};
 use crate::camera::optics::Exposure;
 use crate::chain::{ChainPrediction, ChainStage, StagePrediction};
 use crate::error::Result;
@@ -115,10 +115,6 @@ pub fn prediction(found: &PredictedNoise, format: Option<ReportFormat>) -> Resul
     }
 }
 
-fn finish(writer: csv::Writer<Vec<u8>>) -> Result<String> {
-    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
-}
-
 fn cell(value: Option<f64>) -> String {
     value.map_or(String::new(), |value| value.to_string())
 }
@@ -146,7 +142,7 @@ fn stages_csv(found: &ChainPrediction) -> Result<String> {
             writer.write_record(words.into_iter().chain(numbers.map(cell)).chain(of_causes)).map_err(unwritable)?;
         }
     }
-    finish(writer)
+    finished(writer)
 }
 
 /// One row per scene, `lead` in front.
@@ -184,7 +180,7 @@ fn scenes_csv<'a>(
         let row = lead.into_iter().chain(signal).chain(cells).chain(delta_e.into_iter().flatten()).chain(own);
         writer.write_record(row).map_err(unwritable)?;
     }
-    finish(writer)
+    finished(writer)
 }
 
 /// XYZ of a spectrum itself, and how far those of the camera are off without noise.

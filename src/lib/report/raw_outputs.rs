@@ -119,13 +119,38 @@ fn read_out(reader: &FrameReader) -> Result<String> {
     let class = |index| profile.read_out(index, white - black);
     let classes: Option<Vec<ClassReadOut>> = (0..filters.len()).map(class).collect();
     let classes = classes.ok_or_else(|| refuse("its NoiseProfile has a class without shot noise"))?;
+    let sensor = Sensor {
+        schema: SENSOR_SCHEMA.into(),
+        name: format!("noise profile of {}", raw.name),
+        description: Some(DESCRIPTION.into()),
+        source: Some("NoiseProfile of the DNG: variance S x + O of x = (ADU - black) / (white - black)".into()),
+        provenance: std::collections::BTreeMap::new(),
+        readout: Some(mean_read_out(raw, cfa, [black, white], &classes)),
+        response: None,
+        xyz_from_camera: None,
+    };
+    sensor.check().map_err(|problem| refuse(&format!("its NoiseProfile tells no possible read-out: {problem}")))?;
+    let mut text = "# By class:\n".to_owned();
+    for ((index, filter), class) in filters.iter().enumerate().zip(&classes) {
+        let [slope, offset] = profile.lines[index.min(count - 1)];
+        let ClassReadOut { adu_per_e, noise_at_black_adu, noise_at_black_e, saturation_e } = class;
+        text += &format!(
+            "# {filter}: S {slope:e}, O {offset:e}: {adu_per_e:.6} ADU per e-, {noise_at_black_adu:.4} ADU or \
+             {noise_at_black_e:.4} e- at black, {saturation_e:.1} e- at white\n"
+        );
+    }
+    Ok(text + &yaml_writer::write("the read-out", &sensor)?)
+}
+
+/// The read-out of the mean class of a raw between black and white.
+fn mean_read_out(raw: &FrameHeader, cfa: FilterArray, [black, white]: [f64; 2], classes: &[ClassReadOut]) -> ReadOut {
     let mean_of = |f: fn(&ClassReadOut) -> f64| classes.iter().map(f).sum::<f64>() / classes.len() as f64;
     let adu_per_e = mean_of(|class| class.adu_per_e);
     // Rounding is not read noise.
     let noise_adu = (mean_of(|class| class.noise_at_black_adu.powi(2)) - 1.0 / 12.0).max(0.0).sqrt();
     let [width, height] =
         [raw.geometry.width, raw.geometry.height].map(|extent| u32::try_from(extent).unwrap_or(u32::MAX));
-    let readout = ReadOut {
+    ReadOut {
         setting: None,
         width,
         height,
@@ -153,28 +178,7 @@ fn read_out(reader: &FrameReader) -> Result<String> {
         bias_adu: black,
         adu_per_e,
         linearization: None,
-    };
-    let sensor = Sensor {
-        schema: SENSOR_SCHEMA.into(),
-        name: format!("noise profile of {}", raw.name),
-        description: Some(DESCRIPTION.into()),
-        source: Some("NoiseProfile of the DNG: variance S x + O of x = (ADU - black) / (white - black)".into()),
-        provenance: std::collections::BTreeMap::new(),
-        readout: Some(readout),
-        response: None,
-        xyz_from_camera: None,
-    };
-    sensor.check().map_err(|problem| refuse(&format!("its NoiseProfile tells no possible read-out: {problem}")))?;
-    let mut text = "# By class:\n".to_owned();
-    for ((index, filter), class) in filters.iter().enumerate().zip(&classes) {
-        let [slope, offset] = profile.lines[index.min(count - 1)];
-        let ClassReadOut { adu_per_e, noise_at_black_adu, noise_at_black_e, saturation_e } = class;
-        text += &format!(
-            "# {filter}: S {slope:e}, O {offset:e}: {adu_per_e:.6} ADU per e-, {noise_at_black_adu:.4} ADU or \
-             {noise_at_black_e:.4} e- at black, {saturation_e:.1} e- at white\n"
-        );
     }
-    Ok(text + &yaml_writer::write("the read-out", &sensor)?)
 }
 
 /// The largest black level, from which a DNG counts its range, and the white level.

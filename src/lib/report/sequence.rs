@@ -1,6 +1,6 @@
 //! Statistics of several frames, one after another.
 
-use super::{ReportFormat, render, unwritable};
+use super::{ReportFormat, finished, render, unwritable};
 use crate::analysis::statistics::{Laws, Report};
 use crate::error::{Error, Result};
 use crate::formats::places::in_stream;
@@ -109,7 +109,7 @@ fn rows(Subject { file, frame }: &Subject, table: &str, with_head: bool) -> Resu
             writer.write_record(row.iter().chain(more)).map_err(unwritable)?;
         }
     }
-    String::from_utf8(writer.into_inner().map_err(unwritable)?).map_err(unwritable)
+    finished(writer)
 }
 
 /// Reports of all frames of a run on their way out, and what the checks among them say.

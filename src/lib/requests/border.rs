@@ -44,37 +44,8 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
             "its metadata know no masked photosites (`masked_areas`); `import-raw --crop full` keeps those of a DNG that has any",
         ));
     }
-    let mut reader = FrameReader::open(options)?;
-    let Geometry { width, height, origin, .. } = frame.geometry.clone();
-    let [x0, y0] = origin.map(i64::from);
-    let mut sites: [Vec<f32>; 4] = Default::default();
-    // The whole border is one line.
-    let count = match border {
-        Border::Whole => 1,
-        Border::Rows => height,
-        Border::Columns => width,
-    };
-    let mut lines = vec![Vec::new(); count];
-    let mut samples = Vec::new();
-    for y in 0..height {
-        samples.clear();
-        reader.read(1, &mut samples)?;
-        for (x, sample) in samples[..width].iter().enumerate().filter(|(_, sample)| sample.is_finite()) {
-            let place = [x0 + x as i64, y0 + y as i64];
-            if areas.iter().any(|[left, top, wide, high]| {
-                (*left..left + wide).contains(&place[0]) && (*top..top + high).contains(&place[1])
-            }) {
-                let site = usize::from(place[1] & 1 != 0) * 2 + usize::from(place[0] & 1 != 0);
-                sites[site].push(*sample);
-                let line = match border {
-                    Border::Whole => 0,
-                    Border::Rows => y,
-                    Border::Columns => x,
-                };
-                lines[line].push((site, *sample));
-            }
-        }
-    }
+    let origin = frame.geometry.origin;
+    let Masked { sites, lines } = Masked::read(frame, &areas, options, border)?;
     if sites.iter().any(Vec::is_empty) {
         return Err(frame.refuse("not all of its 2x2 sites have masked photosites"));
     }
@@ -117,6 +88,51 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
         frame.name,
         counts.iter().sum::<usize>()
     )))
+}
+
+/// The samples of masked photosites.
+struct Masked {
+    /// Those of each of the 2×2 sites, row by row.
+    sites: [Vec<f32>; 4],
+    /// Those of each row, or column, with their site; the whole border is one line.
+    lines: Vec<Vec<(usize, f32)>>,
+}
+
+impl Masked {
+    /// Reads those of a frame within `areas`, left, top, width and height on the sensor.
+    fn read(frame: &FrameHeader, areas: &[[i64; 4]], options: &InputOptions, border: Border) -> Result<Self> {
+        let mut reader = FrameReader::open(options)?;
+        let Geometry { width, height, origin, .. } = frame.geometry.clone();
+        let [x0, y0] = origin.map(i64::from);
+        let mut sites: [Vec<f32>; 4] = Default::default();
+        let count = match border {
+            Border::Whole => 1,
+            Border::Rows => height,
+            Border::Columns => width,
+        };
+        let mut lines = vec![Vec::new(); count];
+        let mut samples = Vec::new();
+        for y in 0..height {
+            samples.clear();
+            reader.read(1, &mut samples)?;
+            for (x, sample) in samples[..width].iter().enumerate().filter(|(_, sample)| sample.is_finite()) {
+                let place = [x0 + x as i64, y0 + y as i64];
+                if areas.iter().any(|[left, top, wide, high]| {
+                    (*left..left + wide).contains(&place[0]) && (*top..top + high).contains(&place[1])
+                }) {
+                    let site = usize::from(place[1] & 1 != 0) * 2 + usize::from(place[0] & 1 != 0);
+                    sites[site].push(*sample);
+                    let line = match border {
+                        Border::Whole => 0,
+                        Border::Rows => y,
+                        Border::Columns => x,
+                    };
+                    lines[line].push((site, *sample));
+                }
+            }
+        }
+        Ok(Self { sites, lines })
+    }
 }
 
 /// What such a black level is uncertain by: samples scatter about the level of their site and what their line is off, which is

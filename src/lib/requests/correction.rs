@@ -16,7 +16,7 @@ use crate::metadata::{DefectsRecord, FlatRecord, FrameHeader};
 use crate::numerics::averages::{CLIP, Combine};
 use crate::stages::black::Black;
 use crate::stages::correct::{CorrectFrame, CorrectionSettings};
-use crate::stages::darks::{DarkFrames, DarkSettings};
+use crate::stages::darks::{DarkFrames, DarkLimits, DarkSettings};
 use crate::stages::defects::{DefectMap, beyond_chance, lost_beyond};
 use crate::stages::flats::FlatFrames;
 use crate::stages::masters::Averaging;
@@ -206,7 +206,7 @@ impl Correction {
     /// the frame.
     fn frames(&self, role: Role, light: &Light, company: &mut Company) -> Result<Vec<OneOfMany>> {
         let paths = match role {
-            Role::Light => return Ok(Vec::new()),
+            Role::Light | Role::Exposure => return Ok(Vec::new()),
             Role::Dark => &self.dark,
             Role::Bias => &self.bias,
             Role::Flat => &self.flat,
@@ -303,6 +303,7 @@ impl Correction {
         let beyond = self.find_defects.map(|given| given.unwrap_or_else(|| beyond_chance(samples)));
         let flats = self.flats(light, &mut company)?;
         let mut warnings = [stage.warnings(), &company.check()?].concat();
+        warnings.extend((!self.dark.is_empty()).then(|| doubt_of_dark(frame)).flatten());
         let dark_limits = match beyond.zip(self.darks(light, again).transpose()) {
             Some((beyond, darks)) => Some(darks?.survey(beyond)?),
             None => None,
@@ -320,32 +321,12 @@ impl Correction {
                 warnings.push(format!("{} photosites of the flats are saturated; they are marked", means.full));
             }
         }
-        if let Some([share, variance]) = beyond.map(lost_beyond).filter(|[_, variance]| *variance > LEAST_LOST) {
-            warnings.push(format!(
-                "limits of {} standard deviations mark ordinary photosites too, {:.2} % of them; up to {:.1} % of the variance of the frames they are found in goes with them, which no prediction knows",
-                beyond.unwrap_or_default(),
-                100.0 * share,
-                100.0 * variance
-            ));
-        }
+        warnings.extend(beyond.and_then(doubt_of_limits));
         let sources =
             darks.iter().flat_map(DarkFrames::frames).chain(flats.iter().flat_map(|(flats, _)| flats.frames()));
         let mut remarks: Vec<String> = sources.flat_map(|source| source.notes().to_vec()).collect();
         remarks.extend(darks.iter().flat_map(|darks| darks.stack().remarks().to_vec()));
-        let found_in = |is_there: bool, what: &str| is_there.then(|| what.to_owned());
-        let defects = (self.defects.is_some() || beyond.is_some()).then(|| DefectsRecord {
-            map: self.defects.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned()),
-            digest: self.defects.as_deref().and_then(digest_of),
-            found_beyond: beyond,
-            found_in: [
-                found_in(dark_limits.is_some(), "level of dark frames"),
-                found_in(dark_limits.as_ref().is_some_and(|limits| limits.tell_unstable()), "scatter of dark frames"),
-                found_in(beyond.is_some() && flats.is_some(), "flat field"),
-            ]
-            .into_iter()
-            .flatten()
-            .collect(),
-        });
+        let defects = self.defects_record(beyond, dark_limits.as_ref(), flats.is_some());
         let shares_masters = company.shares_darks().unwrap_or_else(|| {
             let problem =
                 "some of the dark frames come off both frame and flats: predictions take their noise for independent";
@@ -361,6 +342,55 @@ impl Correction {
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
         Ok(OpenCorrection { stage, corrections, notes })
     }
+
+    /// How defective photosites are told, where they are: by a list or map, and in frames, beyond so many standard deviations.
+    fn defects_record(
+        &self,
+        beyond: Option<f64>,
+        dark_limits: Option<&DarkLimits>,
+        has_flats: bool,
+    ) -> Option<DefectsRecord> {
+        let found_in = |is_there: bool, what: &str| is_there.then(|| what.to_owned());
+        let map = self.defects.as_deref();
+        (map.is_some() || beyond.is_some()).then(|| DefectsRecord {
+            map: map.and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned()),
+            digest: map.and_then(digest_of),
+            found_beyond: beyond,
+            found_in: [
+                found_in(dark_limits.is_some(), "level of dark frames"),
+                found_in(dark_limits.is_some_and(|limits| limits.tell_unstable()), "scatter of dark frames"),
+                found_in(beyond.is_some() && has_flats, "flat field"),
+            ]
+            .into_iter()
+            .flatten()
+            .collect(),
+        })
+    }
+}
+
+/// A warning of limits, in standard deviations, that mark so many ordinary photosites that variances fall short.
+fn doubt_of_limits(beyond: f64) -> Option<String> {
+    let [share, variance] = lost_beyond(beyond);
+    (variance > LEAST_LOST).then(|| {
+        format!(
+            "limits of {beyond} standard deviations mark ordinary photosites too, {:.2} % of them; up to {:.1} % of the variance \
+             of the frames they are found in goes with them, which no prediction knows",
+            100.0 * share,
+            100.0 * variance
+        )
+    })
+}
+
+/// A warning of a frame that dark frames come off and that is one itself: a shell gives `--dark` the first of several names.
+fn doubt_of_dark(frame: &FrameHeader) -> Option<String> {
+    let scene = frame.metadata.scene.as_ref()?;
+    (scene.expected_electrons == Some([0.0; 3])).then(|| {
+        format!(
+            "{}: no light fell on it: it is a dark frame itself; to take several names for --dark put them in quotes, \
+             --dark 'dark-*.exr'",
+            frame.name
+        )
+    })
 }
 
 /// A digest of a list or map of defects; none of one that cannot be read, which is told elsewhere.

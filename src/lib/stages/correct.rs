@@ -70,26 +70,12 @@ impl CorrectFrame {
             darks.check_dark()?;
             warnings = darks.warnings_beside(input);
         }
-        let known_cte = input.metadata.noise.as_ref().map(|noise| noise.cte.unwrap_or(1.0));
-        if let Some((undone, simulated)) = cte.zip(known_cte).filter(|(undone, simulated)| undone != simulated) {
-            let truth = match simulated {
-                1.0 => "its charge was not transferred".to_owned(),
-                efficiency => format!("its charge was transferred with an efficiency of {efficiency}"),
-            };
-            warnings.push(format!("{}: {truth}, as its metadata say; {undone} is undone all the same", input.name));
-        }
+        warnings.extend(cte.and_then(|undone| doubt_of_transfer(input, undone)));
         let known_black = input.black_levels()?;
         let levels = match black {
             Black::None if darks.is_none() && cte.is_none() && !is_more => {
-                return Err(Error::Usage("there is nothing to correct".into()).give(&[
-                    "black",
-                    "dark",
-                    "bias",
-                    "flat",
-                    "defects",
-                    "linearize",
-                    "cte",
-                ]));
+                let problem = Error::Usage("there is nothing to correct".into());
+                return Err(problem.give(&["black", "dark", "bias", "flat", "defects", "linearize", "cte"]));
             }
             Black::None => BlackLevels::uniform_at(0.0),
             _ if darks.is_some() => {
@@ -118,15 +104,7 @@ impl CorrectFrame {
         };
         note_levels(&mut metadata, input, off, is_subtracted)?;
         if let Some(cte) = cte {
-            if metadata.black_level_adu.is_some() && metadata.uniform_black_adu().is_none() {
-                return Err(input.refuse(
-                    "what is left of its black level differs among photosites, so that it is no charge; subtract it with \
-                     --black auto as transfer is undone",
-                ));
-            }
-            let restored = |level: f64| bias_adu + (level - bias_adu) / uniform_share(cte);
-            metadata.black_level_adu = metadata.black_level_adu.map(|level| level.map(restored));
-            metadata.white_level_adu = metadata.white_level_adu.map(|white| white.map(restored));
+            restore_levels(&mut metadata, input, cte, bias_adu)?;
         }
         if is_subtracted && darks.is_none() && levels.uniform() == Some(0.0) {
             metadata.leave_out("correct-frame", "subtraction of the black level", "it is zero");
@@ -159,6 +137,31 @@ impl CorrectFrame {
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
+}
+
+/// A warning of charge that was transferred with another efficiency than that which is undone.
+fn doubt_of_transfer(input: &FrameHeader, undone: f64) -> Option<String> {
+    let simulated = input.metadata.noise.as_ref()?.cte.unwrap_or(1.0);
+    let truth = match simulated {
+        1.0 => "its charge was not transferred".to_owned(),
+        efficiency => format!("its charge was transferred with an efficiency of {efficiency}"),
+    };
+    let name = &input.name;
+    (undone != simulated).then(|| format!("{name}: {truth}, as its metadata say; {undone} is undone all the same"))
+}
+
+/// Moves black and white level as undoing the transfer of charge above the bias moves them.
+fn restore_levels(metadata: &mut Metadata, input: &FrameHeader, cte: f64, bias_adu: f64) -> Result<()> {
+    if metadata.black_level_adu.is_some() && metadata.uniform_black_adu().is_none() {
+        return Err(input.refuse(
+            "what is left of its black level differs among photosites, so that it is no charge; subtract it with \
+             --black auto as transfer is undone",
+        ));
+    }
+    let restored = |level: f64| bias_adu + (level - bias_adu) / uniform_share(cte);
+    metadata.black_level_adu = metadata.black_level_adu.map(|level| level.map(restored));
+    metadata.white_level_adu = metadata.white_level_adu.map(|white| white.map(restored));
+    Ok(())
 }
 
 /// Notes what is left of black and white once `off`, where that is known, is subtracted; a frame of unknown black counts

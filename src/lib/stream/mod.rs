@@ -7,6 +7,7 @@ mod drive;
 mod fold;
 mod memory;
 mod outlet;
+mod passing;
 mod stage;
 #[cfg(test)]
 mod tests;
@@ -18,5 +19,6 @@ pub use drive::run;
 pub use fold::{fold, fold_into};
 pub use memory::MemoryFrame;
 pub use outlet::Outlet;
+pub use passing::Passing;
 pub use stage::{Footprint, RowSink, RowSource, Stage};
 pub use through::Through;

@@ -3,11 +3,13 @@
 //! Wavelengths are in nm, spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, areas in cm², charge in electrons, luminance in
 //! cd m⁻². Every conversion stands here; a bare power of ten elsewhere is a defect.
 
+mod heading;
 mod spectral;
 mod spelling;
 mod wavelength;
 
-pub use spectral::{OtherUnit, RadianceUnit, Stated, unit_of_heading, units_in};
+pub use heading::unit_of_heading;
+pub use spectral::{OtherUnit, RadianceUnit, Stated, units_in};
 pub use wavelength::WavelengthUnit;
 
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@ use super::assessment::Assessment;
 use super::check::Verdict;
 use super::laws::{Known, Laws};
 use super::levels::Levels;
-use super::portrait::{Portrait, Sitting};
+use super::portrait::{Portrait, sitting};
 use super::region::Region;
 use super::report::{RegionReport, Report, coverage};
 use super::tally::{Tally, tallies};
@@ -98,7 +98,7 @@ fn measure_all(
     }
     let mut portrait = is_drawn.then(|| Portrait::new(&frame, regions[0], prediction.as_ref().ok()));
     let tallies = match &mut portrait {
-        Some(portrait) => tallies(&mut Sitting::new(&mut watch, portrait), regions, &levels)?,
+        Some(portrait) => tallies(&mut sitting(&mut watch, portrait), regions, &levels)?,
         None => tallies(&mut watch, regions, &levels)?,
     };
     let (counts, left_out) = watch.seen();

@@ -27,7 +27,7 @@ use crate::numerics::running::Running;
 use crate::propagation::{Equations, FramePrediction, Repeated};
 use crate::stages::exposures::{Exposures, too_few};
 use crate::stages::saturation::with_mask;
-use crate::stream::{MemoryFrame, RowSource};
+use crate::stream::{MemoryFrame, Passing, RowSource};
 
 /// What is asked of frames.
 #[derive(Debug, Clone)]
@@ -104,7 +104,11 @@ impl OverFrames {
         };
         let levels = Levels::of(&frame)?;
         seen.pixels.begin();
-        let mut adding = Adding { source: &mut watch, pixels: &mut seen.pixels, at: 0 };
+        let (pixels, mut at) = (&mut seen.pixels, 0);
+        let mut adding = Passing::new(&mut watch, |samples| {
+            pixels.add(at, samples);
+            at += samples.len();
+        });
         let tallies = tallies(&mut adding, &seen.regions, &levels)?;
         for (of_region, tally) in seen.of_frames.iter_mut().zip(&tallies) {
             of_region.add(tally);
@@ -126,35 +130,6 @@ impl OverFrames {
             return too_few("statistics over frames are");
         };
         Ok((seen.report(&settings)?, seen.pixels_frame()))
-    }
-}
-
-/// Takes the rows that pass through into the statistics of pixels.
-struct Adding<'a> {
-    source: &'a mut dyn RowSource,
-    pixels: &'a mut Running,
-    at: usize,
-}
-
-impl RowSource for Adding<'_> {
-    fn header(&self) -> &FrameHeader {
-        self.source.header()
-    }
-
-    fn natural_rows(&self) -> usize {
-        self.source.natural_rows()
-    }
-
-    fn may_wait(&self) -> bool {
-        self.source.may_wait()
-    }
-
-    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
-        let start = samples.len();
-        self.source.read(rows, samples)?;
-        self.pixels.add(self.at, &samples[start..]);
-        self.at += samples.len() - start;
-        Ok(())
     }
 }
 

@@ -3,10 +3,9 @@
 
 use super::region::Region;
 use crate::cfa::{Class, FilterArray};
-use crate::error::Result;
 use crate::metadata::FrameHeader;
 use crate::propagation::{FramePrediction, PixelMoments, gains};
-use crate::stream::RowSource;
+use crate::stream::{Passing, RowSource};
 use crate::units::QuantityKind;
 use std::collections::{BTreeMap, VecDeque};
 
@@ -456,42 +455,17 @@ impl Profile {
 }
 
 /// A source whose rows a portrait is made of as they pass.
-pub(super) struct Sitting<'a> {
-    pub source: &'a mut dyn RowSource,
-    pub portrait: &'a mut Portrait,
-    row: usize,
-}
-
-impl<'a> Sitting<'a> {
-    pub fn new(source: &'a mut dyn RowSource, portrait: &'a mut Portrait) -> Self {
-        Self { source, portrait, row: 0 }
-    }
-}
-
-impl RowSource for Sitting<'_> {
-    fn header(&self) -> &FrameHeader {
-        self.source.header()
-    }
-
-    fn natural_rows(&self) -> usize {
-        self.source.natural_rows()
-    }
-
-    fn may_wait(&self) -> bool {
-        self.source.may_wait()
-    }
-
-    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
-        let start = samples.len();
-        self.source.read(rows, samples)?;
-        let row_samples = self.source.header().geometry.row_samples();
-        for row in samples[start..].chunks_exact(row_samples) {
-            self.portrait.add_row(self.row, row);
-            self.row += 1;
+pub(super) fn sitting<'a>(source: &'a mut dyn RowSource, portrait: &'a mut Portrait) -> impl RowSource {
+    let geometry = &source.header().geometry;
+    let (row_samples, height) = (geometry.row_samples(), geometry.height);
+    let mut y = 0;
+    Passing::new(source, move |samples| {
+        for row in samples.chunks_exact(row_samples) {
+            portrait.add_row(y, row);
+            y += 1;
         }
-        if self.row == self.source.header().geometry.height {
-            self.portrait.finish();
+        if y == height {
+            portrait.finish();
         }
-        Ok(())
-    }
+    })
 }

@@ -446,6 +446,7 @@ fn exposure_and_metadata_of_ours_are_found() {
 }
 
 #[test]
+#[allow(clippy::too_many_lines, reason = "a table of cases")]
 fn what_cannot_be_read_is_refused_by_name() {
     let image = Image::new(8, 6, 12).strips(&samples(48, 12, 1), 6, Image::plain);
     let jpeg = |stream: Vec<u8>| Image { chunks: vec![stream], ..image.clone().with(259, SHORT, &[7.0]) };

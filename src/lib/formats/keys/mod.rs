@@ -139,6 +139,7 @@ mod tests {
                 ("adc.", field_names::<AdcRecord>()),
                 ("adc.linearization.", field_names::<Linearization>()),
                 ("average.", field_names::<ExposuresRecord>()),
+                ("averaged.", field_names::<DrawnExposures>()),
                 ("correction.", field_names::<CorrectionRecord>()),
                 ("correction.masters.", field_names::<MasterRecord>()),
                 ("correction.masters.average.", field_names::<AverageRecord>()),

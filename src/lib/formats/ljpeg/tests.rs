@@ -48,6 +48,7 @@ fn codes(long: bool) -> (Vec<(u32, u32)>, Vec<u8>) {
 }
 
 /// Encodes rows of samples, those of all components in turns.
+#[allow(clippy::too_many_lines, reason = "a file, segment after segment")]
 pub fn encode(samples: &[u16], row: usize, with: &Encoding) -> Vec<u8> {
     let Encoding { precision, components, predictor, point_transform, restart_rows, long_codes } = *with;
     let (width, height) = (row / components, samples.len() / row);

@@ -39,74 +39,78 @@ impl Shade {
     ///
     /// [`Error::Usage`] for a range that shows nothing; [`Error::Format`] for quantities that are no picture.
     pub fn new(frame: &FrameHeader, range: Range, reduced: &Reduced) -> Result<Self> {
-        let metadata = &frame.metadata;
         let planes = 0..reduced.planes;
         let none = || frame.refuse("none of its pixels has a number that is finite; there is nothing to show");
-        let extremes = || {
-            planes
-                .clone()
-                .map(|plane| reduced.moments(plane))
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], plane| {
-                    [low.min(plane.min[0]), high.max(plane.max[0])]
-                })
-        };
-        let (low, high) = match range {
-            Range::Values(low, high) => (low, high),
+        match range {
+            Range::Values(low, high) => Self::planes(frame, vec![(low, high); reduced.planes]),
             Range::Deviations(count) => {
                 let about = |plane| {
                     let moments = reduced.moments(plane);
                     let spread = count * moments.std(0).unwrap_or(0.0);
                     (moments.mean[0] - spread, moments.mean[0] + spread)
                 };
-                return Self::planes(frame, planes.map(about).collect());
+                Self::planes(frame, planes.map(about).collect())
             }
             Range::Shares(low, high) => {
                 let between = |plane| reduced.quantiles(plane, [low, high]).map(|[low, high]| (low, high));
-                return Self::planes(frame, planes.map(between).collect::<Option<_>>().ok_or_else(none)?);
+                Self::planes(frame, planes.map(between).collect::<Option<_>>().ok_or_else(none)?)
             }
-            Range::Full => {
-                match metadata.quantity {
-                    QuantityKind::Srgb => return Ok(Self::Encoded),
-                    QuantityKind::Xyz if reduced.planes != 3 => {
-                        return Err(frame
-                            .refuse("a single plane of XYZ is no picture; give --range LOW,HIGH, or --false-color"));
-                    }
-                    QuantityKind::Xyz => {
-                        let white = metadata.color.as_ref().and_then(|color| color.white);
-                        let white = white.ok_or_else(|| {
-                            frame.refuse(
-                                "the metadata name no white; give --range LOW,HIGH, or make it anew with `to-xyz \
-                             --white-luminance CD_PER_M2`",
-                            )
-                        })?;
-                        return Ok(Self::Xyz(linear_srgb_from_xyz(white)));
-                    }
-                    QuantityKind::ExpectedElectrons | QuantityKind::Electrons => {
-                        let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
-                        let full = readout.map_or_else(|| extremes()[1], |readout| readout.full_well_e);
-                        (metadata.dark_signal_e.unwrap_or(0.0), full)
-                    }
-                    QuantityKind::Adu => {
-                        let black = frame.black_levels()?.map_or(0.0, |black| black.smallest());
-                        let white = metadata.white_level_adu.unwrap_or_else(|| extremes()[1].into());
-                        if reduced.planes == 3 {
-                            return Self::planes(frame, white.classes().map(|white| (black, white)).to_vec());
-                        }
-                        (black, white.largest())
-                    }
-                    QuantityKind::LinearSrgb => (0.0, 1.0),
-                    QuantityKind::Unspecified => {
-                        let [lowest, highest] = extremes();
-                        (lowest.min(0.0), highest)
-                    }
-                    other => {
-                        return Err(frame
-                        .refuse(format!("{other} is no picture; give --range LOW,HIGH, or show one plane with --plane and --false-color")));
-                    }
+            Range::Full => Self::full(frame, reduced),
+        }
+    }
+
+    /// From what no light reads to the most that the stage can hold.
+    fn full(frame: &FrameHeader, reduced: &Reduced) -> Result<Self> {
+        let metadata = &frame.metadata;
+        let extremes = || {
+            (0..reduced.planes)
+                .map(|plane| reduced.moments(plane))
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], plane| {
+                    [low.min(plane.min[0]), high.max(plane.max[0])]
+                })
+        };
+        let ends = match metadata.quantity {
+            QuantityKind::Srgb => return Ok(Self::Encoded),
+            QuantityKind::Xyz if reduced.planes != 3 => {
+                return Err(
+                    frame.refuse("a single plane of XYZ is no picture; give --range LOW,HIGH, or --false-color")
+                );
+            }
+            QuantityKind::Xyz => {
+                let white = metadata.color.as_ref().and_then(|color| color.white);
+                let white = white.ok_or_else(|| {
+                    frame.refuse(
+                        "the metadata name no white; give --range LOW,HIGH, or make it anew with `to-xyz \
+                         --white-luminance CD_PER_M2`",
+                    )
+                })?;
+                return Ok(Self::Xyz(linear_srgb_from_xyz(white)));
+            }
+            QuantityKind::ExpectedElectrons | QuantityKind::Electrons => {
+                let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+                let full = readout.map_or_else(|| extremes()[1], |readout| readout.full_well_e);
+                (metadata.dark_signal_e.unwrap_or(0.0), full)
+            }
+            QuantityKind::Adu => {
+                let black = frame.black_levels()?.map_or(0.0, |black| black.smallest());
+                let white = metadata.white_level_adu.unwrap_or_else(|| extremes()[1].into());
+                if reduced.planes == 3 {
+                    return Self::planes(frame, white.classes().map(|white| (black, white)).to_vec());
                 }
+                (black, white.largest())
+            }
+            QuantityKind::LinearSrgb => (0.0, 1.0),
+            QuantityKind::Unspecified => {
+                let [lowest, highest] = extremes();
+                (lowest.min(0.0), highest)
+            }
+            other => {
+                return Err(frame.refuse(format!(
+                    "{other} is no picture; give --range LOW,HIGH, or show one plane with --plane and --false-color"
+                )));
             }
         };
-        Self::planes(frame, vec![(low, high); reduced.planes])
+        Self::planes(frame, vec![ends; reduced.planes])
     }
 
     fn planes(frame: &FrameHeader, ranges: Vec<(f64, f64)>) -> Result<Self> {

@@ -174,10 +174,7 @@ impl<W: Write + Seek> TiffWriter<W> {
         self.write_rest()?;
         let mut fields = self.fields();
         fields.extend(self.put_exif(&self.settings.exif.clone())?);
-        fields.sort_by_key(|field| field.tag.to_u16());
-        let directory = self.put_directory(fields)?;
-        self.begin_with(directory)?;
-        Ok((self.output, self.unfit))
+        self.end_with(fields)
     }
 
     /// Writes what is left, with a small picture before it: the file begins with the directory of `first`, below which the
@@ -197,6 +194,11 @@ impl<W: Write + Seek> TiffWriter<W> {
         fields.extend(self.put_exif(&first.exif)?);
         fields.push(self.offsets(Tag::StripOffsets, std::iter::once(pixels)));
         fields.push(self.offsets(Tag::SubIfd, std::iter::once(below)));
+        self.end_with(fields)
+    }
+
+    /// Writes the directory with which the file begins, and is done.
+    fn end_with(mut self, mut fields: Vec<Field>) -> Result<(W, u64)> {
         fields.sort_by_key(|field| field.tag.to_u16());
         let directory = self.put_directory(fields)?;
         self.begin_with(directory)?;

@@ -74,26 +74,8 @@ impl Demosaic {
     /// [`Error::Format`](crate::error::Error::Format) below 2×2, for arrays that are no Bayer pattern, and where what is
     /// left of the black level differs among photosites.
     pub fn new(input: &FrameHeader, method: Method, black: Black, pattern: Option<CfaPattern>) -> Result<Self> {
+        check_plane(input)?;
         let metadata = &input.metadata;
-        let holds = input.holds();
-        if metadata.demosaic.is_some() {
-            return Err(input.refuse(format!("it holds {holds}; demosaicking is done once")));
-        }
-        if input.geometry.channels.len() != 1 {
-            let hint = match metadata.quantity {
-                QuantityKind::Unspecified => {
-                    " (where one of its channels is such a plane, take that alone, for example with `--channel R`)"
-                }
-                _ => "",
-            };
-            return Err(input.out_of_order(format!("it holds {holds}, not a CFA plane{hint}"), "mosaic"));
-        }
-        let (width, height) = (input.geometry.width, input.geometry.height);
-        if width < 2 || height < 2 {
-            return Err(input.refuse(format!(
-                "a CFA plane of {width}x{height} lacks whole classes; demosaicking needs at least 2x2"
-            )));
-        }
         let cfa = match pattern {
             Some(pattern) => pattern,
             None => input.bayer("demosaicked")?.ok_or_else(|| input.missing("cfa"))?,
@@ -242,6 +224,29 @@ impl Demosaic {
             }
         }
     }
+}
+
+/// Makes sure that a frame is one plane of photosites that has every class.
+fn check_plane(input: &FrameHeader) -> Result<()> {
+    let holds = input.holds();
+    if input.metadata.demosaic.is_some() {
+        return Err(input.refuse(format!("it holds {holds}; demosaicking is done once")));
+    }
+    if input.geometry.channels.len() != 1 {
+        let hint = match input.metadata.quantity {
+            QuantityKind::Unspecified => {
+                " (where one of its channels is such a plane, take that alone, for example with `--channel R`)"
+            }
+            _ => "",
+        };
+        return Err(input.out_of_order(format!("it holds {holds}, not a CFA plane{hint}"), "mosaic"));
+    }
+    let (width, height) = (input.geometry.width, input.geometry.height);
+    if width < 2 || height < 2 {
+        return Err(input
+            .refuse(format!("a CFA plane of {width}x{height} lacks whole classes; demosaicking needs at least 2x2")));
+    }
+    Ok(())
 }
 
 impl Stage for Demosaic {

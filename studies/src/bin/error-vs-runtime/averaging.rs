@@ -33,6 +33,7 @@ struct Mean {
     time: f64,
 }
 
+#[allow(clippy::too_many_lines, reason = "a study, told from top to bottom")]
 pub fn study(study: &Study) -> Result<Section> {
     let (size, frames) = if study.quick { ([96, 64], 8_usize) } else { ([384, 256], 64) };
     let pixels = size[0] * size[1];

@@ -30,6 +30,7 @@ struct Scene {
     truth: MemoryFrame,
 }
 
+#[allow(clippy::too_many_lines, reason = "a study, told from top to bottom")]
 pub fn study(study: &Study) -> Result<Section> {
     let size = if study.quick { [192, 128] } else { [768, 512] };
     let mut scenes = vec![

@@ -29,6 +29,7 @@ struct Way {
     time: f64,
 }
 
+#[allow(clippy::too_many_lines, reason = "a study, told from top to bottom")]
 pub fn study(study: &Study) -> Result<Section> {
     let size = if study.quick { [400, 300] } else { [2400, 1600] };
     // The huge simulation: one exposure of each level, through every method.

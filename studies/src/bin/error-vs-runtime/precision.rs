@@ -109,6 +109,7 @@ fn plain<T: Real>(electrons: &[f32], [width, height]: [usize; 2], constants: &Co
     xyz
 }
 
+#[allow(clippy::too_many_lines, reason = "a study, told from top to bottom")]
 pub fn study(study: &Study) -> Result<Section> {
     let size = if study.quick { [128, 96] } else { [640, 480] };
     let electrons = exposed(&study.sky_with_gradient(size), study.seed(6), study.seed(6))?;

@@ -37,6 +37,7 @@ fn power(value: usize) -> String {
     if value == 10_usize.pow(magnitude) { power_of_ten(magnitude.cast_signed()) } else { value.to_string() }
 }
 
+#[allow(clippy::too_many_lines, reason = "a study, told from top to bottom")]
 pub fn study(study: &Study) -> Result<Section> {
     let sizes: &[(usize, usize)] = if study.quick {
         &[(100, 20), (1000, 20), (10_000, 10), (100_000, 3)]

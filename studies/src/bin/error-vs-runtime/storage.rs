@@ -40,6 +40,7 @@ struct Way {
 
 const GROUPS: [&str; 4] = ["EXR, f32", "EXR, f16", "TIFF, f32", "TIFF, u16"];
 
+#[allow(clippy::too_many_lines, reason = "a study, told from top to bottom")]
 pub fn study(study: &Study) -> Result<Section> {
     let size = if study.quick { [160, 120] } else { [640, 480] };
     let directory = tempfile::tempdir().map_err(|e| Error::disk("a temporary directory", "make", e))?;

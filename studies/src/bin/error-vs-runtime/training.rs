@@ -57,6 +57,7 @@ fn figure(found: &[Training], total: usize) -> Plot {
     plot
 }
 
+#[allow(clippy::too_many_lines, reason = "a study, told from top to bottom")]
 pub fn study(study: &Study) -> Result<Section> {
     let camera = &study.camera;
     let total = camera.skies.library.radiance.nrows();

@@ -80,6 +80,7 @@ struct Setting {
     time: f64,
 }
 
+#[allow(clippy::too_many_lines, reason = "a study, told from top to bottom")]
 pub fn study(study: &Study) -> Result<Section> {
     let camera = &study.camera;
     let every = if study.quick { 40 } else { 1 };

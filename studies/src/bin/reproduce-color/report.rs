@@ -172,6 +172,7 @@ fn lightness(skies: &[SampleEvaluation]) -> Distribution {
     Distribution::of(skies.iter().map(|sky| sky.xyz[1] / sky.white[1]))
 }
 
+#[allow(clippy::too_many_lines, reason = "a page, written from top to bottom")]
 pub fn markdown(results: &Results) -> Result<String> {
     let mut out = String::new();
     let studio = &results.studio;

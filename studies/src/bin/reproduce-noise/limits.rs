@@ -107,6 +107,7 @@ fn of_one(moments: &Moments, channel: usize) -> (f64, f64) {
     (variance(moments, channel), moments.count as f64)
 }
 
+#[allow(clippy::too_many_lines, reason = "a table of cases")]
 fn cases(camera: &Camera) -> Vec<Case<'_>> {
     let exact = |level: f64| Sites::of(camera, [level; 3], Equations::Exact);
     let electrons =

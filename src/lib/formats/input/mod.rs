@@ -1,64 +1,33 @@
 //! Opens frames of any format, from files and pipes, with the metadata that belongs to them.
 
+mod kept;
+mod metadata;
+mod opening;
+mod options;
+
+pub use options::{InputOptions, Linearizing};
+
+use self::kept::{LEFT_OUT, cut, keep_planes, left_out, take_channel};
+use self::metadata::{Found, doubt_of_marks, find_metadata, take_scaling};
+use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
 use super::digest::SamplesDigest;
 use super::dng::{DngReader, RawArea};
-use super::files::{STDIN_NAME, named, open_named, read_file, sidecar_path, spool};
-use super::format::{
-    ColorTags, HEAD_BYTES, Opened, Readers, Rest, SampleReader, SampleType, Streaming, U16_FULL_SCALE,
-};
+use super::files::{named, open_named, spool};
+use super::format::{ColorTags, Rest, SampleReader, SampleType, U16_FULL_SCALE};
 use super::makers::{MakersReader, Worker};
-use super::places::in_stream;
-use super::read_ahead::Pipe;
 use super::sequence::Sequence;
-use super::viewable::{Scaling, is_scale};
-use super::{headerless, pipe, register, table, tiff, yaml};
-use crate::analysis::statistics::Region;
+use super::viewable::Scaling;
+use super::{headerless, register, table, tiff};
 use crate::camera::noise_profile::NoiseProfile;
-use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
-use crate::frame::{Geometry, THREE_PLANES};
-use crate::metadata::{FrameHeader, Metadata};
+use crate::metadata::FrameHeader;
 use crate::stages::linearize::Linearize;
-use crate::stages::saturation::{MASK_BITS, MASK_LAYER, bits, samples_tell, with_mask};
+use crate::stages::saturation::{MASK_BITS, MASK_LAYER, bits, with_mask};
 use crate::stream::RowSource;
-use crate::text::counted;
 use crate::units::QuantityKind;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
-
-/// What to open.
-#[derive(Debug, Clone, Default)]
-pub struct InputOptions {
-    /// The file; none or `-` for the standard input.
-    pub path: Option<PathBuf>,
-    /// The frames that the next is taken of, instead of a file that holds one.
-    pub sequence: Option<Sequence>,
-    /// Part of a multi-part EXR, page of a TIFF, HDU of a FITS.
-    pub part: usize,
-    /// How the samples lie in a file without a header; none where the file says what it is.
-    pub raw: Option<headerless::Layout>,
-    /// A file whose metadata count before all others.
-    pub metadata: Option<PathBuf>,
-    /// Whether channels besides R, G, B or Y are kept.
-    pub all_channels: bool,
-    /// The channel that is taken alone, as a single plane; none for those of the frame.
-    pub channel: Option<String>,
-    /// The rectangle that is taken alone; none for all of the frame. Its photosites keep their places on the sensor.
-    pub crop: Option<Region>,
-    /// Whether codes are made proportional to charge, by the linearization of their sensor.
-    pub linearize: Linearizing,
-}
-
-/// Whether codes are made proportional to charge as they are read.
-#[derive(Debug, Clone, Default)]
-pub enum Linearizing {
-    /// They stay as they are.
-    #[default]
-    No,
-    /// By the sensor of the metadata, or this one where they name none.
-    As(Option<Box<Sensor>>),
-}
+use std::io::{Seek, SeekFrom};
+use std::path::Path;
 
 /// A frame that is being read.
 ///
@@ -216,7 +185,8 @@ impl FrameReader {
     /// Those of its metadata; [`Error::Usage`] where it has not the channel or the rectangle that is wanted.
     pub fn of(reader: Box<dyn SampleReader>, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
-        let Found { mut metadata, sidecar, is_embedded } = find_metadata(reader.as_ref(), name, path, options)?;
+        let Found { mut metadata, sidecar, is_embedded } =
+            find_metadata(reader.as_ref(), name, path, options.metadata.as_deref())?;
         let stored = reader.geometry();
         let to_come = metadata.frames_to_come.take().unwrap_or_default();
         let scaling = take_scaling(reader.as_ref(), &mut metadata, is_embedded, name)?;
@@ -232,7 +202,7 @@ impl FrameReader {
         let is_ours = !metadata.history.is_empty();
         let mask = left_out.iter().position(|channel| channel == MASK_LAYER).map(|at| geometry.channels.len() + at);
         let mask = mask.filter(|_| is_ours);
-        notes.extend(self::left_out(name, left_out));
+        notes.extend(kept::left_out(name, left_out));
         let check = metadata.samples.as_ref().zip(sidecar).map(|(samples, sidecar)| DigestCheck {
             digest: SamplesDigest::like(&samples.digest),
             expected: samples.digest.clone(),
@@ -240,6 +210,10 @@ impl FrameReader {
         });
         let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
+        if let Some(file) = &metadata.file {
+            // The first program of the pipe reads it.
+            register::note_inputs([Path::new(file)])?;
+        }
         let mut header = FrameHeader { name: name.into(), geometry, metadata };
         doubt_of_marks(&header, stored);
         let corner = options.crop.map_or(Ok([0, 0]), |crop| cut(&mut header, crop))?;
@@ -504,242 +478,15 @@ impl RowSource for FrameReader {
     }
 }
 
-/// A warning that pixels were made of saturated samples, where neither their level nor a layer tells which: TIFF has none.
-fn doubt_of_marks(header: &FrameHeader, stored: &Geometry) {
-    let is_told = samples_tell(header) || stored.channels.iter().any(|channel| channel == MASK_LAYER);
-    let saturated = header.metadata.samples.as_ref().and_then(|samples| samples.saturated);
-    if let Some(count) = saturated.filter(|count| *count > 0 && !is_told) {
-        register::doubt(format!(
-            "{}: {count} of its pixels were made of saturated samples, by its sidecar, and nothing marks which; EXR would",
-            header.name
-        ));
-    }
-}
-
-/// How the note of channels that no stage sees ends.
-const LEFT_OUT: &str = " are left out";
-
-/// That note; none where there are no such channels but marks.
-fn left_out(name: &str, channels: &[String]) -> Option<String> {
-    let dropped: Vec<&str> = channels.iter().map(String::as_str).filter(|channel| *channel != MASK_LAYER).collect();
-    (!dropped.is_empty()).then(|| format!("{name}: channels {}{LEFT_OUT}", dropped.join(", ")))
-}
-
-/// Whether an open file is one that can seek, and no pipe.
-fn is_file(input: &File, name: &str) -> Result<bool> {
-    Ok(input.metadata().map_err(|e| Error::disk(name, "read", e))?.is_file())
-}
-
-/// Opens a file that can seek with the reader of its format.
-fn open_seekable(mut input: File, name: &str, part: usize) -> Opened {
-    let failed = |e| Error::disk(name, "read", e);
-    let start = input.stream_position().map_err(failed)?;
-    let head = head_of(&mut input, name)?;
-    let readers = readers_of(&head, name)?;
-    input.seek(SeekFrom::Start(start)).map_err(failed)?;
-    open_whole(readers, &head, input, name, part)
-}
-
-/// Opens a stream.
-fn open_unseekable(input: File, name: &str, part: usize) -> Opened {
-    pipe::enlarge(&input);
-    open_piped(Pipe::of(input), name, part)
-}
-
-/// Opens a stream with the reader of its format. One that cannot be read without seeking is first copied to a temporary
-/// file.
-fn open_piped(mut input: Pipe, name: &str, part: usize) -> Opened {
-    let head = input.head(HEAD_BYTES).map_err(|e| Error::disk(name, "read", e))?.to_vec();
-    check_begun(&head, name)?;
-    let readers = readers_of(&head, name)?;
-    let is_streamed = |stream: &Streaming| (stream.is_streamable)(&head) && !(stream.has_parts && part != 0);
-    if let Some(stream) = readers.stream.filter(is_streamed) {
-        if part != 0 {
-            return Err(Error::Usage(format!("{name}: it has no part {part}; it has a single one")));
-        }
-        return (stream.open)(input, name);
-    }
-    let spooled = spool(&mut input, name)?;
-    open_whole(readers, &head, spooled, name, part)
-}
-
-/// Opens a file that begins with `head` with these readers, or, where its tags call for them, with others.
-fn open_whole(readers: Readers, head: &[u8], input: File, name: &str, part: usize) -> Opened {
-    let narrower = if tiff::begins_so(head) { table::by_tags(&input, name)? } else { None };
-    (narrower.unwrap_or(readers).open)(input, name, part)
-}
-
-/// The first bytes, by which most formats are known.
-fn head_of(input: &mut File, name: &str) -> Result<Vec<u8>> {
-    let mut head = Vec::new();
-    input.take(HEAD_BYTES as u64).read_to_end(&mut head).map_err(|e| Error::disk(name, "read", e))?;
-    check_begun(&head, name)?;
-    Ok(head)
-}
-
-/// Makes sure that something comes.
-fn check_begun(head: &[u8], name: &str) -> Result<()> {
-    if !head.is_empty() {
-        return Ok(());
-    }
-    if name == STDIN_NAME && pipe::has_failed() {
-        return Err(Error::Upstream);
-    }
-    let hint = if name == STDIN_NAME { "; the program before it wrote nothing" } else { "" };
-    Err(Error::format(name, format!("it is empty{hint}")))
-}
-
-/// An error in reading a stream, which is not worth telling where the program before has failed in the midst of a frame.
-fn of_upstream(error: Error, name: &str) -> Error {
-    let is_told = matches!(error, Error::Format { .. }) && in_stream(name) == STDIN_NAME && pipe::has_failed();
-    if is_told { Error::Upstream } else { error }
-}
-
-/// The readers of what a file begins as.
-fn readers_of(head: &[u8], name: &str) -> Result<Readers> {
-    table::by_head(head, name)?.ok_or_else(|| {
-        let hint = if head.len() < 8 {
-            format!("; it has {} and no more", counted(head.len() as u64, "bytes"))
-        } else if is_text(head) {
-            "; it looks like text (a spectrum goes into `render-radiance`)".into()
-        } else {
-            String::new()
-        };
-        Error::format(name, format!("it is neither {} file{hint}", table::names_of_read()))
-    })
-}
-
-/// Whether bytes are the beginning of a text, the last character perhaps cut off.
-fn is_text(head: &[u8]) -> bool {
-    let whole = match std::str::from_utf8(head) {
-        Ok(text) => text,
-        Err(cut) if cut.error_len().is_none() => std::str::from_utf8(&head[..cut.valid_up_to()]).unwrap_or_default(),
-        Err(_) => return false,
-    };
-    whole.chars().all(|character| !character.is_control() || character.is_whitespace())
-}
-
-/// The metadata of a frame, and where they were found.
-struct Found {
-    metadata: Metadata,
-    /// What describes the samples, as messages call it: the sidecar, or what the frame itself holds.
-    sidecar: Option<String>,
-    /// Whether they are those that the file itself holds.
-    is_embedded: bool,
-}
-
-/// The metadata in order of trust: `--metadata`, sidecar, embedded, the format's own tags.
-fn find_metadata(reader: &dyn SampleReader, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Found> {
-    path.map_or(Ok(()), register::note_sidecar)?;
-    let beside = |metadata, sidecar| Found { metadata, sidecar, is_embedded: false };
-    let from_file = |path: &Path| -> Result<Metadata> {
-        let shown = path.display().to_string();
-        let bytes = read_file(path)?;
-        let text = String::from_utf8(bytes).map_err(|_| Error::format(&shown, "it is not UTF-8 text"))?;
-        yaml::parse_metadata(&shown, &text)
-    };
-    if let Some(path) = &options.metadata {
-        let metadata = from_file(path)?;
-        let shown = path.display().to_string();
-        yaml::check_misspelt(&shown, &metadata)?;
-        doubt_of_metadata(&shown, metadata.contradictions());
-        return Ok(beside(metadata, None));
-    }
-    if let Some(sidecar) = path.map(sidecar_path).filter(|sidecar| sidecar.is_file()) {
-        let (metadata, shown) = (from_file(&sidecar)?, sidecar.display().to_string());
-        // Another version may have written it: what is unknown is kept.
-        doubt_of_metadata(&shown, yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()));
-        return Ok(beside(metadata, Some(shown)));
-    }
-    if let Some(text) = reader.embedded() {
-        let describes = reader.describes_samples().then(|| "its metadata".to_owned());
-        return Ok(Found { metadata: yaml::parse_metadata(name, text)?, sidecar: describes, is_embedded: true });
-    }
-    Ok(beside(reader.own_tags().clone(), None))
-}
-
-/// Warnings of what a file of metadata says.
-fn doubt_of_metadata(name: &str, problems: impl IntoIterator<Item = String>) {
-    problems.into_iter().for_each(|problem| register::doubt(format!("{name}: {problem}")));
-}
-
-/// What stored samples were multiplied with, which the metadata no longer say then. What the file itself says of it counts:
-/// metadata beside it may have been made for another.
-///
-/// # Errors
-///
-/// [`Error::Format`] for what is no power of two.
-fn take_scaling(
-    reader: &dyn SampleReader,
-    metadata: &mut Metadata,
-    is_embedded: bool,
-    name: &str,
-) -> Result<Option<Scaling>> {
-    let found = metadata.sample_scale.take();
-    let embedded = reader.embedded().filter(|_| !is_embedded).and_then(|text| yaml::parse_metadata(name, text).ok());
-    let scale = embedded.map_or(found, |embedded| embedded.sample_scale).unwrap_or(1.0);
-    if !is_scale(scale) {
-        let problem = format!("its `sample_scale`, {scale}, is no power of two, as 0.25 and 16 are");
-        return Err(Error::format(name, problem));
-    }
-    Ok(Scaling::of(reader.geometry().width, &reader.geometry().channels, scale))
-}
-
-/// One channel alone, as the plane Y, and its place among those that are stored.
-///
-/// # Errors
-///
-/// [`Error::Usage`] where there is no such channel.
-fn take_channel(stored: &Geometry, channel: &str, name: &str) -> Result<(usize, Geometry)> {
-    let Some(place) = stored.channels.iter().position(|known| known == channel) else {
-        let mut some = stored.channels.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
-        if stored.channels.len() > 8 {
-            some += ", …";
-        }
-        let problem = format!("{name}: there is no channel `{channel}`; it has {some}");
-        return Err(Error::Usage(problem).change(&["channel"]));
-    };
-    Ok((place, stored.with_channels(&["Y"])))
-}
-
-/// Cuts a frame down to a rectangle, and gives the column and row that come first.
-///
-/// # Errors
-///
-/// [`Error::Usage`] where it does not lie within the frame.
-fn cut(header: &mut FrameHeader, crop: Region) -> Result<[usize; 2]> {
-    crop.check(header).map_err(|error| error.change(&["crop"]))?;
-    let geometry = &mut header.geometry;
-    for (first, by) in geometry.origin.iter_mut().zip([crop.x, crop.y]) {
-        let moved = i32::try_from(by).ok().and_then(|by| first.checked_add(by));
-        *first = moved.ok_or_else(|| Error::format(&header.name, "it lies too far from the sensor's corner"))?;
-    }
-    (geometry.width, geometry.height) = (crop.width, crop.height);
-    // The counts of a sidecar are those of the whole frame.
-    header.metadata.samples = None;
-    Ok([crop.x, crop.y])
-}
-
-/// The channels that stages work on: the first three where they are R, G, B; Y alone; otherwise all.
-fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry {
-    let mut kept = stored.clone();
-    let starts =
-        |names: &[&str]| stored.channels.len() > names.len() && stored.channels.iter().zip(names).all(|(a, b)| a == b);
-    if !all && quantity != QuantityKind::SpectralRadiance {
-        if THREE_PLANES.iter().any(|planes| starts(planes)) {
-            kept.channels.truncate(3);
-        } else if starts(&["Y"]) {
-            kept.channels.truncate(1);
-        }
-    }
-    kept
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::statistics::Region;
     use crate::formats::output::{FrameWriter, OutputOptions};
+    use crate::frame::Geometry;
+    use crate::metadata::Metadata;
     use crate::stream::{Counts, RowSink};
+    use std::path::PathBuf;
 
     const CROP: Region = Region { x: 2, y: 3, width: 4, height: 2 };
 

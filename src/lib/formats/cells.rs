@@ -1,0 +1,160 @@
+//! The cells of a table: from bytes to text, and from text to numbers.
+
+use super::delimited::{self, Separator, decimal, number};
+use super::foreign::csv_complaint;
+use crate::error::{Error, Result};
+use csv::StringRecord;
+use flate2::read::GzDecoder;
+use ndarray::Array2;
+use std::borrow::Cow;
+use std::io::Read;
+
+/// A table may unpack to this much.
+const MAX_BYTES: u64 = 256 << 20;
+/// It may unpack to so many times its size, or to so much however small it is.
+const MAX_EXPANSION: u64 = 64;
+const SMALL_BYTES: u64 = 16 << 20;
+/// A table may have this many numbers: 256 MiB of them.
+const MAX_CELLS: usize = 1 << 25;
+/// A table may have this many columns: as text they take many times the memory of their numbers.
+pub(super) const MAX_COLUMNS: usize = 1 << 20;
+
+/// A finite number with a decimal point or a decimal comma, if it is one.
+pub(super) fn numeric(cell: &str) -> Option<f64> {
+    number(cell).or_else(|| decimal(cell))
+}
+
+/// A table's rows below its header.
+pub(super) struct Cells {
+    /// Shape rows × columns; 0 where a row's label is no number.
+    pub(super) numbers: Array2<f64>,
+    /// What the rows begin with, where they have labels.
+    pub(super) labels: Vec<String>,
+}
+
+impl Cells {
+    /// Reads the rows, after `first` where that is one; each begins with a label where the table goes `by_rows`.
+    pub(super) fn read(
+        name: &str,
+        reader: &mut csv::Reader<&[u8]>,
+        first: Option<&StringRecord>,
+        by_rows: bool,
+    ) -> Result<Self> {
+        let refuse = |problem: String| Error::format(name, problem);
+        let (mut numbers, mut labels, mut rows, mut width) = (Vec::new(), Vec::new(), 0, 0);
+        let mut record = first.cloned().unwrap_or_default();
+        let mut at_hand = first.is_some();
+        let [mut has_points, mut has_commas] = [false; 2];
+        // One row at a time: as text a table takes many times the memory of its numbers.
+        while std::mem::take(&mut at_hand) || reader.read_record(&mut record).map_err(|e| csv_complaint(name, &e))? {
+            let line = record.position().map_or(0, csv::Position::line);
+            (rows, width) = (rows + 1, record.len());
+            if numbers.len() + width > MAX_CELLS {
+                return Err(refuse(format!("it has more than {MAX_CELLS} numbers; no table has")));
+            }
+            if by_rows {
+                labels.push(record[0].to_owned());
+            }
+            for (column, text) in record.iter().enumerate() {
+                has_points |= text.contains('.') && number(text).is_some();
+                has_commas |= decimal(text).is_some();
+                numbers.push(match numeric(text) {
+                    Some(value) => value,
+                    // The label of a row need not be a number.
+                    None if by_rows && column == 0 => 0.0,
+                    None => {
+                        let shown: String = text.chars().take(20).collect();
+                        return Err(refuse(format!("line {line}, column {}: `{shown}` is no number", column + 1)));
+                    }
+                });
+            }
+        }
+        if has_points && has_commas {
+            return Err(refuse("its numbers have decimal points and decimal commas; write all with a point".into()));
+        }
+        let numbers =
+            Array2::from_shape_vec((rows, width), numbers).map_err(|_| refuse("its rows differ in length".into()))?;
+        Ok(Self { numbers, labels })
+    }
+}
+
+/// A table as text.
+pub(super) struct Text<'a> {
+    pub(super) decoded: Cow<'a, str>,
+    /// Its rows in the form that readers take, where they are in another.
+    plain: Option<String>,
+    separator: Separator,
+}
+
+impl<'a> Text<'a> {
+    /// The text of a table; `is_of_numbers` where separators behind the last cell of a row mean nothing.
+    pub(super) fn of(name: &str, bytes: &'a [u8], is_of_numbers: bool) -> Result<Self> {
+        let decoded = delimited::decoded(name, bytes)?;
+        // Before any cell is told apart: each row is held as a whole.
+        check_size(name, &decoded)?;
+        let separator = Separator::of(&decoded);
+        let plain = delimited::plain(name, &decoded, separator, is_of_numbers)?;
+        Ok(Self { decoded, plain, separator })
+    }
+
+    pub(super) fn rows(&self) -> &str {
+        self.plain.as_deref().unwrap_or(&self.decoded)
+    }
+
+    /// A reader of its rows.
+    pub(super) fn reader(&self, has_headers: bool) -> csv::Reader<&[u8]> {
+        csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .delimiter(self.separator.byte())
+            .has_headers(has_headers)
+            .trim(csv::Trim::All)
+            .from_reader(self.rows().as_bytes())
+    }
+
+    /// Whether commas may be those of decimals as well as part columns: without a header, and with no other mark of decimals.
+    pub(super) fn is_ambiguous(&self, first: &StringRecord) -> bool {
+        self.separator == Separator::Byte(b',')
+            && first.len() > 2
+            && first.iter().all(|cell| cell.bytes().all(|byte| byte.is_ascii_digit()))
+            && !self.rows().lines().any(|line| !line.starts_with('#') && line.contains('.'))
+    }
+}
+
+/// Refuses a text of more cells, or of more in a line, than any table has, whatever parts them.
+fn check_size(name: &str, text: &str) -> Result<()> {
+    let mut all = 0;
+    let mut widest = 0;
+    for line in text.lines().map(str::as_bytes) {
+        let parted_by = |mark: u8| line.iter().filter(|byte| **byte == mark).count();
+        let blanks = line.windows(2).filter(|pair| pair[0] == b' ' && pair[1] != b' ').count();
+        let cells = b",;\t".map(parted_by).into_iter().fold(blanks, usize::max);
+        all += cells;
+        widest = widest.max(cells);
+    }
+    if all >= MAX_CELLS {
+        return Err(Error::format(name, format!("it has more than {MAX_CELLS} numbers; no table has")));
+    }
+    if widest >= MAX_COLUMNS {
+        return Err(Error::format(name, format!("it has more than {MAX_COLUMNS} columns; no table has")));
+    }
+    Ok(())
+}
+
+/// The bytes of a table that may be gzipped.
+pub(super) fn unpacked<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>> {
+    if !bytes.starts_with(&[0x1F, 0x8B]) {
+        return Ok(bytes.into());
+    }
+    // What many times the file comes of is no table: of numbers a few times as much.
+    let most = (bytes.len() as u64 * MAX_EXPANSION).clamp(SMALL_BYTES, MAX_BYTES);
+    let mut unpacked = Vec::new();
+    let unpack = GzDecoder::new(bytes).take(most + 1).read_to_end(&mut unpacked);
+    unpack.map_err(|error| Error::format(name, format!("it is gzipped, but damaged: {error}")))?;
+    if unpacked.len() as u64 > most {
+        return Err(Error::format(
+            name,
+            format!("it unpacks to more than {} MiB; no table of its size does", most >> 20),
+        ));
+    }
+    Ok(unpacked.into())
+}

@@ -1,0 +1,100 @@
+//! The curves of a sensor's response, read and checked.
+
+use super::places::{Place, read_beside};
+use crate::camera::response::{Scale, SpectralResponse};
+use crate::camera::sensor::{Counts, CurveFile, ResponseFiles};
+use crate::cfa::FilterArray;
+use crate::error::{Error, Result};
+use crate::formats::csv::SpectralTable;
+use crate::formats::digest::sha256;
+use crate::formats::response_table::ResponseTable;
+use crate::names::Named;
+use crate::spectrum::Curve;
+
+/// The curves of a response as they are read and checked.
+pub(super) struct Curves<'a> {
+    pub(super) place: &'a Place,
+    /// The sensor file in messages.
+    pub(super) sensor: &'a str,
+    pub(super) array: Option<FilterArray>,
+    /// What came up.
+    pub(super) doubts: Vec<String>,
+    /// What a file of another program says of the camera.
+    pub(super) about: Option<String>,
+}
+
+impl Curves<'_> {
+    /// Reads those that files hold, and notes the digests of these; gives those of R, G and B, unless the classes are others.
+    pub(super) fn load(&mut self, files: &mut ResponseFiles) -> Result<Option<SpectralResponse>> {
+        let found = match (&mut files.quantum_efficiency, &mut files.relative_response) {
+            (Some(curve), _) => self.absolute(curve)?.map(|classes| (classes, Scale::Absolute)),
+            (None, Some(curve)) => {
+                let classes = self.relative(curve)?;
+                let counts = files.counts.unwrap_or_else(|| {
+                    self.doubts.push(format!(
+                        "nobody says whether its response counts energy or quanta; it is taken as {} (--counts)",
+                        Counts::default().name()
+                    ));
+                    Counts::default()
+                });
+                files.counts = Some(counts);
+                classes.map(|classes| (classes, Scale::Relative { counts, peak: files.peak_quantum_efficiency }))
+            }
+            (None, None) => None,
+        };
+        let cover_glass = match &mut files.cover_glass {
+            Some(glass) => {
+                let (name, bytes) = self.bytes(glass)?;
+                let transmittance = SpectralTable::parse(&name, &bytes)?.curve(glass.column.as_deref())?;
+                Some(within_unit(self.sensor, "cover_glass", transmittance)?)
+            }
+            None => None,
+        };
+        Ok(found.map(|(quantum_efficiency, scale)| SpectralResponse { quantum_efficiency, cover_glass, scale }))
+    }
+
+    /// The file of a curve, with its name.
+    fn bytes(&self, curve: &mut CurveFile) -> Result<(String, Vec<u8>)> {
+        let (name, bytes) = read_beside(self.place, self.sensor, &curve.file)?;
+        curve.sha256 = Some(sha256(&bytes));
+        Ok((name, bytes))
+    }
+
+    /// Quantum efficiencies.
+    fn absolute(&self, curve: &mut CurveFile) -> Result<Option<[Curve; 3]>> {
+        let (name, bytes) = self.bytes(curve)?;
+        let efficiencies = SpectralTable::parse(&name, &bytes)?;
+        let class = |column: Option<&str>| within_unit(self.sensor, "quantum_efficiency", efficiencies.curve(column)?);
+        if self.array.is_none_or(FilterArray::has_three_classes) {
+            return Ok(Some([class(Some("R"))?, class(Some("G"))?, class(Some("B"))?]));
+        }
+        let filters = self.array.map_or_else(Vec::new, FilterArray::filters);
+        if filters.is_empty() {
+            class(curve.column.as_deref())?;
+        }
+        for filter in filters {
+            class(Some(&filter.to_string()))?;
+        }
+        Ok(None)
+    }
+
+    /// Relative responses, which are of R, G and B alone.
+    fn relative(&mut self, curve: &mut CurveFile) -> Result<Option<[Curve; 3]>> {
+        let (name, bytes) = self.bytes(curve)?;
+        let table = ResponseTable::parse(&name, &bytes, curve.column.as_deref())?;
+        self.doubts.extend(table.doubts);
+        self.about = table.about;
+        Ok(Some(table.classes).filter(|_| self.array.is_none_or(FilterArray::has_three_classes)))
+    }
+}
+
+/// An efficiency or a transmittance is a fraction.
+fn within_unit(sensor: &str, key: &str, curve: Curve) -> Result<Curve> {
+    let (low, high) = curve.extremes();
+    if low < 0.0 || high > 1.0 {
+        let per_cent = if low >= 0.0 && high <= 100.0 { ", and looks like per cent: divide it by 100" } else { "" };
+        let problem = format!("`{key}` runs from {low} to {high}; it must lie within 0 and 1{per_cent}");
+        return Err(Error::format(sensor, problem));
+    }
+    Ok(curve)
+}

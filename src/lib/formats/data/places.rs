@@ -1,0 +1,96 @@
+//! Where data files are found: beside the file that names them, in directories, or built in.
+
+use crate::error::{Error, Result};
+use crate::formats::files::read_file;
+use std::path::{Path, PathBuf};
+
+/// The environment variable that names directories with data files, like `sample_data`.
+pub const DATA_VARIABLE: &str = "CYANOMETER_DATA";
+
+/// Files that every program carries, by their place in `sample_data`.
+pub(in crate::formats) const BUILT_IN: [(&str, &[u8]); 13] = [
+    ("sensors/kaf-5101ce.yaml", include_bytes!("../../../../sample_data/sensors/kaf-5101ce.yaml")),
+    ("sensors/kaf5101ce_est_qe_1nm.csv", include_bytes!("../../../../sample_data/sensors/kaf5101ce_est_qe_1nm.csv")),
+    ("sensors/rawtoaces.csv", include_bytes!("../../../../sample_data/sensors/rawtoaces.csv")),
+    ("sensors/rawtoaces_cameras.csv", include_bytes!("../../../../sample_data/sensors/rawtoaces_cameras.csv")),
+    ("sensors/imx219.yaml", include_bytes!("../../../../sample_data/sensors/imx219.yaml")),
+    ("sensors/imx477.yaml", include_bytes!("../../../../sample_data/sensors/imx477.yaml")),
+    ("sensors/ov5647.yaml", include_bytes!("../../../../sample_data/sensors/ov5647.yaml")),
+    ("sensors/bg39_1mm.csv", include_bytes!("../../../../sample_data/sensors/bg39_1mm.csv")),
+    ("observers/cie1931_2deg_1nm.csv", include_bytes!("../../../../sample_data/observers/cie1931_2deg_1nm.csv")),
+    ("illuminants/cie_daylight_1nm.csv", include_bytes!("../../../../sample_data/illuminants/cie_daylight_1nm.csv")),
+    ("charts/colorchecker.csv", include_bytes!("../../../../sample_data/charts/colorchecker.csv")),
+    ("charts/colorchecker-2005.csv", include_bytes!("../../../../sample_data/charts/colorchecker-2005.csv")),
+    ("illuminants/cie_d65_1nm.csv", include_bytes!("../../../../sample_data/illuminants/cie_d65_1nm.csv")),
+];
+
+/// Where a data file was found: in a directory, or built in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::formats) enum Place {
+    Directory(PathBuf),
+    BuiltIn,
+}
+
+/// Reads a file that a sensor file names; a name with a directory in it is never opened.
+pub(super) fn read_beside(place: &Place, sensor: &str, file: &str) -> Result<(String, Vec<u8>)> {
+    if Path::new(file).file_name().is_none_or(|name| name != file) {
+        return Err(Error::format(sensor, format!("`{file}` must be the bare name of a file beside the sensor file")));
+    }
+    match place {
+        Place::Directory(directory) => {
+            let path = directory.join(file);
+            let shown = path.display().to_string();
+            // A named pipe, which a reader would wait on, is nothing that a user has named; what is missing, reading tells.
+            if std::fs::metadata(&path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
+                return Err(Error::format(&shown, "it is no file but a pipe or a device; a table must be a file"));
+            }
+            let bytes = read_file(&path).map_err(|error| match error {
+                Error::Disk { .. } => Error::format(sensor, format!("it names a file that is not read: {error}")),
+                other => other,
+            })?;
+            Ok((shown, bytes))
+        }
+        Place::BuiltIn => match built_in(&format!("sensors/{file}")) {
+            Some(bytes) => Ok((file.to_owned(), bytes.to_vec())),
+            None => Err(Error::format(sensor, format!("its file `{file}` is not built in"))),
+        },
+    }
+}
+
+pub(super) fn built_in(file: &str) -> Option<&'static [u8]> {
+    BUILT_IN.iter().find(|(name, _)| *name == file).map(|(_, bytes)| *bytes)
+}
+
+/// Directories that may hold data files, first to last.
+pub(in crate::formats) fn directories() -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> =
+        std::env::var_os(DATA_VARIABLE).map(|list| std::env::split_paths(&list).collect()).unwrap_or_default();
+    if let Ok(program) = std::env::current_exe() {
+        let above: Vec<&Path> = program.ancestors().skip(1).collect();
+        found.extend(above.get(1).map(|prefix| prefix.join("share/cyanometer")));
+        found.extend(above.iter().take(4).map(|directory| directory.join("sample_data")));
+    }
+    found
+}
+
+pub(super) fn find(file: &str) -> Result<Option<(Place, Vec<u8>)>> {
+    for directory in directories() {
+        let path = directory.join(file);
+        if path.is_file() {
+            return Ok(Some((Place::Directory(directory), read_file(&path)?)));
+        }
+    }
+    Ok(built_in(file).map(|bytes| (Place::BuiltIn, bytes.to_vec())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_path_in_a_sensor_file_is_opened() {
+        for file in ["../qe.csv", "/etc/passwd", "a/b.csv", ".."] {
+            assert!(read_beside(&Place::BuiltIn, "s.yaml", file).unwrap_err().to_string().contains("bare name"));
+        }
+    }
+}

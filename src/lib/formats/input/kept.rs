@@ -1,0 +1,67 @@
+//! What is kept of a frame: its channels, and a rectangle.
+
+use crate::analysis::statistics::Region;
+use crate::error::{Error, Result};
+use crate::frame::{Geometry, THREE_PLANES};
+use crate::metadata::FrameHeader;
+use crate::stages::saturation::MASK_LAYER;
+use crate::units::QuantityKind;
+
+/// One channel alone, as the plane Y, and its place among those that are stored.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where there is no such channel.
+pub(super) fn take_channel(stored: &Geometry, channel: &str, name: &str) -> Result<(usize, Geometry)> {
+    let Some(place) = stored.channels.iter().position(|known| known == channel) else {
+        let mut some = stored.channels.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
+        if stored.channels.len() > 8 {
+            some += ", …";
+        }
+        let problem = format!("{name}: there is no channel `{channel}`; it has {some}");
+        return Err(Error::Usage(problem).change(&["channel"]));
+    };
+    Ok((place, stored.with_channels(&["Y"])))
+}
+
+/// Cuts a frame down to a rectangle, and gives the column and row that come first.
+///
+/// # Errors
+///
+/// [`Error::Usage`] where it does not lie within the frame.
+pub(super) fn cut(header: &mut FrameHeader, crop: Region) -> Result<[usize; 2]> {
+    crop.check(header).map_err(|error| error.change(&["crop"]))?;
+    let geometry = &mut header.geometry;
+    for (first, by) in geometry.origin.iter_mut().zip([crop.x, crop.y]) {
+        let moved = i32::try_from(by).ok().and_then(|by| first.checked_add(by));
+        *first = moved.ok_or_else(|| Error::format(&header.name, "it lies too far from the sensor's corner"))?;
+    }
+    (geometry.width, geometry.height) = (crop.width, crop.height);
+    // The counts of a sidecar are those of the whole frame.
+    header.metadata.samples = None;
+    Ok([crop.x, crop.y])
+}
+
+/// The channels that stages work on: the first three where they are R, G, B; Y alone; otherwise all.
+pub(super) fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry {
+    let mut kept = stored.clone();
+    let starts =
+        |names: &[&str]| stored.channels.len() > names.len() && stored.channels.iter().zip(names).all(|(a, b)| a == b);
+    if !all && quantity != QuantityKind::SpectralRadiance {
+        if THREE_PLANES.iter().any(|planes| starts(planes)) {
+            kept.channels.truncate(3);
+        } else if starts(&["Y"]) {
+            kept.channels.truncate(1);
+        }
+    }
+    kept
+}
+
+/// How the note of channels that no stage sees ends.
+pub(super) const LEFT_OUT: &str = " are left out";
+
+/// That note; none where there are no such channels but marks.
+pub(super) fn left_out(name: &str, channels: &[String]) -> Option<String> {
+    let dropped: Vec<&str> = channels.iter().map(String::as_str).filter(|channel| *channel != MASK_LAYER).collect();
+    (!dropped.is_empty()).then(|| format!("{name}: channels {}{LEFT_OUT}", dropped.join(", ")))
+}

@@ -1,0 +1,105 @@
+//! Which reader opens a file: by its first bytes, and by whether it can seek.
+
+use crate::error::{Error, Result};
+use crate::formats::files::{STDIN_NAME, spool};
+use crate::formats::format::{HEAD_BYTES, Opened, Readers, Streaming};
+use crate::formats::places::in_stream;
+use crate::formats::read_ahead::Pipe;
+use crate::formats::{pipe, table, tiff};
+use crate::text::counted;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+
+/// Whether an open file is one that can seek, and no pipe.
+pub(super) fn is_file(input: &File, name: &str) -> Result<bool> {
+    Ok(input.metadata().map_err(|e| Error::disk(name, "read", e))?.is_file())
+}
+
+/// Opens a file that can seek with the reader of its format.
+pub(super) fn open_seekable(mut input: File, name: &str, part: usize) -> Opened {
+    let failed = |e| Error::disk(name, "read", e);
+    let start = input.stream_position().map_err(failed)?;
+    let head = head_of(&mut input, name)?;
+    let readers = readers_of(&head, name)?;
+    input.seek(SeekFrom::Start(start)).map_err(failed)?;
+    open_whole(readers, &head, input, name, part)
+}
+
+/// Opens a stream.
+pub(super) fn open_unseekable(input: File, name: &str, part: usize) -> Opened {
+    pipe::enlarge(&input);
+    open_piped(Pipe::of(input), name, part)
+}
+
+/// Opens a stream with the reader of its format. One that cannot be read without seeking is first copied to a temporary
+/// file.
+pub(super) fn open_piped(mut input: Pipe, name: &str, part: usize) -> Opened {
+    let head = input.head(HEAD_BYTES).map_err(|e| Error::disk(name, "read", e))?.to_vec();
+    check_begun(&head, name)?;
+    let readers = readers_of(&head, name)?;
+    let is_streamed = |stream: &Streaming| (stream.is_streamable)(&head) && !(stream.has_parts && part != 0);
+    if let Some(stream) = readers.stream.filter(is_streamed) {
+        if part != 0 {
+            return Err(Error::Usage(format!("{name}: it has no part {part}; it has a single one")));
+        }
+        return (stream.open)(input, name);
+    }
+    let spooled = spool(&mut input, name)?;
+    open_whole(readers, &head, spooled, name, part)
+}
+
+/// Opens a file that begins with `head` with these readers, or, where its tags call for them, with others.
+fn open_whole(readers: Readers, head: &[u8], input: File, name: &str, part: usize) -> Opened {
+    let narrower = if tiff::begins_so(head) { table::by_tags(&input, name)? } else { None };
+    (narrower.unwrap_or(readers).open)(input, name, part)
+}
+
+/// The first bytes, by which most formats are known.
+pub(super) fn head_of(input: &mut File, name: &str) -> Result<Vec<u8>> {
+    let mut head = Vec::new();
+    input.take(HEAD_BYTES as u64).read_to_end(&mut head).map_err(|e| Error::disk(name, "read", e))?;
+    check_begun(&head, name)?;
+    Ok(head)
+}
+
+/// Makes sure that something comes.
+fn check_begun(head: &[u8], name: &str) -> Result<()> {
+    if !head.is_empty() {
+        return Ok(());
+    }
+    if name == STDIN_NAME && pipe::has_failed() {
+        return Err(Error::Upstream);
+    }
+    let hint = if name == STDIN_NAME { "; the program before it wrote nothing" } else { "" };
+    Err(Error::format(name, format!("it is empty{hint}")))
+}
+
+/// An error in reading a stream, which is not worth telling where the program before has failed in the midst of a frame.
+pub(super) fn of_upstream(error: Error, name: &str) -> Error {
+    let is_told = matches!(error, Error::Format { .. }) && in_stream(name) == STDIN_NAME && pipe::has_failed();
+    if is_told { Error::Upstream } else { error }
+}
+
+/// The readers of what a file begins as.
+pub(super) fn readers_of(head: &[u8], name: &str) -> Result<Readers> {
+    table::by_head(head, name)?.ok_or_else(|| {
+        let hint = if head.len() < 8 {
+            format!("; it has {} and no more", counted(head.len() as u64, "bytes"))
+        } else if is_text(head) {
+            "; it looks like text (a spectrum goes into `render-radiance`)".into()
+        } else {
+            String::new()
+        };
+        Error::format(name, format!("it is neither {} file{hint}", table::names_of_read()))
+    })
+}
+
+/// Whether bytes are the beginning of a text, the last character perhaps cut off.
+fn is_text(head: &[u8]) -> bool {
+    let whole = match std::str::from_utf8(head) {
+        Ok(text) => text,
+        Err(cut) if cut.error_len().is_none() => std::str::from_utf8(&head[..cut.valid_up_to()]).unwrap_or_default(),
+        Err(_) => return false,
+    };
+    whole.chars().all(|character| !character.is_control() || character.is_whitespace())
+}

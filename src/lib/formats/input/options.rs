@@ -1,0 +1,40 @@
+//! What to open, and how.
+
+use crate::analysis::statistics::Region;
+use crate::camera::sensor::Sensor;
+use crate::formats::headerless;
+use crate::formats::sequence::Sequence;
+use std::path::PathBuf;
+
+/// What to open.
+#[derive(Debug, Clone, Default)]
+pub struct InputOptions {
+    /// The file; none or `-` for the standard input.
+    pub path: Option<PathBuf>,
+    /// The frames that the next is taken of, instead of a file that holds one.
+    pub sequence: Option<Sequence>,
+    /// Part of a multi-part EXR, page of a TIFF, HDU of a FITS.
+    pub part: usize,
+    /// How the samples lie in a file without a header; none where the file says what it is.
+    pub raw: Option<headerless::Layout>,
+    /// A file whose metadata count before all others.
+    pub metadata: Option<PathBuf>,
+    /// Whether channels besides R, G, B or Y are kept.
+    pub all_channels: bool,
+    /// The channel that is taken alone, as a single plane; none for those of the frame.
+    pub channel: Option<String>,
+    /// The rectangle that is taken alone; none for all of the frame. Its photosites keep their places on the sensor.
+    pub crop: Option<Region>,
+    /// Whether codes are made proportional to charge, by the linearization of their sensor.
+    pub linearize: Linearizing,
+}
+
+/// Whether codes are made proportional to charge as they are read.
+#[derive(Debug, Clone, Default)]
+pub enum Linearizing {
+    /// They stay as they are.
+    #[default]
+    No,
+    /// By the sensor of the metadata, or this one where they name none.
+    As(Option<Box<Sensor>>),
+}
