@@ -503,10 +503,8 @@ fn exposures_count_once() {
     copy.noise = None;
     for name in ["a", "b"] {
         fs::copy(shop.path("a.exr"), shop.path(&format!("{name}.exr"))).ok();
-        let text = cyanometer::formats::yaml::write_metadata(&cyanometer::metadata::Metadata {
-            scene: None,
-            ..copy.clone()
-        });
+        let text =
+            cyanometer::formats::yaml::write_metadata(&cyanometer::metadata::Metadata { scene: None, ..copy.clone() });
         fs::write(shop.path(&format!("{name}.exr.yaml")), text.unwrap()).unwrap();
     }
     let copies = shop.attempt("average-frames a.exr b.exr -o m.exr", &[]);

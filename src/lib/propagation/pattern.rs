@@ -72,17 +72,13 @@ impl Shared {
         let (law, is_fine) = (&light.law, light.is_fine || dark.is_fine);
         let xs = sensitivities(&law.light, of_light.std());
         let wider = if law.dark.rate > dark.law.dark.rate { law.dark } else { dark.law.dark };
-        let mut ys = if is_fine {
+        let ys = if is_fine {
             fine_sensitivities(&wider, of_light.finest().min(of_dark.finest()))
         } else {
             sensitivities(&law.dark, of_light.std())
         };
         let is_light_summed = of_light.evaluations(xs.len() * ys.len()) <= of_light.affordable();
         let is_dark_summed = of_dark.evaluations(ys.len()) <= of_dark.affordable();
-        if is_fine && !is_light_summed && !is_dark_summed {
-            // What follows from cumulants has no edges of single counts.
-            ys = fine_sensitivities(&wider, of_light.std().min(of_dark.std()));
-        }
         let mut sums = Sums::default();
         let mut add = |[x, y]: [(f64, f64); 2], dark: Moments| {
             sums.add(x.1 * y.1, of_light.at(x.0, y.0, is_light_summed)[0], dark);
