@@ -39,6 +39,7 @@ mod repeated;
 pub mod sampling;
 pub mod saturation;
 pub mod smooth_hue;
+mod steps;
 mod tails;
 pub mod taps;
 mod unlike;
