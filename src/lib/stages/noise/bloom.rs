@@ -263,7 +263,7 @@ impl Kernel for Read<'_> {
             run.make_temporal(&mut scratch.words);
             let samples = &mut samples[span.clone()];
             if line.model.read_noise_e > 0.0 {
-                add(samples, line.read_noise(&run, &mut scratch));
+                add(samples, line.read_noise(&run, &mut scratch, &span));
             }
             line.add_jumps(&run, &mut scratch, samples);
             line.add_offsets(&run, &mut scratch, span, samples);
