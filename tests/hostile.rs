@@ -6,7 +6,7 @@
 mod support;
 
 use cyanometer::error::Result;
-use cyanometer::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter};
+use cyanometer::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter, Layers};
 use cyanometer::formats::fits::FitsReader;
 use cyanometer::formats::format::SampleReader;
 use cyanometer::formats::input::{FrameReader, InputOptions};
@@ -428,8 +428,16 @@ fn damaged_files_and_pipes_are_taken_or_refused_alike() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.exr");
         let samples: Vec<f32> = (0..5 * 36 * 3).map(|i| (i * 31 % 17) as f32).collect();
-        let mut writer =
-            ExrWriter::create(Vec::new(), "a.exr", &geometry, ExrSamples::F32, compression, &tags).unwrap();
+        let mut writer = ExrWriter::create(
+            Vec::new(),
+            "a.exr",
+            &geometry,
+            ExrSamples::F32,
+            compression,
+            Layers::BesideTheImage,
+            &tags,
+        )
+        .unwrap();
         writer.write(&samples).unwrap();
         let (mut whole, patch) = writer.finish().unwrap();
         if let Some(patch) = patch {

@@ -191,6 +191,46 @@ class Written(ProgramCase):
         self.assertIsNotNone(values, "no chromaticities")
         np.testing.assert_allclose(values, (1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3), atol=1e-6)
 
+    def test_layers_in_a_part_of_their_own(self):
+        rgb = self.run_pipe([*RENDER, SIZE], NOISE, ["digitize"], ["mosaic"])
+        demosaic = ["demosaic", "--method", "bi", "--sigma"]
+        self.run_program([*demosaic, "-o", "beside.exr"], rgb)
+        beside = read_planes(self.directory / "beside.exr")
+        colors = ("R", "G", "B")
+        self.assertIn("sigma.G", beside)
+        for compression in ("none", "zip", "piz"):
+            self.run_program(
+                [*demosaic, "--separate-layers", "--compression", compression, "-o", "apart.exr"], rgb
+            )
+            apart = self.directory / "apart.exr"
+            first, second = read_spec(apart, 0), read_spec(apart, 1)
+            self.assertEqual(first.get_string_attribute("name"), "image")
+            self.assertEqual(second.get_string_attribute("name"), "layers")
+            self.assertEqual(second.get_string_attribute("colorInteropID"), "data")
+            self.assertEqual(first.getattribute("chromaticities"), second.getattribute("chromaticities"))
+            self.same_planes(read_planes(apart, 0), {name: beside[name] for name in colors})
+            self.same_planes(
+                read_planes(apart, 1), {name: plane for name, plane in beside.items() if name not in colors}
+            )
+            # Our programs see no difference, through a pipe either.
+            report = ["measure", "--output-format", "csv"]
+            expected = self.run_program([*report, "beside.exr"]).replace(b"beside", b"apart")
+            self.assertEqual(self.run_program([*report, "apart.exr"]), expected)
+        refused = self.attempt([*demosaic, "--separate-layers"], rgb)
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn(b"name the output", refused.stderr)
+
+    def test_sensitivity_is_told(self):
+        description = "schema: cyanometer/1\nquantity: adu\nunit: ADU\ncfa: rggb\nblack_level_adu: 100\nwhite_level_adu: 4095\n"
+        (self.directory / "frame.yaml").write_text(description + "iso_speed: 400\n", encoding="utf-8")
+        codes = np.arange(64, dtype=np.uint16).reshape(8, 8)
+        write_planes(self.path("codes.tif"), {"Y": codes}, "uint16")
+        for name in ("frame.exr", "frame.tif"):
+            self.run_program(["correct-frame", "codes.tif", "--metadata", "frame.yaml", "--black", "none", "-o", name])
+            spec = read_spec(self.directory / name)
+            told = [spec.getattribute(key) for key in ("isoSpeed", "Exif:ISOSpeedRatings", "Exif:PhotographicSensitivity")]
+            self.assertIn(400, [value for value in told if value is not None], name)
+
 
 class Read(ProgramCase):
     """What OpenImageIO writes."""

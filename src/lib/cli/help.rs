@@ -48,6 +48,7 @@ const GROUPS: [(&str, &[&str]); 10] = [
             "compression",
             "sample-type",
             "viewable",
+            "separate-layers",
             "output-format",
             "plot",
             "pixels",

@@ -248,7 +248,7 @@ pub fn png_damage(name: &str, error: png::DecodingError) -> Error {
 mod tests {
     use super::*;
     use crate::formats::csv::SpectralTable;
-    use crate::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter, patch_table};
+    use crate::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter, Layers, patch_table};
     use crate::formats::format::SampleReader;
     use crate::formats::read_ahead::Pipe;
     use crate::formats::yaml::parse_strict;
@@ -262,7 +262,9 @@ mod tests {
         let geometry = Geometry::new(6, 4, &["Y"]);
         let (samples, compression) = (ExrSamples::F32, ExrCompression::Zips);
         let tags = ExrTags::default();
-        let mut writer = ExrWriter::create(Vec::new(), "a.exr", &geometry, samples, compression, &tags).unwrap();
+        let mut writer =
+            ExrWriter::create(Vec::new(), "a.exr", &geometry, samples, compression, Layers::BesideTheImage, &tags)
+                .unwrap();
         writer.write(&[0.5; 24]).unwrap();
         let (bytes, table) = writer.finish().unwrap();
         let mut file = io::Cursor::new(bytes);

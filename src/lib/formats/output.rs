@@ -101,7 +101,15 @@ impl FrameWriter {
             Encoding::Exr(samples, compression) => {
                 let (metadata, software) = (Some(description), Some(software));
                 let tags = ExrTags { metadata, software, ..native_tags(header) };
-                Encoder::Exr(Box::new(ExrWriter::create(target, &name, geometry, samples, compression, &tags)?))
+                Encoder::Exr(Box::new(ExrWriter::create(
+                    target,
+                    &name,
+                    geometry,
+                    samples,
+                    compression,
+                    options.layers()?,
+                    &tags,
+                )?))
             }
             Encoding::Tiff(samples, compression) => {
                 let scale = u16_scale(header.metadata.quantity, samples);
@@ -181,6 +189,7 @@ fn native_tags(header: &FrameHeader) -> ExrTags {
     ExrTags {
         exposure_s: metadata.exposure.map(|e| e.exposure_s),
         f_number: metadata.exposure.map(|e| e.f_number),
+        iso_speed: metadata.iso_speed,
         // Absolute XYZ: unscaled (1, 1, 1) has Y = 1 cd m⁻². Of relative ones no luminance is known.
         white_luminance: (metadata.quantity == QuantityKind::Xyz && metadata.unit != RELATIVE_UNIT)
             .then(|| metadata.sample_scale.unwrap_or(1.0).recip()),
@@ -218,7 +227,7 @@ fn interop_id(header: &FrameHeader) -> Option<&'static str> {
 const ICC_PROFILE: u16 = 34675;
 
 /// A warning of codes that f16 rounds: it counts by ones to 2048, by twos to 4096 and so on.
-fn doubt_of_codes(name: &str, header: &FrameHeader) {
+pub fn doubt_of_codes(name: &str, header: &FrameHeader) {
     let white = header.metadata.white_level_adu.map(|white| white.largest());
     let rounded = white.filter(|white| header.metadata.quantity == QuantityKind::Adu && *white > LARGEST_EXACT_F16);
     if let Some(white) = rounded {

@@ -1,7 +1,7 @@
 //! How frames are stored: what options choose, and what goes together.
 
 use super::dng;
-use super::exr::{ExrCompression, ExrSamples};
+use super::exr::{ExrCompression, ExrSamples, Layers};
 use super::format::SampleType;
 use super::places::{STDOUT_NAME, named};
 use super::tiff::{TiffCompression, TiffSamples};
@@ -112,6 +112,8 @@ pub struct OutputOptions {
     pub samples: Option<SampleKind>,
     /// Whether samples are scaled so that viewers show them.
     pub is_viewable: bool,
+    /// Whether layers go into a second part of an EXR file.
+    pub separates_layers: bool,
     /// Frames that follow in the same stream, at least; a named file does not tell.
     pub frames_to_come: u64,
 }
@@ -140,6 +142,9 @@ impl OutputOptions {
             return Err(Error::Usage(
                 "a TIFF has no names for the channels of a map of differences; write an EXR".into(),
             ));
+        }
+        if format != Format::Exr && self.separates_layers {
+            return Err(Error::Usage("an EXR alone has layers; write one, or leave --separate-layers out".into()));
         }
         // An average of codes lies between them.
         let Metadata { demosaic, correction, average, .. } = &header.metadata;
@@ -192,6 +197,22 @@ impl OutputOptions {
     pub(super) fn scale(&self, header: &FrameHeader, encoding: Encoding) -> Result<f64> {
         let fills_u16 = matches!(encoding, Encoding::Tiff(TiffSamples::U16, _));
         if self.is_viewable { viewable::scale_of(header, fills_u16) } else { Ok(1.0) }
+    }
+
+    /// Where the layers of an EXR stand.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where they cannot stand apart: a pipe carries one part.
+    pub(super) fn layers(&self) -> Result<Layers> {
+        match (self.separates_layers, named(self.path.as_deref())) {
+            (false, _) => Ok(Layers::BesideTheImage),
+            (true, Some(_)) => Ok(Layers::InAPartOfTheirOwn),
+            (true, None) => Err(Error::Usage(
+                "layers stand in a part of their own in files alone; name the output, or leave --separate-layers out"
+                    .into(),
+            )),
+        }
     }
 
     /// Whether the file has names for layers beside the samples.

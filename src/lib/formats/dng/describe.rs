@@ -46,6 +46,13 @@ pub(super) fn describe(
         }
         found => found?,
     };
+    metadata.iso_speed = match told_sensitivity(file, &image.first) {
+        Err(Error::Format { problem, .. }) => {
+            notes.push(format!("its sensitivity is passed over: {problem}"));
+            None
+        }
+        found => found?,
+    };
     // No sample depends on it either.
     let model = file.text(&image.first, tags::UNIQUE_CAMERA_MODEL.tag()).unwrap_or_default();
     metadata.camera =
@@ -131,12 +138,31 @@ fn filters(file: &mut TiffFile, image: &RawImage, active: Rectangle) -> Result<F
     })
 }
 
+/// The directory of Exif.
+fn exif(file: &mut TiffFile, first: &Directory) -> Result<Option<Directory>> {
+    let Some(offset) = tags::EXIF.one(file, first)? else { return Ok(None) };
+    file.directory_below(offset as u64).map(Some)
+}
+
+/// The sensitivity that the camera was set to, ISO. What 16 bits do not hold is 65535 in the one tag and stands in the other
+/// \[Exif3, PhotographicSensitivity].
+fn told_sensitivity(file: &mut TiffFile, first: &Directory) -> Result<Option<f64>> {
+    const BEYOND: f64 = 65_535.0;
+    let below = exif(file, first)?;
+    let mut number = |tag: tags::DngTag| -> Result<Option<f64>> {
+        let mut directories = std::iter::once(first).chain(&below);
+        let Some(directory) = directories.find(|directory| tag.is_in(directory)) else { return Ok(None) };
+        Ok(tag.numbers(file, directory, 1)?.map(|numbers| numbers[0]).filter(|number| *number > 0.0))
+    };
+    match number(tags::PHOTOGRAPHIC_SENSITIVITY)? {
+        Some(BEYOND) => Ok(number(tags::ISO_SPEED)?.or(Some(BEYOND))),
+        found => Ok(found),
+    }
+}
+
 /// Exposure time and f-number, where both are known.
 fn told_exposure(file: &mut TiffFile, first: &Directory, notes: &mut Vec<String>) -> Result<Option<Exposure>> {
-    let below = match tags::EXIF.one(file, first)? {
-        Some(offset) => Some(file.directory_below(offset as u64)?),
-        None => None,
-    };
+    let below = exif(file, first)?;
     let directories = || std::iter::once(first).chain(&below);
     // Lenses without contacts leave zeros.
     let mut number = |tag: tags::DngTag| -> Result<Option<f64>> {

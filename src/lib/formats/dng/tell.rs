@@ -163,9 +163,9 @@ fn black_levels(black: &BlackLevels, width: usize) -> Vec<ExtraTag> {
 fn noise_profile(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<ExtraTag> {
     let metadata = &header.metadata;
     let (record, adc) = (metadata.noise.as_ref()?, metadata.adc.filter(|adc| !adc.is_bent())?);
-    // Charge that moved makes neighbors alike, and dark frames bring noise of their own.
+    // Charge that moved makes neighbors alike, dark frames bring noise of their own, and amplifiers have one each.
     let is_plain = metadata.correction.as_ref().is_none_or(|record| !record.took_frames() && record.is_plain());
-    if record.cte.is_some() || !is_plain {
+    if record.cte.is_some() || !is_plain || header.taps().is_some() {
         return None;
     }
     let line = LinearNoise::of(&NoiseModel::of(header, record).ok()?, &adc);
@@ -198,14 +198,31 @@ fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor
     found
 }
 
-/// The exposure, as Exif has it; no tags where it is unknown.
+/// Exposure and sensitivity, as Exif has them; no tags where they are unknown.
 pub(in crate::formats) fn of_exposure(metadata: &Metadata) -> Vec<ExtraTag> {
-    let Some(exposure) = metadata.exposure else { return Vec::new() };
-    let settings = [(tags::EXPOSURE_TIME, exposure.exposure_s), (tags::F_NUMBER, exposure.f_number)];
-    let ratios = settings.map(|(tag, value)| (tag, ratio(value))).into_iter().filter(|(_, [above, _])| *above > 0);
-    let mut found = vec![tags::EXIF_VERSION.with(TagValue::Undefined(EXIF_VERSION.to_vec()))];
-    found.extend(ratios.map(|(tag, ratio)| tag.with(TagValue::Ratios(vec![ratio]))));
+    let settings = metadata.exposure.map(|e| [(tags::EXPOSURE_TIME, e.exposure_s), (tags::F_NUMBER, e.f_number)]);
+    let settings = settings.into_iter().flatten().map(|(tag, value)| (tag, ratio(value)));
+    let mut found: Vec<ExtraTag> = settings
+        .filter(|(_, [above, _])| *above > 0)
+        .map(|(tag, ratio)| tag.with(TagValue::Ratios(vec![ratio])))
+        .collect();
+    found.extend(metadata.iso_speed.into_iter().flat_map(of_sensitivity));
+    if !found.is_empty() {
+        found.push(tags::EXIF_VERSION.with(TagValue::Undefined(EXIF_VERSION.to_vec())));
+    }
     found
+}
+
+/// A sensitivity, ISO, to a whole number: what 16 bits do not hold is 65535, and stands in a tag of its own besides.
+fn of_sensitivity(iso: f64) -> Vec<ExtraTag> {
+    let [above, below] = ratio(iso.round());
+    let whole = above.checked_div(below).unwrap_or(0);
+    let short = u16::try_from(whole).unwrap_or(u16::MAX);
+    let mut found = vec![tags::PHOTOGRAPHIC_SENSITIVITY.with(TagValue::Shorts(vec![short]))];
+    if u32::from(short) < whole {
+        found.push(tags::ISO_SPEED.with(TagValue::Longs(vec![whole])));
+    }
+    if whole > 0 { found } else { Vec::new() }
 }
 
 /// The name of the sensor, in the letters that the tags allow.

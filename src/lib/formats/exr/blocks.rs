@@ -6,11 +6,11 @@
 use super::straight::Offsets;
 use crate::error::{Error, Result};
 use crate::formats::format::Rest;
+use crate::formats::positioned::Positioned;
 use crate::formats::read_ahead::{Pipe, ReadAhead};
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock, CompressedTileBlock, TileCoordinates};
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData};
-use std::fs::File;
 use std::io::{self, Read};
 
 /// Where the bytes come from.
@@ -18,7 +18,7 @@ enum Input {
     /// Another program.
     Pipe(Pipe),
     /// A file of so many bytes from the frame's first on.
-    File(ReadAhead<File>, u64),
+    File(ReadAhead<Positioned>, u64),
     /// Handed to whoever reads on behind the frame.
     Gone(io::Empty),
 }
@@ -42,7 +42,13 @@ impl Blocks {
     /// # Errors
     ///
     /// [`Error::Format`] where the table points outside the file, or twice to the same place.
-    pub fn of_file(reader: ReadAhead<File>, name: &str, position: u64, length: u64, offsets: Offsets) -> Result<Self> {
+    pub fn of_file(
+        reader: ReadAhead<Positioned>,
+        name: &str,
+        position: u64,
+        length: u64,
+        offsets: Offsets,
+    ) -> Result<Self> {
         let (extent, twice) = offsets.extent();
         if extent.is_some_and(|(first, last)| first == 0 || last >= length) {
             return Err(Error::cut_short(name));
@@ -202,6 +208,11 @@ impl Blocks {
         }
     }
 
+    /// The blocks of another part of the same frame may lie further behind.
+    pub fn end_with(&mut self, other: &Self) {
+        self.end = self.end.max(other.end);
+    }
+
     /// Hands out what lies behind the blocks, once all of a frame of one part and no other levels have been read.
     ///
     /// # Errors
@@ -214,7 +225,7 @@ impl Blocks {
                 let behind = self.end.cast_signed() - self.position.cast_signed();
                 let at = reader.seek_relative(behind).and_then(|()| reader.stream_position());
                 let at = at.map_err(|e| Error::disk(&self.name, "read", e))?;
-                Ok(Rest::File(reader.into_inner(), at))
+                Ok(Rest::File(reader.into_inner().into_file(), at))
             }
             Input::File(..) | Input::Gone(_) => Ok(Rest::Nothing),
         }

@@ -108,6 +108,7 @@ fn own_tags(tags: &ExrTags, geometry: &Geometry, notes: &mut Vec<String>) -> Met
     if is_spectral {
         metadata.unit = emissive_unit(tags);
     }
+    metadata.iso_speed = tags.iso_speed.filter(|iso| *iso > 0.0 && iso.is_finite());
     if let Some((exposure_s, f_number)) = tags.exposure_s.zip(tags.f_number) {
         match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
             Ok(exposure) => metadata.exposure = Some(exposure),
@@ -166,6 +167,7 @@ fn read_tags(header: &Header) -> ExrTags {
         software: own.software_name.as_ref().map(text),
         exposure_s: own.exposure.map(f64::from),
         f_number: own.aperture.map(f64::from),
+        iso_speed: own.iso_speed.map(f64::from),
         white_luminance: own.white_luminance.map(f64::from),
         neutral_xy: own.adopted_neutral.map(point),
         interop_id: None,

@@ -6,19 +6,28 @@
 
 mod attributes;
 mod blocks;
+mod format;
 mod header;
+mod layered;
 mod read;
 mod straight;
 mod write;
 mod write_behind;
 
-pub use read::{ExrReader, FORMAT};
+use crate::stages::saturation::MASK_LAYER;
+
+pub use format::FORMAT;
+pub use read::ExrReader;
 pub use write::{ExrWriter, TablePatch, patch_table};
 
 /// The string attribute that holds the metadata.
 const METADATA_ATTRIBUTE: &str = "cyanometer";
 /// The attribute that names the color space.
 const INTEROP_ATTRIBUTE: &str = "colorInteropID";
+/// What it says of channels that are no colors \[CIF2025].
+const DATA: &str = "data";
+/// What the parts of a file are called whose layers stand apart.
+const PART_NAMES: [&str; 2] = ["image", "layers"];
 /// Blocks smaller than this are read 32 at a time, larger ones two, to save memory; blocks to be written are gathered up to
 /// this, or one that is larger.
 const PARALLEL_BLOCK_BYTES: usize = 4 << 20;
@@ -57,6 +66,20 @@ pub enum ExrCompression {
     Piz,
 }
 
+/// Where layers (standard deviations, covariances, marks) stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layers {
+    /// Beside the image, in its part: a pipe needs no seek so.
+    BesideTheImage,
+    /// In a second part, whose channels are marked as data.
+    InAPartOfTheirOwn,
+}
+
+/// Whether a channel is one of a layer.
+fn is_layer(channel: &str) -> bool {
+    channel.contains('.') || channel == MASK_LAYER
+}
+
 pub use crate::color::rgb::Primaries;
 
 /// Chromaticities that mark XYZ stored as R, G, B: an OpenEXR convention.
@@ -73,6 +96,8 @@ pub struct ExrTags {
     pub exposure_s: Option<f64>,
     /// `aperture`, the f-number.
     pub f_number: Option<f64>,
+    /// `isoSpeed`.
+    pub iso_speed: Option<f64>,
     /// `whiteLuminance` in cd m⁻².
     pub white_luminance: Option<f64>,
     /// `adoptedNeutral`: the chromaticity that counts as neutral.

@@ -1,15 +1,14 @@
 //! Reads EXR parts, from files by their offset tables and from pipes as blocks come.
 
-use super::PARALLEL_BLOCK_BYTES;
 use super::blocks::Blocks;
 use super::header::{Contents, read_meta};
 use super::straight::{Offsets, Straight};
+use super::{PARALLEL_BLOCK_BYTES, PART_NAMES, is_layer};
 use crate::color::rgb::Encoding;
 use crate::error::{Error, Result};
 use crate::formats::foreign::exr_complaint;
-use crate::formats::format::{
-    ColorTags, FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign, Streaming,
-};
+use crate::formats::format::{ColorTags, Rest, SampleReader, SampleType};
+use crate::formats::positioned::Positioned;
 use crate::formats::read_ahead::{Pipe, ReadAhead};
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::Metadata;
@@ -18,7 +17,7 @@ use exr::block::chunk::{Chunk, CompressedBlock};
 use exr::math::Vec2;
 use exr::meta::attribute::{LineOrder, SampleType as ExrSampleType};
 use exr::meta::header::Header;
-use exr::meta::{BlockDescription, MetaData, magic_number};
+use exr::meta::{BlockDescription, MetaData};
 use half::f16;
 use rayon::prelude::*;
 use std::fs::File;
@@ -28,20 +27,6 @@ use std::io::{self, Read, Seek};
 const SMALL: u128 = 64 << 20;
 /// Larger ones may take so many times what has been read of the image's blocks.
 const MOST_EXPANSION: u64 = 64;
-
-/// OpenEXR.
-pub const FORMAT: FrameFormat = FrameFormat {
-    name: "an EXR",
-    sign: Sign::Bytes(|head| head.starts_with(&magic_number::BYTES)),
-    reading: Reading::Rows(Readers {
-        open: |file, name, part| Ok(Box::new(ExrReader::open(file, name, part)?)),
-        stream: Some(Streaming {
-            is_streamable,
-            has_parts: false,
-            open: |input, name| Ok(Box::new(ExrReader::stream(input, name)?)),
-        }),
-    }),
-};
 
 /// Reads a part of an EXR file or stream.
 pub struct ExrReader {
@@ -67,7 +52,7 @@ impl ExrReader {
         let failed = |e| Error::disk(name, "read", e);
         let first = file.stream_position().map_err(failed)?;
         let length = file.metadata().map_err(failed)?.len().saturating_sub(first);
-        let mut reader = ReadAhead::new(file);
+        let mut reader = ReadAhead::new(Positioned::of(file).map_err(failed)?);
         let meta = read_meta(&mut reader, name)?;
         let contents = Contents::of(&meta, part, name)?;
         let mut offsets = Offsets::new();
@@ -110,6 +95,39 @@ impl ExrReader {
         let straight = Straight::of(&meta, part, &contents.order);
         let name = name.into();
         Self { blocks, name, meta, part, contents, straight, rows_read: 0, ahead: Vec::new() }
+    }
+
+    /// Whether the second part holds layers of the first, which is of ours.
+    pub(super) fn has_layers(&self) -> bool {
+        let [image, layers] = &self.meta.headers[..] else { return false };
+        let named = |header: &Header, name: &str| {
+            header.own_attributes.layer_name.as_ref().is_some_and(|text| text.as_slice() == name.as_bytes())
+        };
+        let window = |header: &Header| (header.layer_size, header.own_attributes.layer_position);
+        let counts = |header: &Header| {
+            let of_layers = header
+                .channels
+                .list
+                .iter()
+                .filter(|channel| std::str::from_utf8(channel.name.as_slice()).is_ok_and(is_layer));
+            (of_layers.count(), header.channels.list.len())
+        };
+        let is_image = self.contents.tags.metadata.is_some() && counts(image).0 == 0;
+        let are_layers = counts(layers).0 == counts(layers).1 && window(layers) == window(image);
+        is_image && are_layers && named(image, PART_NAMES[0]) && named(layers, PART_NAMES[1])
+    }
+
+    /// What lies behind this part and `other`, once both have been read.
+    pub(super) fn rest_behind(&mut self, other: &Self) -> Result<Rest> {
+        if !(self.is_done() && other.is_done()) {
+            return Ok(Rest::Nothing);
+        }
+        self.blocks.end_with(&other.blocks);
+        self.blocks.rest()
+    }
+
+    fn is_done(&self) -> bool {
+        self.ahead.is_empty() && self.rows_read == self.contents.geometry.height
     }
 
     fn header(&self) -> &Header {
@@ -316,15 +334,8 @@ impl SampleReader for ExrReader {
 
     fn rest(&mut self) -> Result<Rest> {
         let is_single = !self.meta.requirements.is_multilayer() && self.header().blocks == BlockDescription::ScanLines;
-        let is_done = self.ahead.is_empty() && self.rows_read == self.contents.geometry.height;
-        if is_single && is_done { self.blocks.rest() } else { Ok(Rest::Nothing) }
+        if is_single && self.is_done() { self.blocks.rest() } else { Ok(Rest::Nothing) }
     }
-}
-
-/// Whether the bytes are the start of an EXR file that can be read without seeking: one part of scanlines.
-fn is_streamable(head: &[u8]) -> bool {
-    // Bytes 5 and 6 hold the flags: tiled 0x02, deep 0x08, multi-part 0x10 [OpenEXR file layout].
-    head.len() >= 8 && head[..4] == magic_number::BYTES && head[5] & (0x02 | 0x08 | 0x10) == 0
 }
 
 fn read_table(input: &mut impl Read, entries: usize, name: &str) -> Result<Offsets> {

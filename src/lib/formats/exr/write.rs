@@ -2,7 +2,10 @@
 
 use super::straight::encode;
 use super::write_behind::WriteBehind;
-use super::{ExrCompression, ExrSamples, ExrTags, INTEROP_ATTRIBUTE, METADATA_ATTRIBUTE, PARALLEL_BLOCK_BYTES};
+use super::{
+    DATA, ExrCompression, ExrSamples, ExrTags, INTEROP_ATTRIBUTE, Layers, METADATA_ATTRIBUTE, PARALLEL_BLOCK_BYTES,
+    PART_NAMES, is_layer,
+};
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, to_sample};
 use exr::block::UncompressedBlock;
@@ -17,31 +20,38 @@ use exr::meta::{BlockDescription, Requirements, magic_number};
 use rayon::prelude::*;
 use std::io::{self, Seek, SeekFrom, Write};
 
-/// Writes a scanline EXR file, single part.
+/// Writes a scanline EXR file, of one part or with the layers in a second one.
 ///
-/// Without compression every size is known, so header and offset table come first and nothing is patched.
+/// Without compression every size is known, so headers and offset tables come first and nothing is patched.
 pub struct ExrWriter<W> {
     output: WriteBehind<W>,
     name: String,
-    header: Header,
+    /// Those of the parts.
+    headers: Vec<Header>,
+    parts: Vec<Part>,
     samples: ExrSamples,
     geometry: Geometry,
-    /// For each of the file's channels, its place in the geometry.
-    order: Vec<usize>,
     rows_taken: usize,
-    /// Bytes of the rows of a block that is to be compressed and not full yet.
-    partial: Vec<u8>,
-    /// Where each compressed block went.
-    offsets: Vec<u64>,
+    /// Where the offset tables of all parts begin, one behind another.
     table_at: u64,
     position: u64,
 }
 
-/// An offset table that must be put in once the file is written: where, and what.
+/// A part that is being written.
+struct Part {
+    /// For each of its channels, the place in the geometry.
+    order: Vec<usize>,
+    /// Bytes of the rows of a block that is to be compressed and not full yet.
+    partial: Vec<u8>,
+    /// Where each compressed block went.
+    offsets: Vec<u64>,
+}
+
+/// Offset tables that must be put in once the file is written: where, and what.
 pub type TablePatch = (u64, Vec<u8>);
 
 impl<W: Write> ExrWriter<W> {
-    /// Writes header and offset table.
+    /// Writes headers and offset tables.
     ///
     /// # Errors
     ///
@@ -52,48 +62,81 @@ impl<W: Write> ExrWriter<W> {
         geometry: &Geometry,
         samples: ExrSamples,
         compression: ExrCompression,
+        layers: Layers,
         tags: &ExrTags,
     ) -> Result<Self> {
-        let mut order: Vec<usize> = (0..geometry.channels.len()).collect();
-        order.sort_by(|&a, &b| geometry.channels[a].as_bytes().cmp(geometry.channels[b].as_bytes()));
-        let header = file_header(name, geometry, &order, samples, compression, tags)?;
+        let orders = orders(geometry, layers);
+        let is_divided = orders.len() > 1;
+        let mut headers = Vec::new();
+        for (order, part_name) in orders.iter().zip(PART_NAMES) {
+            let mut header = file_header(name, geometry, order, samples, compression, tags)?;
+            if is_divided {
+                header.own_attributes.layer_name = Some(Text::new_or_panic(part_name));
+            }
+            if !headers.is_empty() {
+                mark_as_data(&mut header);
+            }
+            headers.push(header);
+        }
         let mut head = Vec::new();
         let requirements = Requirements {
             file_format_version: 2,
             is_single_layer_and_tiled: false,
             has_long_names: geometry.channels.iter().any(|channel| channel.len() > 31),
             has_deep_data: false,
-            has_multiple_layers: false,
+            has_multiple_layers: is_divided,
         };
         let encoded = magic_number::write(&mut head)
             .and_then(|()| requirements.write(&mut head))
-            .and_then(|()| Header::write_all(std::slice::from_ref(&header), &mut head, false));
+            .and_then(|()| Header::write_all(&headers, &mut head, is_divided));
         encoded.map_err(|error| Error::format(name, format!("its header cannot be written: {error}")))?;
         let table_at = head.len() as u64;
-        let blocks = header.chunk_count as u64;
-        let data_at = table_at + 8 * blocks;
-        // An uncompressed block is one row: y coordinate and size in 4 bytes each, then the samples.
-        let block_bytes = 8 + header.max_block_byte_size() as u64;
+        let blocks = headers.iter().map(|header| header.chunk_count as u64).sum::<u64>();
+        let parts = orders.into_iter().map(|order| Part { order, partial: Vec::new(), offsets: Vec::new() }).collect();
         let mut writer = Self {
             output: WriteBehind::new(output),
             name: name.into(),
-            header,
+            headers,
+            parts,
             samples,
             geometry: geometry.clone(),
-            order,
             rows_taken: 0,
-            partial: Vec::new(),
-            offsets: Vec::new(),
             table_at,
-            position: data_at,
+            position: table_at + 8 * blocks,
         };
         writer.put(&head)?;
-        // Entry by entry: the table of a frame of 2^31 rows takes 16 GiB.
-        for block in 0..blocks {
-            let offset = if compression == ExrCompression::None { data_at + block * block_bytes } else { 0 };
-            writer.put(&offset.to_le_bytes())?;
-        }
+        writer.put_tables(compression)?;
         Ok(writer)
+    }
+
+    /// Writes the offset tables: those of uncompressed blocks as they will be, others empty.
+    fn put_tables(&mut self, compression: ExrCompression) -> Result<()> {
+        let (first, is_plain) = (self.position, compression == ExrCompression::None);
+        // An uncompressed block is one row; of several parts, each part's row follows that of the part before it.
+        let sizes: Vec<u64> = (0..self.parts.len()).map(|part| self.block_bytes(part)).collect();
+        for part in 0..self.parts.len() {
+            let before = sizes[..part].iter().sum::<u64>();
+            // Entry by entry: the table of a frame of 2^31 rows takes 16 GiB.
+            for block in 0..self.headers[part].chunk_count as u64 {
+                let offset = if is_plain { first + before + block * sizes.iter().sum::<u64>() } else { 0 };
+                self.put(&offset.to_le_bytes())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes of an uncompressed block: the part's number where there are several, y coordinate and size in 4 bytes each, then
+    /// the samples.
+    fn block_bytes(&self, part: usize) -> u64 {
+        let number = if self.parts.len() > 1 { 4 } else { 0 };
+        number + 8 + self.headers[part].max_block_byte_size() as u64
+    }
+
+    /// The head of a block of `bytes` bytes that begins at row `y`.
+    fn block_head(&self, part: usize, y: i32, bytes: usize) -> Vec<u8> {
+        let size = i32::try_from(bytes).unwrap_or(i32::MAX);
+        let number = i32::try_from(part).ok().filter(|_| self.parts.len() > 1);
+        number.into_iter().chain([y, size]).flat_map(i32::to_le_bytes).collect()
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
@@ -106,27 +149,34 @@ impl<W: Write> ExrWriter<W> {
     ///
     /// [`Error::Disk`] where writing fails.
     pub fn write(&mut self, samples: &[f32]) -> Result<()> {
-        let is_compressed = self.header.compression != Compression::Uncompressed;
+        let is_compressed = self.is_compressed();
         for row in samples.chunks_exact(self.geometry.row_samples()) {
-            if is_compressed {
-                self.gather(row);
-                self.rows_taken += 1;
-                self.compress_full_blocks()?;
-            } else {
-                self.put_row(row).map_err(|e| Error::disk(&self.name, "write", e))?;
-                self.rows_taken += 1;
+            for part in 0..self.parts.len() {
+                if is_compressed {
+                    self.gather(part, row);
+                } else {
+                    self.put_row(part, row).map_err(|e| Error::disk(&self.name, "write", e))?;
+                }
+            }
+            self.rows_taken += 1;
+            for part in 0..self.parts.len() {
+                self.compress_full_blocks(part)?;
             }
         }
         Ok(())
     }
 
-    /// Writes a row as a block, in the file's order of channels.
-    fn put_row(&mut self, row: &[f32]) -> io::Result<()> {
-        let size = i32::try_from(self.header.max_block_byte_size()).unwrap_or(i32::MAX);
-        self.output.write_all(&self.row_coordinate(self.rows_taken).to_le_bytes())?;
-        self.output.write_all(&size.to_le_bytes())?;
+    fn is_compressed(&self) -> bool {
+        self.headers[0].compression != Compression::Uncompressed
+    }
+
+    /// Writes a row as a block, in the part's order of channels.
+    fn put_row(&mut self, part: usize, row: &[f32]) -> io::Result<()> {
+        let size = self.headers[part].max_block_byte_size();
+        let head = self.block_head(part, self.row_coordinate(self.rows_taken), size);
+        self.output.write_all(&head)?;
         let (width, bytes) = (self.geometry.width, self.samples.bytes());
-        for &channel in &self.order {
+        for &channel in &self.parts[part].order {
             let mut line = &row[channel * width..(channel + 1) * width];
             while !line.is_empty() {
                 let room = self.output.room(bytes)?;
@@ -139,13 +189,14 @@ impl<W: Write> ExrWriter<W> {
         Ok(())
     }
 
-    /// Appends a row to what is to be compressed, in the file's order of channels.
-    fn gather(&mut self, row: &[f32]) {
+    /// Appends a row to what is to be compressed, in the part's order of channels.
+    fn gather(&mut self, part: usize, row: &[f32]) {
         let (width, bytes) = (self.geometry.width, self.samples.bytes());
-        for &channel in &self.order {
-            let start = self.partial.len();
-            self.partial.resize(start + width * bytes, 0);
-            encode(&row[channel * width..(channel + 1) * width], self.samples, &mut self.partial[start..]);
+        let Part { order, partial, .. } = &mut self.parts[part];
+        for &channel in order.iter() {
+            let start = partial.len();
+            partial.resize(start + width * bytes, 0);
+            encode(&row[channel * width..(channel + 1) * width], self.samples, &mut partial[start..]);
         }
     }
 
@@ -154,15 +205,16 @@ impl<W: Write> ExrWriter<W> {
     }
 
     /// Compresses what is pending once it fills enough blocks to keep the threads busy, or at the end.
-    fn compress_full_blocks(&mut self) -> Result<()> {
-        let block_bytes = self.header.max_block_byte_size();
+    fn compress_full_blocks(&mut self, part: usize) -> Result<()> {
+        let block_bytes = self.headers[part].max_block_byte_size();
         let together = (PARALLEL_BLOCK_BYTES / block_bytes).clamp(1, 2 * rayon::current_num_threads());
         let last = self.rows_taken == self.geometry.height;
-        if self.partial.is_empty() || !(last || self.partial.len() >= together * block_bytes) {
+        let gathered = self.parts[part].partial.len();
+        if gathered == 0 || !(last || gathered >= together * block_bytes) {
             return Ok(());
         }
-        let lines = self.header.compression.scan_lines_per_block();
-        let pending = std::mem::take(&mut self.partial);
+        let lines = self.headers[part].compression.scan_lines_per_block();
+        let pending = std::mem::take(&mut self.parts[part].partial);
         let first_row = self.rows_taken - pending.len() / (block_bytes / lines);
         // A single block is moved, not copied: on wide frames it is the largest thing in memory.
         let blocks: Vec<Vec<u8>> = match pending.len() <= block_bytes {
@@ -173,7 +225,7 @@ impl<W: Write> ExrWriter<W> {
             let row = first_row + index * lines;
             let block = UncompressedBlock {
                 index: exr::block::BlockIndex {
-                    layer: 0,
+                    layer: part,
                     pixel_position: Vec2(0, row),
                     pixel_size: Vec2(self.geometry.width, data.len() / (block_bytes / lines)),
                     level: Vec2(0, 0),
@@ -181,37 +233,37 @@ impl<W: Write> ExrWriter<W> {
                 data,
             };
             block
-                .compress_to_chunk(std::slice::from_ref(&self.header))
+                .compress_to_chunk(&self.headers)
                 .map_err(|error| Error::format(&self.name, format!("a block cannot be compressed: {error}")))
         };
         let chunks: Vec<Chunk> = blocks.into_par_iter().enumerate().map(compress).collect::<Result<Vec<_>>>()?;
         for chunk in chunks {
             let CompressedBlock::ScanLine(block) = &chunk.compressed_block else { continue };
-            self.offsets.push(self.position);
-            let size = i32::try_from(block.compressed_pixels_le.len()).unwrap_or(i32::MAX);
-            let head = [block.y_coordinate.to_le_bytes(), size.to_le_bytes()].concat();
+            self.parts[part].offsets.push(self.position);
+            let head = self.block_head(part, block.y_coordinate, block.compressed_pixels_le.len());
             self.put(&head)?;
             self.put(&block.compressed_pixels_le)?;
-            self.position += 8 + block.compressed_pixels_le.len() as u64;
+            self.position += (head.len() + block.compressed_pixels_le.len()) as u64;
         }
         Ok(())
     }
 
-    /// Ends the file; gives back the output and, after compression, the offset table to patch in.
+    /// Ends the file; gives back the output and, after compression, the offset tables to patch in.
     ///
     /// # Errors
     ///
     /// [`Error::Disk`] where writing fails.
     pub fn finish(self) -> Result<(W, Option<TablePatch>)> {
         assert_eq!(self.rows_taken, self.geometry.height, "a frame was ended before its last row");
+        let is_compressed = self.is_compressed();
         let output = self.output.finish().map_err(|e| Error::disk(&self.name, "write", e))?;
-        let table = self.offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
-        let patch = (self.header.compression != Compression::Uncompressed).then_some((self.table_at, table));
+        let offsets = self.parts.iter().flat_map(|part| &part.offsets);
+        let patch = is_compressed.then(|| (self.table_at, offsets.flat_map(|offset| offset.to_le_bytes()).collect()));
         Ok((output, patch))
     }
 }
 
-/// Puts an offset table into its place.
+/// Puts offset tables into their place.
 ///
 /// # Errors
 ///
@@ -224,6 +276,29 @@ pub fn patch_table<W: Write + Seek>(output: &mut W, name: &str, (at, table): &Ta
         output.flush()
     };
     patch(output).map_err(|e| Error::disk(name, "write", e))
+}
+
+/// For each part the places of its channels in the geometry, by their names.
+fn orders(geometry: &Geometry, layers: Layers) -> Vec<Vec<usize>> {
+    let is_apart = |place: &usize| layers == Layers::InAPartOfTheirOwn && is_layer(&geometry.channels[*place]);
+    let (beside, image): (Vec<usize>, Vec<usize>) = (0..geometry.channels.len()).partition(is_apart);
+    let mut orders = if beside.is_empty() || image.is_empty() {
+        vec![(0..geometry.channels.len()).collect::<Vec<usize>>()]
+    } else {
+        vec![image, beside]
+    };
+    for order in &mut orders {
+        order.sort_by(|&a, &b| geometry.channels[a].as_bytes().cmp(geometry.channels[b].as_bytes()));
+    }
+    orders
+}
+
+/// Says of a part that its channels are no colors. What holds for the whole file stays with the first.
+fn mark_as_data(header: &mut Header) {
+    let own = LayerAttributes { layer_position: header.own_attributes.layer_position, ..LayerAttributes::default() };
+    header.own_attributes = LayerAttributes { layer_name: header.own_attributes.layer_name.take(), ..own };
+    let name = (Text::new_or_panic(INTEROP_ATTRIBUTE), AttributeValue::Text(Text::new_or_panic(DATA)));
+    header.shared_attributes.other = std::iter::once(name).collect();
 }
 
 fn file_header(
@@ -284,6 +359,7 @@ fn attributes(tags: &ExrTags, origin: Vec2<i32>, size: Vec2<usize>) -> (LayerAtt
     own.software_name = tags.software.as_ref().map(text);
     own.exposure = tags.exposure_s.map(to_sample);
     own.aperture = tags.f_number.map(to_sample);
+    own.iso_speed = tags.iso_speed.map(to_sample);
     own.white_luminance = tags.white_luminance.map(to_sample);
     own.adopted_neutral = tags.neutral_xy.map(point);
     // The crate keeps other attributes in hash maps; one entry alone in each has the same order in every run.

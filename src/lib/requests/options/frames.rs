@@ -109,10 +109,13 @@ pub struct Output {
     /// DNG
     #[arg(long, value_name = "TYPE", value_parser = values::choice::<SampleKind>())]
     pub sample_type: Option<SampleKind>,
-    /// Scale samples by a power of two so that image viewers show them: what is white comes into the upper half of 0 to 1 (EXR,
-    /// TIFF of floats) or of 16 bits. Programs of this toolchain undo it to the bit
+    /// Scale samples by a power of two so that viewers show them: white between half and all of 1, or of 16 bits. Programs of
+    /// this toolchain undo it to the bit
     #[arg(long)]
     pub viewable: bool,
+    /// Put the layers of an EXR file (standard deviations, covariances, marks) into a second part of it, marked as data
+    #[arg(long)]
+    pub separate_layers: bool,
 }
 
 impl Output {
@@ -175,6 +178,7 @@ impl Output {
             compression: self.compression,
             samples: self.sample_type,
             is_viewable: self.viewable,
+            separates_layers: self.separate_layers,
             frames_to_come: 0,
         }
     }
