@@ -247,74 +247,88 @@ pub(super) fn at_full_well(near: &[Node], full: f64, reading: &Reading, at_full:
     let (below, above): (Vec<Node>, Vec<Node>) =
         near.iter().partition(|node| node.mean <= full && node.floor == f64::NEG_INFINITY);
     let mut sum = [0.0; 4];
-    let mut add = |weight: f64, moments: Moments| {
-        for (sum, moment) in sum.iter_mut().zip(moments) {
-            *sum += weight * moment;
-        }
-    };
     for node in &below {
-        add(node.weight, open.at(node.mean, node.std * node.std));
+        add(&mut sum, node.weight, open.at(node.mean, node.std * node.std));
     }
     for node in &above {
-        add(node.weight, at_full);
+        add(&mut sum, node.weight, at_full);
         if node.floor.is_finite() {
             let share = cumulative((node.floor - node.mean) / node.std);
-            add(node.weight * share, difference(open.at(node.floor, 0.0), at_full));
+            add(&mut sum, node.weight * share, difference(open.at(node.floor, 0.0), at_full));
         }
     }
-    for (mut nodes, direction, sign) in [(below, 1.0, -1.0), (above, -1.0, 1.0)] {
-        if nodes.is_empty() {
-            continue;
-        }
-        nodes.sort_by(|a, b| a.mean.total_cmp(&b.mean));
-        let reach = |node: &Node| (REACH * node.std + direction * (node.mean - full)).min(full - node.floor);
-        let farthest = nodes.iter().map(reach).fold(0.0, f64::max);
-        let stds = nodes.iter().map(|node| node.std);
-        let is_narrow = |std: &f64| *std < MANY * code;
-        let widest = stds.clone().fold(0.0, f64::max);
-        let stretch = Stretch {
-            from: full,
-            direction,
-            extent: farthest,
-            narrowest: stds.clone().fold(f64::INFINITY, f64::min),
-            widest_narrow: stds.filter(is_narrow).fold(0.0, f64::max),
-            noise_e: reading.noise_e,
-            widest_panel: f64::INFINITY,
-        };
-        let mut floors: Vec<f64> = nodes.iter().map(|node| node.floor).filter(|floor| floor.is_finite()).collect();
-        floors.sort_by(f64::total_cmp);
-        floors.dedup();
-        // So many are a step so small each that nothing is seen of them.
-        if floors.len() > MOST_BREAKS {
-            floors.clear();
-        }
-        let share_at = |electrons: f64| -> f64 {
-            let at = |node: &Node| {
-                let z = (electrons - node.mean) / node.std;
-                if z.abs() < REACH && electrons > node.floor { node.weight * density(z) / node.std } else { 0.0 }
-            };
-            let within = |mean: f64| nodes.partition_point(|node| node.mean < mean);
-            let reach = REACH * widest;
-            nodes[within(electrons - reach)..within(electrons + reach)].iter().map(at).sum()
-        };
-        let flat = Flat::of(&nodes, full, farthest, direction);
-        let share_at = |electrons: f64| flat.as_ref().map_or_else(|| share_at(electrons), |flat| flat.at(electrons));
-        let places = stretch.places(&open, &floors);
-        let mut shares = Interpolant::new(stretch.smooth_panels(&floors), share_at);
-        // Codes may cut panels that one rule would do for into many.
-        let is_cut_fine = places.len() > 2 * shares.places();
-        for place in places {
-            let distance = (place.electrons - full) * direction;
-            let share =
-                if is_cut_fine { shares.at(distance, |d| full + direction * d) } else { share_at(place.electrons) };
-            if share != 0.0 {
-                let moments =
-                    if place.is_smooth { open.smooth_at(place.electrons) } else { open.at(place.electrons, 0.0) };
-                add(sign * share * place.weight, difference(moments, at_full));
-            }
-        }
+    for (nodes, direction) in [(below, 1.0), (above, -1.0)] {
+        add_beyond(&mut sum, nodes, direction, full, [&open, reading], at_full);
     }
     sum
+}
+
+fn add(sum: &mut Moments, weight: f64, moments: Moments) {
+    for (sum, moment) in sum.iter_mut().zip(moments) {
+        *sum += weight * moment;
+    }
+}
+
+/// Takes off what is read of normal laws beyond full well (`direction` 1), or adds what is read below it of those whose mean lies
+/// beyond (−1), less what is read there of full photosites. `open` is the reading without a highest code where that is out of reach.
+fn add_beyond(
+    sum: &mut Moments,
+    mut nodes: Vec<Node>,
+    direction: f64,
+    full: f64,
+    [open, reading]: [&Reading; 2],
+    at_full: Moments,
+) {
+    let sign = -direction;
+    let code = reading.visible_code_e().unwrap_or(0.0);
+    if nodes.is_empty() {
+        return;
+    }
+    nodes.sort_by(|a, b| a.mean.total_cmp(&b.mean));
+    let reach = |node: &Node| (REACH * node.std + direction * (node.mean - full)).min(full - node.floor);
+    let farthest = nodes.iter().map(reach).fold(0.0, f64::max);
+    let stds = nodes.iter().map(|node| node.std);
+    let is_narrow = |std: &f64| *std < MANY * code;
+    let widest = stds.clone().fold(0.0, f64::max);
+    let stretch = Stretch {
+        from: full,
+        direction,
+        extent: farthest,
+        narrowest: stds.clone().fold(f64::INFINITY, f64::min),
+        widest_narrow: stds.filter(is_narrow).fold(0.0, f64::max),
+        noise_e: reading.noise_e,
+        widest_panel: f64::INFINITY,
+    };
+    let mut floors: Vec<f64> = nodes.iter().map(|node| node.floor).filter(|floor| floor.is_finite()).collect();
+    floors.sort_by(f64::total_cmp);
+    floors.dedup();
+    // So many are a step so small each that nothing is seen of them.
+    if floors.len() > MOST_BREAKS {
+        floors.clear();
+    }
+    let share_at = |electrons: f64| -> f64 {
+        let at = |node: &Node| {
+            let z = (electrons - node.mean) / node.std;
+            if z.abs() < REACH && electrons > node.floor { node.weight * density(z) / node.std } else { 0.0 }
+        };
+        let within = |mean: f64| nodes.partition_point(|node| node.mean < mean);
+        let reach = REACH * widest;
+        nodes[within(electrons - reach)..within(electrons + reach)].iter().map(at).sum()
+    };
+    let flat = Flat::of(&nodes, full, farthest, direction);
+    let share_at = |electrons: f64| flat.as_ref().map_or_else(|| share_at(electrons), |flat| flat.at(electrons));
+    let places = stretch.places(open, &floors);
+    let mut shares = Interpolant::new(stretch.smooth_panels(&floors), share_at);
+    // Codes may cut panels that one rule would do for into many.
+    let is_cut_fine = places.len() > 2 * shares.places();
+    for place in places {
+        let distance = (place.electrons - full) * direction;
+        let share = if is_cut_fine { shares.at(distance, |d| full + direction * d) } else { share_at(place.electrons) };
+        if share != 0.0 {
+            let moments = if place.is_smooth { open.smooth_at(place.electrons) } else { open.at(place.electrons, 0.0) };
+            add(sum, sign * share * place.weight, difference(moments, at_full));
+        }
+    }
 }
 
 pub(super) fn difference(a: Moments, b: Moments) -> Moments {

@@ -222,50 +222,56 @@ fn seams(reading: &Reading, other: &MeanVariance, full: f64) -> Vec<f64> {
     edges.into_iter().filter(|edge| edge.is_finite()).flat_map(of_edge).collect()
 }
 
+/// The same at places that are shared, where no code is to be gone through: the density is worked out once.
+fn of_shared(
+    (counts, base): (&[Count], &Stretch),
+    others: &[Count],
+    few: Option<&Vec<Count>>,
+    reading: &Reading,
+    full: f64,
+) -> Moments {
+    let mut sum = [0.0; 4];
+    let code = reading.visible_code_e();
+    let spread_out = MeanVariance::of_counts(others);
+    // Codes that the other charge covers by many are a uniform error.
+    let is_many = code.is_some_and(|code| spread_out.std() > MANY * code);
+    let finest = reading.noise_e.max(if code.is_some() { f64::INFINITY } else { 0.0 });
+    let narrow = Stretch { noise_e: 0.0, narrowest: base.narrowest.min(finest.max(1e-3)), ..*base };
+    let places = narrow.places(&Reading::electrons(0.0, 0.0), &seams(reading, &spread_out, full));
+    let share = |place: &Place| (place.electrons, place.weight * density_at(counts, place.electrons));
+    let shared: Vec<(f64, f64)> = places.iter().map(share).collect();
+    let gone: f64 = shared.iter().map(|(_, weight)| weight).sum();
+    for other in others {
+        add(&mut sum, other.weight * gone, reading.at(other.electrons.min(full), other.spread.powi(2)));
+    }
+    // What is moved is a polynomial where codes are many, or none, and nothing ends.
+    let is_polynomial = reading.is_endless() && (is_many || code.is_none());
+    for other in few.filter(|_| is_polynomial).map_or(others, Vec::as_slice) {
+        let variance = other.spread * other.spread;
+        for &(below, weight) in &shared {
+            let at = (other.electrons + below).min(full);
+            let is_free = is_many && reading.is_free_at(at, variance);
+            let moved = if is_free { smooth(reading, at, variance) } else { reading.at(at, variance) };
+            add(&mut sum, -other.weight * weight, moved);
+        }
+    }
+    sum
+}
+
 fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> Moments {
     let mut sum = [0.0; 4];
     let Some((counts, base)) = below_zero(charge) else { return sum };
     let Others { each: others, few } = others;
     let code = reading.visible_code_e();
-    // Shared places where no code is to be gone through; then the density is worked out once.
-    let is_shared = others.len() > MANY_NODES || code.is_none();
-    let spread_out = MeanVariance::of_counts(others);
-    // Codes that the other charge covers by many are a uniform error.
-    let is_many = code.is_some_and(|code| spread_out.std() > MANY * code);
-    let shared: Vec<(f64, f64)> = if is_shared {
-        let blind = Stretch { noise_e: 0.0, ..base };
-        let finest = reading.noise_e.max(if is_shared && code.is_some() { f64::INFINITY } else { 0.0 });
-        let narrow = Stretch { narrowest: blind.narrowest.min(finest.max(1e-3)), ..blind };
-        let places = narrow.places(&Reading::electrons(0.0, 0.0), &seams(reading, &spread_out, full));
-        let share = |place: &Place| (place.electrons, place.weight * density_at(&counts, place.electrons));
-        places.iter().map(share).collect()
-    } else {
-        Vec::new()
-    };
+    if others.len() > MANY_NODES || code.is_none() {
+        return of_shared((&counts, &base), others, few.as_ref(), reading, full);
+    }
     // Codes are gone through as far as laws reach that are narrow.
     let spreads = counts.iter().map(|count| count.spread);
     let narrow = spreads.filter(|spread| *spread < MANY * code.unwrap_or(0.0)).fold(0.0, f64::max);
-    let mut steps = if is_shared { None } else { Steps::new(charge, &base, &counts, reading) };
+    let mut steps = Steps::new(charge, &base, &counts, reading);
     let mut table = None;
     let is_only = others.windows(2).all(|pair| pair[0].spread == pair[1].spread);
-    if is_shared {
-        let gone: f64 = shared.iter().map(|(_, weight)| weight).sum();
-        for other in others {
-            add(&mut sum, other.weight * gone, reading.at(other.electrons.min(full), other.spread.powi(2)));
-        }
-        // What is moved is a polynomial where codes are many, or none, and nothing ends.
-        let is_polynomial = reading.is_endless() && (is_many || code.is_none());
-        for other in few.as_ref().filter(|_| is_polynomial).unwrap_or(others) {
-            let variance = other.spread * other.spread;
-            for &(below, weight) in &shared {
-                let at = (other.electrons + below).min(full);
-                let is_free = is_many && reading.is_free_at(at, variance);
-                let moved = if is_free { smooth(reading, at, variance) } else { reading.at(at, variance) };
-                add(&mut sum, -other.weight * weight, moved);
-            }
-        }
-        return sum;
-    }
     for other in others {
         let noise_e = reading.noise_e.hypot(other.spread);
         let is_hidden = code.is_some_and(|code| noise_e > SMOOTH * code);

@@ -11,8 +11,9 @@
 //! e what a photosite has beyond full well, r the room that it has, r′ what is left of it. Charge is conserved: what is drained,
 //! what leaves at the ends, and what is in the wells at last is what was collected. [`Spill`] does it, row by row.
 
+use super::AddNoise;
+use super::line::{Charges, Line, Scratch, add, not_finite};
 use super::smear::check_whole;
-use super::{AddNoise, Charges, Line, Scratch, add, not_finite};
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{FrameHeader, PoissonKind};

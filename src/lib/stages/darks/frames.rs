@@ -1,0 +1,250 @@
+//! Dark frames that are read in step with the frame that they come off.
+
+use super::stack::{DarkSettings, DarkStack, Master};
+use crate::error::Result;
+use crate::frame::to_sample;
+use crate::metadata::FrameHeader;
+use crate::stages::defects::{Survey, add};
+use crate::stages::masters::{Averaging, Frames};
+use crate::stages::saturation::DEFECTIVE;
+use crate::stages::sites::SiteClasses;
+use crate::stream::RowSource;
+
+/// Dark frames read in step; memory is some rows of them, and what comes off.
+#[derive(Debug)]
+pub struct DarkFrames<S> {
+    stack: DarkStack,
+    masters: Vec<Frames<S>>,
+    rows_made: usize,
+    made: Vec<f64>,
+    average: Vec<f64>,
+    /// Photosites that were found to be off, and unstable, so far.
+    found: [u64; 2],
+}
+
+impl<S: RowSource> DarkFrames<S> {
+    /// The mean of all of `frames`; none of none.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`DarkStack::of`].
+    pub fn of(frames: Vec<S>) -> Result<Option<Self>> {
+        let stack = DarkStack::of(frames.iter().map(S::header))?;
+        Ok(stack.map(|stack| Self::new(stack, frames)))
+    }
+
+    /// What comes off `frame`, of dark and of bias frames; none of none.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`DarkStack::matched`].
+    pub fn matched(frame: &FrameHeader, darks: Vec<S>, biases: Vec<S>, settings: DarkSettings) -> Result<Option<Self>> {
+        let heads = |frames: &[S]| frames.iter().map(|frame| frame.header().clone()).collect::<Vec<_>>();
+        let (of_darks, of_biases) = (heads(&darks), heads(&biases));
+        let [of_darks, of_biases] = [&of_darks, &of_biases].map(|heads| heads.iter().collect::<Vec<_>>());
+        let stack = DarkStack::matched(frame, &of_darks, &of_biases, settings)?;
+        Ok(stack.map(|stack| Self::new(stack, darks.into_iter().chain(biases).collect())))
+    }
+
+    fn new(stack: DarkStack, frames: Vec<S>) -> Self {
+        let mut frames: Vec<Option<S>> = frames.into_iter().map(Some).collect();
+        let master = |Master { record, members }: &Master| {
+            let of_master = members.iter().filter_map(|member| frames[*member].take()).collect();
+            Frames::new(of_master, Averaging::of(&record.average))
+        };
+        let masters = stack.masters.iter().map(master).collect();
+        Self { stack, masters, rows_made: 0, made: Vec::new(), average: Vec::new(), found: [0; 2] }
+    }
+
+    /// What is known of them.
+    pub fn stack(&self) -> &DarkStack {
+        &self.stack
+    }
+
+    /// Each of those that count.
+    pub fn frames(&self) -> impl Iterator<Item = &S> {
+        self.masters.iter().flat_map(Frames::frames)
+    }
+
+    /// The averages.
+    pub fn masters_mut(&mut self) -> &mut [Frames<S>] {
+        &mut self.masters
+    }
+
+    /// Photosites that were found to be off, and unstable, so far.
+    pub fn found(&self) -> [u64; 2] {
+        self.found
+    }
+
+    /// Samples of theirs that were clipped so far.
+    pub fn clipped(&self) -> u64 {
+        self.masters.iter().map(Frames::clipped).sum()
+    }
+
+    pub(super) fn natural_rows(&self) -> usize {
+        self.frames().map(S::natural_rows).fold(1, usize::max)
+    }
+
+    pub(super) fn may_wait(&self) -> bool {
+        self.frames().any(S::may_wait)
+    }
+
+    /// Reads all rows for what is ordinary among what comes off, within so many standard deviations; and among variances
+    /// from frame to frame, where there are frames enough of the first average.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames.
+    pub fn survey(mut self, beyond: f64) -> Result<DarkLimits> {
+        let geometry = self.stack.head.geometry.clone();
+        let (width, planes) = (geometry.width, geometry.channels.len());
+        let classes = SiteClasses::of(&self.stack.head, planes);
+        let survey = || Survey::new(classes.count(), width * geometry.height);
+        let [mut levels, mut scatters] = [survey(), survey()];
+        let has_scatter = self.keep_scatter();
+        while self.rows_made < geometry.height {
+            let first = self.rows_made;
+            self.next(geometry.cached_rows().min(geometry.height - first))?;
+            for (index, line) in self.made.chunks_exact(width).enumerate() {
+                let of_row = classes.row(first + index / planes, index % planes);
+                for (x, dark) in line.iter().enumerate() {
+                    let class = of_row[x % of_row.len()];
+                    levels.take(class, *dark);
+                    if has_scatter {
+                        scatters.take(class, self.masters[0].scatter()[index * width + x].cbrt());
+                    }
+                }
+            }
+        }
+        // Rounding alone scatters by as much.
+        let levels = levels.limits(beyond, 0.25);
+        let scatters = has_scatter.then(|| scatters.limits(beyond, 1e-3));
+        Ok(DarkLimits { levels, scatters, classes })
+    }
+
+    /// Keeps the scatter of the frames of the first average, where they are enough; gives whether they are.
+    fn keep_scatter(&mut self) -> bool {
+        let is_enough = self.masters.first().is_some_and(|master| master.frames().count() >= ENOUGH_TO_SCATTER);
+        if is_enough {
+            self.masters[0].keep_scatter();
+        }
+        is_enough
+    }
+
+    /// What comes off the next `rows` rows, `[row][channel][column]`; doubles, as samples would round it.
+    pub(in crate::stages) fn next(&mut self, rows: usize) -> Result<&[f64]> {
+        let geometry = &self.stack.head.geometry;
+        let (row_samples, width) = (geometry.row_samples(), geometry.width);
+        self.made.clear();
+        self.made.resize(rows * row_samples, 0.0);
+        for (master, Master { record, .. }) in self.masters.iter_mut().zip(&self.stack.masters) {
+            master.next(rows, &mut self.average)?;
+            for (sum, average) in self.made.iter_mut().zip(&self.average) {
+                *sum += record.weight * average;
+            }
+        }
+        if let Some(level) = &self.stack.level {
+            for (index, line) in self.made.chunks_exact_mut(width).enumerate() {
+                let black = level.row(self.rows_made + index / (row_samples / width));
+                line.iter_mut().enumerate().for_each(|(x, sum)| *sum += black.at(x));
+            }
+        }
+        self.rows_made += rows;
+        Ok(&self.made)
+    }
+}
+
+/// Frames from which on their scatter tells unstable photosites.
+const ENOUGH_TO_SCATTER: usize = 5;
+
+/// What is ordinary among dark frames, by class.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DarkLimits {
+    levels: Vec<[f64; 2]>,
+    /// Of cube roots of variances, which are nearly normal \[WH1931].
+    scatters: Option<Vec<[f64; 2]>>,
+    classes: SiteClasses,
+}
+
+impl DarkLimits {
+    /// Whether frames were enough to tell unstable photosites.
+    pub fn tell_unstable(&self) -> bool {
+        self.scatters.is_some()
+    }
+}
+
+/// The rows of a frame less what dark frames make, all read in step.
+pub struct LessDarks<'a, S> {
+    frame: &'a mut dyn RowSource,
+    darks: &'a mut DarkFrames<S>,
+    limits: Option<&'a DarkLimits>,
+}
+
+impl<'a, S: RowSource> LessDarks<'a, S> {
+    /// `frame` less `darks`, which fit it as [`CorrectFrame::new`](super::correct::CorrectFrame::new) makes sure. What
+    /// channels it has behind those of the darks stay as they are.
+    pub fn new(frame: &'a mut dyn RowSource, darks: &'a mut DarkFrames<S>) -> Self {
+        Self { frame, darks, limits: None }
+    }
+
+    /// The same; photosites beyond `limits` are marked as defective in the last channel of `frame`, the layer of marks.
+    pub fn marking(frame: &'a mut dyn RowSource, darks: &'a mut DarkFrames<S>, limits: &'a DarkLimits) -> Self {
+        darks.keep_scatter();
+        Self { limits: Some(limits), ..Self::new(frame, darks) }
+    }
+
+    /// Marks rows of the frame from `first` on.
+    fn mark(&mut self, first: usize, samples: &mut [f32]) {
+        let Some(limits) = self.limits else { return };
+        let geometry = &self.darks.stack.head.geometry;
+        let (width, planes) = (geometry.width, geometry.channels.len());
+        let of_frame = self.frame.header().geometry.row_samples();
+        let DarkFrames { masters, made, found, .. } = &mut *self.darks;
+        let scatter = masters[0].scatter();
+        for (index, line) in made.chunks_exact(width).enumerate() {
+            let marks = &mut samples[(index / planes + 1) * of_frame - width..][..width];
+            let of_row = limits.classes.row(first + index / planes, index % planes);
+            for (x, (dark, mark)) in line.iter().zip(marks).enumerate() {
+                let class = of_row[x % of_row.len()];
+                let [low, high] = limits.levels[class];
+                let is_off = !(low..=high).contains(dark);
+                let is_unstable = limits.scatters.as_ref().is_some_and(|scatters| {
+                    scatter.get(index * width + x).is_some_and(|scatter| scatter.cbrt() > scatters[class][1])
+                });
+                if is_off || is_unstable {
+                    add(mark, DEFECTIVE);
+                    found[usize::from(!is_off)] += 1;
+                }
+            }
+        }
+    }
+}
+
+impl<S: RowSource> RowSource for LessDarks<'_, S> {
+    fn header(&self) -> &FrameHeader {
+        self.frame.header()
+    }
+
+    fn natural_rows(&self) -> usize {
+        self.frame.natural_rows().max(self.darks.natural_rows())
+    }
+
+    fn may_wait(&self) -> bool {
+        self.frame.may_wait() || self.darks.may_wait()
+    }
+
+    fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
+        let start = samples.len();
+        self.frame.read(rows, samples)?;
+        let of_frame = self.frame.header().geometry.row_samples();
+        let of_dark = self.darks.stack.head.geometry.row_samples();
+        let darks = self.darks.next(rows)?;
+        for (row, darks) in samples[start..].chunks_exact_mut(of_frame).zip(darks.chunks_exact(of_dark)) {
+            for (sample, dark) in row.iter_mut().zip(darks) {
+                *sample = to_sample(f64::from(*sample) - dark);
+            }
+        }
+        self.mark(self.darks.rows_made - rows, &mut samples[start..]);
+        Ok(())
+    }
+}
