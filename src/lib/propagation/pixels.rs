@@ -204,6 +204,8 @@ fn phase_at(at: [usize; 2], geometry: &Geometry) -> usize {
 struct LevelVariance {
     step: f64,
     values: Vec<f64>,
+    /// The level below which an average hangs on where in a code it lies, which no level of a pixel tells.
+    told_from: f64,
 }
 
 const STEPS: usize = 1024;
@@ -251,7 +253,17 @@ impl LevelVariance {
             let one = one(expected_e);
             average.map_or(one, |record| photosite.variance_of_average(class, expected_e, one, record))
         };
-        Self { step, values: (0..=steps).into_par_iter().map(variance).collect() }
+        let is_by_code = |index: &usize| {
+            let expected_e = photosite.expected_at(*index as f64 * step);
+            let is_by_code = |record| photosite.is_average_by_code(expected_e, record);
+            average.is_some_and(is_by_code) && !photosite.is_spread_over_codes(expected_e)
+        };
+        let told_from = match (0..=steps).rev().find(is_by_code) {
+            Some(last) if last == steps => f64::INFINITY,
+            Some(last) => (last + 1) as f64 * step,
+            None => f64::NEG_INFINITY,
+        };
+        Self { step, values: (0..=steps).into_par_iter().map(variance).collect(), told_from }
     }
 
     /// The variance at a level; below zero as at zero, beyond the last as there.
@@ -320,7 +332,8 @@ impl PixelNoise {
     /// propagation holds there.
     ///
     /// Where smooth hue transition divides by a green that is lost in noise, the covariance is that of the hue which
-    /// green would make at its noise, and says only that it is large.
+    /// green would make at its noise, and says only that it is large. Where a median or clipped mean of codes scatters over less than
+    /// a code, it is that of an average over all places in a code.
     pub fn covariance(&self, [x, y]: [usize; 2], rgb: [f64; 3]) -> (Covariance, bool) {
         let kind = self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x);
         let level = rgb.map(|sample| sample - self.black);
@@ -344,8 +357,9 @@ impl PixelNoise {
             covariance
         };
         let variances = [0, 1, 2].map(|class| self.variances[class].at(level[class]));
+        let is_told = !(0..3).any(|class| level[class] < self.variances[class].told_from);
         if !self.depends_on_hue {
-            return (all(variances, None), true);
+            return (all(variances, None), is_told);
         }
         let green = level[Class::Green as usize];
         let first_order = smooth_hue::FirstOrder::of(level, variances);
@@ -355,7 +369,7 @@ impl PixelNoise {
             let hue = level.max(0.0) / divisor;
             if hue.is_finite() { hue } else { 1.0 }
         });
-        (all(variances, Some(hues)), first_order.holds)
+        (all(variances, Some(hues)), is_told && first_order.holds)
     }
 }
 

@@ -143,6 +143,29 @@ impl<'a> Assessment<'a> {
         groups.flat_map(of_group).collect()
     }
 
+    /// The same report with what is expected of samples of this region in place of what a large frame has.
+    pub fn of_region(&self, mut report: RegionReport) -> RegionReport {
+        if report.count < 2 {
+            return report;
+        }
+        let expect = |channels: &mut [ChannelReport], groups: &[&Group<'_>]| {
+            let expected = groups.iter().flat_map(|group| &group.predicted.channels);
+            for (channel, expected) in channels.iter_mut().zip(expected) {
+                channel.predicted_std = channel.predicted_std.map(|_| expected.sample_std);
+            }
+        };
+        expect(&mut report.channels, &[&self.channels]);
+        expect(&mut report.classes, &self.classes.iter().collect::<Vec<_>>());
+        let Predicted { channels, tested, .. } = &self.channels.predicted;
+        let of_three = tested.as_ref().map(|expected| &expected.sampling.covariance);
+        report.predicted_covariance = match (of_three, &channels[..]) {
+            (Some(c), _) => Some((0..3).map(|i| (0..3).map(|j| c[(i, j)]).collect()).collect()),
+            (None, [one]) => Some(vec![vec![one.sample_std * one.sample_std]]),
+            (None, _) => report.predicted_covariance,
+        };
+        report
+    }
+
     /// Standard deviations by formula of the means of the channels, and of each class.
     pub fn mean_stds(&self) -> Vec<Vec<f64>> {
         let of_group = |group: &Group<'_>| group.predicted.channels.iter().map(|channel| channel.mean_error).collect();
@@ -236,6 +259,6 @@ impl Group<'_> {
             mean: [0, 1, 2].map(|i| self.moments.mean[place(i)]),
             covariance: Matrix3::from_fn(covariance),
         };
-        tests(&measured, expected)
+        tests(&measured, expected).into_iter().filter(Test::is_sound).collect()
     }
 }

@@ -125,6 +125,14 @@ impl Verdict {
     }
 }
 
+impl Test {
+    /// Whether its law is known to numbers. Where it is not nothing was tested: no number is no alarm.
+    pub(super) fn is_sound(&self) -> bool {
+        let numbers = [Some(self.measured), Some(self.expected), self.z, self.degrees_of_freedom, Some(self.p)];
+        numbers.into_iter().flatten().all(f64::is_finite)
+    }
+}
+
 /// What was measured of channels that were observed together.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measured<'a> {
@@ -172,20 +180,18 @@ impl Expected {
         skews.fold(0.0, |most, skewness| if skewness.abs() > f64::abs(most) { skewness } else { most })
     }
 
-    /// Skewness of a sample variance of independent samples, but for their sixth cumulant:
-    /// (12 κ₄ κ₂ + 4 κ₃² + 8 κ₂³)⁄n² over the 3⁄2 power of its variance \[Fisher1930]; of photosites that are unlike each other
-    /// with κ₆.
-    fn variance_skewness(&self, channel: usize, scatter: f64) -> f64 {
+    /// Third cumulant of a sample variance of independent samples, but for their sixth cumulant:
+    /// (12 κ₄ κ₂ + 4 κ₃² + 8 κ₂³)⁄n² \[Fisher1930]; of photosites that are unlike each other with κ₆.
+    fn variance_third(&self, channel: usize) -> f64 {
         let (second, third) = (self.site_variances[channel], self.site_thirds[channel]);
         let fourth = self.site_kurtosis[channel] * second * second;
         let of_sites = 12.0 * fourth * second + 4.0 * third * third + self.site_sixths[channel];
         let square = self.sampling.count.powi(2);
-        let cumulant = match self.sampling.variance_thirds {
+        match self.sampling.variance_thirds {
             Some(thirds) if self.is_plane => of_sites.max(0.0) / square + thirds[channel],
             Some(thirds) => thirds[channel],
             None => (of_sites + 8.0 * second.powi(3)) / square,
-        };
-        cumulant / scatter.powf(1.5)
+        }
     }
 
     /// The least variance of a photosite.
@@ -326,19 +332,8 @@ pub(super) fn tests_over_frames(
         if sampling.count > 1.0 {
             found.push(temporal_variance(measured, expected, i, freedom));
         }
-        let law = sampling.mean_covariance[(i, i)];
         if sampling.count * expected.least_variance() >= RARE {
-            let of_means = variances_of_means[i];
-            found.push(Test {
-                subject: Subject::VarianceOfFrameMeans,
-                channels: vec![measured.names[i].clone()],
-                measured: of_means,
-                expected: law,
-                z: Some((of_means / law - 1.0) * (freedom / 2.0).sqrt()),
-                degrees_of_freedom: Some(freedom),
-                // Sums of codes of few frames may be equal: less than is expected says nothing.
-                p: if of_means > law { significance::of_chi_square(freedom * of_means / law, freedom) } else { 1.0 },
-            });
+            found.push(variance_of_frame_means(measured, expected, i, variances_of_means[i], freedom));
         }
     }
     for (index, [i, j]) in PAIRS.into_iter().enumerate() {
@@ -388,7 +383,7 @@ fn of_any_law(z: f64) -> f64 {
 
 /// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946]. Where ν is small, or
 /// samples have two values, the probability is Chebyshev's bound, var s²/(s² − E s²)². Of independent samples with tails
-/// heavier than normal ones the law has the skewness that their cumulants give.
+/// heavier than normal ones the law has the third cumulant that theirs give.
 fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
     let expected = law.sampling.covariance[(i, i)];
     let pair = pair([i, i]);
@@ -412,9 +407,10 @@ fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
             let skewness = law
                 .pixel_variance_skewness()
                 .max(law.sampling.variance_thirds.map_or(0.0, |thirds| thirds[i] / scatter.powf(1.5)));
-            significance::of_skewed(z, skewness).max(significance::of_chi_square(freedom * found / expected, freedom))
+            significance::of_sum_of_squares(found, [expected, scatter, skewness * scatter.powf(1.5)])
+                .max(significance::of_chi_square(freedom * found / expected, freedom))
         } else if law.sampling.variance_thirds.is_some() || (law.is_plane && law.site_kurtosis[i] > 0.0) {
-            significance::of_skewed(z, law.variance_skewness(i, scatter))
+            significance::of_sum_of_squares(found, [expected, scatter, law.variance_third(i)])
         } else {
             significance::of_chi_square(freedom * found / expected, freedom)
         },
@@ -430,10 +426,39 @@ fn temporal_variance(measured: &Measured<'_>, law: &Expected, i: usize, frames: 
     let thirds = law.sampling.variance_thirds.map(|thirds| thirds[i] / (frames * frames));
     let p = match thirds {
         _ if freedom < FEW || law.site_kurtosis[i] < FLAT => of_any_law(z),
-        Some(third) => significance::of_skewed(z, third / scatter.powf(1.5)),
+        Some(third) => significance::of_sum_of_squares(test.measured, [test.expected, scatter, third]),
         None => significance::of_chi_square(freedom * test.measured / test.expected, freedom),
     };
     Test { subject: Subject::TemporalVariance, p, ..test }
+}
+
+/// The variance of the means of frames is like χ². Sums of codes are whole numbers, so that means which differ by less may be equal: if
+/// each is off by half a step at most, the root of their variance is off by √(N/(N − 1)) of that at most, and so far it may be
+/// larger.
+fn variance_of_frame_means(measured: &Measured<'_>, expected: &Expected, i: usize, found: f64, freedom: f64) -> Test {
+    let law = expected.sampling.mean_covariance[(i, i)];
+    // Half a step of a sum of n photosites to its standard deviation, one of which has a variance in steps².
+    let (site, count) = match expected.is_plane {
+        true => (expected.sampling.count * law, expected.sampling.count),
+        false => (expected.least_variance(), expected.sampling.count / 4.0),
+    };
+    let half_step = 0.5 / (count * site).sqrt() * (1.0 + 1.0 / freedom).sqrt();
+    let ratio = found / law;
+    let p = if ratio > 1.0 {
+        significance::of_chi_square(freedom * ratio, freedom)
+    } else {
+        let most = (ratio.sqrt() + half_step).powi(2);
+        if most < 1.0 { significance::of_chi_square(freedom * most, freedom) } else { 1.0 }
+    };
+    Test {
+        subject: Subject::VarianceOfFrameMeans,
+        channels: vec![measured.names[i].clone()],
+        measured: found,
+        expected: law,
+        z: Some((ratio - 1.0) * (freedom / 2.0).sqrt()),
+        degrees_of_freedom: Some(freedom),
+        p,
+    }
 }
 
 /// artanh r about artanh ρ + ρ/2ν, with variance 1/(ν − 2), as of ν + 1 independent normal pairs \[Fisher1921].
