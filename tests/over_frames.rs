@@ -389,7 +389,10 @@ fn the_frame_of_means_is_predicted_too() {
         let alone = measure(&mut mean, &[], Saturated::Kept, Equations::Exact, None).unwrap();
         for (class, of_all) in alone.regions[0].classes.iter().zip(&report.regions[0].classes) {
             assert_eq!(class.predicted_mean, of_all.predicted_mean);
-            assert_eq!(class.predicted_std, of_all.predicted_std_of_means);
+            // Of many frames it is what is expected of this region, in which rows differ less than over a large frame.
+            let share = of_all.predicted_std_of_means.unwrap() / class.predicted_std.unwrap();
+            let shares_rows = camera.readout.prnu_row > 0.0;
+            assert!(if shares_rows { (0.9..1.0).contains(&share) } else { share == 1.0 }, "{seed}: {share}");
             assert!((class.std.unwrap() / of_all.std_of_means.unwrap() - 1.0).abs() < 1e-6);
         }
     }

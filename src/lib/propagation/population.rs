@@ -42,8 +42,9 @@ const MANY_CODES: f64 = 2.5;
 /// Skewness of what is drawn anew beyond which a median keeps another share than of normal samples.
 const SKEW: f64 = 0.15;
 
-/// Read noise, e⁻, below which every count moves beyond an edge by itself; and the least that is told apart.
-const APART_E: f64 = 0.6;
+/// Read noise, e⁻, below which every count moves beyond an edge by itself, by more than e^(−2π²σ²) or 2 % of what it counts; and the
+/// least that is told apart.
+const APART_E: f64 = 0.45;
 const LEAST_E: f64 = 0.1;
 
 /// Photosites of one class, and how many there are of each kind.
@@ -75,15 +76,22 @@ impl Population {
         let law = Law { read_noise_e: model.read_noise(), ..Law::of(model, expected_e) };
         let reading = site.adc.map_or_else(|| law.of_electrons(), |adc| law.of_codes(&adc, codes_of(&adc)));
         let drawn_e = law.light.shot_std().hypot(law.dark.shot_std()).hypot(law.read_noise_e);
-        let least_e = if law.read_noise_e < APART_E { law.read_noise_e.max(LEAST_E) } else { f64::INFINITY };
-        let blur_e = (share * drawn_e).min(least_e).max(site.adc.map_or(0.0, |adc| 0.04 / adc.adu_per_e));
-        let sensitivity = |charge: &Charge| -> Option<Vec<(f64, f64)>> {
-            let found = differing(charge.pattern * charge.rate, blur_e)?;
-            Some(found.into_iter().map(|(z, weight)| ((1.0 + charge.pattern * z).max(0.0), weight)).collect())
+        let blur_e = (share * drawn_e).max(site.adc.map_or(0.0, |adc| 0.04 / adc.adu_per_e));
+        let spreads_e =
+            [law.light.pattern * law.light.rate, law.dark.pattern * law.dark.rate, model.offsets()].map(|e| e.max(0.0));
+        let widest_e = spreads_e.into_iter().fold(0.0, f64::max);
+        let are_counts_apart = law.read_noise_e < APART_E;
+        let axis = |spread_e: f64| {
+            // What photosites differ in most blurs counts for what else they differ in.
+            let is_fine = are_counts_apart && (spread_e >= widest_e || widest_e < APART_E);
+            differing(spread_e, if is_fine { blur_e.min(law.read_noise_e.max(LEAST_E)) } else { blur_e })
         };
-        let [lights, darks] = [sensitivity(&law.light)?, sensitivity(&law.dark)?];
-        let offset_e = model.offsets();
-        let offsets = differing(offset_e, blur_e)?.into_iter().map(|(z, weight)| (offset_e * z, weight)).collect();
+        let sensitivities_of = |pattern: f64, spread_e: f64| -> Option<Vec<(f64, f64)>> {
+            Some(axis(spread_e)?.into_iter().map(|(z, weight)| ((1.0 + pattern * z).max(0.0), weight)).collect())
+        };
+        let lights = sensitivities_of(law.light.pattern, spreads_e[0])?;
+        let darks = sensitivities_of(law.dark.pattern, spreads_e[1])?;
+        let offsets = axis(spreads_e[2])?.into_iter().map(|(z, weight)| (spreads_e[2] * z, weight)).collect();
         let counts = [&law.light, &law.dark].map(|charge| counts(charge, law.read_noise_e.max(1e-3)));
         let is_counted = |charge: &Charge| charge.shot == Some(PoissonKind::Exact);
         let [many, few] = counts.each_ref().map(Vec::len);
