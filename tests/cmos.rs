@@ -6,15 +6,18 @@ mod support;
 
 use cyanometer::analysis::statistics::{Region, RegionReport, Saturated, measure};
 use cyanometer::camera::readout::ReadOut;
+use cyanometer::camera::taps::{TapLayout, Taps};
 use cyanometer::cfa::CfaPattern;
+use cyanometer::chain::{CameraSetup, Predictor, PredictorSettings};
 use cyanometer::color::{Space, White};
 use cyanometer::metadata::Scene;
+use cyanometer::names::Named;
 use cyanometer::numerics::significance::{of_chi_square, of_smallest};
 use cyanometer::numerics::vectors::Instructions;
 use cyanometer::propagation::covariance::symmetric;
 use cyanometer::propagation::pixels::PixelNoise;
 use cyanometer::propagation::{Equations, FramePrediction, of_frame};
-use cyanometer::random::{Source, of_column, of_row};
+use cyanometer::random::{Source, of_column, of_knot, of_row};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
@@ -29,7 +32,7 @@ use rayon::prelude::*;
 use support::{assert_same, at, crop, expected, sensor, through, through_cuts};
 
 /// Sources that only sensors of this kind have.
-const OWN: [Source; 7] = [
+const OWN: [Source; 8] = [
     Source::RowNoise,
     Source::ColumnNoise,
     Source::Dsnu,
@@ -37,6 +40,7 @@ const OWN: [Source; 7] = [
     Source::DsnuColumn,
     Source::PrnuRow,
     Source::PrnuColumn,
+    Source::BlackDrift,
 ];
 
 /// The read-out of a CMOS sensor whose rows and columns are as noisy as its photosites.
@@ -127,6 +131,8 @@ fn rows_and_columns_have_their_own_draws() {
     let level = 1000.0_f32;
     let mut light = scene([40, 30], [level; 3]);
     light.header.geometry.origin = [-7, 300];
+    let per_row = 6.5;
+    with_readout(&mut light, |readout| (readout.black_drift_e, readout.black_drift_rows) = (3.0, per_row));
     let take = |kept: Source| {
         let without = Source::ALL.into_iter().filter(|source| *source != kept).collect();
         noisy(&light, &NoiseSettings { seed: 5, sensor_seed: 6, frame: 9, without, ..Default::default() })
@@ -144,6 +150,11 @@ fn rows_and_columns_have_their_own_draws() {
                 Source::DsnuRow => 1.5 * row.offset,
                 Source::DsnuColumn => 7.0 * column.offset,
                 Source::PrnuRow => f64::from(level) * 0.002 * row.response,
+                Source::BlackDrift => {
+                    let place = f64::from(300 + u32::try_from(y).unwrap()) / per_row;
+                    let (knot, angle) = (place.floor() as i32, std::f64::consts::FRAC_PI_2 * place.fract());
+                    3.0 * (angle.cos() * of_knot(5, 9, knot) + angle.sin() * of_knot(5, 9, knot + 1))
+                }
                 _ => f64::from(level) * 0.004 * column.response,
             };
             let found = f64::from(at(&frame, x, y, channel)) - f64::from(at(&none, x, y, channel));
@@ -211,7 +222,7 @@ fn sensors_without_them_say_nothing_of_them() {
     frame.header.metadata.scene = Some(Scene::uniform("test", [100.0; 3]));
     let made = noisy(&frame, &settings(1));
     let text = serde_yaml::to_string(&made.header.metadata).unwrap();
-    for word in ["row_noise", "column_noise", "dsnu", "prnu_row", "prnu_column"] {
+    for word in ["row_noise", "column_noise", "dsnu", "prnu_row", "prnu_column", "black_drift", "taps"] {
         assert!(!text.contains(word), "{word}");
     }
 }
@@ -374,5 +385,353 @@ fn what_rows_share_is_not_left_out() {
     for (shared, alone) in std(&camera).into_iter().zip(std(&independent)) {
         // 40 rows and 60 columns instead of 2400 pixels.
         assert!(shared > 1.5 * alone, "{shared} {alone}");
+    }
+}
+
+// --- amplifiers and drift --------------------------------------------------------------------------------------------
+
+/// Layouts with numbers of taps that differ in everything.
+fn several_taps() -> [Taps; 5] {
+    let of = |layout, count: usize| Taps {
+        layout,
+        gain: vec![1.0, 1.02, 0.97, 1.05][..count].to_vec(),
+        offset_e: vec![3.0, -20.0, 11.0, 0.0][..count].to_vec(),
+        read_noise_e: vec![4.0, 9.0, 14.0, 2.0][..count].to_vec(),
+    };
+    [
+        of(TapLayout::Columns, 2),
+        of(TapLayout::Columns, 3),
+        of(TapLayout::LeftRight, 2),
+        of(TapLayout::TopBottom, 2),
+        of(TapLayout::Quadrants, 4),
+    ]
+}
+
+/// The frame of a uniform scene of a sensor that is read through taps, whose middle is that of the frame.
+fn tapped(size: [usize; 2], electrons: [f32; 3], taps: &Taps) -> MemoryFrame {
+    let mut frame = scene(size, electrons);
+    with_readout(&mut frame, |readout| {
+        quiet_lines(readout);
+        readout.dsnu_e = 5.0;
+        (readout.width, readout.height) = (u32::try_from(size[0]).unwrap(), u32::try_from(size[1]).unwrap());
+        readout.taps = Some(taps.clone());
+    });
+    frame
+}
+
+/// Without what rows and columns share.
+fn quiet_lines(readout: &mut ReadOut) {
+    (readout.row_noise_e, readout.column_noise_e, readout.dsnu_e) = (0.0, 0.0, 0.0);
+    (readout.dsnu_row_e, readout.dsnu_column_e) = (0.0, 0.0);
+    (readout.prnu_row, readout.prnu_column) = (0.0, 0.0);
+}
+
+/// The frame of a uniform scene of a sensor whose black level drifts, by as much as photosites have of their own.
+fn drifting(size: [usize; 2], electrons: [f32; 3], rows: f64) -> MemoryFrame {
+    let mut frame = scene(size, electrons);
+    with_readout(&mut frame, |readout| (readout.black_drift_e, readout.black_drift_rows) = (7.0, rows));
+    frame
+}
+
+/// What each tap makes of a charge: by the sensor's own numbers, and by those of the tap; and read noise in proportion.
+#[test]
+fn taps_have_their_own_numbers() {
+    for taps in several_taps() {
+        let light = tapped([44, 31], [900.0, 2000.0, 1500.0], &taps);
+        let only = |kept: Source| {
+            let without = Source::ALL.into_iter().filter(|source| *source != kept).collect();
+            noisy(&light, &NoiseSettings { seed: 5, without, ..Default::default() })
+        };
+        let mut alike = light.clone();
+        with_readout(&mut alike, |readout| (readout.taps, readout.read_noise_e) = (None, 1.0));
+        let without: Vec<Source> = Source::ALL.into_iter().filter(|source| *source != Source::Ron).collect();
+        let unit = noisy(&alike, &NoiseSettings { seed: 5, without, ..Default::default() });
+        let noisy = only(Source::Ron);
+        let codes = digitized(&noisy);
+        for (y, x, channel) in (0..31).flat_map(|y| (0..44).flat_map(move |x| (0..3).map(move |c| (y, x, c)))) {
+            let half = |at: usize, extent: usize| usize::from(at >= extent / 2);
+            let tap = match taps.layout {
+                TapLayout::Columns => x % taps.gain.len(),
+                TapLayout::LeftRight => half(x, 44),
+                TapLayout::TopBottom => half(y, 31),
+                TapLayout::Quadrants => 2 * half(y, 31) + half(x, 44),
+            };
+            let charge = f64::from(at(&noisy, x, y, channel));
+            let dark = f64::from(at(&light, x, y, channel)) + light_dark(&noisy);
+            let off = f64::from(at(&unit, x, y, channel)) - dark;
+            // Single precision at 2000 e-, times the read noise.
+            assert!((charge - dark - taps.read_noise_e[tap] * off).abs() < 5e-3, "{x} {y}: {charge} {off}");
+            let level = 500.0 + 0.4 * taps.gain[tap] * (charge + taps.offset_e[tap]);
+            let code = f64::from(at(&codes, x, y, channel));
+            assert!((code - level).abs() <= 0.5 + 1e-9, "{taps:?} {x} {y}: {code} {level}");
+        }
+    }
+}
+
+fn light_dark(noisy: &MemoryFrame) -> f64 {
+    noisy.header.metadata.noise.as_ref().unwrap().dark_e
+}
+
+/// Mosaic, crops, bands, threads and instructions change no bit of what taps and drift make, before and behind the converter.
+#[test]
+fn taps_and_drift_belong_to_places() {
+    let settings = NoiseSettings { seed: 3, sensor_seed: 4, frame: 7, ..Default::default() };
+    for taps in several_taps() {
+        let mut light = tapped([530, 37], [900.0, 2000.0, 1500.0], &taps);
+        with_readout(&mut light, |readout| (readout.black_drift_e, readout.black_drift_rows) = (7.0, 5.5));
+        let stage = AddNoise::new(&light.header, &settings).unwrap();
+        let whole = through(&light, &stage);
+        let converter = Digitize::new(&whole.header, &AdcSettings::default()).unwrap();
+        let codes = through(&whole, &converter);
+        let plane = through(&light, &Mosaic::new(&light.header, None).unwrap());
+        assert_same(&digitized(&noisy(&plane, &settings)), &plane_of(&codes), "mosaic");
+        for [x, y, width, height] in
+            [[0, 0, 530, 37], [3, 5, 300, 20], [129, 17, 70, 20], [264, 30, 17, 7], [265, 18, 1, 1]]
+        {
+            let part = noisy(&crop(&light, x, y, width, height), &settings);
+            assert_same(&part, &crop(&whole, x, y, width, height), "crop");
+            assert_same(&digitized(&part), &crop(&codes, x, y, width, height), "crop of codes");
+        }
+        assert_same(&through_cuts(&light, &stage, &[1, 18, 20]).0, &whole, "bands");
+        assert_same(&through_cuts(&whole, &converter, &[1, 18, 20]).0, &codes, "bands of codes");
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert_same(&pool.install(|| through(&light, &stage)), &whole, "threads");
+        }
+        assert_same(&through(&light, &stage.clone().on(Instructions::up_to_256_bits())), &whole, "instructions");
+    }
+    // Taps that do not differ are none.
+    let light = scene([60, 37], [900.0, 2000.0, 1500.0]);
+    let mut alike = light.clone();
+    with_readout(&mut alike, |readout| {
+        let taps =
+            Taps { layout: TapLayout::Quadrants, gain: vec![1.0; 4], offset_e: vec![], read_noise_e: vec![6.0; 4] };
+        readout.taps = Some(taps);
+    });
+    assert_same(&digitized(&noisy(&alike, &settings)), &digitized(&noisy(&light, &settings)), "taps alike");
+}
+
+/// False alarms of the regions of frames come no more often than the level says.
+fn regions_cover(what: &str, parts: &[Region], made: impl Fn(u64) -> Vec<MemoryFrame> + Sync) {
+    let of = |seed: u64| -> Vec<f64> {
+        made(seed).iter().flat_map(|frame| regions(frame, parts)).map(|region| corrected(&region)).collect()
+    };
+    let trials: Vec<Vec<f64>> = (0..SEEDS).into_par_iter().map(of).collect();
+    for index in 0..trials[0].len() {
+        judge(&format!("{what}, {index}"), &trials.iter().map(|trial| trial[index]).collect::<Vec<_>>(), 0.0);
+    }
+}
+
+/// Whole frames and regions of several taps before demosaicking, less dark frames too; behind one tap at every stage.
+#[test]
+fn frames_of_taps_raise_false_alarms_at_the_stated_rate() {
+    let whole = Region { x: 0, y: 0, width: 26, height: 21 };
+    let some = Region { x: 3, y: 2, width: 15, height: 14 };
+    let corner = Region { x: 14, y: 11, width: 12, height: 10 };
+    for taps in several_taps() {
+        let scene = tapped([26, 21], [900.0, 2500.0, 1800.0], &taps);
+        let sites = |seed: u64| {
+            let electrons = noisy(&scene, &settings(seed));
+            let codes = digitized(&electrons);
+            let plane = plane_of(&codes);
+            let less = less_darks(&plane, &scene, seed, 2);
+            vec![electrons, codes, plane, less]
+        };
+        regions_cover(&format!("{:?}", taps.layout), &[whole, some, corner], sites);
+    }
+    let scene = tapped([26, 21], [900.0, 2500.0, 1800.0], &several_taps()[4]);
+    let lower_right = Region { x: 16, y: 13, width: 10, height: 8 };
+    let pixels = |seed: u64| {
+        let plane = plane_of(&digitized(&noisy(&scene, &settings(seed))));
+        let camera = demosaicked(&plane, Method::EffectiveColor);
+        let xyz = colored(&camera, Space::Xyz);
+        let of_less = demosaicked(&less_darks(&plane, &scene, seed, 2), Method::Bilinear);
+        vec![camera, xyz, of_less]
+    };
+    regions_cover("behind one tap", &[lower_right], pixels);
+}
+
+/// So do frames whose black level drifts over fewer rows than they have, as many, and more.
+#[test]
+fn drifting_frames_raise_false_alarms_at_the_stated_rate() {
+    for rows in [3.3, 20.0, 170.0] {
+        let scene = drifting([24, 19], [900.0, 2500.0, 1800.0], rows);
+        let sites = |seed: u64| {
+            let electrons = noisy(&scene, &settings(seed));
+            let codes = digitized(&electrons);
+            let plane = plane_of(&codes);
+            let less = less_darks(&plane, &scene, seed, 2);
+            vec![electrons, codes, plane, less]
+        };
+        let some = Region { x: 2, y: 3, width: 17, height: 12 };
+        regions_cover(&format!("drift over {rows} rows"), &[Region { x: 0, y: 0, width: 24, height: 19 }, some], sites);
+    }
+}
+
+/// Means and variances of regions over many sensors, as standard deviations of their scatter: means have the predicted variance, and
+/// sample variances the predicted mean.
+#[test]
+fn regions_of_taps_and_drift_scatter_as_predicted() {
+    let seeds = 1500_u64;
+    let scenes = [
+        tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[4]),
+        tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[1]),
+        drifting([26, 22], [900.0, 2500.0, 1800.0], 9.0),
+        drifting([26, 22], [900.0, 2500.0, 1800.0], 60.0),
+    ];
+    let part = [Region { x: 5, y: 3, width: 16, height: 15 }];
+    let mut smallest = 1.0_f64;
+    let mut tests = 0;
+    for scene in &scenes {
+        let of = |seed: u64| {
+            let codes = digitized(&noisy(scene, &settings(seed + 70_000)));
+            let plane = plane_of(&codes);
+            let less = less_darks(&plane, scene, seed + 70_000, 2);
+            let reports = [&codes, &plane, &less].map(|frame| regions(frame, &part).remove(0));
+            let [codes, plane, less] = reports;
+            let mut found = codes.channels;
+            found.extend(plane.classes);
+            found.extend(plane.channels);
+            found.extend(less.classes);
+            found
+        };
+        let all: Vec<_> = (0..seeds).into_par_iter().map(of).collect();
+        for index in 0..all[0].len() {
+            let z: Vec<f64> = all.iter().map(|channels| channels[index].z_mean.unwrap()).collect();
+            let mean = z.iter().sum::<f64>() / seeds as f64;
+            let square: f64 = z.iter().map(|z| z * z).sum();
+            // Standard errors are known, means too: chi-square of so many, and a normal mean.
+            let p = of_chi_square(square, seeds as f64);
+            assert!(p > 1e-6, "mean {index}: {}", (square / seeds as f64).sqrt());
+            assert!(mean.abs() < 5.0 / (seeds as f64).sqrt(), "mean {index}: {mean}");
+            smallest = smallest.min(p);
+            tests += 1;
+        }
+    }
+    assert!(of_smallest(smallest, tests) > 1e-4, "{smallest} of {tests}");
+}
+
+/// What is not predicted is refused with the key in the reason.
+#[test]
+fn what_taps_and_drift_leave_open_is_refused() {
+    let why = |frame: &MemoryFrame| of_frame(&frame.header, Equations::Exact).unwrap_err().to_string();
+    let taps = &several_taps()[2];
+    let scene = tapped([26, 22], [900.0, 2500.0, 1800.0], taps);
+    let plane = plane_of(&digitized(&noisy(&scene, &settings(1))));
+    let camera = demosaicked(&plane, Method::Bilinear);
+    assert!(why(&camera).contains("several amplifiers (`taps`"), "{}", why(&camera));
+    // The left half with the reach of the method is predicted, and one column more is not.
+    let left = |width: usize| Region { x: 0, y: 0, width, height: 22 };
+    assert!(regions_or(&camera, left(12)).is_ok());
+    assert!(regions_or(&camera, left(13)).is_err());
+    let mut lines = scene.clone();
+    with_readout(&mut lines, |readout| readout.row_noise_e = 3.0);
+    let codes = digitized(&noisy(&lines, &settings(1)));
+    assert!(why(&codes).contains("rows or columns share noise, and several amplifiers"));
+    assert!(regions_or(&codes, left(13)).is_ok());
+    let cte =
+        AddNoise::new(&scene.header, &NoiseSettings { cte: Some(0.9999), ..settings(1) }).unwrap_err().to_string();
+    assert!(cte.contains("several `taps`"), "{cte}");
+    let drift = drifting([26, 22], [900.0, 2500.0, 1800.0], 9.0);
+    let camera = demosaicked(&plane_of(&digitized(&noisy(&drift, &settings(1)))), Method::Bilinear);
+    assert!(why(&camera).contains("`black_drift_e`"), "{}", why(&camera));
+    assert!(PixelNoise::of(&camera.header).unwrap_err().to_string().contains("`black_drift_e`"));
+    let full = drifting([26, 22], [29_990.0, 2500.0, 1800.0], 9.0);
+    assert!(why(&digitized(&noisy(&full, &settings(1)))).contains("black level drifts along rows, and full well"));
+}
+
+fn regions_or(frame: &MemoryFrame, region: Region) -> cyanometer::error::Result<()> {
+    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+    measure(&mut source, &[region], Saturated::Kept, Equations::Exact, Some(0.5)).map(|_| ())
+}
+
+/// A frame that lies behind one tap is predicted as that of a sensor with its numbers, and the budget of all photosites holds what
+/// taps add.
+#[test]
+fn one_tap_is_a_sensor_of_its_own() {
+    let taps = &several_taps()[4];
+    let scene = tapped([40, 32], [900.0, 2500.0, 1800.0], taps);
+    let made =
+        |scene: &MemoryFrame| demosaicked(&plane_of(&digitized(&noisy(scene, &settings(3)))), Method::EffectiveColor);
+    let quarter = made(&crop(&scene, 20, 0, 20, 16));
+    let mut alone = crop(&scene, 20, 0, 20, 16);
+    with_readout(&mut alone, |readout| {
+        readout.taps = None;
+        (readout.read_noise_e, readout.adu_per_e) = (9.0, 0.4 * 1.02);
+        readout.bias_adu = 500.0 + 0.4 * 1.02 * -20.0;
+    });
+    let mut alone = made(&alone);
+    // Black is that of the sensor with taps.
+    alone.header.metadata.demosaic = quarter.header.metadata.demosaic.clone();
+    let pixels = |frame: &MemoryFrame| match of_frame(&frame.header, Equations::Exact) {
+        Ok(FramePrediction::Pixels(pixels)) => pixels,
+        other => panic!("{other:?}"),
+    };
+    // The crop ends at the border of its tap, so that pixels there may have been made of the next.
+    let part = |frame: &MemoryFrame| crop(frame, 4, 0, 16, 12);
+    assert_eq!(pixels(&part(&quarter)).covariance, pixels(&part(&alone)).covariance);
+    assert_eq!(pixels(&part(&quarter)).mean, pixels(&part(&alone)).mean);
+    let setup =
+        CameraSetup::new(scene.header.metadata.sensor.clone().unwrap(), scene.header.metadata.exposure.unwrap());
+    let setup = CameraSetup { noise: settings(3), dark_frames: 3, ..setup };
+    let found = Predictor::new(PredictorSettings::of(setup)).unwrap().predict([900.0, 2500.0, 1800.0]).unwrap();
+    assert!(found.no_pixels.unwrap().contains("several amplifiers"));
+    assert_eq!(found.stages.len(), 3);
+    for stage in &found.stages {
+        let causes = [0, 1, 2].map(|k| stage.causes.iter().map(|entry| entry.variance[k]).sum::<f64>());
+        let of_taps = stage.causes.iter().find(|entry| entry.cause.name() == "taps").unwrap().variance;
+        for k in 0..3 {
+            assert!((causes[k] / stage.std[k].powi(2) - 1.0).abs() < 1e-12);
+            // 4 equal parts of gains 1, 1.02, 0.97 and 1.05, and offsets; of electrons they do not differ.
+            let light = [900.0, 2500.0, 1800.0][k] + 60.0 * 0.033;
+            let level = |tap: usize| 0.4 * taps.gain[tap] * (light + taps.offset_e[tap]);
+            let mean = (0..4).map(level).sum::<f64>() / 4.0;
+            let between = (0..4).map(|tap| (level(tap) - mean).powi(2)).sum::<f64>() / 4.0;
+            match stage.stage.name() {
+                "electrons" => assert!(of_taps[k].abs() < 1e-6 * stage.std[k].powi(2), "{}", of_taps[k]),
+                "adu" => assert!((of_taps[k] / between - 1.0).abs() < 1e-3, "{} {between}", of_taps[k]),
+                _ => assert!(of_taps[k] > 0.5 * between && of_taps[k] < 1.5 * between),
+            }
+        }
+    }
+}
+
+/// Standard deviations beside pixels, at the border of taps and away from it: against the scatter of 3000 frames, each of another
+/// sensor, chi-square of 2999.
+#[test]
+fn sigma_knows_the_taps_of_each_photosite() {
+    for taps in several_taps() {
+        let mut scene = tapped([14, 12], [900.0, 2500.0, 1800.0], &taps);
+        with_readout(&mut scene, |readout| {
+            // Levels are taken to be the same behind all taps; read noise differs.
+            let taps = readout.taps.as_mut().unwrap();
+            (taps.gain, taps.offset_e) = (vec![], vec![]);
+            taps.read_noise_e.iter_mut().for_each(|noise| *noise *= 8.0);
+        });
+        let made =
+            |seed: u64| demosaicked(&plane_of(&digitized(&noisy(&scene, &settings(seed)))), Method::EffectiveColor);
+        let places: Vec<[usize; 2]> = (2..12).flat_map(|x| [[x, 5], [x, 6]]).collect();
+        let frames = 3000;
+        let all: Vec<Vec<[f64; 3]>> = (0..frames)
+            .into_par_iter()
+            .map(|seed| {
+                let frame = made(seed);
+                places.iter().map(|[x, y]| [0, 1, 2].map(|c| f64::from(at(&frame, *x, *y, c)))).collect()
+            })
+            .collect();
+        let noise = PixelNoise::of(&made(0).header).unwrap();
+        let n = frames as f64;
+        let mut smallest = 1.0_f64;
+        for (index, place) in places.iter().enumerate() {
+            let mean = [0, 1, 2].map(|c| all.iter().map(|frame| frame[index][c]).sum::<f64>() / n);
+            let predicted = symmetric(&noise.covariance(*place, mean).0);
+            for c in 0..3 {
+                let square: f64 = all.iter().map(|frame| (frame[index][c] - mean[c]).powi(2)).sum();
+                let p = of_chi_square(square / predicted[(c, c)], n - 1.0);
+                assert!(p > 1e-6, "{taps:?} {place:?} {c}: {}", square / (n - 1.0) / predicted[(c, c)]);
+                smallest = smallest.min(p);
+            }
+        }
+        assert!(of_smallest(smallest, 3 * places.len()) > 1e-4, "{smallest}");
     }
 }

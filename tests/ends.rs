@@ -35,6 +35,8 @@ const QUIET: NoiseModel = NoiseModel {
     lines: LineNoise {
         row_noise_e: 0.0,
         column_noise_e: 0.0,
+        black_drift_e: 0.0,
+        black_drift_rows: 0.0,
         dsnu_e: 0.0,
         dsnu_row_e: 0.0,
         dsnu_column_e: 0.0,
@@ -309,6 +311,42 @@ fn light_near_full_well_is_summed_over_counts() {
         let (first, second) = (first / total, second / total);
         assert!((found.mean - 4095.0 - first).abs() < 1e-6, "{light_e}: {} {first}", found.mean);
         assert!((found.variance / (second - first * first) - 1.0).abs() < 1e-6, "{light_e}: {}", found.variance);
+    }
+}
+
+/// Dark current without shot noise whose sensitivities are cut off at zero, beside an end of the codes that charges below zero would
+/// leave: one normal law a count of light, code by code. Read noise is next to none, and no edge is near a charge of many photosites.
+#[test]
+fn cut_patterns_are_summed_beside_the_ends_of_codes() {
+    for (dark_e, dcnu, full_well_e, light_e, adc) in [
+        (992_770.188, 0.224_751_8, 167_270.386_6, 1.254_384_8, AdcRecord::new(14, 7_528.034_668, 0.063_407_19)),
+        (1_169.974_767, 1.202_842_7, 1_682.282_5, 0.025_280_03, AdcRecord::new(6, 53.928_498, 0.025_641_427)),
+    ] {
+        let dark_e = f64::from(to_sample(dark_e));
+        let model = NoiseModel { dark_e, dcnu, full_well_e, dark_shot: false, ..QUIET };
+        let found = Case { model, adc, light_e }.codes().moments;
+        let top = f64::from(adc.top_code());
+        let (mut first, mut second) = (0.0, 0.0);
+        for (light, p) in counts(light_e, true) {
+            let mut code = 0.0;
+            while code < top {
+                let edge = (code + 0.5 - adc.bias_adu) / adc.adu_per_e;
+                let normal = 1.0 - normal_above((edge - light - dark_e) / (dcnu * dark_e));
+                let below = if edge > full_well_e {
+                    1.0
+                } else if edge > light {
+                    normal
+                } else {
+                    0.0
+                };
+                first -= p * below;
+                second += p * below * (2.0 * (top - code) - 1.0);
+                code += 1.0;
+            }
+        }
+        let variance = second - first * first;
+        assert!((found.mean - top - first).abs() < 1e-8 * variance.sqrt(), "{dark_e}: {} {first}", found.mean);
+        assert!((found.variance / variance - 1.0).abs() < 1e-8, "{dark_e}: {} {variance}", found.variance);
     }
 }
 

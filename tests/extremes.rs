@@ -9,11 +9,12 @@ mod support;
 use cyanometer::analysis::characterization::Signals;
 use cyanometer::analysis::characterization::regression::{FitSettings, fit};
 use cyanometer::analysis::statistics::{Saturated, measure};
+use cyanometer::camera::linearity::Linearization;
 use cyanometer::camera::optics::{Exposure, Vignetting};
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::CfaPattern;
-use cyanometer::chain::{CameraSetup, uniform_frame};
-use cyanometer::color::{lab_from_xyz, xyy_from_xyz, xyz_from_lab};
+use cyanometer::chain::{CameraSetup, Predictor, PredictorSettings, uniform_frame};
+use cyanometer::color::{Space, White, lab_from_xyz, xyy_from_xyz, xyz_from_lab};
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::Scene;
 use cyanometer::numerics::least_squares::Problem;
@@ -27,6 +28,7 @@ use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stages::noise::AddNoise;
 use cyanometer::stages::noise::{NoiseSettings, rectified_mean, rectified_mean_square};
+use cyanometer::stages::to_xyz::ColorSettings;
 use cyanometer::stages::transfer::Transfer;
 use cyanometer::stream::MemoryFrame;
 use cyanometer::units::QuantityKind;
@@ -701,4 +703,114 @@ fn tell_of_cameras(what: &str, outcomes: Vec<Outcome>, start: Instant) {
     told("predictions", &what, "no more alarms than the level", &found, None, start.elapsed().as_secs_f64());
     // A Poisson number of this mean is above mean + 4 σ + 3 in fewer than one case of 10⁴.
     assert!((alarms.len() as f64) <= expected + 4.0 * expected.sqrt() + 3.0, "{found}\n{alarms:#?}");
+}
+
+// --- how long predictions take -----------------------------------------------------------------------------------------
+
+/// Seconds that the processor has worked for this thread; of the clock where no system tells.
+fn worked_s(since: Instant) -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let of_thread = told.and_then(|told| told.split(' ').next()?.parse::<f64>().ok()).map(|ns| ns * 1e-9);
+    of_thread.unwrap_or_else(|| since.elapsed().as_secs_f64())
+}
+
+/// A camera as [`any_camera`], or of what few sensors have too: rows and columns, hot pixels and jumps, a bent converter; with dark
+/// frames or none.
+fn any_sensor(index: u64) -> (&'static str, CameraSetup, [f64; 3]) {
+    let chance = &mut Chance(index.wrapping_mul(0x5851_f42d_4c95_7f2d));
+    let (mut setup, light) = any_camera(chance);
+    let readout = setup.sensor.readout.as_mut().unwrap();
+    let full_well_e = readout.full_well_e;
+    setup.dark_frames = [0, 0, 1, 7][usize::try_from(chance.word() % 4).unwrap()];
+    let kind =
+        ["plain", "rows and columns", "hot pixels and jumps", "bent converters"][usize::try_from(index % 4).unwrap()];
+    let has_tails = kind == "hot pixels and jumps";
+    if kind == "rows and columns" || has_tails && chance.word().is_multiple_of(4) {
+        (readout.row_noise_e, readout.column_noise_e) =
+            (chance.log_or_none(1e-6, 0.03) * full_well_e, chance.log_or_none(1e-6, 0.03) * full_well_e);
+        readout.dsnu_e = chance.log_or_none(1e-6, 0.03) * full_well_e;
+        (readout.prnu_row, readout.prnu_column) = (chance.log_or_none(1e-6, 0.05), chance.log_or_none(1e-6, 0.05));
+    }
+    let [has_hot, has_rts] = [chance.word() % 3 != 0, chance.word() % 3 != 0];
+    if has_tails && has_hot {
+        readout.hot_pixel_share = chance.log(1e-6, 1.0);
+        readout.hot_pixel_dark_current_e_per_s = chance.log(1e-3, 1e3) * full_well_e / setup.exposure.exposure_s;
+    }
+    if has_tails && (has_rts || !has_hot) {
+        (readout.rts_share, readout.rts_amplitude_e) = (chance.log(1e-6, 1.0), chance.log(1e-6, 0.3) * full_well_e);
+    }
+    if kind == "bent converters" {
+        let top = f64::from((1_u32 << readout.bits) - 1);
+        let bend = (chance.share() - 0.5) / top;
+        readout.linearization = Some(Linearization::polynomial(vec![1.0, bend]).unwrap());
+    }
+    (kind, setup, light)
+}
+
+/// How long the prediction of one setting takes, CPU of all stages, and whether it is refused.
+fn predicted_in(setup: &CameraSetup, light: [f64; 3]) -> Option<(f64, bool)> {
+    setup.sensor.readout().unwrap().check().ok()?;
+    let color = ColorSettings {
+        xyz_from_camera: [[0.4, 0.3, 0.2], [0.2, 0.7, 0.1], [0.0, 0.1, 0.9]],
+        method: None,
+        is_relative: false,
+        residual: None,
+        space: Space::Xyz,
+        white: White::D65,
+        white_luminance: None,
+    };
+    // Each in a thread of its own, which remembers nothing of others.
+    std::thread::scope(|scope| {
+        let run = || {
+            let start = Instant::now();
+            let before = worked_s(start);
+            let mut predictor =
+                Predictor::new(PredictorSettings { color: Some(color), ..PredictorSettings::of(setup.clone()) })
+                    .ok()?;
+            let is_refused = predictor.predict(light).is_err();
+            Some((worked_s(start) - before, is_refused))
+        };
+        scope.spawn(run).join().unwrap()
+    })
+}
+
+/// How long predictions of random sensors take: `CYANOMETER_CAMERAS=2000 cargo test --release --test extremes
+/// predictions_take -- --ignored --nocapture`; CYANOMETER_FIRST is the number of the first.
+#[test]
+#[ignore = "a measurement"]
+fn predictions_take_milliseconds() {
+    let first: u64 = std::env::var("CYANOMETER_FIRST").map_or(0, |first| first.parse().unwrap());
+    let mut found: Vec<(&str, u64, f64)> = Vec::new();
+    let (mut refused, mut not_accepted) = (0, 0);
+    for index in first..first + cameras() {
+        let (kind, setup, light) = any_sensor(index);
+        let Some((seconds, is_refused)) = predicted_in(&setup, light) else {
+            not_accepted += 1;
+            continue;
+        };
+        refused += u32::from(is_refused);
+        if seconds > 0.01 {
+            eprintln!("{kind} {index}: {:.1} ms{}", 1e3 * seconds, if is_refused { ", refused" } else { "" });
+        }
+        found.push((kind, index, seconds));
+    }
+    eprintln!("{} predicted, {refused} of them refused; {not_accepted} are no sensors", found.len());
+    let mut kinds: Vec<&str> = found.iter().map(|(kind, ..)| *kind).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    for kind in kinds {
+        let mut times: Vec<(f64, u64)> =
+            found.iter().filter(|(of, ..)| *of == kind).map(|(_, index, seconds)| (*seconds, *index)).collect();
+        times.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let above = times.iter().filter(|(seconds, _)| *seconds > 0.01).count();
+        let (median, (slowest, of)) = (times[times.len() / 2].0, times[times.len() - 1]);
+        let told_of = format!(
+            "median {:.2} ms, {above} above 10 ms, the slowest {:.1} ms (number {of})",
+            1e3 * median,
+            1e3 * slowest
+        );
+        eprintln!("{kind}: {} cameras, {told_of}", times.len());
+        let what = format!("all stages of {} cameras at random, {kind}: CPU of one thread", times.len());
+        told("predictions", &what, "none above 10 ms", &told_of, None, times.iter().map(|(seconds, _)| seconds).sum());
+    }
 }

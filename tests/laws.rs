@@ -367,6 +367,7 @@ fn frames_change_temporal_noise_and_sensors_change_patterns() {
     (readout.row_noise_e, readout.column_noise_e, readout.dsnu_e) = (3.0, 2.0, 4.0);
     (readout.dsnu_row_e, readout.dsnu_column_e) = (1.0, 5.0);
     (readout.prnu_row, readout.prnu_column) = (0.01, 0.02);
+    (readout.black_drift_e, readout.black_drift_rows) = (3.0, 6.5);
     // Every photosite is hot, and has a trap, the amplitude of which stays with the sensor.
     (readout.hot_pixel_share, readout.hot_pixel_dark_current_e_per_s) = (1.0, 500.0);
     (readout.rts_share, readout.rts_amplitude_e) = (1.0, 8.0);

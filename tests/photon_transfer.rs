@@ -127,6 +127,17 @@ fn level(readout: &ReadOut, index: u32, condition: Condition, expected_e: f64, f
 
 /// What a camera is found to be.
 fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
+    let [flats, darks] = levels(readout, index);
+    found(&flats, &darks)
+}
+
+fn found(flats: &[Level], darks: &[Level]) -> ClassFindings {
+    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true };
+    of_class("G", flats, darks, darks, &settings)
+}
+
+/// Flats and darks of a camera.
+fn levels(readout: &ReadOut, index: u32) -> [Vec<Level>; 2] {
     let lit = |photons: f64| Condition {
         is_lit: true,
         exposure_s: Some(FLAT_S),
@@ -142,19 +153,18 @@ fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
         number += frames;
         number - frames
     };
-    let flats: Vec<Level> = shares
+    let flats = shares
         .iter()
         .map(|share| {
             let frames = if *share == 0.5 { 8 } else { 2 };
             level(readout, index, lit(share * end / QUANTUM_EFFICIENCY), share * end, frames, next(frames))
         })
         .collect();
-    let darks: Vec<Level> = [(FLAT_S, 8), (0.1, 2), (0.25, 2), (0.5, 4), (1.0, 4)]
+    let darks = [(FLAT_S, 8), (0.1, 2), (0.25, 2), (0.5, 4), (1.0, 4)]
         .iter()
         .map(|(time, frames)| level(readout, index, dark(*time), 0.0, *frames, next(*frames)))
         .collect();
-    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true };
-    of_class("G", &flats, &darks, &darks, &settings)
+    [flats, darks]
 }
 
 /// The signal of the largest temporal variance, in electrons.
@@ -290,4 +300,64 @@ fn check_coverage(kind: Kind) {
         assert!(known * 10 >= count * 6, "{key} is known of {known} of {count} cameras alone");
         assert!(f64::from(missed) <= allowed, "{key}: {missed} of {known} intervals missed");
     }
+}
+
+/// A level as it is with another light than is said: its signal so many times as large.
+fn relit(flat: &Level, dark: &Level, times: f64) -> Level {
+    Level { mean: dark.mean + (flat.mean - dark.mean) * times, ..flat.clone() }
+}
+
+/// A lamp whose light scatters by 0.5 % from level to level, alike in proportion at all: of 60 measurements 3 responsivities may
+/// lie outside their intervals, and 10 by chance, 4 standard deviations.
+#[test]
+fn a_lamp_that_flickers_widens_the_responsivity() {
+    const COUNT: u32 = 60;
+    let readout = camera(3, Kind::Ccd);
+    let [flats, darks] = levels(&readout, 3);
+    let key = "responsivity_adu_per_photon";
+    let truth = found(&flats, &darks).get(key).unwrap().value;
+    let missed = (0..COUNT).filter(|draw| {
+        let mut chance = Chance { camera: 1000 + draw, drawn: 0 };
+        // The sum of 12 uniform numbers is normal enough.
+        let mut normal = || (0..12).map(|_| chance.uniform()).sum::<f64>() - 6.0;
+        let lit: Vec<Level> = flats.iter().map(|flat| relit(flat, &darks[0], 1.0 + 0.005 * normal())).collect();
+        let interval = found(&lit, &darks).get(key).unwrap();
+        !(interval.low..=interval.high).contains(&truth)
+    });
+    let missed = missed.count();
+    eprintln!("{missed} of {COUNT}");
+    assert!(missed <= 10, "{missed} of {COUNT}");
+}
+
+/// What levels show of wrong photons and of light that drifts is told; a camera that is as it should be raises no doubt.
+#[test]
+fn light_that_is_not_as_said_is_doubted() {
+    let readout = camera(3, Kind::Ccd);
+    let [flats, darks] = levels(&readout, 3);
+    assert_eq!(found(&flats, &darks).doubts, Vec::<String>::new());
+    let doubt = |flats: &[Level], words: &str| {
+        let doubts = found(flats, &darks).doubts;
+        assert!(doubts.iter().any(|doubt| doubt.contains(words)), "{words}: {doubts:?}");
+    };
+    let mut exchanged = flats.clone();
+    exchanged.swap(3, 4);
+    let photons = [3, 4].map(|place| exchanged[place].condition.photons);
+    (exchanged[3].condition.photons, exchanged[4].condition.photons) = (photons[1], photons[0]);
+    doubt(&exchanged, "are photons exchanged?");
+    let mut none = flats.clone();
+    none[0].condition.photons = Some(0.0);
+    doubt(&none, "a flat of 0 photons has a signal of");
+    let mut drifting = flats.clone();
+    for site in drifting.iter_mut().flat_map(|flat| &mut flat.sites) {
+        let (first, dark) = (site.frame_means[0], darks[0].mean);
+        for (frame, mean) in site.frame_means.iter_mut().enumerate() {
+            *mean = first + (first - dark) * 0.01 * frame as f64;
+        }
+    }
+    doubt(&drifting, "light rises by 1.00 % from frame to frame");
+    let brightest = flats[12].mean - darks[0].mean;
+    let bent = |flat: &Level| relit(flat, &darks[0], 1.0 - 0.02 * (flat.mean - darks[0].mean) / brightest);
+    doubt(&flats.iter().map(bent).collect::<Vec<_>>(), "the response bends");
+    let wrong = |(place, flat): (usize, &Level)| relit(flat, &darks[0], if place % 2 == 0 { 1.0 } else { 1.05 });
+    doubt(&flats.iter().enumerate().map(wrong).collect::<Vec<_>>(), "signals miss the line of the response by");
 }

@@ -437,3 +437,77 @@ fn names_stand_for_several_files() {
         assert!(!shop.path("m/p.svg").exists());
     }
 }
+
+/// What the first program of a pipe reads the last does not write over; nor are sidecars of inputs, whatever comes of the rest.
+#[test]
+fn inputs_upstream_and_sidecars_stay() {
+    let shop = with_scene();
+    fs::create_dir(shop.path("n")).unwrap();
+    shop.run("add-noise scene.exr --seed 5 --frames 0..3 -o n/a{frame}.exr", &[]);
+    let all = || ["a0.exr", "a1.exr", "a2.exr", "a1.exr.yaml"].map(|name| shop.bytes(&format!("n/{name}")));
+    let before = all();
+    let codes = shop.run("digitize n/a0.exr n/a1.exr n/a2.exr", &[]);
+    for line in ["mosaic -o n/{stem}.exr", "mosaic -o n/a{frame}.exr", "average-frames -o n/a2.exr"] {
+        let refused = shop.attempt(line, &codes);
+        assert!(said(&refused).contains("it is the same file as the input n/a"), "{line}: {}", said(&refused));
+        assert_ne!(refused.status.code(), Some(0), "{line}");
+    }
+    for line in [
+        "measure n/a0.exr n/a1.exr -o n/a1.exr.yaml",
+        "measure --over frames n/a0.exr n/a1.exr -o n/a1.exr.yaml",
+        "measure --over frames n/a0.exr n/a1.exr --pixels n/p.exr -o n/p.exr.yaml",
+    ] {
+        let refused = shop.attempt(line, &[]);
+        assert_eq!(refused.status.code(), Some(BAD_USAGE), "{line}: {}", said(&refused));
+    }
+    assert!(all() == before && !shop.path("n/p.exr").exists());
+    // A directory named after its input need not be there before its name is known.
+    fs::create_dir(shop.path("n/a1")).unwrap();
+    let codes = shop.run("digitize n/a1.exr n/a1.exr", &[]);
+    shop.run("mosaic -o n/{stem}/{index}.exr", &codes);
+    assert!(shop.path("n/a1/1.exr").exists());
+    shop.run("measure n/a0.exr n/a1.exr -o lines.jsonl", &[]);
+    assert_eq!(lines(&shop.bytes("lines.jsonl")).len(), 2);
+}
+
+/// An exposure counts once, also within averages and by its file or its samples, where no seed is told.
+#[test]
+fn exposures_count_once() {
+    let shop = with_scene();
+    shop.run("add-noise scene.exr --seed 5 --frames 0..8 -o e{frame}.exr", &[]);
+    shop.run("average-frames e0.exr e1.exr e2.exr -o first.exr", &[]);
+    shop.run("average-frames e2.exr e3.exr e5.exr -o second.exr", &[]);
+    shop.run("average-frames e4.exr e6.exr e7.exr -o third.exr", &[]);
+    let runs = |name: &str| -> Vec<[u64; 3]> {
+        shop.sidecar(name).averaged.iter().map(|run| [run.seed, run.first.into(), run.last.into()]).collect()
+    };
+    assert_eq!(runs("second.exr"), [[5, 2, 3], [5, 5, 5]]);
+    let twice = shop.attempt("average-frames first.exr second.exr -o both.exr", &[]);
+    assert!(said(&twice).contains("exposure 2 of seed 5 comes twice"), "{}", said(&twice));
+    shop.run("average-frames first.exr third.exr -o both.exr", &[]);
+    assert_eq!(runs("both.exr"), [[5, 0, 2], [5, 4, 4], [5, 6, 7]]);
+    // Frames of a camera have no seeds.
+    let plain = |name: &str, changed: &str| {
+        shop.run(&format!("digitize {changed} -o {name}.tiff"), &[]);
+        fs::remove_file(shop.path(&format!("{name}.tiff.yaml"))).unwrap();
+    };
+    plain("a", "e0.exr");
+    plain("b", "e1.exr");
+    for line in ["average-frames a.tiff b.tiff ./a.tiff -o m.exr", "measure --over frames a.tiff b.tiff a.tiff"] {
+        let refused = shop.attempt(line, &[]);
+        assert!(said(&refused).contains("a.tiff: it is given twice as an exposure"), "{}", said(&refused));
+        assert_eq!(refused.status.code(), Some(BAD_USAGE));
+    }
+    shop.run("digitize e0.exr -o a.exr", &[]);
+    let mut copy = shop.sidecar("a.exr");
+    copy.noise = None;
+    for name in ["a", "b"] {
+        fs::copy(shop.path("a.exr"), shop.path(&format!("{name}.exr"))).ok();
+        let text =
+            cyanometer::formats::yaml::write_metadata(&cyanometer::metadata::Metadata { scene: None, ..copy.clone() });
+        fs::write(shop.path(&format!("{name}.exr.yaml")), text.unwrap()).unwrap();
+    }
+    let copies = shop.attempt("average-frames a.exr b.exr -o m.exr", &[]);
+    assert!(said(&copies).contains("its samples are those of a.exr, by the digests of both"), "{}", said(&copies));
+    assert!(!shop.path("m.exr").exists());
+}

@@ -3,10 +3,7 @@
 use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
-use cyanometer::propagation::{self, Equations};
 use cyanometer::requests::{described::DescribedInput, options};
-use cyanometer::stages::noise::AddNoise;
-use cyanometer::stream::RowSource;
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -47,11 +44,5 @@ fn expose(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     let mut reader = arguments.input.with(input.clone()).open()?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
     session.tell(arguments.noise.choice.doubt().as_slice());
-    let mut stage = AddNoise::new(reader.header(), &arguments.noise.settings(exposure))?;
-    propagation::note(stage.header_mut(), Equations::Exact);
-    session.sign_exposure(stage.header_mut(), exposure);
-    if let Some(warning) = stage.warning() {
-        session.warn(&warning);
-    }
-    session.drive(reader, &stage, output)
+    session.expose(reader, &arguments.noise.settings(exposure), exposure, output)
 }

@@ -5,6 +5,7 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::propagation::{self, Equations};
 use cyanometer::requests::averaging::{AverageRequest, SharedAverage};
+use cyanometer::requests::independence::check_exposures;
 use cyanometer::requests::options;
 use cyanometer::stream::Counts;
 use std::process::ExitCode;
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let average = arguments.request.begin()?;
     arguments.output.check_one()?;
+    check_exposures(&arguments.input.inputs)?;
     let in_order = options::Output { makes: options::Makes::One, ..options::Output::default() };
     session.each_frame::<Arguments>(&arguments.input, &in_order, |turn| {
         let mut reader = AverageRequest::open(turn.input)?;

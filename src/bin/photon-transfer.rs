@@ -32,7 +32,7 @@ fn main() -> ExitCode {
 
 fn run(Arguments { measurement, outputs, .. }: &Arguments, session: &cli::Session) -> Result<()> {
     outputs.check()?;
-    let camera = measurement.run()?;
+    let camera = measurement.run(outputs.draws())?;
     session.tell(&camera.notes);
     outputs.write(&camera)
 }

@@ -45,7 +45,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { input, request, output, .. } = arguments;
-    let stacked = request.stacked(input)?;
+    let stacked = request.stacked(input, output)?;
     let stack = SharedStack::of(output)?;
     let into = stack.as_ref();
     match stacked {

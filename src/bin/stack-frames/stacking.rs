@@ -41,13 +41,16 @@ impl StackRequest {
     ///
     /// [`Error::Usage`] where stacks and frames come together, frames of what is no stack are chosen, or a stack has not so many;
     /// those of [`Stack::open`].
-    pub fn stacked(&self, input: &Input) -> Result<Option<Stacked>> {
+    pub fn stacked(&self, input: &Input, output: &Output) -> Result<Option<Stacked>> {
         let (stacks, frames): (Vec<_>, Vec<_>) =
             input.inputs.iter().partition(|path| names_stack(path) || is_stack(path));
         match (stacks.first(), frames.first()) {
             (Some(stack), Some(frame)) => {
                 let [stack, frame] = [stack, frame].map(|path| path.display());
-                return Err(Error::Usage(format!("{stack} is a stack and {frame} is none; take one kind at a time")));
+                return Err(Error::Usage(format!(
+                    "{stack} is a stack and {frame} is none; take one kind at a time, or put them one behind \
+                     the other: (stack-frames {stack}; cat {frame}) | stack-frames -o NEW.zarr"
+                )));
             }
             (None, _) if self.frames.is_some() => {
                 let problem = "frames are chosen out of stacks, and no input is one";
@@ -58,6 +61,7 @@ impl StackRequest {
         }
         let mut all = Vec::new();
         for path in stacks {
+            check_outside(path, output)?;
             std::fs::metadata(path).map_err(|e| Error::disk(&path.display().to_string(), "open", e))?;
             let stack = Stack::open(path)?;
             let has = 0..stack.frames();
@@ -70,6 +74,22 @@ impl StackRequest {
         }
         Ok(Some(Stacked(all)))
     }
+}
+
+/// Makes sure that nothing is written into a stack that is read, where the next one would replace it.
+fn check_outside(stack: &Path, output: &Output) -> Result<()> {
+    let Some(target) = named(output.output.as_deref()) else { return Ok(()) };
+    let whole = |path: &Path| std::fs::canonicalize(path).ok();
+    let above =
+        target.ancestors().skip(1).map(|above| if above.as_os_str().is_empty() { Path::new(".") } else { above });
+    let inside =
+        above.filter_map(whole).next().zip(whole(stack)).is_some_and(|(above, stack)| above.starts_with(stack));
+    if inside {
+        let (target, stack) = (target.display(), stack.display());
+        let problem = format!("{target}: it would lie inside the stack {stack}; name a place outside");
+        return Err(Error::Usage(problem).change(&["output"]));
+    }
+    Ok(())
 }
 
 impl Stacked {
@@ -121,7 +141,8 @@ impl SharedStack {
         if is_pattern(Path::new(path.as_os_str().to_string_lossy().trim_end_matches('/'))) {
             return Err(wrong("all frames go into one stack, which has a plain name"));
         }
-        let chosen: [(bool, &str, &'static [&'static str]); 3] = [
+        let chosen: [(bool, &str, &'static [&'static str]); 4] = [
+            (output.separate_layers, "layers are arrays of their own in a stack", &["separate_layers"]),
             (output.resume, "a stack is whole or not at all", &["resume"]),
             (output.viewable, "stacks are for arrays, not for viewers", &["viewable"]),
             (output.format.is_some(), "a stack is no such format", &["format"]),

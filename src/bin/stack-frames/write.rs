@@ -6,7 +6,7 @@ use cyanometer::error::{Error, Result};
 use cyanometer::formats::atomic::AtomicDirectory;
 use cyanometer::formats::digest::SamplesDigest;
 use cyanometer::formats::format::SampleType;
-use cyanometer::formats::output::SampleKind;
+use cyanometer::formats::output::{SampleKind, doubt_of_codes};
 use cyanometer::formats::places::STACK_DESCRIPTION;
 use cyanometer::formats::{register, yaml};
 use cyanometer::frame::Geometry;
@@ -206,6 +206,9 @@ impl Form {
             Some(SampleKind::F16) => SampleType::F16,
             Some(SampleKind::U16) => SampleType::U16,
         };
+        if stored == SampleType::F16 {
+            doubt_of_codes(name, header);
+        }
         let attributes = Map::from_iter([
             ("long_name".to_owned(), json!(metadata.quantity.to_string())),
             ("units".to_owned(), json!(metadata.unit)),

@@ -2,7 +2,7 @@
 //!
 //! A sensor is two parts that are measured apart: the [`readout`], which photon transfer tells, and the spectral
 //! [`response`]. [`sensor`] holds what a file says of both, [`levels`] what is black and white among its codes,
-//! and [`linearity`] how these bend.
+//! [`linearity`] how these bend, and [`taps`] through which amplifier each photosite is read.
 
 pub mod levels;
 pub mod linearity;
@@ -11,3 +11,4 @@ pub mod optics;
 pub mod readout;
 pub mod response;
 pub mod sensor;
+pub mod taps;

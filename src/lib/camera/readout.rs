@@ -1,6 +1,7 @@
 //! The read-out of a sensor: geometry, wells, noise, converter; and its dark current.
 
 use super::linearity::Linearization;
+use super::taps::Taps;
 use crate::cfa::FilterArray;
 use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, kelvin};
 use serde::{Deserialize, Serialize};
@@ -17,10 +18,14 @@ const MOST_DCNU: f64 = 2.0;
 const MOST_PRNU: f64 = 0.5;
 /// The same of whole rows and columns: gains of amplifiers differ by less.
 const MOST_LINE_PRNU: f64 = 0.05;
+/// The longest time that a packet stays at a photosite which it passes that does not look like µs, s.
+const MOST_SMEAR_LINE_S: f64 = 0.01;
 /// The smallest full well in e⁻ that does not look like thousands of them.
 const LEAST_WELL_E: f64 = 100.0;
 /// So many times the range of the converter is beyond what amplifiers are set to.
 const MOST_RANGES: f64 = 100.0;
+/// Rows over which a level can drift.
+const LEAST_DRIFT_ROWS: f64 = 2.0;
 
 /// What a sensor makes of charge, in numbers: what photon transfer measures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,6 +64,12 @@ pub struct ReadOut {
     /// The same of a column.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub column_noise_e: f64,
+    /// Drift of the black level along the rows of one exposure: rms, e⁻.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub black_drift_e: f64,
+    /// Rows from one level that is drawn to the next, between which it drifts smoothly.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub black_drift_rows: f64,
     /// Fixed offsets of photosites, read out with their charge whatever the exposure: rms, e⁻.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub dsnu_e: f64,
@@ -86,6 +97,12 @@ pub struct ReadOut {
     /// Mean amplitude of their jumps, exponentially distributed: e⁻.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub rts_amplitude_e: f64,
+    /// Time for which the light of each photosite that a packet passes on its way along its column counts, smear: s.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub smear_line_s: f64,
+    /// Share of the charge beyond full well that spills along its column, and is not drained: fraction of 1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub blooming: f64,
     /// Bits of the converter.
     pub bits: u32,
     /// What the converter adds, ADU.
@@ -95,6 +112,9 @@ pub struct ReadOut {
     /// What makes its codes proportional to charge; none where they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub linearization: Option<Linearization>,
+    /// The amplifiers that it is read through; none where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taps: Option<Taps>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
@@ -130,6 +150,8 @@ impl ReadOut {
             ("read_noise_e", self.read_noise_e),
             ("row_noise_e", self.row_noise_e),
             ("column_noise_e", self.column_noise_e),
+            ("black_drift_e", self.black_drift_e),
+            ("black_drift_rows", self.black_drift_rows),
             ("dsnu_e", self.dsnu_e),
             ("dsnu_row_e", self.dsnu_row_e),
             ("dsnu_column_e", self.dsnu_column_e),
@@ -139,6 +161,8 @@ impl ReadOut {
             ("hot_pixel_dark_current_e_per_s", self.hot_pixel_dark_current_e_per_s),
             ("rts_share", self.rts_share),
             ("rts_amplitude_e", self.rts_amplitude_e),
+            ("smear_line_s", self.smear_line_s),
+            ("blooming", self.blooming),
         ];
         for (key, value) in not_negative {
             if !(0.0..f64::INFINITY).contains(&value) {
@@ -151,6 +175,7 @@ impl ReadOut {
                 ("hot_pixel_dark_current_e_per_s", self.hot_pixel_dark_current_e_per_s),
             ),
             (("rts_share", self.rts_share), ("rts_amplitude_e", self.rts_amplitude_e)),
+            (("black_drift_e", self.black_drift_e), ("black_drift_rows", self.black_drift_rows)),
         ];
         for (share, mean) in pairs {
             for ((here, value), (other, missing)) in [(share, mean), (mean, share)] {
@@ -158,6 +183,12 @@ impl ReadOut {
                     return Err(format!("`{here}` is {value}, which says nothing without `{other}`"));
                 }
             }
+        }
+        if self.black_drift_e > 0.0 && self.black_drift_rows < LEAST_DRIFT_ROWS {
+            return Err(format!(
+                "`black_drift_rows` is {}; it must be {LEAST_DRIFT_ROWS} at least, what changes from row to row is `row_noise_e`",
+                self.black_drift_rows
+            ));
         }
         if !(1..=16).contains(&self.bits) {
             return Err(format!("`bits` is {}; it must be 1 to 16", self.bits));
@@ -197,11 +228,16 @@ impl ReadOut {
             ("prnu_column", self.prnu_column, MOST_LINE_PRNU),
             ("hot_pixel_share", self.hot_pixel_share, 1.0),
             ("rts_share", self.rts_share, 1.0),
+            ("blooming", self.blooming, 1.0),
         ];
         for (key, value, most) in patterns {
             if value > most {
                 return suspect(key, value, "fractions of 1", format!("per cent, which is {}", value / 100.0));
             }
+        }
+        if self.smear_line_s > MOST_SMEAR_LINE_S {
+            let seconds = self.smear_line_s / 1e6;
+            return suspect("smear_line_s", self.smear_line_s, "s", format!("us, which is {seconds:e} s"));
         }
         if self.full_well_e < LEAST_WELL_E {
             let electrons = self.full_well_e * 1000.0;
@@ -228,15 +264,59 @@ impl ReadOut {
         if let Some(curve) = self.linearization {
             curve.check_rises([-0.5, top_code + 0.5].map(|edge| edge - self.bias_adu))?;
         }
+        self.taps.as_ref().map_or(Ok(()), |taps| self.check_taps(taps, top_code))
+    }
+
+    fn check_taps(&self, taps: &Taps, top_code: f64) -> Result<(), String> {
+        taps.check(self.full_well_e)?;
+        for tap in 0..taps.count() {
+            let bias_adu = self.of_tap(tap).bias_adu;
+            if bias_adu > top_code {
+                return Err(format!(
+                    "`taps.offset_e` of tap {tap} makes its bias {bias_adu}; the largest code of {} bits is {top_code}",
+                    self.bits
+                ));
+            }
+            if let Some(curve) = self.linearization {
+                curve.check_rises([-0.5, top_code + 0.5].map(|edge| edge - bias_adu))?;
+            }
+        }
         Ok(())
     }
 
+    /// The tap of a photosite, by column and row on the sensor; 0 of sensors that have one.
+    pub fn tap(&self, at: [i64; 2]) -> usize {
+        self.taps.as_ref().map_or(0, |taps| taps.tap([self.width, self.height], at))
+    }
+
+    /// The read-out as if all went through one of its taps.
+    #[must_use]
+    pub fn of_tap(&self, tap: usize) -> Self {
+        let Some(taps) = &self.taps else { return self.clone() };
+        let adu_per_e = self.adu_per_e * taps.gain(tap);
+        Self {
+            read_noise_e: taps.read_noise_e(tap, self.read_noise_e),
+            bias_adu: self.bias_adu + adu_per_e * taps.offset_e(tap),
+            adu_per_e,
+            taps: None,
+            ..self.clone()
+        }
+    }
+
+    /// The read noise of each of its taps, e⁻.
+    pub fn read_noises_e(&self) -> impl Iterator<Item = f64> {
+        let count = self.taps.as_ref().map_or(1, Taps::count);
+        (0..count)
+            .map(|tap| self.taps.as_ref().map_or(self.read_noise_e, |taps| taps.read_noise_e(tap, self.read_noise_e)))
+    }
+
     /// What is added to charge when it is read, rms or mean in e⁻, by key.
-    pub fn added_e(&self) -> [(&'static str, f64); 7] {
+    pub fn added_e(&self) -> [(&'static str, f64); 8] {
         [
             ("read_noise_e", self.read_noise_e),
             ("row_noise_e", self.row_noise_e),
             ("column_noise_e", self.column_noise_e),
+            ("black_drift_e", self.black_drift_e),
             ("dsnu_e", self.dsnu_e),
             ("dsnu_row_e", self.dsnu_row_e),
             ("dsnu_column_e", self.dsnu_column_e),
@@ -306,6 +386,7 @@ pub fn silicon_band_gap_ev(temperature_k: f64) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::camera::taps::TapLayout;
     use crate::cfa::CfaPattern;
 
     /// That of the default sensor.
@@ -325,6 +406,8 @@ pub(crate) mod tests {
             read_noise_e: 15.7,
             row_noise_e: 0.0,
             column_noise_e: 0.0,
+            black_drift_e: 0.0,
+            black_drift_rows: 0.0,
             dsnu_e: 0.0,
             dsnu_row_e: 0.0,
             dsnu_column_e: 0.0,
@@ -334,10 +417,13 @@ pub(crate) mod tests {
             hot_pixel_dark_current_e_per_s: 0.0,
             rts_share: 0.0,
             rts_amplitude_e: 0.0,
+            smear_line_s: 0.0,
+            blooming: 0.0,
             bits: 12,
             bias_adu: 1753.0,
             adu_per_e: 0.058824,
             linearization: None,
+            taps: None,
         }
     }
 
@@ -389,6 +475,8 @@ pub(crate) mod tests {
                 "`prnu` is 5; it is in fractions of 1, and 5 looks like per cent, which is 0.05",
             ),
             (ReadOut { dcnu: 20.0, ..kaf5101ce() }, "20 looks like per cent, which is 0.2"),
+            (ReadOut { blooming: 30.0, ..kaf5101ce() }, "30 looks like per cent, which is 0.3"),
+            (ReadOut { smear_line_s: 1.2, ..kaf5101ce() }, "it is in s, and 1.2 looks like us, which is 1.2e-6 s"),
             (ReadOut { full_well_e: 40.0, ..kaf5101ce() }, "40 looks like thousands of them, which is 40000"),
             (ReadOut { read_noise_e: 50_000.0, ..kaf5101ce() }, "no less than `full_well_e`"),
             (ReadOut { bits: 8, ..kaf5101ce() }, "the largest code of 8 bits is 255"),
@@ -399,5 +487,27 @@ pub(crate) mod tests {
         let [doubt] = &ReadOut { adu_per_e: 17.0, ..kaf5101ce() }.doubts()[..] else { panic!("no doubt") };
         assert!(doubt.contains("166 times the range of 12 bits; it looks like electrons per ADU"), "{doubt}");
         assert!(kaf5101ce().doubts().is_empty());
+    }
+
+    #[test]
+    fn impossible_taps_are_refused_by_key() {
+        let taps = |layout, gain: &[f64]| Taps { layout, gain: gain.to_vec(), offset_e: vec![], read_noise_e: vec![] };
+        let complaint = |taps: Taps| ReadOut { taps: Some(taps), ..kaf5101ce() }.check().unwrap_err();
+        let halves = taps(TapLayout::LeftRight, &[1.0, 1.01]);
+        for (wrong, said) in [
+            (taps(TapLayout::LeftRight, &[]), "`taps` has none of `gain`, `offset_e` and `read_noise_e`"),
+            (taps(TapLayout::Columns, &[1.0; 5]), "`taps` has numbers of 5 taps; the layout `columns` has 2 to 4"),
+            (taps(TapLayout::Quadrants, &[1.0; 2]), "the layout `quadrants` has 4"),
+            (taps(TapLayout::TopBottom, &[1.0, 101.0]), "`taps.gain` is 101 for tap 1; it is relative to `adu_per_e`"),
+            (taps(TapLayout::TopBottom, &[f64::NAN, 1.0]), "`taps.gain` is NaN for tap 0"),
+            (Taps { offset_e: vec![0.0], ..halves.clone() }, "`taps.offset_e` has 1 numbers, but there are 2 taps"),
+            (Taps { offset_e: vec![0.0, -1e5], ..halves.clone() }, "`taps.offset_e` is -100000 for tap 1"),
+            (Taps { offset_e: vec![39_990.0, 0.0], ..halves.clone() }, "`taps.offset_e` of tap 0 makes its bias 4105"),
+            (Taps { read_noise_e: vec![15.0, -1.0], ..halves.clone() }, "`taps.read_noise_e` is -1 for tap 1"),
+        ] {
+            let found = complaint(wrong);
+            assert!(found.contains(said), "{found}");
+        }
+        assert_eq!(ReadOut { taps: Some(halves), ..kaf5101ce() }.check(), Ok(()));
     }
 }

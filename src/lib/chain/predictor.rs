@@ -13,11 +13,13 @@ use crate::metadata::{CorrectionRecord, FrameHeader, Scene};
 use crate::names::Named;
 use crate::numerics::normal;
 use crate::propagation::budget::{Budget, Cause};
-use crate::propagation::frame::{Sites, quantity_of_sites};
+use crate::propagation::drift;
+use crate::propagation::frame::{Predicted, Sites, quantity_of_sites};
 use crate::propagation::gains;
 use crate::propagation::saturation;
 use crate::propagation::smooth_hue::FirstOrder;
-use crate::propagation::{Equations, FramePrediction, PixelMoments, SiteCovariance};
+use crate::propagation::taps::{Group, pooled};
+use crate::propagation::{Equations, FramePrediction, PixelMoments, SiteCovariance, of_frame};
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::PHASES;
 use crate::stages::to_xyz::ColorSettings;
@@ -91,8 +93,8 @@ pub struct Predictor {
 /// the light.
 const SATURATED: f64 = 1e-3;
 
-/// What photosites are: their quantity, and how they were corrected.
-type Plane = (QuantityKind, Option<CorrectionRecord>);
+/// What photosites are: their quantity, how they were corrected, and whether their columns have smear of a plane.
+type Plane = (QuantityKind, Option<CorrectionRecord>, bool);
 
 fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)]))
@@ -151,8 +153,10 @@ impl Predictor {
         let mut stages = Vec::new();
         let mut noise_delta_e = None;
         let mut first_order = None;
+        let mut no_pixels = None;
         // Photosites are the same from the converter, or the subtraction of dark frames, on.
         let mut known: Option<(Plane, Sites, [Budget; 3])> = None;
+        let has_smear = self.sensor().readout.as_ref().is_some_and(|readout| readout.smear_line_s > 0.0);
         for (stage, head) in &mut self.heads {
             if let Some(scene) = &mut head.metadata.scene {
                 scene.expected_electrons = Some(electrons);
@@ -160,12 +164,24 @@ impl Predictor {
             let none = |why| {
                 Error::Data(format!("nothing can be predicted of {} at {electrons:?} electrons: {why}", stage.name()))
             };
-            let plane = (quantity_of_sites(head), head.metadata.correction.clone());
+            let of_readout = head.readout().map(|readout| (readout.taps.is_some(), readout.black_drift_e > 0.0));
+            let (has_taps, drifts) = of_readout.unwrap_or_default();
+            if head.metadata.demosaic.is_some() && (has_taps || drifts) {
+                no_pixels = Some(if has_taps { PIXELS_OF_TAPS } else { PIXELS_IN_DRIFT }.to_owned());
+                continue;
+            }
+            if has_taps {
+                let (prediction, causes) = self.settings.groups(head).map_err(none)?;
+                stages.push(self.settings.stage(*stage, head, &prediction, &causes));
+                continue;
+            }
+            let is_plane = head.metadata.cfa.is_some() || head.metadata.demosaic.is_some();
+            let plane = (quantity_of_sites(head), head.metadata.correction.clone(), is_plane && has_smear);
             let (sites, causes) = match known.take().filter(|(of, ..)| *of == plane) {
                 Some((_, sites, causes)) => (sites, causes),
                 None => {
                     let sites = Sites::of(head, self.settings.equations).map_err(none)?;
-                    let causes = electrons.map(|e| sites.photosite.budget(e));
+                    let causes = sites.expected_e.map(|e| sites.photosite.budget(e));
                     (sites, causes)
                 }
             };
@@ -184,11 +200,40 @@ impl Predictor {
             stages.push(self.settings.stage(*stage, head, &prediction, &causes));
             known = Some((plane, sites, causes));
         }
-        Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order })
+        Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order, no_pixels })
     }
 }
 
+/// Why no pixels are predicted that several amplifiers have a part in.
+const PIXELS_OF_TAPS: &str = "the sensor is read through several amplifiers (`taps`), and pixels are made of photosites of one or of \
+                              more of them; `measure` predicts regions behind one";
+
+/// Why no pixels are predicted of a black level that drifts.
+const PIXELS_IN_DRIFT: &str = "the black level of the sensor drifts along rows (`black_drift_e`), and what pixels share by that is not \
+                               predicted";
+
 impl PredictorSettings {
+    /// The photosites of a frame that several amplifiers read, and their variances by cause: means over all of a class.
+    fn groups(&self, head: &FrameHeader) -> Predicted<(FramePrediction, [Budget; 3])> {
+        let prediction = of_frame(head, self.equations)?;
+        let mut causes = [[0.0; Cause::ALL.len()]; 3];
+        let mut counts = [0.0; 3];
+        for (part_counts, sites) in Sites::of_taps(head, self.equations)? {
+            for k in 0..3 {
+                let budget = sites.photosite.budget(sites.expected_e[k]);
+                causes[k].iter_mut().zip(budget).for_each(|(sum, variance)| *sum += part_counts[k] * variance);
+                counts[k] += part_counts[k];
+            }
+        }
+        causes.iter_mut().zip(counts).for_each(|(causes, n)| causes.iter_mut().for_each(|sum| *sum /= n));
+        if let FramePrediction::Groups(groups) = &prediction {
+            for (causes, class) in causes.iter_mut().zip(pooled(groups)) {
+                causes[Cause::Taps as usize] = class.moments.variance - causes.iter().sum::<f64>();
+            }
+        }
+        Ok((prediction, causes))
+    }
+
     fn stage(
         &self,
         stage: ChainStage,
@@ -234,7 +279,7 @@ impl PredictorSettings {
             channels: (0..3).map(|index| head.channel_name(index).to_owned()).collect(),
             void: match prediction {
                 FramePrediction::Pixels(mixture) => mixture.void,
-                FramePrediction::Planes(_) => None,
+                FramePrediction::Planes(_) | FramePrediction::Groups(_) => None,
             },
             mean,
             bias: match prediction {
@@ -264,6 +309,18 @@ impl PredictorSettings {
                 let own = Matrix3::from_diagonal(&sites.own.into());
                 (classes.map(|class| class.moments.mean), own + sites.row + sites.column)
             }
+            FramePrediction::Groups(groups) => {
+                let classes = pooled(groups);
+                let mean = classes.map(|class| class.moments.mean);
+                // Amplifiers move the classes together.
+                let n: f64 = groups.iter().map(|group| group.counts[0]).sum();
+                let off = |group: &Group, i: usize| group.sites[i].moments.mean - mean[i];
+                let between = |i: usize, j: usize| {
+                    groups.iter().map(|group| group.counts[0] * off(group, i) * off(group, j)).sum::<f64>() / n
+                };
+                let covariance = |i: usize, j: usize| if i == j { classes[i].moments.variance } else { between(i, j) };
+                (mean, Matrix3::from_fn(covariance))
+            }
             FramePrediction::Pixels(mixture) if self.equations == Equations::Paper => {
                 (mixture.mean, mixture.covariance)
             }
@@ -282,7 +339,7 @@ impl PredictorSettings {
         covariance: &Matrix3<f64>,
     ) -> Vec<CauseVariance> {
         let gains = match prediction {
-            FramePrediction::Planes(_) => None,
+            FramePrediction::Planes(_) | FramePrediction::Groups(_) => None,
             FramePrediction::Pixels(_) if self.equations == Equations::Paper => return Vec::new(),
             FramePrediction::Pixels(mixture) => Some(gains::mean_pixel(&mixture.weights)),
         };
@@ -347,7 +404,22 @@ impl PredictorSettings {
                 let sites = SiteCovariance::of(classes);
                 let [columns, rows] = size.map(|extent| extent as f64);
                 let own = Matrix3::from_diagonal(&sites.own.into());
-                own / (columns * rows) + sites.row / rows + sites.column / columns
+                let of_rows = if sites.drifts() {
+                    let shared = drift::of_mean_of_rows(size[1], sites.drift_rows);
+                    (sites.row - sites.drift) / rows + sites.drift * shared
+                } else {
+                    sites.row / rows
+                };
+                own / (columns * rows) + of_rows + sites.column / columns
+            }
+            // Photosites of any place: what they have behind an amplifier, on average.
+            FramePrediction::Groups(groups) => {
+                let n = size[0] as f64 * size[1] as f64;
+                let within = |k: usize| {
+                    let all: f64 = groups.iter().map(|group| group.counts[k]).sum();
+                    groups.iter().map(|group| group.counts[k] * group.sites[k].moments.variance).sum::<f64>() / all
+                };
+                Matrix3::from_diagonal(&[0, 1, 2].map(|k| within(k) / n).into())
             }
             FramePrediction::Pixels(_) => covariance / (size[0] as f64 * size[1] as f64),
         }

@@ -4,6 +4,7 @@ mod advice;
 pub mod demo;
 mod documents;
 pub mod examples;
+mod exposing;
 mod frames;
 mod general;
 mod help;

@@ -198,6 +198,27 @@ impl Session {
         self.ended(reader, counts).map(drop)
     }
 
+    /// Drives the rows that have become of a frame `read` without a layer of marks, of which so much was counted before, through a stage
+    /// to a new output.
+    ///
+    /// # Errors
+    ///
+    /// Those of rows, stage and writer.
+    pub(super) fn drive_rows<S: Stage>(
+        &self,
+        read: &FrameHeader,
+        (rows, before): (&mut dyn RowSource, Counts),
+        stage: &S,
+        output: &Output,
+    ) -> Result<Option<Counts>> {
+        let masking = Masking::of(read, false, stage.header(), output.options().holds_layers()?);
+        let made = masking.header(stage);
+        let no_darks: Option<&mut DarkFrames<FrameReader>> = None;
+        self.write(&made, output, |writer, progress| {
+            Ok(before.plus(masking.run(stage, rows, no_darks, writer, progress)?))
+        })
+    }
+
     /// Passes a frame from an open reader on to a new output as it is; what its sidecar counted is counted on.
     ///
     /// # Errors
@@ -257,7 +278,7 @@ impl Session {
     }
 
     /// Says what was counted of a frame; one that was complete is passed over. Tells whether it was made.
-    fn ended(&self, mut reader: FrameReader, counts: Option<Counts>) -> Result<bool> {
+    pub(super) fn ended(&self, mut reader: FrameReader, counts: Option<Counts>) -> Result<bool> {
         match counts {
             Some(counts) => counts.warnings().iter().for_each(|warning| self.warn(warning)),
             None => reader.drain()?,
@@ -343,8 +364,8 @@ impl Session {
         }
         match path {
             Some(path) => Err(Error::Usage(format!(
-                "{}: another frame of this run went there; give names with {{frame}}, the number of the exposure, or {{index}}, \
-                 that in the stream",
+                "{}: another frame of this run went there; give names with {{stem}}, that of its file, {{frame}}, the number of \
+                 the exposure, or {{index}}, that in the stream",
                 path.display()
             ))),
             None if options.format.is_none_or(|format| format == Format::Exr) => Ok(options),

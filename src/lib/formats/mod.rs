@@ -42,6 +42,7 @@ mod settings;
 pub mod spectral;
 pub mod stack;
 pub mod standard;
+pub mod stored_rows;
 mod storing;
 pub mod table;
 pub mod tiff;

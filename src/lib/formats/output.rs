@@ -227,7 +227,7 @@ fn interop_id(header: &FrameHeader) -> Option<&'static str> {
 const ICC_PROFILE: u16 = 34675;
 
 /// A warning of codes that f16 rounds: it counts by ones to 2048, by twos to 4096 and so on.
-fn doubt_of_codes(name: &str, header: &FrameHeader) {
+pub fn doubt_of_codes(name: &str, header: &FrameHeader) {
     let white = header.metadata.white_level_adu.map(|white| white.largest());
     let rounded = white.filter(|white| header.metadata.quantity == QuantityKind::Adu && *white > LARGEST_EXACT_F16);
     if let Some(white) = rounded {

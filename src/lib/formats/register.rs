@@ -64,14 +64,14 @@ pub fn note_input(about: &Metadata, name: &str) -> Result<()> {
     }
 }
 
-/// Notes files that will be read, before any is opened; what does not exist is told when it is.
+/// Notes files that will be read, and their sidecars, before any is opened; what does not exist is told when it is.
 ///
 /// # Errors
 ///
 /// As [`note_input`].
 pub fn note_inputs<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<()> {
     let noted = |path: &Path| match std::fs::metadata(path) {
-        Ok(about) => note_input(&about, &path.display().to_string()),
+        Ok(about) => note_input(&about, &path.display().to_string()).and_then(|()| note_sidecar(path)),
         Err(_) => Ok(()),
     };
     paths.into_iter().filter_map(|path| named(Some(path))).try_for_each(noted)

@@ -2,6 +2,7 @@
 
 use crate::camera::linearity::Linearization;
 use crate::camera::readout::ReadOut;
+use crate::camera::taps::Taps;
 use serde::{Deserialize, Serialize};
 
 /// The converter as it was set, and whether its codes were made straight since.
@@ -34,6 +35,13 @@ impl AdcRecord {
     pub fn of_readout(readout: &ReadOut) -> Self {
         let straight = Self::new(readout.bits, readout.bias_adu, readout.adu_per_e);
         Self { linearization: readout.linearization, ..straight }
+    }
+
+    /// The converter behind one of the amplifiers of a sensor, as it is set for all: K g for K, and K g o more than its bias.
+    #[must_use]
+    pub fn of_tap(self, taps: &Taps, tap: usize) -> Self {
+        let adu_per_e = self.adu_per_e * taps.gain(tap);
+        Self { adu_per_e, bias_adu: self.bias_adu + adu_per_e * taps.offset_e(tap), ..self }
     }
 
     /// Whether its samples are not proportional to charge.

@@ -7,6 +7,7 @@ use crate::numerics::averages::Combine;
 use crate::random::Source;
 use crate::units::QuantityKind;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// What was taken back of a frame of codes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -139,6 +140,66 @@ impl ExposuresRecord {
     }
 }
 
+/// Exposures of one seed in which noise was drawn, one after another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DrawnExposures {
+    /// The seed.
+    pub seed: u64,
+    /// The number of the first.
+    pub first: u32,
+    /// The number of the last.
+    pub last: u32,
+}
+
+impl DrawnExposures {
+    /// A single one.
+    pub fn one(seed: u64, number: u32) -> Self {
+        Self { seed, first: number, last: number }
+    }
+
+    /// The first exposure that is in both.
+    pub fn common(self, other: Self) -> Option<u32> {
+        let first = self.first.max(other.first);
+        (self.seed == other.seed && first <= self.last.min(other.last)).then_some(first)
+    }
+}
+
+/// Exposures that came so far, none of them twice.
+#[derive(Debug, Clone, Default)]
+pub struct ExposureSet(BTreeMap<(u64, u32), u32>);
+
+impl ExposureSet {
+    /// Takes in a run; where one of its exposures is there already, gives that one's number instead.
+    ///
+    /// # Errors
+    ///
+    /// The number of an exposure that came before.
+    pub fn insert(&mut self, run: DrawnExposures) -> Result<(), u32> {
+        let DrawnExposures { seed, first, last } = run;
+        let before = self.0.range((seed, 0)..=(seed, last)).next_back();
+        let before = before.map(|(&(seed, first), &last)| DrawnExposures { seed, first, last });
+        match before.and_then(|before| before.common(run)) {
+            Some(number) => Err(number),
+            None => {
+                self.0.insert((seed, first), last);
+                Ok(())
+            }
+        }
+    }
+
+    /// All as runs, in order.
+    pub fn runs(&self) -> Vec<DrawnExposures> {
+        let mut runs: Vec<DrawnExposures> = Vec::new();
+        for (&(seed, first), &last) in &self.0 {
+            match runs.last_mut().filter(|run| run.seed == seed && run.last.checked_add(1) == Some(first)) {
+                Some(run) => run.last = last,
+                None => runs.push(DrawnExposures { seed, first, last }),
+            }
+        }
+        runs
+    }
+}
+
 /// An average that was subtracted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MasterRecord {
@@ -200,6 +261,7 @@ impl MasterNoise {
             hot_pixel_e,
             poisson,
             cte: None,
+            smear_per_row: 0.0,
         }
     }
 }
@@ -250,4 +312,29 @@ pub struct DefectsRecord {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
 fn is_zero(count: &u32) -> bool {
     *count == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exposures_are_in_a_set_once() {
+        let mut set = ExposureSet::default();
+        let run = |seed, first, last| DrawnExposures { seed, first, last };
+        for (run, wanted) in [
+            (run(7, 3, 5), Ok(())),
+            (run(7, 6, 6), Ok(())),
+            (run(7, 0, 2), Ok(())),
+            (run(8, 4, 4), Ok(())),
+            (run(7, 5, 9), Err(6)),
+            (run(7, 4, 4), Err(4)),
+            (run(7, 0, u32::MAX), Err(6)),
+            (run(6, 0, u32::MAX), Ok(())),
+            (run(6, u32::MAX, u32::MAX), Err(u32::MAX)),
+        ] {
+            assert_eq!(set.insert(run), wanted, "{run:?}");
+        }
+        assert_eq!(set.runs(), [run(6, 0, u32::MAX), run(7, 0, 6), run(8, 4, 4)]);
+    }
 }

@@ -7,7 +7,8 @@ mod records;
 
 pub use converter::AdcRecord;
 pub use correction::{
-    AverageRecord, CorrectionRecord, DefectsRecord, ExposuresRecord, FlatRecord, MasterKind, MasterNoise, MasterRecord,
+    AverageRecord, CorrectionRecord, DefectsRecord, DrawnExposures, ExposureSet, ExposuresRecord, FlatRecord,
+    MasterKind, MasterNoise, MasterRecord,
 };
 pub use difference::Difference;
 pub use records::{
@@ -19,6 +20,7 @@ use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
 use crate::camera::optics::Exposure;
 use crate::camera::readout::ReadOut;
 use crate::camera::sensor::Sensor;
+use crate::camera::taps::Taps;
 use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, bare_name};
@@ -103,6 +105,9 @@ pub struct Metadata {
     /// The exposures that the frame is the average of, where it is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub average: Option<ExposuresRecord>,
+    /// Which exposures these are, as far as their metadata tell.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub averaged: Vec<DrawnExposures>,
     /// What was taken back before demosaicking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correction: Option<CorrectionRecord>,
@@ -121,6 +126,9 @@ pub struct Metadata {
     /// Expected share of the pixels that were made of saturated samples, by the law of a uniform scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturated_share: Option<f64>,
+    /// Photosites of the exposure that took up charge which spilled over along their columns, where its sensor blooms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bloomed_photosites: Option<u64>,
     /// What the bits of the layer `mask` mean, where the frame has one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mask_bits: Vec<String>,
@@ -173,12 +181,14 @@ impl Metadata {
             noise: None,
             adc: None,
             average: None,
+            averaged: Vec::new(),
             correction: None,
             demosaic: None,
             color: None,
             predicted: None,
             uncertainty: None,
             saturated_share: None,
+            bloomed_photosites: None,
             mask_bits: Vec::new(),
             left_out: Vec::new(),
             history: Vec::new(),
@@ -314,13 +324,31 @@ impl FrameHeader {
         }
     }
 
+    /// Seeds and numbers of the exposures in which its noise was drawn: its own, or those that it is the average of.
+    pub fn drawn(&self) -> Vec<DrawnExposures> {
+        let noise = self.metadata.noise.as_ref().filter(|noise| !noise.sources.is_empty());
+        match noise.map(|noise| (noise.seed, noise.frame)) {
+            Some((seed, frame)) if self.metadata.averaged.is_empty() => vec![DrawnExposures::one(seed, frame)],
+            _ => self.metadata.averaged.clone(),
+        }
+    }
+
+    /// Whether noise that an exposure draws anew may be in it; not where it was simulated without.
+    pub fn is_noisy(&self) -> bool {
+        match &self.metadata.noise {
+            Some(noise) => noise.sources.iter().any(|source| !source.is_fixed_pattern()),
+            None => self.metadata.scene.is_none(),
+        }
+    }
+
     /// The same without what tells it from other exposures of its scene: its name, its seed and number, what its samples were
-    /// counted to be, and what this version does not know.
+    /// counted to be, where charge spilled, and what this version does not know.
     #[must_use]
     pub fn without_exposure(&self) -> Self {
         let mut head = Self { name: String::new(), ..self.clone() };
         head.metadata.history.clear();
-        (head.metadata.samples, head.metadata.file) = (None, None);
+        (head.metadata.samples, head.metadata.file, head.metadata.bloomed_photosites) = (None, None, None);
+        head.metadata.averaged.clear();
         if let Some(noise) = &mut head.metadata.noise {
             (noise.seed, noise.frame) = (0, 0);
         }
@@ -432,6 +460,25 @@ impl FrameHeader {
             "it starts at column {column}, row {row} of the sensor; charge of the photosites before these is missing, \
              so that transfer cannot be followed"
         )))
+    }
+
+    /// The amplifiers that its sensor is read through; none where there is one, or nothing is known.
+    pub fn taps(&self) -> Option<&Taps> {
+        self.metadata.sensor.as_ref()?.readout.as_ref()?.taps.as_ref()
+    }
+
+    /// Makes sure that all charge goes to one output, as charge transfer is simulated and undone.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for a sensor that is read through several amplifiers.
+    pub fn check_one_output(&self) -> Result<()> {
+        match self.taps() {
+            None => Ok(()),
+            Some(_) => Err(self.refuse(
+                "its sensor is read through several `taps`, but charge transfer is that to one output, in the sensor's corner",
+            )),
+        }
     }
 
     /// An [`Error::MissingKey`] about this frame.

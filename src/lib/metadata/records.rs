@@ -118,6 +118,9 @@ pub struct NoiseRecord {
     /// Share of a packet that each move to the output takes along, where charge transfer was simulated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cte: Option<f64>,
+    /// Share of the light of each photosite of its column that a packet has as smear; 0 where there is none.
+    #[serde(default, skip_serializing_if = "is_no_charge")]
+    pub smear_per_row: f64,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]

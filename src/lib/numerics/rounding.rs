@@ -22,6 +22,30 @@ pub const SMOOTH: f64 = 1.25;
 /// 10⁻⁷/σ¹³, is below 10⁻¹².
 const WIDE: f64 = 2.5;
 
+/// The standard deviation in codes from which five terms of the series of a mean will do.
+const FEW_TERMS: f64 = 0.3;
+
+/// What rounding adds to the mean of a normal variable that no end is near.
+fn of_rounding(mean: f64, sigma: f64) -> f64 {
+    if sigma >= SMOOTH {
+        return 0.0;
+    }
+    let (sine, cosine) = (std::f64::consts::TAU * (mean - mean.round())).sin_cos();
+    let q = (-2.0 * (std::f64::consts::PI * sigma).powi(2)).exp();
+    // (−1)ᵐ sin(mt) and q^(m²), each from those before.
+    let (mut before, mut alternating) = (0.0, -sine);
+    let (mut damping, mut next) = (q, q * q * q);
+    let (mut sum, mut m) = (0.0, 1.0);
+    while damping > 1e-16 {
+        sum += alternating * damping / m;
+        (before, alternating) = (alternating, -2.0 * cosine * alternating - before);
+        damping *= next;
+        next *= q * q;
+        m += 1.0;
+    }
+    sum / std::f64::consts::PI
+}
+
 /// Powers 1 to 4.
 fn powers(x: f64) -> [f64; 4] {
     let square = x * x;
@@ -68,6 +92,36 @@ impl Rounding {
             return powers(self.code(mean) - center);
         }
         if sigma < WIDE { self.sum(mean, sigma, center) } else { self.integral(mean, sigma, center) }
+    }
+
+    /// The first of [`Self::moments`], in less time.
+    ///
+    /// Far from the ends it is x + Σ (−1)ᵐ sin(2πm x) e^(−2π²m²σ²)/(πm), x the mean, which few terms of sum.
+    pub fn mean(&self, mean: f64, sigma: f64, center: f64) -> f64 {
+        let reach = REACH * sigma;
+        let is_free = mean - reach > self.lowest && mean + reach < self.highest;
+        if sigma <= 0.0 || mean + reach < self.lowest - 0.5 || mean - reach > self.highest + 0.5 {
+            return self.code(mean) - center;
+        }
+        if is_free && sigma >= FEW_TERMS {
+            return mean - center + of_rounding(mean, sigma);
+        }
+        if sigma >= WIDE {
+            return self.integral(mean, sigma, center)[0];
+        }
+        let base = self.code(mean);
+        let mut found = base - center;
+        let mut code = base;
+        while code < self.highest && code + 0.5 < mean + reach {
+            found += cumulative((mean - code - 0.5) / sigma);
+            code += 1.0;
+        }
+        code = base - 1.0;
+        while code >= self.lowest && code + 0.5 > mean - reach {
+            found -= cumulative((code + 0.5 - mean) / sigma);
+            code -= 1.0;
+        }
+        found
     }
 
     /// The code of a number.
@@ -228,10 +282,11 @@ mod tests {
     #[test]
     fn moments_are_those_of_the_codes() {
         let byte = Rounding { lowest: 0.0, highest: 255.0 };
-        for sigma in [0.01, 0.1, 0.4, 0.9, 1.3, 2.4, 2.5, 2.6, 3.0, 4.0, 8.0, 20.0, 100.0, 800.0] {
+        for sigma in [0.01, 0.1, 0.29, 0.31, 0.4, 0.9, 1.3, 2.4, 2.5, 2.6, 3.0, 4.0, 8.0, 20.0, 100.0, 800.0] {
             for mean in [-30.0, -0.5, 0.2, 3.5, 12.49, 100.0, 127.3, 250.6, 255.5, 259.0, 400.0] {
                 let center = byte.code(mean);
                 let (found, expected) = (byte.moments(mean, sigma, center), reference(byte, mean, sigma, center));
+                assert!((byte.mean(mean, sigma, center) - expected[0]).abs() < 1e-10 * sigma.clamp(1.0, 256.0));
                 for (j, power) in (0..4).zip(1..) {
                     let scale = sigma.clamp(1.0, 256.0).powi(power);
                     assert!(

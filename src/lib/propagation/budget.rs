@@ -51,6 +51,10 @@ pub enum Cause {
     HotPixels,
     /// Random telegraph signals of some photosites.
     Rts,
+    /// Drift of the black level along rows.
+    BlackDrift,
+    /// Gains and offsets of the amplifiers that a sensor is read through, a fixed pattern.
+    Taps,
     /// What full well, rounding and the ends of the range take from the fixed patterns, or add to them.
     ClippedPattern,
     /// What is curved in a color takes from its variance, or adds to it.
@@ -59,7 +63,7 @@ pub enum Cause {
 
 impl Cause {
     /// All causes, in the order in which they act.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 22] = [
         Self::SignalShot,
         Self::Prnu,
         Self::PrnuRow,
@@ -78,6 +82,8 @@ impl Cause {
         Self::Rails,
         Self::HotPixels,
         Self::Rts,
+        Self::BlackDrift,
+        Self::Taps,
         Self::ClippedPattern,
         Self::Curvature,
     ];
@@ -103,6 +109,8 @@ impl Cause {
             Self::Rails => "rails",
             Self::HotPixels => "hot_pixels",
             Self::Rts => "rts",
+            Self::BlackDrift => "black_drift",
+            Self::Taps => "taps",
             Self::ClippedPattern => "clipped_pattern",
             Self::Curvature => "curvature",
         }
@@ -110,13 +118,15 @@ impl Cause {
 
     /// Whether it is the same in every exposure of one sensor.
     pub fn is_fixed_pattern(self) -> bool {
-        PATTERNS.contains(&self) || OFFSETS.contains(&self) || matches!(self, Self::HotPixels | Self::ClippedPattern)
+        PATTERNS.contains(&self)
+            || OFFSETS.contains(&self)
+            || matches!(self, Self::HotPixels | Self::Taps | Self::ClippedPattern)
     }
 
     /// Whether photosites of a row (0), or of a column (1), share it; none where each has its own.
     pub fn shared_by(self) -> Option<usize> {
         match self {
-            Self::RowNoise | Self::DsnuRow | Self::PrnuRow => Some(0),
+            Self::RowNoise | Self::BlackDrift | Self::DsnuRow | Self::PrnuRow => Some(0),
             Self::ColumnNoise | Self::DsnuColumn | Self::PrnuColumn => Some(1),
             _ => None,
         }
@@ -134,6 +144,8 @@ impl Cause {
             Self::PrnuColumn => Some(readout.prnu_column),
             Self::HotPixels => Some(readout.hot_pixel_share),
             Self::Rts => Some(readout.rts_share),
+            Self::BlackDrift => Some(readout.black_drift_e),
+            Self::Taps => Some(if readout.taps.is_some() { 1.0 } else { 0.0 }),
             _ => None,
         }
     }
@@ -143,8 +155,16 @@ impl Cause {
 const PATTERNS: [Cause; 4] = [Cause::Prnu, Cause::PrnuRow, Cause::PrnuColumn, Cause::Dcnu];
 
 /// What is added to the charge as it is read.
-const ADDED: [Cause; 7] =
-    [Cause::Read, Cause::Rts, Cause::RowNoise, Cause::ColumnNoise, Cause::Dsnu, Cause::DsnuRow, Cause::DsnuColumn];
+const ADDED: [Cause; 8] = [
+    Cause::Read,
+    Cause::Rts,
+    Cause::RowNoise,
+    Cause::ColumnNoise,
+    Cause::BlackDrift,
+    Cause::Dsnu,
+    Cause::DsnuRow,
+    Cause::DsnuColumn,
+];
 
 /// Fixed patterns of it.
 const OFFSETS: [Cause; 3] = [Cause::Dsnu, Cause::DsnuRow, Cause::DsnuColumn];
@@ -277,6 +297,7 @@ impl Photosite {
         set(Cause::Rts, model.tails.trap_variance());
         set(Cause::RowNoise, model.lines.row_noise_e.powi(2));
         set(Cause::ColumnNoise, model.lines.column_noise_e.powi(2));
+        set(Cause::BlackDrift, model.lines.black_drift_e.powi(2));
         set(Cause::Dsnu, model.lines.dsnu_e.powi(2));
         set(Cause::DsnuRow, model.lines.dsnu_row_e.powi(2));
         set(Cause::DsnuColumn, model.lines.dsnu_column_e.powi(2));

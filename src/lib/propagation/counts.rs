@@ -73,6 +73,16 @@ impl Charge {
         }
     }
 
+    /// No more than the number of [`Self::counts`], without a pattern.
+    pub fn least_counts(&self, smoothing: f64) -> f64 {
+        let sigma = self.rate.sqrt();
+        if self.is_certain() || self.shot == Some(PoissonKind::Gaussian) || smoothing >= 3.0 * sigma {
+            return 1.0;
+        }
+        // Weights of 10⁻¹⁵ are 8 standard deviations off.
+        (14.0 * sigma / self.step(smoothing).floor().max(1.0)).max(1.0)
+    }
+
     /// Counts and weights that sums over a function of the count need which is as smooth as a normal law of the standard
     /// deviation `smoothing`: every count where that is next to nothing.
     pub fn counts(&self, smoothing: f64) -> Vec<Count> {

@@ -3,8 +3,10 @@
 //! The way goes down once: from the head to the photosites that the frame was made of ([`Sites`]), from these to its
 //! pixels ([`PixelMoments`]).
 
+use super::columns::{Smeared, check_wells};
 use super::curved;
 use super::divided::NARROW;
+use super::lines::DRIFTING;
 use super::masters::{Dark, Flat};
 use super::moments::LineCovariance;
 use super::moments::{Equations, Prediction};
@@ -12,6 +14,7 @@ use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
 use super::repeated;
 use super::tails;
+use super::taps::{self, Group};
 pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::levels::BlackLevel;
 use crate::color;
@@ -32,6 +35,8 @@ use nalgebra::Matrix3;
 pub enum FramePrediction {
     /// Classes that are drawn apart: R, G and B before demosaicking.
     Planes([Prediction; 3]),
+    /// Such classes in groups, one for each of the amplifiers that have read the frame.
+    Groups(Vec<Group>),
     /// Pixels that are weighted sums of photosites.
     Pixels(Box<PixelMoments>),
 }
@@ -85,10 +90,14 @@ pub enum FramePrediction {
 /// # Ok::<(), cyanometer::error::Error>(())
 /// ```
 pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
+    let moments = |frame: &FrameHeader, equations| Ok(Sites::of(frame, equations)?.moments);
+    if let Some(groups) = taps::groups(frame, equations, moments)? {
+        return Ok(FramePrediction::Groups(groups));
+    }
     let prediction = Sites::of(frame, equations)?.frame(frame)?;
     match &prediction {
         FramePrediction::Pixels(pixels) => pixels.void.map_or(Ok(()), |why| Err(Unpredictable::Beyond(why)))?,
-        FramePrediction::Planes(_) => {}
+        FramePrediction::Planes(_) | FramePrediction::Groups(_) => {}
     }
     Ok(prediction)
 }
@@ -106,7 +115,7 @@ pub(crate) fn quantity_of_sites(frame: &FrameHeader) -> QuantityKind {
 pub struct Sites {
     /// What their samples follow from.
     pub photosite: Photosite,
-    /// Signal electrons that they expect.
+    /// Signal electrons that they expect, those of smear among them.
     pub expected_e: [f64; 3],
     /// Moments of their samples.
     pub moments: [Prediction; 3],
@@ -119,6 +128,7 @@ impl Sites {
     ///
     /// As [`of_frame`].
     pub fn of(frame: &FrameHeader, equations: Equations) -> Predicted<Self> {
+        let frame = &*taps::of_one(frame)?;
         let metadata = &frame.metadata;
         let scene = metadata.scene.as_ref().ok_or(Unpredictable::Missing("scene"))?;
         if !scene.uniform {
@@ -127,6 +137,9 @@ impl Sites {
         let expected_e = scene.expected_electrons.ok_or(Unpredictable::Missing("scene.expected_electrons"))?;
         let model = noise_model(frame)?;
         let photosite = Photosite::of_electrons(model, equations);
+        let smeared = Smeared::of(frame, expected_e)?;
+        let expected_e = smeared.expected_e;
+        check_wells(frame, &photosite, expected_e)?;
         if !model.tails.is_none()
             && (metadata.is_transferred() || metadata.noise.as_ref().is_some_and(|noise| noise.cte.is_some()))
         {
@@ -157,13 +170,25 @@ impl Sites {
             moments.iter_mut().zip(lines).for_each(|(moments, lines)| moments.lines = lines);
         }
         let sites = Self { photosite, expected_e, moments };
-        match &metadata.average {
-            None => Ok(sites),
+        let sites = match &metadata.average {
+            None => sites,
             Some(record) => {
                 let average = repeated::average_of(frame, record, quantity_of_sites(frame))?;
-                Ok(Self { moments: photosite.averaged(moments, expected_e, &average)?, ..sites })
+                Self { moments: photosite.averaged(moments, expected_e, &average)?, ..sites }
             }
-        }
+        };
+        smeared.check_even(photosite.slope(), &sites.moments)?;
+        Ok(sites)
+    }
+
+    /// The photosites of each of the amplifiers that read a frame, with the numbers of R, G and B.
+    ///
+    /// # Errors
+    ///
+    /// As [`of_frame`].
+    pub fn of_taps(frame: &FrameHeader, equations: Equations) -> Predicted<Vec<([f64; 3], Self)>> {
+        let parts = taps::parts(frame).into_iter();
+        parts.map(|part| Ok((part.counts, Self::of(&part.frame, equations)?))).collect()
     }
 
     /// Predicts a frame that was made of these photosites; pixels say where their moments are void.
@@ -174,6 +199,9 @@ impl Sites {
     pub fn frame(&self, frame: &FrameHeader) -> Predicted<FramePrediction> {
         let metadata = &frame.metadata;
         let Some(record) = &metadata.demosaic else { return Ok(FramePrediction::Planes(self.moments)) };
+        if self.photosite.drifts() {
+            return Err(Unpredictable::Beyond(DRIFTING));
+        }
         let equations = self.photosite.equations;
         let method = Method::named(&record.method)
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
@@ -396,6 +424,7 @@ fn noise_model(frame: &FrameHeader) -> Predicted<NoiseModel> {
         hot_pixel_e: 0.0,
         poisson: PoissonKind::Exact,
         cte: None,
+        smear_per_row: 0.0,
     };
     let record = frame.metadata.noise.as_ref().unwrap_or(&silent);
     let mut model = NoiseModel::of(frame, record).map_err(|error| match error {

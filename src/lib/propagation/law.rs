@@ -233,7 +233,7 @@ impl Law {
     }
 
     /// The least and the largest charge, full well apart.
-    fn extent(&self) -> [f64; 2] {
+    pub fn extent(&self) -> [f64; 2] {
         [self.light.least() + self.dark.least(), self.light.most() + self.dark.most()]
     }
 

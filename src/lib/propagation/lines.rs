@@ -63,6 +63,14 @@ const OFFSETS_SHOW: &str = "photosites have fixed offsets, and the noise of the 
 const NORMALIZED: &str = "it was divided by a flat field whose rows or columns share noise or gains, and how far these move its level \
                           is not predicted";
 
+/// Why nothing is said of a drift that codes follow on a curve.
+const DRIFT_CUT: &str = "its black level drifts along rows, and full well, an end of the codes or a step of them cuts what rows share \
+                         by that";
+
+/// Why nothing is said of pixels of a frame whose black level drifts.
+pub(super) const DRIFTING: &str = "its black level drifts along rows (`black_drift_e`), and what its pixels share by that is not \
+                                   predicted; photosites are, before demosaicking";
+
 /// Why the paper says nothing.
 const NOT_IN_THE_PAPER: &str = "the paper has no equations for noise of rows and columns, nor for fixed offsets";
 
@@ -79,7 +87,11 @@ impl Axis {
     /// Temporal noise in e⁻, fixed offsets in e⁻, and relative response.
     fn parts(self, lines: &LineNoise) -> [f64; 3] {
         match self {
-            Self::Row => [lines.row_noise_e, lines.dsnu_row_e, lines.prnu_row],
+            Self::Row => {
+                let LineNoise { row_noise_e, black_drift_e, .. } = *lines;
+                let temporal = if black_drift_e > 0.0 { row_noise_e.hypot(black_drift_e) } else { row_noise_e };
+                [temporal, lines.dsnu_row_e, lines.prnu_row]
+            }
             Self::Column => [lines.column_noise_e, lines.dsnu_column_e, lines.prnu_column],
         }
     }
@@ -87,7 +99,9 @@ impl Axis {
     /// The model without them.
     fn without(self, model: &NoiseModel) -> NoiseModel {
         let lines = match self {
-            Self::Row => LineNoise { row_noise_e: 0.0, dsnu_row_e: 0.0, prnu_row: 0.0, ..model.lines },
+            Self::Row => {
+                LineNoise { row_noise_e: 0.0, black_drift_e: 0.0, dsnu_row_e: 0.0, prnu_row: 0.0, ..model.lines }
+            }
             Self::Column => LineNoise { column_noise_e: 0.0, dsnu_column_e: 0.0, prnu_column: 0.0, ..model.lines },
         };
         NoiseModel { lines, ..*model }
@@ -120,7 +134,7 @@ impl Photosite {
         }
         let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
         let mut averages = self.darks.iter().flatten().chain(flat);
-        let is_shared = |dark: &Dark| dark.model.lines.row_noise_e > 0.0 || dark.model.lines.column_noise_e > 0.0;
+        let is_shared = |dark: &Dark| Axis::ALL.iter().any(|axis| axis.parts(&dark.model.lines)[0] > 0.0);
         if averages.any(|dark| is_shared(dark) && dark.frames > 2 && dark.combine != Combine::Mean) {
             return Err(Unpredictable::Beyond(NO_MEANS));
         }
@@ -164,10 +178,14 @@ impl Photosite {
         if self.has_tails() {
             return self.lines_of_unlike(regime, expected_e);
         }
+        if self.drifts() && matches!(regime, Regime::Curved) {
+            return Err(Unpredictable::Beyond(DRIFT_CUT));
+        }
+        let mut slopes = [self.slope(); 3];
         let [row, column] = match regime {
             Regime::Straight => Axis::ALL.map(|axis| self.straight(axis, expected_e, [self.slope(); 3])),
             Regime::OnAverage => {
-                let slopes = expected_e.map(|expected_e| self.mean_slope(expected_e));
+                slopes = expected_e.map(|expected_e| self.mean_slope(expected_e));
                 Axis::ALL.map(|axis| self.straight(axis, expected_e, slopes))
             }
             Regime::Curved => {
@@ -176,8 +194,26 @@ impl Photosite {
             }
             Regime::Unknown => return Err(Unpredictable::Beyond(TOO_COARSE)),
         };
+        Ok(self.by_class(&row, &column, slopes))
+    }
+
+    /// What is shared as each class has it, with the part of the drift by such slopes to the charge.
+    fn by_class(&self, row: &Matrix3<f64>, column: &Matrix3<f64>, slopes: [f64; 3]) -> [LineCovariance; 3] {
+        let of_dark = |dark: &Dark| dark.weight.powi(2) * dark.kept()[0] * dark.model.lines.black_drift_e.powi(2);
+        let drift = self.model.lines.black_drift_e.powi(2) + self.darks.iter().flatten().map(of_dark).sum::<f64>();
+        let drift_rows = self.models().map(|model| model.lines.black_drift_rows).fold(0.0, f64::max);
         let of_class = |matrix: &Matrix3<f64>, k: usize| [0, 1, 2].map(|l| matrix[(k, l)]);
-        Ok([0, 1, 2].map(|k| LineCovariance { row: of_class(&row, k), column: of_class(&column, k) }))
+        [0, 1, 2].map(|k| LineCovariance {
+            row: of_class(row, k),
+            column: of_class(column, k),
+            drift: [0, 1, 2].map(|l| drift * slopes[k] * slopes[l]),
+            drift_rows,
+        })
+    }
+
+    /// Whether its black level drifts along rows, or that of what came off.
+    pub(super) fn drifts(&self) -> bool {
+        self.models().any(|model| model.lines.black_drift_e > 0.0)
     }
 
     /// The same of photosites that are unlike each other, to first order in what is shared: of hot ones that are full the gain of
@@ -199,8 +235,7 @@ impl Photosite {
             })
         };
         let [row, column] = Axis::ALL.map(of_axis);
-        let of_class = |matrix: &Matrix3<f64>, k: usize| [0, 1, 2].map(|l| matrix[(k, l)]);
-        Ok([0, 1, 2].map(|k| LineCovariance { row: of_class(&row, k), column: of_class(&column, k) }))
+        Ok(self.by_class(&row, &column, of_offsets))
     }
 
     /// The share of readings that are within the codes.

@@ -7,15 +7,18 @@
 mod bent;
 pub mod budget;
 mod charge;
+mod columns;
 mod counts;
 pub mod covariance;
 mod curved;
 mod divided;
+pub mod drift;
 mod ends;
 mod exposures;
 pub mod frame;
 pub mod gains;
 mod law;
+mod level_variance;
 mod line_sampling;
 pub mod linear;
 mod lines;
@@ -37,7 +40,9 @@ mod repeated;
 pub mod sampling;
 pub mod saturation;
 pub mod smooth_hue;
+mod steps;
 mod tails;
+pub mod taps;
 mod unlike;
 mod unpredictable;
 

@@ -88,6 +88,10 @@ pub struct LineCovariance {
     pub row: [f64; 3],
     /// In its column.
     pub column: [f64; 3],
+    /// What of that in its row is drift of the black level, which rows near it share in part.
+    pub drift: [f64; 3],
+    /// Rows from one knot of the drift to the next; 0 where there is none.
+    pub drift_rows: f64,
 }
 
 /// The covariance of photosites: what each has by itself, and what those of a row and of a column share, by classes.
@@ -99,18 +103,23 @@ pub struct SiteCovariance {
     pub row: Matrix3<f64>,
     /// The same in a column.
     pub column: Matrix3<f64>,
+    /// What of that in a row is drift of the black level, which rows near it share in part.
+    pub drift: Matrix3<f64>,
+    /// Rows from one knot of the drift to the next.
+    pub drift_rows: f64,
 }
 
 impl SiteCovariance {
     /// That of photosites that share nothing.
     pub fn independent(own: [f64; 3]) -> Self {
-        Self { own, row: Matrix3::zeros(), column: Matrix3::zeros() }
+        let none = Matrix3::zeros();
+        Self { own, row: none, column: none, drift: none, drift_rows: 0.0 }
     }
 
     /// That of photosites of these moments.
     pub fn of(sites: &[Prediction; 3]) -> Self {
         let own = |k: usize| {
-            let LineCovariance { row, column } = sites[k].lines;
+            let LineCovariance { row, column, .. } = sites[k].lines;
             let shared = row[k] + column[k];
             let variance = sites[k].moments.variance;
             if shared == 0.0 { variance } else { (variance - shared).max(0.0) }
@@ -119,12 +128,19 @@ impl SiteCovariance {
             own: [0, 1, 2].map(own),
             row: Matrix3::from_fn(|k, l| sites[k].lines.row[l]),
             column: Matrix3::from_fn(|k, l| sites[k].lines.column[l]),
+            drift: Matrix3::from_fn(|k, l| sites[k].lines.drift[l]),
+            drift_rows: sites[0].lines.drift_rows,
         }
     }
 
     /// Whether photosites share nothing.
     pub fn is_independent(&self) -> bool {
         self.row == Matrix3::zeros() && self.column == Matrix3::zeros()
+    }
+
+    /// Whether rows share the drift of the black level.
+    pub fn drifts(&self) -> bool {
+        self.drift != Matrix3::zeros()
     }
 
     /// What photosites share beyond themselves: in a row and in a column.

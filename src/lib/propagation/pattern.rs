@@ -38,6 +38,13 @@ pub(super) struct Seen {
     pub is_fine: bool,
 }
 
+impl Seen {
+    /// Whether each photosite holds full well in every exposure, and no median is asked for.
+    fn is_full(&self) -> bool {
+        self.median_of.is_none() && self.law.extent()[0] >= self.law.full_well_e
+    }
+}
+
 /// Evaluations up to which counts are gone through one by one.
 const AFFORDABLE: usize = 6_000;
 
@@ -58,11 +65,14 @@ impl Shared {
     }
 
     fn work_out(light: &Seen, dark: &Seen) -> Self {
+        if light.is_full() && dark.is_full() {
+            return Self { light: 0.0, dark: 0.0, both: 0.0, median: None };
+        }
         let (of_light, of_dark) = (Temporal::of(light), Temporal::of(dark));
         let (law, is_fine) = (&light.law, light.is_fine || dark.is_fine);
         let xs = sensitivities(&law.light, of_light.std());
+        let wider = if law.dark.rate > dark.law.dark.rate { law.dark } else { dark.law.dark };
         let ys = if is_fine {
-            let wider = if law.dark.rate > dark.law.dark.rate { law.dark } else { dark.law.dark };
             fine_sensitivities(&wider, of_light.finest().min(of_dark.finest()))
         } else {
             sensitivities(&law.dark, of_light.std())
@@ -272,8 +282,12 @@ impl Jump {
 
 impl<'a> Temporal<'a> {
     fn of(Seen { law, reading, median_of, is_fine }: &'a Seen) -> Self {
+        let noise_e = law.read_noise_e.max(1e-3);
+        let [light, dark] = [law.light, law.dark].map(|charge| Charge { pattern: 0.0, ..charge });
+        // More than are ever gone through are not listed.
+        let is_listed = light.least_counts(noise_e) * dark.least_counts(noise_e) <= AFFORDABLE_IF_FINE as f64;
         let counts = |charge: &Charge| {
-            let mut counts = Charge { pattern: 0.0, ..*charge }.counts(law.read_noise_e.max(1e-3));
+            let mut counts = if is_listed { charge.counts(noise_e) } else { Vec::new() };
             counts.retain(|count| count.weight > 1e-15);
             counts
         };
@@ -282,8 +296,8 @@ impl<'a> Temporal<'a> {
             reading,
             median_of: *median_of,
             is_fine: *is_fine,
-            light: counts(&law.light),
-            dark: counts(&law.dark),
+            light: counts(&light),
+            dark: counts(&dark),
             jumps: law.jumps().into_iter().map(|jump| Jump::of(jump, reading, law.full_well_e)).collect(),
         }
     }
@@ -306,8 +320,11 @@ impl<'a> Temporal<'a> {
         if self.is_fine { AFFORDABLE_IF_FINE } else { AFFORDABLE }
     }
 
-    /// How often counts are gone through at so many sensitivities.
+    /// How often counts are gone through at so many sensitivities; of more than are listed no number would do.
     fn evaluations(&self, sensitivities: usize) -> usize {
+        if self.light.is_empty() || self.dark.is_empty() {
+            return usize::MAX;
+        }
         sensitivities.saturating_mul(self.light.len()).saturating_mul(self.dark.len())
     }
 
@@ -379,7 +396,7 @@ impl<'a> Temporal<'a> {
             for light in &self.light {
                 let electrons = x * light.electrons + y * dark.electrons;
                 let variance = (x * light.spread).powi(2) + (y * dark.spread).powi(2);
-                let read = if electrons >= full { at_full } else { reading.at(electrons, variance)[0] };
+                let read = if electrons >= full { at_full } else { reading.mean_at(electrons, variance) };
                 mean += light.weight * dark.weight * read;
             }
         }
@@ -416,7 +433,7 @@ impl<'a> Temporal<'a> {
         mean += above(mirrored, -lower);
         // Where it shows, rounding is that of a normal law.
         let shows = self.is_fine && reading.is_free_at(mean, whole.variance);
-        let offset = if shows { reading.at(mean, charge.variance) } else { reading.smooth_at(mean) }[0];
+        let offset = if shows { reading.mean_at(mean, charge.variance) } else { reading.smooth_at(mean)[0] };
         if is_full { offset + rounding_at_full * charge.exceeds(full) } else { offset }
     }
 }

@@ -2,16 +2,19 @@
 //!
 //! Scenes need not be uniform: each pixel's demosaicked R, G and B tell the signal of the photosites around it, the noise
 //! model their variances, and the weights of its phase (folded back at the edges) its covariance. What varies within the
-//! reach of the weights, three photosites, is taken as level.
+//! reach of the weights, three photosites, is taken as level; photosites behind several amplifiers are taken to read the same level.
 
 use super::charge;
 use super::covariance::{Covariance, PAIRS};
 use super::frame::{corrected, quantity_of_sites};
-use super::lines::LineTerms;
+use super::level_variance::LevelVariance;
+use super::lines::{DRIFTING, LineTerms};
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::repeated::average_of;
 use super::smooth_hue;
+use super::taps;
+use crate::camera::taps::Taps;
 use crate::cfa::Class;
 use crate::error::Result;
 use crate::frame::Geometry;
@@ -23,7 +26,7 @@ use crate::stages::demosaic::stencil::{Stencil, phase};
 use crate::stages::demosaic::weights::WeightTable;
 use crate::stages::noise::NoiseModel;
 use crate::units::QuantityKind;
-use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Tells the covariance of the demosaicked R, G and B of a pixel from its place and level.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +39,8 @@ pub struct PixelNoise {
     of_black: Option<(Vec<PixelGains>, [f64; 3])>,
     /// What photosites share by rows and by columns; none where they share nothing.
     of_lines: Option<PixelLines>,
+    /// What each amplifier makes of photosites, where there are several.
+    of_taps: Option<PixelTaps>,
     depends_on_hue: bool,
     variances: [LevelVariance; 3],
     /// What no light reads in the frame, in the unit of its samples.
@@ -49,6 +54,8 @@ struct Places {
     reach: usize,
     /// One place of each kind.
     examples: Vec<usize>,
+    /// The kind of each place, where amplifiers make more kinds.
+    kinds: Vec<usize>,
 }
 
 impl Places {
@@ -58,11 +65,32 @@ impl Places {
         } else {
             (0..reach + 2).chain(length - reach..length).collect()
         };
-        Self { length, reach, examples }
+        Self { length, reach, examples, kinds: Vec::new() }
+    }
+
+    /// The same of lines that amplifiers read, `taps` telling those of each.
+    fn of_taps(length: usize, reach: usize, taps: impl Fn(usize) -> [usize; 2]) -> Self {
+        let of_lines: Vec<[usize; 2]> = (0..length).map(taps).collect();
+        let is_at_edge = |place: usize| place < reach || place + reach >= length;
+        let around = |place: usize| of_lines[place.saturating_sub(reach)..(place + reach + 1).min(length)].to_vec();
+        let key = |place: usize| (is_at_edge(place).then_some(place), place % 2, around(place));
+        let mut known = BTreeMap::new();
+        let mut examples = Vec::new();
+        let kind = |place: usize| {
+            *known.entry(key(place)).or_insert_with(|| {
+                examples.push(place);
+                examples.len() - 1
+            })
+        };
+        let kinds = (0..length).map(kind).collect();
+        Self { length, reach, examples, kinds }
     }
 
     fn kind(&self, place: usize) -> usize {
         let Self { length, reach, .. } = *self;
+        if let Some(kind) = self.kinds.get(place) {
+            return *kind;
+        }
         if length <= 2 * reach + 2 || place < reach {
             place
         } else if place >= length - reach {
@@ -85,6 +113,48 @@ struct PixelLines {
     gains: Vec<PixelGains<{ 2 * PAIRS.len() }>>,
     terms: [LineTerms; 2],
     photosite: Photosite,
+}
+
+/// Most amplifiers of a sensor.
+const TAPS: usize = 4;
+
+/// What each of the amplifiers of a sensor makes of the photosites of pixels.
+#[derive(Debug, Clone, PartialEq)]
+struct PixelTaps {
+    /// Gains of the variances of the three classes behind each.
+    gains: Vec<PixelGains<{ 3 * TAPS }>>,
+    variances: Vec<[LevelVariance; 3]>,
+    /// What no light reads behind each, less what it does without them.
+    shifts: Vec<f64>,
+}
+
+impl PixelTaps {
+    /// The variances of the classes behind each amplifier, as all photosites read such levels above black.
+    fn at(&self, level: [f64; 3]) -> [f64; 3 * TAPS] {
+        std::array::from_fn(|index| {
+            let (tap, class) = (index / 3, index % 3);
+            let of_tap = self.variances.get(tap).map(|variances| variances[class].at(level[class] - self.shifts[tap]));
+            of_tap.unwrap_or_default()
+        })
+    }
+}
+
+impl PixelGains<{ 3 * TAPS }> {
+    /// Those of the classes behind each amplifier, `tap` telling that of a place of the frame.
+    fn of_taps(table: &WeightTable, at: [usize; 2], geometry: &Geometry, tap: impl Fn([isize; 2]) -> usize) -> Self {
+        let phase = phase_at(at, geometry);
+        let class = |offset| table.class(phase, offset) as usize;
+        Self::by(table, at, geometry, |a, b| {
+            let mut sums = [0.0; 3 * TAPS];
+            for (offset, weight) in a.sites() {
+                let place = [0, 1].map(|axis| at[axis].cast_signed() + offset[axis]);
+                if let Some(sum) = sums.get_mut(3 * tap(place) + class(offset)) {
+                    *sum += weight * b.at(offset);
+                }
+            }
+            sums
+        })
+    }
 }
 
 impl PixelLines {
@@ -196,88 +266,6 @@ fn phase_at(at: [usize; 2], geometry: &Geometry) -> usize {
     phase(origin[0] + at[0] as i64, origin[1] + at[1] as i64)
 }
 
-/// Variance of a photosite against its level above black, linear between equally spaced levels.
-///
-/// Variance is a parabola in the level away from saturation, so a table of 1024 steps is off by less than
-/// prnu² step²/4 ≈ 0.02 e² of several hundred.
-#[derive(Debug, Clone, PartialEq)]
-struct LevelVariance {
-    step: f64,
-    values: Vec<f64>,
-    /// The level below which an average hangs on where in a code it lies, which no level of a pixel tells.
-    told_from: f64,
-}
-
-const STEPS: usize = 1024;
-
-impl LevelVariance {
-    /// Of R, G and B, which differ where flat fields do.
-    fn of_classes(photosite: &Photosite, average: Option<&AverageRecord>, largest: f64) -> [Self; 3] {
-        match photosite.flat {
-            None => {
-                let all = Self::new(photosite, 0, average, largest);
-                [all.clone(), all.clone(), all]
-            }
-            Some(_) => [0, 1, 2].map(|class| Self::new(photosite, class, average, largest)),
-        }
-    }
-
-    fn new(photosite: &Photosite, class: usize, average: Option<&AverageRecord>, largest: f64) -> Self {
-        // Patterns that are cut off at zero take long to predict, and their variances are smooth.
-        let is_rectified = photosite.model.response().max(photosite.model.dcnu) > 0.2;
-        let steps = if is_rectified || photosite.has_tails() { STEPS / 8 } else { STEPS };
-        let step = largest / steps as f64;
-        let one = |expected_e: f64| {
-            if photosite.flat.is_some() {
-                return photosite.variance_divided(class, expected_e);
-            }
-            if photosite.has_tails() {
-                return photosite.moments(expected_e).moments.variance;
-            }
-            let Some(adc) = photosite.adc else { return photosite.moments(expected_e).moments.variance };
-            if photosite.darks[0].is_some() {
-                return photosite.less_dark(&adc, expected_e, false).moments.variance;
-            }
-            let electrons = photosite.model.dark_e + expected_e;
-            let slope = adc.sample_per_e(electrons);
-            let charge = charge::charge(&photosite.model, expected_e).variance + photosite.model.added().powi(2);
-            // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
-            if charge.sqrt() * slope < 0.5 * adc.sample_slope(adc.level_at(electrons)) {
-                charge * slope * slope + adc.rounding_at(electrons)
-            } else {
-                photosite.moments(expected_e).moments.variance
-            }
-        };
-        let variance = |index: usize| {
-            let expected_e = photosite.expected_at(index as f64 * step);
-            let one = one(expected_e);
-            average.map_or(one, |record| photosite.variance_of_average(class, expected_e, one, record))
-        };
-        let is_by_code = |index: &usize| {
-            let expected_e = photosite.expected_at(*index as f64 * step);
-            let is_by_code = |record| photosite.is_average_by_code(expected_e, record);
-            average.is_some_and(is_by_code) && !photosite.is_spread_over_codes(expected_e)
-        };
-        let told_from = match (0..=steps).rev().find(is_by_code) {
-            Some(last) if last == steps => f64::INFINITY,
-            Some(last) => (last + 1) as f64 * step,
-            None => f64::NEG_INFINITY,
-        };
-        Self { step, values: (0..=steps).into_par_iter().map(variance).collect(), told_from }
-    }
-
-    /// The variance at a level; below zero as at zero, beyond the last as there.
-    fn at(&self, level: f64) -> f64 {
-        let steps = self.values.len() - 1;
-        let place = (level / self.step).clamp(0.0, steps as f64);
-        // A level that is not finite has a neighbor's variance, as its sample has no meaning; `min` and `max` drop NaN.
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1024; NaN becomes 0")]
-        let index = (place as usize).min(steps - 1);
-        let share = if place.is_nan() { 0.0 } else { place - index as f64 };
-        self.values[index] + share * (self.values[index + 1] - self.values[index])
-    }
-}
-
 impl PixelNoise {
     /// The noise of the pixels of a demosaicked frame.
     ///
@@ -295,17 +283,19 @@ impl PixelNoise {
         })?;
         let method = Method::named(&record.method)
             .ok_or_else(|| frame.refuse(format!("it was demosaicked by `{}`, a method unknown here", record.method)))?;
-        let (photosite, black) = photosite_of(frame)?;
+        let (photosite, black) = photosite_of(&taps::as_if_one(frame))?;
         let largest = photosite.model.full_well_e * photosite.slope();
         let table = WeightTable::of(method, record.cfa);
-        let columns = Places::new(frame.geometry.width, method.reach());
-        let rows = Places::new(frame.geometry.height, method.reach());
+        let [columns, rows] = places(frame, method.reach());
         let places = || rows.examples.iter().flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]));
         let gains = |gains: fn(&WeightTable, [usize; 2], &Geometry) -> PixelGains| -> Vec<PixelGains> {
             places().map(|at| gains(table, at, &frame.geometry)).collect()
         };
         photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
         photosite.check_lines().map_err(|why| frame.refuse(why.to_string()))?;
+        if photosite.drifts() {
+            return Err(frame.refuse(DRIFTING));
+        }
         let average = match &metadata.average {
             Some(record) => {
                 let record =
@@ -325,7 +315,12 @@ impl PixelNoise {
             .map(|noise| (gains(PixelGains::of_black), [noise.row_adu2, noise.column_adu2, noise.site_adu2]));
         let gains = gains(PixelGains::new);
         let variances = LevelVariance::of_classes(&photosite, average.as_ref(), largest);
-        Ok(Self { columns, rows, gains, of_black, of_lines, depends_on_hue: table.depends_on_hue(), variances, black })
+        let of_taps = match frame.taps() {
+            Some(_) => Some(pixel_taps(frame, table, places().collect(), average.as_ref(), &photosite)?),
+            None => None,
+        };
+        let depends_on_hue = table.depends_on_hue();
+        Ok(Self { columns, rows, gains, of_black, of_lines, of_taps, depends_on_hue, variances, black })
     }
 
     /// The covariance of the pixel in column `x` and row `y` of the frame, whose samples are `rgb`; and whether
@@ -345,7 +340,10 @@ impl PixelNoise {
                     *variance = (*variance - shared[own] - shared[PAIRS.len() + own]).max(0.0);
                 }
             }
-            let mut covariance = self.gains[kind].covariance(variances, hues);
+            let mut covariance = match &self.of_taps {
+                Some(taps) => taps.gains[kind].covariance(taps.at(level), hues),
+                None => self.gains[kind].covariance(variances, hues),
+            };
             if let Some((gains, shared)) = shared {
                 let more = gains.covariance(shared, hues);
                 covariance.iter_mut().zip(more).for_each(|(covariance, more)| *covariance += more);
@@ -356,8 +354,11 @@ impl PixelNoise {
             }
             covariance
         };
-        let variances = [0, 1, 2].map(|class| self.variances[class].at(level[class]));
-        let is_told = !(0..3).any(|class| level[class] < self.variances[class].told_from);
+        let is_told = !(0..3).any(|class| level[class] < self.variances[class].told_from());
+        let mut variances = [0, 1, 2].map(|class| self.variances[class].at(level[class]));
+        for (index, of_tap) in self.of_taps.iter().flat_map(|taps| taps.at(level)).enumerate() {
+            variances[index % 3] = variances[index % 3].max(of_tap);
+        }
         if !self.depends_on_hue {
             return (all(variances, None), is_told);
         }
@@ -373,6 +374,56 @@ impl PixelNoise {
     }
 }
 
+/// The columns and rows of a frame that are alike.
+fn places(frame: &FrameHeader, reach: usize) -> [Places; 2] {
+    let geometry = &frame.geometry;
+    let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+    let extents = [geometry.width, geometry.height];
+    let Some(readout) = readout.filter(|readout| readout.taps.is_some()) else {
+        return extents.map(|extent| Places::new(extent, reach));
+    };
+    let middle = [readout.width, readout.height].map(|extent| i64::from(extent / 2));
+    [0, 1].map(|axis| {
+        let taps = |place: usize| {
+            [0, 1].map(|side| {
+                let mut at = middle.map(|middle| middle - 1 + side);
+                at[axis] = i64::from(geometry.origin[axis]) + place as i64;
+                readout.tap(at)
+            })
+        };
+        Places::of_taps(extents[axis], reach, taps)
+    })
+}
+
+/// What each amplifier makes of the photosites of pixels at such examples of all places.
+fn pixel_taps(
+    frame: &FrameHeader,
+    table: &WeightTable,
+    examples: Vec<[usize; 2]>,
+    average: Option<&AverageRecord>,
+    one: &Photosite,
+) -> Result<PixelTaps> {
+    if one.has_lines() {
+        return Err(frame.refuse(taps::WITH_LINES));
+    }
+    if one.flat.is_some() {
+        return Err(frame.refuse(taps::FLATTENED));
+    }
+    let readout = frame.readout()?;
+    let geometry = &frame.geometry;
+    let tap = |place: [isize; 2]| readout.tap([0, 1].map(|axis| i64::from(geometry.origin[axis]) + place[axis] as i64));
+    let gains = examples.into_iter().map(|at| PixelGains::of_taps(table, at, geometry, tap)).collect();
+    let (mut variances, mut shifts) = (Vec::new(), Vec::new());
+    for tap in 0..frame.taps().map_or(0, Taps::count) {
+        let (photosite, _) = photosite_of(&taps::of_tap(frame, tap))?;
+        photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
+        let largest = photosite.model.full_well_e * photosite.slope();
+        shifts.push(photosite.moments(0.0).moments.mean - one.moments(0.0).moments.mean);
+        variances.push(LevelVariance::of_classes(&photosite, average, largest));
+    }
+    Ok(PixelTaps { gains, variances, shifts })
+}
+
 /// The photosites that a demosaicked frame was made of, and what no light reads in it, in the unit of its samples.
 fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
     let metadata = &frame.metadata;
@@ -381,6 +432,12 @@ fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
             "its charge was transferred, and what that does to noise differs from place to place; no standard \
              deviations can be told",
         ));
+    }
+    if let Some(count) = metadata.bloomed_photosites.filter(|count| *count > 0) {
+        return Err(frame.refuse(format!(
+            "charge has spilled over into {count} of its photosites from others of their columns; nothing tells which, so that no \
+             standard deviations can be told"
+        )));
     }
     let readout = frame.readout()?;
     let noise = match &metadata.noise {
@@ -407,7 +464,7 @@ pub fn dim_green_below(frame: &FrameHeader) -> Option<f64> {
     if Method::named(&record.method) != Some(Method::SmoothHue) {
         return None;
     }
-    let (photosite, black) = photosite_of(frame).ok()?;
+    let (photosite, black) = photosite_of(&taps::as_if_one(frame)).ok()?;
     let slope = photosite.slope();
     let mut level = 0.0;
     // Rises to where a level is so many times its noise; the noise rises as its root.
@@ -433,5 +490,6 @@ fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
         hot_pixel_e: readout.hot_pixel_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
         poisson: crate::metadata::PoissonKind::Exact,
         cte: None,
+        smear_per_row: 0.0,
     })
 }

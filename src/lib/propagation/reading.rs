@@ -96,6 +96,17 @@ impl Reading {
         }
     }
 
+    /// The first of these moments, in less time.
+    pub fn mean_at(&self, electrons: f64, variance: f64) -> f64 {
+        match self.asked {
+            Asked::Codes(adc, ends) if adc.linearization.is_none() => {
+                let std_e = (variance + self.noise_e * self.noise_e).sqrt();
+                ends.mean(adc.level_at(electrons + self.offset_e), adc.adu_per_e * std_e, self.center)
+            }
+            _ => self.at(electrons, variance)[0],
+        }
+    }
+
     /// The same where rounding is as good as a uniform error, and nothing ends.
     pub fn smooth_at(&self, electrons: f64) -> Moments {
         match self.asked {

@@ -1,8 +1,9 @@
 //! What is predicted of a frame, written into its metadata.
 
 use super::frame::{FramePrediction, of_frame};
-use super::moments::Equations;
+use super::moments::{Equations, Prediction};
 use super::saturation;
+use super::taps::pooled;
 use crate::metadata::{FrameHeader, PredictedRecord};
 
 /// Writes the predicted moments of a frame into its metadata, where there are any, and the shares of its classes that are
@@ -10,10 +11,12 @@ use crate::metadata::{FrameHeader, PredictedRecord};
 pub fn note(frame: &mut FrameHeader, equations: Equations) {
     // A frame of which nothing can be predicted carries no prediction; `of_frame` tells why to whoever asks.
     frame.metadata.predicted = of_frame(frame, equations).ok().map(|prediction| {
+        let of = |classes: [Prediction; 3]| {
+            (classes.map(|class| class.moments.mean), classes.map(|class| class.moments.std()))
+        };
         let (mean, std) = match prediction {
-            FramePrediction::Planes(classes) => {
-                (classes.map(|class| class.moments.mean), classes.map(|class| class.moments.std()))
-            }
+            FramePrediction::Planes(classes) => of(classes),
+            FramePrediction::Groups(groups) => of(pooled(&groups)),
             FramePrediction::Pixels(pixels) => {
                 (pixels.mean, [0, 1, 2].map(|i| pixels.covariance[(i, i)].max(0.0).sqrt()))
             }

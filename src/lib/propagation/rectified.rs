@@ -7,6 +7,7 @@ use super::counts::{Charge, Count};
 use super::ends::{MANY, Place, Stretch, difference};
 use super::node::{Law, Node};
 use super::reading::{Moments, Reading};
+use super::steps::Steps;
 use crate::numerics::normal::{MeanVariance, density};
 use crate::numerics::rounding::{REACH, SMOOTH};
 
@@ -244,7 +245,9 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
     // Codes are gone through as far as laws reach that are narrow.
     let spreads = counts.iter().map(|count| count.spread);
     let narrow = spreads.filter(|spread| *spread < MANY * code.unwrap_or(0.0)).fold(0.0, f64::max);
-    let table = (!is_shared && others.len() > 8).then(|| Table::new(&base, &counts));
+    let mut steps = if is_shared { None } else { Steps::new(charge, &base, &counts, reading) };
+    let mut table = None;
+    let is_only = others.windows(2).all(|pair| pair[0].spread == pair[1].spread);
     if is_shared {
         let gone: f64 = shared.iter().map(|(_, weight)| weight).sum();
         for other in others {
@@ -264,10 +267,21 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
         return sum;
     }
     for other in others {
-        let still = reading.at(other.electrons.min(full), other.spread * other.spread);
         let noise_e = reading.noise_e.hypot(other.spread);
-        let blurred = Reading { noise_e, ..*reading };
         let is_hidden = code.is_some_and(|code| noise_e > SMOOTH * code);
+        if let Some(steps) = &mut steps
+            && !is_hidden
+            && other.electrons <= full
+            && steps.is_known(noise_e, is_only)
+        {
+            add(&mut sum, other.weight, steps.moments(other.electrons, noise_e));
+            continue;
+        }
+        let still = reading.at(other.electrons.min(full), other.spread * other.spread);
+        let blurred = Reading { noise_e, ..*reading };
+        if table.is_none() && others.len() > 8 {
+            table = Some(Table::new(&base, &counts));
+        }
         let widest_narrow = if is_hidden { 0.0 } else { narrow };
         let stretch = Stretch { from: other.electrons, widest_narrow, noise_e, ..base };
         for place in stretch.places(&blurred, &[]) {

@@ -160,9 +160,10 @@ impl Photosite {
     /// [`Unpredictable::Beyond`] where no formula tells what rows and columns share.
     pub(super) fn temporal_of(&self, expected_e: [f64; 3]) -> Predicted<[Temporal; 3]> {
         let lines = if self.has_lines() {
-            let LineNoise { row_noise_e, column_noise_e, dsnu_e, .. } = self.model.lines;
             let mut one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
-            one.model.lines = LineNoise { row_noise_e, column_noise_e, dsnu_e, ..LineNoise::default() };
+            let temporal =
+                LineNoise { dsnu_row_e: 0.0, dsnu_column_e: 0.0, prnu_row: 0.0, prnu_column: 0.0, ..self.model.lines };
+            one.model.lines = temporal;
             one.lines(expected_e)?
         } else {
             [LineCovariance::default(); 3]

@@ -491,7 +491,8 @@ mod tests {
         let outer = |a: [f64; 3], b: [f64; 3], k: usize| [0, 1, 2].map(|l| a[k] * a[l] + b[k] * b[l]);
         for (k, site) in sites.iter_mut().enumerate() {
             let row = outer([0.3, 0.5, 0.2], [0.1, 0.2, -0.1], k);
-            site.lines = LineCovariance { row, column: outer([0.2, 0.2, 0.2], [0.0, 0.3, 0.1], k) };
+            site.lines =
+                LineCovariance { row, column: outer([0.2, 0.2, 0.2], [0.0, 0.3, 0.1], k), ..Default::default() };
             site.moments.variance += row[k] + site.lines.column[k];
         }
         sites

@@ -2,9 +2,10 @@
 
 use super::frame::{FramePrediction, Sites, has_tails, of_frame, quantity_of_sites};
 use super::law::Law;
-use super::moments::Equations;
+use super::moments::{Equations, Prediction};
+use super::taps;
 use crate::cfa::CfaPattern;
-use crate::metadata::{FrameHeader, Scene};
+use crate::metadata::{AdcRecord, FrameHeader, Scene};
 use crate::names::Named;
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::PHASES;
@@ -29,20 +30,52 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
     if has_tails(frame) {
         return true;
     }
-    let moments: [(f64, f64); 3] = match of_frame(&bounding, Equations::Exact) {
-        Ok(FramePrediction::Planes(classes)) => classes.map(|class| (class.moments.mean, class.moments.std())),
+    let of_class = |class: Prediction| (class.moments.mean, class.moments.std());
+    let moments: Vec<[(f64, f64); 3]> = match of_frame(&bounding, Equations::Exact) {
+        Ok(FramePrediction::Planes(classes)) => vec![classes.map(of_class)],
+        Ok(FramePrediction::Groups(groups)) => groups.iter().map(|group| group.sites.map(of_class)).collect(),
         Ok(FramePrediction::Pixels(pixels)) => {
-            [0, 1, 2].map(|k| (pixels.mean[k], pixels.covariance[(k, k)].max(0.0).sqrt()))
+            vec![[0, 1, 2].map(|k| (pixels.mean[k], pixels.covariance[(k, k)].max(0.0).sqrt()))]
         }
         Err(_) => return true,
     };
     let is_beyond = |(level, (mean, std)): (f32, (f64, f64))| f64::from(level) - mean > OUT_OF_REACH * std;
-    !levels.classes().into_iter().zip(moments).all(is_beyond)
+    !moments.into_iter().all(|moments| levels.classes().into_iter().zip(moments).all(is_beyond))
 }
 
 /// The expected shares of the samples of R, G and B that are full; of electrons, of photosites whose charge reaches full
 /// well, before read noise. None where the scene is not uniform, or the samples are not those of photosites.
 pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
+    if frame.taps().is_some() {
+        return shares_of_taps(frame);
+    }
+    shares_from(frame, f64::INFINITY)
+}
+
+/// The same of a sensor that is read through several amplifiers, the lowest of whose full codes counts for all.
+fn shares_of_taps(frame: &FrameHeader) -> Option<[f64; 3]> {
+    let parts = taps::parts(frame);
+    let full_well_e = frame.readout().ok()?.full_well_e;
+    let full_code = |adc: AdcRecord| adc.full_code(full_well_e);
+    let lowest = match (frame.metadata.adc, frame.taps()) {
+        (Some(adc), Some(taps)) => {
+            (0..taps.count()).map(|tap| full_code(adc.of_tap(taps, tap))).fold(f64::INFINITY, f64::min)
+        }
+        _ => f64::INFINITY,
+    };
+    let [mut sums, mut counts] = [[0.0; 3]; 2];
+    for part in parts {
+        let of_part = shares_from(&part.frame, lowest)?;
+        for k in 0..3 {
+            sums[k] += part.counts[k] * of_part[k];
+            counts[k] += part.counts[k];
+        }
+    }
+    Some([0, 1, 2].map(|k| if counts[k] > 0.0 { sums[k] / counts[k] } else { 0.0 }))
+}
+
+/// The shares of samples that are full or reach a code.
+fn shares_from(frame: &FrameHeader, code: f64) -> Option<[f64; 3]> {
     // Which exposures of an average a full photosite was full in is not told.
     let Sites { photosite, expected_e, .. } =
         Sites::of(frame, Equations::Exact).ok().filter(|_| frame.metadata.average.is_none())?;
@@ -57,7 +90,7 @@ pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
     match (quantity_of_sites(frame), photosite.adc) {
         (QuantityKind::Electrons, _) => Some(expected_e.map(of_charge)),
         (QuantityKind::Adu, Some(adc)) => {
-            let first_full_e = adc.electrons_at(adc.full_code(full_well_e) - 0.5);
+            let first_full_e = adc.electrons_at(adc.full_code(full_well_e).min(code) - 0.5);
             Some(expected_e.map(|expected_e| share(expected_e, &|law| law.is_read_from(first_full_e))))
         }
         _ => None,
@@ -70,7 +103,8 @@ pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
 pub fn share_of_pixels(frame: &FrameHeader) -> Option<f64> {
     let record = frame.metadata.demosaic.as_ref()?;
     let method = Method::named(&record.method)?;
-    Some(used(method, record.cfa, shares(frame)?))
+    // Which pixels several amplifiers have a part in is not followed.
+    frame.taps().is_none().then(|| shares(frame)).flatten().map(|shares| used(method, record.cfa, shares))
 }
 
 /// Shares below which nothing is told: the law's tails are no better than this.

@@ -275,8 +275,10 @@ mod tests {
     fn both_expansions_are_one() {
         let mean = [30.0, 60.0, 200.0];
         let plain = [4.0, 6.0, 30.0].map(|variance| Prediction::of_cumulants(0.0, variance, 0.3, 0.8));
-        let shared =
-            plain.map(|site| Prediction { lines: LineCovariance { row: [1e-14; 3], column: [0.0; 3] }, ..site });
+        let shared = plain.map(|site| Prediction {
+            lines: LineCovariance { row: [1e-14; 3], column: [0.0; 3], ..Default::default() },
+            ..site
+        });
         for pattern in [CfaPattern::Rggb, CfaPattern::Gbrg] {
             let [a, b] = [plain, shared].map(|s| second_order(Method::SmoothHue, pattern, mean, &s).unwrap());
             assert!(

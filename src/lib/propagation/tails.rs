@@ -220,6 +220,11 @@ impl Photosite {
 
     /// What holds for each kind of photosites: those that jump apart only where jumps show how codes are rounded, or end.
     fn each<T>(&self, expected_e: f64, of: impl Fn(&Self) -> T) -> Vec<Kind<T>> {
+        self.each_of(expected_e, true, of)
+    }
+
+    /// The same; of jumps that show how codes are rounded all amplitudes, or few.
+    fn each_of<T>(&self, expected_e: f64, is_fine: bool, of: impl Fn(&Self) -> T) -> Vec<Kind<T>> {
         let [hot_share, trap_share] = [self.most(|tails| tails.hot_share), self.most(|tails| tails.rts_share)];
         let mut kinds = vec![(0.0, 1.0 - hot_share)];
         if hot_share > 0.0 {
@@ -237,7 +242,10 @@ impl Photosite {
             if !jumps_apart {
                 continue;
             }
-            let traps = if hot == 0.0 { self.trap_nodes(expected_e).unwrap_or_default() } else { FEW.clone() };
+            let traps = match hot == 0.0 && is_fine {
+                true => self.trap_nodes(expected_e).unwrap_or_default(),
+                false => FEW.clone(),
+            };
             let all: f64 = traps.iter().map(|(_, weight)| weight).sum();
             for (trap, of_trap) in traps {
                 let weight = weight * trap_share * of_trap / all;
@@ -339,11 +347,16 @@ impl Photosite {
 
     /// Moments of the samples of all kinds of photosites together.
     pub(super) fn mixed(&self, expected_e: f64) -> Prediction {
-        thread_local! { static KNOWN: Memory<(Photosite, f64), Prediction> = const { Memory::new() }; }
+        self.mixture(expected_e).0
+    }
+
+    /// The same beside the variance of the means of the kinds.
+    fn mixture(&self, expected_e: f64) -> (Prediction, f64) {
+        thread_local! { static KNOWN: Memory<(Photosite, f64), (Prediction, f64)> = const { Memory::new() }; }
         KNOWN.with(|known| known.recall((*self, expected_e), |(site, expected_e)| site.work_out(*expected_e)))
     }
 
-    fn work_out(&self, expected_e: f64) -> Prediction {
+    fn work_out(&self, expected_e: f64) -> (Prediction, f64) {
         let [second, fourth, sixth] = self.jump_cumulants();
         let with_jumps = |kind: Kind<Prediction>| {
             let Kind { weight, is_free, value } = kind;
@@ -360,7 +373,10 @@ impl Photosite {
             Prediction { sixth: trap, ..site.moments(expected_e) }
         });
         let parts: Vec<(f64, Prediction)> = kinds.into_iter().map(with_jumps).collect();
-        mixture(&parts)
+        let found = mixture(&parts);
+        let of_means =
+            parts.iter().map(|(weight, part)| weight * (part.moments.mean - found.moments.mean).powi(2)).sum();
+        (found, of_means)
     }
 
     /// The mean over all kinds of photosites of a number that jumps do not change where they are free.
@@ -369,15 +385,20 @@ impl Photosite {
     }
 
     /// The variance by cause: the mean over all kinds of photosites, and that of their means, which hot pixels make.
+    ///
+    /// Where jumps show how codes are rounded few of their amplitudes tell the causes; what all make of rounding is the rest.
     pub(super) fn mixed_budget(&self, expected_e: f64) -> Budget {
         let [jumps, ..] = self.jump_cumulants();
-        let kinds = self.each(expected_e, |site| (site.budget(expected_e), site.moments(expected_e).moments.mean));
-        let mean: f64 = kinds.iter().map(|kind| kind.weight * kind.value.1).sum();
+        let (whole, of_means) = self.mixture(expected_e);
+        let kinds = self.each_of(expected_e, false, |site| site.budget(expected_e));
         let mut budget =
-            Cause::ALL.map(|cause| kinds.iter().map(|kind| kind.weight * kind.value.0[cause as usize]).sum::<f64>());
-        for kind in &kinds {
-            budget[Cause::HotPixels as usize] += kind.weight * (kind.value.1 - mean).powi(2);
-            budget[Cause::Rts as usize] += if kind.is_free { kind.weight * jumps } else { 0.0 };
+            Cause::ALL.map(|cause| kinds.iter().map(|kind| kind.weight * kind.value[cause as usize]).sum::<f64>());
+        budget[Cause::HotPixels as usize] += of_means;
+        for kind in kinds.iter().filter(|kind| kind.is_free) {
+            budget[Cause::Rts as usize] += kind.weight * jumps;
+        }
+        if self.adc.is_some() {
+            budget[Cause::Quantization as usize] += whole.moments.variance - budget.iter().sum::<f64>();
         }
         budget
     }

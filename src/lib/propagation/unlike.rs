@@ -115,6 +115,8 @@ impl Temporal {
         let lines = LineCovariance {
             row: less(one.lines.row, self.lines.row),
             column: less(one.lines.column, self.lines.column),
+            drift: less(one.lines.drift, self.lines.drift),
+            drift_rows: one.lines.drift_rows,
         };
         // Sixth cumulants mark photosites that are unlike each other.
         Prediction { sixth: one.sixth, common: one.common, lines, ..found }

@@ -43,11 +43,13 @@ pub enum Source {
     HotPixels,
     /// Random telegraph signals of some photosites, temporal.
     Rts,
+    /// Drift of the black level along rows, temporal.
+    BlackDrift,
 }
 
 impl Source {
     /// All sources, first those of Eq. 9 in its order.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Dcsn,
         Self::Dcnu,
         Self::Ssn,
@@ -62,11 +64,16 @@ impl Source {
         Self::PrnuColumn,
         Self::HotPixels,
         Self::Rts,
+        Self::BlackDrift,
     ];
 
     /// Whether the source repeats from frame to frame of one sensor.
     pub fn is_fixed_pattern(self) -> bool {
-        !matches!(self, Self::Dcsn | Self::Ssn | Self::Ron | Self::RowNoise | Self::ColumnNoise | Self::Rts)
+        let is_temporal = matches!(
+            self,
+            Self::Dcsn | Self::Ssn | Self::Ron | Self::RowNoise | Self::ColumnNoise | Self::Rts | Self::BlackDrift
+        );
+        !is_temporal
     }
 }
 
@@ -89,6 +96,7 @@ impl Named for Source {
             Self::PrnuColumn => "prnu_column",
             Self::HotPixels => "hot_pixels",
             Self::Rts => "rts",
+            Self::BlackDrift => "black_drift",
         }
     }
 }
@@ -397,6 +405,7 @@ impl Run {
 /// | sensor seed | 0, row | 0 | 2²⁵ + 2²⁴ | DSNU and PRNU of the row |
 /// | seed | column, 0 | frame | 2²⁵ + 1 | column noise |
 /// | sensor seed | column, 0 | 0 | 2²⁵ + 2²⁴ + 1 | DSNU and PRNU of the column |
+/// | seed | 0, knot | frame | 2²⁵ + 2 | drift of the black level at a knot, [`of_knot`] |
 ///
 /// Each number has two words, the high one first. All classes of a row share its draws.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -421,8 +430,18 @@ pub fn of_column([seed, sensor_seed]: [u64; 2], frame: u32, column: i32) -> Line
     of_line([seed, sensor_seed], frame, [column.cast_unsigned(), 0], LINE | 1)
 }
 
+/// The draw of the black level of a frame at a knot of its drift.
+pub fn of_knot(seed: u64, frame: u32, knot: i32) -> f64 {
+    let [a, b, ..] = philox4x32_10([0, knot.cast_unsigned(), frame, LINE | 2], halves(seed));
+    normal(a, b)
+}
+
+/// The standard normal number of two words, the high one first.
+fn normal(high: u32, low: u32) -> f64 {
+    gaussian::quantile(u64::from(high) << 32 | u64::from(low))
+}
+
 fn of_line([seed, sensor_seed]: [u64; 2], frame: u32, [x, y]: [u32; 2], fourth: u32) -> LineDraws {
-    let normal = |high: u32, low: u32| gaussian::quantile(u64::from(high) << 32 | u64::from(low));
     let [a, b, ..] = philox4x32_10([x, y, frame, fourth], halves(seed));
     let [c, d, e, f] = philox4x32_10([x, y, 0, fourth | PATTERN], halves(sensor_seed));
     LineDraws { temporal: normal(a, b), offset: normal(c, d), response: normal(e, f) }

@@ -82,6 +82,11 @@ impl CameraOutputs {
         register::announce(&[self.output.as_deref(), self.plot.as_deref(), self.sensor_out.as_deref()])
     }
 
+    /// Whether a figure is asked for.
+    pub fn draws(&self) -> bool {
+        self.plot.is_some()
+    }
+
     /// Writes report and plot.
     ///
     /// # Errors

@@ -1,36 +1,28 @@
-//! The curves of a measured camera.
+//! The page of a measured camera, in the order of the data sheet of \[EMVA1288].
 
-use crate::analysis::photon_transfer::ClassFindings;
-use crate::plot::{Arrangement, Axis, Color, Marks, Panel, Plot};
+use super::camera_patterns::{color, pattern_panels};
+use crate::analysis::photon_transfer::{ClassFindings, CurvePoint};
+use crate::plot::{Arrangement, Axis, Color, Marks, Panel, Plot, ReferenceLine, Region};
 use crate::requests::photon_transfer::MeasuredCamera;
 
-/// Draws, two beside each other: variance against signal with the line of the gain, signal against light, deviations from the straight
-/// line, signal-to-noise ratio; then spectrograms, profiles and histograms of the patterns under light and in the dark.
+/// Levels with so large a share of samples at the largest code have less noise than their light.
+const CLIPPED: f64 = 1e-3;
+/// Points of a drawn curve.
+const STEPS: u32 = 100;
+
+/// Draws, two beside each other: variance against signal with the line of the gain, signal against light, linearity and the deviations
+/// from the straight line, signal-to-noise ratio with that of an ideal camera, dark current; then of the patterns under light and in
+/// the dark spectrograms, profiles, histograms with the normal law, and accumulated histograms.
 pub fn camera_page(camera: &MeasuredCamera) -> Plot {
-    let mut transfer =
-        Panel::new(Axis::linear("signal above dark / ADU"), Axis::linear("temporal variance above dark / ADU\u{B2}"));
-    let mut response = Panel::new(Axis::linear(light_label(camera)), Axis::linear("signal above dark / ADU"));
-    let mut straight = Panel::new(Axis::linear(light_label(camera)), Axis::linear("deviation from the line / %"));
-    let mut ratio = Panel::new(Axis::log10("signal / e\u{207B}"), Axis::log10("signal-to-noise ratio"));
-    transfer.title = "Photon transfer".into();
-    response.title = "Response".into();
-    straight.title = "Linearity".into();
-    ratio.title = "Signal to noise".into();
-    for (index, class) in camera.classes.iter().enumerate() {
-        let color = color(&class.name, index);
-        add_transfer(&mut transfer, class, color);
-        let lit = class.curve.iter().filter_map(|point| Some([point.photons.or(point.exposure_s)?, point.signal_adu]));
-        response.add(&class.name, color, Marks::Points(lit.collect()));
-        if let Some(linearity) = &class.linearity {
-            let deviations = linearity.deviations.iter().map(|[light, deviation]| [*light, 100.0 * deviation]);
-            straight.add(&class.name, color, Marks::Points(deviations.collect()));
-        }
-        add_ratio(&mut ratio, class, color);
-    }
-    let mut panels = vec![transfer, response, straight, ratio];
-    for (which, name, unit) in [(0, "PRNU", "%"), (1, "DSNU", "e\u{207B}")] {
-        panels.extend(patterns(camera, which, name, unit));
-    }
+    let mut panels = vec![
+        transfer(camera),
+        sensitivity(camera),
+        linearity(camera),
+        deviation(camera),
+        signal_to_noise(camera),
+        dark_current(camera),
+    ];
+    panels.extend(pattern_panels(camera));
     panels.retain(|panel| !panel.series.is_empty());
     let title = format!("Photon transfer of {}", camera.list);
     let mut panels = panels.into_iter();
@@ -41,84 +33,198 @@ pub fn camera_page(camera: &MeasuredCamera) -> Plot {
     plot
 }
 
-/// Spectrogram, profiles and histogram of a pattern.
-fn patterns(camera: &MeasuredCamera, which: usize, name: &str, unit: &str) -> [Panel; 3] {
-    let label = |of: &str| format!("{of} / {unit}");
-    let mut spectrum = Panel::new(
-        Axis::linear("frequency / cycles per photosite of the class"),
-        Axis::log10(&format!("power / {unit}\u{B2}")),
+fn classes(camera: &MeasuredCamera) -> impl Iterator<Item = (&ClassFindings, Color)> {
+    camera.classes.iter().enumerate().map(|(index, class)| (class, color(&class.name, index)))
+}
+
+fn titled(title: &str, x: Axis, y: Axis) -> Panel {
+    Panel { title: title.into(), ..Panel::new(x, y) }
+}
+
+/// Whether light is told by photons rather than by exposure times; none where it is not told, or one time is that of all.
+fn light(camera: &MeasuredCamera) -> Option<bool> {
+    let points = || camera.classes.iter().flat_map(|class| &class.curve);
+    if points().any(|point| point.photons.is_some()) {
+        return Some(true);
+    }
+    let times = || points().filter_map(|point| point.exposure_s);
+    let first = times().next()?;
+    times().any(|time| (time - first).abs() > 1e-6 * first).then_some(false)
+}
+
+fn light_of(point: &CurvePoint, by_photons: bool) -> Option<f64> {
+    if by_photons { point.photons } else { point.exposure_s }
+}
+
+fn light_axis(by_photons: bool) -> Axis {
+    Axis::linear(if by_photons { "photons per photosite" } else { "exposure time / s" })
+}
+
+fn transfer(camera: &MeasuredCamera) -> Panel {
+    let mut panel = titled(
+        "Photon transfer",
+        Axis::linear("signal above dark / ADU"),
+        Axis::linear("temporal variance above dark / ADU\u{B2}"),
     );
-    let mut profile = Panel::new(Axis::linear("column or row"), Axis::linear(&label("mean behind the filter")));
-    let mut histogram = Panel::new(Axis::linear(&label("deviation behind the filter")), Axis::log10("photosites"));
-    spectrum.title = format!("{name}, spectrogram");
-    profile.title = format!("{name}, profiles");
-    histogram.title = format!("{name}, histogram");
-    for (index, (class, views)) in camera.classes.iter().zip(&camera.patterns).enumerate() {
-        let (Some(view), Some(values)) = (&views[which], class.values) else { continue };
-        let color = color(&class.name, index);
-        // The two directions of a single class are told apart by color too.
-        let other = if camera.classes.len() == 1 { Color::Vermillion } else { color };
-        let scale = if which == 0 { 100.0 } else { 1.0 / values.gain };
-        let scaled =
-            |points: &[[f64; 2]], factor: f64| points.iter().map(|[x, y]| [*x, y * factor]).collect::<Vec<_>>();
-        let [along_rows, along_columns] = &view.spectra;
-        spectrum.add(&format!("{}, rows", class.name), color, Marks::Line(scaled(&along_rows[1..], scale * scale)));
-        spectrum.add(
-            &format!("{}, columns", class.name),
-            other,
-            Marks::Dashed(scaled(&along_columns[1..], scale * scale)),
-        );
-        profile.add(&format!("{}, columns", class.name), color, Marks::Line(scaled(&view.profiles[0], scale)));
-        profile.add(&format!("{}, rows", class.name), other, Marks::Dashed(scaled(&view.profiles[1], scale)));
-        let along = |points: &[[f64; 2]]| points.iter().map(|[x, y]| [x * scale, *y]).collect::<Vec<_>>();
-        histogram.add(&class.name, color, Marks::Points(along(&view.histogram)));
-        let law = along(&view.normal).into_iter().filter(|[_, count]| *count > 0.1);
-        histogram.add(&format!("{}, normal law", class.name), color, Marks::Line(law.collect()));
+    let mut others = Vec::new();
+    for (class, color) in classes(camera) {
+        let [fitted, rest] = [true, false].map(|is_fitted| {
+            let wanted = class.curve.iter().filter(|point| point.is_fitted == is_fitted);
+            wanted.map(|point| [point.signal_adu, point.variance_adu2]).collect::<Vec<_>>()
+        });
+        let most = fitted.iter().map(|[signal, _]| *signal).fold(0.0, f64::max);
+        let gain = class.values.map(|values| values.gain);
+        let name = gain.map_or_else(|| class.name.clone(), |gain| format!("{}, K {gain:.5}", class.name));
+        others.extend(rest);
+        panel.add(&name, color, Marks::Points(fitted));
+        if let Some(gain) = gain {
+            panel.add("", color, Marks::Line(vec![[0.0, 0.0], [most, gain * most]]));
+        }
     }
-    [spectrum, profile, histogram]
-}
-
-fn light_label(camera: &MeasuredCamera) -> &'static str {
-    let has_photons = camera.classes.iter().flat_map(|class| &class.curve).any(|point| point.photons.is_some());
-    if has_photons { "photons per photosite" } else { "exposure time / s" }
-}
-
-fn color(name: &str, index: usize) -> Color {
-    match name {
-        "R" => Color::Vermillion,
-        "G" => Color::Green,
-        "B" => Color::Blue,
-        _ => Color::of_index(index),
-    }
-}
-
-fn add_transfer(panel: &mut Panel, class: &ClassFindings, color: Color) {
-    let points = |is_fitted: bool| {
-        let wanted = class.curve.iter().filter(move |point| point.is_fitted == is_fitted);
-        wanted.map(|point| [point.signal_adu, point.variance_adu2]).collect::<Vec<_>>()
-    };
-    panel.add(&class.name, color, Marks::Points(points(true)));
-    let others = points(false);
     if !others.is_empty() {
-        panel.add(&format!("{}, not fitted", class.name), Color::Gray, Marks::Points(others));
+        panel.add("not fitted", Color::Gray, Marks::Points(others));
     }
-    if let Some(values) = class.values {
-        let most = class.curve.iter().filter(|point| point.is_fitted).map(|point| point.signal_adu).fold(0.0, f64::max);
-        panel.add(
-            &format!("{}, K {:.5}", class.name, values.gain),
-            color,
-            Marks::Line(vec![[0.0, 0.0], [most, values.gain * most]]),
-        );
-    }
+    panel
 }
 
-fn add_ratio(panel: &mut Panel, class: &ClassFindings, color: Color) {
-    let Some(values) = class.values else { return };
-    let dark = values.dark_variance.unwrap_or(0.0);
-    let most = class.get("saturation_e").map_or(f64::INFINITY, |saturation| saturation.high * values.gain);
-    let is_whole = |signal: f64| signal > 0.0 && signal <= most;
-    let measured = class.curve.iter().filter(|point| is_whole(point.signal_adu) && point.variance_adu2 + dark > 0.0);
-    let points =
-        measured.map(|point| [point.signal_adu / values.gain, point.signal_adu / (point.variance_adu2 + dark).sqrt()]);
-    panel.add(&class.name, color, Marks::Points(points.collect()));
+fn sensitivity(camera: &MeasuredCamera) -> Panel {
+    let by_photons = light(camera);
+    let mut panel =
+        titled("Sensitivity", light_axis(by_photons.unwrap_or(true)), Axis::linear("signal above dark / ADU"));
+    let Some(by_photons) = by_photons else { return panel };
+    for (class, color) in classes(camera) {
+        let at = |point: &CurvePoint| Some([light_of(point, by_photons)?, point.signal_adu]);
+        let responsivity = class.values.and_then(|values| values.responsivity).filter(|_| by_photons);
+        let name =
+            responsivity.map_or_else(|| class.name.clone(), |of_light| format!("{}, R {of_light:.5}", class.name));
+        panel.add(&name, color, Marks::Points(class.curve.iter().filter_map(at).collect()));
+        if let Some(responsivity) = responsivity {
+            let most = class.curve.iter().filter(|point| point.is_fitted).filter_map(|p| p.photons).fold(0.0, f64::max);
+            panel.add("", color, Marks::Line(vec![[0.0, 0.0], [most, responsivity * most]]));
+        }
+    }
+    panel
+}
+
+fn linearity(camera: &MeasuredCamera) -> Panel {
+    let by_photons = light(camera).unwrap_or(true);
+    let mut panel = titled("Linearity", light_axis(by_photons), Axis::linear("signal above dark / ADU"));
+    for (class, color) in classes(camera) {
+        let Some(linearity) = &class.linearity else { continue };
+        let [low, high] =
+            [linearity.deviations.first(), linearity.deviations.last()].map(|end| end.map_or(0.0, |[light, _]| *light));
+        let within = class.curve.iter().filter_map(|point| Some([light_of(point, by_photons)?, point.signal_adu]));
+        let within = within.filter(|[light, _]| (low..=high).contains(light));
+        panel.add(&format!("{}, 5 to 95 % of saturation", class.name), color, Marks::Points(within.collect()));
+        let line = [low, high].map(|light| [light, linearity.line.at(light)]);
+        panel.add("", color, Marks::Line(line.to_vec()));
+    }
+    panel
+}
+
+fn deviation(camera: &MeasuredCamera) -> Panel {
+    let axis = light_axis(light(camera).unwrap_or(true));
+    let mut panel = titled("Deviation from linearity", axis, Axis::linear("deviation from the line / %"));
+    for (class, color) in classes(camera) {
+        if let Some(linearity) = &class.linearity {
+            let deviations = linearity.deviations.iter().map(|[light, deviation]| [*light, 100.0 * deviation]);
+            panel.add(&class.name, color, Marks::LineAndPoints(deviations.collect()));
+        }
+    }
+    if !panel.series.is_empty() {
+        panel.horizontal_lines.push(ReferenceLine { at: 0.0, label: String::new() });
+    }
+    panel
+}
+
+/// Signal over temporal noise of levels that are not clipped, with the law of the numbers that were measured, and without any noise
+/// but that of light.
+fn signal_to_noise(camera: &MeasuredCamera) -> Panel {
+    let mut panel =
+        titled("Signal-to-noise ratio", Axis::log10("signal / e\u{207B}"), Axis::log10("signal-to-noise ratio"));
+    let mut ends: Option<[f64; 2]> = None;
+    for (class, color) in classes(camera) {
+        let Some(values) = class.values else { continue };
+        let dark = values.dark_variance.unwrap_or(0.0);
+        let most = class.get("saturation_e").map_or(f64::INFINITY, |saturation| saturation.value);
+        let electrons = |point: &CurvePoint| point.signal_adu / values.gain;
+        let is_whole = |point: &&CurvePoint| {
+            point.signal_adu > 0.0
+                && point.variance_adu2 + dark > 0.0
+                && point.clipped <= CLIPPED
+                && electrons(point) <= most
+        };
+        let shown: Vec<[f64; 2]> = class
+            .curve
+            .iter()
+            .filter(is_whole)
+            .map(|point| [electrons(point), point.signal_adu / (point.variance_adu2 + dark).sqrt()])
+            .collect();
+        let (low, high) =
+            shown.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), [x, _]| (low.min(*x), high.max(*x)));
+        if shown.is_empty() {
+            continue;
+        }
+        let low = class.get("threshold_e").map_or(low, |threshold| threshold.value.min(low));
+        let high = if most.is_finite() { most.max(high) } else { high };
+        let (from, to) = ends.map_or((low, high), |[from, to]| (from.min(low), to.max(high)));
+        ends = Some([from, to]);
+        let noise = dark / (values.gain * values.gain);
+        let law = |signal: f64| [signal, signal / (noise + signal).sqrt()];
+        panel.add(&class.name, color, Marks::Points(shown));
+        panel.add("", color, Marks::Line(along([low, high]).map(law).collect()));
+        // The pattern is noise of a single frame too.
+        if let (1, Some(prnu), Some(dsnu)) = (camera.classes.len(), class.get("prnu"), class.get("dsnu_e")) {
+            let total = |signal: f64| {
+                [signal, signal / (noise + signal + dsnu.value.powi(2) + (prnu.value * signal).powi(2)).sqrt()]
+            };
+            panel.add("with the pattern", Color::Vermillion, Marks::Dashed(along([low, high]).map(total).collect()));
+        }
+    }
+    if let Some(ends) = ends {
+        let ideal = along(ends).map(|signal| [signal, signal.sqrt()]).collect();
+        panel.add("ideal", Color::Black, Marks::Dashed(ideal));
+    }
+    if let [class] = camera.classes.as_slice() {
+        panel.regions.extend(dynamic_range(class));
+    }
+    panel
+}
+
+/// From the threshold to saturation.
+fn dynamic_range(class: &ClassFindings) -> Option<Region> {
+    let [threshold, saturation, range] =
+        ["threshold_e", "saturation_e", "dynamic_range"].map(|key| class.get(key).map(|found| found.value));
+    let label = format!("dynamic range {:.1} dB", 20.0 * range?.log10());
+    Some(Region { from: threshold?, to: saturation?, label, color: Color::SkyBlue })
+}
+
+/// Places at equal factors.
+fn along([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+    (0..=STEPS).map(move |step| low * (high / low).powf(f64::from(step) / f64::from(STEPS)))
+}
+
+/// What darks of several times have above none: signal, and variance in the same unit.
+fn dark_current(camera: &MeasuredCamera) -> Panel {
+    let mut panel =
+        titled("Dark current", Axis::linear("exposure time / s"), Axis::linear("above no exposure / e\u{207B}"));
+    for (class, color) in classes(camera) {
+        let Some(values) = class.values else { continue };
+        let (Some(black), Some(slope)) = (values.dark_mean, values.dark_slope) else { continue };
+        let most = class.darks.iter().filter_map(|dark| dark.exposure_s).fold(0.0, f64::max);
+        let means =
+            class.darks.iter().filter_map(|dark| Some([dark.exposure_s?, (dark.mean_adu - black) / values.gain]));
+        panel.add(&format!("{}, mean", class.name), color, Marks::Points(means.collect()));
+        panel.add("", color, Marks::Line(vec![[0.0, 0.0], [most, slope / values.gain * most]]));
+        let (1, Some(silent), Some(rise)) = (camera.classes.len(), values.dark_variance, values.dark_variance_slope)
+        else {
+            continue;
+        };
+        let square = values.gain * values.gain;
+        let noise =
+            class.darks.iter().filter_map(|dark| Some([dark.exposure_s?, (dark.variance_adu2 - silent) / square]));
+        panel.add(&format!("{}, variance", class.name), Color::Vermillion, Marks::Points(noise.collect()));
+        panel.add("", Color::Vermillion, Marks::Dashed(vec![[0.0, 0.0], [most, rise / square * most]]));
+    }
+    panel
 }

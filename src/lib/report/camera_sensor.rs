@@ -132,6 +132,8 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         read_noise_e,
         row_noise_e,
         column_noise_e,
+        black_drift_e: 0.0,
+        black_drift_rows: 0.0,
         dsnu_e,
         dsnu_row_e,
         dsnu_column_e,
@@ -141,10 +143,13 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         hot_pixel_dark_current_e_per_s: 0.0,
         rts_share: 0.0,
         rts_amplitude_e: 0.0,
+        smear_line_s: 0.0,
+        blooming: 0.0,
         bits,
         bias_adu: bias_adu.value,
         adu_per_e: gain.value,
         linearization: None,
+        taps: None,
     };
     let percent = camera.confidence * 100.0;
     let source = format!("photon-transfer of {}; intervals hold with {percent} %", frames_in_words(camera.frames));

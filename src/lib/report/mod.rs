@@ -5,6 +5,7 @@ pub mod characterization;
 pub mod chart;
 
 mod camera_page;
+mod camera_patterns;
 mod camera_sensor;
 mod difference;
 mod matrix_text;
@@ -79,6 +80,8 @@ impl Named for ReportFormat {
 /// [`Error::Usage`] for a name that ends like that of another form.
 pub fn form_of<F: Named>(asked: Option<F>, output: Option<&Path>) -> Result<Option<F>> {
     let ending = named(output).and_then(Path::extension).map(|ending| ending.to_string_lossy().to_lowercase());
+    // Of several frames JSON has a line each.
+    let ending = ending.map(|ending| if LINES.contains(&ending.as_str()) { "json".into() } else { ending });
     match ending.filter(|_| asked.is_none()) {
         None => Ok(asked),
         Some(ending) => match F::named(&ending) {
@@ -91,6 +94,9 @@ pub fn form_of<F: Named>(asked: Option<F>, output: Option<&Path>) -> Result<Opti
         },
     }
 }
+
+/// What names of files of JSON lines end in.
+const LINES: [&str; 2] = ["jsonl", "ndjson"];
 
 /// What names of files end in that no report should be written to.
 const OF_OTHERS: [&str; 21] = [

@@ -35,6 +35,8 @@ pub fn photon_transfer(curve: &TransferCurve) -> Plot {
         Cause::Dcnu,
         Cause::HotPixels,
         Cause::Rts,
+        Cause::BlackDrift,
+        Cause::Taps,
     ]);
     let shot = part(&[Cause::SignalShot]);
     let pattern = part(&[Cause::Prnu, Cause::PrnuRow, Cause::PrnuColumn]);

@@ -223,6 +223,7 @@ impl Averaged {
             record = AverageRecord { frames: before.frames.saturating_mul(record.frames), ..record };
         }
         let name = averaging.name();
+        metadata.averaged = seen.exposures.drawn();
         metadata.average = Some(ExposuresRecord::of(record, metadata.quantity, metadata.demosaic.is_some()));
         (metadata.predicted, metadata.uncertainty, metadata.saturated_share, metadata.samples) =
             (None, None, None, None);

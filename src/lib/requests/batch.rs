@@ -71,7 +71,8 @@ pub fn check_directories(jobs: &[Job]) -> Result<()> {
     let mut last = None;
     let frames = || jobs.iter().filter_map(|job| named(job.frame.as_deref()));
     for (frame, directory) in frames().filter_map(|frame| Some((frame, frame.parent()?))) {
-        let is_known = !directory.as_os_str().is_empty() && numbered(directory, 0, 0).is_none();
+        let has_name = directory.to_string_lossy().contains(STEM);
+        let is_known = !directory.as_os_str().is_empty() && numbered(directory, 0, 0).is_none() && !has_name;
         if is_known && last != Some(directory) && !directory.is_dir() {
             let problem = format!("there is no directory `{}`; make it first", directory.display());
             return Err(Error::format(&frame.display().to_string(), problem));

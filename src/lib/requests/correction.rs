@@ -206,7 +206,7 @@ impl Correction {
     /// the frame.
     fn frames(&self, role: Role, light: &Light, company: &mut Company) -> Result<Vec<OneOfMany>> {
         let paths = match role {
-            Role::Light => return Ok(Vec::new()),
+            Role::Light | Role::Exposure => return Ok(Vec::new()),
             Role::Dark => &self.dark,
             Role::Bias => &self.bias,
             Role::Flat => &self.flat,
@@ -303,6 +303,7 @@ impl Correction {
         let beyond = self.find_defects.map(|given| given.unwrap_or_else(|| beyond_chance(samples)));
         let flats = self.flats(light, &mut company)?;
         let mut warnings = [stage.warnings(), &company.check()?].concat();
+        warnings.extend((!self.dark.is_empty()).then(|| doubt_of_dark(frame)).flatten());
         let dark_limits = match beyond.zip(self.darks(light, again).transpose()) {
             Some((beyond, darks)) => Some(darks?.survey(beyond)?),
             None => None,
@@ -376,6 +377,18 @@ fn doubt_of_limits(beyond: f64) -> Option<String> {
              of the frames they are found in goes with them, which no prediction knows",
             100.0 * share,
             100.0 * variance
+        )
+    })
+}
+
+/// A warning of a frame that dark frames come off and that is one itself: a shell gives `--dark` the first of several names.
+fn doubt_of_dark(frame: &FrameHeader) -> Option<String> {
+    let scene = frame.metadata.scene.as_ref()?;
+    (scene.expected_electrons == Some([0.0; 3])).then(|| {
+        format!(
+            "{}: no light fell on it: it is a dark frame itself; to take several names for --dark put them in quotes, \
+             --dark 'dark-*.exr'",
+            frame.name
         )
     })
 }

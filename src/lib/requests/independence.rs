@@ -2,9 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::formats::places::place;
-use crate::metadata::{FrameHeader, NoiseRecord};
+use crate::metadata::{DrawnExposures, FrameHeader};
 use crate::random::Source;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a frame is taken for beside others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +19,8 @@ pub enum Role {
     Flat,
     /// A dark frame of the flats.
     FlatDark,
+    /// An exposure of the scene.
+    Exposure,
 }
 
 impl Role {
@@ -29,6 +31,7 @@ impl Role {
             Self::Bias => "a bias frame",
             Self::Flat => "a flat",
             Self::FlatDark => "a dark frame of the flats",
+            Self::Exposure => "an exposure",
         }
     }
 
@@ -37,6 +40,16 @@ impl Role {
         let comes_off = |role| matches!(role, Self::Dark | Self::Bias);
         self != other && (comes_off(self) && other == Self::FlatDark || self == Self::FlatDark && comes_off(other))
     }
+}
+
+/// Makes sure that no file of several exposures of a scene is given twice.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_exposures(files: &[PathBuf]) -> Result<()> {
+    let files: Vec<_> = files.iter().map(|file| (Role::Exposure, file.as_path())).collect();
+    check_files(&files)
 }
 
 /// Makes sure that no file is given twice where that would count as two frames.
@@ -89,8 +102,7 @@ impl Company {
                         "its samples are those of {its}, by the digests of both; copies of one exposure do not count as two"
                     )));
                 }
-                let Some(noise) = shared_noise(frame, other) else { continue };
-                let NoiseRecord { seed, frame: number, .. } = noise;
+                let Some((seed, number)) = shared_noise(frame, other) else { continue };
                 if role == other_role {
                     return Err(frame.refuse(format!(
                         "its noise is that of {its}, of seed {seed} and frame {number}, and does not average out; draw it \
@@ -143,30 +155,21 @@ impl Company {
 /// Exposures that differ by no more than this are the same, written with other digits.
 const SAME_EXPOSURE: f64 = 1e-6;
 
-/// Sources that every exposure draws anew.
-const TEMPORAL: [Source; 5] = [Source::Dcsn, Source::Ssn, Source::Ron, Source::RowNoise, Source::ColumnNoise];
-
-/// Whether noise that an exposure draws anew may be in a frame; not in one that was simulated without.
-fn is_noisy(frame: &FrameHeader) -> bool {
-    let metadata = &frame.metadata;
-    match &metadata.noise {
-        Some(noise) => noise.sources.iter().any(|source| TEMPORAL.contains(source)),
-        None => metadata.scene.is_none(),
-    }
-}
-
 /// Whether two frames have the same noisy samples, as their sidecars tell.
 pub(super) fn are_copies(a: &FrameHeader, b: &FrameHeader) -> bool {
     let digest = |frame: &FrameHeader| frame.metadata.samples.as_ref().map(|samples| samples.digest.clone());
-    digest(a).is_some() && digest(a) == digest(b) && is_noisy(a) && is_noisy(b)
+    digest(a).is_some() && digest(a) == digest(b) && a.is_noisy() && b.is_noisy()
 }
 
-/// The noise that was drawn in both of two frames.
-pub(super) fn shared_noise<'a>(a: &'a FrameHeader, b: &FrameHeader) -> Option<&'a NoiseRecord> {
-    let (a, b) = (a.metadata.noise.as_ref()?, b.metadata.noise.as_ref()?);
-    let is_in = |noise: &NoiseRecord, source: Source| noise.sources.contains(&source);
-    let is_shared = TEMPORAL.into_iter().any(|source| is_in(a, source) && is_in(b, source));
-    ((a.seed, a.sensor_seed, a.frame) == (b.seed, b.sensor_seed, b.frame) && is_shared).then_some(a)
+/// Seed and number of an exposure whose noise is in both of two frames, or of which both are averages.
+pub(super) fn shared_noise(a: &FrameHeader, b: &FrameHeader) -> Option<(u64, u32)> {
+    let (its, other) = (a.metadata.noise.as_ref()?, b.metadata.noise.as_ref()?);
+    let is_shared = |source: &&Source| !source.is_fixed_pattern() && other.sources.contains(source);
+    its.sources.iter().find(is_shared).filter(|_| its.sensor_seed == other.sensor_seed)?;
+    let others = b.drawn();
+    let common =
+        |run: DrawnExposures| others.iter().find_map(|other| run.common(*other)).map(|number| (run.seed, number));
+    a.drawn().into_iter().find_map(common)
 }
 
 #[cfg(test)]
@@ -174,7 +177,7 @@ mod tests {
     use super::*;
     use crate::camera::optics::Exposure;
     use crate::frame::Geometry;
-    use crate::metadata::{Metadata, PoissonKind, SamplesRecord};
+    use crate::metadata::{Metadata, NoiseRecord, PoissonKind, SamplesRecord};
     use crate::stream::Counts;
     use crate::units::QuantityKind;
 
@@ -190,6 +193,7 @@ mod tests {
             hot_pixel_e: 0.0,
             poisson: PoissonKind::Exact,
             cte: None,
+            smear_per_row: 0.0,
         });
         FrameHeader { name: name.into(), geometry: Geometry::new(4, 4, &["Y"]), metadata }
     }

@@ -1,5 +1,6 @@
 //! Statistics of a frame beside what propagation predicts.
 
+use super::independence::check_exposures;
 use super::options::Output;
 use super::{batch, values};
 use crate::analysis::statistics::portrait::Portrait;
@@ -8,7 +9,7 @@ use crate::analysis::statistics::{
     measure_with_portrait, patches,
 };
 use crate::error::Result;
-use crate::formats::places::output_of;
+use crate::formats::places::{output_of, sidecar_path};
 use crate::formats::plots::PlotFormat;
 use crate::formats::register;
 use crate::metadata::FrameHeader;
@@ -99,10 +100,15 @@ impl Measurement {
     ///
     /// # Errors
     ///
-    /// Those of [`register::announce`], [`register::note_inputs`], [`batch::check_each_named`] and [`batch::check_one_report`].
+    /// Those of [`check_exposures`] where frames are taken together, [`register::announce`], [`register::note_inputs`], [`batch::check_each_named`] and [`batch::check_one_report`].
     pub fn announce(&self, inputs: &[PathBuf], report: Option<&Path>) -> Result<()> {
-        register::announce(&[report, self.plot.as_deref(), self.pixels.as_deref()])?;
+        let pixels = self.pixels.as_deref();
+        let sidecar = pixels.map(sidecar_path);
+        register::announce(&[report, self.plot.as_deref(), pixels, sidecar.as_deref()])?;
         register::note_inputs(inputs.iter().map(PathBuf::as_path))?;
+        if self.over.is_some() {
+            check_exposures(inputs)?;
+        }
         batch::check_each_named(inputs, self.plot.as_deref())?;
         batch::check_one_report(report)
     }

@@ -1,5 +1,6 @@
 //! The analog-to-digital converter.
 
+use crate::camera::taps::TapLayout;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{AdcRecord, FrameHeader};
@@ -22,7 +23,9 @@ pub struct AdcSettings {
 ///
 /// y = round(K·n + y₀)        n in e⁻, y₀ = bias        [HP2005, Eq. 12]
 ///
-/// A sensor with a linearization f has y = round(f⁻¹(K·n) + y₀).
+/// A sensor with a linearization f has y = round(f⁻¹(K·n) + y₀). One that is read through several amplifiers has K·g for K and
+/// y₀ + K·g·o for y₀, g and o the gain and the offset of that which reads the photosite ([`Taps`](crate::camera::taps::Taps)); the levels in the metadata are
+/// those of g = 1 and o = 0.
 ///
 /// Rounding *is* the quantization noise (variance 1/12 ADU² while σ ≥ ½ ADU); nothing else is added for it. Ties go
 /// away from zero. NaN stays NaN.
@@ -49,8 +52,31 @@ pub struct AdcSettings {
 #[derive(Debug, Clone)]
 pub struct Digitize {
     header: FrameHeader,
+    /// That of all photosites, or those of the amplifiers.
+    converters: Vec<Converter>,
+    /// Width and height of a sensor that is read through several amplifiers.
+    size: [u32; 2],
+}
+
+/// One converter, and the charges at which it does something else.
+#[derive(Debug, Clone)]
+struct Converter {
     adc: AdcRecord,
+    clipping: Clipping,
     bent: Option<BentEdges>,
+}
+
+impl Converter {
+    fn of(adc: AdcRecord) -> Self {
+        Self { adc, clipping: Clipping::of(&adc), bent: adc.linearization.map(|_| BentEdges::of(&adc)) }
+    }
+
+    fn digitize(&self, instructions: Instructions, charges: &[f32], codes: &mut [f32]) -> Counts {
+        match &self.bent {
+            Some(edges) => edges.digitize(charges, codes),
+            None => vectors::run_on(instructions, Row { adc: self.adc, clipping: self.clipping, charges, codes }),
+        }
+    }
 }
 
 impl Digitize {
@@ -99,9 +125,15 @@ impl Digitize {
                 adc.adu_per_e
             )));
         }
+        let taps = input.taps();
+        let adcs: Vec<AdcRecord> = match taps {
+            None => vec![adc],
+            Some(taps) => (0..taps.count()).map(|tap| adc.of_tap(taps, tap)).collect(),
+        };
         if let Some(curve) = adc.linearization {
-            curve.check_rises(adc.range()).map_err(Error::Usage)?;
+            adcs.iter().try_for_each(|adc| curve.check_rises(adc.range())).map_err(Error::Usage)?;
         }
+        let size = readout.map_or([0; 2], |readout| [readout.width, readout.height]);
         let mut metadata = input.metadata.becoming(QuantityKind::Adu);
         metadata.adc = Some(adc);
         // Expected electrons are those of light alone.
@@ -109,8 +141,8 @@ impl Digitize {
         let dark_signal_e = metadata.dark_signal_e.take().or(is_light.then_some(0.0));
         metadata.set_black_adu(dark_signal_e.map(|dark_e| adc.level_at(dark_e).into()));
         metadata.white_level_adu = Some(f64::from(adc.top_code()).into());
-        let bent = adc.linearization.map(|_| BentEdges::of(&adc));
-        Ok(Self { header: FrameHeader { metadata, ..input.clone() }, adc, bent })
+        let converters = adcs.into_iter().map(Converter::of).collect();
+        Ok(Self { header: FrameHeader { metadata, ..input.clone() }, converters, size })
     }
 
     /// The head of the digitized frame, to add to.
@@ -126,19 +158,61 @@ impl Digitize {
         mut output: Rows<'_, Adu>,
     ) -> Counts {
         let mut counts = Counts::default();
-        let clipping = Clipping::of(&self.adc);
+        let mut scratch = Scratch::default();
         for y in output.range() {
             for channel in 0..input.channels() {
                 let (charges, codes) = (input.row(y.cast_signed(), channel), output.row(y, channel));
-                let of_row = match &self.bent {
-                    Some(edges) => edges.digitize(charges, codes),
-                    None => vectors::run_on(instructions, Row { adc: self.adc, clipping, charges, codes }),
+                let of_row = match &self.converters[..] {
+                    [one] => one.digitize(instructions, charges, codes),
+                    _ => self.digitize_by_taps(instructions, y, (charges, codes), &mut scratch),
                 };
                 counts = counts.plus(of_row);
             }
         }
         counts
     }
+
+    /// Digitizes row `y` of the frame, each photosite by the amplifier that reads it.
+    fn digitize_by_taps(
+        &self,
+        instructions: Instructions,
+        y: usize,
+        (charges, codes): (&[f32], &mut [f32]),
+        scratch: &mut Scratch,
+    ) -> Counts {
+        let Some(taps) = self.header.taps() else { return Counts::default() };
+        let [x0, y0] = self.header.geometry.origin.map(i64::from);
+        let converter = |x: usize| &self.converters[taps.tap(self.size, [x0 + x as i64, y0 + y as i64])];
+        let width = charges.len();
+        if taps.layout == TapLayout::Columns {
+            let step = taps.count();
+            let mut counts = Counts::default();
+            for first in 0..step.min(width) {
+                scratch.charges.clear();
+                scratch.charges.extend(charges[first..].iter().step_by(step));
+                scratch.codes.resize(scratch.charges.len(), 0.0);
+                counts = counts.plus(converter(first).digitize(instructions, &scratch.charges, &mut scratch.codes));
+                for (code, made) in codes[first..].iter_mut().step_by(step).zip(&scratch.codes) {
+                    *code = *made;
+                }
+            }
+            return counts;
+        }
+        let border = usize::try_from(i64::from(self.size[0] / 2) - x0).unwrap_or_default().min(width);
+        let (left, right) = codes.split_at_mut(border);
+        let halves = [(0, &charges[..border], left), (border, &charges[border..], right)];
+        let of_half = |(first, charges, codes): (usize, &[f32], &mut [f32])| {
+            if charges.is_empty() { Counts::default() } else { converter(first).digitize(instructions, charges, codes) }
+        };
+        halves.into_iter().map(of_half).fold(Counts::default(), Counts::plus)
+    }
+}
+
+/// Memory for the samples of every so many columns.
+#[derive(Debug, Default)]
+struct Scratch {
+    charges: Vec<f32>,
+    codes: Vec<f32>,
 }
 
 /// The charges between the codes of a converter that is not straight: from the first on, they rise from −½ to ½ above the largest

@@ -89,6 +89,7 @@ impl CorrectFrame {
         let mut transfer = None;
         if let Some(cte) = cte {
             input.check_corner()?;
+            input.check_one_output()?;
             transfer = Some(Transfer::undoing(cte, &input.geometry)?);
             if !is_subtracted {
                 bias_adu = input.metadata.adc.ok_or_else(|| input.missing("adc"))?.bias_adu;

@@ -57,13 +57,16 @@ impl Master {
     fn of(kind: MasterKind, heads: &[&FrameHeader], members: Vec<usize>, averaging: Averaging) -> Result<Self> {
         let first = heads[members[0]];
         let metadata = &first.metadata;
+        // Where charge has spilled over, what was drawn is not the noise that it tells.
+        let has_spilled = |member: &usize| heads[*member].metadata.bloomed_photosites > Some(0);
+        let is_told = !members.iter().any(has_spilled);
         let record = MasterRecord {
             kind,
             average: averaging.record_of(members.iter().map(|member| heads[*member]))?,
             weight: 1.0,
             exposure_s: metadata.exposure.map(|exposure| exposure.exposure_s),
             temperature_k: temperature_k(first),
-            noise: metadata.noise.as_ref().map(MasterNoise::of),
+            noise: metadata.noise.as_ref().filter(|_| is_told).map(MasterNoise::of),
             identity: identity(members.iter().map(|member| heads[*member])),
         };
         Ok(Self { record, members })

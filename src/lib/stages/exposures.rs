@@ -1,8 +1,8 @@
 //! Exposures of one scene by one camera: whether frames that come one after another are.
 
 use crate::error::{Error, Result};
-use crate::metadata::{Difference, FrameHeader, Metadata};
-use std::collections::HashSet;
+use crate::metadata::{Difference, DrawnExposures, ExposureSet, FrameHeader, Metadata};
+use std::collections::HashMap;
 
 /// What is known of exposures that came so far.
 #[derive(Debug, Clone)]
@@ -11,20 +11,29 @@ pub struct Exposures {
     head: FrameHeader,
     /// What the first that differs in more than the exposure differs in.
     unlike: Option<String>,
-    /// Seed and number of each that tells them.
-    drawn: HashSet<(u64, u32)>,
+    /// Those whose metadata tell their seed and number.
+    drawn: ExposureSet,
+    /// By the digest of its samples, what each is called whose sidecar tells it.
+    by_digest: HashMap<String, String>,
 }
 
 impl Exposures {
     /// Those that `first` begins.
     pub fn of(first: &FrameHeader) -> Self {
-        let mut exposures =
-            Self { first: first.clone(), head: first.without_exposure(), unlike: None, drawn: HashSet::new() };
-        exposures.drawn.extend(drawn(first));
+        let (head, drawn, by_digest) = (first.without_exposure(), ExposureSet::default(), HashMap::new());
+        let mut exposures = Self { first: first.clone(), head, unlike: None, drawn, by_digest };
+        // Runs of one frame that overlap are told by no other.
+        first.drawn().into_iter().for_each(|run| _ = exposures.drawn.insert(run));
+        exposures.by_digest.extend(digest(first).map(|digest| (digest, first.name.clone())));
         exposures
     }
 
-    /// The first frame.
+    /// Seeds and numbers, as far as metadata tell them.
+    pub fn drawn(&self) -> Vec<DrawnExposures> {
+        self.drawn.runs()
+    }
+
+    /// The first frame; where charge has spilled in others, it tells of the one that has most.
     pub fn first(&self) -> &FrameHeader {
         &self.first
     }
@@ -42,11 +51,18 @@ impl Exposures {
     /// in another way, or is the same exposure as another, as far as metadata tell.
     pub fn take(&mut self, frame: &FrameHeader) -> Result<()> {
         self.check(frame)?;
-        if let Some((seed, number)) = drawn(frame)
-            && !self.drawn.insert((seed, number))
-        {
-            let problem = format!("exposure {number} of seed {seed} comes twice; its noise would count as that of two");
-            return Err(frame.refuse(problem));
+        for run in frame.drawn() {
+            self.drawn.insert(run).map_err(|number| {
+                let seed = run.seed;
+                frame.refuse(format!(
+                    "exposure {number} of seed {seed} comes twice; its noise would count as that of two"
+                ))
+            })?;
+        }
+        if let Some(other) = digest(frame).and_then(|digest| self.by_digest.insert(digest, frame.name.clone())) {
+            return Err(frame.refuse(format!(
+                "its samples are those of {other}, by the digests of both; copies of one exposure do not count as two"
+            )));
         }
         let head = frame.without_exposure();
         if self.unlike.is_none() && head != self.head {
@@ -58,6 +74,8 @@ impl Exposures {
             };
             self.unlike = Some(differs);
         }
+        let spilled = &mut self.first.metadata.bloomed_photosites;
+        *spilled = (*spilled).max(frame.metadata.bloomed_photosites);
         Ok(())
     }
 
@@ -126,10 +144,9 @@ fn blacks(frame: &FrameHeader) -> Metadata {
     }
 }
 
-/// Seed and number of an exposure in which noise was drawn.
-fn drawn(frame: &FrameHeader) -> Option<(u64, u32)> {
-    let noise = frame.metadata.noise.as_ref().filter(|noise| !noise.sources.is_empty());
-    noise.map(|noise| (noise.seed, noise.frame))
+/// The digest of samples with noise, where the sidecar tells it.
+fn digest(frame: &FrameHeader) -> Option<String> {
+    frame.metadata.samples.as_ref().filter(|_| frame.is_noisy()).map(|samples| samples.digest.clone())
 }
 
 /// The error of fewer than two.

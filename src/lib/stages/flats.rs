@@ -82,6 +82,8 @@ impl<S: RowSource> FlatFrames<S> {
         }
         let is_even = |flat: &S| flat.header().metadata.scene.as_ref().is_some_and(|scene| scene.uniform);
         let mut head = first.header().clone();
+        head.metadata.bloomed_photosites =
+            flats.iter().map(|flat| flat.header().metadata.bloomed_photosites).max().flatten();
         let is_even = flats.iter().all(is_even);
         let pedestal = match DarkFrames::matched(&head, darks, biases, settings)? {
             Some(darks) => {
@@ -227,12 +229,14 @@ impl<S: RowSource> FlatFrames<S> {
             Pedestal::Frames(darks) => (darks.stack().masters(), None),
             Pedestal::Level(level) => (Vec::new(), level.uniform()),
         };
+        let metadata = &self.head.metadata;
         FlatRecord {
             average: self.average,
             means_adu: means.means.clone(),
             photosites: means.photosites.clone(),
             even: self.is_even,
-            noise: self.head.metadata.noise.as_ref().map(MasterNoise::of),
+            // Where charge has spilled over, what was drawn is not the noise that it tells.
+            noise: metadata.noise.as_ref().filter(|_| metadata.bloomed_photosites <= Some(0)).map(MasterNoise::of),
             black_adu,
             masters,
             shares_masters: false,

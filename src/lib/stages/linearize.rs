@@ -34,6 +34,11 @@ impl Linearize {
         if adc.linearization.is_none() {
             return Err(frame.refuse("its sensor has no `linearization`; a sensor file can have one in its `readout`"));
         }
+        if frame.taps().is_some() {
+            return Err(frame.refuse(
+                "its sensor is read through several `taps`, and the curve of each begins at its own bias; codes of one bias are made straight",
+            ));
+        }
         let metadata = &mut frame.metadata;
         if metadata.black_by_row.iter().chain(&metadata.black_by_column).any(|delta| *delta != 0.0) {
             return Err(frame.refuse(

@@ -78,6 +78,7 @@ impl Mosaic {
                 input.refuse(format!("{problem}, such as --cfa rggb"))
             })?,
         };
+        check_smear(input, pattern)?;
         let mut metadata = input.metadata.becoming(input.metadata.quantity);
         metadata.predicted.clone_from(&input.metadata.predicted);
         metadata.cfa = Some(pattern.into());
@@ -100,6 +101,19 @@ impl Mosaic {
             vectors::run_on(instructions, Alternate { even, odd, to: output.row(y, 0) });
         }
         Counts::default()
+    }
+}
+
+/// Makes sure that columns whose smear was drawn are those of the plane.
+fn check_smear(frame: &FrameHeader, pattern: CfaPattern) -> Result<()> {
+    let metadata = &frame.metadata;
+    let has_smear = metadata.noise.as_ref().is_some_and(|noise| noise.smear_per_row > 0.0);
+    let of_sensor = metadata.sensor.as_ref().and_then(|sensor| sensor.bayer().ok());
+    match of_sensor {
+        Some(own) if has_smear && own != pattern => Err(frame.refuse(format!(
+            "its smear is that of columns behind the filter array of its sensor, {own}, not {pattern}; leave --pattern out"
+        ))),
+        _ => Ok(()),
     }
 }
 

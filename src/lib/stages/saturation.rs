@@ -44,7 +44,7 @@ pub struct FullLevels {
 
 impl FullLevels {
     /// The levels of the frame's samples: full well of electrons; of ADU the white level of the class, or the code of full
-    /// well where that is smaller. None where the metadata do not know, and of colors.
+    /// well where that is smaller, the least of several amplifiers. None where the metadata do not know, and of colors.
     pub fn of(frame: &FrameHeader) -> Option<Self> {
         let metadata = &frame.metadata;
         let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
@@ -56,7 +56,12 @@ impl FullLevels {
                 let full_well_e = readout.map_or(f64::INFINITY, |readout| readout.full_well_e);
                 let below_top =
                     |adc: AdcRecord| adc.sample(adc.top_code().into()) - adc.sample(adc.full_code(full_well_e));
-                let missing = metadata.adc.map_or(0.0, below_top);
+                // Of several amplifiers the lowest counts.
+                let of_taps = |adc: AdcRecord| match frame.taps() {
+                    None => below_top(adc),
+                    Some(taps) => (0..taps.count()).map(|tap| below_top(adc.of_tap(taps, tap))).fold(0.0, f64::max),
+                };
+                let missing = metadata.adc.map_or(0.0, of_taps);
                 white.classes().map(|level| level - missing)
             }
             _ => return None,

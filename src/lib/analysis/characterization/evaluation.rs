@@ -437,7 +437,7 @@ fn moments(differences: &[Difference]) -> (Difference, Difference, Difference) {
 fn pixels_of(head: &FrameHeader) -> Predicted<Box<PixelMoments>> {
     match Sites::of(head, Equations::Exact)?.frame(head)? {
         FramePrediction::Pixels(pixels) => Ok(pixels),
-        FramePrediction::Planes(_) => Err(Unpredictable::Missing("demosaic")),
+        FramePrediction::Planes(_) | FramePrediction::Groups(_) => Err(Unpredictable::Missing("demosaic")),
     }
 }
 

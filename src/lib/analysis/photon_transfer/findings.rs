@@ -2,6 +2,7 @@
 
 use super::curve::{Curve, LEAST_VARIANCE, ROUNDING, Values};
 use super::dark::{doubling_temperature, parted_pattern};
+use super::doubts::doubts;
 use super::level::Level;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal};
@@ -44,8 +45,21 @@ pub struct CurvePoint {
     pub variance_adu2: f64,
     /// What that scatters by: a standard deviation.
     pub variance_error_adu2: f64,
+    /// The share of its samples at the largest code or beyond.
+    pub clipped: f64,
     /// Whether gain and responsivity are fitted to it.
     pub is_fitted: bool,
+}
+
+/// A dark level as the curve of the dark current shows it.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct DarkPoint {
+    /// Exposure time in s.
+    pub exposure_s: Option<f64>,
+    /// Mean.
+    pub mean_adu: f64,
+    /// Temporal variance.
+    pub variance_adu2: f64,
 }
 
 /// What was measured of a class.
@@ -57,6 +71,8 @@ pub struct ClassFindings {
     pub findings: Vec<Finding>,
     /// The photon transfer curve.
     pub curve: Vec<CurvePoint>,
+    /// Darks of the flats' temperature.
+    pub darks: Vec<DarkPoint>,
     /// Deviations from the straight line.
     pub linearity: Option<Linearity>,
     /// What the fits give, in samples.
@@ -97,6 +113,7 @@ pub fn of_class(
         name: name.into(),
         findings: vec![finding("gain_adu_per_e", Err(why))],
         curve: Vec::new(),
+        darks: Vec::new(),
         linearity: None,
         values: None,
         stacks: [None; 2],
@@ -204,24 +221,22 @@ pub fn of_class(
         signal_adu: curve.signal(flat),
         variance_adu2: curve.noise(flat),
         variance_error_adu2: flats[flat].variance_variance.sqrt(),
+        clipped: flats[flat].at_ends[0],
         is_fitted: curve.fitted().contains(&flat),
     });
     let (curve_points, values) = (points.collect(), curve.values());
     let notes = notes(&curve, flats);
-    let other_time = |[flat, dark]: [f64; 2]| {
-        format!(
-            "flats of {flat} s stand above darks of {dark} s, as there are none of their exposure: black level and dark noise are those \
-             of the darks"
-        )
+    let doubts = doubts(&curve, flats, confidence);
+    let dark_point = |dark: &Level| DarkPoint {
+        exposure_s: dark.condition.exposure_s,
+        mean_adu: dark.mean,
+        variance_adu2: dark.variance,
     };
-    let brighter = "the dark signal falls with exposure time beyond chance: is there a flat among the darks?";
-    let falls = curve.interval(|values| values.dark_slope, confidence).is_some_and(|slope| slope.high < 0.0);
-    let falling = falls.then(|| brighter.to_owned());
-    let doubts = curve.other_time().map(other_time).into_iter().chain(falling).collect();
     ClassFindings {
         name: name.into(),
         findings: found,
         curve: curve_points,
+        darks: darks.iter().map(dark_point).collect(),
         linearity: straight.ok(),
         values,
         stacks: places,

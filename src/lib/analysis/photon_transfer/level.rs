@@ -1,6 +1,6 @@
 //! What a class of photosites does at one level of light, or in the dark.
 
-use super::survey::SiteSurvey;
+use super::tally::SiteSurvey;
 
 /// A level of light, or darkness, as frames of it were taken.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -5,6 +5,7 @@
 
 mod curve;
 mod dark;
+mod doubts;
 mod findings;
 mod fit;
 mod level;
@@ -12,15 +13,17 @@ mod linearity;
 mod pattern;
 mod sites;
 mod survey;
+mod tally;
 mod view;
 
 pub use curve::Values;
 pub use dark::doubling_temperature;
-pub use findings::{ClassFindings, CurvePoint, Finding, KEYS, Settings, of_class};
+pub use findings::{ClassFindings, CurvePoint, DarkPoint, Finding, KEYS, Settings, of_class};
 pub use fit::Line;
 pub use level::{Condition, Level};
 pub use linearity::Linearity;
 pub use pattern::left_in_mean;
 pub use sites::Site;
-pub use survey::{SiteSurvey, Survey, survey};
-pub use view::{OUTSTANDING, Outlier, PatternView, pattern_view};
+pub use survey::{Survey, survey};
+pub use tally::SiteSurvey;
+pub use view::{OUTSTANDING, Outlier, PatternFigure, PatternView, pattern_view};

@@ -1,5 +1,6 @@
 //! Photosites that are alike: those at one place of the filter array's period, or those of a plane.
 
+use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
 
 /// A grid of photosites behind one filter.
@@ -43,7 +44,8 @@ impl Site {
         (0..step[1]).flat_map(|y| (0..step[0]).map(move |x| [x, y])).filter_map(site).collect()
     }
 
-    /// Copies those of row `y` of the plane's row `samples`, which has some.
+    /// Copies those of the plane's row `samples`, which has some.
+    #[inline(always)]
     pub fn gather(&self, samples: &[f32], into: &mut [f64]) {
         if self.step[0] == 1 {
             into.iter_mut().zip(samples).for_each(|(to, from)| *to = f64::from(*from));
@@ -51,6 +53,12 @@ impl Site {
             let own = samples[self.first[0]..].iter().step_by(self.step[0]);
             into.iter_mut().zip(own).for_each(|(to, from)| *to = f64::from(*from));
         }
+    }
+
+    /// Writes values of those of a row into the plane's row.
+    pub fn spread(&self, values: &[f64], into: &mut [f32]) {
+        let own = into[self.first[0]..].iter_mut().step_by(self.step[0]);
+        own.zip(values).for_each(|(to, value)| *to = to_sample(*value));
     }
 
     /// Whether it has photosites in row `y`.

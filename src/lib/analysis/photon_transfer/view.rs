@@ -30,17 +30,28 @@ pub struct Outlier {
     pub deviation: f64,
 }
 
-/// A fixed pattern of a class.
+/// What a figure shows of a fixed pattern.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PatternView {
+pub struct PatternFigure {
     /// Frequency in cycles per photosite and power, along rows and along columns.
     pub spectra: [Vec<[f64; 2]>; 2],
-    /// Place and mean, column by column and row by row, behind the filter.
-    pub profiles: [Vec<[f64; 2]>; 2],
     /// Value and photosites of each bin, behind the filter.
     pub histogram: Vec<[f64; 2]>,
     /// The same of a normal law of the spread of most.
     pub normal: Vec<[f64; 2]>,
+    /// Distance from most and the share of photosites that are as far or farther, behind the filter.
+    pub accumulated: Vec<[f64; 2]>,
+    /// The same of the normal law.
+    pub normal_accumulated: Vec<[f64; 2]>,
+}
+
+/// A fixed pattern of a class.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PatternView {
+    /// Place and mean, column by column and row by row, behind the filter.
+    pub profiles: [Vec<[f64; 2]>; 2],
+    /// What only a figure shows, where one is asked for.
+    pub figure: Option<PatternFigure>,
     /// Spread of most photosites behind the filter: that of a normal law with their median absolute deviation.
     pub spread: f64,
     /// How many stand out, and how many of a normal law would.
@@ -70,7 +81,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn of(site: &Site, width: usize, planes: usize, at: &dyn Fn(usize) -> f64) -> Self {
+    fn of(site: &Site, width: usize, planes: usize, at: &(dyn Fn(usize) -> f64 + Sync)) -> Self {
         let [columns, rows] = site.size;
         let index = |x: usize, y: usize| {
             ((site.first[1] + y * site.step[1]) * planes + site.plane) * width + site.first[0] + x * site.step[0]
@@ -88,22 +99,24 @@ impl Grid {
         Self { columns: self.rows, rows: self.columns, values: values.collect() }
     }
 
-    /// Mean power of the rows.
+    /// Mean power of the rows, two by two: of z = x₁ + i x₂, |Z(f)|² + |Z(−f)|² is twice the power of both at f.
     fn spectrum(&self) -> Vec<[f64; 2]> {
-        let mean = self.mean();
-        let transform = FftPlanner::new().plan_fft_forward(self.columns);
-        let mut power = vec![0.0; self.columns / 2 + 1];
-        let mut line = vec![Complex::default(); self.columns];
+        let (mean, columns) = (self.mean(), self.columns);
+        let transform = FftPlanner::new().plan_fft_forward(columns);
+        let mut power = vec![0.0; columns / 2 + 1];
+        let mut line = vec![Complex::default(); columns];
         let mut scratch = vec![Complex::default(); transform.get_inplace_scratch_len()];
-        for row in self.values.chunks_exact(self.columns) {
-            for (line, value) in line.iter_mut().zip(row) {
-                *line = Complex::new(value - mean, 0.0);
-            }
+        for rows in self.values.chunks(2 * columns) {
+            let (first, second) = rows.split_at(columns);
+            line.iter_mut().zip(first).for_each(|(line, value)| *line = Complex::new(value - mean, 0.0));
+            line.iter_mut().zip(second).for_each(|(line, value)| line.im = value - mean);
             transform.process_with_scratch(&mut line, &mut scratch);
-            power.iter_mut().zip(&line).for_each(|(power, value)| *power += value.norm_sqr());
+            for (index, power) in power.iter_mut().enumerate() {
+                *power += 0.5 * (line[index].norm_sqr() + line[(columns - index) % columns].norm_sqr());
+            }
         }
-        let scale = 1.0 / (self.columns * self.rows) as f64;
-        power.iter().enumerate().map(|(index, power)| [index as f64 / self.columns as f64, power * scale]).collect()
+        let scale = 1.0 / (columns * self.rows) as f64;
+        power.iter().enumerate().map(|(index, power)| [index as f64 / columns as f64, power * scale]).collect()
     }
 
     /// Each value less the mean of the box around it, where there is one.
@@ -125,9 +138,14 @@ impl Grid {
         Self { columns, rows, values }
     }
 
-    fn profile(&self) -> Vec<f64> {
+    /// Means of the columns, or of the rows.
+    fn profile(&self, axis: usize) -> Vec<f64> {
+        let rows = self.values.chunks_exact(self.columns);
+        if axis == 1 {
+            return rows.map(|row| row.iter().sum::<f64>() / self.columns as f64).collect();
+        }
         let mut sums = vec![0.0; self.columns];
-        for row in self.values.chunks_exact(self.columns) {
+        for row in rows {
             sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
         }
         sums.iter().map(|sum| sum / self.rows as f64).collect()
@@ -135,34 +153,51 @@ impl Grid {
 }
 
 /// The pattern of a class whose grids are `sites` in a picture of so many columns and planes, of which `at` gives the value at an
-/// index; none of a grid that the filter leaves nothing of.
-pub fn pattern_view(sites: &[&Site], [width, planes]: [usize; 2], at: &dyn Fn(usize) -> f64) -> Option<PatternView> {
+/// index, with what a figure shows where it `draws`; none of a grid that the filter leaves nothing of.
+pub fn pattern_view(
+    sites: &[&Site],
+    [width, planes]: [usize; 2],
+    at: &(dyn Fn(usize) -> f64 + Sync),
+    draws: bool,
+) -> Option<PatternView> {
     if sites.iter().any(|site| site.size.iter().any(|extent| *extent < 2 * BOX)) {
         return None;
     }
     let grids: Vec<Grid> = sites.iter().map(|site| Grid::of(site, width, planes, at)).collect();
-    let spectra = [false, true].map(|is_turned| {
-        let of = |grid: &Grid| if is_turned { grid.turned().spectrum() } else { grid.spectrum() };
-        mean_of(grids.iter().map(of).collect())
-    });
     let filtered: Vec<Grid> = grids.iter().map(Grid::high_passed).collect();
     let profiles = [0, 1].map(|axis| {
         let mut all: Vec<[f64; 2]> = Vec::new();
         for (site, grid) in sites.iter().zip(&filtered) {
-            let profile = if axis == 0 { grid.profile() } else { grid.turned().profile() };
             let place = |index: usize| (site.first[axis] + (index + BOX / 2) * site.step[axis]) as f64;
-            all.extend(profile.iter().enumerate().map(|(index, mean)| [place(index), *mean]));
+            all.extend(grid.profile(axis).iter().enumerate().map(|(index, mean)| [place(index), *mean]));
         }
         all.sort_by(|a, b| a[0].total_cmp(&b[0]));
         all
     });
     let mut values: Vec<f64> = filtered.iter().flat_map(|grid| grid.values.iter().copied()).collect();
-    let count = values.len();
     let middle = median(&mut values);
     let mut absolute: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
     let spread = median(&mut absolute) / NORMAL_MEDIAN;
+    let (outstanding, outliers) = outliers(sites, &filtered, middle, spread);
+    let lines = [0, 1].map(|axis| {
+        of_lines(
+            &profiles[axis],
+            filtered[0].values.len() as f64 / [filtered[0].columns, filtered[0].rows][axis] as f64,
+            spread,
+        )
+    });
+    let figure = draws.then(|| {
+        let (histogram, normal) = histogram(&values, middle, spread);
+        let (accumulated, normal_accumulated) = accumulated(absolute, spread);
+        PatternFigure { spectra: spectra(&grids), histogram, normal, accumulated, normal_accumulated }
+    });
+    Some(PatternView { profiles, figure, spread, outstanding, outliers, lines })
+}
+
+/// How many photosites stand out, and how many of a normal law would; and those that do most.
+fn outliers(sites: &[&Site], filtered: &[Grid], middle: f64, spread: f64) -> ([f64; 2], Vec<Outlier>) {
     let mut outliers = Vec::new();
-    for (site, grid) in sites.iter().zip(&filtered) {
+    for (site, grid) in sites.iter().zip(filtered) {
         for (index, value) in grid.values.iter().enumerate() {
             if (value - middle).abs() > OUTSTANDING * spread && spread > 0.0 {
                 let place = |axis: usize, of: usize| site.first[axis] + (of + BOX / 2) * site.step[axis];
@@ -171,19 +206,43 @@ pub fn pattern_view(sites: &[&Site], [width, planes]: [usize; 2], at: &dyn Fn(us
             }
         }
     }
+    let count: usize = filtered.iter().map(|grid| grid.values.len()).sum();
     let expected = crate::numerics::significance::of_normal(OUTSTANDING) * count as f64;
     let outstanding = [outliers.len() as f64, expected];
     outliers.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
     outliers.truncate(NAMED);
-    let (histogram, normal) = histogram(&values, middle, spread);
-    let lines = [0, 1].map(|axis| {
-        of_lines(
-            &profiles[axis],
-            filtered[0].values.len() as f64 / [filtered[0].columns, filtered[0].rows][axis] as f64,
-            spread,
-        )
-    });
-    Some(PatternView { spectra, profiles, histogram, normal, spread, outstanding, outliers, lines })
+    (outstanding, outliers)
+}
+
+/// Spectrograms along rows and along columns, the mean of those of the grids.
+fn spectra(grids: &[Grid]) -> [Vec<[f64; 2]>; 2] {
+    let all = |is_turned: bool| {
+        let of = |grid: &Grid| if is_turned { grid.turned().spectrum() } else { grid.spectrum() };
+        mean_of(grids.iter().map(of).collect())
+    };
+    let (rows, columns) = rayon::join(|| all(false), || all(true));
+    [rows, columns]
+}
+
+/// Shares of photosites at such distances or beyond, and those of a normal law: all that are far, few of those that are not.
+fn accumulated(mut distances: Vec<f64>, spread: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
+    /// From one rank to the next, beyond the first.
+    const STEP: f64 = 1.05;
+    distances.sort_unstable_by(|a, b| b.total_cmp(a));
+    let (mut measured, mut rank) = (Vec::new(), 1);
+    while rank <= distances.len() {
+        measured.push([distances[rank - 1], rank as f64 / distances.len() as f64]);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a rank")]
+        let next = (rank as f64 * STEP) as usize;
+        rank = next.max(rank + 1);
+    }
+    let far = distances.first().copied().unwrap_or(0.0);
+    let law = |index: usize| {
+        let distance = far * index as f64 / BINS as f64;
+        [distance, crate::numerics::significance::of_normal(distance / spread)]
+    };
+    let normal = if spread > 0.0 { (0..=BINS).map(law).collect() } else { Vec::new() };
+    (measured, normal)
 }
 
 fn mean_of(spectra: Vec<Vec<[f64; 2]>>) -> Vec<[f64; 2]> {

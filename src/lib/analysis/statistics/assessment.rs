@@ -56,8 +56,16 @@ impl<'a> Assessment<'a> {
                 Predicted::of_cfa_plane(predictions, counts, array.as_ref())
             }
             (Some(FramePrediction::Planes(predictions)), None) if is_three => {
-                Predicted::of_planes(predictions, count, region)
+                Predicted::of_planes(predictions, count, region, frame.geometry.origin)
             }
+            (Some(FramePrediction::Groups(groups)), Some(counts)) if count > 0 => {
+                of_classes = Class::ALL.map(|class| match counts[class as usize] {
+                    0 => Predicted::default(),
+                    _ => Predicted::of_class_in_groups(groups, class),
+                });
+                Predicted::of_plane_in_groups(groups)
+            }
+            (Some(FramePrediction::Groups(groups)), None) if is_three => Predicted::of_groups(groups),
             (Some(FramePrediction::Pixels(mixture)), None) if is_three => {
                 Predicted::of_pixels(mixture, sampling(mixture))
             }

@@ -2,10 +2,12 @@
 
 use super::check::{Expected, pair, rounding};
 use super::grids::{self, Array, Grid, PlaneScatter};
+use super::groups;
 use super::region::Region;
 use crate::cfa::Class;
 use crate::numerics::normal::MeanVariance;
 use crate::propagation::sampling::Sampling;
+use crate::propagation::taps::{Group, pooled};
 use crate::propagation::{LineCovariance, PixelMoments, Prediction, SiteCovariance};
 use nalgebra::Matrix3;
 
@@ -39,12 +41,12 @@ pub(super) struct Expectation {
 
 impl Predicted {
     /// Of `count` pixels of three planes that are drawn apart, but for what rows and columns share in a region.
-    pub fn of_planes(classes: &[Prediction; 3], count: u64, region: Region) -> Self {
+    pub fn of_planes(classes: &[Prediction; 3], count: u64, region: Region, origin: [i32; 2]) -> Self {
         let sites = SiteCovariance::of(classes);
         let sampling = if sites.is_independent() {
             Sampling::independent(classes, count as f64)
         } else {
-            grids::sampling(classes, &[Grid::of_planes(region)])
+            grids::sampling(classes, &[Grid::of_planes(region, origin)])
         };
         let expected = Expected {
             mean: classes.map(|class| class.moments.mean),
@@ -61,6 +63,60 @@ impl Predicted {
             sites.row + sites.column + Matrix3::from_diagonal(&sites.own.into())
         };
         Self::of_three(&population, expected)
+    }
+
+    /// Of three planes that several amplifiers have read.
+    pub fn of_groups(groups: &[Group]) -> Self {
+        let sampling = groups::sampling(&groups::of_planes(groups));
+        let population = sampling.covariance * ((sampling.count - 1.0) / sampling.count) + sampling.mean_covariance;
+        Self::of_three(&population, Self::grouped(&pooled(groups), groups, sampling))
+    }
+
+    /// Of a class of a plane that several amplifiers have read.
+    pub fn of_class_in_groups(groups: &[Group], class: Class) -> Self {
+        let parts = groups::of_class(groups, class as usize);
+        let prediction = pooled(groups)[class as usize];
+        if parts.is_empty() {
+            return Self::of_one(&prediction, 0);
+        }
+        let sampling = groups::sampling(&parts);
+        let count = sampling.count;
+        let one = Self::of_one_with(Expectation::of_sampling(&prediction, &sampling), &prediction, count > 0.0);
+        let alone: Vec<Group> =
+            parts.iter().map(|(count, sites)| Group { counts: [*count; 3], sites: *sites }).collect();
+        Self { tested: Some(Self::grouped(&[prediction; 3], &alone, sampling)), ..one }
+    }
+
+    /// Of a plane behind a filter array that several amplifiers have read.
+    pub fn of_plane_in_groups(groups: &[Group]) -> Self {
+        let parts = groups::of_plane(groups);
+        let alone: Vec<Group> =
+            parts.iter().map(|(count, sites)| Group { counts: [*count; 3], sites: *sites }).collect();
+        let prediction = pooled(&alone)[0];
+        let sampling = groups::sampling(&parts);
+        Self::of_one_with(Expectation::of_sampling(&prediction, &sampling), &prediction, sampling.count > 0.0)
+    }
+
+    /// What can be tested of groups: what their photosites have by themselves.
+    fn grouped(whole: &[Prediction; 3], groups: &[Group], sampling: Sampling) -> Expected {
+        let mean = whole.map(|class| class.moments.mean);
+        let within = |k: usize, of: fn(&Prediction) -> f64| -> f64 {
+            let n: f64 = groups.iter().map(|group| group.counts[k]).sum();
+            groups.iter().map(|group| group.counts[k] * of(&group.sites[k])).sum::<f64>() / n
+        };
+        let variances = [0, 1, 2].map(|k| within(k, |site| site.moments.variance));
+        let kurtosis = |k: usize| {
+            if variances[k] > 0.0 { within(k, Prediction::fourth) / variances[k].powi(2) } else { 0.0 }
+        };
+        Expected {
+            mean,
+            site_variances: variances,
+            site_thirds: whole.map(|class| class.third),
+            site_kurtosis: [0, 1, 2].map(kurtosis),
+            site_sixths: whole.map(|class| class.sixth),
+            sampling,
+            is_plane: true,
+        }
     }
 
     /// Of mixed pixels that scatter as `sampling` says.
@@ -149,11 +205,15 @@ impl Predicted {
     }
 
     fn of_one_that_is(expectation: Expectation, prediction: &Prediction, count: u64) -> Self {
+        Self::of_one_with(expectation, prediction, count > 0)
+    }
+
+    fn of_one_with(expectation: Expectation, prediction: &Prediction, is_any: bool) -> Self {
         let std = prediction.moments.std();
         Self {
             channels: vec![expectation],
             covariance: Some(vec![vec![std * std]]),
-            mean_std: (count > 0).then(|| vec![expectation.mean_error]),
+            mean_std: is_any.then(|| vec![expectation.mean_error]),
             tested: None,
         }
     }

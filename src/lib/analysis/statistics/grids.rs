@@ -9,6 +9,7 @@ use crate::cfa::{CfaPattern, Class};
 use crate::frame::Geometry;
 use crate::numerics::normal::MeanVariance;
 use crate::propagation::covariance::PAIRS;
+use crate::propagation::drift::{Drift, DriftRows};
 use crate::propagation::sampling::Sampling;
 use crate::propagation::{LineCovariance, Prediction, SiteCovariance};
 use nalgebra::Matrix3;
@@ -18,12 +19,23 @@ use nalgebra::Matrix3;
 pub(super) struct Grid {
     rows: f64,
     columns: f64,
+    /// Its first row on the sensor, and from one to the next.
+    first: i64,
+    step: i64,
 }
 
 impl Grid {
     /// All of a region.
-    pub fn of_planes(region: Region) -> Self {
-        Self { rows: region.height as f64, columns: region.width as f64 }
+    pub fn of_planes(region: Region, origin: [i32; 2]) -> Self {
+        let first = i64::from(origin[1]) + region.y as i64;
+        Self { rows: region.height as f64, columns: region.width as f64, first, step: 1 }
+    }
+
+    /// Its rows as the drift of the black level meets them.
+    fn drift_rows(&self) -> DriftRows {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]
+        let count = self.rows as usize;
+        DriftRows { first: self.first, step: self.step, count, columns: self.columns }
     }
 
     fn count(&self) -> f64 {
@@ -37,6 +49,8 @@ pub(super) struct Array {
     classes: [[usize; 2]; 2],
     rows: [f64; 2],
     columns: [f64; 2],
+    /// Its first row on the sensor.
+    first: i64,
 }
 
 impl Array {
@@ -49,22 +63,45 @@ impl Array {
             classes: [0, 1].map(|q| [0, 1].map(|p| class(q, p))),
             rows: halves(region.height),
             columns: halves(region.width),
+            first: y0 + region.y as i64,
         }
     }
 
     /// The grids of a class.
     pub fn grids(&self, class: Class) -> Vec<Grid> {
         let places = self.places().filter(|[q, p]| self.classes[*q][*p] == class as usize);
-        let grids = places.map(|[q, p]| Grid { rows: self.rows[q], columns: self.columns[p] });
+        let grids = places.map(|[q, p]| self.grid(q, p));
         grids.filter(|grid| grid.count() > 0.0).collect()
+    }
+
+    fn grid(&self, q: usize, p: usize) -> Grid {
+        Grid { rows: self.rows[q], columns: self.columns[p], first: self.first + q as i64, step: 2 }
     }
 
     fn places(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
         (0..4).map(|place| [place / 2, place % 2])
     }
 
+    /// Adds what the drift of the black level makes of all photosites taken together, whose means are off by such weights at each
+    /// place, and which have such a variance by themselves and with their rows.
+    fn add_drift(&self, found: &mut PlaneScatter, sites: &SiteCovariance, weights: &[f64], own: f64) {
+        let rows: Vec<DriftRows> = self.places().map(|[q, p]| self.grid(q, p).drift_rows()).collect();
+        let drift = Drift::of(&rows, sites.drift_rows);
+        // Slopes of the classes differ by what rounding makes of a mean, if at all.
+        let variance = sites.drift.diagonal().mean();
+        let [one, two, _] = drift.traces();
+        let count: f64 = rows.iter().map(|rows| rows.columns * rows.count as f64).sum();
+        found.mean_variance += variance * drift.of_mean();
+        found.sample.mean += variance * one / (count - 1.0);
+        let of_offsets = variance * Drift::of_sums(&rows, sites.drift_rows, weights);
+        let scatter = 2.0 * (2.0 * own * variance * one + variance * variance * two) + 4.0 * of_offsets;
+        found.sample.variance += scatter / (count - 1.0).powi(2);
+    }
+
     /// Mean and expected sample variance of all photosites taken together, and the variances of both.
     pub fn of_plane(&self, classes: &[Prediction; 3]) -> PlaneScatter {
+        let drifting = SiteCovariance::of(classes);
+        let classes = &without_drift(classes);
         let sites = SiteCovariance::of(classes);
         let class = |[q, p]: [usize; 2]| self.classes[q][p];
         let count = |[q, p]: [usize; 2]| self.rows[q] * self.columns[p];
@@ -104,13 +141,20 @@ impl Array {
             .iter()
             .sum();
         let variance = sum(&|at| classes[class(at)].moments.variance + offset(at).powi(2)) - total / n;
-        PlaneScatter {
+        let mut found = PlaneScatter {
             mean_variance: total / (n * n) + common,
             sample: MeanVariance {
                 mean: variance / (n - 1.0),
                 variance: (2.0 * trace + 4.0 * of_offsets + fourth).max(0.0) / (n - 1.0).powi(2),
             },
+        };
+        if drifting.drifts() {
+            let weights: Vec<f64> = self.places().map(offset).collect();
+            let columns: f64 = self.columns.iter().sum();
+            let own = sum(&|at| sites.own[class(at)] + columns * sites.row[(class(at), class(at))]) / n;
+            self.add_drift(&mut found, &drifting, &weights, own);
         }
+        found
     }
 }
 
@@ -123,15 +167,74 @@ pub(super) struct PlaneScatter {
     pub sample: MeanVariance,
 }
 
+/// The same photosites without what the drift of the black level makes of them.
+fn without_drift(channels: &[Prediction; 3]) -> [Prediction; 3] {
+    [0, 1, 2].map(|k| {
+        let Prediction { moments, lines, .. } = channels[k];
+        if lines.drift == [0.0; 3] {
+            return channels[k];
+        }
+        let variance = moments.variance - lines.drift[k];
+        let row = [0, 1, 2].map(|l| lines.row[l] - lines.drift[l]);
+        let excess_kurtosis = if variance > 0.0 { channels[k].fourth() / (variance * variance) } else { 0.0 };
+        let lines = LineCovariance { row, drift: [0.0; 3], drift_rows: 0.0, ..lines };
+        Prediction { moments: MeanVariance { variance, ..moments }, excess_kurtosis, lines, ..channels[k] }
+    })
+}
+
 /// Three channels alike, all of a class.
 pub(super) fn alike(prediction: &Prediction, class: Class) -> [Prediction; 3] {
-    let LineCovariance { row, column } = prediction.lines;
-    let lines = LineCovariance { row: [row[class as usize]; 3], column: [column[class as usize]; 3] };
+    let LineCovariance { row, column, drift, drift_rows } = prediction.lines;
+    let of_class = |shared: [f64; 3]| [shared[class as usize]; 3];
+    let lines = LineCovariance { row: of_class(row), column: of_class(column), drift: of_class(drift), drift_rows };
     [Prediction { lines, ..*prediction }; 3]
 }
 
 /// The law of samples of three channels that stand on such grids.
 pub(super) fn sampling(channels: &[Prediction; 3], grids: &[Grid]) -> Sampling {
+    let sites = SiteCovariance::of(channels);
+    if !sites.drifts() {
+        return without_drift_sampling(channels, grids);
+    }
+    let mut found = without_drift_sampling(&without_drift(channels), grids);
+    add_drift(&mut found, &sites, grids);
+    found
+}
+
+/// Adds what the drift of the black level makes: U = PVP, with V what it shares, beside what has been counted, A, whose products
+/// with it are those of what is a photosite's own, of rows and of columns.
+fn add_drift(found: &mut Sampling, sites: &SiteCovariance, grids: &[Grid]) {
+    let rows: Vec<DriftRows> = grids.iter().map(Grid::drift_rows).collect();
+    let drift = Drift::of(&rows, sites.drift_rows);
+    let [one, two, three] = drift.traces();
+    let lines = rows.iter().map(|rows| drift.with_lines(rows)).fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    let row = sites.row - sites.drift;
+    let own = Matrix3::from_diagonal(&sites.own.into());
+    let free = (found.count - 1.0).max(f64::MIN_POSITIVE);
+    // tr AU, of channels.
+    let beside: Matrix3<f64> = own * one + row * lines[0] + sites.column * lines[1];
+    let product = |ik: (usize, usize), lj: (usize, usize)| {
+        beside[ik] * sites.drift[lj] + sites.drift[ik] * beside[lj] + sites.drift[ik] * sites.drift[lj] * two
+    };
+    for (a, [i, j]) in PAIRS.into_iter().enumerate() {
+        for (b, [k, l]) in PAIRS.into_iter().enumerate() {
+            found.spread[a][b] += (product((i, k), (l, j)) + product((i, l), (k, j))) / (free * free);
+        }
+    }
+    found.mean_covariance += sites.drift * drift.of_mean();
+    found.covariance += sites.drift * (one / free);
+    // On what is the same along rows what is a photosite's own and the rows' has one value, of grids of as many columns.
+    let columns = grids.iter().map(Grid::count).sum::<f64>() / grids.iter().map(|grid| grid.rows).sum::<f64>();
+    for (i, third) in found.variance_thirds.iter_mut().flatten().enumerate() {
+        let (value, of_drift) = (own[(i, i)] + columns * row[(i, i)], sites.drift[(i, i)]);
+        let cubes =
+            3.0 * value * value * of_drift * one + 3.0 * value * of_drift.powi(2) * two + of_drift.powi(3) * three;
+        *third += 8.0 * cubes / free.powi(3);
+    }
+}
+
+/// The same where no black level drifts.
+fn without_drift_sampling(channels: &[Prediction; 3], grids: &[Grid]) -> Sampling {
     let sites = SiteCovariance::of(channels);
     let own = Matrix3::from_diagonal(&sites.own.into());
     let count: f64 = grids.iter().map(Grid::count).sum();
@@ -188,7 +291,7 @@ mod tests {
         let offset = [[0.4, 0.5, 0.3], [0.2, 0.3, 0.1]];
         [0, 1, 2].map(|k| {
             let line = |axis: usize| [0, 1, 2].map(|l| offset[axis][k] * offset[axis][l]);
-            let lines = LineCovariance { row: line(0), column: line(1) };
+            let lines = LineCovariance { row: line(0), column: line(1), ..Default::default() };
             let variance = [1.0, 2.0, 0.5][k] + lines.row[k] + lines.column[k];
             let moments = MeanVariance { mean: [3.0, 7.0, 4.0][k], variance };
             Prediction { moments, third: 0.0, excess_kurtosis: 0.3, sixth: 0.0, common: 0.0, lines }
@@ -221,7 +324,7 @@ mod tests {
         let pattern = CfaPattern::Rggb;
         let array = Array::of(pattern, &geometry, region);
         let class = |[x, y]: [usize; 2]| pattern.class((x + 3) as i64, (y + 2) as i64) as usize;
-        let three = sampling(&sites(), &[Grid::of_planes(region)]);
+        let three = sampling(&sites(), &[Grid::of_planes(region, [0, 0])]);
         let green_sites: Vec<[usize; 2]> = places(region).into_iter().filter(|at| class(*at) == 1).collect();
         let green = sampling(&alike(&sites()[1], Class::Green), &array.grids(Class::Green));
         for (found, places, is_green) in [(three, places(region), false), (green, green_sites, true)] {

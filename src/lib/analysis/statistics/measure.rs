@@ -2,7 +2,7 @@
 
 use super::assessment::Assessment;
 use super::check::Verdict;
-use super::laws::{Known, Laws};
+use super::laws::{Known, Laws, Samplings};
 use super::levels::Levels;
 use super::portrait::{Portrait, sitting};
 use super::region::Region;
@@ -11,7 +11,7 @@ use super::tally::{Tally, tallies};
 use super::watch::{Marks, Saturated, Watch};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
-use crate::propagation::{Equations, FramePrediction, PixelMoments};
+use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
 use crate::stream::RowSource;
 
 /// Reads a whole frame and works out the statistics of its regions.
@@ -91,12 +91,20 @@ fn measure_all(
     let levels = Levels::of(&frame)?;
     // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
     let Known { prediction, samplings, .. } = laws.of(&frame, equations);
+    // What several amplifiers have read differs from region to region.
+    let of_regions: Option<Vec<std::result::Result<FramePrediction, Unpredictable>>> = frame
+        .taps()
+        .map(|_| regions.iter().map(|region| propagation::of_frame(&region.header(&frame), equations)).collect());
     if let Ok(FramePrediction::Pixels(mixture)) = prediction {
         for region in regions {
             samplings.of(mixture, &frame, *region);
         }
     }
-    let mut portrait = is_drawn.then(|| Portrait::new(&frame, regions[0], prediction.as_ref().ok()));
+    let mut portrait = is_drawn.then(|| {
+        let of_region = of_regions.as_ref().map_or(&*prediction, |of_regions| &of_regions[0]);
+        let drawn = of_region.as_ref().ok().filter(|drawn| !matches!(drawn, FramePrediction::Groups(_)));
+        Portrait::new(&frame, regions[0], drawn)
+    });
     let tallies = match &mut portrait {
         Some(portrait) => tallies(&mut sitting(&mut watch, portrait), regions, &levels)?,
         None => tallies(&mut watch, regions, &levels)?,
@@ -117,16 +125,24 @@ fn measure_all(
     if !is_fair(&counts[0]) {
         portrait.iter_mut().for_each(Portrait::forget_predictions);
     }
-    let report = |((region, tally), marks): ((&Region, &Tally), &Marks)| {
-        let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, *region);
+    let report = |(index, ((region, tally), marks)): (usize, ((&Region, &Tally), &Marks))| {
+        let sampling = |mixture: &PixelMoments| match of_regions {
+            None => samplings.of(mixture, &frame, *region),
+            Some(_) => Samplings::default().of(mixture, &frame, *region),
+        };
+        let prediction = of_regions.as_ref().map_or(&*prediction, |of_regions| &of_regions[index]);
         // What is left where pixels are left out by their values follows no formula; those of defects are any.
         let prediction = prediction.as_ref().ok().filter(|_| is_fair(marks));
         let assessment = Assessment::new(tally, &frame, *region, prediction, sampling);
         let tests = if level.is_some() { assessment.tests() } else { Vec::new() };
         RegionReport { tests, ..assessment.report(&frame, *region, &levels).with_marks(*marks, left_out) }
     };
-    let regions = regions.iter().zip(&tallies).zip(&counts).map(report).collect();
-    let unpredicted = prediction.as_ref().err().map(ToString::to_string);
+    let regions = regions.iter().zip(&tallies).zip(&counts).enumerate().map(report).collect();
+    let unpredicted = match &of_regions {
+        None => prediction.as_ref().err(),
+        Some(of_regions) => of_regions.iter().find_map(|prediction| prediction.as_ref().err()),
+    };
+    let unpredicted = unpredicted.map(ToString::to_string);
     let mut report = Report { regions, check: None, uncertainty: coverage(&frame), unpredicted };
     if let Some(level) = level {
         if prediction.is_ok() {

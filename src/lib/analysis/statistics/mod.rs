@@ -7,6 +7,7 @@ mod assessment;
 pub mod check;
 mod expectation;
 mod grids;
+mod groups;
 mod laws;
 mod levels;
 mod measure;

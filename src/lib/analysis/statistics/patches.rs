@@ -16,7 +16,7 @@ use crate::metadata::{FrameHeader, Scene};
 use crate::names::Named;
 use crate::numerics::moments::{self, Moments};
 use crate::propagation::sampling::{Place, Sampling, SamplingBasis};
-use crate::propagation::{self, Equations, FramePrediction, PixelMoments};
+use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::REACH;
 use crate::stages::demosaic::weights::WeightTable;
@@ -137,6 +137,10 @@ impl Iterator for Places {
     }
 }
 
+/// Why nothing is said of patches that several amplifiers read.
+const READ_BY_SEVERAL: &str = "its sensor is read through several amplifiers (`taps`); regions of a uniform scene are predicted, and \
+                               patches not";
+
 /// Reads a whole frame and works out the statistics of the interiors of its patches.
 ///
 /// Where the scene is uniform, or not rendered, predictions are those of the frame, or none.
@@ -158,7 +162,11 @@ pub fn measure(
     let tallies = tallies(&mut watch, &regions, &levels)?;
     let (counts, left_out) = watch.seen();
     let mut unpredicted = None;
-    let reports: Vec<RegionReport> = match propagation::of_frame(&frame, equations) {
+    let known = match frame.taps() {
+        None => propagation::of_frame(&frame, equations),
+        Some(_) => Err(Unpredictable::Beyond(READ_BY_SEVERAL)),
+    };
+    let reports: Vec<RegionReport> = match known {
         Ok(known) => {
             let mut samplings = Samplings::default();
             let tallies = tallies.iter().zip(regions);
@@ -229,14 +237,16 @@ impl Laws {
     }
 }
 
-/// Whether the frame was rendered and nothing was done to it that leaves a patch without a level of its own.
+/// Whether the frame was rendered and nothing was done to it that leaves a patch without a level of its own: smear hangs on
+/// what else is in its columns.
 fn is_rendered(frame: &FrameHeader) -> bool {
-    frame.metadata.scene.is_some() && !frame.metadata.is_transferred()
+    let has_smear = frame.metadata.noise.as_ref().is_some_and(|noise| noise.smear_per_row > 0.0);
+    frame.metadata.scene.is_some() && !frame.metadata.is_transferred() && !has_smear
 }
 
 /// What is predicted of a uniform scene whose means are those of a tally.
 fn at_means(tally: &Tally, frame: &FrameHeader, equations: Equations) -> Option<FramePrediction> {
-    if !is_rendered(frame) {
+    if !is_rendered(frame) || frame.taps().is_some() {
         return None;
     }
     let expected = expected_electrons(frame, means(tally)?)?;

@@ -4,6 +4,8 @@
 use super::region::Region;
 use crate::cfa::{Class, FilterArray};
 use crate::metadata::FrameHeader;
+use crate::numerics::normal::MeanVariance;
+use crate::propagation::taps::pooled;
 use crate::propagation::{FramePrediction, PixelMoments, gains};
 use crate::stream::{Passing, RowSource};
 use crate::units::QuantityKind;
@@ -282,8 +284,15 @@ impl Foreseen {
                     correlations: Some([correlation(row), correlation(column)]),
                 }
             }
+            FramePrediction::Groups(groups) => {
+                let MeanVariance { mean, variance } = pooled(groups)[index].moments;
+                Self { mean, stds: vec![variance.max(0.0).sqrt()], profile_std: None, correlations: None }
+            }
             FramePrediction::Pixels(mixture) => Self::of_pixels(mixture, index, patches),
         };
+        // Of a level that drifts from row to row no profile is told.
+        let drifts = matches!(prediction, FramePrediction::Planes(classes) if classes[index].lines.drift != [0.0; 3]);
+        let is_moved = is_moved || drifts;
         if is_moved { Self { profile_std: None, correlations: None, ..foreseen } } else { foreseen }
     }
 

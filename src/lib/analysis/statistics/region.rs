@@ -25,6 +25,17 @@ impl Region {
         Self { x: 0, y: 0, width: frame.geometry.width, height: frame.geometry.height }
     }
 
+    /// The head of a frame of which it is all.
+    pub(super) fn header(&self, frame: &FrameHeader) -> FrameHeader {
+        let mut made = frame.clone();
+        let geometry = &mut made.geometry;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
+        let moved = |origin: i32, by: usize| origin.wrapping_add(by as i32);
+        geometry.origin = [moved(geometry.origin[0], self.x), moved(geometry.origin[1], self.y)];
+        (geometry.width, geometry.height) = (self.width, self.height);
+        made
+    }
+
     /// The rows of the frame that belong to the region, among some.
     pub(super) fn rows_among(&self, rows: &Range<usize>) -> Range<usize> {
         self.y.max(rows.start)..(self.y + self.height).min(rows.end)

@@ -163,9 +163,9 @@ fn black_levels(black: &BlackLevels, width: usize) -> Vec<ExtraTag> {
 fn noise_profile(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<ExtraTag> {
     let metadata = &header.metadata;
     let (record, adc) = (metadata.noise.as_ref()?, metadata.adc.filter(|adc| !adc.is_bent())?);
-    // Charge that moved makes neighbors alike, and dark frames bring noise of their own.
+    // Charge that moved makes neighbors alike, dark frames bring noise of their own, and amplifiers have one each.
     let is_plain = metadata.correction.as_ref().is_none_or(|record| !record.took_frames() && record.is_plain());
-    if record.cte.is_some() || !is_plain {
+    if record.cte.is_some() || !is_plain || header.taps().is_some() {
         return None;
     }
     let line = LinearNoise::of(&NoiseModel::of(header, record).ok()?, &adc);

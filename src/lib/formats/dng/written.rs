@@ -181,6 +181,7 @@ fn with_noise(header: &mut FrameHeader) -> Photosite {
         hot_pixel_e: 0.0,
         poisson: PoissonKind::Exact,
         cte: None,
+        smear_per_row: 0.0,
     });
     metadata.black_level_adu = Some((800.0 + 0.8 * 73.0).into());
     metadata.white_level_adu = Some(65_535.0.into());

@@ -6,6 +6,7 @@
 
 mod attributes;
 mod blocks;
+mod format;
 mod header;
 mod layered;
 mod read;
@@ -15,7 +16,8 @@ mod write_behind;
 
 use crate::stages::saturation::MASK_LAYER;
 
-pub use read::{ExrReader, FORMAT};
+pub use format::FORMAT;
+pub use read::ExrReader;
 pub use write::{ExrWriter, TablePatch, patch_table};
 
 /// The string attribute that holds the metadata.

@@ -7,9 +7,7 @@ use super::{PARALLEL_BLOCK_BYTES, PART_NAMES, is_layer};
 use crate::color::rgb::Encoding;
 use crate::error::{Error, Result};
 use crate::formats::foreign::exr_complaint;
-use crate::formats::format::{
-    ColorTags, FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign, Streaming,
-};
+use crate::formats::format::{ColorTags, Rest, SampleReader, SampleType};
 use crate::formats::positioned::Positioned;
 use crate::formats::read_ahead::{Pipe, ReadAhead};
 use crate::frame::{Geometry, to_sample};
@@ -19,7 +17,7 @@ use exr::block::chunk::{Chunk, CompressedBlock};
 use exr::math::Vec2;
 use exr::meta::attribute::{LineOrder, SampleType as ExrSampleType};
 use exr::meta::header::Header;
-use exr::meta::{BlockDescription, MetaData, magic_number};
+use exr::meta::{BlockDescription, MetaData};
 use half::f16;
 use rayon::prelude::*;
 use std::fs::File;
@@ -29,20 +27,6 @@ use std::io::{self, Read, Seek};
 const SMALL: u128 = 64 << 20;
 /// Larger ones may take so many times what has been read of the image's blocks.
 const MOST_EXPANSION: u64 = 64;
-
-/// OpenEXR.
-pub const FORMAT: FrameFormat = FrameFormat {
-    name: "an EXR",
-    sign: Sign::Bytes(|head| head.starts_with(&magic_number::BYTES)),
-    reading: Reading::Rows(Readers {
-        open: super::layered::open,
-        stream: Some(Streaming {
-            is_streamable,
-            has_parts: false,
-            open: |input, name| Ok(Box::new(ExrReader::stream(input, name)?)),
-        }),
-    }),
-};
 
 /// Reads a part of an EXR file or stream.
 pub struct ExrReader {
@@ -352,12 +336,6 @@ impl SampleReader for ExrReader {
         let is_single = !self.meta.requirements.is_multilayer() && self.header().blocks == BlockDescription::ScanLines;
         if is_single && self.is_done() { self.blocks.rest() } else { Ok(Rest::Nothing) }
     }
-}
-
-/// Whether the bytes are the start of an EXR file that can be read without seeking: one part of scanlines.
-fn is_streamable(head: &[u8]) -> bool {
-    // Bytes 5 and 6 hold the flags: tiled 0x02, deep 0x08, multi-part 0x10 [OpenEXR file layout].
-    head.len() >= 8 && head[..4] == magic_number::BYTES && head[5] & (0x02 | 0x08 | 0x10) == 0
 }
 
 fn read_table(input: &mut impl Read, entries: usize, name: &str) -> Result<Offsets> {

@@ -15,6 +15,8 @@ const US_PER_S: f64 = 1e6;
 #[derive(Debug)]
 pub(super) struct Told {
     pub metadata: Metadata,
+    /// Exposure time in s, with an f-number or without.
+    pub exposure_s: Option<f64>,
     /// The first row of the array is the lowest of the picture.
     pub is_bottom_up: bool,
     /// What was passed over, and why.
@@ -52,9 +54,11 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     let mut metadata = Metadata::new(if is_adu { QuantityKind::Adu } else { QuantityKind::Unspecified });
     metadata.cfa = cfa;
     metadata.camera = header.text("INSTRUME").map(|camera| visible(camera).into_owned());
-    metadata.exposure = told_exposure(header, &mut notes);
+    let exposure_s = told_time(header);
+    metadata.exposure = told_exposure(header, exposure_s, &mut notes);
     pass_over(header, &mut notes);
-    Told { metadata, is_bottom_up, notes }
+    let exposure_s = exposure_s.filter(|seconds| *seconds > 0.0 && seconds.is_finite());
+    Told { metadata, exposure_s, is_bottom_up, notes }
 }
 
 /// The filter array of a single plane.
@@ -90,10 +94,14 @@ fn filters(header: &Header, channels: usize, notes: &mut Vec<String>) -> Option<
     array
 }
 
-/// Exposure time and f-number, which count together; the transmittance of the lens, which no keyword has, is 1.
-fn told_exposure(header: &Header, notes: &mut Vec<String>) -> Option<Exposure> {
+/// Exposure time in s.
+fn told_time(header: &Header) -> Option<f64> {
     let seconds = header.number("EXPTIME").or_else(|| header.number("EXPOSURE"));
-    let exposure_s = seconds.or_else(|| Some(header.number("EXPOINUS")? / US_PER_S));
+    seconds.or_else(|| Some(header.number("EXPOINUS")? / US_PER_S))
+}
+
+/// Exposure time and f-number, which count together; the transmittance of the lens, which no keyword has, is 1.
+fn told_exposure(header: &Header, exposure_s: Option<f64>, notes: &mut Vec<String>) -> Option<Exposure> {
     let ratio = || Some(header.number("FOCALLEN")? / header.number("APTDIA").filter(|diameter| *diameter > 0.0)?);
     let f_number = ratio().filter(|number| *number > 0.0).or_else(|| header.number("FOCRATIO"));
     exposure::of_parts(exposure_s, f_number, ["EXPTIME", "FOCALLEN and APTDIA, or FOCRATIO"], notes)

@@ -345,6 +345,10 @@ impl SampleReader for FitsReader {
         &self.told.metadata
     }
 
+    fn exposure_s(&self) -> Option<f64> {
+        self.told.exposure_s
+    }
+
     fn notes(&self) -> &[String] {
         &self.told.notes
     }

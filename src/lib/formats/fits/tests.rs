@@ -267,6 +267,9 @@ fn keywords_of_the_camera_are_used_or_told() {
     assert_eq!(metadata.exposure, None);
     assert!(notes.starts_with("its exposure time of 2.5 s is passed over: it has no f-number"));
     assert!(told(&lens).1.starts_with("its f-number of 4 is passed over: it has no exposure time"));
+    // Flats and darks need no f-number.
+    let seconds = |value: f64| keywords::read(&Header::of(&[("EXPTIME", number(value))]), 1, true).exposure_s;
+    assert_eq!([2.5, 0.0].map(seconds), [Some(2.5), None]);
     let (metadata, notes) = told(&[("EXPTIME", number(0.0)), ("FOCRATIO", number(4.0))]);
     assert_eq!(metadata.exposure, None);
     assert!(notes.starts_with("its exposure is passed over: an exposure of 0 s is impossible"));

@@ -210,6 +210,10 @@ impl FrameReader {
         });
         let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
+        if let Some(file) = &metadata.file {
+            // The first program of the pipe reads it.
+            register::note_inputs([Path::new(file)])?;
+        }
         let mut header = FrameHeader { name: name.into(), geometry, metadata };
         doubt_of_marks(&header, stored);
         let corner = options.crop.map_or(Ok([0, 0]), |crop| cut(&mut header, crop))?;
@@ -266,6 +270,11 @@ impl FrameReader {
     /// The type of the stored samples; none where channels differ in it.
     pub fn sample_type(&self) -> Option<SampleType> {
         self.reader.stored_as()
+    }
+
+    /// The exposure time in s that the file's tags tell, with an f-number or without.
+    pub fn exposure_s(&self) -> Option<f64> {
+        self.reader.exposure_s()
     }
 
     /// What the file's tags say of its colors.

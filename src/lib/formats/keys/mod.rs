@@ -95,6 +95,7 @@ mod tests {
     use crate::camera::optics::Exposure;
     use crate::camera::readout::ReadOut;
     use crate::camera::sensor::{CurveFile, Provenance, ResponseFiles, Sensor};
+    use crate::camera::taps::Taps;
     use crate::color::difference::DifferenceReport;
     use crate::formats::yaml::{Keys, field_names, parse_matrix, parse_metadata, parse_sensor};
     use crate::metadata::*;
@@ -113,6 +114,7 @@ mod tests {
                 ("readout.", &["settings"]),
                 ("readout.settings.", &["name", "KEY"]),
                 ("readout.linearization.", field_names::<Linearization>()),
+                ("readout.taps.", field_names::<Taps>()),
                 ("response.", field_names::<ResponseFiles>()),
                 ("response.quantum_efficiency.", field_names::<CurveFile>()),
                 ("response.relative_response.", field_names::<CurveFile>()),
@@ -139,6 +141,7 @@ mod tests {
                 ("adc.", field_names::<AdcRecord>()),
                 ("adc.linearization.", field_names::<Linearization>()),
                 ("average.", field_names::<ExposuresRecord>()),
+                ("averaged.", field_names::<DrawnExposures>()),
                 ("correction.", field_names::<CorrectionRecord>()),
                 ("correction.masters.", field_names::<MasterRecord>()),
                 ("correction.masters.average.", field_names::<AverageRecord>()),

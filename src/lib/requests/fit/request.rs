@@ -77,7 +77,7 @@ pub struct Fit {
     #[arg(long, default_value_t = 0, requires = "evaluate", conflicts_with = "noise_free")]
     pub sensor_seed: u64,
     /// Noise sources to leave out, between commas: dcsn, dcnu, ssn, prnu, ron; row_noise,
-    /// column_noise, dsnu, dsnu_row, dsnu_column, prnu_row, prnu_column; hot_pixels, rts
+    /// column_noise, dsnu, dsnu_row, dsnu_column, prnu_row, prnu_column, black_drift; hot_pixels, rts
     #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = values::choice::<Source>(), requires = "noisy")]
     pub without: Vec<Source>,
     /// Evaluate without noise only

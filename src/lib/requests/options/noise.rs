@@ -14,7 +14,7 @@ use std::ops::Range;
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 pub struct NoiseChoice {
     /// Sources to leave out, between commas; their means stay: dcsn, dcnu, ssn, prnu, ron; row_noise,
-    /// column_noise, dsnu, dsnu_row, dsnu_column, prnu_row, prnu_column; hot_pixels, rts
+    /// column_noise, dsnu, dsnu_row, dsnu_column, prnu_row, prnu_column, black_drift; hot_pixels, rts
     #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = values::choice::<Source>())]
     pub without: Vec<Source>,
     /// Temperature of the sensor in K; by default the sensor's own

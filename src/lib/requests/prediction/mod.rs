@@ -222,6 +222,10 @@ impl NoisePrediction {
                 void.green_over_noise
             )));
         }
+        let no_pixels = found.budgets.scenes().into_iter().find_map(|scene| scene.no_pixels.clone());
+        if let Some(why) = no_pixels {
+            found.notes.push(Note::Warning(format!("nothing is predicted from demosaicking on: {why}")));
+        }
         let stages = found.budgets.scenes().into_iter().flat_map(|scene| &scene.stages);
         let void = stages.filter(|stage| stage.stage == ChainStage::Lab).find_map(|stage| stage.void);
         if let Some(why) = void {

@@ -5,13 +5,19 @@
 //! DCNU and PRNU are fixed patterns: they hang on the sensor's seed alone. DCSN, SSN and RON are temporal: they hang on
 //! seed and frame. Where charge transfer is simulated, it takes light and dark charge to the output before RON is added.
 //! Sensors that are read by row and column have noise of these besides ([`LineNoise`]): gains beside PRNU, and offsets, fixed
-//! and temporal, beside RON.
+//! and temporal, beside RON. Columns of a CCD may have [smear], which goes into what light is expected, and charge beyond full
+//! well that spills along them ([bloom]).
 
+pub mod bloom;
 mod model;
+pub mod smear;
+mod taps;
 
-pub use model::{LineNoise, NoiseModel, NoiseSettings, Tails, rectified_mean, rectified_mean_square};
+pub use model::{LineNoise, NoiseModel, NoiseSettings, Tails, knots, rectified_mean, rectified_mean_square};
+pub use smear::ColumnLight;
 
 use crate::camera::readout::ReadOut;
+use crate::camera::sensor::Sensor;
 use crate::cfa::{CfaPattern, Class};
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
@@ -19,12 +25,14 @@ use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::random::philox::{LONGEST_RUN, VECTOR};
 use crate::random::poisson::Table;
-use crate::random::{LineDraws, Run, RunWords, Source, Unlike, of_column, of_row, spans};
+use crate::random::{LineDraws, Run, RunWords, Source, Unlike, of_column, of_knot, of_row, spans};
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
 use crate::units::{Electrons, ExpectedElectrons, QuantityKind};
+use smear::Known;
 use std::ops::Range;
 use std::sync::Arc;
+use taps::ReadNoise;
 
 /// Draws one noisy exposure.
 ///
@@ -66,7 +74,12 @@ pub struct AddNoise {
     transfer: Option<Transfer>,
     tables: Tables,
     columns: Columns,
+    taps: ReadNoise,
     instructions: Instructions,
+    /// Share of what is beyond full well that spills along its column.
+    blooming: f64,
+    /// Whether columns have smear that their rows must tell first.
+    lacks_light: bool,
 }
 
 /// What the frame's columns have by themselves; empty where they have nothing.
@@ -76,6 +89,8 @@ struct Columns {
     offsets: Vec<f32>,
     /// Relative gains less 1.
     gains: Vec<f32>,
+    /// Smear, expected electrons.
+    smear: Vec<f32>,
 }
 
 impl Columns {
@@ -101,7 +116,21 @@ impl Columns {
         Self {
             offsets: if has_offsets { offsets } else { Vec::new() },
             gains: if prnu_column > 0.0 { gains } else { Vec::new() },
+            smear: Vec::new(),
         }
+    }
+}
+
+impl Columns {
+    /// Adds smear, of which packets take such a share of the light; tells whether the head of the frame says enough.
+    fn add_smear(&mut self, frame: &FrameHeader, share: f64) -> Result<bool> {
+        if share > 0.0 {
+            match smear::known(frame, frame.sensor()?.bayer()?, share)? {
+                Known::Smear(smear) => self.smear = smear,
+                Known::Nothing => return Ok(false),
+            }
+        }
+        Ok(true)
     }
 }
 
@@ -159,6 +188,7 @@ impl AddNoise {
         let transfer = match settings.cte {
             Some(cte) => {
                 input.check_corner()?;
+                input.check_one_output()?;
                 Some(Transfer::new(cte, &input.geometry)?)
             }
             None => None,
@@ -172,7 +202,8 @@ impl AddNoise {
         let mut sources: Vec<Source> =
             Source::ALL.into_iter().filter(|source| !settings.without.contains(source)).collect();
         // What the noisy frames leave out, the clean one does.
-        let read_variance = if sources.contains(&Source::Ron) { readout.read_noise_e.powi(2) } else { 0.0 };
+        let least_read_noise_e = readout.read_noises_e().fold(f64::INFINITY, f64::min);
+        let read_variance = if sources.contains(&Source::Ron) { least_read_noise_e.powi(2) } else { 0.0 };
         let of_hot = hot_share * hot_pixel_e * (1.0 + 2.0 * hot_pixel_e);
         let dark_variance = dark_e * (1.0 + readout.dcnu.powi(2)) + of_hot;
         if dark_variance > 0.0 && dark_variance < NEGLIGIBLE_DARK * read_variance {
@@ -210,16 +241,53 @@ impl AddNoise {
             hot_pixel_e,
             poisson: settings.poisson,
             cte: settings.cte,
+            smear_per_row: if exposure_s > 0.0 { readout.smear_line_s / exposure_s } else { 0.0 },
         };
-        let model = NoiseModel::of(input, &record)?;
+        let mut model = NoiseModel::of(input, &record)?;
+        let taps = ReadNoise::of(input, readout, &record);
+        if record.sources.contains(&Source::Ron) {
+            model.read_noise_e = readout.read_noises_e().fold(0.0, f64::max);
+        }
         let mean_dark_e = dark_e * rectified_mean(model.dcnu) + model.tails.mean_hot_e();
         metadata.dark_signal_e = Some(mean_dark_e * settings.cte.map_or(1.0, uniform_share));
         metadata.noise = Some(record.clone());
         let instructions = Instructions::widest();
         let tables = Tables::of(input, &model, instructions);
-        let columns = Columns::of(input, &model, &record);
+        let mut columns = Columns::of(input, &model, &record);
+        let lacks_light = !columns.add_smear(input, record.smear_per_row)?;
+        let blooming = readout.blooming;
         let header = FrameHeader { metadata, ..input.clone() };
-        Ok(Self { header, pattern, model, record, transfer, tables, columns, instructions })
+        Ok(Self {
+            header,
+            pattern,
+            model,
+            record,
+            transfer,
+            tables,
+            columns,
+            taps,
+            instructions,
+            blooming,
+            lacks_light,
+        })
+    }
+
+    /// What adds up the light of the frame's columns, where smear hangs on rows that are not read yet: the whole frame goes
+    /// through it, and then into [`Self::with_light`]. Without it a band needs all rows of the frame.
+    pub fn light_wanted(&self) -> Option<ColumnLight> {
+        self.lacks_light.then(|| self.column_light())
+    }
+
+    fn column_light(&self) -> ColumnLight {
+        let of_sensor = self.header.sensor().and_then(Sensor::bayer).ok();
+        ColumnLight::of(&self.header, of_sensor.or(self.pattern).unwrap_or(CfaPattern::Rggb))
+    }
+
+    /// The same with smear of the light of its columns, all of whose rows were added up.
+    pub fn with_light(mut self, light: &ColumnLight) -> Self {
+        self.columns.smear = light.smear(self.record.smear_per_row);
+        self.lacks_light = false;
+        self
     }
 
     /// Draws on a narrower set of instructions than the widest there is; the noise is the same.
@@ -269,7 +337,7 @@ fn has_noise(readout: &ReadOut, source: Source) -> bool {
     match source {
         Source::Dcnu => readout.dcnu > 0.0,
         Source::Prnu => readout.prnu > 0.0,
-        Source::Ron => readout.read_noise_e > 0.0,
+        Source::Ron => readout.read_noises_e().any(|noise| noise > 0.0),
         Source::RowNoise => readout.row_noise_e > 0.0,
         Source::ColumnNoise => readout.column_noise_e > 0.0,
         Source::Dsnu => readout.dsnu_e > 0.0,
@@ -279,6 +347,7 @@ fn has_noise(readout: &ReadOut, source: Source) -> bool {
         Source::PrnuColumn => readout.prnu_column > 0.0,
         Source::HotPixels => readout.hot_pixel_share > 0.0,
         Source::Rts => readout.rts_share > 0.0,
+        Source::BlackDrift => readout.black_drift_e > 0.0,
         Source::Dcsn | Source::Ssn => true,
     }
 }
@@ -308,10 +377,20 @@ impl Stage for AddNoise {
     }
 
     fn reach(&self) -> usize {
+        if self.lacks_light || self.blooms() {
+            return self.header.geometry.height;
+        }
         self.transfer.as_ref().map_or(0, Transfer::reach)
     }
 
     fn apply(&self, input: Window<'_, ExpectedElectrons>, mut output: Rows<'_, Electrons>) -> Counts {
+        if let Some(mut light) = self.light_wanted() {
+            (0..input.frame_height()).for_each(|y| light.add(input.all_channels(y)));
+            return self.clone().with_light(&light).apply(input, output);
+        }
+        if self.blooms() {
+            return self.apply_to_all(input, output);
+        }
         let rows = output.range();
         let Some(transfer) = &self.transfer else {
             let draw = Expose { noise: self, input, output };
@@ -359,6 +438,8 @@ struct Line<'a> {
     /// Electrons that are added to the row, and its relative gain less 1.
     offset: f32,
     gain: f32,
+    /// Read noise of each column, e⁻; empty where all have that of the model.
+    read_noise: &'a [f32],
     /// Row of the sensor, and column of the frame's first.
     row: i32,
     first_column: i32,
@@ -377,14 +458,21 @@ impl AddNoise {
         #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wraps as sensor columns do")]
         let row = y0.wrapping_add(y as i32);
         let Self { model, record, tables, columns, .. } = self;
-        let LineNoise { row_noise_e, dsnu_row_e, prnu_row, .. } = model.lines;
+        let LineNoise { row_noise_e, dsnu_row_e, prnu_row, black_drift_e, .. } = model.lines;
         let (mut offset, mut gain) = (0.0, 0.0);
         if row_noise_e > 0.0 || dsnu_row_e > 0.0 || prnu_row > 0.0 {
             let draws = of_row([record.seed, record.sensor_seed], record.frame, row);
             offset = to_sample(row_noise_e * draws.temporal + dsnu_row_e * draws.offset);
             gain = to_sample(prnu_row * draws.response);
         }
-        Line { model, record, tables, columns, offset, gain, row, first_column, classes }
+        if black_drift_e > 0.0 {
+            let (knot, [of_this, of_next]) = knots(row.into(), model.lines.black_drift_rows);
+            #[expect(clippy::cast_possible_truncation, reason = "knots are fewer than rows, and one more")]
+            let level = |knot: i64| of_knot(record.seed, record.frame, knot as i32);
+            offset += to_sample(black_drift_e * (of_this * level(knot) + of_next * level(knot + 1)));
+        }
+        let read_noise = self.taps.row(row);
+        Line { model, record, tables, columns, offset, gain, read_noise, row, first_column, classes }
     }
 }
 
@@ -414,7 +502,7 @@ impl Kernel for Expose<'_> {
                     run.make_temporal(&mut scratch.words);
                     line.charges(&run, &mut scratch, &span, expected, noisy, &mut counts);
                     if noise.model.read_noise_e > 0.0 {
-                        add(noisy, line.read_noise(&run, &mut scratch));
+                        add(noisy, line.read_noise(&run, &mut scratch, &span));
                     }
                     line.add_jumps(&run, &mut scratch, noisy);
                     line.add_offsets(&run, &mut scratch, span, noisy);
@@ -449,7 +537,7 @@ impl Kernel for Charges<'_> {
             if let Some(read_noise) = &mut read_noise {
                 let of_span = &mut read_noise[span.clone()];
                 if line.model.read_noise_e > 0.0 {
-                    let made = line.read_noise(&run, &mut scratch);
+                    let made = line.read_noise(&run, &mut scratch, &span);
                     of_span.copy_from_slice(&made[..of_span.len()]);
                 } else {
                     of_span.fill(0.0);
@@ -515,6 +603,9 @@ impl Line<'_> {
         for (rate, &expected) in rates.iter_mut().zip(expected) {
             negative += u32::from(expected < 0.0);
             *rate = if expected < 0.0 { 0.0 } else { expected };
+        }
+        if let Some(smear) = self.columns.smear.get(span.clone()) {
+            add(rates, smear);
         }
         // What fills the run up looks like the rest, so that it takes no path of its own.
         for index in expected.len()..run.length {
@@ -675,9 +766,13 @@ impl Line<'_> {
 
     /// Draws the read noise of each photosite. The run's temporal words are made.
     #[inline(always)]
-    fn read_noise<'a>(&self, run: &Run, scratch: &'a mut Scratch) -> &'a [f32] {
+    fn read_noise<'a>(&self, run: &Run, scratch: &'a mut Scratch, span: &Range<usize>) -> &'a [f32] {
         let noise = &mut scratch.normals[..run.length];
         run.normals(&scratch.words, Source::Ron, noise);
+        if let Some(of_columns) = self.read_noise.get(span.clone()) {
+            noise.iter_mut().zip(of_columns).for_each(|(noise, rms)| *noise *= rms);
+            return noise;
+        }
         let rms = to_sample(self.model.read_noise_e);
         noise.iter_mut().for_each(|noise| *noise *= rms);
         noise

@@ -78,13 +78,19 @@ impl Tails {
 ///
 /// A photosite in row r and column c has the sensitivity max(0, 1 + prnu n + prnu_row n_r + prnu_column n_c), and to what is
 /// read of it are added dsnu n′ + row_noise m_r + column_noise m_c + dsnu_row n′_r + dsnu_column n′_c, all n and m standard
-/// normal numbers. Those of a row serve all its photosites, of whatever class.
+/// normal numbers. Those of a row serve all its photosites, of whatever class. So does black_drift (z_j cos(πt/2) + z_j+1 sin(πt/2))
+/// with z_j a normal number of each knot, j the last knot of each `black_drift_rows` rows of the sensor up to r, and t
+/// from 0 to 1 between two of them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LineNoise {
     /// Of a row in one exposure, e⁻.
     pub row_noise_e: f64,
     /// Of a column in one exposure, e⁻.
     pub column_noise_e: f64,
+    /// Drift of the black level along the rows of one exposure, e⁻.
+    pub black_drift_e: f64,
+    /// Rows from one of its knots to the next; 0 where there is none.
+    pub black_drift_rows: f64,
     /// Fixed offsets of photosites, e⁻.
     pub dsnu_e: f64,
     /// Fixed offsets of rows, e⁻.
@@ -119,6 +125,17 @@ impl LineNoise {
     }
 }
 
+/// The last knot of the drift of the black level up to a row of the sensor, and the weights of it and the next.
+///
+/// j = ⌊r/L⌋,  t = r/L − j,  cos(πt/2) and sin(πt/2), L = `black_drift_rows`, so that the variance is the same everywhere
+pub fn knots(row: i64, black_drift_rows: f64) -> (i64, [f64; 2]) {
+    let place = row as f64 / black_drift_rows;
+    let knot = place.floor();
+    let angle = std::f64::consts::FRAC_PI_2 * (place - knot);
+    #[expect(clippy::cast_possible_truncation, reason = "no farther than the row")]
+    (knot as i64, [libm::cos(angle), libm::sin(angle)])
+}
+
 /// √(Σ x²); of one number that is not zero that number itself.
 fn root_sum<const N: usize>(parts: [f64; N]) -> f64 {
     parts.into_iter().fold(0.0, |sum: f64, part| if part == 0.0 { sum } else { sum.hypot(part) })
@@ -146,6 +163,8 @@ impl NoiseModel {
             lines: LineNoise {
                 row_noise_e: if_drawn(Source::RowNoise, readout.row_noise_e),
                 column_noise_e: if_drawn(Source::ColumnNoise, readout.column_noise_e),
+                black_drift_e: if_drawn(Source::BlackDrift, readout.black_drift_e),
+                black_drift_rows: if_drawn(Source::BlackDrift, readout.black_drift_rows),
                 dsnu_e: if_drawn(Source::Dsnu, readout.dsnu_e),
                 dsnu_row_e: if_drawn(Source::DsnuRow, readout.dsnu_row_e),
                 dsnu_column_e: if_drawn(Source::DsnuColumn, readout.dsnu_column_e),
@@ -169,7 +188,7 @@ impl NoiseModel {
 
     /// What is added anew to a photosite in each exposure, that of rows and columns included: rms e⁻.
     pub fn read_noise(&self) -> f64 {
-        root_sum([self.read_noise_e, self.lines.row_noise_e, self.lines.column_noise_e])
+        root_sum([self.read_noise_e, self.lines.row_noise_e, self.lines.column_noise_e, self.lines.black_drift_e])
     }
 
     /// Fixed offsets of photosites, those of rows and columns included: rms e⁻.

@@ -9,7 +9,10 @@
 //! that is not quite linear do, all of them have one more error, alike, which is as large as they miss it: then the line tends to
 //! that of equal weights, which the standard fits.
 
-use super::fit::{Line, Point, variance_besides};
+mod bend;
+mod weights;
+
+use super::fit::{Line, Point};
 use super::level::Level;
 use super::pattern::{Part, fixed};
 use crate::numerics::variance_components::Interval;
@@ -81,6 +84,8 @@ pub struct Curve {
     pub is_silent: bool,
     /// Whether the darks are clipped at 0.
     pub are_darks_clipped: bool,
+    /// The share of the light that signals miss their line by, beyond what they scatter by: a standard deviation.
+    pub light_error: f64,
     rounding: f64,
     weights: Weights,
 }
@@ -126,6 +131,7 @@ impl Curve {
             is_offset_free: is_silent || are_darks_clipped,
             is_silent: is_silent && !darks.is_empty(),
             are_darks_clipped,
+            light_error: 0.0,
             rounding,
             weights: Weights::default(),
         };
@@ -267,48 +273,6 @@ impl Curve {
         })
     }
 
-    /// Weights, from the first fit on at its levels; what points miss their lines by is added to what they scatter by.
-    fn weigh(&mut self) {
-        self.weigh_darks();
-        let fitted: Vec<Point4> = self.fitted.iter().map(|&flat| self.flats[flat].clone()).collect();
-        let relative = relative_scatter(&fitted);
-        let parameters = if self.is_offset_free { 2 } else { 1 };
-        let freedom = self.fitted.len().saturating_sub(parameters) as f64;
-        let mut besides = 0.0;
-        for _ in 0..3 {
-            let Some(line) = self.gain_line() else { return };
-            let own: Vec<f64> = self
-                .fitted
-                .iter()
-                .map(|&flat| {
-                    let dark = self.no_light(flat).map_or(0.0, |[_, variance]| variance);
-                    let level = line.at(self.signal(flat)) + if self.is_offset_free { 0.0 } else { dark };
-                    let point = &self.flats[flat];
-                    let beneath = self.scatter_beneath(flat);
-                    let of_dark = if self.is_offset_free { 0.0 } else { beneath[1] };
-                    relative / point.freedom * level.max(self.rounding).powi(2)
-                        + of_dark
-                        + line.slope.powi(2) * (point.mean.variance + beneath[0])
-                })
-                .collect();
-            let weighted = |besides: f64| {
-                let gain = own.iter().map(|own| 1.0 / (own + besides).max(f64::MIN_POSITIVE)).collect();
-                Self { weights: Weights { gain, ..self.weights.clone() }, ..self.clone() }
-            };
-            let misfit = |besides: f64| {
-                let weighted = weighted(besides);
-                weighted.gain_line().map_or(0.0, |line| line.chi_square(weighted.gain_points()))
-            };
-            let largest = self.fitted.iter().map(|&flat| self.noise(flat).powi(2)).fold(0.0, f64::max);
-            besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
-            self.weights = weighted(besides).weights;
-        }
-        for &flat in &self.fitted {
-            self.flats[flat].variance.variance += besides;
-        }
-        self.weigh_response();
-    }
-
     /// What scatters beneath a flat: of the mean and of the variance of no light.
     fn scatter_beneath(&self, flat: usize) -> [f64; 2] {
         match self.beneath[flat] {
@@ -319,83 +283,6 @@ impl Curve {
                 [mean(|dark| dark.mean.variance), mean(|dark| dark.variance.variance)]
             }
             Beneath::Unknown => [0.0; 2],
-        }
-    }
-
-    fn weigh_darks(&mut self) {
-        let weigh = |of: fn(&Point4) -> Datum, besides: f64| -> Vec<f64> {
-            self.darks.iter().map(|dark| 1.0 / (of(dark).variance + besides).max(f64::MIN_POSITIVE)).collect()
-        };
-        let (means, variances) = (weigh(|dark| dark.mean, 0.0), weigh(|dark| dark.variance, 0.0));
-        (self.weights.dark_mean, self.weights.dark_variance) = (means, variances);
-        let freedom = self.darks.len() as f64 - 2.0;
-        if self.times() < 2 || freedom <= 0.0 {
-            return;
-        }
-        // A variance that is low by chance does not count more.
-        let relative = relative_scatter(&self.darks);
-        for _ in 0..2 {
-            let Some([_, line]) = self.dark_lines() else { return };
-            for (dark, weight) in self.darks.iter_mut().zip(&mut self.weights.dark_variance) {
-                let level = line.at(dark.exposure_s.unwrap_or(0.0)).max(self.rounding).max(0.5 * dark.variance.value);
-                dark.variance.variance = relative / dark.freedom * level * level;
-                *weight = 1.0 / dark.variance.variance.max(f64::MIN_POSITIVE);
-            }
-        }
-        for (which, of) in [|dark: &Point4| dark.mean, |dark: &Point4| dark.variance].into_iter().enumerate() {
-            let points = |besides: f64| -> Vec<Point> {
-                let point = |dark: &Point4| {
-                    let weight = 1.0 / (of(dark).variance + besides).max(f64::MIN_POSITIVE);
-                    Some(Point { x: dark.exposure_s?, y: of(dark).value, weight })
-                };
-                self.darks.iter().filter_map(point).collect()
-            };
-            let misfit = |besides: f64| {
-                let points = points(besides);
-                Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
-            };
-            let largest = self.darks.iter().map(|dark| of(dark).value.powi(2)).fold(0.0, f64::max);
-            let besides = variance_besides(freedom, misfit, largest);
-            if besides <= 0.0 {
-                continue;
-            }
-            for dark in &mut self.darks {
-                let datum = if which == 0 { &mut dark.mean } else { &mut dark.variance };
-                datum.variance += besides;
-            }
-            // A black level that moves does so under light too.
-            if which == 0 {
-                self.flats.iter_mut().for_each(|flat| flat.mean.variance += besides);
-            }
-            let weights: Vec<f64> = self.darks.iter().map(|dark| 1.0 / of(dark).variance).collect();
-            if which == 0 { self.weights.dark_mean = weights } else { self.weights.dark_variance = weights }
-        }
-    }
-
-    fn weigh_response(&mut self) {
-        let freedom = self.response_points().count() as f64 - 1.0;
-        if freedom < 0.0 {
-            return;
-        }
-        let weights = |besides: f64| -> Vec<f64> {
-            let own = |&flat: &usize| self.flats[flat].mean.variance + self.scatter_beneath(flat)[0];
-            self.fitted.iter().map(|flat| 1.0 / (own(flat) + besides).max(f64::MIN_POSITIVE)).collect()
-        };
-        let misfit = |besides: f64| {
-            let weighted =
-                Self { weights: Weights { response: weights(besides), ..self.weights.clone() }, ..self.clone() };
-            let points: Vec<Point> = weighted.response_points().collect();
-            Line::through_zero(points.clone()).map_or(0.0, |line| line.chi_square(points))
-        };
-        let largest = self.fitted.iter().map(|&flat| self.signal(flat).powi(2)).fold(0.0, f64::max);
-        let besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
-        self.weights.response = weights(besides);
-        // What they miss it by is an error of the light: it tells nothing of the gain.
-        let Some(line) = Line::through_zero(self.response_points()) else { return };
-        for flat in &mut self.flats {
-            if let Some(photons) = &mut flat.photons {
-                photons.variance += besides / line.slope.powi(2);
-            }
         }
     }
 
@@ -462,15 +349,6 @@ impl Curve {
     pub fn signal_variance(&self, flat: usize) -> f64 {
         self.flats[flat].mean.variance + self.scatter_beneath(flat)[0]
     }
-}
-
-/// Relative variance of a variance, times its freedom, over several levels: 2 of normal noise.
-fn relative_scatter(points: &[Point4]) -> f64 {
-    let all: f64 = points.iter().map(|point| point.freedom).sum();
-    let share =
-        |point: &Point4| point.freedom / all * point.freedom * point.variance.variance / point.variance.value.powi(2);
-    let pooled: f64 = points.iter().filter(|point| point.variance.value > 0.0).map(share).sum();
-    if pooled > 0.0 { pooled } else { 2.0 }
 }
 
 /// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].

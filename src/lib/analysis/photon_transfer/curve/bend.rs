@@ -1,0 +1,50 @@
+//! What a response that bends does to the gain.
+
+use super::super::fit::{Line, Point, variance_besides};
+use super::{Beneath, Curve};
+
+impl Curve {
+    /// How much of the gain a response that bends makes it miss, a share of it, and what that scatters by; none of light that is not
+    /// known.
+    ///
+    /// Where a signal is R x (1 + ε x), of shot noise alone its variance is (1 + 2 ε x)² of that of a straight response over
+    /// (1 + ε x): to first order 3 ε x more at signal K n, which the line through the levels takes for gain.
+    pub fn bend(&self) -> Option<[f64; 2]> {
+        let light = |flat: usize| self.flats[flat].photons.map(|photons| photons.value).or(self.flats[flat].exposure_s);
+        let known: Vec<usize> =
+            self.fitted.iter().copied().filter(|&flat| self.beneath[flat] != Beneath::Unknown).collect();
+        let brightest = known.iter().filter_map(|&flat| light(flat)).fold(0.0, f64::max);
+        // Signal over light is R + R ε x, whatever the light is counted in.
+        let points = |share: f64| -> Option<Vec<Point>> {
+            let point = |&flat: &usize| {
+                let (x, signal) = (light(flat)? / brightest, self.signal(flat));
+                let variance = self.signal_variance(flat) + share * signal * signal;
+                (x > 0.0).then(|| Point { x, y: signal / x, weight: x * x / variance.max(f64::MIN_POSITIVE) })
+            };
+            known.iter().map(point).collect()
+        };
+        let misfit = |share: f64| {
+            let points = points(share).unwrap_or_default();
+            Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
+        };
+        let freedom = points(0.0)?.len() as f64 - 2.0;
+        if freedom < 1.0 {
+            return None;
+        }
+        let points = points(variance_besides(freedom, misfit, 1.0))?;
+        let line = Line::through(points.clone())?;
+        let all: f64 = points.iter().map(|point| point.weight).sum();
+        let middle = points.iter().map(|point| point.weight * point.x).sum::<f64>() / all;
+        let spread: f64 = points.iter().map(|point| point.weight * (point.x - middle).powi(2)).sum();
+        let missed = |bend: f64| {
+            let at = |(place, &flat): (usize, &usize)| {
+                let (x, signal) = (light(flat).unwrap_or(0.0) / brightest, self.signal(flat));
+                Point { x: signal, y: 3.0 * bend * x * signal, weight: self.weights.gain[place] }
+            };
+            let points: Vec<Point> = self.fitted.iter().enumerate().map(at).collect();
+            let line = if self.is_offset_free { Line::through(points) } else { Line::through_zero(points) };
+            line.map(|line| line.slope)
+        };
+        Some([missed(line.slope / line.offset)?, missed(spread.sqrt().recip() / line.offset)?.abs()])
+    }
+}

@@ -1,0 +1,150 @@
+//! What the levels of a curve count in its fits.
+
+use super::super::fit::{Line, Point, variance_besides};
+use super::{Curve, Datum, Point4, Weights};
+
+/// A quantile of Student's law over that of the normal, at 95 %, is 1 plus this over its degrees of freedom.
+const FEW_LEVELS: f64 = 1.21;
+
+impl Curve {
+    /// Weights, from the first fit on at its levels; what points miss their lines by is added to what they scatter by.
+    pub(super) fn weigh(&mut self) {
+        self.weigh_darks();
+        let fitted: Vec<Point4> = self.fitted.iter().map(|&flat| self.flats[flat].clone()).collect();
+        let relative = relative_scatter(&fitted);
+        let parameters = if self.is_offset_free { 2 } else { 1 };
+        let freedom = self.fitted.len().saturating_sub(parameters) as f64;
+        let mut besides = 0.0;
+        for _ in 0..3 {
+            let Some(line) = self.gain_line() else { return };
+            let own: Vec<f64> = self
+                .fitted
+                .iter()
+                .map(|&flat| {
+                    let dark = self.no_light(flat).map_or(0.0, |[_, variance]| variance);
+                    let level = line.at(self.signal(flat)) + if self.is_offset_free { 0.0 } else { dark };
+                    let point = &self.flats[flat];
+                    let beneath = self.scatter_beneath(flat);
+                    let of_dark = if self.is_offset_free { 0.0 } else { beneath[1] };
+                    relative / point.freedom * level.max(self.rounding).powi(2)
+                        + of_dark
+                        + line.slope.powi(2) * (point.mean.variance + beneath[0])
+                })
+                .collect();
+            let weighted = |besides: f64| {
+                let gain = own.iter().map(|own| 1.0 / (own + besides).max(f64::MIN_POSITIVE)).collect();
+                Self { weights: Weights { gain, ..self.weights.clone() }, ..self.clone() }
+            };
+            let misfit = |besides: f64| {
+                let weighted = weighted(besides);
+                weighted.gain_line().map_or(0.0, |line| line.chi_square(weighted.gain_points()))
+            };
+            let largest = self.fitted.iter().map(|&flat| self.noise(flat).powi(2)).fold(0.0, f64::max);
+            besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
+            self.weights = weighted(besides).weights;
+        }
+        for &flat in &self.fitted {
+            self.flats[flat].variance.variance += besides;
+        }
+        self.weigh_response();
+    }
+
+    fn weigh_darks(&mut self) {
+        let weigh = |of: fn(&Point4) -> Datum, besides: f64| -> Vec<f64> {
+            self.darks.iter().map(|dark| 1.0 / (of(dark).variance + besides).max(f64::MIN_POSITIVE)).collect()
+        };
+        let (means, variances) = (weigh(|dark| dark.mean, 0.0), weigh(|dark| dark.variance, 0.0));
+        (self.weights.dark_mean, self.weights.dark_variance) = (means, variances);
+        let freedom = self.darks.len() as f64 - 2.0;
+        if self.times() < 2 || freedom <= 0.0 {
+            return;
+        }
+        // A variance that is low by chance does not count more.
+        let relative = relative_scatter(&self.darks);
+        for _ in 0..2 {
+            let Some([_, line]) = self.dark_lines() else { return };
+            for (dark, weight) in self.darks.iter_mut().zip(&mut self.weights.dark_variance) {
+                let level = line.at(dark.exposure_s.unwrap_or(0.0)).max(self.rounding).max(0.5 * dark.variance.value);
+                dark.variance.variance = relative / dark.freedom * level * level;
+                *weight = 1.0 / dark.variance.variance.max(f64::MIN_POSITIVE);
+            }
+        }
+        for (which, of) in [|dark: &Point4| dark.mean, |dark: &Point4| dark.variance].into_iter().enumerate() {
+            let points = |besides: f64| -> Vec<Point> {
+                let point = |dark: &Point4| {
+                    let weight = 1.0 / (of(dark).variance + besides).max(f64::MIN_POSITIVE);
+                    Some(Point { x: dark.exposure_s?, y: of(dark).value, weight })
+                };
+                self.darks.iter().filter_map(point).collect()
+            };
+            let misfit = |besides: f64| {
+                let points = points(besides);
+                Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
+            };
+            let largest = self.darks.iter().map(|dark| of(dark).value.powi(2)).fold(0.0, f64::max);
+            let besides = variance_besides(freedom, misfit, largest);
+            if besides <= 0.0 {
+                continue;
+            }
+            for dark in &mut self.darks {
+                let datum = if which == 0 { &mut dark.mean } else { &mut dark.variance };
+                datum.variance += besides;
+            }
+            // A black level that moves does so under light too.
+            if which == 0 {
+                self.flats.iter_mut().for_each(|flat| flat.mean.variance += besides);
+            }
+            let weights: Vec<f64> = self.darks.iter().map(|dark| 1.0 / of(dark).variance).collect();
+            if which == 0 { self.weights.dark_mean = weights } else { self.weights.dark_variance = weights }
+        }
+    }
+
+    fn weigh_response(&mut self) {
+        let freedom = self.response_points().count() as f64 - 1.0;
+        if freedom < 0.0 {
+            return;
+        }
+        let weights = |besides: f64, share: f64| -> Vec<f64> {
+            let own = |&flat: &usize| {
+                let scatter = self.flats[flat].mean.variance + self.scatter_beneath(flat)[0];
+                scatter + besides + share * self.signal(flat).powi(2)
+            };
+            self.fitted.iter().map(|flat| 1.0 / own(flat).max(f64::MIN_POSITIVE)).collect()
+        };
+        let misfit = |besides: f64, share: f64| {
+            let response = weights(besides, share);
+            let weighted = Self { weights: Weights { response, ..self.weights.clone() }, ..self.clone() };
+            let points: Vec<Point> = weighted.response_points().collect();
+            Line::through_zero(points.clone()).map_or(0.0, |line| line.chi_square(points))
+        };
+        let largest = self.fitted.iter().map(|&flat| self.signal(flat).powi(2)).fold(0.0, f64::max);
+        let [besides, share] = if freedom > 0.0 {
+            let alike = variance_besides(freedom, |besides| misfit(besides, 0.0), largest);
+            [alike, variance_besides(freedom, |share| misfit(0.0, share), 1.0)]
+        } else {
+            [0.0; 2]
+        };
+        self.weights.response = weights(besides, 0.0);
+        self.light_error = share.sqrt();
+        // What they miss it by is an error of the light: it tells nothing of the gain. It may be alike at all levels, or in proportion
+        // to them, as that of a lamp that flickers; the larger counts, and it is known from few levels.
+        let Some(line) = Line::through_zero(self.response_points()) else { return };
+        let few = (1.0 + FEW_LEVELS / freedom.max(1.0)).powi(2);
+        for flat in 0..self.flats.len() {
+            let signal = self.signal(flat);
+            let missed = few * besides.max(share * signal * signal);
+            if let Some(photons) = &mut self.flats[flat].photons {
+                photons.variance += missed / line.slope.powi(2);
+            }
+        }
+    }
+}
+
+/// Relative variance of a variance, times its freedom, over several levels: 2 of normal noise.
+fn relative_scatter(points: &[Point4]) -> f64 {
+    let all: f64 = points.iter().map(|point| point.freedom).sum();
+    let share =
+        |point: &Point4| point.freedom / all * point.freedom * point.variance.variance / point.variance.value.powi(2);
+    let pooled: f64 = points.iter().filter(|point| point.variance.value > 0.0).map(share).sum();
+    if pooled > 0.0 { pooled } else { 2.0 }
+}

@@ -1,0 +1,128 @@
+//! What may make the numbers of a camera wrong, as its levels show it.
+
+use super::curve::Curve;
+use super::level::Level;
+
+/// So many standard deviations are beyond chance.
+const BEYOND: f64 = 5.0;
+/// Signals of levels differ by so large a share where one is of more light.
+const LEAST_STEP: f64 = 0.01;
+/// Signals that miss the line of the response by so large a share are told of.
+const MISSED: f64 = 0.02;
+/// Light that changes by so large a share from frame to frame, at one level after another, is told of.
+const DRIFT: f64 = 1e-3;
+
+/// What a user should be warned of.
+pub fn doubts(curve: &Curve, flats: &[Level], confidence: f64) -> Vec<String> {
+    let other_time = curve.other_time().map(|[flat, dark]| {
+        format!(
+            "flats of {flat} s stand above darks of {dark} s, as there are none of their exposure: black level and dark noise are those \
+             of the darks"
+        )
+    });
+    let falls = curve.interval(|values| values.dark_slope, confidence).is_some_and(|slope| slope.high < 0.0);
+    let falling = falls
+        .then(|| "the dark signal falls with exposure time beyond chance: is there a flat among the darks?".to_owned());
+    let all = [
+        other_time,
+        falling,
+        lit_by_none(curve, flats),
+        exchanged(curve, flats),
+        missed(curve),
+        drifting(curve, flats),
+        bent(curve, confidence),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// Whether a signal is beyond another by more than chance.
+fn is_more(curve: &Curve, flat: usize, other: f64, variance: f64) -> bool {
+    curve.signal(flat) > other + BEYOND * (curve.signal_variance(flat) + variance).sqrt()
+}
+
+/// A flat that is said to be of no photons, and has a signal.
+fn lit_by_none(curve: &Curve, flats: &[Level]) -> Option<String> {
+    let is_lit = |flat: &usize| flats[*flat].condition.photons == Some(0.0) && is_more(curve, *flat, 0.0, 0.0);
+    let flat = (0..flats.len()).filter(|&flat| curve.knows_black(flat)).find(is_lit)?;
+    Some(format!(
+        "a flat of 0 photons has a signal of {:.2} ADU: photons that are not known are left empty",
+        curve.signal(flat)
+    ))
+}
+
+/// Flats of more photons that have less signal.
+fn exchanged(curve: &Curve, flats: &[Level]) -> Option<String> {
+    let counted = |flat: usize| Some((flat, flats[flat].condition.photons?));
+    let mut counted: Vec<(usize, f64)> = (0..flats.len()).filter_map(counted).collect();
+    counted.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let is_less = |two: &&[(usize, f64)]| {
+        let [(less, photons), (more, more_photons)] = [two[0], two[1]];
+        let (signal, variance) = (curve.signal(more), curve.signal_variance(more));
+        let is_apart = more_photons > photons * (1.0 + LEAST_STEP);
+        is_apart && is_more(curve, less, signal * (1.0 + LEAST_STEP), variance)
+    };
+    let two = counted.windows(2).find(is_less)?;
+    let [(less, photons), (more, more_photons)] = [two[0], two[1]];
+    Some(format!(
+        "flats of {more_photons} photons have less signal, {:.1} ADU, than those of {photons}, {:.1} ADU: are photons exchanged?",
+        curve.signal(more),
+        curve.signal(less)
+    ))
+}
+
+/// Signals that miss the line of the response by much.
+fn missed(curve: &Curve) -> Option<String> {
+    (curve.light_error >= MISSED).then(|| {
+        format!(
+            "signals miss the line of the response by {:.1} % more than they scatter by, so that light drifted, photons are wrong or \
+             the response bends; intervals of responsivity and quantum efficiency take that as an error of each level by itself",
+            curve.light_error * 100.0
+        )
+    })
+}
+
+/// Light that rises, or falls, within each level.
+fn drifting(curve: &Curve, flats: &[Level]) -> Option<String> {
+    let step = |&flat: &usize| {
+        let level = &flats[flat];
+        let means = |frame: usize| {
+            let own = level.sites.iter().map(|site| site.frame_means[frame] * site.count() as f64);
+            own.sum::<f64>() / level.sites.iter().map(|site| site.count() as f64).sum::<f64>()
+        };
+        let signal = curve.signal(flat);
+        (signal > 0.0).then(|| (means(level.frames - 1) - means(0)) / (level.frames - 1) as f64 / signal)
+    };
+    let steps: Vec<f64> = curve.fitted().iter().filter_map(step).collect();
+    let count = steps.len() as f64;
+    if count < 5.0 {
+        return None;
+    }
+    let mean = steps.iter().sum::<f64>() / count;
+    let scatter = steps.iter().map(|step| (step - mean).powi(2)).sum::<f64>() / (count - 1.0) / count;
+    (mean.abs() > BEYOND * scatter.sqrt() && mean.abs() >= DRIFT).then(|| {
+        let way = if mean > 0.0 { "rises" } else { "falls" };
+        format!(
+            "light {way} by {:.2} % from frame to frame, at one level after another: numbers of photons are wrong where the lamp \
+             drifts on between levels, and responsivity and quantum efficiency with them",
+            mean.abs() * 100.0
+        )
+    })
+}
+
+/// A response that bends, which the variances follow and their scatter hides.
+fn bent(curve: &Curve, confidence: f64) -> Option<String> {
+    let [missed, scatter] = curve.bend()?;
+    let gain = curve.interval(|values| Some(values.gain), confidence)?;
+    let width = (gain.high - gain.low) / (2.0 * gain.value);
+    // Twice what it scatters by, and more than half of what the interval has room for.
+    let is_told = missed.abs() > 2.0 * scatter && missed.abs() > width / 2.0;
+    is_told.then(|| {
+        format!(
+            "the response bends, so that the gain, the slope of the whole photon transfer curve, is about {:.1} % {} than that of \
+             little light; its interval, {:.1} %, is that of the slope",
+            missed.abs() * 100.0,
+            if missed > 0.0 { "more" } else { "less" },
+            width * 100.0
+        )
+    })
+}

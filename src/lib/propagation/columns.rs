@@ -1,0 +1,113 @@
+//! What photosites of a CCD have of others in their column: smear, and charge that spills over.
+
+use super::law::Law;
+use super::moments::Prediction;
+use super::photosite::Photosite;
+use super::unpredictable::{Predicted, Unpredictable};
+use crate::cfa::{CfaPattern, Class, FilterArray};
+use crate::metadata::FrameHeader;
+use crate::stages::noise::smear::uniform_columns;
+
+/// The share of photosites beyond full well from which on charge that spills counts: of 10⁷ photosites, one in a hundred frames.
+const OVERFLOWING: f64 = 1e-9;
+
+/// Why nothing is predicted where charge may spill.
+const BLOOMS: &str =
+    "charge spills over along columns from photosites beyond full well, more than one in 10⁹, into their neighbors";
+
+/// Why nothing is predicted where charge has spilled.
+pub(super) const BLOOMED: &str = "photosites are saturated by neighbors: charge has spilled over along their columns";
+
+/// Half the difference of the smear of even and odd columns up to which photosites of a class are alike, as a share of their
+/// noise: what it adds to their variance is below 4·10⁻⁶ of it, less than is seen in 10¹⁰ of them.
+const ALIKE: f64 = 2e-3;
+
+/// Why nothing is predicted where photosites of a class differ by their columns.
+const UNEVEN: &str = "the smear of columns with red photosites and of those with blue ones differs by more than the four hundredth \
+                      part of the noise, so that photosites of a class are not alike";
+
+/// Why nothing is predicted of another array's mosaic.
+const OF_ANOTHER: &str = "it is behind another filter array than its sensor has, by which its columns have smear";
+
+/// Why nothing is predicted over a flat field.
+const DIVIDED: &str = "it was divided by a flat field of a sensor with smear, in which columns with red photosites and those with blue \
+                       ones may differ";
+
+/// What photosites expect with smear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Smeared {
+    /// Electrons of R, G and B, means over the columns that have them.
+    pub expected_e: [f64; 3],
+    /// What the columns of a class are off its mean by, e⁻.
+    off_e: f64,
+}
+
+impl Smeared {
+    /// What the photosites of a frame expect in a uniform scene of which they would expect so many electrons without smear.
+    pub fn of(frame: &FrameHeader, expected_e: [f64; 3]) -> Predicted<Self> {
+        let share = frame.metadata.noise.as_ref().map_or(0.0, |noise| noise.smear_per_row);
+        if share <= 0.0 {
+            return Ok(Self { expected_e, off_e: 0.0 });
+        }
+        if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
+            return Err(Unpredictable::Beyond(DIVIDED));
+        }
+        let sensor = frame.metadata.sensor.as_ref().ok_or(Unpredictable::Missing("sensor"))?;
+        let readout = sensor.readout.as_ref().ok_or(Unpredictable::Missing("sensor.readout"))?;
+        let pattern = readout.cfa.bayer().ok_or(Unpredictable::Beyond(OF_ANOTHER))?;
+        let smear = uniform_columns(pattern, readout.height, expected_e).map(|sum| share * sum);
+        let mean = smear[0].midpoint(smear[1]);
+        let mut with = expected_e.map(|e| e + mean);
+        if let Some(plane) = plane_of(frame) {
+            if plane != pattern {
+                return Err(Unpredictable::Beyond(OF_ANOTHER));
+            }
+            // Red photosites lie in columns of one parity, blue ones in those of the other.
+            for class in [Class::Red, Class::Blue] {
+                with[class as usize] = expected_e[class as usize] + smear[column_of(pattern, class)];
+            }
+        }
+        Ok(Self { expected_e: with, off_e: (smear[0] - smear[1]).abs() / 2.0 })
+    }
+
+    /// Makes sure that photosites of a class are alike next to their noise; `slope` samples to an electron.
+    pub fn check_even(&self, slope: f64, classes: &[Prediction; 3]) -> Predicted<()> {
+        let is_alike = |class: &Prediction| self.off_e * slope <= ALIKE * class.moments.std();
+        if self.off_e == 0.0 || classes.iter().all(is_alike) { Ok(()) } else { Err(Unpredictable::Beyond(UNEVEN)) }
+    }
+}
+
+/// The pattern of the plane that a frame is, or was demosaicked from; none of three planes.
+fn plane_of(frame: &FrameHeader) -> Option<CfaPattern> {
+    let metadata = &frame.metadata;
+    metadata.demosaic.as_ref().map(|record| record.cfa).or_else(|| metadata.cfa.and_then(FilterArray::bayer))
+}
+
+/// The parity of the columns that have red or blue photosites.
+fn column_of(pattern: CfaPattern, class: Class) -> usize {
+    let is_first = [0, 1].iter().any(|row| pattern.row_classes([0, 0], *row)[0] == class);
+    usize::from(!is_first)
+}
+
+/// Makes sure that next to no charge spills between the photosites of a frame.
+pub(super) fn check_wells(frame: &FrameHeader, photosite: &Photosite, expected_e: [f64; 3]) -> Predicted<()> {
+    let metadata = &frame.metadata;
+    if metadata.bloomed_photosites.is_some_and(|count| count > 0) {
+        return Err(Unpredictable::Beyond(BLOOMED));
+    }
+    let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+    if metadata.noise.is_none() || readout.is_none_or(|readout| readout.blooming <= 0.0) {
+        return Ok(());
+    }
+    let full_well_e = photosite.model.full_well_e;
+    let is_beyond = |expected_e: f64| {
+        let share = if photosite.has_tails() {
+            photosite.mean_of(expected_e, |site| Law::of(&site.model, expected_e).reaches(full_well_e))
+        } else {
+            Law::of(&photosite.model, expected_e).reaches(full_well_e)
+        };
+        // What is no number is not known to be little.
+        share.is_nan() || share > OVERFLOWING
+    };
+    if expected_e.into_iter().any(is_beyond) { Err(Unpredictable::Beyond(BLOOMS)) } else { Ok(()) }
+}

@@ -1,0 +1,185 @@
+//! What frames of a measurement must have in common, and what may be wrong with them.
+
+use super::conditions::{Group, Head};
+use crate::analysis::photon_transfer::Survey;
+use crate::error::{Error, Result};
+use crate::frame::Geometry;
+use crate::metadata::{FrameHeader, Metadata};
+use crate::requests::independence::{are_copies, shared_noise};
+use crate::requests::notes::Note;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Makes sure that two frames are of one camera as far as they say.
+///
+/// # Errors
+///
+/// Where they differ.
+pub fn check_alike(first: &FrameHeader, other: &FrameHeader) -> Result<()> {
+    let Geometry { width, height, channels, .. } = &first.geometry;
+    let differs = |what: &str| Err(other.refuse(format!("its {what} is not that of {}", first.name)));
+    if (&other.geometry.width, &other.geometry.height) != (width, height) {
+        let [w, h] = [other.geometry.width, other.geometry.height];
+        return Err(other.refuse(format!("it is {w}x{h}, and {} is {width}x{height}", first.name)));
+    }
+    if other.geometry.channels.len() != channels.len() {
+        return Err(other.refuse(format!("it holds {}, and {} {}", other.holds(), first.name, first.holds())));
+    }
+    if other.metadata.cfa != first.metadata.cfa {
+        return differs("filter array");
+    }
+    if other.geometry.origin != first.geometry.origin {
+        return differs("place on the sensor");
+    }
+    if other.metadata.quantity != first.metadata.quantity {
+        return Err(other.refuse(format!("it holds {}, and {} {}", other.holds(), first.name, first.holds())));
+    }
+    if other.metadata.white_level_adu != first.metadata.white_level_adu {
+        return differs("white level");
+    }
+    let are_others =
+        |of: fn(&Metadata) -> Option<f64>| of(&first.metadata).zip(of(&other.metadata)).is_some_and(|(a, b)| a != b);
+    if are_others(Metadata::adu_per_e) {
+        return differs("setting of the gain");
+    }
+    if are_others(Metadata::bias_adu) {
+        return differs("bias");
+    }
+    let body = |frame: &FrameHeader| {
+        let metadata = &frame.metadata;
+        let name = metadata.sensor.as_ref().map(|sensor| sensor.name.clone()).or_else(|| metadata.camera.clone());
+        (name, metadata.noise.as_ref().map(|noise| noise.sensor_seed))
+    };
+    let [(own, seed), (theirs, other_seed)] = [first, other].map(body);
+    if own.is_some() && theirs.is_some() && own != theirs {
+        return differs("camera");
+    }
+    if seed.is_some() && other_seed.is_some() && seed != other_seed {
+        return Err(other.refuse(format!("its sensor seed is not that of {}: it is another camera's", first.name)));
+    }
+    Ok(())
+}
+
+/// Makes sure that no exposure comes twice; gives a warning where noise of one is that of another, taken under other conditions.
+///
+/// # Errors
+///
+/// For copies of an exposure.
+pub fn check_apart(heads: &[Head]) -> Result<Option<String>> {
+    let mut warning = None;
+    let (mut by_digest, mut by_number) = (HashMap::new(), HashMap::new());
+    for Head { header: head, .. } in heads {
+        let metadata = &head.metadata;
+        let digest = metadata.samples.as_ref().map(|samples| samples.digest.as_str());
+        let same = digest.and_then(|digest| by_digest.insert(digest, head)).filter(|other| are_copies(head, other));
+        if let Some(other) = same {
+            let problem = format!("its samples are those of {}", other.name);
+            return Err(head.refuse(problem + "; copies of one exposure do not count as two"));
+        }
+        let Some(noise) = &metadata.noise else { continue };
+        let before: Option<&FrameHeader> = by_number.insert((noise.seed, noise.sensor_seed, noise.frame), head);
+        let Some(other) = before.filter(|other| shared_noise(head, other).is_some()) else { continue };
+        let (seed, frame) = (noise.seed, noise.frame);
+        if metadata.scene == other.metadata.scene && metadata.exposure == other.metadata.exposure {
+            return Err(head.refuse(format!("its noise is that of {}, of seed {seed} and frame {frame}", other.name)));
+        }
+        warning.get_or_insert_with(|| {
+            format!(
+                "{}: its noise is drawn from the numbers of {}, of seed {seed} and frame {frame}: levels are not independent, and \
+                 intervals too narrow; draw each level with a --seed or --frames of its own",
+                head.name, other.name
+            )
+        });
+    }
+    Ok(warning)
+}
+
+/// Refuses a plane of unknown array whose sites differ as those behind filters do.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_array(head: &FrameHeader, groups: &[Group], surveys: &[Survey]) -> Result<()> {
+    /// Sites of one kind differ by less: amplifiers do by one or two in a hundred.
+    const LEAST: f64 = 0.1;
+    if head.metadata.cfa.is_some() || head.geometry.channels.len() > 1 || head.geometry.height < 2 {
+        return Ok(());
+    }
+    let of_kind = |is_lit: bool| {
+        let own = groups.iter().zip(surveys).filter(move |(group, _)| group.condition.is_lit == is_lit);
+        own.map(|(_, survey)| survey)
+    };
+    // The brightest that is not full, above what is there without light.
+    let is_whole = |survey: &&Survey| survey.sites.iter().all(|site| site.at_ends[0] == 0);
+    let brightest = of_kind(true).filter(is_whole).max_by(|a, b| a.sites[0].mean.total_cmp(&b.sites[0].mean));
+    let dark = of_kind(false).next().map_or([0.0; 4], |survey| survey.quad);
+    let Some(bright) = brightest else { return Ok(()) };
+    let signal: Vec<f64> = bright.quad.iter().zip(dark).map(|(bright, dark)| bright - dark).collect();
+    let mean = signal.iter().sum::<f64>() / 4.0;
+    let spread =
+        signal.iter().copied().fold(f64::NEG_INFINITY, f64::max) - signal.iter().copied().fold(f64::INFINITY, f64::min);
+    if mean > 0.0 && spread > LEAST * mean {
+        let shares: Vec<String> = signal.iter().map(|signal| format!("{:.2}", signal / mean)).collect();
+        let problem = format!(
+            "{}: nothing says its filter array, and its photosites see unlike: those of each 2x2 have {} of their mean; for frames \
+             without filters it is monochrome",
+            head.name,
+            shares.join(", ")
+        );
+        return Err(Error::Usage(problem).give(&["cfa"]));
+    }
+    Ok(())
+}
+
+/// What codes look like that is not said of them: shifted, or ending below the code that is said to be the largest.
+pub fn doubt_of_codes(list: &str, head: &FrameHeader, groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
+    let shift = surveys.iter().fold(0, |bits, survey| bits | survey.bits).trailing_zeros();
+    let shifted = (shift > 0 && shift < u32::BITS).then(|| {
+        format!(
+            "{list}: all codes are multiples of {}, as those that were shifted left by {shift} bits; numbers in ADU are of such codes, and \
+             the error of rounding is taken as too small: shift them back",
+            1_u32 << shift
+        )
+    });
+    let top = head.metadata.white_level_adu.map(|white| white.largest());
+    let lit = groups.iter().zip(surveys).filter(|(group, _)| group.condition.is_lit);
+    let brightest = lit.flat_map(|(_, survey)| &survey.sites).map(|site| site.mean).fold(0.0, f64::max);
+    let end = (1..16).map(|bits| f64::from(bits).exp2() - 1.0).find(|end| (end - brightest).abs() < 0.01);
+    let ended = end.zip(top).filter(|(end, top)| end < top).map(|(end, top)| {
+        format!("{list}: the brightest flats are of the code {end} alone; that is the largest then, and not {top}, which is said to be")
+    });
+    shifted.into_iter().chain(ended).map(Note::Warning).collect()
+}
+
+/// Frames of one light whose means differ by more than this share were taken under several.
+const SAME_LIGHT: f64 = 0.1;
+
+/// Makes sure that means of frames are those of one light.
+///
+/// # Errors
+///
+/// [`Error::Data`].
+pub fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Result<()> {
+    let [least, most] =
+        [means.iter().copied().fold(f64::INFINITY, f64::min), means.iter().copied().fold(0.0, f64::max)];
+    // Of codes near the black level a tenth is little light.
+    let scale = top.map_or(most, |top| most.max(top / 10.0));
+    if most - least > SAME_LIGHT * scale {
+        let at = |wanted: f64| {
+            means.iter().position(|mean| *mean == wanted).map_or(Path::new("?"), |index| &group.files[index])
+        };
+        let (first, second) = (at(least).display(), at(most).display());
+        return Err(Error::Data(if group.condition.is_lit {
+            format!(
+                "{first} and {second} are taken to be of one light and exposure, and their means are {least:.4} and {most:.4}; tell \
+                 exposures apart in a list, by `exposure_s`, and levels of light by `photons` or `level`"
+            )
+        } else {
+            format!(
+                "{first} and {second} are taken to be darks of one exposure, and their means are {least:.4} and {most:.4}; one saw \
+                 light, or their times differ, which `exposure_s` of a list tells"
+            )
+        }));
+    }
+    Ok(())
+}

@@ -1,0 +1,293 @@
+//! A camera measured from flats and darks.
+
+mod checks;
+mod conditions;
+
+use super::described::Described;
+use super::notes::Note;
+use super::values;
+use crate::analysis::photon_transfer::{
+    ClassFindings, Condition, Level, PatternView, Settings, Site, SiteSurvey, Survey, left_in_mean, of_class,
+    pattern_view, survey,
+};
+use crate::cfa::FilterArray;
+use crate::error::{Error, Result};
+use crate::formats::frame_list::{self, FrameList};
+use crate::formats::many::OneOfMany;
+use crate::metadata::FrameHeader;
+use crate::text::counted;
+use crate::units::QuantityKind;
+use checks::{check_alike, check_apart, check_array, check_same_light, doubt_of_codes};
+use clap::Args;
+use conditions::{Group, grouped, head_of, in_folder, options};
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+/// Flats and darks, and what is asked of them.
+#[derive(Debug, Clone, Args)]
+pub struct PhotonTransfer {
+    /// List of flats and darks: a table with the columns file, kind (flat or dark), exposure_s, photons, temperature_k, level; the same
+    /// as YAML; an EMVA 1288 descriptor; or a directory of frames that say all that themselves
+    #[arg(value_name = "LIST")]
+    pub list: PathBuf,
+    /// Filter array of frames that do not say: rggb, bggr, grbg, gbrg, monochrome, or its period as 4x4:RRGGRRGGGGBBGGBB
+    #[arg(long, value_name = "PATTERN", value_parser = str::parse::<FilterArray>)]
+    pub cfa: Option<FilterArray>,
+    /// The largest code, where frames do not say
+    #[arg(long = "white", value_name = "N", value_parser = values::number)]
+    pub white_level_adu: Option<f64>,
+    /// Probability that an interval holds its number
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = values::fraction)]
+    pub confidence: f64,
+    /// Relative standard uncertainty of the numbers of photons, all alike, as that of the radiometer
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0, value_parser = values::number)]
+    pub photon_error: f64,
+}
+
+/// What was measured.
+#[derive(Debug, Clone)]
+pub struct MeasuredCamera {
+    /// What the list was called.
+    pub list: String,
+    /// The frame that the others are like.
+    pub head: FrameHeader,
+    /// Each class of photosites, or each plane.
+    pub classes: Vec<ClassFindings>,
+    /// What the patterns of each look like, under light and in the dark.
+    pub patterns: Vec<[Option<PatternView>; 2]>,
+    /// Frames that counted, flats and darks.
+    pub frames: [usize; 2],
+    /// The probability that an interval holds its number.
+    pub confidence: f64,
+    /// Temperature of the sensor in K, where it is known.
+    pub temperature_k: Option<f64>,
+    /// What came up.
+    pub notes: Vec<Note>,
+}
+
+impl PhotonTransfer {
+    /// Reads all frames and measures the camera, with what only a figure shows where it `draws`.
+    ///
+    /// # Errors
+    ///
+    /// Those of the list and of the frames; [`Error::Data`] for frames that are no measurement.
+    pub fn run(&self, draws: bool) -> Result<MeasuredCamera> {
+        if !(0.0..1.0).contains(&self.photon_error) {
+            return Err(
+                Error::Usage("an uncertainty is a fraction: 0 or more, and below 1".into()).change(&["photon_error"])
+            );
+        }
+        if self.confidence >= 1.0 {
+            return Err(Error::Usage("no interval holds its number for certain".into()).change(&["confidence"]));
+        }
+        if self.white_level_adu.is_some_and(|white| white <= 0.0) {
+            return Err(Error::Usage("the largest code is above 0".into()).change(&["white"]));
+        }
+        let list_name = self.list.display().to_string();
+        let is_folder = self.list.is_dir();
+        let FrameList { frames, white_level_adu } = if is_folder {
+            FrameList { frames: in_folder(&self.list)?, white_level_adu: None }
+        } else {
+            frame_list::read(&self.list)?
+        };
+        let white_level_adu = self.white_level_adu.or(white_level_adu);
+        let described = Described { cfa: self.cfa, white_level_adu, ..Described::default() };
+        let heads = frames.par_iter().map(|frame| head_of(frame, &described)).collect::<Result<Vec<_>>>()?;
+        let Some(first) = heads.first() else {
+            return Err(Error::format(&list_name, "it holds no frames"));
+        };
+        let first = &first.header;
+        for head in &heads {
+            check_alike(first, &head.header)?;
+        }
+        let (groups, mut notes) = grouped(&list_name, &frames, &heads)?;
+        notes.extend(check_apart(&heads)?.map(Note::Warning));
+        if groups.iter().all(|group| !group.condition.is_lit) {
+            return Err(Error::Data(format!("{list_name}: it has no two flats of one light and exposure")));
+        }
+        let top = first.metadata.white_level_adu.map(|white| white.largest());
+        let are_codes = first.metadata.quantity != QuantityKind::Electrons;
+        if top.is_none() && are_codes {
+            notes.push(Note::Warning(format!(
+                "{list_name}: the largest code is not known, so that clipped levels are told by their variance alone; give --white"
+            )));
+        }
+        let stacks = stacks(&groups);
+        let surveys = groups.par_iter().enumerate().with_max_len(1);
+        let surveys = surveys.map(|(place, group)| survey_of(group, &described, top, stacks.contains(&place)));
+        let mut surveys = surveys.collect::<Result<Vec<_>>>()?;
+        check_array(first, &groups, &surveys)?;
+        notes.extend(doubt_of_codes(&list_name, first, &groups, &surveys));
+        let settings = Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes };
+        let temperature_k = main_temperature(&groups);
+        let classes = classes(first, &groups, &surveys, temperature_k, &settings);
+        for place in classes.iter().flat_map(|class| class.stacks).flatten().map(|(place, _)| place) {
+            if surveys[place].picture.is_none() {
+                surveys[place] = survey_of(&groups[place], &described, top, true)?;
+            }
+        }
+        let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys, draws)).collect();
+        for class in &classes {
+            if let Some(efficiency) = class.get("quantum_efficiency").filter(|efficiency| efficiency.low > 1.0) {
+                notes.push(Note::Warning(format!(
+                    "{}: a quantum efficiency of {:.0} % cannot be: photons are those of a photosite during the exposure, and codes \
+                     proportional to light",
+                    class.name,
+                    efficiency.value * 100.0
+                )));
+            }
+            notes.extend(class.doubts.iter().map(|doubt| Note::Warning(format!("{}: {doubt}", class.name))));
+            notes.extend(class.notes.iter().map(|note| Note::Remark(format!("{}: {note}", class.name))));
+        }
+        let count = |is_lit: bool| {
+            groups.iter().filter(|group| group.condition.is_lit == is_lit).map(|group| group.files.len()).sum()
+        };
+        Ok(MeasuredCamera {
+            list: list_name,
+            head: first.clone(),
+            classes,
+            patterns,
+            frames: [count(true), count(false)],
+            confidence: self.confidence,
+            temperature_k,
+            notes,
+        })
+    }
+}
+
+/// Reads the frames of a condition.
+fn survey_of(group: &Group, described: &Described, top: Option<f64>, keeps: bool) -> Result<Survey> {
+    /// Files that other groups may have open meanwhile.
+    const OTHERS: usize = 64;
+    let mut frames = OneOfMany::open_all(group.files.iter().map(|file| options(file)).collect(), OTHERS)?;
+    for frame in &mut frames {
+        described.apply(frame.header_mut())?;
+    }
+    let found = survey(&mut frames, top, keeps)?;
+    for site in &found.sites {
+        if let Some((frame, mean)) =
+            site.frame_means.iter().enumerate().find(|(_, mean)| top.is_some_and(|top| **mean > top))
+        {
+            let (file, top) = (group.files[frame].display(), top.unwrap_or_default());
+            let problem = format!("{file}: its mean is {mean:.1}, above the largest code, {top}; name the right one");
+            return Err(Error::Usage(problem).change(&["white"]));
+        }
+        check_same_light(group, &site.frame_means, top)?;
+    }
+    let within = |mean: f64| mean > 0.0 && top.is_none_or(|top| mean < top);
+    let is_same = |site: &SiteSurvey| site.variance == 0.0 && within(site.mean) && site.spatial.rest.value > 0.0;
+    if found.sites.iter().all(is_same) {
+        let problem =
+            format!("{} and {}: their samples are the same", group.files[0].display(), group.files[1].display());
+        return Err(Error::Data(problem + "; copies of one exposure do not count as two"));
+    }
+    Ok(found)
+}
+
+/// The conditions of the most frames, one with light and one without, where they are alone in that.
+fn stacks(groups: &[Group]) -> Vec<usize> {
+    let of_kind = |is_lit: bool| {
+        let own = || groups.iter().enumerate().filter(move |(_, group)| group.condition.is_lit == is_lit);
+        let most = own().map(|(_, group)| group.files.len()).max()?;
+        let mut with_most = own().filter(move |(_, group)| group.files.len() == most).map(|(place, _)| place);
+        with_most.next().filter(|_| with_most.next().is_none())
+    };
+    [true, false].into_iter().filter_map(of_kind).collect()
+}
+
+/// What the patterns of a class look like: that of light, a share of the signal, and that of the dark, in samples.
+fn patterns(head: &FrameHeader, class: &ClassFindings, surveys: &[Survey], draws: bool) -> [Option<PatternView>; 2] {
+    let sites = Site::of(head);
+    let own: Vec<&Site> = sites.iter().filter(|site| site.class == class.name).collect();
+    let size = [head.geometry.width, head.geometry.channels.len()];
+    let picture = |stack: usize| {
+        let (place, signal) = class.stacks[stack]?;
+        surveys[place].picture.as_deref().map(|picture| (picture, signal))
+    };
+    // Temporal noise of rows and columns that is left in the means is no pattern.
+    let left = |stack: usize| {
+        let (place, _) = class.stacks[stack]?;
+        let own = sites.iter().zip(&surveys[place].sites).filter(|(site, _)| site.class == class.name);
+        let level = Level::of(place, Condition::default(), own.map(|(_, survey)| survey.clone()).collect());
+        (level.frames >= 2).then(|| left_in_mean(&level))
+    };
+    let [of_flat, of_dark] = [0, 1].map(|stack| left(stack).unwrap_or_default());
+    let without = |mut view: PatternView, left: [f64; 2]| {
+        view.lines.iter_mut().zip(left).for_each(|([variance, _], left)| *variance -= left);
+        view
+    };
+    let of_dark_alone = || {
+        let (dark, _) = picture(1)?;
+        let view = pattern_view(&own, size, &|index| f64::from(dark[index]), draws)?;
+        Some(without(view, of_dark))
+    };
+    let of_light = || {
+        let ((flat, signal), (dark, _)) = picture(0).zip(picture(1))?;
+        let share = |index: usize| (f64::from(flat[index]) - f64::from(dark[index])) / signal;
+        let view = pattern_view(&own, size, &share, draws)?;
+        Some(without(view, [0, 1].map(|axis| (of_flat[axis] + of_dark[axis]) / (signal * signal))))
+    };
+    let (light, dark) = rayon::join(of_light, of_dark_alone);
+    [light, dark]
+}
+
+/// The temperature at which most flats were taken.
+fn main_temperature(groups: &[Group]) -> Option<f64> {
+    let lit = || groups.iter().filter(|group| group.condition.is_lit);
+    let count = |wanted: f64| lit().filter(|group| group.condition.temperature_k == Some(wanted)).count();
+    lit().filter_map(|group| group.condition.temperature_k).max_by_key(|temperature| count(*temperature))
+}
+
+/// What is measured of each class.
+fn classes(
+    head: &FrameHeader,
+    groups: &[Group],
+    surveys: &[Survey],
+    temperature_k: Option<f64>,
+    settings: &Settings,
+) -> Vec<ClassFindings> {
+    let sites = Site::of(head);
+    let mut names: Vec<&str> = Vec::new();
+    for site in &sites {
+        if !names.contains(&site.class.as_str()) {
+            names.push(&site.class);
+        }
+    }
+    let level = |name: &str, index: usize| {
+        let own = sites.iter().zip(&surveys[index].sites).filter(|(site, _)| site.class == name);
+        Level::of(index, groups[index].condition, own.map(|(_, survey)| survey.clone()).collect())
+    };
+    let light = |level: &Level| {
+        let Condition { photons, exposure_s, .. } = level.condition;
+        [photons.or(exposure_s).unwrap_or(0.0), level.mean]
+    };
+    let by_photons =
+        groups.iter().filter(|group| group.condition.is_lit).all(|group| group.condition.photons.is_some());
+    let of = |name: &&str| {
+        let of_kind = |is_lit: bool| -> Vec<Level> {
+            let wanted = |index: &usize| {
+                let condition = &groups[*index].condition;
+                condition.is_lit == is_lit
+                    && (condition.temperature_k == temperature_k || condition.temperature_k.is_none())
+            };
+            (0..groups.len()).filter(wanted).map(|index| level(name, index)).collect()
+        };
+        let [mut flats, darks] = [of_kind(true), of_kind(false)];
+        flats.sort_by(|a, b| {
+            let ([light_a, mean_a], [light_b, mean_b]) = (light(a), light(b));
+            let by_light = if by_photons { light_a.total_cmp(&light_b) } else { std::cmp::Ordering::Equal };
+            by_light.then(mean_a.total_cmp(&mean_b))
+        });
+        let all: Vec<Level> = (0..groups.len())
+            .filter(|&index| !groups[index].condition.is_lit)
+            .map(|index| level(name, index))
+            .collect();
+        of_class(name, &flats, &darks, &all, settings)
+    };
+    names.par_iter().map(of).collect()
+}
+
+/// What a report calls the number of frames.
+pub fn frames_in_words([flats, darks]: [usize; 2]) -> String {
+    format!("{} and {}", counted(flats as u64, "flats"), counted(darks as u64, "darks"))
+}
