@@ -5,6 +5,7 @@ use super::expectation::{Expectation, Predicted};
 use super::grids::Array;
 use super::levels::Levels;
 use super::region::Region;
+use super::repeated_check;
 use super::report::{ChannelReport, RegionReport};
 use super::tally::Tally;
 use crate::cfa::Class;
@@ -139,14 +140,14 @@ impl<'a> Assessment<'a> {
 
     /// Tests of means over frames.
     pub fn tests_of_means(&self) -> Vec<Test> {
-        self.groups().flat_map(|group| group.tested(check::tests_of_means)).collect()
+        self.groups().flat_map(|group| group.tested(repeated_check::tests_of_means)).collect()
     }
 
     /// Tests of what is drawn anew in so many frames, whose own means have variances: of all channels, and of each class.
     pub fn tests_over_frames(&self, variances_of_means: &[Vec<f64>], frames: u32) -> Vec<Test> {
         let groups = self.groups().zip(variances_of_means);
         let of_group = |(group, variances): (&Group<'_>, &Vec<f64>)| {
-            group.tested(|measured, expected| check::tests_over_frames(measured, variances, expected, frames))
+            group.tested(|measured, expected| repeated_check::tests_over_frames(measured, variances, expected, frames))
         };
         groups.flat_map(of_group).collect()
     }

@@ -34,7 +34,7 @@ pub enum Subject {
 
 impl Subject {
     /// The same of means over frames.
-    fn of_means(self) -> Self {
+    pub(super) fn of_means(self) -> Self {
         match self {
             Self::Variance => Self::VarianceOfMeans,
             Self::Correlation => Self::CorrelationOfMeans,
@@ -195,7 +195,7 @@ impl Expected {
     }
 
     /// The least variance of a photosite.
-    fn least_variance(&self) -> f64 {
+    pub(super) fn least_variance(&self) -> f64 {
         self.site_variances.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
@@ -242,7 +242,7 @@ impl Expected {
 
     /// What rounding may take a sample of a channel off by: pixels that are made of several samples are rounded as the largest of
     /// them is, by up to 30 · 2⁻²⁴ of it and more where a matrix follows.
-    fn rounding(&self, channel: usize) -> f64 {
+    pub(super) fn rounding(&self, channel: usize) -> f64 {
         if self.is_plane {
             return rounding(self.mean[channel]);
         }
@@ -251,14 +251,14 @@ impl Expected {
 }
 
 /// Fewer samples off their usual step than this make sums that are no normal deviates.
-const RARE: f64 = 25.0;
+pub(super) const RARE: f64 = 25.0;
 
 /// Fewer effective degrees of freedom than this, and a variance follows no χ² well enough: the inequality of Chebyshev holds
 /// of any law.
-const FEW: f64 = 12.0;
+pub(super) const FEW: f64 = 12.0;
 
 /// Excess kurtosis below which a law has hardly more than two values, and a sample variance is a function of the mean.
-const FLAT: f64 = -1.0;
+pub(super) const FLAT: f64 = -1.0;
 
 /// Channels that are correlated more closely than this are functions of each other: nothing is left to chance.
 const TIED: f64 = 1.0 - 1e-9;
@@ -306,45 +306,6 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     found
 }
 
-/// Tests the means over frames of pixels.
-pub(super) fn tests_of_means(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
-    let tests = tests(measured, expected);
-    tests.into_iter().map(|test| Test { subject: test.subject.of_means(), ..test }).collect()
-}
-
-/// Tests what is drawn anew in each of so many frames: variances and correlations of the channels `0..count` within frames, whose
-/// scatter `expected` has, and the variances of the means of frames.
-pub(super) fn tests_over_frames(
-    measured: &Measured<'_>,
-    variances_of_means: &[f64],
-    expected: &Expected,
-    frames: u32,
-) -> Vec<Test> {
-    let sampling = &expected.sampling;
-    let (channels, freedom) = (measured.names.len(), f64::from(frames) - 1.0);
-    // Sums over few samples off their usual step are like no normal law.
-    let is_rare = |i: usize| {
-        let site = if expected.is_plane { expected.site_variances[i] } else { expected.least_variance() };
-        sampling.count * freedom * site < RARE || sampling.covariance[(i, i)].max(0.0).sqrt() <= expected.rounding(i)
-    };
-    let mut found = Vec::new();
-    for i in (0..channels).filter(|i| !is_rare(*i)) {
-        if sampling.count > 1.0 {
-            found.push(temporal_variance(measured, expected, i, freedom));
-        }
-        if sampling.count * expected.least_variance() >= RARE {
-            found.push(variance_of_frame_means(measured, expected, i, variances_of_means[i], freedom));
-        }
-    }
-    for (index, [i, j]) in PAIRS.into_iter().enumerate() {
-        if i != j && j < channels && ![i, j].into_iter().any(is_rare) && sampling.count >= 4.0 {
-            let test = correlation(measured, sampling, index);
-            found.extend(test.map(|test| Test { subject: Subject::TemporalCorrelation, ..test }));
-        }
-    }
-    found
-}
-
 /// What rounding to single precision may take a sample of this mean off by, with some room.
 pub(super) fn rounding(mean: f64) -> f64 {
     4.0 * f64::from(f32::EPSILON) * mean.abs()
@@ -377,14 +338,14 @@ fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
 }
 
 /// The bound of Chebyshev, 1/z².
-fn of_any_law(z: f64) -> f64 {
+pub(super) fn of_any_law(z: f64) -> f64 {
     (1.0 / (z * z)).min(1.0)
 }
 
 /// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946]. Where ν is small, or
 /// samples have two values, the probability is Chebyshev's bound, var s²/(s² − E s²)². Of independent samples with tails
 /// heavier than normal ones the law has the third cumulant that theirs give.
-fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
+pub(super) fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
     let expected = law.sampling.covariance[(i, i)];
     let pair = pair([i, i]);
     let scatter = law.sampling.spread[pair][pair];
@@ -417,56 +378,12 @@ fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
     }
 }
 
-/// The same of what N frames make of it, of which each degree of freedom of the frames is as good as a frame: what rows and columns
-/// share makes the law skewer by 1/(N − 1)² of its third cumulant.
-fn temporal_variance(measured: &Measured<'_>, law: &Expected, i: usize, frames: f64) -> Test {
-    let test = variance(measured, law, i);
-    let scatter = law.sampling.spread[pair([i, i])][pair([i, i])];
-    let (z, freedom) = (test.z.unwrap_or_default(), test.degrees_of_freedom.unwrap_or_default());
-    let thirds = law.sampling.variance_thirds.map(|thirds| thirds[i] / (frames * frames));
-    let p = match thirds {
-        _ if freedom < FEW || law.site_kurtosis[i] < FLAT => of_any_law(z),
-        Some(third) => significance::of_sum_of_squares(test.measured, [test.expected, scatter, third]),
-        None => significance::of_chi_square(freedom * test.measured / test.expected, freedom),
-    };
-    Test { subject: Subject::TemporalVariance, p, ..test }
-}
-
-/// The variance of the means of frames is like χ². Sums of codes are whole numbers, so that means which differ by less may be equal: if
-/// each is off by half a step at most, the root of their variance is off by √(N/(N − 1)) of that at most, and so far it may be
-/// larger.
-fn variance_of_frame_means(measured: &Measured<'_>, expected: &Expected, i: usize, found: f64, freedom: f64) -> Test {
-    let law = expected.sampling.mean_covariance[(i, i)];
-    // Half a step of a sum of n photosites to its standard deviation, one of which has a variance in steps².
-    let (site, count) = match expected.is_plane {
-        true => (expected.sampling.count * law, expected.sampling.count),
-        false => (expected.least_variance(), expected.sampling.count / 4.0),
-    };
-    let half_step = 0.5 / (count * site).sqrt() * (1.0 + 1.0 / freedom).sqrt();
-    let ratio = found / law;
-    let p = if ratio > 1.0 {
-        significance::of_chi_square(freedom * ratio, freedom)
-    } else {
-        let most = (ratio.sqrt() + half_step).powi(2);
-        if most < 1.0 { significance::of_chi_square(freedom * most, freedom) } else { 1.0 }
-    };
-    Test {
-        subject: Subject::VarianceOfFrameMeans,
-        channels: vec![measured.names[i].clone()],
-        measured: found,
-        expected: law,
-        z: Some((ratio - 1.0) * (freedom / 2.0).sqrt()),
-        degrees_of_freedom: Some(freedom),
-        p,
-    }
-}
-
 /// artanh r about artanh ρ + ρ/2ν, with variance 1/(ν − 2), as of ν + 1 independent normal pairs \[Fisher1921].
 ///
 /// The effective ν makes 1/ν the variance to first order: r = s_ij/√(s_ii s_jj) varies as its differential does,
 /// dr = ds_ij/√(s_ii s_jj) − ½ r (ds_ii/s_ii + ds_jj/s_jj), and artanh r by dr/(1 − ρ²). None of channels that are functions
 /// of each other, nor where ν is too small for the law of the transformed correlation to be normal.
-fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Option<Test> {
+pub(super) fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Option<Test> {
     let [i, j] = PAIRS[index];
     let correlation = |c: &Matrix3<f64>| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
     let (found, expected) = (correlation(&measured.covariance), correlation(&sampling.covariance));
