@@ -19,7 +19,8 @@ pub enum Combine {
     Mean,
     /// Their median; of an even number the mean of the two in the middle.
     Median,
-    /// The mean of those that lie within some standard deviations of the median, again and again until none is left out.
+    /// The mean of those that lie within some standard deviations of the median, or at that limit, again and again until none is
+    /// left out.
     Clipped,
 }
 
@@ -39,6 +40,9 @@ serde_by_name!(Combine);
 
 /// Standard deviations beyond which samples are clipped unless another number is given.
 pub const CLIP: f64 = 3.0;
+
+/// The limit beside which a sample still lies at it: codes may lie there exactly, and the standard deviation is rounded.
+const AT_LIMIT: f64 = 1.0 + 1e-12;
 
 /// What is left of the noise of samples in their average.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -241,7 +245,7 @@ fn clipped(samples: &mut [f32], clip: f64) -> (f64, std::ops::Range<usize>) {
             return (mean, kept);
         }
         let variance = left.iter().map(|sample| (f64::from(*sample) - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        let (center, reach) = (middle(left), clip * variance.sqrt());
+        let (center, reach) = (middle(left), clip * variance.sqrt() * AT_LIMIT);
         let is_near = |sample: f32| (f64::from(sample) - center).abs() <= reach;
         let first = left.iter().position(|sample| is_near(*sample));
         let last = left.iter().rposition(|sample| is_near(*sample));
@@ -316,5 +320,18 @@ mod tests {
         assert_eq!(average(Combine::Clipped, &mut samples, 2.5), (2.0, 2));
         assert!(average(Combine::Clipped, &mut [1.0, f32::NAN, 2.0], 2.5).0.is_nan());
         assert_eq!(average(Combine::Clipped, &mut [7.0; 5], 2.5), (7.0, 0));
+    }
+
+    /// Six codes and three of the next have s = ½ exactly, so that two standard deviations reach the next code, wherever the codes
+    /// lie: mean 129⅓, squares 6/9 + 3·4/9 = 2, over 8.
+    #[test]
+    fn what_lies_at_the_limit_stays() {
+        for low in [0_u16, 1, 3, 129, 130, 4095, 65_000] {
+            let mut samples = [f32::from(low); 9];
+            samples[..3].fill(f32::from(low) + 1.0);
+            let (mean, clipped) = average(Combine::Clipped, &mut samples, 2.0);
+            assert!(clipped == 0 && (mean - f64::from(low) - 1.0 / 3.0).abs() < 1e-10, "{low}: {mean}, {clipped}");
+            assert_eq!(average(Combine::Clipped, &mut samples, 1.999_999).1, 3, "{low}");
+        }
     }
 }

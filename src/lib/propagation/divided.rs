@@ -97,12 +97,13 @@ impl Photosite {
         let off = of_both + first * first * (of_flat - scale * scale);
         let prediction = Prediction::of_cumulants(mean, variance, third * scale.powi(3), 0.0);
         let (anew, unlike) = unlike.found();
-        let unlike = Unlike { spread: unlike.spread + of_flat_noise / weight, ..unlike };
+        let unlike = Unlike { spread: unlike.spread + of_flat_noise / weight, of_means: None, ..unlike };
         let square = scale * scale;
         let temporal = Temporal {
             variance: anew * square,
             rounding: rounding / weight * square,
             unlike: Some(unlike.scaled(scale)),
+            single: [0.0; 2],
             lines: LineCovariance::default(),
         };
         Some((Prediction { common: off / flat.photosites[class].max(1.0), ..prediction }, temporal))

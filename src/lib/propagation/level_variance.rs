@@ -13,6 +13,8 @@ use rayon::prelude::*;
 pub(super) struct LevelVariance {
     step: f64,
     values: Vec<f64>,
+    /// The level below which an average hangs on where in a code it lies, which no level of a pixel tells.
+    told_from: f64,
 }
 
 const STEPS: usize = 1024;
@@ -60,7 +62,22 @@ impl LevelVariance {
             let one = one(expected_e);
             average.map_or(one, |record| photosite.variance_of_average(class, expected_e, one, record))
         };
-        Self { step, values: (0..=steps).into_par_iter().map(variance).collect() }
+        let is_by_code = |index: &usize| {
+            let expected_e = photosite.expected_at(*index as f64 * step);
+            let is_by_code = |record| photosite.is_average_by_code(expected_e, record);
+            average.is_some_and(is_by_code) && !photosite.is_spread_over_codes(expected_e)
+        };
+        let told_from = match (0..=steps).rev().find(is_by_code) {
+            Some(last) if last == steps => f64::INFINITY,
+            Some(last) => (last + 1) as f64 * step,
+            None => f64::NEG_INFINITY,
+        };
+        Self { step, values: (0..=steps).into_par_iter().map(variance).collect(), told_from }
+    }
+
+    /// The level from which on they are known.
+    pub fn told_from(&self) -> f64 {
+        self.told_from
     }
 
     /// The variance at a level; below zero as at zero, beyond the last as there.

@@ -135,7 +135,7 @@ pub(super) struct Nonlocal {
     pub products: [[f64; 6]; 6],
     /// Of row sums, in both orders.
     pub row_products: [[f64; 6]; 6],
-    /// Σ λ, Σ λ² and Σ λ³ of what rows share, and columns, for each channel; less the mean.
+    /// Σ λ, Σ λ² and Σ λ³ of what rows share, and columns, for each channel, as the mean leaves them.
     pub powers: [[[f64; 3]; 3]; 2],
 }
 
@@ -148,7 +148,31 @@ struct AxisSums {
     by_parity: [[[[Matrix3<f64>; 2]; 2]; 2]; 2],
     /// Σ over lines of parity q of the row sums of pixels of parity p: `[p][q]`.
     row_sums: [[Matrix3<f64>; 2]; 2],
-    powers: [[f64; 3]; 3],
+    powers: [Powers; 3],
+}
+
+/// Sums over the pixels of a place of what one channel of them shares, r = C1 its row sums.
+#[derive(Debug, Clone, Copy, Default)]
+struct Powers {
+    /// tr C, tr C² and tr C³.
+    traces: [f64; 3],
+    /// r·r and r·Cr.
+    of_row_sums: [f64; 2],
+}
+
+impl Powers {
+    /// tr (PC)ᵏ, P the projection that takes the mean of so many pixels off.
+    fn projected(&self, total: f64, count: f64) -> [f64; 3] {
+        let [one, two, three] = self.traces;
+        let [square, cube] = self.of_row_sums;
+        let mean = total / count;
+        let found = [
+            one - mean,
+            two - 2.0 * square / count + mean * mean,
+            three - 3.0 * cube / count + 3.0 * mean * square / count - mean.powi(3),
+        ];
+        found.map(|power| power.max(0.0))
+    }
 }
 
 impl AxisSums {
@@ -169,13 +193,6 @@ impl AxisSums {
             small.size[across] = extent;
             sums.add(share, &Shared::of(weights, covariance, axis, &small, place.size[axis]));
         }
-        let count = (place.size[0] * place.size[1]) as f64;
-        for (channel, powers) in sums.powers.iter_mut().enumerate() {
-            let of_mean = sums.total[(channel, channel)] / count;
-            for (power, exponent) in powers.iter_mut().zip(1..) {
-                *power = (*power - of_mean.powi(exponent)).max(0.0);
-            }
-        }
         sums
     }
 
@@ -184,30 +201,44 @@ impl AxisSums {
         for t in 0..shared.profiles.len() {
             for p in 0..2 {
                 let mut row_sum = Matrix3::zeros();
-                let mut near = Vec::new();
                 for u in shared.near(t) {
                     for q in 0..2 {
                         let c = shared.covariance([p, t], [q, u]);
                         row_sum += n[q] * c;
                         add_products(&mut self.products, &c, share * n[p] * n[q]);
                         self.by_parity[p][q][t % 2][u % 2] += share * c;
-                        near.push(([q, u], c.diagonal()));
                     }
                 }
                 self.total += share * n[p] * row_sum;
                 self.row_sums[p][t % 2] += share * row_sum;
                 add_products(&mut self.row_products, &row_sum, share * n[p]);
                 add_products(&mut self.row_products, &row_sum.transpose(), share * n[p]);
-                for i in 0..3 {
-                    for (at, one) in &near {
-                        self.powers[i][0] += if *at == [p, t] { share * n[p] * one[i] } else { 0.0 };
-                        self.powers[i][1] += share * n[p] * n[at[0]] * one[i] * one[i];
-                        for (other, two) in &near {
-                            let third = shared.variance_of(i, *at, *other);
-                            self.powers[i][2] += share * n[p] * n[at[0]] * n[other[0]] * one[i] * third * two[i];
-                        }
-                    }
-                }
+            }
+        }
+        for channel in 0..3 {
+            self.add_powers(share, shared, channel);
+        }
+    }
+
+    fn add_powers(&mut self, share: f64, shared: &Shared, channel: usize) {
+        let lines = || (0..shared.profiles.len()).flat_map(|t| [[0, t], [1, t]]);
+        let covariance = |a: [usize; 2], b: [usize; 2]| shared.variance_of(channel, a, b);
+        let near = |t: usize| shared.near(t).flat_map(|u| [[0, u], [1, u]]);
+        let count = |[p, _]: [usize; 2]| shared.counts[p];
+        let row_sum = |a: [usize; 2]| near(a[1]).map(|b| count(b) * covariance(a, b)).sum::<f64>();
+        let row_sums: Vec<f64> = lines().map(row_sum).collect();
+        let of_row = |[p, t]: [usize; 2]| row_sums[2 * t + p];
+        let Powers { traces, of_row_sums } = &mut self.powers[channel];
+        for a in lines() {
+            let weight = share * count(a);
+            let others: Vec<([usize; 2], f64)> = near(a[1]).map(|b| (b, covariance(a, b))).collect();
+            traces[0] += weight * covariance(a, a);
+            of_row_sums[0] += weight * of_row(a) * of_row(a);
+            for (b, one) in &others {
+                let weight = weight * count(*b) * one;
+                traces[1] += weight * one;
+                of_row_sums[1] += weight * of_row(a) * of_row(*b);
+                traces[2] += others.iter().map(|(c, two)| weight * count(*c) * covariance(*b, *c) * two).sum::<f64>();
             }
         }
     }
@@ -238,11 +269,13 @@ impl Nonlocal {
     /// Of the pixels of a place.
     pub fn of(weights: &Weights, sites: &SiteCovariance, place: &Place) -> Self {
         let [rows, columns] = [0, 1].map(|axis| AxisSums::of(weights, sites.lines()[axis], axis, place));
+        let pixels = (place.size[0] * place.size[1]) as f64;
+        let powers = |sums: &AxisSums| [0, 1, 2].map(|i| sums.powers[i].projected(sums.total[(i, i)], pixels));
         let mut found = Self {
             total: rows.total + columns.total,
             products: sum_of(&rows.products, &columns.products),
             row_products: sum_of(&rows.row_products, &columns.row_products),
-            powers: [rows.powers, columns.powers],
+            powers: [powers(&rows), powers(&columns)],
         };
         for p in 0..2 {
             for q in 0..2 {
@@ -261,14 +294,21 @@ impl Nonlocal {
     }
 
     /// Third cumulant of the quadratic form Σ (x − x̄)² of a channel, of which what is each photosite's own makes up `own`,
-    /// Σ λ and Σ λ², and the sum of all pixels `own_total`: Σ 8 λ³, the eigenvalues of what is shared each with what is a
-    /// pixel's own, those of the latter as of χ².
-    pub fn third(&self, channel: usize, own: [f64; 2], own_total: f64, count: f64) -> f64 {
+    /// Σ λ and Σ λ², and `cross` is tr PDPC of that and of what is shared: 8 Σ λ³, what is shared with as much beside it of a pixel's
+    /// own as these two traces tell, and of what is own as of χ².
+    pub fn third(&self, channel: usize, own: [f64; 2], cross: f64) -> f64 {
         let of_own = if own[0] > 0.0 { own[1] * own[1] / own[0] } else { 0.0 };
-        let beside = own_total / count;
-        let shared = self.powers.iter().map(|powers| powers[channel]);
-        let of_shared = shared.map(|[one, two, three]| three + 3.0 * beside * (two + beside * one)).sum::<f64>();
+        let shared = || self.powers.iter().map(|powers| powers[channel]);
+        let all: f64 = shared().map(|[one, ..]| one).sum();
+        let beside = if all > 0.0 { cross.max(0.0) / all } else { 0.0 };
+        let of_shared = shared().map(|[one, two, three]| three + 3.0 * beside * (two + beside * one)).sum::<f64>();
         8.0 * (of_own + of_shared)
+    }
+
+    /// tr (PC)² of what is shared, of a channel and its pair in [`PAIRS`].
+    pub fn square(&self, channel: usize, pair: usize, count: f64) -> f64 {
+        let total = self.total[(channel, channel)];
+        0.5 * (self.products[pair][pair] - self.row_products[pair][pair] / count) + (total / count).powi(2)
     }
 }
 

@@ -435,7 +435,7 @@ pub(super) fn blur_e(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> f6
 
 /// Standard normal numbers and their weights for a function that is smooth on the scale of `blur` of what they are times
 /// `spread`.
-fn nodes(spread: f64, blur: f64) -> Vec<(f64, f64)> {
+pub(super) fn nodes(spread: f64, blur: f64) -> Vec<(f64, f64)> {
     /// Steps to the scale: the error of the sum is below e^(−2π²·1.3²).
     const STEPS: f64 = 1.3;
     const REACH: f64 = 6.5;

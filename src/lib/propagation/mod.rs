@@ -32,6 +32,7 @@ pub mod photosite;
 pub mod pixel_moments;
 pub mod pixels;
 mod place;
+mod population;
 mod reading;
 mod record;
 mod rectified;

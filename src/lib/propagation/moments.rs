@@ -73,6 +73,12 @@ impl Prediction {
     pub fn fourth(&self) -> f64 {
         self.excess_kurtosis * self.moments.variance.powi(2)
     }
+
+    /// Fourth cumulant of what is a photosite's own, of such variance: what is shared is as good as normal, and no law has less than
+    /// −2κ₂².
+    pub fn fourth_of_own(&self, variance: f64) -> f64 {
+        self.fourth().max(-2.0 * variance * variance)
+    }
 }
 
 /// Covariances of a photosite with another of class R, G or B in its row, and in its column.

@@ -327,7 +327,8 @@ impl PixelNoise {
     /// propagation holds there.
     ///
     /// Where smooth hue transition divides by a green that is lost in noise, the covariance is that of the hue which
-    /// green would make at its noise, and says only that it is large.
+    /// green would make at its noise, and says only that it is large. Where a median or clipped mean of codes scatters over less than
+    /// a code, it is that of an average over all places in a code.
     pub fn covariance(&self, [x, y]: [usize; 2], rgb: [f64; 3]) -> (Covariance, bool) {
         let kind = self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x);
         let level = rgb.map(|sample| sample - self.black);
@@ -353,12 +354,13 @@ impl PixelNoise {
             }
             covariance
         };
+        let is_told = !(0..3).any(|class| level[class] < self.variances[class].told_from());
         let mut variances = [0, 1, 2].map(|class| self.variances[class].at(level[class]));
         for (index, of_tap) in self.of_taps.iter().flat_map(|taps| taps.at(level)).enumerate() {
             variances[index % 3] = variances[index % 3].max(of_tap);
         }
         if !self.depends_on_hue {
-            return (all(variances, None), true);
+            return (all(variances, None), is_told);
         }
         let green = level[Class::Green as usize];
         let first_order = smooth_hue::FirstOrder::of(level, variances);
@@ -368,7 +370,7 @@ impl PixelNoise {
             let hue = level.max(0.0) / divisor;
             if hue.is_finite() { hue } else { 1.0 }
         });
-        (all(variances, Some(hues)), first_order.holds)
+        (all(variances, Some(hues)), is_told && first_order.holds)
     }
 }
 

@@ -13,20 +13,17 @@
 //! - E s² = E v,  Var s² = 2 E v²/(N − 1) + E k₄/N + Var v
 //!
 //! E v is the whole variance less that of the pattern, exact wherever these are. The other cumulants, which only tell how far
-//! measured variances scatter, are sums over the sensitivities of photosites, of which each is taken to read a normal charge.
+//! measured variances scatter, are sums over photosites and their counts ([`population`](super::population)); so are medians of
+//! codes that scatter over less than a code, or are far from normal.
 
-use super::charge::{charge_at, sensitivities};
-use super::law::Law;
 use super::masters::{Dark, MOST_DARKS, kept};
 use super::moments::{Equations, LineCovariance, Prediction};
 use super::photosite::Photosite;
-use super::reading::{Reading, codes_of};
-use super::unlike::{Temporal, Unlike, UnlikeSums};
+use super::unlike::Temporal;
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::{AdcRecord, AverageRecord, ExposuresRecord, FrameHeader};
 use crate::names::Named;
-use crate::numerics::averages::{CLIP, Kept};
-use crate::numerics::normal::MeanVariance;
+use crate::numerics::averages::{CLIP, Combine, Kept};
 use crate::stages::demosaic::Method;
 use crate::stages::noise::LineNoise;
 use crate::units::QuantityKind;
@@ -38,6 +35,18 @@ const NO_MEANS: &str = "medians and clipped means of exposures whose rows or col
 /// The standard deviation, in codes, of what is drawn anew below which the means of photosites show how codes are rounded: what
 /// that does to their variance is less than e^(−4π²σ²)/2π², 10⁻⁵ of a squared code.
 const VISIBLE: f64 = 0.46;
+
+/// Why nothing is said of clipped means of codes of little noise.
+pub(super) const CLIPPED_BY_CODE: &str = "the noise of its exposures, over few codes, makes what their clipped mean leaves out hang on \
+                                          where in a code the mean of each photosite lies; use `--combine mean`";
+
+/// Why nothing is said of medians of codes of little noise.
+pub(super) const MEDIAN_BY_CODE: &str = "the noise of its exposures, over few codes, makes their median hang on where in a code the mean \
+                                         of each photosite lies, and that is not told; use `--combine mean`";
+
+/// Why nothing is said of averages of what is far from normal.
+const FAR_FROM_NORMAL: &str = "full well or an end of the codes cuts off its exposures, or they hold few electrons, and no formula tells \
+                               what their median or clipped mean keeps; use `--combine mean`";
 
 /// Why nothing is said of averages that were digitized.
 const BEFORE_THE_CONVERTER: &str = "it was averaged as electrons, and digitized then, which no camera does";
@@ -109,53 +118,37 @@ impl Photosite {
     /// The variance of an average of exposures of which one has the variance `one`.
     pub(super) fn variance_of_average(&self, class: usize, expected_e: f64, one: f64, record: &AverageRecord) -> f64 {
         let of_one = Prediction::of_cumulants(0.0, one, 0.0, 0.0);
-        self.temporal(class, expected_e).averaged(&of_one, record).moments.variance
+        self.temporal(class, expected_e, false).averaged(&of_one, record).moments.variance
     }
 
-    /// What is drawn anew in each exposure at photosites of the class R, G or B, what rows and columns share apart.
-    fn temporal(&self, class: usize, expected_e: f64) -> Temporal {
+    /// What is drawn anew in each exposure at photosites of the class R, G or B, what rows and columns share apart; where it is asked,
+    /// how photosites differ.
+    fn temporal(&self, class: usize, expected_e: f64, is_told: bool) -> Temporal {
         if let Some((_, found)) = self.flat.and_then(|_| self.divided_over(class, expected_e)) {
             return found;
         }
         let one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
         let rounding = one.adc.map_or(0.0, |adc| adc.rounding_at(one.model.dark_e + expected_e));
-        let unlike = (!one.has_tails()).then(|| one.unlike(expected_e));
-        let variance = one.temporal_variance(expected_e);
-        Temporal { variance, rounding: rounding.min(variance), unlike, lines: LineCovariance::default() }
+        let unlike = (is_told && !one.has_tails()).then(|| one.unlike(expected_e));
+        let whole = one.moments(expected_e);
+        let variance = one.temporal_variance(expected_e, whole.moments.variance);
+        Temporal {
+            variance,
+            rounding: rounding.min(variance),
+            unlike,
+            single: [whole.third, whole.fourth()],
+            lines: LineCovariance::default(),
+        }
     }
 
     /// E v of samples that nothing came off.
-    fn temporal_variance(&self, expected_e: f64) -> f64 {
-        let whole = self.moments(expected_e).moments.variance;
+    fn temporal_variance(&self, expected_e: f64, whole: f64) -> f64 {
         let shows_codes = |adc: &AdcRecord| Dark::mean_of(self.model, 1).std_codes(adc, expected_e) < VISIBLE;
         let fixed = match self.adc.filter(|_| !self.has_tails() && self.equations == Equations::Exact) {
             Some(adc) if shows_codes(&adc) => self.shared(&adc, (expected_e, None), (self, None), true).light,
             _ => self.fixed_variance(expected_e),
         };
         (whole - fixed).clamp(0.0, whole)
-    }
-
-    fn unlike(&self, expected_e: f64) -> Unlike {
-        let law = Law::of(&self.model, expected_e);
-        let [lights, darks] = [self.model.response(), self.model.dcnu].map(sensitivities);
-        let mut sums = UnlikeSums::default();
-        for (&(x, of_x), &(u, of_u)) in lights.iter().flat_map(|x| darks.iter().map(move |u| (x, u))) {
-            let charge = charge_at(&self.model, expected_e, [x, u]);
-            let MeanVariance { mean, variance } = charge.clipped_above(law.full_well_e);
-            let share = if charge.variance > 0.0 { (variance / charge.variance).sqrt() } else { 0.0 };
-            let (reading, slope) = match self.adc {
-                Some(adc) => (law.of_codes(&adc, codes_of(&adc)), adc.sample_per_e(mean)),
-                None => (law.of_electrons(), 1.0),
-            };
-            let moments = Reading { noise_e: self.model.read_noise(), ..reading }.at(mean, variance);
-            let found = Prediction::about(0.0, &moments);
-            // What counts are skewed by; where they are cut off, less.
-            let shot = charge.scaled(slope * share);
-            let sample =
-                [found.moments.mean, found.moments.variance, found.third + shot.third, found.fourth() + shot.fourth];
-            sums.add(of_x * of_u, sample);
-        }
-        sums.found().1
     }
 }
 
@@ -175,7 +168,7 @@ impl Photosite {
         } else {
             [LineCovariance::default(); 3]
         };
-        Ok([0, 1, 2].map(|k| Temporal { lines: lines[k], ..self.temporal(k, expected_e[k]) }))
+        Ok([0, 1, 2].map(|k| Temporal { lines: lines[k], ..self.temporal(k, expected_e[k], true) }))
     }
 
     /// What an average of exposures keeps of samples of which one exposure has such moments.
@@ -191,6 +184,34 @@ impl Photosite {
     ) -> Predicted<[Prediction; 3]> {
         self.check_average(record)?;
         let temporal = self.temporal_of(expected_e)?;
-        Ok([0, 1, 2].map(|k| temporal[k].averaged(&moments[k], record)))
+        let mut found = [0, 1, 2].map(|k| temporal[k].averaged(&moments[k], record));
+        if is_mean(record) || self.has_lines() || self.has_tails() {
+            return Ok(found);
+        }
+        for (class, average) in found.iter_mut().enumerate() {
+            if let Some(exact) = self.no_mean(expected_e[class], record)? {
+                *average = Prediction { common: average.common, lines: average.lines, ..exact };
+            }
+        }
+        Ok(found)
+    }
+
+    /// The law of a median that no formula of normal samples tells; none where one does.
+    fn no_mean(&self, expected_e: f64, record: &AverageRecord) -> Predicted<Option<Prediction>> {
+        let is_by_code = self.is_average_by_code(expected_e, record) && !self.is_spread_over_codes(expected_e);
+        if !is_by_code && !self.is_far_from_normal(expected_e) {
+            return Ok(None);
+        }
+        let why = match record.combine {
+            _ if !is_by_code => FAR_FROM_NORMAL,
+            Combine::Clipped => CLIPPED_BY_CODE,
+            Combine::Median | Combine::Mean => MEDIAN_BY_CODE,
+        };
+        let is_told = record.combine == Combine::Median
+            && self.equations == Equations::Exact
+            && self.darks[0].is_none()
+            && self.flat.is_none();
+        let exact = if is_told { self.median_of(expected_e, record.frames) } else { None };
+        exact.map(Some).ok_or(Unpredictable::Beyond(why))
     }
 }

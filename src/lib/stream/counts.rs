@@ -144,7 +144,8 @@ impl Counts {
             ),
             (
                 self.propagation_void,
-                "pixels have a green too near its noise to divide by; their standard deviations say only that they are large",
+                "pixels have standard deviations that do not hold: of a green too near its noise to divide by, which say only that they \
+                 are large, or of a median or clipped mean of codes that scatter over so few that it hangs on where in a code it lies",
             ),
         ]
         .into_iter()

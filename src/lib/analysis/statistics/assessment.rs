@@ -5,6 +5,7 @@ use super::expectation::{Expectation, Predicted};
 use super::grids::Array;
 use super::levels::Levels;
 use super::region::Region;
+use super::repeated_check;
 use super::report::{ChannelReport, RegionReport};
 use super::tally::Tally;
 use crate::cfa::Class;
@@ -139,16 +140,39 @@ impl<'a> Assessment<'a> {
 
     /// Tests of means over frames.
     pub fn tests_of_means(&self) -> Vec<Test> {
-        self.groups().flat_map(|group| group.tested(check::tests_of_means)).collect()
+        self.groups().flat_map(|group| group.tested(repeated_check::tests_of_means)).collect()
     }
 
     /// Tests of what is drawn anew in so many frames, whose own means have variances: of all channels, and of each class.
     pub fn tests_over_frames(&self, variances_of_means: &[Vec<f64>], frames: u32) -> Vec<Test> {
         let groups = self.groups().zip(variances_of_means);
         let of_group = |(group, variances): (&Group<'_>, &Vec<f64>)| {
-            group.tested(|measured, expected| check::tests_over_frames(measured, variances, expected, frames))
+            group.tested(|measured, expected| repeated_check::tests_over_frames(measured, variances, expected, frames))
         };
         groups.flat_map(of_group).collect()
+    }
+
+    /// The same report with what is expected of samples of this region in place of what a large frame has.
+    pub fn of_region(&self, mut report: RegionReport) -> RegionReport {
+        if report.count < 2 {
+            return report;
+        }
+        let expect = |channels: &mut [ChannelReport], groups: &[&Group<'_>]| {
+            let expected = groups.iter().flat_map(|group| &group.predicted.channels);
+            for (channel, expected) in channels.iter_mut().zip(expected) {
+                channel.predicted_std = channel.predicted_std.map(|_| expected.sample_std);
+            }
+        };
+        expect(&mut report.channels, &[&self.channels]);
+        expect(&mut report.classes, &self.classes.iter().collect::<Vec<_>>());
+        let Predicted { channels, tested, .. } = &self.channels.predicted;
+        let of_three = tested.as_ref().map(|expected| &expected.sampling.covariance);
+        report.predicted_covariance = match (of_three, &channels[..]) {
+            (Some(c), _) => Some((0..3).map(|i| (0..3).map(|j| c[(i, j)]).collect()).collect()),
+            (None, [one]) => Some(vec![vec![one.sample_std * one.sample_std]]),
+            (None, _) => report.predicted_covariance,
+        };
+        report
     }
 
     /// Standard deviations by formula of the means of the channels, and of each class.
@@ -244,6 +268,6 @@ impl Group<'_> {
             mean: [0, 1, 2].map(|i| self.moments.mean[place(i)]),
             covariance: Matrix3::from_fn(covariance),
         };
-        tests(&measured, expected)
+        tests(&measured, expected).into_iter().filter(Test::is_sound).collect()
     }
 }

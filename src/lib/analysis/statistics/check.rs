@@ -34,7 +34,7 @@ pub enum Subject {
 
 impl Subject {
     /// The same of means over frames.
-    fn of_means(self) -> Self {
+    pub(super) fn of_means(self) -> Self {
         match self {
             Self::Variance => Self::VarianceOfMeans,
             Self::Correlation => Self::CorrelationOfMeans,
@@ -125,6 +125,14 @@ impl Verdict {
     }
 }
 
+impl Test {
+    /// Whether its law is known to numbers. Where it is not nothing was tested: no number is no alarm.
+    pub(super) fn is_sound(&self) -> bool {
+        let numbers = [Some(self.measured), Some(self.expected), self.z, self.degrees_of_freedom, Some(self.p)];
+        numbers.into_iter().flatten().all(f64::is_finite)
+    }
+}
+
 /// What was measured of channels that were observed together.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measured<'a> {
@@ -172,24 +180,22 @@ impl Expected {
         skews.fold(0.0, |most, skewness| if skewness.abs() > f64::abs(most) { skewness } else { most })
     }
 
-    /// Skewness of a sample variance of independent samples, but for their sixth cumulant:
-    /// (12 κ₄ κ₂ + 4 κ₃² + 8 κ₂³)⁄n² over the 3⁄2 power of its variance \[Fisher1930]; of photosites that are unlike each other
-    /// with κ₆.
-    fn variance_skewness(&self, channel: usize, scatter: f64) -> f64 {
+    /// Third cumulant of a sample variance of independent samples, but for their sixth cumulant:
+    /// (12 κ₄ κ₂ + 4 κ₃² + 8 κ₂³)⁄n² \[Fisher1930]; of photosites that are unlike each other with κ₆.
+    fn variance_third(&self, channel: usize) -> f64 {
         let (second, third) = (self.site_variances[channel], self.site_thirds[channel]);
         let fourth = self.site_kurtosis[channel] * second * second;
         let of_sites = 12.0 * fourth * second + 4.0 * third * third + self.site_sixths[channel];
         let square = self.sampling.count.powi(2);
-        let cumulant = match self.sampling.variance_thirds {
+        match self.sampling.variance_thirds {
             Some(thirds) if self.is_plane => of_sites.max(0.0) / square + thirds[channel],
             Some(thirds) => thirds[channel],
             None => (of_sites + 8.0 * second.powi(3)) / square,
-        };
-        cumulant / scatter.powf(1.5)
+        }
     }
 
     /// The least variance of a photosite.
-    fn least_variance(&self) -> f64 {
+    pub(super) fn least_variance(&self) -> f64 {
         self.site_variances.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
@@ -236,7 +242,7 @@ impl Expected {
 
     /// What rounding may take a sample of a channel off by: pixels that are made of several samples are rounded as the largest of
     /// them is, by up to 30 · 2⁻²⁴ of it and more where a matrix follows.
-    fn rounding(&self, channel: usize) -> f64 {
+    pub(super) fn rounding(&self, channel: usize) -> f64 {
         if self.is_plane {
             return rounding(self.mean[channel]);
         }
@@ -245,14 +251,14 @@ impl Expected {
 }
 
 /// Fewer samples off their usual step than this make sums that are no normal deviates.
-const RARE: f64 = 25.0;
+pub(super) const RARE: f64 = 25.0;
 
 /// Fewer effective degrees of freedom than this, and a variance follows no χ² well enough: the inequality of Chebyshev holds
 /// of any law.
-const FEW: f64 = 12.0;
+pub(super) const FEW: f64 = 12.0;
 
 /// Excess kurtosis below which a law has hardly more than two values, and a sample variance is a function of the mean.
-const FLAT: f64 = -1.0;
+pub(super) const FLAT: f64 = -1.0;
 
 /// Channels that are correlated more closely than this are functions of each other: nothing is left to chance.
 const TIED: f64 = 1.0 - 1e-9;
@@ -300,56 +306,6 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     found
 }
 
-/// Tests the means over frames of pixels.
-pub(super) fn tests_of_means(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
-    let tests = tests(measured, expected);
-    tests.into_iter().map(|test| Test { subject: test.subject.of_means(), ..test }).collect()
-}
-
-/// Tests what is drawn anew in each of so many frames: variances and correlations of the channels `0..count` within frames, whose
-/// scatter `expected` has, and the variances of the means of frames.
-pub(super) fn tests_over_frames(
-    measured: &Measured<'_>,
-    variances_of_means: &[f64],
-    expected: &Expected,
-    frames: u32,
-) -> Vec<Test> {
-    let sampling = &expected.sampling;
-    let (channels, freedom) = (measured.names.len(), f64::from(frames) - 1.0);
-    // Sums over few samples off their usual step are like no normal law.
-    let is_rare = |i: usize| {
-        let site = if expected.is_plane { expected.site_variances[i] } else { expected.least_variance() };
-        sampling.count * freedom * site < RARE || sampling.covariance[(i, i)].max(0.0).sqrt() <= expected.rounding(i)
-    };
-    let mut found = Vec::new();
-    for i in (0..channels).filter(|i| !is_rare(*i)) {
-        if sampling.count > 1.0 {
-            found.push(temporal_variance(measured, expected, i, freedom));
-        }
-        let law = sampling.mean_covariance[(i, i)];
-        if sampling.count * expected.least_variance() >= RARE {
-            let of_means = variances_of_means[i];
-            found.push(Test {
-                subject: Subject::VarianceOfFrameMeans,
-                channels: vec![measured.names[i].clone()],
-                measured: of_means,
-                expected: law,
-                z: Some((of_means / law - 1.0) * (freedom / 2.0).sqrt()),
-                degrees_of_freedom: Some(freedom),
-                // Sums of codes of few frames may be equal: less than is expected says nothing.
-                p: if of_means > law { significance::of_chi_square(freedom * of_means / law, freedom) } else { 1.0 },
-            });
-        }
-    }
-    for (index, [i, j]) in PAIRS.into_iter().enumerate() {
-        if i != j && j < channels && ![i, j].into_iter().any(is_rare) && sampling.count >= 4.0 {
-            let test = correlation(measured, sampling, index);
-            found.extend(test.map(|test| Test { subject: Subject::TemporalCorrelation, ..test }));
-        }
-    }
-    found
-}
-
 /// What rounding to single precision may take a sample of this mean off by, with some room.
 pub(super) fn rounding(mean: f64) -> f64 {
     4.0 * f64::from(f32::EPSILON) * mean.abs()
@@ -382,14 +338,14 @@ fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
 }
 
 /// The bound of Chebyshev, 1/z².
-fn of_any_law(z: f64) -> f64 {
+pub(super) fn of_any_law(z: f64) -> f64 {
     (1.0 / (z * z)).min(1.0)
 }
 
 /// s²/E s² is like χ²_ν/ν with ν = 2 (E s²)²/var s², exact in mean and variance \[Satterthwaite1946]. Where ν is small, or
 /// samples have two values, the probability is Chebyshev's bound, var s²/(s² − E s²)². Of independent samples with tails
-/// heavier than normal ones the law has the skewness that their cumulants give.
-fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
+/// heavier than normal ones the law has the third cumulant that theirs give.
+pub(super) fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
     let expected = law.sampling.covariance[(i, i)];
     let pair = pair([i, i]);
     let scatter = law.sampling.spread[pair][pair];
@@ -412,28 +368,14 @@ fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Test {
             let skewness = law
                 .pixel_variance_skewness()
                 .max(law.sampling.variance_thirds.map_or(0.0, |thirds| thirds[i] / scatter.powf(1.5)));
-            significance::of_skewed(z, skewness).max(significance::of_chi_square(freedom * found / expected, freedom))
+            significance::of_sum_of_squares(found, [expected, scatter, skewness * scatter.powf(1.5)])
+                .max(significance::of_chi_square(freedom * found / expected, freedom))
         } else if law.sampling.variance_thirds.is_some() || (law.is_plane && law.site_kurtosis[i] > 0.0) {
-            significance::of_skewed(z, law.variance_skewness(i, scatter))
+            significance::of_sum_of_squares(found, [expected, scatter, law.variance_third(i)])
         } else {
             significance::of_chi_square(freedom * found / expected, freedom)
         },
     }
-}
-
-/// The same of what N frames make of it, of which each degree of freedom of the frames is as good as a frame: what rows and columns
-/// share makes the law skewer by 1/(N − 1)² of its third cumulant.
-fn temporal_variance(measured: &Measured<'_>, law: &Expected, i: usize, frames: f64) -> Test {
-    let test = variance(measured, law, i);
-    let scatter = law.sampling.spread[pair([i, i])][pair([i, i])];
-    let (z, freedom) = (test.z.unwrap_or_default(), test.degrees_of_freedom.unwrap_or_default());
-    let thirds = law.sampling.variance_thirds.map(|thirds| thirds[i] / (frames * frames));
-    let p = match thirds {
-        _ if freedom < FEW || law.site_kurtosis[i] < FLAT => of_any_law(z),
-        Some(third) => significance::of_skewed(z, third / scatter.powf(1.5)),
-        None => significance::of_chi_square(freedom * test.measured / test.expected, freedom),
-    };
-    Test { subject: Subject::TemporalVariance, p, ..test }
 }
 
 /// artanh r about artanh ρ + ρ/2ν, with variance 1/(ν − 2), as of ν + 1 independent normal pairs \[Fisher1921].
@@ -441,7 +383,7 @@ fn temporal_variance(measured: &Measured<'_>, law: &Expected, i: usize, frames: 
 /// The effective ν makes 1/ν the variance to first order: r = s_ij/√(s_ii s_jj) varies as its differential does,
 /// dr = ds_ij/√(s_ii s_jj) − ½ r (ds_ii/s_ii + ds_jj/s_jj), and artanh r by dr/(1 − ρ²). None of channels that are functions
 /// of each other, nor where ν is too small for the law of the transformed correlation to be normal.
-fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Option<Test> {
+pub(super) fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: usize) -> Option<Test> {
     let [i, j] = PAIRS[index];
     let correlation = |c: &Matrix3<f64>| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
     let (found, expected) = (correlation(&measured.covariance), correlation(&sampling.covariance));

@@ -264,7 +264,7 @@ fn without_drift_sampling(channels: &[Prediction; 3], grids: &[Grid]) -> Samplin
         let mean = total[at] / count;
         of_all - 3.0 * of_means(3) + 3.0 * mean * of_means(2) - mean.powi(3)
     };
-    let fourth = |i: usize| channels[i].fourth() * count * (1.0 - 1.0 / count).powi(2);
+    let fourth = |i: usize| channels[i].fourth_of_own(sites.own[i]) * count * (1.0 - 1.0 / count).powi(2);
     let spread = PAIRS.map(|[i, j]| {
         PAIRS.map(|[k, l]| {
             let normal = product((i, k), (l, j)) + product((i, l), (k, j));

@@ -145,6 +145,9 @@ fn measure_all(
     let unpredicted = unpredicted.map(ToString::to_string);
     let mut report = Report { regions, check: None, uncertainty: coverage(&frame), unpredicted };
     if let Some(level) = level {
+        if prediction.is_ok() {
+            check_planes(&frame)?;
+        }
         let regions = report.regions.iter().map(|region| (&region.tests[..], region.not_finite));
         report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted.as_deref())?);
     }
@@ -160,6 +163,19 @@ pub(super) fn check_testable(frame: &FrameHeader) -> Result<()> {
         )));
     }
     Ok(())
+}
+
+/// Makes sure that the planes of a frame are those that are predicted: one of a filter array, or three.
+fn check_planes(frame: &FrameHeader) -> Result<()> {
+    let names = &frame.geometry.channels;
+    match names.iter().find(|name| name.starts_with("variance.")) {
+        None => Ok(()),
+        Some(name) => Err(Error::Data(format!(
+            "{}: nothing can be checked: beside means over frames it holds their variances ({name}), as `measure --pixels` writes them, \
+             and these are tested where the frames are: `measure --over frames --check`",
+            frame.name
+        ))),
+    }
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ mod over_frames;
 pub mod patches;
 pub mod portrait;
 mod region;
+mod repeated_check;
 mod repeated_report;
 mod report;
 mod tally;

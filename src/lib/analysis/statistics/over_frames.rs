@@ -7,7 +7,8 @@
 //! - variance of the means S = Var m, which T/N is a part of,
 //! - fixed variance F = S − T/N,
 //!
-//! and the same of covariances of channels. None has a bias, whatever neighbors share.
+//! and the same of covariances of channels. What rows share is less between the pixels of a region than over a large frame, in T and
+//! S as in the sample variance of a frame; what is predicted beside them is what is expected of that region.
 
 use super::assessment::Assessment;
 use super::check::Verdict;
@@ -248,7 +249,7 @@ impl Seen {
                 tests.extend(of_variances.tests_over_frames(&self.of_frames[index].variances_of_means(), count));
             }
             let [means, variances] =
-                [&of_means, &of_variances].map(|assessment| assessment.report(frame, *region, &levels));
+                [&of_means, &of_variances].map(|made| made.of_region(made.report(frame, *region, &levels)));
             let is_known = known.is_some_and(|known| known.scatter.is_ok());
             let made = Made { means, variances, is_known, frames: count };
             regions.push(made.region(&self.of_frames[index], &of_variances.mean_stds(), tests));
@@ -262,6 +263,7 @@ impl Seen {
             if let Some(why) = &unpredicted {
                 return Err(Error::Data(format!("{}: nothing can be checked: {why}", frame.name)));
             }
+            check_whole(&frame.name, &regions)?;
         }
         let check = match settings.level {
             Some(level) => {
@@ -289,6 +291,18 @@ impl FrameTallies {
     fn variances_of_means(&self) -> Vec<Vec<f64>> {
         let of_group = |group: &Running| (0..group.means().len()).map(|i| group.variance(i)).collect();
         self.means.iter().map(of_group).collect()
+    }
+}
+
+/// Makes sure that no pixel was left out of a region.
+fn check_whole(frame: &str, regions: &[RepeatedRegion]) -> Result<()> {
+    match regions.iter().map(|region| region.left_out).find(|pixels| *pixels > 0) {
+        None => Ok(()),
+        Some(pixels) => Err(Error::Data(format!(
+            "{frame}: nothing can be checked: {pixels} pixels are saturated, otherwise marked or not finite in a frame; without them \
+             the others are no fair sample"
+        ))
+        .give(&["keep_saturated"])),
     }
 }
 

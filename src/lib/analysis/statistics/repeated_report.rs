@@ -48,7 +48,7 @@ pub struct RepeatedRegion {
     pub temporal_covariance: Option<Vec<Vec<f64>>>,
     /// Covariance over pixels of what is the same in all frames.
     pub fixed_covariance: Option<Vec<Vec<f64>>>,
-    /// The first by formula.
+    /// The first as it is expected of this region, by formula.
     pub predicted_temporal_covariance: Option<Vec<Vec<f64>>>,
     /// The second by formula.
     pub predicted_fixed_covariance: Option<Vec<Vec<f64>>>,
@@ -80,7 +80,7 @@ pub struct RepeatedChannel {
     pub clipped: Option<u64>,
     /// Mean by formula.
     pub predicted_mean: Option<f64>,
-    /// The others by formula.
+    /// The others as they are expected of this region, by formula.
     pub predicted_temporal_std: Option<f64>,
     /// See [`Self::fixed_std`].
     pub predicted_fixed_std: Option<f64>,
