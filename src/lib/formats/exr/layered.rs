@@ -90,7 +90,7 @@ mod tests {
     use crate::formats::exr::{ExrCompression, ExrSamples, ExrTags, ExrWriter, Layers, patch_table};
     use std::io::{Seek, SeekFrom};
 
-    const CHANNELS: [&str; 8] = ["R", "G", "B", "sigma.R", "sigma.G", "sigma.B", "covariance.XY", "mask"];
+    const CHANNELS: [&str; 8] = ["R", "G", "B", "covariance.XY", "sigma.R", "sigma.G", "sigma.B", "mask"];
 
     fn geometry(channels: &[&str]) -> Geometry {
         Geometry { origin: [-3, 5], ..Geometry::new(5, 37, channels) }
