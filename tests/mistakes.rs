@@ -96,7 +96,7 @@ const MISTAKES: [(&str, i32, &str); 107] = [
         "add-noise expected.exr --without ssm",
         BAD_USAGE,
         "`ssm` is no value for --without <SOURCES>; it is one of dcsn, dcnu, ssn, prnu, ron, row_noise, \
-         column_noise, dsnu, dsnu_row, dsnu_column, prnu_row, prnu_column, hot_pixels, rts; did you mean `ssn`? See `add-noise --help`",
+         column_noise, dsnu, dsnu_row, dsnu_column, prnu_row, prnu_column, hot_pixels, rts, black_drift; did you mean `ssn`? See `add-noise --help`",
     ),
     (
         "add-noise expected.exr --sed 7",

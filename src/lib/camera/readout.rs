@@ -128,6 +128,7 @@ impl ReadOut {
     /// # Errors
     ///
     /// What is wrong, in words.
+    #[allow(clippy::too_many_lines, reason = "a table of keys")]
     pub fn check(&self) -> Result<(), String> {
         let positive = [
             ("pixel_pitch_um", self.pixel_pitch_um.unwrap_or(1.0)),

@@ -77,6 +77,22 @@ pub fn note_inputs<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<()> 
     paths.into_iter().filter_map(|path| named(Some(path))).try_for_each(noted)
 }
 
+/// Notes a file, and its sidecar, that the first program of the pipe reads: it is not written over, and when it was changed is not
+/// asked.
+///
+/// # Errors
+///
+/// As [`note_input`].
+pub(super) fn note_upstream(path: &Path) -> Result<()> {
+    let noted = |path: &Path| match (&mut *register(), std::fs::metadata(path)) {
+        (Some(register), Ok(about)) if about.is_file() => {
+            register.note_input(file_id(&about), Input { name: path.display().to_string(), modified: None })
+        }
+        _ => Ok(()),
+    };
+    noted(path).and_then(|()| noted(&sidecar_path(path)))
+}
+
 /// The name of an input that was changed after `made`, among those whose names are `of_it`.
 pub fn changed_after(made: SystemTime, of_it: impl Fn(&str) -> bool) -> Option<String> {
     let register = register();

@@ -28,6 +28,7 @@ impl Told {
 /// # Errors
 ///
 /// [`Error::Data`] where there is no gain or black level, and for frames of electrons, which tell nothing of a converter.
+#[allow(clippy::too_many_lines, reason = "key after key, as a sensor file has them")]
 pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     let metadata = &camera.head.metadata;
     let lacking = |what: &str| Error::Data(format!("{}: no sensor file follows: {what}", camera.list));

@@ -100,6 +100,7 @@ fn lacking(what: &str) -> String {
 }
 
 /// What the levels of a class tell; flats in the order of their light, darks of the flats' temperature, and all darks.
+#[allow(clippy::too_many_lines, reason = "finding after finding, as the data sheet has them")]
 pub fn of_class(
     name: &str,
     flats: &[Level],

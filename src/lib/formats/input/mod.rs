@@ -212,7 +212,7 @@ impl FrameReader {
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
         if let Some(file) = &metadata.file {
             // The first program of the pipe reads it.
-            register::note_inputs([Path::new(file)])?;
+            register::note_upstream(Path::new(file))?;
         }
         let mut header = FrameHeader { name: name.into(), geometry, metadata };
         doubt_of_marks(&header, stored);

@@ -72,17 +72,7 @@ impl PhotonTransfer {
     ///
     /// Those of the list and of the frames; [`Error::Data`] for frames that are no measurement.
     pub fn run(&self, draws: bool) -> Result<MeasuredCamera> {
-        if !(0.0..1.0).contains(&self.photon_error) {
-            return Err(
-                Error::Usage("an uncertainty is a fraction: 0 or more, and below 1".into()).change(&["photon_error"])
-            );
-        }
-        if self.confidence >= 1.0 {
-            return Err(Error::Usage("no interval holds its number for certain".into()).change(&["confidence"]));
-        }
-        if self.white_level_adu.is_some_and(|white| white <= 0.0) {
-            return Err(Error::Usage("the largest code is above 0".into()).change(&["white"]));
-        }
+        self.check()?;
         let list_name = self.list.display().to_string();
         let is_folder = self.list.is_dir();
         let FrameList { frames, white_level_adu } = if is_folder {
@@ -127,18 +117,7 @@ impl PhotonTransfer {
             }
         }
         let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys, draws)).collect();
-        for class in &classes {
-            if let Some(efficiency) = class.get("quantum_efficiency").filter(|efficiency| efficiency.low > 1.0) {
-                notes.push(Note::Warning(format!(
-                    "{}: a quantum efficiency of {:.0} % cannot be: photons are those of a photosite during the exposure, and codes \
-                     proportional to light",
-                    class.name,
-                    efficiency.value * 100.0
-                )));
-            }
-            notes.extend(class.doubts.iter().map(|doubt| Note::Warning(format!("{}: {doubt}", class.name))));
-            notes.extend(class.notes.iter().map(|note| Note::Remark(format!("{}: {note}", class.name))));
-        }
+        notes.extend(classes.iter().flat_map(notes_of));
         let count = |is_lit: bool| {
             groups.iter().filter(|group| group.condition.is_lit == is_lit).map(|group| group.files.len()).sum()
         };
@@ -153,6 +132,35 @@ impl PhotonTransfer {
             notes,
         })
     }
+
+    /// Makes sure that its numbers are possible.
+    fn check(&self) -> Result<()> {
+        let usage = |problem: &str, key: &'static [&'static str]| Err(Error::Usage(problem.into()).change(key));
+        if !(0.0..1.0).contains(&self.photon_error) {
+            return usage("an uncertainty is a fraction: 0 or more, and below 1", &["photon_error"]);
+        }
+        if self.confidence >= 1.0 {
+            return usage("no interval holds its number for certain", &["confidence"]);
+        }
+        if self.white_level_adu.is_some_and(|white| white <= 0.0) {
+            return usage("the largest code is above 0", &["white"]);
+        }
+        Ok(())
+    }
+}
+
+/// What a careful user should know of what was found of a class.
+fn notes_of(class: &ClassFindings) -> Vec<Note> {
+    let beyond = class.get("quantum_efficiency").filter(|efficiency| efficiency.low > 1.0).map(|efficiency| {
+        format!(
+            "a quantum efficiency of {:.0} % cannot be: photons are those of a photosite during the exposure, and codes \
+             proportional to light",
+            efficiency.value * 100.0
+        )
+    });
+    let of_class = |text: &String| format!("{}: {text}", class.name);
+    let warnings = beyond.iter().chain(&class.doubts).map(|doubt| Note::Warning(of_class(doubt)));
+    warnings.chain(class.notes.iter().map(|note| Note::Remark(of_class(note)))).collect()
 }
 
 /// Reads the frames of a condition.
