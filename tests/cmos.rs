@@ -152,6 +152,7 @@ fn rows_and_columns_have_their_own_draws() {
                 Source::PrnuRow => f64::from(level) * 0.002 * row.response,
                 Source::BlackDrift => {
                     let place = f64::from(300 + u32::try_from(y).unwrap()) / per_row;
+                    #[allow(clippy::cast_possible_truncation, reason = "some hundreds")]
                     let (knot, angle) = (place.floor() as i32, std::f64::consts::FRAC_PI_2 * place.fract());
                     3.0 * (angle.cos() * of_knot(5, 9, knot) + angle.sin() * of_knot(5, 9, knot + 1))
                 }

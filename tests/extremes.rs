@@ -731,7 +731,7 @@ fn any_sensor(index: u64) -> (&'static str, CameraSetup, [f64; 3]) {
         readout.dsnu_e = chance.log_or_none(1e-6, 0.03) * full_well_e;
         (readout.prnu_row, readout.prnu_column) = (chance.log_or_none(1e-6, 0.05), chance.log_or_none(1e-6, 0.05));
     }
-    let [has_hot, has_rts] = [chance.word() % 3 != 0, chance.word() % 3 != 0];
+    let [has_hot, has_rts] = [(); 2].map(|()| !chance.word().is_multiple_of(3));
     if has_tails && has_hot {
         readout.hot_pixel_share = chance.log(1e-6, 1.0);
         readout.hot_pixel_dark_current_e_per_s = chance.log(1e-3, 1e3) * full_well_e / setup.exposure.exposure_s;

@@ -149,6 +149,7 @@ fn for_every_stage(width: usize, height: usize, check: &mut dyn FnMut(&MemoryFra
 }
 
 /// A stage of any kind.
+#[allow(clippy::large_enum_variant, reason = "there is one at a time")]
 enum AnyStage {
     Noise(AddNoise),
     Import(Import),

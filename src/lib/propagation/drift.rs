@@ -159,6 +159,7 @@ mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
+    #[allow(clippy::cast_possible_truncation, reason = "a few columns")]
     fn matrix(rows: &[DriftRows], per_knot: f64) -> (Vec<(i64, usize, usize)>, DMatrix<f64>) {
         let sites: Vec<(i64, usize, usize)> = rows
             .iter()

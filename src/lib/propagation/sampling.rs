@@ -500,6 +500,7 @@ mod tests {
 
     /// Everything from full matrices: W of all pixels and channels, Σ = W D Wᵀ, P, traces.
     #[test]
+    #[allow(clippy::too_many_lines, reason = "one case after another, against one set of matrices")]
     fn small_regions_agree_with_full_matrices() {
         let cases = [
             ([9, 8], [0, 2], [7, 5]),

@@ -104,6 +104,7 @@ mod tests {
 
     /// By full matrices, of normal samples: s_ij = xᵢᵀPxⱼ/(n − 1). Sums of a hundred numbers of one size: relative 10⁻¹².
     #[test]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few photosites")]
     fn groups_agree_with_full_matrices() {
         let group = |count: f64, mean: [f64; 3], variance: [f64; 3]| {
             (count, [0, 1, 2].map(|k| Prediction::of_cumulants(mean[k], variance[k], 0.0, 0.0)))

@@ -183,7 +183,7 @@ fn read_tags(header: &Header) -> ExrTags {
 /// The order in which channels are worked on: R, G, B (or Y; x, y, Y; L, a, b) first, the rest layer by layer as the file
 /// has them, each again R, G, B (or the like) first. Where all belong to layers, as in `left.R`, what stands behind the
 /// last dot counts. Marks come last of all, as they are made.
-fn canonical_order(names: &[String]) -> Vec<usize> {
+pub(super) fn canonical_order(names: &[String]) -> Vec<usize> {
     let place = |wanted: &str| {
         let exact = names.iter().position(|name| name == wanted);
         exact.or_else(|| names.iter().position(|name| bare_name(name) == wanted))

