@@ -102,15 +102,19 @@ class OverFrames(ProgramCase):
 
     def test_predictions_are_those_of_the_model(self):
         """Light ρ, dark signal δ, K = 0.8: v = K² (ρ (1 + s²) + δ (1 + d²) + r²) + 1/12, and fixed K² (ρ² s² + δ² d² + offsets²);
-        s² n_r of rows comes apart as frames do. Exact to what is cut off at zero and rounded: 10⁻⁶."""
+        s² n_r of rows comes apart as frames do. What n rows, or columns, of a class share differs among its N photosites by
+        (1 − 1/n) N/(N − 1) of its variance. Exact to what is cut off at zero and rounded: 10⁻⁶."""
         self.make_planes()
         report = json.loads(
             self.run_program(["measure", "--over", "frames", "--output-format", "json", *self.files("plane")])
         )
         dark, square = 90.0, 0.8**2
-        for channel, light in zip(report["regions"][0]["classes"], [2000.0, 4000.0, 3000.0], strict=True):
-            temporal = square * (light * (1 + 0.012**2) + dark * (1 + 0.2**2) + 6**2 + 2**2) + 1 / 12
-            fixed = square * ((light * 0.012) ** 2 + (dark * 0.2) ** 2 + 4**2 + 1.5**2)
+        shapes = [(45, 60, 2700), (90, 120, 5400), (45, 60, 2700)]
+        classes = zip(report["regions"][0]["classes"], [2000.0, 4000.0, 3000.0], shapes, strict=True)
+        for channel, light, (rows, columns, sites) in classes:
+            of_rows, of_columns = [(1 - 1 / lines) * sites / (sites - 1) for lines in (rows, columns)]
+            temporal = square * (light * (1 + 0.012**2) + dark * (1 + 0.2**2) + 6**2 + 2**2 * of_rows) + 1 / 12
+            fixed = square * ((light * 0.012) ** 2 + (dark * 0.2) ** 2 + 4**2 + 1.5**2 * of_columns)
             self.assertAlmostEqual(channel["predicted_temporal_std"] ** 2 / temporal, 1, delta=1e-6)
             self.assertAlmostEqual(channel["predicted_fixed_std"] ** 2 / fixed, 1, delta=1e-6)
 
