@@ -181,7 +181,7 @@ pub struct LessDarks<'a, S> {
 }
 
 impl<'a, S: RowSource> LessDarks<'a, S> {
-    /// `frame` less `darks`, which fit it as [`CorrectFrame::new`](super::correct::CorrectFrame::new) makes sure. What
+    /// `frame` less `darks`, which fit it as [`CorrectFrame::new`](crate::stages::correct::CorrectFrame::new) makes sure. What
     /// channels it has behind those of the darks stay as they are.
     pub fn new(frame: &'a mut dyn RowSource, darks: &'a mut DarkFrames<S>) -> Self {
         Self { frame, darks, limits: None }

@@ -88,8 +88,8 @@ impl AddNoise {
     ///
     /// # Errors
     ///
-    /// [`Error::Order`] unless the frame holds expected electrons of photosites; [`Error::MissingKey`] without sensor
-    /// or exposure; [`Error::Usage`] for an impossible temperature or charge transfer efficiency; [`Error::Format`]
+    /// [`Error::Order`](crate::error::Error::Order) unless the frame holds expected electrons of photosites; [`Error::MissingKey`](crate::error::Error::MissingKey) without sensor
+    /// or exposure; [`Error::Usage`](crate::error::Error::Usage) for an impossible temperature or charge transfer efficiency; [`Error::Format`](crate::error::Error::Format)
     /// where charge of a crop would be transferred, and for planes behind another array than Bayer's.
     pub fn new(input: &FrameHeader, settings: &NoiseSettings) -> Result<Self> {
         check_expected(input)?;
@@ -180,7 +180,7 @@ impl AddNoise {
 ///
 /// # Errors
 ///
-/// [`Error::Format`] where noise was added already, else [`Error::Order`].
+/// [`Error::Format`](crate::error::Error::Format) where noise was added already, else [`Error::Order`](crate::error::Error::Order).
 fn check_expected(frame: &FrameHeader) -> Result<()> {
     let holds = frame.holds();
     match frame.metadata.quantity {
@@ -199,7 +199,7 @@ fn check_expected(frame: &FrameHeader) -> Result<()> {
 ///
 /// # Errors
 ///
-/// [`Error::Format`] when the frame has neither three planes nor a CFA pattern.
+/// [`Error::Format`](crate::error::Error::Format) when the frame has neither three planes nor a CFA pattern.
 fn check_planes(frame: &FrameHeader) -> Result<()> {
     match (frame.geometry.channels.len(), frame.metadata.cfa) {
         (3, None) if frame.has_three_planes() => Ok(()),

@@ -6,7 +6,7 @@
 //!
 //! E′ᵧ = Eᵧ + (τ/t) Σⱼ Eⱼ,
 //!
-//! the sum over the whole column, whichever way it is read [Ruyten1999]. Behind a filter array the column is that of the plane:
+//! the sum over the whole column, whichever way it is read \[Ruyten1999]. Behind a filter array the column is that of the plane:
 //! what a photosite would record of another class, as in three planes, has the smear of the photosites that are there.
 
 use crate::cfa::{CfaPattern, Class};
