@@ -523,6 +523,15 @@ fn regions_cover(what: &str, parts: &[Region], made: impl Fn(u64) -> Vec<MemoryF
     }
 }
 
+/// An exposure of a scene at each stage before demosaicking, and less two dark frames.
+fn before_demosaicking(scene: &MemoryFrame, seed: u64) -> Vec<MemoryFrame> {
+    let electrons = noisy(scene, &settings(seed));
+    let codes = digitized(&electrons);
+    let plane = plane_of(&codes);
+    let less = less_darks(&plane, scene, seed, 2);
+    vec![electrons, codes, plane, less]
+}
+
 /// Whole frames and regions of several taps before demosaicking, less dark frames too; behind one tap at every stage.
 #[test]
 fn frames_of_taps_raise_false_alarms_at_the_stated_rate() {
@@ -531,13 +540,7 @@ fn frames_of_taps_raise_false_alarms_at_the_stated_rate() {
     let corner = Region { x: 14, y: 11, width: 12, height: 10 };
     for taps in several_taps() {
         let scene = tapped([26, 21], [900.0, 2500.0, 1800.0], &taps);
-        let sites = |seed: u64| {
-            let electrons = noisy(&scene, &settings(seed));
-            let codes = digitized(&electrons);
-            let plane = plane_of(&codes);
-            let less = less_darks(&plane, &scene, seed, 2);
-            vec![electrons, codes, plane, less]
-        };
+        let sites = |seed: u64| before_demosaicking(&scene, seed);
         regions_cover(&format!("{:?}", taps.layout), &[whole, some, corner], sites);
     }
     let scene = tapped([26, 21], [900.0, 2500.0, 1800.0], &several_taps()[4]);
@@ -557,13 +560,7 @@ fn frames_of_taps_raise_false_alarms_at_the_stated_rate() {
 fn drifting_frames_raise_false_alarms_at_the_stated_rate() {
     for rows in [3.3, 20.0, 170.0] {
         let scene = drifting([24, 19], [900.0, 2500.0, 1800.0], rows);
-        let sites = |seed: u64| {
-            let electrons = noisy(&scene, &settings(seed));
-            let codes = digitized(&electrons);
-            let plane = plane_of(&codes);
-            let less = less_darks(&plane, &scene, seed, 2);
-            vec![electrons, codes, plane, less]
-        };
+        let sites = |seed: u64| before_demosaicking(&scene, seed);
         let some = Region { x: 2, y: 3, width: 17, height: 12 };
         regions_cover(&format!("drift over {rows} rows"), &[Region { x: 0, y: 0, width: 24, height: 19 }, some], sites);
     }

@@ -70,11 +70,7 @@ pub fn note_input(about: &Metadata, name: &str) -> Result<()> {
 ///
 /// As [`note_input`].
 pub fn note_inputs<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<()> {
-    let noted = |path: &Path| match std::fs::metadata(path) {
-        Ok(about) => note_input(&about, &path.display().to_string()).and_then(|()| note_sidecar(path)),
-        Err(_) => Ok(()),
-    };
-    paths.into_iter().filter_map(|path| named(Some(path))).try_for_each(noted)
+    paths.into_iter().filter_map(|path| named(Some(path))).try_for_each(|path| note_with_sidecar(path, true))
 }
 
 /// Notes a file, and its sidecar, that the first program of the pipe reads: it is not written over, and when it was changed is not
@@ -84,9 +80,15 @@ pub fn note_inputs<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<()> 
 ///
 /// As [`note_input`].
 pub(super) fn note_upstream(path: &Path) -> Result<()> {
+    note_with_sidecar(path, false)
+}
+
+/// Notes a file and its sidecar, as far as they are there; `counts` says whether it is asked when they were changed.
+fn note_with_sidecar(path: &Path, counts: bool) -> Result<()> {
     let noted = |path: &Path| match (&mut *register(), std::fs::metadata(path)) {
         (Some(register), Ok(about)) if about.is_file() => {
-            register.note_input(file_id(&about), Input { name: path.display().to_string(), modified: None })
+            let modified = about.modified().ok().filter(|_| counts);
+            register.note_input(file_id(&about), Input { name: path.display().to_string(), modified })
         }
         _ => Ok(()),
     };

@@ -52,6 +52,11 @@ pub struct UpsamplingRecord {
 }
 
 impl Scene {
+    /// Whether no light fell, as far as it tells.
+    pub fn is_dark(&self) -> bool {
+        self.expected_electrons == Some([0.0; 3])
+    }
+
     /// A scene of which nothing is known but what it is called.
     pub fn of(source: impl Into<String>) -> Self {
         Self {

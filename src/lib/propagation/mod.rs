@@ -22,6 +22,7 @@ mod level_variance;
 mod line_sampling;
 pub mod linear;
 mod lines;
+mod lookup;
 pub mod masters;
 mod memory;
 pub mod moments;

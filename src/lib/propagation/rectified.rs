@@ -5,6 +5,7 @@
 
 use super::counts::{Charge, Count};
 use super::ends::{MANY, Place, Stretch, difference};
+use super::lookup::Lookup;
 use super::node::{Law, Node};
 use super::reading::{Moments, Reading};
 use super::steps::Steps;
@@ -165,48 +166,23 @@ fn density_at(counts: &[Count], electrons: f64) -> f64 {
     counts.iter().map(at).sum()
 }
 
-/// The density below zero, looked up: cubic between places that are even in ln(1 + |v|/a), a the narrowest spread.
-struct Table {
-    scale: f64,
-    step: f64,
-    values: Vec<[f64; 2]>,
-}
-
-impl Table {
-    const STEPS: usize = 1000;
-
-    fn new(stretch: &Stretch, counts: &[Count]) -> Self {
-        let scale = stretch.narrowest;
-        let step = (stretch.extent / scale).ln_1p() / Self::STEPS as f64;
-        let value = |index: usize| {
-            let below = scale * (index as f64 * step).exp_m1();
-            let (mut sum, mut slope) = (0.0, 0.0);
-            for count in counts {
-                let z = (-below - count.electrons) / count.spread;
-                if z > -REACH - 1.0 {
-                    let share = count.weight * density(z) / count.spread;
-                    sum += share;
-                    slope += share * z / count.spread;
-                }
+/// The density below zero, looked up.
+fn density_table(stretch: &Stretch, counts: &[Count]) -> Lookup {
+    let mut table = Lookup::new(stretch.narrowest, stretch.extent);
+    for index in 0..table.values.len() {
+        let below = table.distance(index);
+        let (mut sum, mut slope) = (0.0, 0.0);
+        for count in counts {
+            let z = (-below - count.electrons) / count.spread;
+            if z > -REACH - 1.0 {
+                let share = count.weight * density(z) / count.spread;
+                sum += share;
+                slope += share * z / count.spread;
             }
-            // By the step: d|v| = (a + |v|) du.
-            [sum, slope * (scale + below) * step]
-        };
-        Self { scale, step, values: (0..=Self::STEPS).map(value).collect() }
-    }
-
-    fn at(&self, electrons: f64) -> f64 {
-        let place = (-electrons / self.scale).max(0.0).ln_1p() / self.step;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and bounded")]
-        let index = (place as usize).min(Self::STEPS - 1);
-        let t = place - index as f64;
-        if t > 1.0 + 1e-9 {
-            return 0.0;
         }
-        let ([a, da], [b, db]) = (self.values[index], self.values[index + 1]);
-        let s = 1.0 - t;
-        a * s * s * (1.0 + 2.0 * t) + b * t * t * (1.0 + 2.0 * s) + t * s * (s * da - t * db)
+        table.values[index] = [sum, slope * table.by_step(below)];
     }
+    table
 }
 
 /// Charges to take off at which what is read breaks off, as the other charge spreads them out: full well, the ends of the codes,
@@ -286,7 +262,7 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
         let still = reading.at(other.electrons.min(full), other.spread * other.spread);
         let blurred = Reading { noise_e, ..*reading };
         if table.is_none() && others.len() > 8 {
-            table = Some(Table::new(&base, &counts));
+            table = Some(density_table(&base, &counts));
         }
         let widest_narrow = if is_hidden { 0.0 } else { narrow };
         let stretch = Stretch { from: other.electrons, widest_narrow, noise_e, ..base };

@@ -11,6 +11,7 @@
 use super::counts::{Charge, Count};
 use super::curved::NODES as HERMITE;
 use super::ends::{MANY, Stretch};
+use super::lookup::Lookup;
 use super::reading::{Asked, Moments, Reading};
 use crate::numerics::gauss::{NODES, interpolated, panel};
 use crate::numerics::normal::{cumulative, density};
@@ -30,69 +31,42 @@ const FEW: f64 = 200.0;
 /// Panels of a blurred step.
 const PANELS: usize = 12;
 
-/// The probability of charges below v < 0, looked up: cubic between places that are even in ln(1 + |v|/a), a the narrowest
-/// spread.
-struct Below {
-    scale: f64,
-    step: f64,
-    values: Vec<[f64; 2]>,
-}
-
-impl Below {
-    const STEPS: usize = 1000;
-
-    /// Of counts that noise blurs too.
-    fn new(stretch: &Stretch, counts: &[Count], noise_e: f64) -> Self {
-        let scale = stretch.narrowest.hypot(noise_e);
-        let extent = stretch.extent + REACH * noise_e;
-        let step = (extent / scale).ln_1p() / Self::STEPS as f64;
-        let distance = |index: usize| scale * (index as f64 * step).exp_m1();
-        let of_density = |index: usize| {
-            let (mut sum, mut slope) = (0.0, 0.0);
-            for count in counts {
-                let spread = count.spread.hypot(noise_e);
-                let z = (-distance(index) - count.electrons) / spread;
-                if z > -REACH - 1.0 {
-                    let share = count.weight * density(z) / spread;
-                    sum += share;
-                    slope -= share * z / spread;
-                }
+/// The probability of charges below v < 0, looked up, of counts that noise blurs too.
+fn share_below(stretch: &Stretch, counts: &[Count], noise_e: f64) -> Lookup {
+    let mut table = Lookup::new(stretch.narrowest.hypot(noise_e), stretch.extent + REACH * noise_e);
+    let of_density = |distance: f64| {
+        let (mut sum, mut slope) = (0.0, 0.0);
+        for count in counts {
+            let spread = count.spread.hypot(noise_e);
+            let z = (-distance - count.electrons) / spread;
+            if z > -REACH - 1.0 {
+                let share = count.weight * density(z) / spread;
+                sum += share;
+                slope -= share * z / spread;
             }
-            [sum, slope]
-        };
-        let mut values = vec![[0.0; 2]; Self::STEPS + 1];
-        let mut found = 0.0;
-        let (mut last, [mut sum, mut slope]) = (distance(Self::STEPS), of_density(Self::STEPS));
-        for (index, value) in values.iter_mut().enumerate().rev() {
-            let (next, [density, rise]) = (distance(index), of_density(index));
-            // ∫ by Euler and Maclaurin.
-            let width = last - next;
-            found += 0.5 * width * (sum + density) + width * width / 12.0 * (slope - rise);
-            *value = [found, -density * (scale + next) * step];
-            (last, sum, slope) = (next, density, rise);
         }
-        Self { scale, step, values }
+        [sum, slope]
+    };
+    let mut found = 0.0;
+    let mut last = table.distance(Lookup::STEPS);
+    let [mut sum, mut slope] = of_density(last);
+    for index in (0..table.values.len()).rev() {
+        let next = table.distance(index);
+        let [density, rise] = of_density(next);
+        // ∫ by Euler and Maclaurin.
+        let width = last - next;
+        found += 0.5 * width * (sum + density) + width * width / 12.0 * (slope - rise);
+        table.values[index] = [found, -density * table.by_step(next)];
+        (last, sum, slope) = (next, density, rise);
     }
-
-    fn at(&self, electrons: f64) -> f64 {
-        let place = (-electrons / self.scale).max(0.0).ln_1p() / self.step;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and bounded")]
-        let index = (place as usize).min(Self::STEPS - 1);
-        let t = place - index as f64;
-        if t > 1.0 + 1e-9 {
-            return 0.0;
-        }
-        let ([a, da], [b, db]) = (self.values[index], self.values[index + 1]);
-        let s = 1.0 - t;
-        a * s * s * (1.0 + 2.0 * t) + b * t * t * (1.0 + 2.0 * s) + t * s * (s * da - t * db)
-    }
+    table
 }
 
 /// What is below zero of a charge, with noise, e⁻; and T about 0, where there is noise, by panels.
 struct Blurred {
     charge: Charge,
     noise_e: f64,
-    below: Below,
+    below: Lookup,
     near: Vec<[f64; NODES]>,
 }
 
@@ -144,7 +118,7 @@ impl<'a> Steps<'a> {
         let narrow = counts.iter().map(|count| count.spread).filter(|spread| *spread < MANY * code_e);
         let fine = ABOUT_ENDS + 2.0 * REACH * narrow.fold(0.0, f64::max) / code_e;
         let sharp = Blurred::recall(charge, 0.0, || {
-            let below = Below::new(stretch, counts, 0.0);
+            let below = share_below(stretch, counts, 0.0);
             Blurred { charge: *charge, noise_e: 0.0, below, near: Vec::new() }
         });
         Some(Self { charge, stretch, counts, ends, code_e, reading, sharp, blurred: None, fine })
@@ -164,7 +138,7 @@ impl<'a> Steps<'a> {
             values
         };
         let found = Blurred::recall(self.charge, noise_e, || {
-            let below = Below::new(self.stretch, self.counts, noise_e);
+            let below = share_below(self.stretch, self.counts, noise_e);
             Blurred { charge: *self.charge, noise_e, below, near: (0..PANELS).map(of_panel).collect() }
         });
         self.blurred = Some(found);

@@ -384,7 +384,7 @@ fn doubt_of_limits(beyond: f64) -> Option<String> {
 /// A warning of a frame that dark frames come off and that is one itself: a shell gives `--dark` the first of several names.
 fn doubt_of_dark(frame: &FrameHeader) -> Option<String> {
     let scene = frame.metadata.scene.as_ref()?;
-    (scene.expected_electrons == Some([0.0; 3])).then(|| {
+    scene.is_dark().then(|| {
         format!(
             "{}: no light fell on it: it is a dark frame itself; to take several names for --dark put them in quotes, \
              --dark 'dark-*.exr'",

@@ -7,7 +7,7 @@
 use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
-use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise};
+use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise, Scene};
 use crate::stages::darks::{DarkFrames, DarkSettings, check_alike, check_codes};
 use crate::stages::defects::{Survey, add};
 use crate::stages::masters::Frames;
@@ -76,7 +76,7 @@ impl<S: RowSource> FlatFrames<S> {
             check_codes(head)?;
             check_alike(frame, head)?;
             let scene = head.metadata.scene.as_ref();
-            if scene.is_some_and(|scene| scene.expected_electrons == Some([0.0; 3])) {
+            if scene.is_some_and(Scene::is_dark) {
                 return Err(head.refuse("no light fell on it; a flat field is lit evenly"));
             }
         }

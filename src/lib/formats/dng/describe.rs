@@ -7,9 +7,9 @@ use super::levels::Levels;
 use super::tags;
 use crate::camera::optics::Exposure;
 use crate::cfa::{FILTERS, FilterArray};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::formats::exposure;
-use crate::formats::tiff::{Directory, TiffFile};
+use crate::formats::tiff::{Directory, TiffFile, passed_over};
 use crate::metadata::Metadata;
 use crate::text::visible;
 use crate::units::QuantityKind;
@@ -38,21 +38,10 @@ pub(super) fn describe(
     metadata.black_by_row.clone_from(&levels.black_by_row);
     metadata.black_by_column.clone_from(&levels.black_by_column);
     metadata.white_level_adu = Some(levels.white.into());
-    metadata.exposure = match told_exposure(file, &image.first, notes) {
-        // No sample depends on it.
-        Err(Error::Format { problem, .. }) => {
-            notes.push(format!("its exposure is passed over: {problem}"));
-            None
-        }
-        found => found?,
-    };
-    metadata.iso_speed = match told_sensitivity(file, &image.first) {
-        Err(Error::Format { problem, .. }) => {
-            notes.push(format!("its sensitivity is passed over: {problem}"));
-            None
-        }
-        found => found?,
-    };
+    // No sample depends on these.
+    let exposure = told_exposure(file, &image.first, notes);
+    metadata.exposure = passed_over(exposure, "its exposure", notes)?;
+    metadata.iso_speed = passed_over(told_sensitivity(file, &image.first), "its sensitivity", notes)?;
     // No sample depends on it either.
     let model = file.text(&image.first, tags::UNIQUE_CAMERA_MODEL.tag()).unwrap_or_default();
     metadata.camera =

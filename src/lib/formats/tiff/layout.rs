@@ -110,7 +110,7 @@ impl Layout {
 }
 
 /// What was found, or, where the file is damaged there, nothing but a note.
-pub(super) fn passed_over<T: Default>(found: Result<T>, what: &str, notes: &mut Vec<String>) -> Result<T> {
+pub(in crate::formats) fn passed_over<T: Default>(found: Result<T>, what: &str, notes: &mut Vec<String>) -> Result<T> {
     match found {
         Err(Error::Format { problem, .. }) => {
             notes.push(format!("{what} is passed over: {problem}"));

@@ -21,6 +21,7 @@ mod write;
 pub(in crate::formats) use chunk::Predictor;
 pub use directory::{Directory, TiffFile, begins_so};
 pub(in crate::formats) use first::FirstImage;
+pub(in crate::formats) use layout::passed_over;
 pub use read::{FORMAT, TiffReader};
 pub use tags::{ExtraTag, TagValue};
 pub use write::{TiffSettings, TiffWriter};

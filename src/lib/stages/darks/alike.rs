@@ -27,7 +27,7 @@ pub(in crate::stages) fn check_codes(frame: &FrameHeader) -> Result<()> {
 /// Name and scene of a frame on which light fell, as its metadata tell.
 pub(super) fn lit(frame: &FrameHeader) -> Option<(String, String)> {
     let scene = frame.metadata.scene.as_ref()?;
-    (scene.expected_electrons != Some([0.0; 3])).then(|| (frame.name.clone(), scene.source.clone()))
+    (!scene.is_dark()).then(|| (frame.name.clone(), scene.source.clone()))
 }
 
 /// Whether the metadata of a frame tell its scene and its sensor.
