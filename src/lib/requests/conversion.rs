@@ -72,7 +72,7 @@ impl Conversion {
     /// A warning of a picture in a file that other programs take for linear light.
     pub fn doubt_of(&self, output: &Output) -> Option<Note> {
         let text = "other programs take an EXR for linear light, and these are samples encoded for viewing; for a picture name a \
-                    .tiff, or let `preview` make one";
+                    .png or .tiff, or let `preview` make one";
         (self.space == Space::Srgb && output.is_exr()).then(|| Note::Warning(text.into()))
     }
 

@@ -10,7 +10,6 @@ mod chunk;
 mod directory;
 mod first;
 mod grid;
-mod interleave;
 mod layout;
 mod read;
 mod tags;
