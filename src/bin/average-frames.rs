@@ -5,6 +5,7 @@ use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::propagation::{self, Equations};
 use cyanometer::requests::averaging::{AverageRequest, SharedAverage};
+use cyanometer::requests::described::DescribedInput;
 use cyanometer::requests::independence::check_exposures;
 use cyanometer::requests::options;
 use cyanometer::stream::Counts;
@@ -22,7 +23,7 @@ static MEMORY: cli::Memory = cli::Memory;
 #[command(version)]
 struct Arguments {
     #[command(flatten)]
-    input: options::Input,
+    input: DescribedInput,
     #[command(flatten)]
     request: AverageRequest,
     #[command(flatten)]
@@ -32,17 +33,19 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| arguments.general.between(&arguments.input, &arguments.output);
+    let general = |arguments: &Arguments| arguments.general.between(&arguments.input.frame, &arguments.output);
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let average = arguments.request.begin()?;
     arguments.output.check_one()?;
-    check_exposures(&arguments.input.inputs)?;
+    let frames = &arguments.input.frame;
+    check_exposures(&frames.inputs)?;
     let in_order = options::Output { makes: options::Makes::One, ..options::Output::default() };
-    session.each_frame::<Arguments>(&arguments.input, &in_order, |turn| {
-        let mut reader = AverageRequest::open(turn.input)?;
+    session.each_frame::<Arguments>(frames, &in_order, |turn| {
+        // With its marks, and the layers of its uncertainty where they are the only ones.
+        let mut reader = arguments.input.with(turn.input.clone()).open_all()?;
         turn.session.report_reader(&reader);
         average.add(&mut reader)
     })?;
