@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 107] = [
+const MISTAKES: [(&str, i32, &str); 108] = [
     (
         "measure codes.exr -o codes.xlsx",
         BAD_USAGE,
