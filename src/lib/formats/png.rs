@@ -1,7 +1,7 @@
 //! PNG: rows of 8 or 16-bit samples of the pictures that programs store their codes in \[PNG2025].
 
 use super::foreign::png_damage;
-use super::format::{ColorTags, FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use super::format::{ColorTags, FrameFormat, HEAD_BYTES, Readers, Reading, Rest, SampleReader, SampleType, Sign};
 use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
@@ -9,7 +9,7 @@ use crate::metadata::{METADATA_BEGIN, Metadata};
 use crate::units::QuantityKind;
 use png::{BitDepth, ColorType, Info, Limits, ScaledFloat};
 use std::fs::File;
-use std::io::{BufReader, Seek, SeekFrom};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 /// Portable Network Graphics.
 pub const FORMAT: FrameFormat = FrameFormat {
@@ -39,6 +39,9 @@ const CONVERT: &str = "convert it first, for example with `oiiotool in.png -o ou
 /// is not divided by. Memory is a few rows, and texts of up to 16 MiB.
 pub struct PngReader {
     name: String,
+    /// The file once more, and where it begins in there.
+    file: File,
+    start: u64,
     reader: png::Reader<BufReader<File>>,
     geometry: Geometry,
     stored: SampleType,
@@ -62,6 +65,7 @@ impl PngReader {
         let start = file.stream_position().map_err(failed)?;
         let length = file.seek(SeekFrom::End(0)).map_err(failed)?.saturating_sub(start);
         file.seek(SeekFrom::Start(start)).map_err(failed)?;
+        let copy = file.try_clone().map_err(failed)?;
         let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), Limits { bytes: TEXT_BYTES });
         let damage = |error| png_damage(name, error);
         let header = decoder.read_header_info().map_err(damage)?;
@@ -73,6 +77,8 @@ impl PngReader {
         let reader = decoder.read_info().map_err(damage)?;
         Ok(Self {
             name: name.into(),
+            file: copy,
+            start,
             geometry: Geometry::new(width, height, channels),
             stored,
             embedded: embedded(reader.info()),
@@ -266,6 +272,38 @@ impl SampleReader for PngReader {
             }
         }
         Ok(())
+    }
+
+    fn rest(&mut self) -> Result<Rest> {
+        let mut head = Vec::new();
+        let found = self.file.seek(SeekFrom::Start(self.start)).and_then(|_| {
+            let mut input = BufReader::new(&self.file);
+            let is_whole = pass_chunks(&mut input)?;
+            input.take(HEAD_BYTES as u64).read_to_end(&mut head).map(|_| is_whole)
+        });
+        if !found.map_err(|e| Error::disk(&self.name, "read", e))? {
+            return Err(Error::cut_short(&self.name));
+        }
+        Ok(if head.iter().all(|byte| *byte == 0) { Rest::Nothing } else { Rest::Unread { head, may_belong: false } })
+    }
+}
+
+/// Goes behind the last chunk; tells whether there is one.
+fn pass_chunks(input: &mut (impl Read + Seek)) -> io::Result<bool> {
+    const SIGNATURE_BYTES: i64 = 8;
+    const CHECKSUM_BYTES: i64 = 4;
+    input.seek_relative(SIGNATURE_BYTES)?;
+    let mut head = [0; 8];
+    loop {
+        match input.read_exact(&mut head) {
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(false),
+            other => other?,
+        }
+        let [a, b, c, d, kind @ ..] = head;
+        input.seek_relative(i64::from(u32::from_be_bytes([a, b, c, d])) + CHECKSUM_BYTES)?;
+        if &kind == b"IEND" {
+            return Ok(true);
+        }
     }
 }
 
