@@ -225,6 +225,13 @@ impl Conversion {
             notes.push(Note::Warning(format!("{}: {shown} {doubt}", frame.name)));
         }
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
+        if matrix.is_relative() && (self.exposure_s.is_some() || self.lens_transmittance.is_some()) {
+            notes.push(Note::Warning(format!(
+                "{}: its XYZ are relative, and no exposure changes them; absolute ones take a matrix from spectra, or from a chart \
+                 whose luminance is known (`fit-matrix`)",
+                frame.name
+            )));
+        }
         notes
     }
 

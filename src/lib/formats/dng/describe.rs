@@ -150,11 +150,7 @@ fn told_sensitivity(file: &mut TiffFile, directories: &[&Directory]) -> Result<O
 }
 
 /// Exposure time and f-number, where both are known.
-fn told_exposure(
-    file: &mut TiffFile,
-    directories: &[&Directory],
-    notes: &mut Vec<String>,
-) -> Result<Option<Exposure>> {
+fn told_exposure(file: &mut TiffFile, directories: &[&Directory], notes: &mut Vec<String>) -> Result<Option<Exposure>> {
     // Lenses without contacts leave zeros.
     let mut number = |tag: tags::DngTag| -> Result<Option<f64>> {
         let Some(directory) = directories.iter().find(|directory| tag.is_in(directory)) else { return Ok(None) };

@@ -10,7 +10,7 @@ use super::storage::{Compression, Storage};
 use super::tags;
 use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
-use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use crate::formats::format::{FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign};
 use crate::formats::tiff::TiffFile;
 use crate::frame::Geometry;
 use crate::metadata::METADATA_BEGIN;
@@ -299,5 +299,9 @@ impl SampleReader for DngReader {
             self.next_row += count;
         }
         Ok(())
+    }
+
+    fn rest(&mut self) -> Result<Rest> {
+        self.file.rest(self.storage.end())
     }
 }

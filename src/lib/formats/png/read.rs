@@ -4,13 +4,15 @@ use super::PLACE;
 use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
 use crate::formats::foreign::png_damage;
-use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use crate::formats::format::{
+    ColorTags, FrameFormat, HEAD_BYTES, Readers, Reading, Rest, SampleReader, SampleType, Sign,
+};
 use crate::frame::Geometry;
 use crate::metadata::{METADATA_BEGIN, Metadata};
 use crate::units::QuantityKind;
 use png::{BitDepth, ColorType, Info, Limits, ScaledFloat};
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Seek, SeekFrom};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 
 /// Portable Network Graphics.
 pub const FORMAT: FrameFormat = FrameFormat {
@@ -40,6 +42,9 @@ const CONVERT: &str = "convert it first, for example with `oiiotool in.png -o ou
 /// is not divided by. Memory is a few rows, and texts of up to 16 MiB.
 pub struct PngReader {
     name: String,
+    /// The file once more, and where it begins in there.
+    file: File,
+    start: u64,
     reader: png::Reader<BufReader<File>>,
     geometry: Geometry,
     stored: SampleType,
@@ -63,6 +68,7 @@ impl PngReader {
         let start = file.stream_position().map_err(failed)?;
         let length = file.seek(SeekFrom::End(0)).map_err(failed)?.saturating_sub(start);
         file.seek(SeekFrom::Start(start)).map_err(failed)?;
+        let copy = file.try_clone().map_err(failed)?;
         let mut file = BufReader::new(file);
         let place = place(&mut file).unwrap_or_default();
         file.seek(SeekFrom::Start(start)).map_err(failed)?;
@@ -83,6 +89,8 @@ impl PngReader {
         };
         Ok(Self {
             name: name.into(),
+            file: copy,
+            start,
             geometry: Geometry { origin, ..Geometry::new(width, height, channels) },
             stored,
             embedded,
@@ -304,6 +312,38 @@ impl SampleReader for PngReader {
             }
         }
         Ok(())
+    }
+
+    fn rest(&mut self) -> Result<Rest> {
+        let mut head = Vec::new();
+        let found = self.file.seek(SeekFrom::Start(self.start)).and_then(|_| {
+            let mut input = BufReader::new(&self.file);
+            let is_whole = pass_chunks(&mut input)?;
+            input.take(HEAD_BYTES as u64).read_to_end(&mut head).map(|_| is_whole)
+        });
+        if !found.map_err(|e| Error::disk(&self.name, "read", e))? {
+            return Err(Error::cut_short(&self.name));
+        }
+        Ok(if head.iter().all(|byte| *byte == 0) { Rest::Nothing } else { Rest::Unread { head, may_belong: false } })
+    }
+}
+
+/// Goes behind the last chunk; tells whether there is one.
+fn pass_chunks(input: &mut (impl Read + Seek)) -> io::Result<bool> {
+    const SIGNATURE_BYTES: i64 = 8;
+    const CHECKSUM_BYTES: i64 = 4;
+    input.seek_relative(SIGNATURE_BYTES)?;
+    let mut head = [0; 8];
+    loop {
+        match input.read_exact(&mut head) {
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(false),
+            other => other?,
+        }
+        let [a, b, c, d, kind @ ..] = head;
+        input.seek_relative(i64::from(u32::from_be_bytes([a, b, c, d])) + CHECKSUM_BYTES)?;
+        if &kind == b"IEND" {
+            return Ok(true);
+        }
     }
 }
 

@@ -99,8 +99,7 @@ impl<W: Write + 'static> PngWriter<W> {
     pub fn write_rows(&mut self, samples: &[f32]) -> Result<()> {
         assert!(samples.len().is_multiple_of(self.row_samples));
         for samples in samples.chunks_exact(self.row_samples) {
-            self.unfit +=
-                interleave_u16(samples, &mut self.row, self.channels, self.scale, |[low, high]| [high, low]);
+            self.unfit += interleave_u16(samples, &mut self.row, self.channels, self.scale, |[low, high]| [high, low]);
             let written = self.stream.write_all(&self.row);
             written.map_err(|error| self.output.problem(&self.name, error.into()))?;
         }
@@ -286,7 +285,8 @@ mod tests {
             assert!(matches!(error, Error::Disk { action: "write", .. }), "{room}: {error}");
         }
         full(length).unwrap();
-        let missing = PngWriter::create(Vec::new(), "a.png", &geometry, settings(false)).unwrap().finish().err().unwrap();
+        let missing =
+            PngWriter::create(Vec::new(), "a.png", &geometry, settings(false)).unwrap().finish().err().unwrap();
         assert!(missing.to_string().starts_with("a.png: it cannot be written as PNG: "), "{missing}");
     }
 }

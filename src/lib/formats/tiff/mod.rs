@@ -8,6 +8,7 @@
 mod capture;
 mod chunk;
 mod directory;
+mod extent;
 mod first;
 mod grid;
 mod layout;
