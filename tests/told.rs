@@ -4,6 +4,7 @@
 
 mod support;
 
+use cyanometer::camera::optics::Exposure;
 use cyanometer::formats::chart::load_reference;
 use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::frame::{Geometry, to_sample};
@@ -213,6 +214,37 @@ fn chart(shop: &Workshop) {
         }
     }
     write(shop, "chart.exr", &header, &samples);
+}
+
+/// Dark frames of a camera are brought to the temperature that the file of the frame tells, by [HP2005, Eq. 6] in electronvolts.
+#[test]
+fn temperatures_of_a_camera_count() {
+    let shop = Workshop::new();
+    let frame = |name: &str, temperature_k: f64, sample: f32| {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some("rggb".parse().unwrap());
+        metadata.black_level_adu = Some(100.0.into());
+        metadata.white_level_adu = Some(4095.0.into());
+        metadata.exposure = Some(Exposure { exposure_s: 1.0, f_number: 8.0, lens_transmittance: 1.0 });
+        metadata.sensor_temperature_k = Some(temperature_k);
+        let header = FrameHeader { name: name.into(), geometry: Geometry::new(4, 4, &["Y"]), metadata };
+        write(&shop, name, &header, &[sample; 16]);
+    };
+    frame("light.exr", 263.15, 1100.0);
+    frame("dark.exr", 268.15, 300.0);
+    assert!(
+        said(&shop, "correct-frame light.exr --dark dark.exr -o c.exr", 0)
+            .contains("dark.exr: its temperature is 268.15 K, but that of light.exr is 263.15 K")
+    );
+    shop.run("correct-frame light.exr --dark dark.exr --scale-dark -o c.exr", &[]);
+    let current = |kelvin: f64| {
+        let gap = 1.1557 - 7.021e-4 * kelvin * kelvin / (1108.0 + kelvin);
+        kelvin.powf(1.5) * (-gap / (2.0 * 8.617_333e-5 * kelvin)).exp()
+    };
+    let expected = 1000.0 - 200.0 * current(263.15) / current(268.15);
+    let (samples, metadata) = shop.read("c.exr");
+    assert!((f64::from(samples[0]) - expected).abs() < 1e-3 * expected, "{} {expected}", samples[0]);
+    assert_eq!(metadata.sensor_temperature_k, Some(263.15));
 }
 
 /// Frames that say nothing are described where they are averaged, stacked, or read as a chart.
