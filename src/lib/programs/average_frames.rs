@@ -4,6 +4,7 @@ use crate::cli;
 use crate::error::Result;
 use crate::propagation::{self, Equations};
 use crate::requests::averaging::{AverageRequest, SharedAverage};
+use crate::requests::described::DescribedInput;
 use crate::requests::independence::check_exposures;
 use crate::requests::options;
 use crate::stream::Counts;
@@ -19,7 +20,7 @@ use std::process::ExitCode;
 #[command(version)]
 struct Arguments {
     #[command(flatten)]
-    input: options::Input,
+    input: DescribedInput,
     #[command(flatten)]
     request: AverageRequest,
     #[command(flatten)]
@@ -30,17 +31,19 @@ struct Arguments {
 
 /// Runs it with the arguments of the process.
 pub fn main() -> ExitCode {
-    let general = |arguments: &Arguments| arguments.general.between(&arguments.input, &arguments.output);
+    let general = |arguments: &Arguments| arguments.general.between(&arguments.input.frame, &arguments.output);
     cli::start("average-frames", general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let average = arguments.request.begin()?;
     arguments.output.check_one()?;
-    check_exposures(&arguments.input.inputs)?;
+    let frames = &arguments.input.frame;
+    check_exposures(&frames.inputs)?;
     let in_order = options::Output { makes: options::Makes::One, ..options::Output::default() };
-    session.each_frame::<Arguments>(&arguments.input, &in_order, |turn| {
-        let mut reader = AverageRequest::open(turn.input)?;
+    session.each_frame::<Arguments>(frames, &in_order, |turn| {
+        // With its marks, and the layers of its uncertainty where they are the only ones.
+        let mut reader = arguments.input.with(turn.input.clone()).open_all()?;
         turn.session.report_reader(&reader);
         average.add(&mut reader)
     })?;

@@ -22,8 +22,11 @@ pub mod to_xyz;
 
 use std::process::ExitCode;
 
+/// What a program does with the arguments of the process.
+type Main = fn() -> ExitCode;
+
 /// The programs that one executable can be, by name.
-const BY_NAME: [(&str, fn() -> ExitCode); 14] = [
+const BY_NAME: [(&str, Main); 14] = [
     ("render-radiance", render_radiance::main),
     ("add-noise", add_noise::main),
     ("digitize", digitize::main),
@@ -42,7 +45,7 @@ const BY_NAME: [(&str, fn() -> ExitCode); 14] = [
 
 /// The program of a name, where this executable can be it; of the name of a file with the project's before it, as a system has it
 /// that keeps plain names for any package's.
-fn by_name(name: &str) -> Option<fn() -> ExitCode> {
+fn by_name(name: &str) -> Option<Main> {
     let plain = name.strip_prefix(concat!(env!("CARGO_PKG_NAME"), "-")).unwrap_or(name);
     BY_NAME.iter().find(|(known, _)| *known == plain).map(|(_, main)| *main)
 }

@@ -11,7 +11,6 @@ mod directory;
 mod extent;
 mod first;
 mod grid;
-mod interleave;
 mod layout;
 mod read;
 mod tags;

@@ -1,15 +1,18 @@
-//! PNG: rows of 8 or 16-bit samples of the pictures that programs store their codes in \[PNG2025].
+//! Reading rows.
 
-use super::foreign::png_damage;
-use super::format::{ColorTags, FrameFormat, HEAD_BYTES, Readers, Reading, Rest, SampleReader, SampleType, Sign};
+use super::PLACE;
 use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
+use crate::formats::foreign::png_damage;
+use crate::formats::format::{
+    ColorTags, FrameFormat, HEAD_BYTES, Readers, Reading, Rest, SampleReader, SampleType, Sign,
+};
 use crate::frame::Geometry;
 use crate::metadata::{METADATA_BEGIN, Metadata};
 use crate::units::QuantityKind;
 use png::{BitDepth, ColorType, Info, Limits, ScaledFloat};
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 
 /// Portable Network Graphics.
 pub const FORMAT: FrameFormat = FrameFormat {
@@ -66,7 +69,10 @@ impl PngReader {
         let length = file.seek(SeekFrom::End(0)).map_err(failed)?.saturating_sub(start);
         file.seek(SeekFrom::Start(start)).map_err(failed)?;
         let copy = file.try_clone().map_err(failed)?;
-        let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), Limits { bytes: TEXT_BYTES });
+        let mut file = BufReader::new(file);
+        let place = place(&mut file).unwrap_or_default();
+        file.seek(SeekFrom::Start(start)).map_err(failed)?;
+        let mut decoder = png::Decoder::new_with_limits(file, Limits { bytes: TEXT_BYTES });
         let damage = |error| png_damage(name, error);
         let header = decoder.read_header_info().map_err(damage)?;
         let refuse = |problem: String| Error::format(name, problem);
@@ -75,18 +81,52 @@ impl PngReader {
         check_size(size, channels.len() as u64 * stored.bytes() as u64, length).map_err(refuse)?;
         let [width, height] = size.map(|side| usize::try_from(side).unwrap_or(usize::MAX));
         let reader = decoder.read_info().map_err(damage)?;
+        let embedded = embedded(reader.info());
+        // Of what our programs made the metadata tell how samples are encoded, and the place is one on the sensor.
+        let (origin, notes) = match embedded {
+            Some(_) => (place, Vec::new()),
+            None => ([0, 0], notes(reader.info())),
+        };
         Ok(Self {
             name: name.into(),
             file: copy,
             start,
-            geometry: Geometry::new(width, height, channels),
+            geometry: Geometry { origin, ..Geometry::new(width, height, channels) },
             stored,
-            embedded: embedded(reader.info()),
+            embedded,
             own_tags: Metadata::new(QuantityKind::Unspecified),
             colors: colors(reader.info()),
-            notes: notes(reader.info()),
+            notes,
             reader,
         })
+    }
+}
+
+/// The place that stands before the samples, where one does.
+///
+/// # Errors
+///
+/// Where the file ends before the samples: who reads these says so.
+fn place(file: &mut (impl BufRead + Seek)) -> io::Result<[i32; 2]> {
+    // The first eight bytes are those of all files.
+    file.seek_relative(8)?;
+    loop {
+        let mut head = [0; 8];
+        file.read_exact(&mut head)?;
+        let [a, b, c, d, kind @ ..] = head;
+        let length = u32::from_be_bytes([a, b, c, d]);
+        match (&kind, length) {
+            (&PLACE, 9) => {
+                let mut sides = [[0; 4]; 2];
+                sides.iter_mut().try_for_each(|side| file.read_exact(side))?;
+                let mut unit = [1];
+                file.read_exact(&mut unit)?;
+                return Ok(if unit == [0] { sides.map(i32::from_be_bytes) } else { [0, 0] });
+            }
+            (b"IDAT", _) => return Ok([0, 0]),
+            // A checksum of four bytes follows each.
+            _ => file.seek_relative(i64::from(length) + 4)?,
+        }
     }
 }
 
