@@ -74,4 +74,6 @@ pub mod report;
 
 pub mod cli;
 
+// Unit tests have no use for them, and need not wait until they are compiled.
+#[cfg(not(test))]
 pub mod programs;

@@ -62,16 +62,3 @@ macro_rules! program {
         }
     };
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cli::programs::{APART, PROGRAMS};
-
-    #[test]
-    fn names_are_those_of_programs() {
-        let known: Vec<&str> = PROGRAMS.into_iter().filter(|name| !APART.contains(name)).collect();
-        assert_eq!(BY_NAME.map(|(name, _)| name).to_vec(), known);
-        assert!(by_name("cyanometer-digitize").is_some() && by_name("cyanometer").is_none());
-    }
-}
