@@ -198,17 +198,19 @@ impl SpectralTable {
         Err(Error::format(&self.name, problem))
     }
 
-    /// Refuses radiances that are brighter than the sun's disk in a unit that nobody named.
+    /// Refuses radiances that no sky has, in a unit that nobody named.
     fn check_brightness(&self, index: usize, unit: RadianceUnit) -> Result<()> {
-        /// Spectral radiance of the sun's disk at its brightest, about 26 kW m⁻² sr⁻¹ nm⁻¹, in W cm⁻² sr⁻¹ nm⁻¹, rounded up
-        /// (the extraterrestrial irradiance of \[ASTM E490] over 6.8·10⁻⁵ sr, smoothed).
-        const SUN: f64 = 3.5;
+        /// Spectral radiance of what scatters all the light of the sun evenly, as the whitest cloud does, at its brightest, in
+        /// W cm⁻² sr⁻¹ nm⁻¹: the extraterrestrial irradiance of \[ASTM E490], 2.1 W m⁻² nm⁻¹, over π.
+        const WHITE: f64 = 6.7e-5;
+        /// So many times as bright a sky may be in places, near the sun.
+        const MOST: f64 = 100.0;
         let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
         let brightest = samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max);
-        if brightest > SUN {
+        if brightest > MOST * WHITE {
             let problem = format!(
-                "it does not say the unit of its radiance; in {unit} it would be {:.1e} times as bright as the sun's disk",
-                brightest / SUN
+                "it does not say the unit of its radiance; in {unit} it would be {:.1e} times as bright as a white cloud in the sun",
+                brightest / WHITE
             );
             return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
         }

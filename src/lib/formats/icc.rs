@@ -42,6 +42,10 @@ pub(super) fn profile(frame: &FrameHeader, scale: f64, full: f64) -> Result<Opti
         return Ok(None);
     }
     let mut profile = ColorProfile::new_srgb();
+    // The crate's are the cones of Bradford, not what adapts D65 to D50, and a tag that calls its codes narrow.
+    profile.cicp = None;
+    let adapted = Adaptation::Bradford.between(D65_XY, color::chromaticity(D50)).ok();
+    profile.chromatic_adaptation = adapted.map(|matrix| Matrix3d { v: color::rows_of(&matrix) });
     profile.description = Some(text("sRGB"));
     profile.copyright = Some(text("No copyright, use freely"));
     if frame.metadata.quantity != QuantityKind::Srgb {

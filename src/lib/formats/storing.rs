@@ -76,7 +76,12 @@ impl Named for CompressionKind {
 
 impl CompressionKind {
     fn refused(self, format: &str, choices: &str) -> Error {
-        Error::Usage(format!("{format} is not compressed by {}; it is one of {choices}", self.name()))
+        let what = if self == Self::None {
+            "not left uncompressed".to_owned()
+        } else {
+            format!("not compressed by {}", self.name())
+        };
+        Error::Usage(format!("{format} is {what}; it is one of {choices}"))
     }
 }
 

@@ -31,7 +31,11 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
     let named = |kind| Some(Stated::Other { text: heading.to_owned(), kind });
     let in_words = || {
         tokens.iter().filter_map(Token::lower).find_map(|word| match (word.as_str(), base(&word)) {
-            ("irradiance", _) => named(OtherUnit::Irradiance),
+            // The latter are libRadtran's.
+            ("irradiance" | "edir" | "eglo" | "edn" | "eup" | "edif" | "eglobal", _) => named(OtherUnit::Irradiance),
+            ("reflectance" | "reflectivity" | "transmittance" | "transmission" | "albedo", _) => {
+                named(OtherUnit::Unknown)
+            }
             (_, Some(Base::Photons)) => named(OtherUnit::Photons),
             _ => None,
         })
@@ -295,6 +299,10 @@ mod tests {
             ("W m-3", Irradiance),
             ("irradiance", Irradiance),
             ("spectral_irradiance_w_per_m2_nm", Irradiance),
+            ("edir", Irradiance),
+            ("eglo", Irradiance),
+            ("Wm-2nm-1", Irradiance),
+            ("transmittance", Unknown),
             ("photons s-1 m-2 sr-1 nm-1", Photons),
             ("L (umol m-2 s-1 sr-1 nm-1)", Photons),
             ("µmol/m2/s", Photons),
@@ -334,6 +342,11 @@ mod tests {
             );
             assert_eq!(RadianceUnit::parse(text), None, "{text}");
         }
+        for glued in ["L (Wm-2sr-1nm-1)", "Wm⁻²sr⁻¹nm⁻¹", "radiance [W·m⁻²sr⁻¹nm⁻¹]"] {
+            let wanted = RadianceUnit::parse("W m-2 sr-1 nm-1").map(Stated::Radiance);
+            assert_eq!((unit_of_heading(glued), wanted.is_some()), (wanted, true), "{glued}");
+        }
+        assert_eq!(RadianceUnit::parse("mWm-2sr-1nm-1"), RadianceUnit::parse("mW m-2 sr-1 nm-1"));
         for text in [
             "radiance",
             "L",
@@ -343,6 +356,8 @@ mod tests {
             "Y 1391.68 cd m-2",
             "a work of W",
             "sky (az=90/el=45)",
+            "site-3 2026-11-24",
+            "Lw-2b",
             "sky (90/45)",
         ] {
             assert_eq!(unit_of_heading(text), None, "{text}");

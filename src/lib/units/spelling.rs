@@ -152,7 +152,8 @@ fn plain_of(character: char) -> char {
     digit.and_then(|digit| "0123456789".chars().nth(digit)).unwrap_or('-')
 }
 
-/// The pieces of a word: a hyphen before a letter parts factors, before a digit it is the sign of a power.
+/// The pieces of a word: a hyphen before a letter parts factors, before a digit it is the sign of a power, behind which another
+/// factor may begin: `Wm-2sr-1nm-1`.
 fn pieces(word: &str) -> Vec<Token> {
     let mut parts = vec![String::new()];
     let mut characters = word.chars().peekable();
@@ -160,10 +161,31 @@ fn pieces(word: &str) -> Vec<Token> {
         if character == '-' && characters.peek().is_none_or(|next| !next.is_ascii_digit()) {
             parts.push(String::new());
         } else if let Some(part) = parts.last_mut() {
-            part.push(character);
+            let is_behind_power = part.contains('-') && part.ends_with(|c: char| c.is_ascii_digit());
+            if is_behind_power && part.starts_with(char::is_alphabetic) && character.is_alphabetic() {
+                parts.push(character.into());
+            } else {
+                part.push(character);
+            }
         }
     }
-    parts.iter().filter(|part| !part.is_empty()).map(|part| piece(part)).collect()
+    parts.iter().filter(|part| !part.is_empty()).flat_map(|part| glued(piece(part))).collect()
+}
+
+/// A power and a length in one word, `Wm-2`, as two factors; another piece as it is.
+fn glued(piece: Token) -> Vec<Token> {
+    if let Token::Factor { word, exponent: exponent @ Some(_) } = &piece
+        && base(word).is_none()
+    {
+        for at in [1, 2].into_iter().filter(|at| word.is_char_boundary(*at) && *at < word.len()) {
+            let (power, length) = word.split_at(at);
+            if let (Some(Base::Power(_)), Some(Base::Length(_))) = (base(power), base(length)) {
+                let factor = |word: &str, exponent| Token::Factor { word: word.to_owned(), exponent };
+                return vec![factor(power, None), factor(length, *exponent)];
+            }
+        }
+    }
+    vec![piece]
 }
 
 fn piece(text: &str) -> Token {

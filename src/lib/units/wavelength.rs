@@ -84,6 +84,9 @@ impl WavelengthUnit {
                 Some(Base::Length(Length::Micrometer)) => Some(Self::Micrometer),
                 Some(Base::Length(Length::Angstrom)) => Some(Self::Angstrom),
                 Some(Base::Length(Length::Meter)) => Some(Self::Meter),
+                Some(Base::Length(Length::Millimeter | Length::Centimeter)) => {
+                    return Err("centimeters or millimeters");
+                }
                 _ => None,
             },
             _ => None,
@@ -118,7 +121,9 @@ mod tests {
         ] {
             assert_eq!(WavelengthUnit::of_heading(heading), Ok(unit), "{heading}");
         }
-        for heading in ["wavenumber", "wavenumber (um-1)", "frequency (THz)", "FREQ", "energy_eV"] {
+        for heading in
+            ["wavenumber", "wavenumber (um-1)", "frequency (THz)", "FREQ", "energy_eV", "wavelength (cm)", "lambda_mm"]
+        {
             assert!(WavelengthUnit::of_heading(heading).is_err(), "{heading}");
         }
         assert_eq!(WavelengthUnit::Micrometer.nm(0.57), 570.0);
