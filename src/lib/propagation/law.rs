@@ -6,6 +6,7 @@
 //! those whose sensitivities are cut off at zero what that adds ([`rectified`](super::rectified)).
 
 use super::counts::Charge;
+use super::effort;
 use super::ends::at_full_well;
 use super::memory::Memory;
 use super::moments::Prediction;
@@ -118,6 +119,10 @@ impl Law {
                 by_step.push((rung, wide.counts(smoothing)));
             }
             let outer = by_step.iter().find(|(known, _)| *known == rung).map(|(_, counts)| counts);
+            effort::spend(outer.map_or(0, |counts| counts.len() as u64));
+            if effort::is_spent() {
+                return Vec::new();
+            }
             found.extend(outer.into_iter().flatten().map(|outer| {
                 let std = inner.spread.hypot(outer.spread);
                 let mean = inner.electrons + outer.electrons;
@@ -178,6 +183,7 @@ impl Law {
         }
         let mut near = Vec::new();
         let at_full = if full.is_finite() { reading.at(full, 0.0) } else { [0.0; 4] };
+        effort::spend(2 * nodes.len() as u64);
         for node in nodes {
             let reach = REACH * node.std;
             if node.floor == f64::NEG_INFINITY && (is_full_far || node.mean + reach <= full) {
