@@ -201,13 +201,29 @@ const ORDER: &[Advice] = &[
 const OUTPUTS: &[Advice] = &[
     advice("preview noisy.exr -o out.jpg", "end the name in .png", &["preview noisy.exr -o out.png"]),
     advice(
-        "digitize noisy.exr -o out.png",
-        "end the name in .exr, .tiff or .dng, or give --format",
+        "digitize noisy.exr -o out.jpg",
+        "end the name in .exr, .tiff, .dng or .png, or give --format",
         &[
             "digitize noisy.exr -o out.exr",
             "digitize noisy.exr -o out.tiff",
-            "digitize noisy.exr -o out.png --format tiff",
+            "digitize noisy.exr -o out.png",
+            "digitize noisy.exr -o out.jpg --format tiff",
         ],
+    ),
+    advice(
+        "demosaic plane.exr -o out.png",
+        "write a TIFF or an EXR, or make a picture with `to-xyz --space srgb` or `preview`",
+        &[
+            "demosaic plane.exr -o out.tiff",
+            "demosaic plane.exr -o rgb.exr",
+            "to-xyz rgb.exr --matrix matrix.yaml --space srgb -o out.png",
+            "preview rgb.exr -o out.png",
+        ],
+    ),
+    advice(
+        "digitize noisy.exr -o out.png --compression lzw",
+        "it is one of deflate",
+        &["digitize noisy.exr -o out.png --compression deflate"],
     ),
     advice("demosaic plane.exr -o no/out.exr", "make it first", &["mkdir no", "demosaic plane.exr -o no/out.exr"]),
     advice("demosaic plane.exr --sigma -o out.tiff", "write an EXR", &["demosaic plane.exr --sigma -o out.exr"]),
@@ -228,8 +244,9 @@ const OUTPUTS: &[Advice] = &[
     ),
     advice(
         "to-xyz rgb.exr --matrix matrix.yaml --space srgb -o out.exr",
-        "for a picture name a .tiff, or let `preview` make one",
+        "for a picture name a .png or .tiff, or let `preview` make one",
         &[
+            "to-xyz rgb.exr --matrix matrix.yaml --space srgb -o out.png",
             "to-xyz rgb.exr --matrix matrix.yaml --space srgb -o out.tiff",
             "preview out.tiff -o out.png",
             "preview xyz.exr -o out.png",

@@ -12,6 +12,7 @@
 
 mod support;
 
+use cyanometer::formats::input::{FrameReader, InputOptions};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -210,4 +211,35 @@ fn raws_of_others_give_a_result_or_a_line() {
 fn texts_of_others_give_a_result_or_a_line() {
     let entries = corpus();
     check_all(&cases(&entries, &["yaml"], &TEXTS));
+}
+
+/// Files with a maker's own data, which may name more bytes: a program warns of these.
+const PRIVATE: [&str; 1] = ["custom_dir_EXIF_GPS"];
+
+/// Reads all rows of a file.
+fn read_whole(path: &Path) -> cyanometer::error::Result<()> {
+    let options = InputOptions { path: Some(path.to_owned()), all_channels: true, ..InputOptions::default() };
+    FrameReader::open(&options)?.drain()
+}
+
+/// Of every whole file that is read, bytes behind it are told: directories, parts and levels that nobody asked for belong to it.
+#[test]
+fn bytes_behind_whole_files_are_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let longer = directory.path().join("longer");
+    let mut read = 0;
+    for entry in
+        corpus().iter().filter(|entry| entry.kind != "yaml" && entry.path.to_string_lossy().contains("/valid/"))
+    {
+        if read_whole(&entry.path).is_err() {
+            continue;
+        }
+        read += 1;
+        fs::write(&longer, [fs::read(&entry.path).unwrap().as_slice(), b"junk"].concat()).unwrap();
+        let told = read_whole(&longer).err().map(|error| error.to_string()).unwrap_or_default();
+        let wanted = "behind its last row come bytes that are no part of it; cut them off";
+        let has_private = PRIVATE.iter().any(|name| entry.path.to_string_lossy().contains(name));
+        assert!(told.ends_with(wanted) || has_private && told.is_empty(), "{}: {told}", entry.path.display());
+    }
+    eprintln!("{read} files");
 }

@@ -4,7 +4,10 @@
 
 mod support;
 
-use cyanometer::cli::programs::PROGRAMS;
+use cyanometer::cli::programs::{APART, PROGRAMS};
+use std::fs;
+use std::os::unix::process::CommandExt;
+use std::process::Command;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop, path_of, programs};
 
 const FRONT: &str = "cyanometer";
@@ -102,24 +105,34 @@ fn the_front_door_runs_a_program_with_its_own_arguments_status_and_history() {
     }
 }
 
-/// A program that is not installed is missed, and nothing of the same name is looked for elsewhere.
+/// Alone in its directory, the front door is each program but those apart, by the name of a link to it, with the project's before it
+/// or not, and by its first word. Of those apart it misses the files, and nothing of the same name is looked for elsewhere.
 #[test]
-fn only_programs_beside_the_front_door_run() {
+fn one_executable_is_most_programs() {
     let shop = Workshop::new();
-    std::fs::copy(path_of(FRONT), shop.path(FRONT)).unwrap();
+    fs::copy(path_of(FRONT), shop.path(FRONT)).unwrap();
     // A process that another test starts meanwhile may hold the copy open for writing until it has become its own program.
-    let alone = |arguments: &[&str]| loop {
-        match std::process::Command::new(shop.path(FRONT)).args(arguments).output() {
+    let alone = |name: &str, arguments: &[&str]| loop {
+        match Command::new(shop.path(FRONT)).arg0(name).args(arguments).output() {
             Err(error) if error.kind() == std::io::ErrorKind::ExecutableFileBusy => std::thread::yield_now(),
             done => break done.unwrap(),
         }
     };
-    let done = alone(&["measure", "a.exr"]);
+    for program in PROGRAMS {
+        let own = format!("{FRONT}-{program}");
+        let calls = [(program, &["-V"][..]), (&own, &["-V"]), ("a/link", &[program, "-V"])];
+        for (name, arguments) in calls {
+            let said = String::from_utf8(alone(name, arguments).stdout).unwrap();
+            let is_it = said.starts_with(&format!("{program} (cyanometer) "));
+            assert_eq!(is_it, !APART.contains(&program), "{name} {arguments:?}: {said}");
+        }
+    }
+    let done = alone(FRONT, &["stack-frames", "a.exr"]);
     let complaint = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(BAD_DATA), "{complaint}");
-    assert!(complaint.contains("measure: cannot run: no such file"), "{complaint}");
-    let list = String::from_utf8(alone(&[]).stdout).unwrap();
-    assert_eq!(list.matches("not beside this program").count(), PROGRAMS.len(), "{list}");
+    assert!(complaint.contains("stack-frames: cannot run: no such file"), "{complaint}");
+    let list = String::from_utf8(alone(FRONT, &[]).stdout).unwrap();
+    assert_eq!(list.matches("not beside this program").count(), APART.len(), "{list}");
 }
 
 #[test]

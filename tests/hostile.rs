@@ -397,6 +397,71 @@ fn bytes_behind_a_frame_are_told() {
     }
 }
 
+/// A FITS of 2x2 codes, with an empty extension behind it.
+fn fits() -> Vec<u8> {
+    let part = |cards: &[&str], data: &[u8]| {
+        let mut bytes: Vec<u8> =
+            cards.iter().chain(&["END"]).flat_map(|card| format!("{card:80}").into_bytes()).collect();
+        bytes.resize(bytes.len().next_multiple_of(2880), b' ');
+        bytes.extend_from_slice(data);
+        bytes.resize(bytes.len().next_multiple_of(2880), 0);
+        bytes
+    };
+    let image = ["BITPIX  = 8", "NAXIS   = 2", "NAXIS1  = 2", "NAXIS2  = 2"];
+    let first = part(&[&["SIMPLE  =                    T"], &image[..]].concat(), &[1, 2, 3, 4]);
+    [first, part(&["XTENSION= 'IMAGE   '", "BITPIX  = 8", "NAXIS   = 0", "PCOUNT  = 0", "GCOUNT  = 1"], &[])].concat()
+}
+
+/// Zeros fill up; all else behind the last byte that belongs to a frame is refused, in files and in pipes.
+#[test]
+fn bytes_behind_a_frame_of_any_format_are_told() {
+    let shop = Workshop::with_frames();
+    for (line, name) in [
+        ("digitize noisy.exr -o codes.tiff", "codes.tiff"),
+        ("digitize noisy.exr --format tiff --viewable -o scaled.tiff", "scaled.tiff"),
+        ("mosaic noisy.exr --format tiff --compression deflate -o electrons.tiff", "electrons.tiff"),
+        ("mosaic codes.tiff -o codes.dng", "codes.dng"),
+        ("preview codes.tiff -o picture.png", "picture.png"),
+    ] {
+        shop.run(line, &[]);
+        drop(fs::remove_file(shop.path(&format!("{name}.yaml"))));
+    }
+    fs::write(shop.path("plane.fits"), fits()).unwrap();
+    let junk = "behind its last row come bytes that are no part of it; cut them off";
+    let another = |format: &str| {
+        format!(
+            "behind it comes {format}; a stream has one frame, or several that are EXR of one part: give each a file of its own"
+        )
+    };
+    for (name, format) in [
+        ("codes.tiff", "a TIFF"),
+        ("scaled.tiff", "a TIFF"),
+        ("electrons.tiff", "a TIFF"),
+        ("codes.dng", "a TIFF"),
+        ("picture.png", "a PNG"),
+        ("plane.fits", "a FITS"),
+    ] {
+        let whole = shop.bytes(name);
+        for (more, wanted) in [
+            (&b""[..], None),
+            (&[0; 3000], None),
+            (b"junk", Some(junk.to_owned())),
+            (b"\0\0junk", Some(junk.to_owned())),
+            (&whole, Some(another(format))),
+        ] {
+            let bytes = [&whole, more].concat();
+            fs::write(shop.path(name), &bytes).unwrap();
+            for line in [format!("measure {name}"), "measure".to_owned()] {
+                let done = shop.attempt(&line, &bytes);
+                let said = String::from_utf8(done.stderr).unwrap();
+                let status = if wanted.is_some() { BAD_DATA } else { 0 };
+                assert_eq!(done.status.code(), Some(status), "{line}, {} more bytes: {said}", more.len());
+                assert!(wanted.as_ref().is_none_or(|wanted| said.contains(wanted)), "{line}: {said}");
+            }
+        }
+    }
+}
+
 fn read_file(bytes: &[u8]) -> Result<Vec<f32>> {
     let mut file: File = tempfile::tempfile().unwrap();
     file.write_all(bytes).unwrap();

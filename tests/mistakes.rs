@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 107] = [
+const MISTAKES: [(&str, i32, &str); 108] = [
     (
         "measure codes.exr -o codes.xlsx",
         BAD_USAGE,
@@ -247,9 +247,14 @@ const MISTAKES: [(&str, i32, &str); 107] = [
         "`0` is no value for --slope <ADU_PER_E>: give a number above 0; see `digitize --help`",
     ),
     (
-        "digitize noisy.exr -o codes.png",
+        "digitize noisy.exr -o codes.jpg",
         BAD_USAGE,
-        "codes.png: `.png` names no format that is written here; end the name in .exr, .tiff or .dng, or give --format",
+        "codes.jpg: `.jpg` names no format that is written here; end the name in .exr, .tiff, .dng or .png, or give --format",
+    ),
+    (
+        "digitize noisy.exr -o codes.png --sample-type f32",
+        BAD_USAGE,
+        "PNG stores u16; for floats write a TIFF or an EXR",
     ),
     ("mosaic plane.exr", BAD_DATA, "plane.exr: it is a CFA plane already, rggb"),
     (

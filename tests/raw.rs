@@ -56,6 +56,33 @@ fn each_part_comes_with_its_place_and_levels() {
     }
 }
 
+/// The border is that of each frame, of several too: levels are the means of its masked photosites, by site.
+#[test]
+fn the_border_of_a_frame_tells_its_black_level() {
+    let shop = Workshop::new();
+    let sample = |frame: u16, i: u16| 300 + 50 * frame + i * i % 97;
+    for frame in 0..2 {
+        let strip: Vec<u8> = (0..120).flat_map(|i| sample(frame, i).to_le_bytes()).collect();
+        let areas: [(u16, &[u32]); 3] = [(50717, &[4000]), (50829, &[0, 4, 10, 12]), (50830, &[0, 0, 10, 4])];
+        fs::write(shop.path(&format!("raw{frame}.dng")), dng([12, 10], 16, 1, &strip, &areas)).unwrap();
+    }
+    shop.run("import-raw raw0.dng raw1.dng --crop full -o {stem}.exr", &[]);
+    shop.run("correct-frame raw0.exr raw1.exr --black border -o {stem}-less.exr", &[]);
+    for frame in 0..2 {
+        let whole: Vec<f64> = (0..120).map(|i| f64::from(sample(frame, i))).collect();
+        let of_site = |i: usize| (i / 12 % 2, i % 12 % 2);
+        let level = |site| {
+            let masked: Vec<f64> = (0..120).filter(|i| i % 12 < 4 && of_site(*i) == site).map(|i| whole[i]).collect();
+            masked.iter().sum::<f64>() / masked.len() as f64
+        };
+        let samples = shop.frame(&format!("raw{frame}-less.exr")).samples;
+        for (i, sample) in samples.iter().enumerate() {
+            // Singles of a few hundred.
+            assert!((f64::from(*sample) - (whole[i] - level(of_site(i)))).abs() < 1e-4, "{frame} {i}");
+        }
+    }
+}
+
 /// What is made of the raw itself is what is made of the import.
 #[test]
 fn programs_read_the_raw_as_its_import() {

@@ -4,6 +4,7 @@
 
 mod support;
 
+use cyanometer::camera::optics::Exposure;
 use cyanometer::formats::chart::load_reference;
 use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::frame::{Geometry, to_sample};
@@ -213,6 +214,85 @@ fn chart(shop: &Workshop) {
         }
     }
     write(shop, "chart.exr", &header, &samples);
+}
+
+/// Dark frames of a camera are brought to the temperature that the file of the frame tells, by [HP2005, Eq. 6] in electronvolts.
+#[test]
+fn temperatures_of_a_camera_count() {
+    let shop = Workshop::new();
+    let frame = |name: &str, temperature_k: f64, sample: f32| {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some("rggb".parse().unwrap());
+        metadata.black_level_adu = Some(100.0.into());
+        metadata.white_level_adu = Some(4095.0.into());
+        metadata.exposure = Some(Exposure { exposure_s: 1.0, f_number: 8.0, lens_transmittance: 1.0 });
+        metadata.sensor_temperature_k = Some(temperature_k);
+        let header = FrameHeader { name: name.into(), geometry: Geometry::new(4, 4, &["Y"]), metadata };
+        write(&shop, name, &header, &[sample; 16]);
+    };
+    frame("light.exr", 263.15, 1100.0);
+    frame("dark.exr", 268.15, 300.0);
+    assert!(
+        said(&shop, "correct-frame light.exr --dark dark.exr -o c.exr", 0)
+            .contains("dark.exr: its temperature is 268.15 K, but that of light.exr is 263.15 K")
+    );
+    shop.run("correct-frame light.exr --dark dark.exr --scale-dark -o c.exr", &[]);
+    let current = |kelvin: f64| {
+        let gap = 1.1557 - 7.021e-4 * kelvin * kelvin / (1108.0 + kelvin);
+        kelvin.powf(1.5) * (-gap / (2.0 * 8.617_333e-5 * kelvin)).exp()
+    };
+    let expected = 1000.0 - 200.0 * current(263.15) / current(268.15);
+    let (samples, metadata) = shop.read("c.exr");
+    assert!((f64::from(samples[0]) - expected).abs() < 1e-3 * expected, "{} {expected}", samples[0]);
+    assert_eq!(metadata.sensor_temperature_k, Some(263.15));
+}
+
+/// Frames that say nothing are described where they are averaged, stacked, or read as a chart.
+#[test]
+fn bare_frames_are_described() {
+    let shop = Workshop::new();
+    chart(&shop);
+    let corners = "--corners 20,20,220,20,220,140,20,140";
+    shop.run(&format!("fit-matrix --chart chart.exr {corners} -o m.yaml"), &[]);
+    fs::write(shop.path("bare.yaml"), "schema: cyanometer/1\nquantity: unspecified\n").unwrap();
+    let bare = format!("fit-matrix --chart chart.exr --metadata bare.yaml {corners} -o bare-m.yaml");
+    let missing =
+        |key: &str, supply: &str| format!("fit-matrix: chart.exr: the metadata has no `{key}`; give {supply}\n");
+    assert_eq!(said(&shop, &bare, BAD_DATA), missing("cfa", "--cfa PATTERN"));
+    assert_eq!(said(&shop, &format!("{bare} --cfa rggb"), BAD_DATA), missing("black_level_adu", "--levels"));
+    shop.run(&format!("{bare} --cfa rggb --levels 100,4100"), &[]);
+    let elements = |name: &str| {
+        let text = String::from_utf8(shop.bytes(name)).unwrap();
+        text.split("xyz_from_camera:").nth(1).unwrap().lines().take(10).collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(elements("bare-m.yaml"), elements("m.yaml"));
+
+    let header = FrameHeader {
+        name: "bare".into(),
+        geometry: Geometry::new(2, 2, &["Y"]),
+        metadata: Metadata::new(QuantityKind::Unspecified),
+    };
+    write(&shop, "a.exr", &header, &[70.0, 80.0, 90.0, 100.0]);
+    write(&shop, "b.exr", &header, &[72.0, 82.0, 92.0, 102.0]);
+    let described = "--cfa rggb --black 64 --white 4095 --exposure 0.5 --f-number 8";
+    shop.run(&format!("average-frames a.exr b.exr {described} -o mean.exr"), &[]);
+    shop.run(&format!("stack-frames a.exr b.exr {described} -o both.zarr"), &[]);
+    shop.run("stack-frames both.zarr --frames 1..2 -o second.exr", &[]);
+    for (name, first) in [("mean.exr", 71.0), ("second.exr", 72.0)] {
+        let (samples, metadata) = shop.read(name);
+        assert_eq!((samples[0], metadata.quantity), (first, QuantityKind::Adu), "{name}");
+        assert_eq!(metadata.cfa.map(|cfa| cfa.to_string()).as_deref(), Some("rggb"), "{name}");
+        assert_eq!((metadata.black_level_adu, metadata.white_level_adu), (Some(64.0.into()), Some(4095.0.into())));
+        assert_eq!(metadata.exposure.map(|exposure| exposure.exposure_s), Some(0.5), "{name}");
+    }
+    let three = "mosaic three.exr --pattern rggb --white 4095 -o x.dng";
+    let planes = FrameHeader { geometry: Geometry::new(2, 2, &["R", "G", "B"]), ..header };
+    write(&shop, "three.exr", &planes, &[70.0; 12]);
+    assert_eq!(
+        said(&shop, three, BAD_DATA),
+        "mosaic: three.exr: the metadata has no `black_level_adu`; give --black N, 0 where it is off already\n"
+    );
+    shop.run(&format!("{three} --black 64"), &[]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Cyanometer: from the spectral radiance of a sky to what a Bayer camera records, and on to CIE XYZ, with the
 //! uncertainty of the numbers at every step.
 //!
-//! The programs are thin; the work is here. A module uses its own floor and lower ones (a test reads the sources and
+//! The programs are thin; the work is below them. A module uses its own floor and lower ones (a test reads the sources and
 //! enforces it).
 //!
 //! | floor | modules | what they know |
@@ -18,6 +18,7 @@
 //! | 9 requests | [`requests`] | what a program does, from its arguments to results and notes |
 //! | 10 reports | [`report`] | tables and figures |
 //! | 11 command line | [`cli`] | complaints, progress, exit |
+//! | 12 programs | [`programs`] | the arguments of each |
 //!
 //! # The chain
 //!
@@ -72,3 +73,7 @@ pub mod requests;
 pub mod report;
 
 pub mod cli;
+
+// Unit tests have no use for them, and need not wait until they are compiled.
+#[cfg(not(test))]
+pub mod programs;

@@ -118,6 +118,34 @@ class Written(ProgramCase):
                     self.assertEqual(str(spec.format), {"u16": "uint16", "f32": "float"}[sample_type])
                     self.same_planes(read_planes(self.directory / "out.tiff"), plain)
 
+    def test_png_has_the_samples_of_tiff(self):
+        plane = self.run_program(["mosaic"], self.noisy)
+        rgb = self.run_program(["demosaic"], self.run_program(["digitize"], plane))
+        cases = {
+            "picture": ("RGB", rgb, ["to-xyz", "--white-luminance", "900", "--space", "srgb"]),
+            "three": ("RGB", self.noisy, ["digitize"]),
+            "plane": ("Y", plane, ["digitize"]),
+            "crop": ("Y", plane, ["digitize", "--crop", "3,5,11,60"]),
+            "viewable": ("Y", plane, ["digitize", "--viewable"]),
+        }
+        for name, (channels, stdin, command) in cases.items():
+            files = [f"{name}.{suffix}" for suffix in ("png", "tiff")]
+            for file in files:
+                self.run_program([*command, "-o", file], stdin)
+            spec = read_spec(self.directory / files[0])
+            self.assertEqual((str(spec.format), "".join(spec.channelnames)), ("uint16", channels), name)
+            self.same_planes(*(read_planes(self.directory / file) for file in files))
+            # Programs of ours read the same of both, place and metadata included, with the sidecar and without.
+            for _ in range(2):
+                reports = [self.run_program(["measure", file, "--output-format", "json"]) for file in files]
+                self.assertEqual(*(json.loads(report)["regions"] for report in reports), name)
+                frames = [self.run_program(["measure", file, "-v"]) for file in files]
+                self.assertEqual(*frames, name)
+                for file in files:
+                    (self.directory / f"{file}.yaml").unlink(missing_ok=True)
+        code_points = read_spec(self.directory / "picture.png").getattribute("CICP")
+        self.assertEqual(tuple(code_points), (1, 13, 0, 1))
+
     def test_compressed_is_smaller(self):
         # Zeros: the run lengths of EXR find nothing in other flat frames of single precision.
         flat = self.run_program(["render-radiance", "--electrons", "0,0,0", "--size", "200x200"])

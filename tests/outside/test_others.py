@@ -231,7 +231,7 @@ class Fits(Others):
         text = (self.directory / "rgb.exr.yaml").read_text()
         self.assertIn("exposure_s: 2.5", text)
         self.assertIn("f_number: 4.0", text)
-        self.assertIn("-10 degrees Celsius", self.told("in.fits"))
+        self.assertIn("sensor_temperature_k: 263.15", text)
 
     def test_parts(self):
         codes, floats = self.codes(), self.codes((8, 9)).astype(np.float32)

@@ -7,7 +7,7 @@ use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::input::FrameReader;
-use cyanometer::requests::options;
+use cyanometer::requests::{described::DescribedInput, options};
 use std::process::ExitCode;
 
 mod layout;
@@ -29,7 +29,7 @@ static MEMORY: cli::Memory = cli::Memory;
 #[command(version)]
 struct Arguments {
     #[command(flatten)]
-    input: options::Input,
+    input: DescribedInput,
     #[command(flatten)]
     request: StackRequest,
     #[command(flatten)]
@@ -39,25 +39,26 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let general = |arguments: &Arguments| arguments.general.between(&arguments.input, &arguments.output);
+    let general = |arguments: &Arguments| arguments.general.between(&arguments.input.frame, &arguments.output);
     cli::start(env!("CARGO_BIN_NAME"), general, run)
 }
 
 fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
-    let Arguments { input, request, output, .. } = arguments;
+    let Arguments { input: DescribedInput { frame: input, described }, request, output, .. } = arguments;
     let stacked = request.stacked(input, output)?;
     let stack = SharedStack::of(output)?;
     let into = stack.as_ref();
     match stacked {
         Some(frames) => session.one_by_one(frames.count(), frames.turns(), |session, frame| {
-            let (reader, output) = frame.open(input, output)?;
+            let (mut reader, output) = frame.open(input, output)?;
+            described.apply(reader.header_mut())?;
             pass(session, reader, into, &output)
         })?,
         None => {
             let of_stack = options::Output { makes: options::Makes::One, ..options::Output::default() };
             let output = if into.is_some() { &of_stack } else { output };
             session.each_frame::<Arguments>(input, output, |turn| {
-                let reader = FrameReader::open(&turn.input.options_for_all())?;
+                let reader = described.open(&turn.input.options_for_all())?;
                 pass(turn.session, reader, into, turn.output)
             })?;
         }

@@ -1,13 +1,13 @@
 //! A demonstration: the chain on skies that the program carries, each command shown before it runs.
 
-use super::programs::beside;
+use super::programs;
 use super::show;
 use crate::error::{Error, Result};
 use crate::formats::atomic::AtomicFile;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
 /// Files of `sample_data/skies` that the commands read.
 const FILES: [(&str, &[u8]); 2] = [
@@ -93,11 +93,10 @@ fn pipeline(line: &str, directory: &Path) -> Result<()> {
         let before = running.last_mut().and_then(|child| child.stdout.take());
         let is_last = index + 1 == commands.len();
         let mut words = command.split(' ');
-        let path = beside(words.next().unwrap_or_default())?;
-        let mut command = Command::new(&path);
+        let mut command = programs::command(words.next().unwrap_or_default())?;
         command.args(words).current_dir(directory).stdin(before.map_or_else(Stdio::null, Stdio::from));
         command.stdout(if is_last { Stdio::inherit() } else { Stdio::piped() });
-        running.push(command.spawn().map_err(|e| Error::disk(&path.display().to_string(), "run", e))?);
+        running.push(command.spawn().map_err(|e| Error::disk(&command.get_program().to_string_lossy(), "run", e))?);
     }
     let mut failed = None;
     for (command, mut child) in commands.into_iter().zip(running) {

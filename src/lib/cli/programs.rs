@@ -28,6 +28,8 @@ pub const PROGRAMS: [&str; 16] = [
     "color-difference",
     "preview",
 ];
+/// Those that are linked with much that no other needs, so that they are executables of their own.
+pub const APART: [&str; 2] = ["import-raw", "stack-frames"];
 /// What the front door does itself: a demonstration, and pages.
 pub const OWN: [&str; 4] = ["demo", "list", "keys", "template"];
 
@@ -42,12 +44,27 @@ The usual pipeline:
 such a file to begin with. `PROGRAM --help` tells what each takes, as `cyanometer PROGRAM --help` does, with examples.
 ";
 
-/// Where a program stands: beside the one that runs; as `cyanometer-PROGRAM` where a system keeps its plain name for any
-/// package's (Debian's alternatives).
-pub(super) fn beside(program: &str) -> Result<PathBuf> {
+/// What starts a program: the file beside the one that runs, which is called `cyanometer-PROGRAM` where a system keeps its plain
+/// name for any package's (Debian's alternatives); or, where there is none, the front door, which can be most of them.
+pub(super) fn command(program: &str) -> Result<Command> {
     let this = std::env::current_exe().map_err(|e| Error::disk(program, "find", e))?;
     let own = this.with_file_name(format!("{}-{program}", env!("CARGO_PKG_NAME")));
-    Ok(if own.is_file() { own } else { this.with_file_name(program) })
+    let plain = this.with_file_name(program);
+    if own.is_file() {
+        Ok(Command::new(own))
+    } else if plain.is_file() || APART.contains(&program) {
+        Ok(Command::new(plain))
+    } else {
+        let mut command = Command::new(this);
+        command.arg0(program);
+        Ok(command)
+    }
+}
+
+/// The name under which this process was called, without directories.
+pub fn called() -> Option<String> {
+    let path = PathBuf::from(std::env::args_os().next()?);
+    Some(path.file_name()?.to_str()?.to_owned())
 }
 
 /// Becomes the program that the first word names, where there is one; the words behind it are its own. Where it cannot be
@@ -65,8 +82,11 @@ pub fn hand_over(front: &'static str) -> Option<ExitCode> {
 
 /// Gives the process to a program; comes back where that is impossible.
 pub fn become_program(program: &str, words: impl IntoIterator<Item: AsRef<OsStr>>) -> Error {
-    match beside(program) {
-        Ok(path) => Error::disk(&path.display().to_string(), "run", Command::new(&path).args(words).exec()),
+    match command(program) {
+        Ok(mut command) => {
+            let failure = command.args(words).exec();
+            Error::disk(&command.get_program().to_string_lossy(), "run", failure)
+        }
         Err(error) => error,
     }
 }
@@ -88,8 +108,8 @@ pub fn list() -> Result<()> {
 
 /// What a program says of itself in a line.
 fn summary(program: &str) -> String {
-    let ask = |path: PathBuf| Command::new(path).arg(SUMMARY).stdin(Stdio::null()).stderr(Stdio::null()).output().ok();
-    let said = beside(program).ok().and_then(ask).filter(|done| done.status.success());
+    let ask = |mut command: Command| command.arg(SUMMARY).stdin(Stdio::null()).stderr(Stdio::null()).output().ok();
+    let said = command(program).ok().and_then(ask).filter(|done| done.status.success());
     let said = said.map(|done| String::from_utf8_lossy(&done.stdout).trim_end().to_owned());
     said.unwrap_or_else(|| "(it is not beside this program, or does not run)".to_owned())
 }

@@ -230,6 +230,14 @@ pub fn png_complaint(name: &str, error: ImageError) -> Error {
     }
 }
 
+/// What the crate `png` complains of while it writes.
+pub fn png_refusal(name: &str, error: png::EncodingError) -> Error {
+    match error {
+        png::EncodingError::IoError(source) => Error::disk(name, "write", source),
+        other => Error::format(name, format!("it cannot be written as PNG: {other}")),
+    }
+}
+
 /// What the crate `png` complains of while it reads.
 pub fn png_damage(name: &str, error: png::DecodingError) -> Error {
     use png::DecodingError::{Format, IoError, LimitsExceeded, Parameter};

@@ -66,11 +66,11 @@ pub trait SampleReader: Send {
     /// reading fails.
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()>;
 
-    /// Hands out what lies behind the last row, which has been read, in formats that know where a frame ends.
+    /// Hands out what lies behind the frame, of which the last row has been read.
     ///
     /// # Errors
     ///
-    /// [`crate::error::Error::Disk`].
+    /// [`crate::error::Error::Disk`]; [`crate::error::Error::Format`] where damage hides where the frame ends.
     fn rest(&mut self) -> Result<Rest> {
         Ok(Rest::Nothing)
     }
@@ -84,6 +84,13 @@ pub enum Rest {
     Pipe(Pipe),
     /// The bytes of a file from this one on.
     File(File, u64),
+    /// What is not read on: behind a frame of this format none can follow.
+    Unread {
+        /// Up to [`HEAD_BYTES`] of what comes first.
+        head: Vec<u8>,
+        /// Whether it may be part of the frame, named by data that only its maker reads.
+        may_belong: bool,
+    },
 }
 
 /// What the tags of a file say of the colors of its R, G and B.

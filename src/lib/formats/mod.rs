@@ -19,6 +19,7 @@ pub mod frame_list;
 pub mod headerless;
 mod icc;
 pub mod input;
+mod interleave;
 pub mod inventory;
 pub mod keys;
 mod ljpeg;

@@ -7,6 +7,7 @@ use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMA
 use super::format::U16_FULL_SCALE;
 use super::icc;
 use super::places::{STDOUT_NAME, named, sidecar_path};
+use super::png::{PngSettings, PngWriter};
 use super::register;
 use super::standard::open_stdout;
 use super::storing::Encoding;
@@ -68,6 +69,7 @@ enum Encoder {
     Exr(Box<ExrWriter<Target>>),
     Tiff(Box<TiffWriter<Target>>),
     Dng(Box<DngWriter<Target>>),
+    Png(Box<PngWriter<Target>>),
 }
 
 impl FrameWriter {
@@ -82,7 +84,7 @@ impl FrameWriter {
         let sample_scale = options.scale(header, encoding)?;
         let mut header = header.clone();
         header.metadata.sample_scale = (sample_scale != 1.0).then_some(sample_scale);
-        let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None));
+        let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None) | Encoding::Png);
         let target = Target::open(options.path.as_deref(), needs_seek)?;
         let name = target.name().to_owned();
         let follow = options.frames_to_come > 0 && target.named_file().is_none();
@@ -125,6 +127,13 @@ impl FrameWriter {
                 let texts = [description, software];
                 Encoder::Dng(Box::new(DngWriter::create(target, &name, header, samples, compression, texts)?))
             }
+            Encoding::Png => {
+                let scale = u16_scale(header.metadata.quantity, TiffSamples::U16);
+                let is_srgb = header.metadata.quantity == QuantityKind::Srgb;
+                let profile = icc::profile(header, sample_scale, f64::from(U16_FULL_SCALE))?;
+                let settings = PngSettings { scale, is_srgb, description, software, profile };
+                Encoder::Png(Box::new(PngWriter::create(target, &name, geometry, settings)?))
+            }
         };
         let scaling = Scaling::of(geometry.width, &geometry.channels, sample_scale);
         let (scaled, stored) = (Vec::new(), Vec::new());
@@ -153,6 +162,11 @@ impl FrameWriter {
                 target
             }
             Encoder::Dng(writer) => writer.finish()?,
+            Encoder::Png(writer) => {
+                let (target, clamped) = writer.finish()?;
+                did_not_fit = clamped;
+                target
+            }
         };
         target.flush().map_err(|e| Error::disk(&self.name, "write", e))?;
         let sidecar = match self.record {
@@ -287,7 +301,9 @@ impl FrameWriter {
                     Some((sample, _)) => Err(viewable::lost(&self.name, *sample)),
                 }
             }
-            Encoding::Tiff(TiffSamples::U16, _) => check_lossless(&self.name, scaling, samples, scaled, U16_FULL_SCALE),
+            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Png => {
+                check_lossless(&self.name, scaling, samples, scaled, U16_FULL_SCALE)
+            }
             _ => check_lossless(&self.name, scaling, samples, scaled, f32::INFINITY),
         }
     }
@@ -313,7 +329,7 @@ impl FrameWriter {
                 stored.extend(to_store.iter().map(|&sample| f16::from_f32(sample).to_f32()));
                 self.scaling.iter().for_each(|scaling| scaling.undo(stored));
             }
-            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) => {
+            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) | Encoding::Png => {
                 let scale = u16_scale(self.header.metadata.quantity, TiffSamples::U16);
                 let rounded = |sample: f32| (sample * scale).round_ties_even().clamp(0.0, U16_FULL_SCALE);
                 stored.extend(samples.iter().map(|&sample| to_sample(f64::from(rounded(sample)).max(0.0))));
@@ -330,6 +346,7 @@ impl FrameWriter {
             Encoder::Exr(writer) => writer.write(samples),
             Encoder::Tiff(writer) => writer.write_rows(samples),
             Encoder::Dng(writer) => writer.write_rows(samples),
+            Encoder::Png(writer) => writer.write_rows(samples),
         }
     }
 }

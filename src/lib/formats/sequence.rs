@@ -3,7 +3,7 @@
 use super::files::{STDIN_NAME, named, open_named, spool};
 use super::format::{HEAD_BYTES, Rest};
 use super::places::FRAME_OF;
-use super::{pipe, table};
+use super::{pipe, register, table};
 use crate::error::{Error, Result};
 use crate::text::counted;
 use std::fmt;
@@ -231,6 +231,7 @@ impl Rest {
     fn head(&mut self, name: &str) -> Result<Vec<u8>> {
         let head = match self {
             Self::Nothing => Ok(Vec::new()),
+            Self::Unread { head, .. } => Ok(head.clone()),
             Self::Pipe(pipe) => pipe.head(HEAD_BYTES).map(<[u8]>::to_vec),
             Self::File(file, at) => {
                 let mut head = Vec::new();
@@ -251,7 +252,10 @@ impl Rest {
         if head.is_empty() {
             return Ok(false);
         }
-        if table::may_follow(&head) { Ok(true) } else { Err(Error::format(name, NO_FRAME)) }
+        if !self.is_unread() && table::may_follow(&head) {
+            return Ok(true);
+        }
+        self.refuse(&head, name).map(|()| false)
     }
 
     /// Makes sure that nothing comes.
@@ -264,7 +268,29 @@ impl Rest {
         if head.is_empty() {
             return Ok(());
         }
-        Err(Error::format(name, if table::may_follow(&head) { ANOTHER } else { NO_FRAME }))
+        if !self.is_unread() && table::may_follow(&head) {
+            return Err(Error::format(name, ANOTHER));
+        }
+        self.refuse(&head, name)
+    }
+
+    fn is_unread(&self) -> bool {
+        matches!(self, Self::Unread { .. })
+    }
+
+    /// Complains of what begins so; of what may be part of the frame a doubt is noted.
+    fn refuse(&self, head: &[u8], name: &str) -> Result<()> {
+        if let Some(format) = table::known_by(head) {
+            let problem = format!(
+                "behind it comes {format}; a stream has one frame, or several that are EXR of one part: give each a file of its own"
+            );
+            return Err(Error::format(name, problem));
+        }
+        if matches!(self, Self::Unread { may_belong: true, .. }) {
+            register::doubt(format!("{name}: behind what its tags name come bytes that only its maker could tell of"));
+            return Ok(());
+        }
+        Err(Error::format(name, NO_FRAME))
     }
 }
 

@@ -4,6 +4,7 @@ use super::dng;
 use super::exr::{ExrCompression, ExrSamples, Layers};
 use super::format::SampleType;
 use super::places::{STDOUT_NAME, named};
+use super::png;
 use super::tiff::{TiffCompression, TiffSamples};
 use super::viewable;
 use crate::error::{Error, Result};
@@ -21,16 +22,19 @@ pub enum Format {
     Tiff,
     /// DNG, of planes of codes.
     Dng,
+    /// PNG, of codes and sRGB.
+    Png,
 }
 
 impl Named for Format {
-    const ALL: &'static [Self] = &[Self::Exr, Self::Tiff, Self::Dng];
+    const ALL: &'static [Self] = &[Self::Exr, Self::Tiff, Self::Dng, Self::Png];
 
     fn name(self) -> &'static str {
         match self {
             Self::Exr => "exr",
             Self::Tiff => "tiff",
             Self::Dng => "dng",
+            Self::Png => "png",
         }
     }
 }
@@ -50,7 +54,7 @@ pub enum CompressionKind {
     Piz,
     /// Lempel-Ziv-Welch (TIFF).
     Lzw,
-    /// Deflate (TIFF, and DNG of floats).
+    /// Deflate (TIFF, PNG, and DNG of floats).
     Deflate,
 }
 
@@ -83,7 +87,7 @@ pub enum SampleKind {
     F32,
     /// 16-bit float (EXR).
     F16,
-    /// 16-bit unsigned (TIFF, DNG).
+    /// 16-bit unsigned (TIFF, DNG, PNG).
     U16,
 }
 
@@ -124,6 +128,8 @@ pub(super) enum Encoding {
     Exr(ExrSamples, ExrCompression),
     Tiff(TiffSamples, TiffCompression),
     Dng(TiffSamples, TiffCompression),
+    /// 16-bit integers, deflated.
+    Png,
 }
 
 impl OutputOptions {
@@ -131,7 +137,8 @@ impl OutputOptions {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] where options do not go together, or the format cannot hold the frame, as [`dng::check_frame`] says of a DNG.
+    /// [`Error::Usage`] where options do not go together, or the format cannot hold the frame, as [`dng::check_frame`] says of a DNG
+    /// and [`png::check_frame`] of a PNG.
     pub(super) fn encoding(&self, header: &FrameHeader) -> Result<Encoding> {
         let format = self.format()?;
         let quantity = header.metadata.quantity;
@@ -171,6 +178,11 @@ impl OutputOptions {
                 let samples = tiff_samples("DNG", self.samples.unwrap_or(default), fits_u16, quantity)?;
                 Ok(Encoding::Dng(samples, dng_compression(compression, samples)?))
             }
+            Format::Png => {
+                check_png(self.samples, self.compression, fits_u16, quantity)?;
+                png::check_frame(header)?;
+                Ok(Encoding::Png)
+            }
         }
     }
 
@@ -185,7 +197,7 @@ impl OutputOptions {
             | Encoding::Tiff(TiffSamples::F32, _)
             | Encoding::Dng(TiffSamples::F32, _) => SampleType::F32,
             Encoding::Exr(ExrSamples::F16, _) => SampleType::F16,
-            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) => SampleType::U16,
+            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) | Encoding::Png => SampleType::U16,
         })
     }
 
@@ -195,7 +207,7 @@ impl OutputOptions {
     ///
     /// Those of [`viewable::scale_of`].
     pub(super) fn scale(&self, header: &FrameHeader, encoding: Encoding) -> Result<f64> {
-        let fills_u16 = matches!(encoding, Encoding::Tiff(TiffSamples::U16, _));
+        let fills_u16 = matches!(encoding, Encoding::Tiff(TiffSamples::U16, _) | Encoding::Png);
         if self.is_viewable { viewable::scale_of(header, fills_u16) } else { Ok(1.0) }
     }
 
@@ -233,8 +245,9 @@ impl OutputOptions {
             (None, Some("exr") | None) => Ok(Format::Exr),
             (None, Some("tif" | "tiff")) => Ok(Format::Tiff),
             (None, Some("dng")) => Ok(Format::Dng),
+            (None, Some("png")) => Ok(Format::Png),
             (None, Some(end)) => Err(Error::Usage(format!(
-                "{}: `.{end}` names no format that is written here; end the name in .exr, .tiff or .dng, or give --format",
+                "{}: `.{end}` names no format that is written here; end the name in .exr, .tiff, .dng or .png, or give --format",
                 path.unwrap_or(Path::new("-")).display()
             ))),
         }
@@ -290,5 +303,27 @@ fn dng_compression(compression: CompressionKind, samples: TiffSamples) -> Result
             "DNG of 16-bit codes is not compressed by {}; leave it uncompressed, or write 32-bit floats (f32) and deflate",
             compression.name()
         ))),
+    }
+}
+
+/// Refuses what a PNG does not store.
+fn check_png(
+    samples: Option<SampleKind>,
+    compression: Option<CompressionKind>,
+    fits_u16: bool,
+    quantity: QuantityKind,
+) -> Result<()> {
+    if !fits_u16 {
+        return Err(Error::Usage(format!(
+            "the 16-bit integers of a PNG would round or clip {quantity}; write a TIFF or an EXR, or make a picture with `to-xyz \
+             --space srgb` or `preview`"
+        )));
+    }
+    if samples.is_some_and(|samples| samples != SampleKind::U16) {
+        return Err(Error::Usage("PNG stores u16; for floats write a TIFF or an EXR".into()));
+    }
+    match compression {
+        None | Some(CompressionKind::Deflate) => Ok(()),
+        Some(other) => Err(other.refused("PNG", "deflate")),
     }
 }

@@ -110,6 +110,11 @@ pub fn may_follow(head: &[u8]) -> bool {
     })
 }
 
+/// The format of a file that begins with the bytes `head`, with the article; none of what is no frame.
+pub fn known_by(head: &[u8]) -> Option<&'static str> {
+    FORMATS.iter().find(|format| matches!(format.sign, Sign::Bytes(is_one) if is_one(head))).map(|format| format.name)
+}
+
 /// The names of the formats that are read: `an EXR nor a DNG nor a PNG nor a FITS nor a TIFF`.
 pub fn names_of_read() -> String {
     let is_read = |format: &&FrameFormat| matches!(format.reading, Reading::Rows(_));

@@ -80,6 +80,9 @@ pub struct Metadata {
     /// The sensitivity that the camera was set to, ISO, as its raw file tells it; no number of ours hangs on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub iso_speed: Option<f64>,
+    /// The temperature of the sensor during the exposure, as its file tells it; where none does, that of the sensor's read-out counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor_temperature_k: Option<f64>,
     /// Exposure time and lens.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
@@ -172,6 +175,7 @@ impl Metadata {
             sensor: None,
             camera: None,
             iso_speed: None,
+            sensor_temperature_k: None,
             exposure: None,
             relative_matrix: None,
             scene: None,
@@ -232,6 +236,13 @@ impl Metadata {
     pub fn adu_per_e(&self) -> Option<f64> {
         let of_sensor = || self.sensor.as_ref()?.readout.as_ref().map(|readout| readout.adu_per_e);
         self.adc.map(|adc| adc.adu_per_e).or_else(of_sensor)
+    }
+
+    /// The temperature of the sensor in K: that which noise was drawn for, or which the exposure had, or else that of its read-out.
+    pub fn temperature_k(&self) -> Option<f64> {
+        let of_sensor = || self.sensor.as_ref()?.readout.as_ref().map(|readout| readout.temperature_k);
+        let drawn = self.noise.as_ref().map(|noise| noise.temperature_k);
+        drawn.or(self.sensor_temperature_k).or_else(of_sensor)
     }
 
     /// What the converter adds, in ADU: as it was set, or as the sensor has it.

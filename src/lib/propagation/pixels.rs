@@ -479,7 +479,7 @@ pub fn dim_green_below(frame: &FrameHeader) -> Option<f64> {
 /// Everything that the sensor's noise is made of, for a frame whose metadata do not say what was drawn.
 fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
     let readout = frame.readout()?;
-    let temperature_k = readout.temperature_k;
+    let temperature_k = frame.metadata.sensor_temperature_k.unwrap_or(readout.temperature_k);
     Ok(NoiseRecord {
         sources: Source::ALL.to_vec(),
         seed: 0,

@@ -1,6 +1,5 @@
 //! The average of exposures of one scene, and what stays uncertain in it.
 
-use super::options::Input;
 use super::values;
 use crate::analysis::statistics::{MarkedRows, Saturated};
 use crate::error::{Error, Result};
@@ -50,15 +49,6 @@ impl AverageRequest {
         }
         let averaging = Averaging { combine: self.combine, clip: self.clip.unwrap_or(CLIP) };
         Ok(SharedAverage(Mutex::new(Average { averaging, wants_layers: self.sigma, seen: None })))
-    }
-
-    /// Opens the next frame with its marks, and the layers of its uncertainty where they are the only ones.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`FrameReader::open`].
-    pub fn open(input: &Input) -> Result<FrameReader> {
-        FrameReader::open(&input.options_for_all())
     }
 }
 

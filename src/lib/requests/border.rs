@@ -4,6 +4,7 @@ use super::notes::Note;
 use crate::camera::levels::BlackLevel;
 use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::places::in_stream;
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::{BlackNoise, FrameHeader};
 use crate::numerics::averages::{Combine, average, clipped_variance};
@@ -32,8 +33,9 @@ const CLIP: f64 = 4.0;
 /// masked photosites, or none beside each row or column; those of the reader.
 pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Border) -> Result<Note> {
     let is_file = options.path.as_deref().is_some_and(|path| path != Path::new("-"));
-    if !is_file {
-        return Err(Error::Usage("a frame whose border tells its black level is read twice; name a file".into()));
+    if !is_file || in_stream(&frame.name) != frame.name {
+        let problem = "a frame whose border tells its black level is read twice; name a file that holds it alone";
+        return Err(Error::Usage(problem.into()));
     }
     if frame.geometry.channels.len() != 1 {
         return Err(frame.refuse(format!("it holds {}; the border of one plane is told", frame.holds())));
@@ -101,7 +103,8 @@ struct Masked {
 impl Masked {
     /// Reads those of a frame within `areas`, left, top, width and height on the sensor.
     fn read(frame: &FrameHeader, areas: &[[i64; 4]], options: &InputOptions, border: Border) -> Result<Self> {
-        let mut reader = FrameReader::open(options)?;
+        // The next frame of several is not meant.
+        let mut reader = FrameReader::open(&InputOptions { sequence: None, ..options.clone() })?;
         let Geometry { width, height, origin, .. } = frame.geometry.clone();
         let [x0, y0] = origin.map(i64::from);
         let mut sites: [Vec<f32>; 4] = Default::default();

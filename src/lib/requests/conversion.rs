@@ -72,7 +72,7 @@ impl Conversion {
     /// A warning of a picture in a file that other programs take for linear light.
     pub fn doubt_of(&self, output: &Output) -> Option<Note> {
         let text = "other programs take an EXR for linear light, and these are samples encoded for viewing; for a picture name a \
-                    .tiff, or let `preview` make one";
+                    .png or .tiff, or let `preview` make one";
         (self.space == Space::Srgb && output.is_exr()).then(|| Note::Warning(text.into()))
     }
 
@@ -225,6 +225,13 @@ impl Conversion {
             notes.push(Note::Warning(format!("{}: {shown} {doubt}", frame.name)));
         }
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
+        if matrix.is_relative() && (self.exposure_s.is_some() || self.lens_transmittance.is_some()) {
+            notes.push(Note::Warning(format!(
+                "{}: its XYZ are relative, and no exposure changes them; absolute ones take a matrix from spectra, or from a chart \
+                 whose luminance is known (`fit-matrix`)",
+                frame.name
+            )));
+        }
         notes
     }
 

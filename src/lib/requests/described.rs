@@ -118,7 +118,11 @@ impl Described {
             // Advice is about the name that was used.
             let option: &[_] = if self.cfa.is_some() { &["cfa"] } else { &["pattern"] };
             if frame.geometry.channels.len() != 1 {
-                let problem = format!("{}: it holds {}; a filter array stands before one", frame.name, frame.holds());
+                let problem = format!(
+                    "{}: it holds {}; a filter array stands before one, which --channel NAME takes",
+                    frame.name,
+                    frame.holds()
+                );
                 return Err(Error::Usage(problem).leave_out(option));
             }
             let known = frame.metadata.cfa.filter(|known| *known != cfa);
@@ -398,7 +402,8 @@ mod tests {
         let cfa = Described { cfa: Some("rggb".parse().unwrap()), ..Described::default() };
         assert_eq!(
             said(cfa, &mut three),
-            "in: it holds three planes of electrons; a filter array stands before one; leave out `cfa`"
+            "in: it holds three planes of electrons; a filter array stands before one, which --channel NAME takes; leave \
+             out `cfa`"
         );
         let white = Described { white_level_adu: Some(1.0), ..Described::default() };
         let complaint = "in: it holds three planes of electrons, which have no level of codes; leave out ";

@@ -87,15 +87,17 @@ impl ChartReader {
         let is_plane = frame.geometry.channels.len() == 1 && frame.metadata.demosaic.is_none();
         let pattern = frame.bayer("read of charts")?.filter(|_| is_plane);
         let Some(pattern) = pattern else {
+            if is_plane && frame.metadata.cfa.is_none() {
+                return Err(frame.missing("cfa"));
+            }
             return Err(frame.refuse(format!(
                 "it holds {holds}; a chart is read from the photosites, so that their noise is known: give the CFA plane of ADU"
             )));
         };
-        let black = frame.black_levels()?.ok_or_else(|| frame.missing("black_level_adu"))?;
+        let unknown = |key: &str| frame.refuse(format!("the metadata has no `{key}`")).give(&["levels"]);
+        let black = frame.black_levels()?.ok_or_else(|| unknown("black_level_adu"))?;
         let (Some(white), Some(full)) = (frame.metadata.white_level_adu, FullLevels::of(frame)) else {
-            return Err(
-                frame.refuse("its metadata have no `white_level_adu`, in which signals are counted; add it to them")
-            );
+            return Err(unknown("white_level_adu"));
         };
         let [width, height] = [frame.geometry.width, frame.geometry.height];
         let highest = black.largest([width, height], |_, _| None)[0];

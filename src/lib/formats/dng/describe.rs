@@ -39,9 +39,11 @@ pub(super) fn describe(
     metadata.black_by_column.clone_from(&levels.black_by_column);
     metadata.white_level_adu = Some(levels.white.into());
     // No sample depends on these.
-    let exposure = told_exposure(file, &image.first, notes);
+    let below = passed_over(exif(file, &image.first), "its Exif", notes)?;
+    let directories: Vec<&Directory> = std::iter::once(&image.first).chain(&below).collect();
+    let exposure = told_exposure(file, &directories, notes);
     metadata.exposure = passed_over(exposure, "its exposure", notes)?;
-    metadata.iso_speed = passed_over(told_sensitivity(file, &image.first), "its sensitivity", notes)?;
+    metadata.iso_speed = passed_over(told_sensitivity(file, &directories), "its sensitivity", notes)?;
     // No sample depends on it either.
     let model = file.text(&image.first, tags::UNIQUE_CAMERA_MODEL.tag()).unwrap_or_default();
     metadata.camera =
@@ -135,12 +137,10 @@ fn exif(file: &mut TiffFile, first: &Directory) -> Result<Option<Directory>> {
 
 /// The sensitivity that the camera was set to, ISO. What 16 bits do not hold is 65535 in the one tag and stands in the other
 /// \[Exif3, PhotographicSensitivity].
-fn told_sensitivity(file: &mut TiffFile, first: &Directory) -> Result<Option<f64>> {
+fn told_sensitivity(file: &mut TiffFile, directories: &[&Directory]) -> Result<Option<f64>> {
     const BEYOND: f64 = 65_535.0;
-    let below = exif(file, first)?;
     let mut number = |tag: tags::DngTag| -> Result<Option<f64>> {
-        let mut directories = std::iter::once(first).chain(&below);
-        let Some(directory) = directories.find(|directory| tag.is_in(directory)) else { return Ok(None) };
+        let Some(directory) = directories.iter().find(|directory| tag.is_in(directory)) else { return Ok(None) };
         Ok(tag.numbers(file, directory, 1)?.map(|numbers| numbers[0]).filter(|number| *number > 0.0))
     };
     match number(tags::PHOTOGRAPHIC_SENSITIVITY)? {
@@ -150,12 +150,10 @@ fn told_sensitivity(file: &mut TiffFile, first: &Directory) -> Result<Option<f64
 }
 
 /// Exposure time and f-number, where both are known.
-fn told_exposure(file: &mut TiffFile, first: &Directory, notes: &mut Vec<String>) -> Result<Option<Exposure>> {
-    let below = exif(file, first)?;
-    let directories = || std::iter::once(first).chain(&below);
+fn told_exposure(file: &mut TiffFile, directories: &[&Directory], notes: &mut Vec<String>) -> Result<Option<Exposure>> {
     // Lenses without contacts leave zeros.
     let mut number = |tag: tags::DngTag| -> Result<Option<f64>> {
-        let Some(directory) = directories().find(|directory| tag.is_in(directory)) else { return Ok(None) };
+        let Some(directory) = directories.iter().find(|directory| tag.is_in(directory)) else { return Ok(None) };
         Ok(file.ratio(directory, tag.tag())?.filter(|number| *number > 0.0))
     };
     let (time, aperture) = (number(tags::EXPOSURE_TIME)?, number(tags::F_NUMBER)?);

@@ -10,7 +10,7 @@ use super::storage::{Compression, Storage};
 use super::tags;
 use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
-use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use crate::formats::format::{FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign};
 use crate::formats::tiff::TiffFile;
 use crate::frame::Geometry;
 use crate::metadata::METADATA_BEGIN;
@@ -94,7 +94,12 @@ impl DngReader {
         let levels = Levels::read(&mut file, &image, on_sensor, reach, storage.sample)?;
         let mut notes = Vec::new();
         describe::note_area(&mut file, &image, active, area, &mut notes)?;
-        let mut own_tags = describe::describe(&mut file, &image, on_sensor, &levels, &mut notes)?;
+        let mut passed_over = Vec::new();
+        let mut own_tags = describe::describe(&mut file, &image, on_sensor, &levels, &mut passed_over)?;
+        // Metadata of ours come first, and tell what tags cannot.
+        if !description.as_deref().is_some_and(|text| text.starts_with(METADATA_BEGIN)) {
+            notes.append(&mut passed_over);
+        }
         if part == RawArea::Full {
             own_tags.masked_areas = area::masked(&mut file, &image, active, place)?;
         }
@@ -294,5 +299,9 @@ impl SampleReader for DngReader {
             self.next_row += count;
         }
         Ok(())
+    }
+
+    fn rest(&mut self) -> Result<Rest> {
+        self.file.rest(self.storage.end())
     }
 }

@@ -18,7 +18,7 @@ use std::io::{Seek, Write};
 /// # Errors
 ///
 /// [`Error::Order`] naming the program that should come first; [`Error::Usage`] where there is none; [`Error::MissingKey`]
-/// for a plane whose filter array is unknown.
+/// for a plane whose filter array or black level is unknown.
 pub fn check_frame(header: &FrameHeader, name: &str) -> Result<()> {
     let FrameHeader { geometry, metadata, .. } = header;
     let problem =
@@ -33,6 +33,10 @@ pub fn check_frame(header: &FrameHeader, name: &str) -> Result<()> {
         QuantityKind::ExpectedElectrons | QuantityKind::Electrons if is_raw && planes == 1 => order("digitize"),
         QuantityKind::Adu if is_raw && header.has_three_planes() => order("mosaic"),
         QuantityKind::Adu if is_raw && planes == 1 && metadata.cfa.is_none() => Err(header.missing("cfa")),
+        // A DNG that does not tell its black level says that it is 0.
+        QuantityKind::Adu if is_raw && planes == 1 && metadata.black_level_adu.is_none() => {
+            Err(header.missing("black_level_adu"))
+        }
         QuantityKind::Adu if is_raw && planes == 1 => match geometry.origin {
             [left, top] if left >= 0 && top >= 0 => Ok(()),
             [left, top] => Err(Error::Usage(format!(

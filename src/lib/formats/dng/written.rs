@@ -262,6 +262,9 @@ fn what_is_no_raw_is_refused() {
     let mut unknown = good.clone();
     unknown.metadata.cfa = None;
     assert_eq!(complaint(&unknown), "in: the metadata has no `cfa`");
+    let mut unknown = good.clone();
+    unknown.metadata.black_level_adu = None;
+    assert_eq!(complaint(&unknown), "in: the metadata has no `black_level_adu`");
     let mut outside = good.clone();
     outside.geometry.origin = [-1, 3];
     assert!(complaint(&outside).ends_with("begins at column -1, row 3 of the sensor; write an EXR"));

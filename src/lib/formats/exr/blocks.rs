@@ -213,7 +213,34 @@ impl Blocks {
         self.end = self.end.max(other.end);
     }
 
-    /// Hands out what lies behind the blocks, once all of a frame of one part and no other levels have been read.
+    /// A block of the frame at `offset` tells the size of what it stores at its byte `size_at`: a deep one in two numbers, of a
+    /// table and of samples.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] where the file ends before it does; [`Error::Disk`].
+    pub fn end_with_block(&mut self, offset: u64, size_at: u64, is_deep: bool) -> Result<()> {
+        let Input::File(reader, length) = &mut self.input else { return Ok(()) };
+        let mut sizes = [0; 16];
+        let sizes = if is_deep { &mut sizes[..] } else { &mut sizes[..4] };
+        let stored = offset + size_at + sizes.len() as u64;
+        if stored > *length {
+            return Err(Error::cut_short(&self.name));
+        }
+        let to = (offset + size_at).cast_signed() - self.position.cast_signed();
+        let read = reader.seek_relative(to).and_then(|()| reader.read_exact(sizes));
+        read.map_err(|e| Error::disk(&self.name, "read", e))?;
+        self.position = stored;
+        let number = |bytes: &[u8]| bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte));
+        let size = sizes.chunks(8).map(number).fold(0, u64::saturating_add);
+        self.end = self.end.max(stored.saturating_add(size));
+        if self.end > *length {
+            return Err(Error::cut_short(&self.name));
+        }
+        Ok(())
+    }
+
+    /// Hands out what lies behind the blocks, once all of a frame have been read.
     ///
     /// # Errors
     ///

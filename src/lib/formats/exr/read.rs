@@ -40,6 +40,16 @@ pub struct ExrReader {
     rows_read: usize,
     /// Decoded rows that were not asked for yet.
     ahead: Vec<f32>,
+    /// In a file of several parts or of tiles, the block that lies furthest behind.
+    last: Option<LastBlock>,
+}
+
+/// A block of any part.
+struct LastBlock {
+    offset: u64,
+    /// Where the size of what it stores stands, from its first byte on.
+    size_at: u64,
+    is_deep: bool,
 }
 
 impl ExrReader {
@@ -56,19 +66,27 @@ impl ExrReader {
         let meta = read_meta(&mut reader, name)?;
         let contents = Contents::of(&meta, part, name)?;
         let mut offsets = Offsets::new();
+        let mut last: Option<LastBlock> = None;
         for (index, header) in meta.headers.iter().enumerate() {
             // An entry takes 8 bytes, and its block at least 8 more.
             if header.chunk_count as u64 > length / 16 {
                 return Err(Error::cut_short(name));
             }
             let table = read_table(&mut reader, header.chunk_count, name)?;
+            let may_be_last = meta.requirements.is_multilayer() || header.blocks != BlockDescription::ScanLines;
+            if may_be_last
+                && let Some((_, offset)) = table.extent().0
+                && last.as_ref().is_none_or(|last| last.offset < offset)
+            {
+                last = Some(LastBlock::of(header, &meta, offset));
+            }
             if index == part {
                 offsets = table;
             }
         }
         let position = reader.stream_position().map_err(failed)? - first;
         let blocks = Blocks::of_file(reader, name, position, length, offsets)?;
-        Ok(Self::new(blocks, name, meta, part, contents))
+        Ok(Self { last, ..Self::new(blocks, name, meta, part, contents) })
     }
 
     /// Opens a stream that cannot seek: scanlines in increasing order, a single part.
@@ -94,7 +112,7 @@ impl ExrReader {
     fn new(blocks: Blocks, name: &str, meta: MetaData, part: usize, contents: Contents) -> Self {
         let straight = Straight::of(&meta, part, &contents.order);
         let name = name.into();
-        Self { blocks, name, meta, part, contents, straight, rows_read: 0, ahead: Vec::new() }
+        Self { blocks, name, meta, part, contents, straight, rows_read: 0, ahead: Vec::new(), last: None }
     }
 
     /// Whether the second part holds layers of the first, which is of ours.
@@ -333,8 +351,22 @@ impl SampleReader for ExrReader {
     }
 
     fn rest(&mut self) -> Result<Rest> {
-        let is_single = !self.meta.requirements.is_multilayer() && self.header().blocks == BlockDescription::ScanLines;
-        if is_single && self.is_done() { self.blocks.rest() } else { Ok(Rest::Nothing) }
+        if !self.is_done() {
+            return Ok(Rest::Nothing);
+        }
+        if let Some(LastBlock { offset, size_at, is_deep }) = self.last {
+            self.blocks.end_with_block(offset, size_at, is_deep)?;
+        }
+        self.blocks.rest()
+    }
+}
+
+impl LastBlock {
+    /// The block at a place, which is one of this part \[OpenEXR file layout].
+    fn of(header: &Header, meta: &MetaData, offset: u64) -> Self {
+        let part_number = if meta.requirements.is_multilayer() { 4 } else { 0 };
+        let place = if header.blocks == BlockDescription::ScanLines { 4 } else { 16 };
+        Self { offset, size_at: part_number + place, is_deep: header.deep }
     }
 }
 

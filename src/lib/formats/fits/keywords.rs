@@ -6,10 +6,14 @@ use crate::cfa::FilterArray;
 use crate::formats::exposure;
 use crate::metadata::Metadata;
 use crate::text::visible;
-use crate::units::QuantityKind;
+use crate::units::{QuantityKind, kelvin};
+use std::ops::RangeInclusive;
 
 /// Microseconds in a second.
 const US_PER_S: f64 = 1e6;
+
+/// Temperatures that sensors have; programs write others where they know none.
+const SENSOR_K: RangeInclusive<f64> = 50.0..=400.0;
 
 /// What a header tells.
 #[derive(Debug)]
@@ -56,6 +60,7 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     metadata.camera = header.text("INSTRUME").map(|camera| visible(camera).into_owned());
     let exposure_s = told_time(header);
     metadata.exposure = told_exposure(header, exposure_s, &mut notes);
+    metadata.sensor_temperature_k = told_temperature(header, &mut notes);
     pass_over(header, &mut notes);
     let exposure_s = exposure_s.filter(|seconds| *seconds > 0.0 && seconds.is_finite());
     Told { metadata, exposure_s, is_bottom_up, notes }
@@ -100,6 +105,19 @@ fn told_time(header: &Header) -> Option<f64> {
     seconds.or_else(|| Some(header.number("EXPOINUS")? / US_PER_S))
 }
 
+/// The temperature of the sensor in K.
+fn told_temperature(header: &Header, notes: &mut Vec<String>) -> Option<f64> {
+    let celsius = header.number("CCD-TEMP")?;
+    let kelvin = kelvin(celsius);
+    let is_possible = SENSOR_K.contains(&kelvin);
+    if !is_possible {
+        notes.push(format!(
+            "its CCD-TEMP of {celsius} degrees Celsius is passed over: it is no temperature of a sensor"
+        ));
+    }
+    is_possible.then_some(kelvin)
+}
+
 /// Exposure time and f-number, which count together; the transmittance of the lens, which no keyword has, is 1.
 fn told_exposure(header: &Header, exposure_s: Option<f64>, notes: &mut Vec<String>) -> Option<Exposure> {
     let ratio = || Some(header.number("FOCALLEN")? / header.number("APTDIA").filter(|diameter| *diameter > 0.0)?);
@@ -112,9 +130,6 @@ fn pass_over(header: &Header, notes: &mut Vec<String>) {
     let mut found = Vec::new();
     if let Some(camera) = header.text("INSTRUME") {
         found.push(format!("camera {camera}"));
-    }
-    if let Some(celsius) = header.number("CCD-TEMP") {
-        found.push(format!("sensor at {celsius} degrees Celsius (CCD-TEMP)"));
     }
     if let Some(gain) = header.number("EGAIN").filter(|gain| *gain > 0.0) {
         found.push(format!("{gain} e-/ADU (EGAIN), which is an `adu_per_e` of {}", 1.0 / gain));

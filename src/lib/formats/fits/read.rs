@@ -1,15 +1,17 @@
 //! Reading rows of an image.
 
-use super::header::{Array, Header, Kind};
+use super::header::{Array, BLOCK_BYTES, Header, Kind};
 use super::keywords::{self, Told};
 use crate::error::{Error, Result};
 use crate::formats::files::spool;
-use crate::formats::format::{FrameFormat, Readers, Reading, SampleReader, SampleType, Sign, Streaming};
+use crate::formats::format::{
+    FrameFormat, HEAD_BYTES, Readers, Reading, Rest, SampleReader, SampleType, Sign, Streaming,
+};
 use crate::formats::read_ahead::Pipe;
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::Metadata;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::os::unix::fs::FileExt;
 
 /// FITS, the Flexible Image Transport System.
@@ -46,6 +48,7 @@ pub struct FitsReader {
     next_row: usize,
     /// One row of one plane, as stored.
     stored: Vec<u8>,
+    array: Array,
 }
 
 /// Where rows come from.
@@ -88,7 +91,7 @@ impl FitsReader {
                 let after = next_image(&mut file, data + array.padded_bytes(), part + 1, name).unwrap_or(None);
                 return Err(no_image(name, part, &array.kind, after));
             }
-            return Self::placed(name, &header, &array, file, data);
+            return Self::placed(name, &header, array, file, data);
         }
         Err(Error::cut_short(name))
     }
@@ -109,16 +112,25 @@ impl FitsReader {
         let (form, geometry, told) = described(name, &header, &array)?;
         if geometry.channels.len() == 1 && !told.is_bottom_up {
             let source = Source::InOrder(Box::new(BufReader::with_capacity(READ_BYTES, input)), true);
-            return Ok(Self { name: name.into(), source, form, geometry, told, next_row: 0, stored: Vec::new() });
+            return Ok(Self {
+                name: name.into(),
+                source,
+                form,
+                geometry,
+                told,
+                next_row: 0,
+                stored: Vec::new(),
+                array,
+            });
         }
         let spooled = spool(&mut input, name)?;
-        Self::placed(name, &header, &array, spooled, 0)
+        Self::placed(name, &header, array, spooled, 0)
     }
 
     /// The image whose array begins at the byte `data` of a file.
-    fn placed(name: &str, header: &Header, array: &Array, mut file: File, data: u64) -> Result<Self> {
+    fn placed(name: &str, header: &Header, array: Array, mut file: File, data: u64) -> Result<Self> {
         let failed = |e| Error::disk(name, "read", e);
-        let (form, geometry, told) = described(name, header, array)?;
+        let (form, geometry, told) = described(name, header, &array)?;
         let length = file.seek(SeekFrom::End(0)).map_err(failed)?;
         if data.checked_add(array.bytes).is_none_or(|end| end > length) {
             return Err(Error::cut_short(name));
@@ -129,7 +141,7 @@ impl FitsReader {
         } else {
             Source::Anywhere(file, data)
         };
-        Ok(Self { name: name.into(), source, form, geometry, told, next_row: 0, stored: Vec::new() })
+        Ok(Self { name: name.into(), source, form, geometry, told, next_row: 0, stored: Vec::new(), array })
     }
 
     /// Brings one row of one plane, as stored.
@@ -364,5 +376,46 @@ impl SampleReader for FitsReader {
         }
         self.next_row += rows;
         Ok(())
+    }
+
+    fn rest(&mut self) -> Result<Rest> {
+        let fill = self.array.padded_bytes() - self.array.bytes;
+        let head = match &mut self.source {
+            Source::InOrder(input, _) => behind(input, fill, &self.name)?,
+            Source::Anywhere(file, data) => {
+                let end = *data + self.array.bytes;
+                file.seek(SeekFrom::Start(end)).map_err(|e| Error::disk(&self.name, "read", e))?;
+                behind(&mut BufReader::with_capacity(READ_BYTES, file), fill, &self.name)?
+            }
+        };
+        Ok(if head.is_empty() { Rest::Nothing } else { Rest::Unread { head, may_belong: false } })
+    }
+}
+
+/// The first bytes behind an array, which `fill` bytes fill up, that are no other part of the file; none where all are. Zeros are
+/// nothing.
+fn behind(input: &mut impl Read, fill: u64, name: &str) -> Result<Vec<u8>> {
+    let failed = |e| Error::disk(name, "read", e);
+    let mut skip = fill;
+    loop {
+        io::copy(&mut input.take(skip), &mut io::sink()).map_err(failed)?;
+        let mut block = Vec::new();
+        loop {
+            block.clear();
+            input.take(BLOCK_BYTES as u64).read_to_end(&mut block).map_err(failed)?;
+            if block.is_empty() {
+                return Ok(block);
+            }
+            if block.iter().any(|byte| *byte != 0) {
+                break;
+            }
+        }
+        if !block.starts_with(b"XTENSION=") {
+            let zeros = block.iter().take_while(|byte| **byte == 0).count();
+            return Ok(block[zeros..].iter().copied().take(HEAD_BYTES).collect());
+        }
+        let header = Header::read(&mut block.as_slice().chain(&mut *input), name)?;
+        let Some(header) = header else { return Ok(Vec::new()) };
+        skip = Array::of(&header, name)?.padded_bytes();
     }
 }

@@ -281,10 +281,11 @@ fn keywords_of_the_camera_are_used_or_told() {
         ("PEDESTAL", number(-100.0)),
     ]);
     assert_eq!((metadata.black_level_adu, metadata.quantity), (None, QuantityKind::Unspecified));
+    assert_eq!(metadata.sensor_temperature_k, Some(263.15));
+    assert_eq!(told(&[("CCD-TEMP", number(-999.0))]).0.sensor_temperature_k, None);
     assert_eq!(
         notes,
-        "its header tells what is not used here: camera ASI533MC, sensor at -10 degrees Celsius (CCD-TEMP), 0.5 e-/ADU \
-         (EGAIN), which is an `adu_per_e` of 2, GAIN 100 in units of the camera; its PEDESTAL of -100 is not taken as the \
+        "its header tells what is not used here: camera ASI533MC, 0.5 e-/ADU (EGAIN), which is an `adu_per_e` of 2, GAIN 100 in units of the camera; its PEDESTAL of -100 is not taken as the \
          black level: programs disagree on its sign and scale"
     );
     assert_eq!(told(&[("BUNIT", text("ADU"))]).0.quantity, QuantityKind::Adu);

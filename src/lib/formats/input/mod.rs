@@ -125,7 +125,7 @@ impl FrameReader {
                 Self::open_file(file, &name, path, options)
             }
             Some(Rest::Pipe(pipe)) => Self::of(open_piped(pipe, &name, options.part)?, &name, path, options),
-            Some(Rest::Nothing) => Err(Error::format(&name, "it is empty")),
+            Some(Rest::Nothing | Rest::Unread { .. }) => Err(Error::format(&name, "it is empty")),
         };
         let mut frame = frame?;
         sequence.expect(frame.to_come, &name)?;
@@ -393,7 +393,7 @@ impl FrameReader {
                 self.pass_over(below, &mut Vec::new())?;
                 let mut rest = self.reader.rest()?;
                 // What a file holds is known now; what a stream brings may take its time.
-                if let Rest::File(..) = rest {
+                if !matches!(rest, Rest::Pipe(_)) {
                     rest.begins_frame(&self.header.name)?;
                 }
                 sequence.go_on(rest);

@@ -31,7 +31,7 @@ pub struct TiffFile {
     pub(super) big_endian: bool,
     /// BigTIFF: offsets and counts have eight bytes.
     big_tiff: bool,
-    first_directory: u64,
+    pub(super) first_directory: u64,
 }
 
 impl TiffFile {
@@ -180,7 +180,7 @@ impl TiffFile {
     }
 
     /// Reads the directory at `offset` (only its link to the next one unless `wanted`), and gives that link.
-    fn directory_at(&mut self, offset: u64, wanted: bool) -> Result<(Directory, u64)> {
+    pub(super) fn directory_at(&mut self, offset: u64, wanted: bool) -> Result<(Directory, u64)> {
         let (count_bytes, entry_bytes, offset_bytes) = if self.big_tiff { (8, 20, 8) } else { (2, 12, 4) };
         let beyond = |file: &Self| file.cut_short("the table of tags");
         if !self.holds(offset, count_bytes as u64) {
@@ -202,7 +202,8 @@ impl TiffFile {
         if self.holds(table + table_bytes, offset_bytes as u64) {
             self.read_at(table + table_bytes, &mut link[..offset_bytes])?;
         }
-        let mut directory = Directory { entries: BTreeMap::new() };
+        let bytes = count_bytes as u64 + table_bytes + offset_bytes as u64;
+        let mut directory = Directory { entries: BTreeMap::new(), bytes };
         if wanted {
             let mut bytes = vec![0; usize::try_from(table_bytes).unwrap_or_default()];
             self.read_at(table, &mut bytes)?;
@@ -237,6 +238,11 @@ impl TiffFile {
         self.directory_below(offset).map(Some)
     }
 
+    /// The most bytes of a value that stands in the table itself.
+    pub(super) fn inline_bytes(&self) -> u64 {
+        if self.big_tiff { 8 } else { 4 }
+    }
+
     /// The bytes of a tag's first `at_most` values, and their type.
     fn value(&mut self, entry: &Entry, tag: Tag, at_most: u64) -> Result<(u16, usize, Vec<u8>)> {
         let size = type_bytes(entry.kind);
@@ -248,7 +254,7 @@ impl TiffFile {
         let total = entry.count.checked_mul(size as u64).filter(|&total| total <= self.length.max(8));
         let Some(total) = total else { return Err(beyond(self)) };
         let wanted = usize::try_from(total.min(at_most.saturating_mul(size as u64))).map_err(|_| beyond(self))?;
-        if total <= if self.big_tiff { 8 } else { 4 } {
+        if total <= self.inline_bytes() {
             return Ok((entry.kind, size, entry.inline[..wanted].to_vec()));
         }
         if !self.holds(entry.offset, total) {
@@ -348,6 +354,8 @@ impl TiffFile {
 #[derive(Debug)]
 pub struct Directory {
     entries: BTreeMap<u16, Entry>,
+    /// Bytes of the table, with its length before and the link behind it.
+    pub(super) bytes: u64,
 }
 
 impl Directory {
@@ -359,6 +367,14 @@ impl Directory {
     /// The numbers of all tags, in ascending order.
     pub fn numbers(&self) -> impl Iterator<Item = u16> {
         self.entries.keys().copied()
+    }
+
+    /// Number and type of each tag, the bytes that its values take, and where they lie if not in the table.
+    pub(super) fn values(&self) -> impl Iterator<Item = (u16, u16, u64, u64)> {
+        self.entries.iter().map(|(tag, entry)| {
+            let bytes = entry.count.saturating_mul(type_bytes(entry.kind) as u64);
+            (*tag, entry.kind, bytes, entry.offset)
+        })
     }
 }
 

@@ -8,9 +8,9 @@
 mod capture;
 mod chunk;
 mod directory;
+mod extent;
 mod first;
 mod grid;
-mod interleave;
 mod layout;
 mod read;
 mod tags;

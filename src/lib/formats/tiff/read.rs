@@ -7,7 +7,7 @@ use super::chunk::{Compression, Trouble};
 use super::directory::{TiffFile, begins_so};
 use super::layout::Layout;
 use crate::error::Result;
-use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign};
 use crate::frame::Geometry;
 use crate::metadata::{METADATA_BEGIN, Metadata};
 use half::f16;
@@ -356,6 +356,10 @@ impl SampleReader for TiffReader {
         self.read_rows(self.next_row, rows, &mut samples[start..])?;
         self.next_row += rows;
         Ok(())
+    }
+
+    fn rest(&mut self) -> Result<Rest> {
+        self.file.rest(self.layout.end())
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::chunk::{self, Predictor};
 use super::first::FirstImage;
-use super::interleave::{interleave, interleave_u16};
 use super::tags::{self, ExtraTag, Field};
 use super::{TiffCompression, TiffSamples, TiffTags};
 use crate::error::{Error, Result};
+use crate::formats::interleave::{interleave, interleave_u16};
 use crate::frame::Geometry;
 use rayon::prelude::*;
 use std::io::{Seek, SeekFrom, Write};
@@ -250,7 +250,7 @@ impl<W: Write + Seek> TiffWriter<W> {
             .zip(lines)
             .with_min_len(16)
             .map(|(row, samples)| match kind {
-                TiffSamples::U16 => interleave_u16(samples, row, channels, scale),
+                TiffSamples::U16 => interleave_u16(samples, row, channels, scale, |low_high| low_high),
                 TiffSamples::F32 => {
                     interleave(samples, row, channels, f32::to_le_bytes);
                     0

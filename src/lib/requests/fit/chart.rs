@@ -1,5 +1,6 @@
 //! Fitting a matrix to a chart of known colors, seen by the camera.
 
+use super::super::described::{Described, DescribedWithBlack};
 use super::super::notes::Note;
 use super::super::values;
 use crate::analysis::characterization::regression::residuals;
@@ -10,6 +11,7 @@ use crate::analysis::chart::fit::{ChartMatrix, Misfit, Patch, fit};
 use crate::analysis::chart::grid::Grid;
 use crate::analysis::chart::judgment::{Judgment, judge};
 use crate::analysis::chart::reading::{ChartReader, ReadPatch};
+use crate::cfa::FilterArray;
 use crate::color::adaptation::Adaptation;
 use crate::color::{chromaticity, rows_of, xyz_of_chromaticity};
 use crate::error::{Error, Result};
@@ -38,8 +40,12 @@ pub struct ChartFit {
     /// CSV of means of patches: columns R, G, B, where known name, std_R, std_G, std_B, cov_RG, cov_RB, cov_GB
     #[arg(long, value_name = "FILE.csv")]
     pub patches: Option<PathBuf>,
-    /// Black and white level of the means in --patches, ADU; without, they are shares of white level less black level
-    #[arg(long, value_name = "BLACK,WHITE", value_parser = values::levels, requires = "patches")]
+    /// Filter array of the frame of the chart, where that does not say it: rggb, bggr, grbg, gbrg
+    #[arg(long, value_name = "PATTERN", value_parser = str::parse::<FilterArray>, requires = "chart")]
+    pub cfa: Option<FilterArray>,
+    /// Black and white level, ADU, of the frame of the chart, where that does not say them, or of the means in --patches, which
+    /// without are shares of white level less black level
+    #[arg(long, value_name = "BLACK,WHITE", value_parser = values::levels)]
     pub levels: Option<[f64; 2]>,
     /// Colors of the patches: colorchecker (made from November 2014 on), colorchecker-2005 (before), or a CSV of X,Y,Z, x,y,Y or
     /// L,a,b with a column name, or of reflectances
@@ -132,8 +138,12 @@ impl ChartFit {
                         .into(),
                 ));
             }
-            (Some(frame), Some(corners), _) => see_frame(&self.options_of(frame), corners)?,
+            (Some(frame), Some(corners), _) => see_frame(self.open(frame)?, corners)?,
             (_, _, Some(table)) => (self.see_table(table)?, Vec::new()),
+            _ if self.levels.is_some() => {
+                let problem = "levels are those of a chart; give --chart or --patches";
+                return Err(Error::Usage(problem.into()).leave_out(&["levels"]));
+            }
             _ => return Ok(None),
         };
         let reference = load_reference(&self.reference)?;
@@ -168,9 +178,13 @@ impl ChartFit {
         Ok(Some(ChartFound { matrix, judgment, notes }))
     }
 
-    /// How the frame of the chart is opened.
-    fn options_of(&self, frame: &Path) -> InputOptions {
-        InputOptions { path: Some(frame.to_owned()), metadata: self.metadata.clone(), ..InputOptions::default() }
+    /// Opens the frame of the chart, as it is described.
+    fn open(&self, frame: &Path) -> Result<FrameReader> {
+        let path = Some(frame.to_owned());
+        let options = InputOptions { path, metadata: self.metadata.clone(), ..InputOptions::default() };
+        let [black_level_adu, white_level_adu] = [0, 1].map(|end| self.levels.map(|levels| levels[end]));
+        let described = Described { cfa: self.cfa, white_level_adu, ..Described::default() };
+        DescribedWithBlack { described, black_level_adu }.open(&options)
     }
 
     /// Means of a table.
@@ -325,8 +339,7 @@ fn residual(patches: &[Patch]) -> f64 {
 }
 
 /// Means of the patches in a frame, and those that there would be if the corners were given from another on.
-fn see_frame(options: &InputOptions, corners: [[f64; 2]; 4]) -> Result<(Seen, Vec<Turned>)> {
-    let mut reader = FrameReader::open(options)?;
+fn see_frame(mut reader: FrameReader, corners: [[f64; 2]; 4]) -> Result<(Seen, Vec<Turned>)> {
     let frame = reader.header().clone();
     let mut charts = Vec::new();
     for turns in 0..corners.len() {

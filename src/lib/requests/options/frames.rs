@@ -98,15 +98,15 @@ pub struct Output {
     /// What is made of several frames.
     #[arg(skip)]
     pub makes: Makes,
-    /// Format; by default that of the file's extension, or EXR; DNG for one plane of ADU alone
+    /// Format; by default that of the file's extension, or EXR; DNG for one plane of ADU alone, PNG for whole codes and sRGB
     #[arg(long, value_parser = values::choice::<Format>())]
     pub format: Option<Format>,
     /// Compression, without loss: rle, zips, zip, piz for EXR; lzw, deflate for TIFF; deflate for DNG of floats; none
-    /// by default
+    /// by default, but a PNG is always deflated
     #[arg(long, value_parser = values::choice::<CompressionKind>())]
     pub compression: Option<CompressionKind>,
-    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF and DNG; by default f32, and u16 for codes in TIFF and
-    /// DNG
+    /// How samples are stored: f32 or f16 in EXR, u16 or f32 in TIFF and DNG, u16 in PNG; by default f32, and u16 for codes in
+    /// TIFF and DNG
     #[arg(long, value_name = "TYPE", value_parser = values::choice::<SampleKind>())]
     pub sample_type: Option<SampleKind>,
     /// Scale samples by a power of two so that viewers show them: white between half and all of 1, or of 16 bits. Programs of

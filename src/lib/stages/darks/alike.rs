@@ -90,7 +90,7 @@ pub(super) fn differences(frame: &FrameHeader, dark: &FrameHeader) -> Vec<String
     let exposure_s = |frame: &FrameHeader| frame.metadata.exposure.map(|exposure| exposure.exposure_s);
     let pairs = [
         ("exposure", "s", exposure_s(dark).zip(exposure_s(frame))),
-        ("temperature", "K", temperature_k(dark).zip(temperature_k(frame))),
+        ("temperature", "K", dark.metadata.temperature_k().zip(frame.metadata.temperature_k())),
     ];
     let warn = |(what, unit, pair): (&str, &str, Option<(f64, f64)>)| {
         let (its, theirs) = pair.filter(|(a, b)| !is_same(*a, *b))?;
@@ -114,11 +114,4 @@ pub(super) fn differences(frame: &FrameHeader, dark: &FrameHeader) -> Vec<String
 /// Equal but for what a text with seven digits may have lost.
 pub(super) fn is_same(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-6 * b.abs()
-}
-
-/// The temperature of the sensor in K as metadata tell it.
-pub(super) fn temperature_k(frame: &FrameHeader) -> Option<f64> {
-    let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
-    let of_sensor = readout.map(|readout| readout.temperature_k);
-    frame.metadata.noise.as_ref().map(|noise| noise.temperature_k).or(of_sensor)
 }

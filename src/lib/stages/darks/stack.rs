@@ -1,8 +1,6 @@
 //! How dark and bias frames count as one.
 
-use super::alike::{
-    check_alike, check_codes, differences, is_same, lit, says_enough, says_enough_of_sensor, temperature_k,
-};
+use super::alike::{check_alike, check_codes, differences, is_same, lit, says_enough, says_enough_of_sensor};
 use crate::camera::levels::BlackLevels;
 use crate::camera::readout::dark_current_law;
 use crate::error::{Error, Result};
@@ -60,7 +58,7 @@ impl Master {
             average: averaging.record_of(members.iter().map(|member| heads[*member]))?,
             weight: 1.0,
             exposure_s: metadata.exposure.map(|exposure| exposure.exposure_s),
-            temperature_k: temperature_k(first),
+            temperature_k: first.metadata.temperature_k(),
             noise: metadata.noise.as_ref().filter(|_| is_told).map(MasterNoise::of),
             identity: identity(members.iter().map(|member| heads[*member])),
         };
@@ -327,7 +325,7 @@ struct Dose {
 
 impl Dose {
     fn of(frame: &FrameHeader, heads: &[&FrameHeader], warnings: &mut Vec<String>) -> Self {
-        let unknown = std::iter::once(&frame).chain(heads).find(|head| temperature_k(head).is_none());
+        let unknown = std::iter::once(&frame).chain(heads).find(|head| head.metadata.temperature_k().is_none());
         if let Some(head) = unknown {
             warnings.push(format!(
                 "{}: its temperature is not known; dark signals are scaled by exposure alone",
@@ -338,7 +336,7 @@ impl Dose {
     }
 
     fn at(&self, head: &FrameHeader) -> Result<f64> {
-        let law = temperature_k(head).filter(|_| self.knows_temperatures).map_or(1.0, dark_current_law);
+        let law = head.metadata.temperature_k().filter(|_| self.knows_temperatures).map_or(1.0, dark_current_law);
         Ok(head.exposure()?.exposure_s * law)
     }
 }

@@ -37,14 +37,21 @@ fn interleave_known<const CHANNELS: usize, const BYTES: usize>(
     }
 }
 
-/// Interleaves a row as 16-bit integers, and counts the samples that do not fit.
-pub(super) fn interleave_u16(samples: &[f32], row: &mut [u8], channels: usize, scale: f32) -> u64 {
+/// Interleaves a row as 16-bit integers, of whose low and high byte `order` makes what is stored, and counts the samples that do
+/// not fit.
+pub(super) fn interleave_u16(
+    samples: &[f32],
+    row: &mut [u8],
+    channels: usize,
+    scale: f32,
+    order: impl Fn([u8; 2]) -> [u8; 2] + Copy,
+) -> u64 {
     let unfit: u32 =
         samples.iter().map(|sample| u32::from(!(0..=i32::from(u16::MAX)).contains(&rounded(sample * scale)))).sum();
     interleave(samples, row, channels, |sample| {
         let fitting = rounded(sample * scale).clamp(0, i32::from(u16::MAX));
         let [low, high, ..] = fitting.to_le_bytes();
-        [low, high]
+        order([low, high])
     });
     unfit.into()
 }

@@ -1,15 +1,18 @@
-//! PNG: rows of 8 or 16-bit samples of the pictures that programs store their codes in \[PNG2025].
+//! Reading rows.
 
-use super::foreign::png_damage;
-use super::format::{ColorTags, FrameFormat, Readers, Reading, SampleReader, SampleType, Sign};
+use super::PLACE;
 use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
+use crate::formats::foreign::png_damage;
+use crate::formats::format::{
+    ColorTags, FrameFormat, HEAD_BYTES, Readers, Reading, Rest, SampleReader, SampleType, Sign,
+};
 use crate::frame::Geometry;
 use crate::metadata::{METADATA_BEGIN, Metadata};
 use crate::units::QuantityKind;
 use png::{BitDepth, ColorType, Info, Limits, ScaledFloat};
 use std::fs::File;
-use std::io::{BufReader, Seek, SeekFrom};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 
 /// Portable Network Graphics.
 pub const FORMAT: FrameFormat = FrameFormat {
@@ -39,6 +42,9 @@ const CONVERT: &str = "convert it first, for example with `oiiotool in.png -o ou
 /// is not divided by. Memory is a few rows, and texts of up to 16 MiB.
 pub struct PngReader {
     name: String,
+    /// The file once more, and where it begins in there.
+    file: File,
+    start: u64,
     reader: png::Reader<BufReader<File>>,
     geometry: Geometry,
     stored: SampleType,
@@ -62,7 +68,11 @@ impl PngReader {
         let start = file.stream_position().map_err(failed)?;
         let length = file.seek(SeekFrom::End(0)).map_err(failed)?.saturating_sub(start);
         file.seek(SeekFrom::Start(start)).map_err(failed)?;
-        let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), Limits { bytes: TEXT_BYTES });
+        let copy = file.try_clone().map_err(failed)?;
+        let mut file = BufReader::new(file);
+        let place = place(&mut file).unwrap_or_default();
+        file.seek(SeekFrom::Start(start)).map_err(failed)?;
+        let mut decoder = png::Decoder::new_with_limits(file, Limits { bytes: TEXT_BYTES });
         let damage = |error| png_damage(name, error);
         let header = decoder.read_header_info().map_err(damage)?;
         let refuse = |problem: String| Error::format(name, problem);
@@ -71,16 +81,52 @@ impl PngReader {
         check_size(size, channels.len() as u64 * stored.bytes() as u64, length).map_err(refuse)?;
         let [width, height] = size.map(|side| usize::try_from(side).unwrap_or(usize::MAX));
         let reader = decoder.read_info().map_err(damage)?;
+        let embedded = embedded(reader.info());
+        // Of what our programs made the metadata tell how samples are encoded, and the place is one on the sensor.
+        let (origin, notes) = match embedded {
+            Some(_) => (place, Vec::new()),
+            None => ([0, 0], notes(reader.info())),
+        };
         Ok(Self {
             name: name.into(),
-            geometry: Geometry::new(width, height, channels),
+            file: copy,
+            start,
+            geometry: Geometry { origin, ..Geometry::new(width, height, channels) },
             stored,
-            embedded: embedded(reader.info()),
+            embedded,
             own_tags: Metadata::new(QuantityKind::Unspecified),
             colors: colors(reader.info()),
-            notes: notes(reader.info()),
+            notes,
             reader,
         })
+    }
+}
+
+/// The place that stands before the samples, where one does.
+///
+/// # Errors
+///
+/// Where the file ends before the samples: who reads these says so.
+fn place(file: &mut (impl BufRead + Seek)) -> io::Result<[i32; 2]> {
+    // The first eight bytes are those of all files.
+    file.seek_relative(8)?;
+    loop {
+        let mut head = [0; 8];
+        file.read_exact(&mut head)?;
+        let [a, b, c, d, kind @ ..] = head;
+        let length = u32::from_be_bytes([a, b, c, d]);
+        match (&kind, length) {
+            (&PLACE, 9) => {
+                let mut sides = [[0; 4]; 2];
+                sides.iter_mut().try_for_each(|side| file.read_exact(side))?;
+                let mut unit = [1];
+                file.read_exact(&mut unit)?;
+                return Ok(if unit == [0] { sides.map(i32::from_be_bytes) } else { [0, 0] });
+            }
+            (b"IDAT", _) => return Ok([0, 0]),
+            // A checksum of four bytes follows each.
+            _ => file.seek_relative(i64::from(length) + 4)?,
+        }
     }
 }
 
@@ -266,6 +312,38 @@ impl SampleReader for PngReader {
             }
         }
         Ok(())
+    }
+
+    fn rest(&mut self) -> Result<Rest> {
+        let mut head = Vec::new();
+        let found = self.file.seek(SeekFrom::Start(self.start)).and_then(|_| {
+            let mut input = BufReader::new(&self.file);
+            let is_whole = pass_chunks(&mut input)?;
+            input.take(HEAD_BYTES as u64).read_to_end(&mut head).map(|_| is_whole)
+        });
+        if !found.map_err(|e| Error::disk(&self.name, "read", e))? {
+            return Err(Error::cut_short(&self.name));
+        }
+        Ok(if head.iter().all(|byte| *byte == 0) { Rest::Nothing } else { Rest::Unread { head, may_belong: false } })
+    }
+}
+
+/// Goes behind the last chunk; tells whether there is one.
+fn pass_chunks(input: &mut (impl Read + Seek)) -> io::Result<bool> {
+    const SIGNATURE_BYTES: i64 = 8;
+    const CHECKSUM_BYTES: i64 = 4;
+    input.seek_relative(SIGNATURE_BYTES)?;
+    let mut head = [0; 8];
+    loop {
+        match input.read_exact(&mut head) {
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(false),
+            other => other?,
+        }
+        let [a, b, c, d, kind @ ..] = head;
+        input.seek_relative(i64::from(u32::from_be_bytes([a, b, c, d])) + CHECKSUM_BYTES)?;
+        if &kind == b"IEND" {
+            return Ok(true);
+        }
     }
 }
 
