@@ -65,7 +65,7 @@ const BLURRED: f64 = 0.8;
 const MOST_NODES: usize = 6000;
 
 /// Evaluations of one count, place or photosite that a class may take, some tenths of a second.
-const MOST_WORK: u64 = 4_000_000;
+const MOST_WORK: u64 = 8_000_000;
 
 /// What a kind of photosites has beyond others, in units of the means.
 #[derive(Debug, Clone, Copy, PartialEq)]
