@@ -236,7 +236,7 @@ fn temperatures_of_a_camera_count() {
         said(&shop, "correct-frame light.exr --dark dark.exr -o c.exr", 0)
             .contains("dark.exr: its temperature is 268.15 K, but that of light.exr is 263.15 K")
     );
-    shop.run("correct-frame light.exr --dark dark.exr --scale-dark -o c.exr", &[]);
+    shop.run("correct-frame light.exr --dark dark.exr --scale-dark --quiet -o c.exr", &[]);
     let current = |kelvin: f64| {
         let gap = 1.1557 - 7.021e-4 * kelvin * kelvin / (1108.0 + kelvin);
         kelvin.powf(1.5) * (-gap / (2.0 * 8.617_333e-5 * kelvin)).exp()

@@ -18,7 +18,7 @@ use tiff::tags::Tag;
 /// Longest name of a camera, bytes.
 const LONGEST_NAME: usize = 128;
 
-/// What is known of the frame, with notes on what is passed over.
+/// What is known of the frame, with notes on what is passed over; but for the exposure, which metadata tell where they are ours.
 ///
 /// # Errors
 ///
@@ -28,6 +28,7 @@ pub(super) fn describe(
     image: &RawImage,
     active: Rectangle,
     levels: &Levels,
+    is_ours: bool,
     notes: &mut Vec<String>,
 ) -> Result<Metadata> {
     // No sample depends on it, but a file that is damaged here may be so elsewhere.
@@ -41,8 +42,10 @@ pub(super) fn describe(
     // No sample depends on these.
     let below = passed_over(exif(file, &image.first), "its Exif", notes)?;
     let directories: Vec<&Directory> = std::iter::once(&image.first).chain(&below).collect();
-    let exposure = told_exposure(file, &directories, notes);
-    metadata.exposure = passed_over(exposure, "its exposure", notes)?;
+    let mut of_exposure = Vec::new();
+    let exposure = told_exposure(file, &directories, &mut of_exposure);
+    metadata.exposure = passed_over(exposure, "its exposure", &mut of_exposure)?;
+    notes.extend(of_exposure.into_iter().filter(|_| !is_ours));
     metadata.iso_speed = passed_over(told_sensitivity(file, &directories), "its sensitivity", notes)?;
     // No sample depends on it either.
     let model = file.text(&image.first, tags::UNIQUE_CAMERA_MODEL.tag()).unwrap_or_default();

@@ -94,12 +94,8 @@ impl DngReader {
         let levels = Levels::read(&mut file, &image, on_sensor, reach, storage.sample)?;
         let mut notes = Vec::new();
         describe::note_area(&mut file, &image, active, area, &mut notes)?;
-        let mut passed_over = Vec::new();
-        let mut own_tags = describe::describe(&mut file, &image, on_sensor, &levels, &mut passed_over)?;
-        // Metadata of ours come first, and tell what tags cannot.
-        if !description.as_deref().is_some_and(|text| text.starts_with(METADATA_BEGIN)) {
-            notes.append(&mut passed_over);
-        }
+        let is_ours = description.as_deref().is_some_and(|text| text.starts_with(METADATA_BEGIN));
+        let mut own_tags = describe::describe(&mut file, &image, on_sensor, &levels, is_ours, &mut notes)?;
         if part == RawArea::Full {
             own_tags.masked_areas = area::masked(&mut file, &image, active, place)?;
         }
