@@ -181,8 +181,8 @@ impl Predictor {
                 Some((_, sites, causes)) => (sites, causes),
                 None => {
                     let sites = Sites::of(head, self.settings.equations).map_err(none)?;
-                    let causes = sites.expected_e.map(|e| sites.photosite.budget(e));
-                    (sites, causes)
+                    let [r, g, b] = sites.expected_e.map(|e| sites.photosite.causes(e).map_err(none));
+                    (sites, [r?, g?, b?])
                 }
             };
             let prediction = sites.frame(head).map_err(none)?;
@@ -220,7 +220,7 @@ impl PredictorSettings {
         let mut counts = [0.0; 3];
         for (part_counts, sites) in Sites::of_taps(head, self.equations)? {
             for k in 0..3 {
-                let budget = sites.photosite.budget(sites.expected_e[k]);
+                let budget = sites.photosite.causes(sites.expected_e[k])?;
                 causes[k].iter_mut().zip(budget).for_each(|(sum, variance)| *sum += part_counts[k] * variance);
                 counts[k] += part_counts[k];
             }

@@ -6,6 +6,7 @@ use super::masters::Dark;
 use super::moments::Equations;
 use super::pattern::Shared;
 use super::photosite::Photosite;
+use super::unpredictable::{Predicted, TOO_LONG, Unpredictable};
 use crate::camera::readout::ReadOut;
 use crate::metadata::AdcRecord;
 use crate::stages::noise::{LineNoise, NoiseModel};
@@ -206,6 +207,17 @@ impl Photosite {
             Some(adc) => self.digitized_budget(&adc, expected_e),
             None => self.charge_budget(expected_e),
         }
+    }
+
+    /// The same, where it does not take too long.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`].
+    pub fn causes(&self, expected_e: f64) -> Predicted<Budget> {
+        let budget = self.budget(expected_e);
+        let is_known = !self.has_tails() || budget.iter().all(|variance| !variance.is_nan());
+        if is_known { Ok(budget) } else { Err(Unpredictable::Beyond(TOO_LONG)) }
     }
 
     /// The variance, over photosites, of the means that each has over exposures.

@@ -10,6 +10,7 @@
 //! farther off they are many to the law's width, and rounding is a uniform error. From the one to the other leads a weight that
 //! is as smooth as a normal law, so that nothing is seen of the seam.
 
+use super::effort;
 use super::node::Node;
 use super::reading::{Moments, Reading};
 use crate::numerics::gauss::{NODES, interpolated, panel};
@@ -313,7 +314,9 @@ fn add_beyond(
         };
         let within = |mean: f64| nodes.partition_point(|node| node.mean < mean);
         let reach = REACH * widest;
-        nodes[within(electrons - reach)..within(electrons + reach)].iter().map(at).sum()
+        let near = &nodes[within(electrons - reach)..within(electrons + reach)];
+        effort::spend(near.len() as u64);
+        near.iter().map(at).sum()
     };
     let flat = Flat::of(&nodes, full, farthest, direction);
     let share_at = |electrons: f64| flat.as_ref().map_or_else(|| share_at(electrons), |flat| flat.at(electrons));
@@ -321,7 +324,11 @@ fn add_beyond(
     let mut shares = Interpolant::new(stretch.smooth_panels(&floors), share_at);
     // Codes may cut panels that one rule would do for into many.
     let is_cut_fine = places.len() > 2 * shares.places();
+    effort::spend(places.len() as u64);
     for place in places {
+        if effort::is_spent() {
+            return;
+        }
         let distance = (place.electrons - full) * direction;
         let share = if is_cut_fine { shares.at(distance, |d| full + direction * d) } else { share_at(place.electrons) };
         if share != 0.0 {

@@ -15,6 +15,7 @@ use super::pixel_moments::PixelMoments;
 use super::repeated;
 use super::tails;
 use super::taps::{self, Group};
+use super::unpredictable::TOO_LONG;
 pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::levels::BlackLevel;
 use crate::color;
@@ -162,6 +163,9 @@ impl Sites {
         };
         photosite.check_lines()?;
         photosite.check_level()?;
+        if photosite.has_tails() && moments.iter().any(|site| site.moments.variance.is_nan()) {
+            return Err(Unpredictable::Beyond(TOO_LONG));
+        }
         if quantity_of_sites(frame) != QuantityKind::ExpectedElectrons {
             let lines = photosite.lines(expected_e)?;
             if frame.metadata.is_transferred() && lines != [LineCovariance::default(); 3] {

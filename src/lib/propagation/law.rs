@@ -6,6 +6,7 @@
 //! those whose sensitivities are cut off at zero what that adds ([`rectified`](super::rectified)).
 
 use super::counts::Charge;
+use super::effort;
 use super::ends::at_full_well;
 use super::memory::Memory;
 use super::moments::Prediction;
@@ -21,6 +22,9 @@ use std::cmp::Ordering;
 
 /// Spreads below this, in e⁻, are none.
 const LEAST_STD: f64 = 1e-6;
+
+/// Evaluations that a normal law takes beside an end of the codes, more than others.
+const OF_ENDS: u64 = 20;
 
 /// Weights below this do not count.
 const LEAST_WEIGHT: f64 = 1e-19;
@@ -118,6 +122,10 @@ impl Law {
                 by_step.push((rung, wide.counts(smoothing)));
             }
             let outer = by_step.iter().find(|(known, _)| *known == rung).map(|(_, counts)| counts);
+            effort::spend(outer.map_or(0, |counts| counts.len() as u64));
+            if effort::is_spent() {
+                return Vec::new();
+            }
             found.extend(outer.into_iter().flatten().map(|outer| {
                 let std = inner.spread.hypot(outer.spread);
                 let mean = inner.electrons + outer.electrons;
@@ -178,8 +186,16 @@ impl Law {
         }
         let mut near = Vec::new();
         let at_full = if full.is_finite() { reading.at(full, 0.0) } else { [0.0; 4] };
+        effort::spend(2 * nodes.len() as u64);
+        let [lower, upper] = reading.ends_e();
         for node in nodes {
             let reach = REACH * node.std;
+            if node.mean - reach < lower || node.mean + reach > upper {
+                effort::spend(OF_ENDS);
+            }
+            if effort::is_spent() {
+                break;
+            }
             if node.floor == f64::NEG_INFINITY && (is_full_far || node.mean + reach <= full) {
                 add(node.weight, reading.at(node.mean, node.std * node.std));
             } else if node.std <= 0.0 || node.mean - reach >= full || node.floor >= full {

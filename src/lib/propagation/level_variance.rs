@@ -72,7 +72,10 @@ impl LevelVariance {
             Some(last) => (last + 1) as f64 * step,
             None => f64::NEG_INFINITY,
         };
-        Self { step, values: (0..=steps).into_par_iter().map(variance).collect(), told_from }
+        let values: Vec<f64> = (0..=steps).into_par_iter().map(variance).collect();
+        // What takes too long is no number.
+        let is_known = !photosite.has_tails() || values.iter().all(|value| !value.is_nan());
+        Self { step, values, told_from: if is_known { told_from } else { f64::INFINITY } }
     }
 
     /// The level from which on they are known.

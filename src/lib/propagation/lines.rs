@@ -31,7 +31,7 @@ use super::masters::Dark;
 use super::moments::{Equations, LineCovariance};
 use super::photosite::Photosite;
 use super::reading::{Reading, codes_of};
-use super::unpredictable::{Predicted, Unpredictable};
+use super::unpredictable::{Predicted, TOO_LONG, Unpredictable};
 use crate::metadata::{AdcRecord, AverageRecord};
 use crate::numerics::averages::Combine;
 use crate::numerics::normal::density;
@@ -227,6 +227,9 @@ impl Photosite {
             expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_read(expected_e)));
         let of_gains =
             expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_open(expected_e)));
+        if of_offsets.iter().chain(&of_gains).any(|share| share.is_nan()) {
+            return Err(Unpredictable::Beyond(TOO_LONG));
+        }
         let x = self.line_signals(expected_e);
         let of_axis = |axis: Axis| {
             let terms = self.terms(axis);

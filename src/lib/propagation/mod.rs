@@ -13,6 +13,7 @@ pub mod covariance;
 mod curved;
 mod divided;
 pub mod drift;
+mod effort;
 mod ends;
 mod exposures;
 pub mod frame;

@@ -61,6 +61,11 @@ impl Reading {
         Self { offset_e: self.offset_e + offset_e, ..*self }
     }
 
+    /// Whether what is asked are codes that are not straight.
+    pub fn is_bent(&self) -> bool {
+        matches!(self.asked, Asked::Codes(adc, _) if adc.linearization.is_some())
+    }
+
     /// Whether nothing that is told apart has an end.
     pub fn is_endless(&self) -> bool {
         self.rails_e() == [f64::NEG_INFINITY, f64::INFINITY]

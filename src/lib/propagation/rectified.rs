@@ -4,6 +4,7 @@
 //! With w all else that it holds, each moment gains ∫ f(v) \[g(w) − g(w + v)] dv, f the density of v.
 
 use super::counts::{Charge, Count};
+use super::effort;
 use super::ends::{MANY, Place, Stretch, difference};
 use super::lookup::Lookup;
 use super::node::{Law, Node};
@@ -44,6 +45,10 @@ pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
         let stretch = Stretch { widest_panel: 2.5 * narrowest, ..base };
         for place in stretch.places(&Reading::electrons(0.0, 0.0), &[]) {
             let share = place.weight * density_at(&counts, place.electrons);
+            effort::spend(others.len() as u64);
+            if effort::is_spent() {
+                return Vec::new();
+            }
             for other in &others {
                 let weight = other.weight * share;
                 if weight > LEAST_WEIGHT {
@@ -159,6 +164,7 @@ fn below_zero(charge: &Charge) -> Option<(Vec<Count>, Stretch)> {
 
 /// Density of the charge at `electrons` < 0.
 fn density_at(counts: &[Count], electrons: f64) -> f64 {
+    effort::spend(counts.len() as u64);
     let at = |count: &Count| {
         let z = (electrons - count.electrons) / count.spread;
         if z > -REACH { count.weight * density(z) / count.spread } else { 0.0 }
@@ -169,7 +175,8 @@ fn density_at(counts: &[Count], electrons: f64) -> f64 {
 /// The density below zero, looked up.
 fn density_table(stretch: &Stretch, counts: &[Count]) -> Lookup {
     let mut table = Lookup::new(stretch.narrowest, stretch.extent);
-    for index in 0..table.values.len() {
+    effort::spend((counts.len() * table.values.len()) as u64);
+    for index in (0..table.values.len()).filter(|_| !effort::is_spent()) {
         let below = table.distance(index);
         let (mut sum, mut slope) = (0.0, 0.0);
         for count in counts {
@@ -230,6 +237,10 @@ fn of_shared(
             let moved = if is_free { smooth(reading, at, variance) } else { reading.at(at, variance) };
             add(&mut sum, -other.weight * weight, moved);
         }
+        effort::spend(shared.len() as u64);
+        if effort::is_spent() {
+            break;
+        }
     }
     sum
 }
@@ -249,6 +260,9 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
     let mut table = None;
     let is_only = others.windows(2).all(|pair| pair[0].spread == pair[1].spread);
     for other in others {
+        if effort::is_spent() {
+            break;
+        }
         let noise_e = reading.noise_e.hypot(other.spread);
         let is_hidden = code.is_some_and(|code| noise_e > SMOOTH * code);
         if let Some(steps) = &mut steps
@@ -266,7 +280,9 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
         }
         let widest_narrow = if is_hidden { 0.0 } else { narrow };
         let stretch = Stretch { from: other.electrons, widest_narrow, noise_e, ..base };
-        for place in stretch.places(&blurred, &[]) {
+        let places = stretch.places(&blurred, &[]);
+        effort::spend(places.len() as u64);
+        for place in places {
             let below = place.electrons - other.electrons;
             let share = match &table {
                 Some(table) => table.at(below),

@@ -20,7 +20,7 @@ use super::masters::{Dark, MOST_DARKS, kept};
 use super::moments::{Equations, LineCovariance, Prediction};
 use super::photosite::Photosite;
 use super::unlike::Temporal;
-use super::unpredictable::{Predicted, Unpredictable};
+use super::unpredictable::{Predicted, TOO_LONG, Unpredictable};
 use crate::metadata::{AdcRecord, AverageRecord, ExposuresRecord, FrameHeader};
 use crate::names::Named;
 use crate::numerics::averages::{CLIP, Combine, Kept};
@@ -148,7 +148,8 @@ impl Photosite {
             Some(adc) if shows_codes(&adc) => self.shared(&adc, (expected_e, None), (self, None), true).light,
             _ => self.fixed_variance(expected_e),
         };
-        (whole - fixed).clamp(0.0, whole)
+        // What takes too long is no number.
+        if (whole - fixed).is_nan() { f64::NAN } else { (whole - fixed).clamp(0.0, whole) }
     }
 }
 
@@ -168,7 +169,9 @@ impl Photosite {
         } else {
             [LineCovariance::default(); 3]
         };
-        Ok([0, 1, 2].map(|k| Temporal { lines: lines[k], ..self.temporal(k, expected_e[k], true) }))
+        let found = [0, 1, 2].map(|k| Temporal { lines: lines[k], ..self.temporal(k, expected_e[k], true) });
+        let is_known = self.flat.is_some() || found.iter().all(|temporal| !temporal.variance.is_nan());
+        if is_known { Ok(found) } else { Err(Unpredictable::Beyond(TOO_LONG)) }
     }
 
     /// What an average of exposures keeps of samples of which one exposure has such moments.

@@ -87,11 +87,13 @@ fn shares_from(frame: &FrameHeader, code: f64) -> Option<[f64; 3]> {
         of(&Law::of(&photosite.model, expected_e))
     };
     let of_charge = |expected_e: f64| share(expected_e, &|law| law.reaches(full_well_e));
+    // What takes too long is no number.
+    let known = |shares: [f64; 3]| shares.iter().all(|share| !share.is_nan()).then_some(shares);
     match (quantity_of_sites(frame), photosite.adc) {
-        (QuantityKind::Electrons, _) => Some(expected_e.map(of_charge)),
+        (QuantityKind::Electrons, _) => known(expected_e.map(of_charge)),
         (QuantityKind::Adu, Some(adc)) => {
             let first_full_e = adc.electrons_at(adc.full_code(full_well_e).min(code) - 0.5);
-            Some(expected_e.map(|expected_e| share(expected_e, &|law| law.is_read_from(first_full_e))))
+            known(expected_e.map(|expected_e| share(expected_e, &|law| law.is_read_from(first_full_e))))
         }
         _ => None,
     }

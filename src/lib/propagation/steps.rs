@@ -10,6 +10,7 @@
 
 use super::counts::{Charge, Count};
 use super::curved::NODES as HERMITE;
+use super::effort;
 use super::ends::{MANY, Stretch};
 use super::lookup::Lookup;
 use super::reading::{Asked, Moments, Reading};
@@ -36,6 +37,7 @@ fn share_below(stretch: &Stretch, counts: &[Count], noise_e: f64) -> Lookup {
     let mut table = Lookup::new(stretch.narrowest.hypot(noise_e), stretch.extent + REACH * noise_e);
     let of_density = |distance: f64| {
         let (mut sum, mut slope) = (0.0, 0.0);
+        effort::spend(counts.len() as u64);
         for count in counts {
             let spread = count.spread.hypot(noise_e);
             let z = (-distance - count.electrons) / spread;
@@ -76,17 +78,22 @@ impl Blurred {
 
     /// What is known of a charge, or is worked out: stages, causes and kinds of photosites ask for the same.
     fn recall(charge: &Charge, noise_e: f64, work_out: impl FnOnce() -> Self) -> Rc<Self> {
-        thread_local! { static KNOWN: RefCell<VecDeque<Rc<Blurred>>> = const { RefCell::new(VecDeque::new()) }; }
-        let is_same = |known: &&Rc<Self>| known.charge == *charge && known.noise_e == noise_e;
+        thread_local! { static KNOWN: RefCell<VecDeque<(Rc<Blurred>, u64)>> = const { RefCell::new(VecDeque::new()) }; }
+        let is_same = |(known, _): &&(Rc<Self>, u64)| known.charge == *charge && known.noise_e == noise_e;
         KNOWN.with(|known| {
             let found = known.borrow().iter().find(is_same).cloned();
-            found.unwrap_or_else(|| {
-                let found = Rc::new(work_out());
+            if let Some((found, took)) = found {
+                effort::spend(took);
+                return found;
+            }
+            let before = effort::left();
+            let found = Rc::new(work_out());
+            if !effort::is_spent() {
                 let mut kept = known.borrow_mut();
                 kept.truncate(Self::KEPT - 1);
-                kept.push_front(found.clone());
-                found
-            })
+                kept.push_front((found.clone(), before - effort::left()));
+            }
+            found
         })
     }
 }
@@ -153,6 +160,7 @@ impl<'a> Steps<'a> {
         let mut sum = 0.0;
         let mut index = 0.0;
         while index < panels {
+            effort::spend(NODES as u64);
             let of_panel = panel(low + index * width, low + (index + 1.0) * width);
             sum +=
                 of_panel.map(|(v, weight)| weight * self.sharp.below.at(v) * density((x - v) / noise_e)).sum::<f64>();
@@ -209,7 +217,10 @@ impl<'a> Steps<'a> {
                 sum.iter_mut().zip(rises).for_each(|(sum, rise)| *sum += weight * rise);
             }
         };
-        let step = |edge: f64| self.step((edge - level) * self.code_e, noise_e);
+        let step = |edge: f64| {
+            effort::spend(1);
+            self.step((edge - level) * self.code_e, noise_e)
+        };
         // The weights of what is gone through one by one, from the charge down, and from the lowest code up.
         let near = level.min(top) - blur - self.fine - HALF_SEAM;
         let far = lowest + ABOUT_ENDS + HALF_SEAM;

@@ -12,6 +12,7 @@
 
 use super::budget::{Budget, Cause};
 use super::charge::charge;
+use super::effort;
 use super::law::Law;
 use super::lines::blur_e;
 use super::masters::Dark;
@@ -63,6 +64,9 @@ const BLURRED: f64 = 0.8;
 /// Values of what photosites differ in that are gone through at most.
 const MOST_NODES: usize = 6000;
 
+/// Evaluations of one count, place or photosite that a class may take, some tenths of a second.
+const MOST_WORK: u64 = 8_000_000;
+
 /// What a kind of photosites has beyond others, in units of the means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct State {
@@ -86,11 +90,47 @@ struct Knee {
     width: f64,
 }
 
-/// Rounding that shows: the distance from code to code, and how far it does.
+/// Rounding that shows: the distance from code to code, how far it does, and what blurs it: a standard deviation, and how its
+/// square grows with the excess.
 #[derive(Debug, Clone, Copy)]
 struct Codes {
     period: f64,
     until: f64,
+    blur: f64,
+    shot: f64,
+}
+
+impl Codes {
+    /// The width of a panel at a place: half a code, or what blurs codes to no finer ripples than a rule follows. Of the ripple of m
+    /// turns to a code e^(−2π²m²σ²) is left, σ in codes, and 12 nodes on a panel of w codes sum it to 10⁻⁹ while π m w < 8.
+    fn panel(&self, place: f64) -> f64 {
+        let blur = (self.blur * self.blur + self.shot * place).sqrt();
+        (1.6 * blur).max(0.5 * self.period)
+    }
+
+    /// Both.
+    fn finer(self, other: Self) -> Self {
+        Self {
+            period: self.period.min(other.period),
+            until: self.until.max(other.until),
+            blur: self.blur.min(other.blur),
+            shot: self.shot.min(other.shot),
+        }
+    }
+
+    /// The ends of its panels; none of too many.
+    fn ends(&self) -> Option<Vec<f64>> {
+        let mut ends = Vec::new();
+        let mut end = 0.0;
+        while end < self.until.min(REACH) {
+            if ends.len() * crate::numerics::gauss::NODES > MOST_NODES {
+                return None;
+            }
+            ends.push(end);
+            end += self.panel(end);
+        }
+        Some(ends)
+    }
 }
 
 /// Gauss and Laguerre's nodes and weights: eigenvalues of the matrix of the polynomials' recurrence, with 2k + 1 on its diagonal
@@ -129,16 +169,8 @@ fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
             distance *= 3.0;
         }
     }
-    if let Some(Codes { period, until }) = codes {
-        let steps = (until.min(REACH) / period).ceil() * 2.0;
-        if steps * crate::numerics::gauss::NODES as f64 > MOST_NODES as f64 {
-            return None;
-        }
-        let mut end = 0.0;
-        while end < until.min(REACH) {
-            ends.push(end);
-            end += 0.5 * period;
-        }
+    if let Some(codes) = codes {
+        ends.extend(codes.ends()?);
     }
     ends.retain(|end| (0.0..=REACH).contains(end));
     ends.sort_by(f64::total_cmp);
@@ -198,7 +230,7 @@ impl Photosite {
         }
         let amplitude_e = self.most(|tails| tails.rts_e);
         let is_too_fine = |expected_e: f64| {
-            self.hot_nodes(expected_e).is_none()
+            self.hot_nodes(expected_e, true).is_none()
                 || self.trap_nodes(expected_e).is_none() && self.jumps_show(expected_e, amplitude_e)
         };
         if expected_e.into_iter().any(is_too_fine) {
@@ -223,17 +255,20 @@ impl Photosite {
         self.each_of(expected_e, true, of)
     }
 
-    /// The same; of jumps that show how codes are rounded all amplitudes, or few.
+    /// The same; where the rounding of codes shows, all amplitudes that tell it, or few.
     fn each_of<T>(&self, expected_e: f64, is_fine: bool, of: impl Fn(&Self) -> T) -> Vec<Kind<T>> {
         let [hot_share, trap_share] = [self.most(|tails| tails.hot_share), self.most(|tails| tails.rts_share)];
         let mut kinds = vec![(0.0, 1.0 - hot_share)];
         if hot_share > 0.0 {
-            let nodes = self.hot_nodes(expected_e).unwrap_or_default();
+            let nodes = self.hot_nodes(expected_e, is_fine).unwrap_or_default();
             kinds.extend(nodes.iter().map(|(t, weight)| (*t, hot_share * weight)));
         }
         let sum: f64 = kinds.iter().map(|(_, weight)| weight).sum();
         let mut found = Vec::new();
         for (hot, weight) in kinds.into_iter().map(|(t, weight)| (t, weight / sum)) {
+            if effort::is_spent() {
+                break;
+            }
             let quiet = self.at(&State { hot, trap: 0.0 });
             let jumps_apart = trap_share > 0.0 && quiet.jumps_show(expected_e, self.most(|tails| tails.rts_e));
             let is_free = trap_share > 0.0 && !jumps_apart;
@@ -299,7 +334,8 @@ impl Photosite {
         std::iter::once(self.model.full_well_e).chain(ends.into_iter().flatten()).filter(|level| level.is_finite())
     }
 
-    fn hot_nodes(&self, expected_e: f64) -> Option<Vec<(f64, f64)>> {
+    /// Amplitudes of hot photosites; where `is_fine` as many as tell how codes are rounded.
+    fn hot_nodes(&self, expected_e: f64, is_fine: bool) -> Option<Vec<(f64, f64)>> {
         let mut knees = Vec::new();
         let mut codes: Option<Codes> = None;
         for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_hot()) {
@@ -310,18 +346,20 @@ impl Photosite {
                 let width = (cold.variance + shot + model.added().powi(2) + model.tails.rts_e.powi(2)).sqrt();
                 Knee { at: (level_e - cold.mean) / hot_e, width: width / hot_e }
             }));
-            let Some(adc) = self.adc else { continue };
-            let blur = adc.adu_per_e * model.added().hypot(Law::of(model, light_e).least_pattern_std());
-            if blur >= SMOOTH {
+            let Some(adc) = self.adc.filter(|_| is_fine) else { continue };
+            let blur_e = model.added().hypot(Law::of(model, light_e).least_pattern_std());
+            if adc.adu_per_e * blur_e >= SMOOTH {
                 continue;
             }
             // Shot noise blurs codes beyond so many electrons.
             let until = if model.dark_shot { (SMOOTH / adc.adu_per_e).powi(2) + 60.0 } else { f64::INFINITY };
-            let next = Codes { period: (1.0 / adc.adu_per_e).max(6.0) / hot_e, until: until / hot_e };
-            codes = Some(codes.map_or(next, |known| Codes {
-                period: known.period.min(next.period),
-                until: known.until.max(next.until),
-            }));
+            let next = Codes {
+                period: (1.0 / adc.adu_per_e).max(6.0) / hot_e,
+                until: until / hot_e,
+                blur: blur_e / hot_e,
+                shot: if model.dark_shot { 1.0 / hot_e } else { 0.0 },
+            };
+            codes = Some(codes.map_or(next, |known: Codes| known.finer(next)));
         }
         nodes(&knees, codes)
     }
@@ -339,7 +377,8 @@ impl Photosite {
             knees.extend(ends.map(|end| Knee { at: (end - mean_e).abs() / amplitude_e, width: width / amplitude_e }));
             let quiet = model.at(&State { hot: 0.0, trap: 0.0 });
             if adc.adu_per_e * blur_e(&quiet, &adc, light_e) < BLURRED {
-                codes = Some(Codes { period: 1.0 / adc.adu_per_e / amplitude_e, until: f64::INFINITY });
+                let [period, blur] = [1.0 / adc.adu_per_e, quiet.added()].map(|width_e| width_e / amplitude_e);
+                codes = Some(Codes { period, until: f64::INFINITY, blur, shot: 0.0 });
             }
         }
         nodes(&knees, codes)
@@ -356,7 +395,13 @@ impl Photosite {
         KNOWN.with(|known| known.recall((*self, expected_e), |(site, expected_e)| site.work_out(*expected_e)))
     }
 
+    /// No numbers where it takes too long.
     fn work_out(&self, expected_e: f64) -> (Prediction, f64) {
+        let none = Prediction::of_cumulants(f64::NAN, f64::NAN, f64::NAN, f64::NAN);
+        effort::within(MOST_WORK, || self.mixture_of_kinds(expected_e)).unwrap_or((none, f64::NAN))
+    }
+
+    fn mixture_of_kinds(&self, expected_e: f64) -> (Prediction, f64) {
         let [second, fourth, sixth] = self.jump_cumulants();
         let with_jumps = |kind: Kind<Prediction>| {
             let Kind { weight, is_free, value } = kind;
@@ -379,18 +424,22 @@ impl Photosite {
         (found, of_means)
     }
 
-    /// The mean over all kinds of photosites of a number that jumps do not change where they are free.
+    /// The mean over all kinds of photosites of a number that jumps do not change where they are free; no number where it takes too
+    /// long.
     pub(super) fn mean_of(&self, expected_e: f64, of: impl Fn(&Self) -> f64) -> f64 {
-        self.each(expected_e, of).iter().map(|kind| kind.weight * kind.value).sum()
+        let mean = || self.each(expected_e, of).iter().map(|kind| kind.weight * kind.value).sum();
+        effort::within(MOST_WORK, mean).unwrap_or(f64::NAN)
     }
 
     /// The variance by cause: the mean over all kinds of photosites, and that of their means, which hot pixels make.
     ///
-    /// Where jumps show how codes are rounded few of their amplitudes tell the causes; what all make of rounding is the rest.
+    /// Where hot photosites or jumps show how codes are rounded few of their amplitudes tell the causes; what all make of rounding is
+    /// the rest. No numbers where it takes too long.
     pub(super) fn mixed_budget(&self, expected_e: f64) -> Budget {
         let [jumps, ..] = self.jump_cumulants();
         let (whole, of_means) = self.mixture(expected_e);
-        let kinds = self.each_of(expected_e, false, |site| site.budget(expected_e));
+        let kinds = || self.each_of(expected_e, false, |site| site.budget(expected_e));
+        let Some(kinds) = effort::within(MOST_WORK, kinds) else { return [f64::NAN; Cause::ALL.len()] };
         let mut budget =
             Cause::ALL.map(|cause| kinds.iter().map(|kind| kind.weight * kind.value[cause as usize]).sum::<f64>());
         budget[Cause::HotPixels as usize] += of_means;
@@ -443,7 +492,7 @@ mod tests {
         let cases = [
             (vec![], None),
             (vec![knee(0.7, 0.01), knee(-0.1, 0.2), knee(30.0, 2.0)], None),
-            (vec![knee(2.0, 0.3)], Some(Codes { period: 0.3, until: 12.0 })),
+            (vec![knee(2.0, 0.3)], Some(Codes { period: 0.3, until: 12.0, blur: 0.0, shot: 0.0 })),
         ];
         for (knees, codes) in cases {
             let found = nodes(&knees, codes).unwrap();
@@ -457,7 +506,55 @@ mod tests {
             }
             assert!((mean(&|t| (-0.2 * t).exp()) - 1.0 / 1.2).abs() < 1e-9);
         }
-        assert!(nodes(&[], Some(Codes { period: 1e-3, until: f64::INFINITY })).is_none());
+        assert!(nodes(&[], Some(Codes { period: 1e-3, until: f64::INFINITY, blur: 0.0, shot: 0.0 })).is_none());
+    }
+
+    /// Ripples of m turns to a code, of which blur leaves e^(−2π²m²σ²): ∫ e^(−t) cos(ω t) dt = 1/(1 + ω²).
+    #[test]
+    fn panels_follow_the_ripples_that_blur_leaves() {
+        for (blur, shot) in [(0.0, 0.0), (0.3, 0.0), (1.2, 0.0), (0.1, 1.0 / 6.0)] {
+            let period = 0.5;
+            let codes = Codes { period, until: REACH, blur: blur * period, shot: shot * period };
+            let found = nodes(&[], Some(codes)).unwrap();
+            for turns in [1.0, 2.0, 3.0] {
+                let turn = std::f64::consts::TAU * turns / period;
+                // Shot noise blurs by e^(−s t).
+                let [still, by_place] = [codes.blur.powi(2), codes.shot].map(|square| 0.5 * turn * turn * square);
+                let ripple = |t: f64| (-still - by_place * t).exp() * (turn * t).cos();
+                let sum: f64 = found.iter().map(|(t, weight)| weight * ripple(*t)).sum();
+                let rate = 1.0 + by_place;
+                let expected = (-still).exp() * rate / (rate * rate + turn * turn);
+                assert!((sum - expected).abs() < 1e-12, "{blur} {shot} {turns}: {sum} {expected}");
+            }
+        }
+    }
+
+    /// Hot pixels of millions of counts that nothing blurs: no numbers rather than minutes, and the same whatever was asked before.
+    #[test]
+    fn what_takes_too_long_is_no_number() {
+        let tails = Tails { hot_share: 0.1, hot_e: 5e6, rts_share: 0.0, ..Tails::default() };
+        let model = NoiseModel {
+            dark_e: 300.0,
+            dcnu: 0.01,
+            prnu: 0.004,
+            read_noise_e: 0.0,
+            full_well_e: 4e5,
+            dark_shot: true,
+            signal_shot: true,
+            poisson: crate::metadata::PoissonKind::Exact,
+            lines: crate::stages::noise::LineNoise::default(),
+            tails,
+        };
+        let site = Photosite::of_electrons(model, Equations::Exact);
+        let spent = |allowed: u64| {
+            let before = effort::left();
+            let found = effort::within(allowed, || site.mixture_of_kinds(1.5).0.moments.mean);
+            (found.is_none(), before - effort::left())
+        };
+        let first = spent(20_000);
+        assert_eq!(first, (true, 20_000));
+        assert_eq!(spent(20_000), first);
+        assert!(site.budget(1.5).iter().all(|variance| !variance.is_nan()) || site.causes(1.5).is_err());
     }
 
     /// Two values of a coin, by hand: variance 1, fourth cumulant −2, sixth 16.

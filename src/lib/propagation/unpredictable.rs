@@ -1,5 +1,9 @@
 //! Why nothing is predicted.
 
+/// Why nothing is said of what takes too long.
+pub(super) const TOO_LONG: &str = "hot pixels or random telegraph signals go over so many counts and codes that the sum of what is made \
+                                   of each would take too long; give the sensor read noise";
+
 /// Why nothing is predicted of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Unpredictable {
