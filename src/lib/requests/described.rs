@@ -219,17 +219,26 @@ pub fn either<T: PartialEq + Copy + Display>(cfa: Option<T>, pattern: Option<T>)
     }
 }
 
+/// What no code of a camera is above: of converters of more than 16 bits the white level is to be told.
+const LARGEST_CODE: f64 = 65_535.0;
+
 /// A warning of a level to subtract that is not what the metadata say of no light.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for one that is not below the white level, where the metadata say nothing of no light.
+/// [`Error::Usage`] for one that is not below the white level, or where none is known the codes of 16 bits, where the metadata say
+/// nothing of no light.
 pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>> {
     let Black::Level(level) = black else { return Ok(None) };
     let white = frame.metadata.white_level_adu.map(|white| white.largest());
     if let Some(white) = white.filter(|white| level >= *white && frame.metadata.black_level_adu.is_none()) {
         let problem = format!("{}: --black {level} is not below the white level, {white} ADU", frame.name);
         return Err(Error::Usage(problem).change(&["black", "white"]));
+    }
+    if white.is_none() && level >= LARGEST_CODE && frame.metadata.quantity == QuantityKind::Adu {
+        let problem =
+            format!("{}: --black {level} is not below {LARGEST_CODE}, the largest code of 16 bits", frame.name);
+        return Err(Error::Usage(problem).change(&["black"]));
     }
     Ok(other_black(frame, level))
 }
