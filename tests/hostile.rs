@@ -430,7 +430,7 @@ fn bytes_behind_a_frame_of_any_format_are_told() {
     let junk = "behind its last row come bytes that are no part of it; cut them off";
     let another = |format: &str| {
         format!(
-            "behind it comes {format}; a stream has one frame, or several that are EXR of one part: give each a file of its own"
+            "behind it comes {format}; a stream has one frame, or several that are EXR of one part in scanlines: give each a file of its own"
         )
     };
     for (name, format) in [
@@ -447,6 +447,7 @@ fn bytes_behind_a_frame_of_any_format_are_told() {
             (&[0; 3000], None),
             (b"junk", Some(junk.to_owned())),
             (b"\0\0junk", Some(junk.to_owned())),
+            (&[&[0; 70_000][..], b"junk"].concat(), Some(junk.to_owned())),
             (&whole, Some(another(format))),
         ] {
             let bytes = [&whole, more].concat();

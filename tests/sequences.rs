@@ -115,6 +115,11 @@ fn a_failure_is_told_once() {
             "add-noise scene.exr missing.exr --frames 0..3",
             &["add-noise: missing.exr: cannot open", "add-noise: 1 of 2 inputs failed; the others are done"],
         ),
+        // A stream of which nobody knows how many frames it has.
+        (
+            "add-noise < <(cat scene.exr scene.exr; echo junk)",
+            &["add-noise: standard input: behind its last row come bytes that are no part of it"],
+        ),
     ] {
         let script = format!("{first} | {rest}; echo ${{PIPESTATUS[@]}} >&2");
         let mut shell = std::process::Command::new("bash");

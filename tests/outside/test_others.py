@@ -332,6 +332,17 @@ class Described(Others):
             self.assertEqual((found["min"], found["max"]), (part.min(), part.max()), name)
             self.refused(["measure", name, *options, "--crop", "30,3,8,6"], "within the frame of 37x23", status=BAD_USAGE)
 
+    def test_images_of_several_pages(self):
+        """tifffile leaves sixteen bytes that no tag names behind three pages; a second file behind the first is an error."""
+        pages = np.stack([self.codes() + page for page in range(3)])
+        for options in ({"metadata": None}, {"imagej": True}, {"bigtiff": True}):
+            tifffile.imwrite(self.directory / "in.tif", pages, photometric="minisblack", **options)
+            for page, codes in enumerate(pages):
+                found = self.read("in.tif", ["--part", str(page)])["Y"]
+                self.assertEqual((found["min"], found["max"]), (codes.min(), codes.max()), options)
+            (self.directory / "two.tif").write_bytes((self.directory / "in.tif").read_bytes() * 2)
+            self.refused(["measure", "two.tif"], "behind it comes a TIFF", "")
+
     def test_a_channel_is_a_plane(self):
         planes = {name: self.codes() for name in ("R", "G", "B", "A")}
         write_planes(self.path("in.tif"), planes, "u16")

@@ -10,7 +10,7 @@ from .conditions import Condition
 from .mistakes import Mistakes
 
 FORMAT = "2"  # of the files in the work directory; another number, and all are made again
-RIM = 2  # photosites at each side that no statistic counts: demosaicking has fewer neighbors there than predictions suppose
+RIM = 4  # photosites at each side that no statistic counts: demosaicking has fewer neighbors there than predictions suppose
 
 
 @dataclasses.dataclass(frozen=True)

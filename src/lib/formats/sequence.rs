@@ -143,10 +143,13 @@ impl Sequence {
             At::Behind(_) if *taken == 0 => Ok(true),
             At::Behind(rest) => rest.begins_frame(&name),
         };
-        if *to_come > 0 && matches!(comes, Ok(false)) {
-            if path.is_none() && pipe::has_failed() {
-                return Err(Error::Upstream);
-            }
+        let has_ended = matches!(comes, Ok(false));
+        // Where nobody knows how many frames there are, the program before tells that it has not given all.
+        let may_lack = *to_come > 0 || *taken > 0 && matches!(at, At::Behind(_));
+        if has_ended && may_lack && path.is_none() && pipe::has_failed() {
+            return Err(Error::Upstream);
+        }
+        if *to_come > 0 && has_ended {
             let came = counted(*taken, "frames");
             let problem =
                 format!("it ends behind {came}, and {to_come} more were to come: the program before has failed");
@@ -282,12 +285,12 @@ impl Rest {
     fn refuse(&self, head: &[u8], name: &str) -> Result<()> {
         if let Some(format) = table::known_by(head) {
             let problem = format!(
-                "behind it comes {format}; a stream has one frame, or several that are EXR of one part: give each a file of its own"
+                "behind it comes {format}; a stream has one frame, or several that are EXR of one part in scanlines: give each a file of its own"
             );
             return Err(Error::format(name, problem));
         }
         if matches!(self, Self::Unread { may_belong: true, .. }) {
-            register::doubt(format!("{name}: behind what its tags name come bytes that only its maker could tell of"));
+            register::doubt(format!("{name}: behind what its tags name come more bytes, which are passed over"));
             return Ok(());
         }
         Err(Error::format(name, NO_FRAME))

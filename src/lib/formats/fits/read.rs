@@ -416,6 +416,10 @@ fn behind(input: &mut impl Read, fill: u64, name: &str) -> Result<Vec<u8>> {
         }
         let header = Header::read(&mut block.as_slice().chain(&mut *input), name)?;
         let Some(header) = header else { return Ok(Vec::new()) };
-        skip = Array::of(&header, name)?.padded_bytes();
+        let array = Array::of(&header, name)?;
+        if io::copy(&mut input.take(array.bytes), &mut io::sink()).map_err(failed)? < array.bytes {
+            return Err(Error::cut_short(name));
+        }
+        skip = array.padded_bytes() - array.bytes;
     }
 }

@@ -319,14 +319,24 @@ impl SampleReader for PngReader {
         let found = self.file.seek(SeekFrom::Start(self.start)).and_then(|_| {
             let mut input = BufReader::new(&self.file);
             let is_whole = pass_chunks(&mut input)?;
-            input.take(HEAD_BYTES as u64).read_to_end(&mut head).map(|_| is_whole)
+            while head.iter().all(|byte| *byte == 0) {
+                head.clear();
+                if input.by_ref().take(READ_BYTES).read_to_end(&mut head)? == 0 {
+                    break;
+                }
+            }
+            Ok(is_whole)
         });
         if !found.map_err(|e| Error::disk(&self.name, "read", e))? {
             return Err(Error::cut_short(&self.name));
         }
-        Ok(if head.iter().all(|byte| *byte == 0) { Rest::Nothing } else { Rest::Unread { head, may_belong: false } })
+        let head: Vec<u8> = head.into_iter().skip_while(|byte| *byte == 0).take(HEAD_BYTES).collect();
+        Ok(if head.is_empty() { Rest::Nothing } else { Rest::Unread { head, may_belong: false } })
     }
 }
+
+/// Bytes behind the last chunk that are looked at together.
+const READ_BYTES: u64 = 1 << 16;
 
 /// Goes behind the last chunk; tells whether there is one.
 fn pass_chunks(input: &mut (impl Read + Seek)) -> io::Result<bool> {

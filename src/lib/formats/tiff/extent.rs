@@ -23,6 +23,8 @@ struct Extent {
     end: u64,
     /// Whether a maker's own data may name more.
     has_private: bool,
+    /// Images that follow one another.
+    pages: usize,
     /// Bytes that may still be read: those of a whole file do not lie one over another.
     left: u64,
 }
@@ -37,30 +39,43 @@ impl TiffFile {
         if known == self.length {
             return Ok(Rest::Nothing);
         }
-        let mut extent = Extent { end: known, has_private: false, left: self.length };
+        let mut extent = Extent { end: known, has_private: false, pages: 0, left: self.length };
         self.extend(&mut extent)?;
         let head = self.first_behind(extent.end)?;
-        Ok(if head.is_empty() { Rest::Nothing } else { Rest::Unread { head, may_belong: extent.has_private } })
+        // Some writers leave scraps of directories behind the last of several images.
+        let may_belong = extent.has_private || extent.pages > 1;
+        Ok(if head.is_empty() { Rest::Nothing } else { Rest::Unread { head, may_belong } })
     }
 
     /// Goes through the directories, each once, until the last byte of the file is named.
     fn extend(&mut self, extent: &mut Extent) -> Result<()> {
         let mut seen = HashSet::new();
-        let mut to_come = vec![self.first_directory];
-        while let Some(offset) = to_come.pop()
-            && extent.end < self.length
-        {
+        let (mut page, mut below) = (self.first_directory, Vec::new());
+        while extent.end < self.length {
+            let is_page = below.is_empty();
+            let offset = below.pop().unwrap_or(page);
+            if is_page && (offset == 0 || seen.contains(&offset)) {
+                break;
+            }
             if offset == 0 || !seen.insert(offset) {
                 continue;
             }
             // What is damaged where nobody has looked names nothing.
-            let Ok((directory, next)) = self.directory_at(offset, true) else { continue };
+            let Ok((directory, next)) = self.directory_at(offset, true) else {
+                page = if is_page { 0 } else { page };
+                continue;
+            };
             let table = directory.bytes;
             let too_many = seen.len() > MOST_DIRECTORIES;
             extent.left = extent.left.checked_sub(table).filter(|_| !too_many).ok_or_else(|| self.overlap())?;
             extent.end = extent.end.max((offset + table).min(self.length));
-            to_come.push(next);
-            self.extend_by(&directory, extent, &mut to_come)?;
+            if is_page {
+                extent.pages += 1;
+                page = next;
+            } else {
+                below.push(next);
+            }
+            self.extend_by(&directory, extent, &mut below)?;
         }
         Ok(())
     }
@@ -174,6 +189,12 @@ mod tests {
         let link = first + 2 + 12 * entries;
         circle[link..link + 4].copy_from_slice(&[a, b, c, d]);
         assert!(matches!(rest(&[&circle, &b"more"[..]].concat()), Rest::Unread { .. }));
+        // A second image may have left scraps behind.
+        let second = u32::try_from(circle.len()).unwrap();
+        let table = circle[first..link].to_vec();
+        circle[link..link + 4].copy_from_slice(&second.to_le_bytes());
+        let two = [&circle[..], &table, &[0; 4], b"more"].concat();
+        assert!(matches!(rest(&two), Rest::Unread { may_belong: true, .. }));
         // Each of these begins two bytes behind the one before, and has 5000 entries.
         let mut over = b"II*\0\x08\0\0\0".to_vec();
         over.resize(70_000, 0);
