@@ -14,7 +14,9 @@ that are alike with their neighbors the variance about the frame's own mean is e
 
     E s^2 = n/(n - 1) (sigma^2 - e1^2)      e1 that of the mean
 
-which is what a measured variance is divided by.
+which is what a measured variance is divided by. Here e1 is that of an endless plane: in a region of w x h demosaicked pixels the
+outermost are alike with others outside, so that its mean scatters less, by up to the share REACH (1/w + 1/h), and s^2 more.
+A ratio between the two is as predicted; in a region of few pixels they differ by per cents.
 """
 
 import dataclasses
@@ -27,6 +29,7 @@ from . import reports, table
 from .conditions import Condition
 from .plan import Plan
 
+REACH = 2  # pixels to which one is alike, more than the mean of distances weighted by correlations, which is about 1
 LEVEL = 1e-4  # chance of a false alarm, all tests of a sweep together
 
 MEASURED = pa.schema(
@@ -122,8 +125,9 @@ def chance(z: float) -> float:
     return math.erfc(abs(z) / math.sqrt(2))
 
 
-def tested(found: Gathered, fixed: float) -> dict[str, Any]:
-    """Measured over predicted, with sampling errors; what lost pixels to saturation has no prediction."""
+def tested(found: Gathered, fixed: float, at_edge: float = 0.0) -> dict[str, Any]:
+    """Measured over predicted, with sampling errors; what lost pixels to saturation has no prediction. The squared error of the
+    mean is less by up to the share `at_edge`."""
     row: dict[str, Any] = {
         "mean": found.mean.mean if found.mean.count else None,
         "mean_spread": found.mean.spread,
@@ -155,7 +159,9 @@ def tested(found: Gathered, fixed: float) -> dict[str, Any]:
     }
     if found.left_out or found.clipped:
         return row
-    z_mean, z_variance = (found.mean.mean - mean) / mean_error, cube_root_z(ratio, 2 / ratio_error**2)
+    largest = (std**2 - (1 - at_edge) * one_mean**2) / (std**2 - one_mean**2)
+    beyond = ratio / min(max(ratio, 1.0), largest)
+    z_mean, z_variance = (found.mean.mean - mean) / mean_error, cube_root_z(beyond, 2 / ratio_error**2)
     # The smaller of two chances, times two for there were two.
     return row | {"z_mean": z_mean, "z_variance": z_variance, "p": min(1.0, 2 * chance(max(z_mean, z_variance, key=abs)))}
 
@@ -168,6 +174,7 @@ class OfCondition:
         self._settings = table.settings(plan, condition, said)
         self._formulas = {part["stage"]: part for part in said["stages"]}
         self._pixels = width * height
+        self._at_edge = min(1.0, REACH * (1 / width + 1 / height))
         self._gathered = {(stage, channel): Gathered() for stage in plan.sweep.stages for channel in reports.CHANNELS[stage]}
 
     def add(self, block: pa.Table) -> None:
@@ -185,7 +192,7 @@ class OfCondition:
             std = formula["std"][at]
             fixed = min(1.0, (formula["fixed_pattern_std"][at] / std) ** 2) if std > 0 else 0.0
             names = {"frames": found.frames, "stage": stage, "channel": channel, "unit": formula["unit"]}
-            measured = {"predicted_snr_db": formula["snr_db"][at], **tested(found, fixed)}
+            measured = {"predicted_snr_db": formula["snr_db"][at], **tested(found, fixed, 0.0 if stage == "adu" else self._at_edge)}
             rows.append({**self._settings, **names, **{key: _rounded(value) for key, value in measured.items()}})
         return rows
 
