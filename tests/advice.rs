@@ -23,7 +23,7 @@ const fn advice(mistake: &'static str, says: &'static str, followed: &'static [&
 
 const SENSOR: &str = "give --sensor NAME|FILE";
 const BLACK: &str = "no `black_level_adu`; give --black N, 0 where it is off already";
-const UNIT: &str = "or give --radiance-unit";
+const UNIT: &str = "as bright as a white cloud in the sun; give --radiance-unit";
 
 /// Frames whose metadata lack what a program needs: `silent.yaml` says nothing, `plane.yaml`, `expected.yaml` … nearly all.
 const MISSING: &[Advice] = &[

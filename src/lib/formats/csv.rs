@@ -555,10 +555,12 @@ mod tests {
         let both = "# from W m-2 sr-1 nm-1 to W cm-2 sr-1 nm-1\nnm,L\n400,1\n";
         assert!(refused(both, None).contains("name the units of radiance W m-2 sr-1 nm-1 and W cm-2 sr-1 nm-1"));
         assert_eq!(unit(both, given).unwrap().0, watts);
-        let (assumed, warning) = unit("nm,L\n400,1\n", None).unwrap();
+        let (assumed, warning) = unit("nm,L\n400,1e-6\n", None).unwrap();
         assert_eq!(assumed, RadianceUnit::default());
         assert!(warning.unwrap().contains("taken as W cm-2 sr-1 nm-1"));
         assert_eq!(unit("nm,L\n400,1\n", given).unwrap(), (watts, None));
+        // A clear sky in W m⁻² sr⁻¹ nm⁻¹.
+        assert!(refused("nm,L\n400,0.1\n", None).contains("1.5e3 times as bright as a white cloud in the sun"));
     }
 
     #[test]

@@ -524,7 +524,8 @@ mod tests {
                 let sum: f64 = found.iter().map(|(t, weight)| weight * ripple(*t)).sum();
                 let rate = 1.0 + by_place;
                 let expected = (-still).exp() * rate / (rate * rate + turn * turn);
-                assert!((sum - expected).abs() < 1e-12, "{blur} {shot} {turns}: {sum} {expected}");
+                // The ripple of m turns of a mean is 1/(π m) of a code: it moves by less than 10⁻⁹ of one.
+                assert!((sum - expected).abs() < 1e-9, "{blur} {shot} {turns}: {sum} {expected}");
             }
         }
     }

@@ -267,7 +267,7 @@ pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
         }
         (_, Some(relative)) => {
             let note = format!("{}: no --matrix is named; XYZ are relative, by {}", frame.name, relative.method);
-            Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Warning(note)))
+            Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Remark(note)))
         }
         (_, None) => {
             let problem = format!("{}: neither its sensor nor its raw file tells a matrix", frame.name);

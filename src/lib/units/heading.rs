@@ -290,6 +290,15 @@ mod tests {
     }
 
     #[test]
+    fn units_without_blanks_are_read() {
+        for glued in ["L (Wm-2sr-1nm-1)", "Wm⁻²sr⁻¹nm⁻¹", "radiance [W·m⁻²sr⁻¹nm⁻¹]"] {
+            let wanted = RadianceUnit::parse("W m-2 sr-1 nm-1").map(Stated::Radiance);
+            assert_eq!((unit_of_heading(glued), wanted.is_some()), (wanted, true), "{glued}");
+        }
+        assert_eq!(RadianceUnit::parse("mWm-2sr-1nm-1"), RadianceUnit::parse("mW m-2 sr-1 nm-1"));
+    }
+
+    #[test]
     fn other_units_are_told_from_radiances() {
         use OtherUnit::{AllWavelengths, Irradiance, PerFrequency, Photons, Scaled, Several, Unknown};
         for (text, kind) in [
@@ -342,11 +351,6 @@ mod tests {
             );
             assert_eq!(RadianceUnit::parse(text), None, "{text}");
         }
-        for glued in ["L (Wm-2sr-1nm-1)", "Wm⁻²sr⁻¹nm⁻¹", "radiance [W·m⁻²sr⁻¹nm⁻¹]"] {
-            let wanted = RadianceUnit::parse("W m-2 sr-1 nm-1").map(Stated::Radiance);
-            assert_eq!((unit_of_heading(glued), wanted.is_some()), (wanted, true), "{glued}");
-        }
-        assert_eq!(RadianceUnit::parse("mWm-2sr-1nm-1"), RadianceUnit::parse("mW m-2 sr-1 nm-1"));
         for text in [
             "radiance",
             "L",

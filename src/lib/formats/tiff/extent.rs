@@ -1,6 +1,6 @@
 //! How far the bytes reach that a file's directories name, and what comes behind them.
 
-use super::directory::{Directory, TiffFile};
+use super::directory::{Directory, TiffFile, begins_so};
 use crate::error::{Error, Result};
 use crate::formats::format::{HEAD_BYTES, Rest};
 use std::collections::HashSet;
@@ -41,9 +41,12 @@ impl TiffFile {
         }
         let mut extent = Extent { end: known, has_private: false, pages: 0, left: self.length };
         self.extend(&mut extent)?;
-        let head = self.first_behind(extent.end)?;
+        let mut head = self.first_behind(extent.end)?;
         // Some writers leave scraps of directories behind the last of several images.
         let may_belong = extent.has_private || extent.pages > 1;
+        if may_belong && let Some(another) = self.another_behind(extent.end)? {
+            head = another;
+        }
         Ok(if head.is_empty() { Rest::Nothing } else { Rest::Unread { head, may_belong } })
     }
 
@@ -116,6 +119,16 @@ impl TiffFile {
 
     fn overlap(&self) -> Error {
         self.problem("it is damaged; its directories lie one over another")
+    }
+
+    /// The head of another TIFF behind a few bytes.
+    fn another_behind(&mut self, from: u64) -> Result<Option<Vec<u8>>> {
+        const SCRAPS: usize = 4096;
+        let count = usize::try_from(self.length - from).unwrap_or(usize::MAX).min(SCRAPS);
+        let mut bytes = vec![0; count];
+        self.read_at(from, &mut bytes)?;
+        let place = (0..count).find(|place| begins_so(&bytes[*place..]));
+        Ok(place.map(|place| bytes[place..].iter().copied().take(HEAD_BYTES).collect()))
     }
 
     /// Up to [`HEAD_BYTES`] from the first byte on that is not zero.
