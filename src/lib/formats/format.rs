@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::frame::Geometry;
 use crate::metadata::Metadata;
 use std::fs::File;
+use std::io::{self, BufRead, Read};
 
 /// Reads the samples of one frame, top to bottom, and says what its file tells about it.
 pub trait SampleReader: Send {
@@ -91,6 +92,44 @@ pub enum Rest {
         /// Whether it may be part of the frame, named by data that only its maker reads.
         may_belong: bool,
     },
+}
+
+impl Rest {
+    /// What comes of `input`, which is not read on; zeros fill up and are nothing.
+    ///
+    /// # Errors
+    ///
+    /// What the input says.
+    pub(super) fn unread(input: &mut impl BufRead, may_belong: bool) -> io::Result<Self> {
+        let (_, head) = behind_zeros(input)?;
+        Ok(Self::of_head(head, may_belong))
+    }
+
+    /// What begins so, and is not read on.
+    pub(super) fn of_head(head: Vec<u8>, may_belong: bool) -> Self {
+        if head.is_empty() { Self::Nothing } else { Self::Unread { head, may_belong } }
+    }
+}
+
+/// Takes the zeros that come first, and up to [`HEAD_BYTES`] of what comes behind them; tells how many zeros there were.
+///
+/// # Errors
+///
+/// What the input says.
+pub(super) fn behind_zeros(input: &mut impl BufRead) -> io::Result<(u64, Vec<u8>)> {
+    let mut zeros = 0;
+    loop {
+        let bytes = input.fill_buf()?;
+        let passed = bytes.iter().take_while(|byte| **byte == 0).count();
+        let has_ended = passed < bytes.len() || bytes.is_empty();
+        input.consume(passed);
+        zeros += passed as u64;
+        if has_ended {
+            let mut head = Vec::new();
+            input.take(HEAD_BYTES as u64).read_to_end(&mut head)?;
+            return Ok((zeros, head));
+        }
+    }
 }
 
 /// What the tags of a file say of the colors of its R, G and B.

@@ -255,7 +255,7 @@ impl Rest {
         if head.is_empty() {
             return Ok(false);
         }
-        if !self.is_unread() && table::may_follow(&head) {
+        if !matches!(self, Self::Unread { .. }) && table::may_follow(&head) {
             return Ok(true);
         }
         self.refuse(&head, name).map(|()| false)
@@ -267,25 +267,15 @@ impl Rest {
     ///
     /// [`Error::Format`] where something does; [`Error::Disk`].
     pub(super) fn end(mut self, name: &str) -> Result<()> {
-        let head = self.head(name)?;
-        if head.is_empty() {
-            return Ok(());
-        }
-        if !self.is_unread() && table::may_follow(&head) {
-            return Err(Error::format(name, ANOTHER));
-        }
-        self.refuse(&head, name)
-    }
-
-    fn is_unread(&self) -> bool {
-        matches!(self, Self::Unread { .. })
+        if self.begins_frame(name)? { Err(Error::format(name, ANOTHER)) } else { Ok(()) }
     }
 
     /// Complains of what begins so; of what may be part of the frame a doubt is noted.
     fn refuse(&self, head: &[u8], name: &str) -> Result<()> {
         if let Some(format) = table::known_by(head) {
             let problem = format!(
-                "behind it comes {format}; a stream has one frame, or several that are EXR of one part in scanlines: give each a file of its own"
+                "behind it comes {}; a stream has one frame, or several that are EXR of one part in scanlines: give each a file of its own",
+                format.name
             );
             return Err(Error::format(name, problem));
         }

@@ -37,8 +37,7 @@ pub const FORMATS: &[FrameFormat] = &[
 ///
 /// [`Error::Format`] for a format that is not read, [`Error::Order`] for one that `import-raw` alone reads.
 pub fn by_head(head: &[u8], name: &str) -> Result<Option<Readers>> {
-    let found = FORMATS.iter().find(|format| matches!(format.sign, Sign::Bytes(is_one) if is_one(head)));
-    found.map(|format| readers(format, name)).transpose()
+    known_by(head).map(|format| readers(format, name)).transpose()
 }
 
 /// The readers of a file that begins as a TIFF does and is something narrower; none where it is just a TIFF.
@@ -71,7 +70,7 @@ fn narrower(file: &File, name: &str) -> Result<Option<&'static FrameFormat>> {
 ///
 /// [`Error::Disk`] where the file cannot be looked at.
 pub fn makers_raw(file: &File, head: &[u8], name: &str) -> Result<Option<&'static FrameFormat>> {
-    let by_head = FORMATS.iter().find(|format| matches!(format.sign, Sign::Bytes(is_one) if is_one(head)));
+    let by_head = known_by(head);
     let by_tags = if tiff::begins_so(head) { whole(narrower(file, name))?.flatten() } else { None };
     let is_makers = |format: &&FrameFormat| matches!(format.reading, Reading::MakersRaw);
     Ok(by_tags.filter(is_makers).or(by_head.filter(is_makers)))
@@ -110,9 +109,9 @@ pub fn may_follow(head: &[u8]) -> bool {
     })
 }
 
-/// The format of a file that begins with the bytes `head`, with the article; none of what is no frame.
-pub fn known_by(head: &[u8]) -> Option<&'static str> {
-    FORMATS.iter().find(|format| matches!(format.sign, Sign::Bytes(is_one) if is_one(head))).map(|format| format.name)
+/// The format of a file that begins with the bytes `head`; none of what is no frame.
+pub fn known_by(head: &[u8]) -> Option<&'static FrameFormat> {
+    FORMATS.iter().find(|format| matches!(format.sign, Sign::Bytes(is_one) if is_one(head)))
 }
 
 /// The names of the formats that are read: `an EXR nor a DNG nor a PNG nor a FITS nor a TIFF`.

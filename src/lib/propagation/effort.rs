@@ -19,13 +19,19 @@ pub(super) fn left() -> u64 {
     LEFT.with(Cell::get)
 }
 
+/// What `work` finds, and the evaluations that it took.
+pub(super) fn counted<T>(work: impl FnOnce() -> T) -> (T, u64) {
+    let before = left();
+    let found = work();
+    (found, before - left())
+}
+
 /// What `work` finds within so many evaluations; none where it takes more.
 pub(super) fn within<T>(evaluations: u64, work: impl FnOnce() -> T) -> Option<T> {
     let before = left();
     let allowed = evaluations.min(before);
     LEFT.with(|left| left.set(allowed));
-    let found = work();
-    let used = allowed - left();
+    let (found, used) = counted(work);
     LEFT.with(|left| left.set(before - used));
     (used < allowed).then_some(found)
 }

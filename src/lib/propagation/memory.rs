@@ -23,14 +23,13 @@ impl<Key: PartialEq, Answer: Copy> Memory<Key, Answer> {
             effort::spend(took);
             return answer;
         }
-        let before = effort::left();
-        let answer = work_out(&key);
+        let (answer, took) = effort::counted(|| work_out(&key));
         if effort::is_spent() {
             return answer;
         }
         let mut kept = self.0.borrow_mut();
         kept.truncate(KEPT - 1);
-        kept.push_front((key, answer, before - effort::left()));
+        kept.push_front((key, answer, took));
         answer
     }
 }

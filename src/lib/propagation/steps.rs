@@ -86,12 +86,11 @@ impl Blurred {
                 effort::spend(took);
                 return found;
             }
-            let before = effort::left();
-            let found = Rc::new(work_out());
+            let (found, took) = effort::counted(|| Rc::new(work_out()));
             if !effort::is_spent() {
                 let mut kept = known.borrow_mut();
                 kept.truncate(Self::KEPT - 1);
-                kept.push_front((found.clone(), before - effort::left()));
+                kept.push_front((found.clone(), took));
             }
             found
         })

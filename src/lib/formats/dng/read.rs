@@ -298,6 +298,6 @@ impl SampleReader for DngReader {
     }
 
     fn rest(&mut self) -> Result<Rest> {
-        self.file.rest(self.storage.end())
+        self.file.rest(&self.storage.chunks)
     }
 }

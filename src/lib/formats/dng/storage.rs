@@ -89,11 +89,6 @@ pub(super) struct Storage {
 }
 
 impl Storage {
-    /// The end of the strip or tile that lies furthest behind.
-    pub fn end(&self) -> u64 {
-        self.chunks.iter().map(|(offset, stored)| offset.saturating_add(*stored)).max().unwrap_or_default()
-    }
-
     /// Reads the tags of an image and checks them against each other and against the file's length.
     ///
     /// # Errors

@@ -5,13 +5,13 @@ use super::keywords::{self, Told};
 use crate::error::{Error, Result};
 use crate::formats::files::spool;
 use crate::formats::format::{
-    FrameFormat, HEAD_BYTES, Readers, Reading, Rest, SampleReader, SampleType, Sign, Streaming,
+    FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign, Streaming, behind_zeros,
 };
 use crate::formats::read_ahead::Pipe;
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::Metadata;
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::os::unix::fs::FileExt;
 
 /// FITS, the Flexible Image Transport System.
@@ -381,41 +381,30 @@ impl SampleReader for FitsReader {
     fn rest(&mut self) -> Result<Rest> {
         let fill = self.array.padded_bytes() - self.array.bytes;
         let head = match &mut self.source {
-            Source::InOrder(input, _) => behind(input, fill, &self.name)?,
+            Source::InOrder(input, _) => behind(&mut BufReader::new(input), fill, &self.name)?,
             Source::Anywhere(file, data) => {
                 let end = *data + self.array.bytes;
                 file.seek(SeekFrom::Start(end)).map_err(|e| Error::disk(&self.name, "read", e))?;
                 behind(&mut BufReader::with_capacity(READ_BYTES, file), fill, &self.name)?
             }
         };
-        Ok(if head.is_empty() { Rest::Nothing } else { Rest::Unread { head, may_belong: false } })
+        Ok(Rest::of_head(head, false))
     }
 }
 
 /// The first bytes behind an array, which `fill` bytes fill up, that are no other part of the file; none where all are. Zeros are
 /// nothing.
-fn behind(input: &mut impl Read, fill: u64, name: &str) -> Result<Vec<u8>> {
+fn behind(input: &mut impl BufRead, fill: u64, name: &str) -> Result<Vec<u8>> {
     let failed = |e| Error::disk(name, "read", e);
     let mut skip = fill;
     loop {
         io::copy(&mut input.take(skip), &mut io::sink()).map_err(failed)?;
-        let mut block = Vec::new();
-        loop {
-            block.clear();
-            input.take(BLOCK_BYTES as u64).read_to_end(&mut block).map_err(failed)?;
-            if block.is_empty() {
-                return Ok(block);
-            }
-            if block.iter().any(|byte| *byte != 0) {
-                break;
-            }
+        let (zeros, head) = behind_zeros(input).map_err(failed)?;
+        let is_part = zeros.is_multiple_of(BLOCK_BYTES as u64) && head.starts_with(b"XTENSION=");
+        if !is_part {
+            return Ok(head);
         }
-        if !block.starts_with(b"XTENSION=") {
-            let zeros = block.iter().take_while(|byte| **byte == 0).count();
-            return Ok(block[zeros..].iter().copied().take(HEAD_BYTES).collect());
-        }
-        let header = Header::read(&mut block.as_slice().chain(&mut *input), name)?;
-        let Some(header) = header else { return Ok(Vec::new()) };
+        let Some(header) = Header::read(&mut head.as_slice().chain(&mut *input), name)? else { return Ok(Vec::new()) };
         let array = Array::of(&header, name)?;
         if io::copy(&mut input.take(array.bytes), &mut io::sink()).map_err(failed)? < array.bytes {
             return Err(Error::cut_short(name));

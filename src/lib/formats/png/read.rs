@@ -4,15 +4,14 @@ use super::PLACE;
 use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
 use crate::formats::foreign::png_damage;
-use crate::formats::format::{
-    ColorTags, FrameFormat, HEAD_BYTES, Readers, Reading, Rest, SampleReader, SampleType, Sign,
-};
+use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign};
 use crate::frame::Geometry;
 use crate::metadata::{METADATA_BEGIN, Metadata};
 use crate::units::QuantityKind;
 use png::{BitDepth, ColorType, Info, Limits, ScaledFloat};
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Seek, SeekFrom};
+use std::os::unix::fs::FileExt;
 
 /// Portable Network Graphics.
 pub const FORMAT: FrameFormat = FrameFormat {
@@ -69,10 +68,7 @@ impl PngReader {
         let length = file.seek(SeekFrom::End(0)).map_err(failed)?.saturating_sub(start);
         file.seek(SeekFrom::Start(start)).map_err(failed)?;
         let copy = file.try_clone().map_err(failed)?;
-        let mut file = BufReader::new(file);
-        let place = place(&mut file).unwrap_or_default();
-        file.seek(SeekFrom::Start(start)).map_err(failed)?;
-        let mut decoder = png::Decoder::new_with_limits(file, Limits { bytes: TEXT_BYTES });
+        let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), Limits { bytes: TEXT_BYTES });
         let damage = |error| png_damage(name, error);
         let header = decoder.read_header_info().map_err(damage)?;
         let refuse = |problem: String| Error::format(name, problem);
@@ -84,7 +80,7 @@ impl PngReader {
         let embedded = embedded(reader.info());
         // Of what our programs made the metadata tell how samples are encoded, and the place is one on the sensor.
         let (origin, notes) = match embedded {
-            Some(_) => (place, Vec::new()),
+            Some(_) => (place(&copy, start).unwrap_or_default(), Vec::new()),
             None => ([0, 0], notes(reader.info())),
         };
         Ok(Self {
@@ -102,32 +98,63 @@ impl PngReader {
     }
 }
 
-/// The place that stands before the samples, where one does.
+/// A chunk of a file: the place of its data, how many bytes they have, and its kind.
+struct Chunk {
+    data: u64,
+    length: u64,
+    kind: [u8; 4],
+}
+
+impl Chunk {
+    /// The first one of a picture that begins at a place.
+    fn first(file: &File, start: u64) -> io::Result<Self> {
+        const SIGNATURE_BYTES: u64 = 8;
+        Self::at(file, start + SIGNATURE_BYTES)
+    }
+
+    fn at(file: &File, place: u64) -> io::Result<Self> {
+        let mut head = [0; 8];
+        file.read_exact_at(&mut head, place)?;
+        let [a, b, c, d, kind @ ..] = head;
+        Ok(Self { data: place + 8, length: u32::from_be_bytes([a, b, c, d]).into(), kind })
+    }
+
+    /// The place behind it: a checksum of four bytes follows the data.
+    fn end(&self) -> u64 {
+        self.data + self.length + 4
+    }
+}
+
+/// The place on the sensor that stands before the samples, where one does.
 ///
 /// # Errors
 ///
 /// Where the file ends before the samples: who reads these says so.
-fn place(file: &mut (impl BufRead + Seek)) -> io::Result<[i32; 2]> {
-    // The first eight bytes are those of all files.
-    file.seek_relative(8)?;
-    loop {
-        let mut head = [0; 8];
-        file.read_exact(&mut head)?;
-        let [a, b, c, d, kind @ ..] = head;
-        let length = u32::from_be_bytes([a, b, c, d]);
-        match (&kind, length) {
-            (&PLACE, 9) => {
-                let mut sides = [[0; 4]; 2];
-                sides.iter_mut().try_for_each(|side| file.read_exact(side))?;
-                let mut unit = [1];
-                file.read_exact(&mut unit)?;
-                return Ok(if unit == [0] { sides.map(i32::from_be_bytes) } else { [0, 0] });
-            }
-            (b"IDAT", _) => return Ok([0, 0]),
-            // A checksum of four bytes follows each.
-            _ => file.seek_relative(i64::from(length) + 4)?,
+fn place(file: &File, start: u64) -> io::Result<[i32; 2]> {
+    let mut chunk = Chunk::first(file, start)?;
+    while chunk.kind != *b"IDAT" {
+        if (chunk.kind, chunk.length) == (PLACE, 9) {
+            let mut told = [0; 9];
+            file.read_exact_at(&mut told, chunk.data)?;
+            let [a, b, c, d, e, f, g, h, unit] = told;
+            return Ok(if unit == 0 { [[a, b, c, d], [e, f, g, h]].map(i32::from_be_bytes) } else { [0, 0] });
         }
+        chunk = Chunk::at(file, chunk.end())?;
     }
+    Ok([0, 0])
+}
+
+/// The place behind the last chunk.
+///
+/// # Errors
+///
+/// Where the file ends before it.
+fn end(file: &File, start: u64) -> io::Result<u64> {
+    let mut chunk = Chunk::first(file, start)?;
+    while chunk.kind != *b"IEND" {
+        chunk = Chunk::at(file, chunk.end())?;
+    }
+    Ok(chunk.end())
 }
 
 /// Channels and samples; or why such a picture is not read.
@@ -315,45 +342,14 @@ impl SampleReader for PngReader {
     }
 
     fn rest(&mut self) -> Result<Rest> {
-        let mut head = Vec::new();
-        let found = self.file.seek(SeekFrom::Start(self.start)).and_then(|_| {
-            let mut input = BufReader::new(&self.file);
-            let is_whole = pass_chunks(&mut input)?;
-            while head.iter().all(|byte| *byte == 0) {
-                head.clear();
-                if input.by_ref().take(READ_BYTES).read_to_end(&mut head)? == 0 {
-                    break;
-                }
-            }
-            Ok(is_whole)
+        let found = end(&self.file, self.start).and_then(|end| {
+            self.file.seek(SeekFrom::Start(end))?;
+            Rest::unread(&mut BufReader::new(&self.file), false)
         });
-        if !found.map_err(|e| Error::disk(&self.name, "read", e))? {
-            return Err(Error::cut_short(&self.name));
-        }
-        let head: Vec<u8> = head.into_iter().skip_while(|byte| *byte == 0).take(HEAD_BYTES).collect();
-        Ok(if head.is_empty() { Rest::Nothing } else { Rest::Unread { head, may_belong: false } })
-    }
-}
-
-/// Bytes behind the last chunk that are looked at together.
-const READ_BYTES: u64 = 1 << 16;
-
-/// Goes behind the last chunk; tells whether there is one.
-fn pass_chunks(input: &mut (impl Read + Seek)) -> io::Result<bool> {
-    const SIGNATURE_BYTES: i64 = 8;
-    const CHECKSUM_BYTES: i64 = 4;
-    input.seek_relative(SIGNATURE_BYTES)?;
-    let mut head = [0; 8];
-    loop {
-        match input.read_exact(&mut head) {
-            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(false),
-            other => other?,
-        }
-        let [a, b, c, d, kind @ ..] = head;
-        input.seek_relative(i64::from(u32::from_be_bytes([a, b, c, d])) + CHECKSUM_BYTES)?;
-        if &kind == b"IEND" {
-            return Ok(true);
-        }
+        found.map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => Error::cut_short(&self.name),
+            _ => Error::disk(&self.name, "read", error),
+        })
     }
 }
 

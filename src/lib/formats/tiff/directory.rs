@@ -22,9 +22,9 @@ const CLASSIC: u64 = 42;
 /// A TIFF file: its bytes, and how its numbers are written.
 #[derive(Debug)]
 pub struct TiffFile {
-    file: File,
+    pub(super) file: File,
     /// The file as the user named it.
-    name: String,
+    pub(super) name: String,
     /// Bytes in the file.
     pub(super) length: u64,
     /// `MM` files; the others are little-endian.

@@ -4,6 +4,7 @@ use super::directory::{Directory, TiffFile, begins_so};
 use crate::error::{Error, Result};
 use crate::formats::format::{HEAD_BYTES, Rest};
 use std::collections::HashSet;
+use std::io::{BufReader, Seek, SeekFrom};
 use tiff::tags::Tag;
 
 /// Directories that are looked at.
@@ -23,64 +24,67 @@ struct Extent {
     end: u64,
     /// Whether a maker's own data may name more.
     has_private: bool,
-    /// Images that follow one another.
-    pages: usize,
+    /// Where directories were looked for.
+    seen: HashSet<u64>,
     /// Bytes that may still be read: those of a whole file do not lie one over another.
     left: u64,
 }
 
 impl TiffFile {
-    /// What comes behind the bytes that its directories name and those before `known`; zeros fill up and are nothing.
+    /// What comes behind the bytes that its directories name and `chunks`, places and lengths; zeros fill up and are nothing.
     ///
     /// # Errors
     ///
     /// [`Error::Disk`]; [`Error::Format`] where directories lie one over another.
-    pub(in crate::formats) fn rest(&mut self, known: u64) -> Result<Rest> {
-        if known == self.length {
+    pub(in crate::formats) fn rest(&mut self, chunks: &[(u64, u64)]) -> Result<Rest> {
+        let end = chunks.iter().map(|(offset, stored)| offset.saturating_add(*stored)).max().unwrap_or_default();
+        if end == self.length {
             return Ok(Rest::Nothing);
         }
-        let mut extent = Extent { end: known, has_private: false, pages: 0, left: self.length };
-        self.extend(&mut extent)?;
-        let mut head = self.first_behind(extent.end)?;
+        let mut extent = Extent { end, has_private: false, seen: HashSet::new(), left: self.length };
+        let images = self.extend(&mut extent)?;
         // Some writers leave scraps of directories behind the last of several images.
-        let may_belong = extent.has_private || extent.pages > 1;
+        let may_belong = extent.has_private || images > 1;
         if may_belong && let Some(another) = self.another_behind(extent.end)? {
-            head = another;
+            return Ok(Rest::of_head(another, may_belong));
         }
-        Ok(if head.is_empty() { Rest::Nothing } else { Rest::Unread { head, may_belong } })
+        let found = self.file.seek(SeekFrom::Start(extent.end));
+        let found = found.and_then(|_| Rest::unread(&mut BufReader::new(&self.file), may_belong));
+        found.map_err(|source| Error::disk(&self.name, "read", source))
     }
 
-    /// Goes through the directories, each once, until the last byte of the file is named.
-    fn extend(&mut self, extent: &mut Extent) -> Result<()> {
-        let mut seen = HashSet::new();
-        let (mut page, mut below) = (self.first_directory, Vec::new());
-        while extent.end < self.length {
-            let is_page = below.is_empty();
-            let offset = below.pop().unwrap_or(page);
-            if is_page && (offset == 0 || seen.contains(&offset)) {
-                break;
+    /// Goes through the directories, each once, until the last byte of the file is named; gives the number of images that follow one
+    /// another.
+    fn extend(&mut self, extent: &mut Extent) -> Result<usize> {
+        let (mut images, mut next) = (0, self.first_directory);
+        let mut below = Vec::new();
+        while extent.end < self.length
+            && let Some(link) = self.visit(next, extent, &mut below)?
+        {
+            (images, next) = (images + 1, link);
+            while extent.end < self.length
+                && let Some(offset) = below.pop()
+            {
+                let link = self.visit(offset, extent, &mut below)?;
+                below.extend(link);
             }
-            if offset == 0 || !seen.insert(offset) {
-                continue;
-            }
-            // What is damaged where nobody has looked names nothing.
-            let Ok((directory, next)) = self.directory_at(offset, true) else {
-                page = if is_page { 0 } else { page };
-                continue;
-            };
-            let table = directory.bytes;
-            let too_many = seen.len() > MOST_DIRECTORIES;
-            extent.left = extent.left.checked_sub(table).filter(|_| !too_many).ok_or_else(|| self.overlap())?;
-            extent.end = extent.end.max((offset + table).min(self.length));
-            if is_page {
-                extent.pages += 1;
-                page = next;
-            } else {
-                below.push(next);
-            }
-            self.extend_by(&directory, extent, &mut below)?;
         }
-        Ok(())
+        Ok(images)
+    }
+
+    /// Adds what the directory at a place names, and the directories below it; gives its link to the next one. None where none is:
+    /// what is damaged where nobody has looked names nothing.
+    fn visit(&mut self, offset: u64, extent: &mut Extent, below: &mut Vec<u64>) -> Result<Option<u64>> {
+        if offset == 0 || !extent.seen.insert(offset) {
+            return Ok(None);
+        }
+        let Ok((directory, next)) = self.directory_at(offset, true) else { return Ok(None) };
+        let table = directory.bytes;
+        let is_one_more = extent.seen.len() <= MOST_DIRECTORIES;
+        extent.left = extent.left.checked_sub(table).filter(|_| is_one_more).ok_or_else(|| self.overlap())?;
+        extent.end = extent.end.max((offset + table).min(self.length));
+        self.extend_by(&directory, extent, below)?;
+        Ok(Some(next))
     }
 
     /// Adds what a directory names, and the directories below it.
@@ -130,25 +134,6 @@ impl TiffFile {
         let place = (0..count).find(|place| begins_so(&bytes[*place..]));
         Ok(place.map(|place| bytes[place..].iter().copied().take(HEAD_BYTES).collect()))
     }
-
-    /// Up to [`HEAD_BYTES`] from the first byte on that is not zero.
-    fn first_behind(&mut self, from: u64) -> Result<Vec<u8>> {
-        let mut at = from;
-        let mut block = vec![0; 1 << 16];
-        while at < self.length {
-            let count = usize::try_from(self.length - at).unwrap_or(usize::MAX).min(block.len());
-            self.read_at(at, &mut block[..count])?;
-            if let Some(first) = block[..count].iter().position(|byte| *byte != 0) {
-                let at = at + first as u64;
-                let count = usize::try_from(self.length - at).unwrap_or(usize::MAX).min(HEAD_BYTES);
-                let mut head = vec![0; count];
-                self.read_at(at, &mut head)?;
-                return Ok(head);
-            }
-            at += count as u64;
-        }
-        Ok(Vec::new())
-    }
 }
 
 #[cfg(test)]
@@ -175,7 +160,7 @@ mod tests {
     }
 
     fn rest(bytes: &[u8]) -> Rest {
-        TiffFile::open(of_bytes(bytes, false), "in").unwrap().rest(8).unwrap()
+        TiffFile::open(of_bytes(bytes, false), "in").unwrap().rest(&[]).unwrap()
     }
 
     #[test]
@@ -221,7 +206,7 @@ mod tests {
             }
         }
         over.push(1);
-        let refused = TiffFile::open(of_bytes(&over, false), "in").unwrap().rest(8).err().unwrap().to_string();
+        let refused = TiffFile::open(of_bytes(&over, false), "in").unwrap().rest(&[]).err().unwrap().to_string();
         assert_eq!(refused, "in: it is damaged; its directories lie one over another");
     }
 }

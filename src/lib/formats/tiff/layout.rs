@@ -107,11 +107,6 @@ impl Layout {
             notes,
         })
     }
-
-    /// The end of the strip or tile that lies furthest behind.
-    pub fn end(&self) -> u64 {
-        self.chunks.iter().map(|(offset, stored)| offset.saturating_add(*stored)).max().unwrap_or_default()
-    }
 }
 
 /// What was found, or, where the file is damaged there, nothing but a note.

@@ -359,7 +359,7 @@ impl SampleReader for TiffReader {
     }
 
     fn rest(&mut self) -> Result<Rest> {
-        self.file.rest(self.layout.end())
+        self.file.rest(&self.layout.chunks)
     }
 }
 
