@@ -123,6 +123,23 @@ impl Curve {
             }
         }
     }
+
+    /// The code that is made straight to `y`, which some code of a rising part is; none where no formula tells it.
+    fn inverse(&self, y: f64) -> Option<f64> {
+        match self {
+            Self::Polynomial { polynomial } => match polynomial.as_slice() {
+                [first] => Some(y / first),
+                // The root between the slope at 0 and that at the code, which is √(c₁² + 4 c₂ y).
+                [first, second] => Some(2.0 * y / (first + (first * first + 4.0 * second * y).max(0.0).sqrt())),
+                _ => None,
+            },
+            Self::Table { codes, linear } => {
+                let i = Self::segment(linear, y);
+                let share = (y - linear[i]) / (linear[i + 1] - linear[i]);
+                Some(codes[i] + share * (codes[i + 1] - codes[i]))
+            }
+        }
+    }
 }
 
 /// All curves that were met.
@@ -199,6 +216,9 @@ impl Linearization {
                 return end + (y - at) / self.slope(end);
             }
         }
+        if let Some(found) = self.0.inverse(y) {
+            return found;
+        }
         let (mut low, mut high) = (from, to);
         let mut x = from + (to - from) * (y - self.linear(from)) / (self.linear(to) - self.linear(from));
         // Newton's steps, or halves where they lead out.
@@ -242,9 +262,10 @@ impl<'de> Deserialize<'de> for Linearization {
 mod tests {
     use super::*;
 
-    fn curves() -> [Linearization; 3] {
+    fn curves() -> [Linearization; 4] {
         [
             Linearization::polynomial(vec![1.0, 3e-6, -1e-11]).unwrap(),
+            Linearization::polynomial(vec![1.02, -4e-6]).unwrap(),
             Linearization::polynomial(vec![0.98]).unwrap(),
             Linearization::table(vec![-50.0, 0.0, 700.0, 4000.0], vec![-51.0, 0.0, 690.0, 4100.0]).unwrap(),
         ]

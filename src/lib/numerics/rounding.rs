@@ -107,7 +107,7 @@ impl Rounding {
             return mean - center + of_rounding(mean, sigma);
         }
         if sigma >= WIDE {
-            return self.integral(mean, sigma, center)[0];
+            return self.mean_of_integral(mean, sigma, center);
         }
         let base = self.code(mean);
         let mut found = base - center;
@@ -157,57 +157,106 @@ impl Rounding {
     ///
     /// Σ D T over the midpoints of a..b = ∫ D T dt − [(DT)′]/24 + 7 [(DT)‴]/5760 − …
     fn integral(&self, mean: f64, sigma: f64, center: f64) -> [f64; 4] {
+        let [low, high] = self.ends(mean, sigma);
+        let [p0, p1, p2, p3, p4] = partial_between(&low, &high);
+        let (x, s) = (mean - center, sigma);
+        // The integral of D from the low end in powers of t − mean, and ∫ D dt: x, x², x³ + x/4, x⁴ + x²/2.
+        let first = x * p0 + s * p1;
+        let second = x * x * p0 + 2.0 * x * s * p1 + s * s * p2;
+        let third = x.powi(3) * p0 + 3.0 * x * x * s * p1 + 3.0 * x * s * s * p2 + s.powi(3) * p3;
+        let fourth = x.powi(4) * p0
+            + 4.0 * x.powi(3) * s * p1
+            + 6.0 * x * x * s * s * p2
+            + 4.0 * x * s.powi(3) * p3
+            + s.powi(4) * p4;
+        let between = [first, second, third + 0.25 * first, fourth + 0.5 * second];
+        let whole = |t: f64| {
+            let [x, square, cube, fourth] = powers(t - center);
+            [x, square, cube + 0.25 * x, fourth + 0.5 * square]
+        };
+        let [at_low, at_high] = [whole(low.at), whole(high.at)];
+        let of_first = powers(low.at - center);
+        let [of_low, of_high] = [low, high].map(|end| {
+            let derivatives = end.derivatives(sigma);
+            [0, 1, 2, 3].map(|j| correction(j, end.at - center, &derivatives))
+        });
+        let moment = |j: usize| {
+            let ends = at_high[j] * high.above + at_low[j] * low.below - at_low[j];
+            of_first[j] + between[j] + ends + of_high[j] - of_low[j]
+        };
+        [0, 1, 2, 3].map(moment)
+    }
+
+    /// The first of these moments: ∫ T dt between the ends, and its terms there.
+    fn mean_of_integral(&self, mean: f64, sigma: f64, center: f64) -> f64 {
+        let ends = self.ends(mean, sigma);
+        // ∫ T dt = (t − mean) T − σ φ.
+        let [low, high] = ends.map(|end| {
+            let derivatives = end.derivatives(sigma);
+            let terms = MIDPOINTS.iter().enumerate().map(|(k, factor)| factor * derivatives[2 * k + 1]);
+            (end.at - mean) * end.above - sigma * end.density + terms.sum::<f64>()
+        });
+        ends[0].at - center + high - low
+    }
+
+    /// The lowest and the highest code within reach, as ends of a sum.
+    fn ends(&self, mean: f64, sigma: f64) -> [End; 2] {
         let reach = REACH * sigma;
-        let (low, high) = (self.lowest.max((mean - reach).floor()), self.highest.min((mean + reach).ceil()));
-        let mut moments = powers(low - center);
-        // The integral of D from the low end, in powers of t − mean; partial moments of the normal law between the ends.
-        let partial = partial_moments([(low - mean) / sigma, (high - mean) / sigma]);
-        let above = cumulative((mean - high) / sigma);
-        let below = cumulative((low - mean) / sigma);
-        for (j, moment) in moments.iter_mut().enumerate() {
-            // ∫ D dt: t − c, (t − c)², (t − c)³ + (t − c)/4, (t − c)⁴ + (t − c)²/2.
-            let whole = |t: f64| {
-                let x = t - center;
-                match j {
-                    0 => x,
-                    1 => x * x,
-                    2 => x * (x * x + 0.25),
-                    _ => x * x * (x * x + 0.5),
-                }
-            };
-            let x = mean - center;
-            let s = sigma;
-            let [p0, p1, p2, p3, p4] = partial;
-            let first = x * p0 + s * p1;
-            let second = x * x * p0 + 2.0 * x * s * p1 + s * s * p2;
-            let third = x.powi(3) * p0 + 3.0 * x * x * s * p1 + 3.0 * x * s * s * p2 + s.powi(3) * p3;
-            let fourth = x.powi(4) * p0
-                + 4.0 * x.powi(3) * s * p1
-                + 6.0 * x * x * s * s * p2
-                + 4.0 * x * s.powi(3) * p3
-                + s.powi(4) * p4;
-            let between = match j {
-                0 => first,
-                1 => second,
-                2 => third + 0.25 * first,
-                _ => fourth + 0.5 * second,
-            };
-            *moment += between + whole(high) * above + whole(low) * below - whole(low);
-            let ends = [high, low].map(|t| correction(j, t - center, (t - mean) / sigma, sigma));
-            *moment += ends[0] - ends[1];
+        let codes = [self.lowest.max((mean - reach).floor()), self.highest.min((mean + reach).ceil())];
+        codes.map(|at| End::of(at, (at - mean) / sigma))
+    }
+}
+
+/// An end of a sum, so many standard deviations from the mean.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    at: f64,
+    z: f64,
+    density: f64,
+    /// Probabilities to be below and above.
+    below: f64,
+    above: f64,
+}
+
+impl End {
+    fn of(at: f64, z: f64) -> Self {
+        // The lesser of the two to full precision.
+        let lesser = cumulative(-z.abs());
+        let (below, above) = if z > 0.0 { (1.0 - lesser, lesser) } else { (lesser, 1.0 - lesser) };
+        Self { at, z, density: density(z), below, above }
+    }
+
+    /// Derivatives of T by t: −(−1)ⁿ⁻¹ Heₙ₋₁(z) φ(z)/σⁿ.
+    fn derivatives(&self, sigma: f64) -> [f64; DERIVATIVES] {
+        let mut t = [0.0; DERIVATIVES];
+        t[0] = self.above;
+        let (mut before, mut hermite) = (0.0, 1.0);
+        let step = -1.0 / sigma;
+        let mut scale = self.density * step;
+        for (n, derivative) in t.iter_mut().enumerate().skip(1) {
+            *derivative = scale * hermite;
+            scale *= step;
+            (before, hermite) = (hermite, self.z * hermite - (n - 1) as f64 * before);
         }
-        moments
+        t
     }
 }
 
 /// ∫ zⁿ φ(z) dz between two ends, n from 0 to 4.
 pub fn partial_moments([low, high]: [f64; 2]) -> [f64; 5] {
-    let mass = if low > 0.0 { cumulative(-low) - cumulative(-high) } else { cumulative(high) - cumulative(low) };
-    let at = |z: f64, power: i32| if z.is_finite() { z.powi(power) * density(z) } else { 0.0 };
-    let mut found = [mass, at(low, 0) - at(high, 0), 0.0, 0.0, 0.0];
-    for n in 2..5_usize {
-        let power = i32::try_from(n - 1).unwrap_or_default();
-        found[n] = at(low, power) - at(high, power) + (n - 1) as f64 * found[n - 2];
+    partial_between(&End::of(low, low), &End::of(high, high))
+}
+
+fn partial_between(low: &End, high: &End) -> [f64; 5] {
+    let mass = if low.z > 0.0 { low.above - high.above } else { high.below - low.below };
+    let of_end = |end: &End| {
+        let [z, square, cube, _] = if end.z.is_finite() { powers(end.z) } else { [0.0; 4] };
+        [1.0, z, square, cube].map(|power| power * end.density)
+    };
+    let [below, above] = [of_end(low), of_end(high)];
+    let mut found = [mass, below[0] - above[0], 0.0, 0.0, 0.0];
+    for n in 2..5 {
+        found[n] = below[n - 1] - above[n - 1] + (n - 1) as f64 * found[n - 2];
     }
     found
 }
@@ -226,29 +275,19 @@ const MIDPOINTS: [f64; 6] = [
 /// Derivatives of T that these take.
 const DERIVATIVES: usize = 2 * MIDPOINTS.len();
 
-/// Σ of the odd derivatives of D T at one end, `x` from the center and `z` standard deviations from the mean.
-fn correction(j: usize, x: f64, z: f64, sigma: f64) -> f64 {
-    // Derivatives 0 to 3 of D.
+/// Σ of the odd derivatives of D T at one end, `x` from the center, by those of T.
+fn correction(j: usize, x: f64, t: &[f64; DERIVATIVES]) -> f64 {
+    // Derivatives 0 to 3 of D, a polynomial of degree j.
     let d = match j {
         0 => [1.0, 0.0, 0.0, 0.0],
         1 => [2.0 * x, 2.0, 0.0, 0.0],
         2 => [3.0 * x * x + 0.25, 6.0 * x, 6.0, 0.0],
         _ => [4.0 * x.powi(3) + x, 12.0 * x * x + 1.0, 24.0 * x, 24.0],
     };
-    // Derivatives of T: −(−1)ⁿ⁻¹ Heₙ₋₁(z) φ(z)/σⁿ.
-    let mut t = [0.0; DERIVATIVES];
-    t[0] = cumulative(-z);
-    let (mut before, mut hermite) = (0.0, 1.0);
-    let mut scale = -density(z) / sigma;
-    for (n, derivative) in t.iter_mut().enumerate().skip(1) {
-        *derivative = scale * hermite;
-        scale *= -1.0 / sigma;
-        (before, hermite) = (hermite, z * hermite - (n - 1) as f64 * before);
-    }
     let product = |order: usize| -> f64 {
         let mut binomial = 1.0;
         let mut sum = 0.0;
-        for (k, d) in d.iter().enumerate().take(order + 1) {
+        for (k, d) in d.iter().enumerate().take(order.min(j) + 1) {
             sum += binomial * d * t[order - k];
             binomial *= (order - k) as f64 / (k + 1) as f64;
         }

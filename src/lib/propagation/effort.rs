@@ -36,6 +36,36 @@ pub(super) fn within<T>(evaluations: u64, work: impl FnOnce() -> T) -> Option<T>
     (used < allowed).then_some(found)
 }
 
+/// How much work equal parts will take, as the first of them tell.
+pub(super) struct Foreseen {
+    parts: u64,
+    begun: u64,
+    /// What was left before the first.
+    allowed: u64,
+}
+
+impl Foreseen {
+    /// Parts from which on all can be foreseen.
+    const TELLING: u64 = 16;
+
+    /// Of so many parts.
+    pub fn of(parts: usize) -> Self {
+        Self { parts: parts as u64, begun: 0, allowed: left() }
+    }
+
+    /// Before each part: where those before tell that all take twice what is allowed, nothing is left for any.
+    pub fn begin_next(&mut self) {
+        if self.begun == 0 {
+            self.allowed = left();
+        }
+        let used = self.allowed - left();
+        if self.begun >= Self::TELLING && used.saturating_mul(self.parts) / self.begun > 2 * self.allowed {
+            spend(left());
+        }
+        self.begun += 1;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -47,5 +77,24 @@ mod tests {
         // What is within counts for what it is part of.
         assert_eq!(within(10, || (within(8, || spend(6)), within(8, || spend(6)), is_spent())), None);
         assert!(!is_spent());
+    }
+    #[test]
+    fn what_takes_too_much_is_foreseen() {
+        let parts_done = |of_part: u64| {
+            let mut done = 0;
+            within(1000, || {
+                let mut foreseen = Foreseen::of(100);
+                while done < 100 {
+                    foreseen.begin_next();
+                    if is_spent() {
+                        break;
+                    }
+                    spend(of_part);
+                    done += 1;
+                }
+            });
+            done
+        };
+        assert_eq!([5, 9, 15, 21, 300].map(parts_done), [100, 100, 67, 16, 4]);
     }
 }

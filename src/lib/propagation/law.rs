@@ -24,7 +24,7 @@ use std::cmp::Ordering;
 const LEAST_STD: f64 = 1e-6;
 
 /// Evaluations that a normal law takes beside an end of the codes, more than others.
-const OF_ENDS: u64 = 20;
+const OF_ENDS: u64 = 8;
 
 /// Weights below this do not count.
 const LEAST_WEIGHT: f64 = 1e-19;
@@ -98,9 +98,9 @@ impl Law {
         self.light.least_pattern_std().hypot(self.dark.least_pattern_std())
     }
 
-    /// The normal laws that make up that of the charge, as many as a sum over them needs that is smooth on the scale of
-    /// `noise_e` beside their own spread.
-    fn nodes(&self, noise_e: f64) -> Vec<Node> {
+    /// Goes through the normal laws that make up that of the charge, as many as a sum over them needs that is smooth on the scale
+    /// of `noise_e` beside their own spread.
+    fn each_node(&self, noise_e: f64, mut of: impl FnMut(Node)) {
         let is_light_wider = self.light.shot_std() >= self.dark.shot_std();
         let (wide, narrow) = if is_light_wider { (&self.light, &self.dark) } else { (&self.dark, &self.light) };
         let given = self.least_pattern_std().hypot(noise_e);
@@ -110,7 +110,6 @@ impl Law {
         };
         let [is_inner_told, is_outer_told] = [ends_at(narrow, wide), ends_at(wide, narrow)];
         let mut by_step: Vec<(u32, Vec<_>)> = Vec::new();
-        let mut found = Vec::new();
         for inner in narrow.counts(if is_inner_told { noise_e } else { wide.shot_std().hypot(given) }) {
             let spread = if is_outer_told { 0.0 } else { wide.least_pattern_std().hypot(inner.spread) };
             let smoothing = spread.hypot(noise_e);
@@ -124,10 +123,17 @@ impl Law {
             let outer = by_step.iter().find(|(known, _)| *known == rung).map(|(_, counts)| counts);
             effort::spend(outer.map_or(0, |counts| counts.len() as u64));
             if effort::is_spent() {
-                return Vec::new();
+                return;
             }
-            found.extend(outer.into_iter().flatten().map(|outer| {
-                let std = inner.spread.hypot(outer.spread);
+            for outer in outer.into_iter().flatten() {
+                let weight = inner.weight * outer.weight;
+                if weight <= LEAST_WEIGHT {
+                    continue;
+                }
+                let std = match [inner.spread, outer.spread] {
+                    [one, 0.0] | [0.0, one] => one,
+                    [inner, outer] => inner.hypot(outer),
+                };
                 let mean = inner.electrons + outer.electrons;
                 // Below what the charge of the lesser pattern holds there is next to nothing.
                 let floor = match narrow.pattern.total_cmp(&wide.pattern) {
@@ -136,11 +142,9 @@ impl Law {
                     Ordering::Less => inner.electrons,
                     Ordering::Equal => 0.0,
                 };
-                Node { mean, floor, std: if std < LEAST_STD { 0.0 } else { std }, weight: inner.weight * outer.weight }
-            }));
+                of(Node { mean, floor, std: if std < LEAST_STD { 0.0 } else { std }, weight });
+            }
         }
-        found.retain(|node| node.weight > LEAST_WEIGHT);
-        found
     }
 
     /// Expected moments of a reading.
@@ -180,21 +184,14 @@ impl Law {
                 *sum += weight * moment;
             }
         };
-        let mut nodes = self.nodes(if is_full_far { reading.noise_e } else { 0.0 });
-        if !is_full_far {
-            nodes.extend(signed_nodes(self, reading));
-        }
         let mut near = Vec::new();
         let at_full = if full.is_finite() { reading.at(full, 0.0) } else { [0.0; 4] };
-        effort::spend(2 * nodes.len() as u64);
         let [lower, upper] = reading.ends_e();
-        for node in nodes {
+        let mut put = |node: Node| {
             let reach = REACH * node.std;
-            if node.mean - reach < lower || node.mean + reach > upper {
-                effort::spend(OF_ENDS);
-            }
+            effort::spend(if node.mean - reach < lower || node.mean + reach > upper { 2 + OF_ENDS } else { 2 });
             if effort::is_spent() {
-                break;
+                return;
             }
             if node.floor == f64::NEG_INFINITY && (is_full_far || node.mean + reach <= full) {
                 add(node.weight, reading.at(node.mean, node.std * node.std));
@@ -203,6 +200,10 @@ impl Law {
             } else {
                 near.push(node);
             }
+        };
+        self.each_node(if is_full_far { reading.noise_e } else { 0.0 }, &mut put);
+        if !is_full_far {
+            signed_nodes(self, reading).into_iter().for_each(put);
         }
         if !near.is_empty() {
             add(1.0, at_full_well(&near, full, reading, at_full));

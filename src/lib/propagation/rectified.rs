@@ -6,11 +6,11 @@
 use super::counts::{Charge, Count};
 use super::effort;
 use super::ends::{MANY, Place, Stretch, difference};
-use super::lookup::Lookup;
+use super::lookup::{Densities, Lookup};
 use super::node::{Law, Node};
 use super::reading::{Moments, Reading};
 use super::steps::Steps;
-use crate::numerics::normal::{MeanVariance, density};
+use crate::numerics::normal::MeanVariance;
 use crate::numerics::rounding::{REACH, SMOOTH};
 
 /// Nodes of the other charge beyond which codes are not gone through for each.
@@ -43,8 +43,9 @@ pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
         others.retain(|other| is_cut(other, law.full_well_e));
         let Some(narrowest) = others.iter().map(|other| other.spread).min_by(f64::total_cmp) else { continue };
         let stretch = Stretch { widest_panel: 2.5 * narrowest, ..base };
+        let densities = Densities::of(&counts, 0.0);
         for place in stretch.places(&Reading::electrons(0.0, 0.0), &[]) {
-            let share = place.weight * density_at(&counts, place.electrons);
+            let share = place.weight * densities.at(place.electrons);
             effort::spend(others.len() as u64);
             if effort::is_spent() {
                 return Vec::new();
@@ -130,11 +131,12 @@ impl MeanVariance {
 /// What rectification does to a charge itself: charges below zero leave, and come back as none.
 fn signed(charge: &Charge) -> Vec<Count> {
     let Some((counts, stretch)) = below_zero(charge) else { return Vec::new() };
+    let densities = Densities::of(&counts, 0.0);
     let reading = Reading::electrons(0.0, 0.0);
     let mut found = Vec::new();
     let mut gone = 0.0;
     for place in stretch.places(&reading, &[]) {
-        let weight = place.weight * density_at(&counts, place.electrons);
+        let weight = place.weight * densities.at(place.electrons);
         gone += weight;
         found.push(Count { electrons: place.electrons, weight: -weight, spread: 0.0 });
     }
@@ -162,32 +164,13 @@ fn below_zero(charge: &Charge) -> Option<(Vec<Count>, Stretch)> {
     (extent > 0.0).then_some((counts, stretch))
 }
 
-/// Density of the charge at `electrons` < 0.
-fn density_at(counts: &[Count], electrons: f64) -> f64 {
-    effort::spend(counts.len() as u64);
-    let at = |count: &Count| {
-        let z = (electrons - count.electrons) / count.spread;
-        if z > -REACH { count.weight * density(z) / count.spread } else { 0.0 }
-    };
-    counts.iter().map(at).sum()
-}
-
 /// The density below zero, looked up.
-fn density_table(stretch: &Stretch, counts: &[Count]) -> Lookup {
+fn density_table(stretch: &Stretch, densities: &Densities) -> Lookup {
     let mut table = Lookup::new(stretch.narrowest, stretch.extent);
-    effort::spend((counts.len() * table.values.len()) as u64);
     for index in (0..table.values.len()).filter(|_| !effort::is_spent()) {
         let below = table.distance(index);
-        let (mut sum, mut slope) = (0.0, 0.0);
-        for count in counts {
-            let z = (-below - count.electrons) / count.spread;
-            if z > -REACH - 1.0 {
-                let share = count.weight * density(z) / count.spread;
-                sum += share;
-                slope += share * z / count.spread;
-            }
-        }
-        table.values[index] = [sum, slope * table.by_step(below)];
+        let [density, rise] = densities.with_slope(-below);
+        table.values[index] = [density, -rise * table.by_step(below)];
     }
     table
 }
@@ -221,7 +204,8 @@ fn of_shared(
     let finest = reading.noise_e.max(if code.is_some() { f64::INFINITY } else { 0.0 });
     let narrow = Stretch { noise_e: 0.0, narrowest: base.narrowest.min(finest.max(1e-3)), ..*base };
     let places = narrow.places(&Reading::electrons(0.0, 0.0), &seams(reading, &spread_out, full));
-    let share = |place: &Place| (place.electrons, place.weight * density_at(counts, place.electrons));
+    let densities = Densities::of(counts, 0.0);
+    let share = |place: &Place| (place.electrons, place.weight * densities.at(place.electrons));
     let shared: Vec<(f64, f64)> = places.iter().map(share).collect();
     let gone: f64 = shared.iter().map(|(_, weight)| weight).sum();
     for other in others {
@@ -256,6 +240,7 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
     // Codes are gone through as far as laws reach that are narrow.
     let spreads = counts.iter().map(|count| count.spread);
     let narrow = spreads.filter(|spread| *spread < MANY * code.unwrap_or(0.0)).fold(0.0, f64::max);
+    let densities = Densities::of(&counts, 0.0);
     let mut steps = Steps::new(charge, &base, &counts, reading);
     let mut table = None;
     let is_only = others.windows(2).all(|pair| pair[0].spread == pair[1].spread);
@@ -276,7 +261,7 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
         let still = reading.at(other.electrons.min(full), other.spread * other.spread);
         let blurred = Reading { noise_e, ..*reading };
         if table.is_none() && others.len() > 8 {
-            table = Some(density_table(&base, &counts));
+            table = Some(density_table(&base, &densities));
         }
         let widest_narrow = if is_hidden { 0.0 } else { narrow };
         let stretch = Stretch { from: other.electrons, widest_narrow, noise_e, ..base };
@@ -286,7 +271,7 @@ fn of_charge(charge: &Charge, others: &Others, reading: &Reading, full: f64) -> 
             let below = place.electrons - other.electrons;
             let share = match &table {
                 Some(table) => table.at(below),
-                None => density_at(&counts, below),
+                None => densities.at(below),
             };
             if share * place.weight * other.weight.abs() > LEAST_WEIGHT {
                 let at = place.electrons.min(full);

@@ -12,7 +12,7 @@ use super::counts::{Charge, Count};
 use super::curved::NODES as HERMITE;
 use super::effort;
 use super::ends::{MANY, Stretch};
-use super::lookup::Lookup;
+use super::lookup::{Densities, Lookup};
 use super::reading::{Asked, Moments, Reading};
 use crate::numerics::gauss::{NODES, interpolated, panel};
 use crate::numerics::normal::{cumulative, density};
@@ -29,32 +29,21 @@ const SEAM: f64 = 1.3;
 const HALF_SEAM: f64 = 8.0 * SEAM;
 /// Codes that are gone through without a seam.
 const FEW: f64 = 200.0;
+/// Evaluations of a normal law that a step takes as long as.
+const OF_STEP: u64 = 4;
 /// Panels of a blurred step.
 const PANELS: usize = 12;
 
 /// The probability of charges below v < 0, looked up, of counts that noise blurs too.
 fn share_below(stretch: &Stretch, counts: &[Count], noise_e: f64) -> Lookup {
     let mut table = Lookup::new(stretch.narrowest.hypot(noise_e), stretch.extent + REACH * noise_e);
-    let of_density = |distance: f64| {
-        let (mut sum, mut slope) = (0.0, 0.0);
-        effort::spend(counts.len() as u64);
-        for count in counts {
-            let spread = count.spread.hypot(noise_e);
-            let z = (-distance - count.electrons) / spread;
-            if z > -REACH - 1.0 {
-                let share = count.weight * density(z) / spread;
-                sum += share;
-                slope -= share * z / spread;
-            }
-        }
-        [sum, slope]
-    };
+    let densities = Densities::of(counts, noise_e);
     let mut found = 0.0;
     let mut last = table.distance(Lookup::STEPS);
-    let [mut sum, mut slope] = of_density(last);
+    let [mut sum, mut slope] = densities.with_slope(-last);
     for index in (0..table.values.len()).rev() {
         let next = table.distance(index);
-        let [density, rise] = of_density(next);
+        let [density, rise] = densities.with_slope(-next);
         // ∫ by Euler and Maclaurin.
         let width = last - next;
         found += 0.5 * width * (sum + density) + width * width / 12.0 * (slope - rise);
@@ -217,7 +206,7 @@ impl<'a> Steps<'a> {
             }
         };
         let step = |edge: f64| {
-            effort::spend(1);
+            effort::spend(OF_STEP);
             self.step((edge - level) * self.code_e, noise_e)
         };
         // The weights of what is gone through one by one, from the charge down, and from the lowest code up.

@@ -64,8 +64,8 @@ const BLURRED: f64 = 0.8;
 /// Values of what photosites differ in that are gone through at most.
 const MOST_NODES: usize = 6000;
 
-/// Evaluations of one count, place or photosite that a class may take, some tenths of a second.
-const MOST_WORK: u64 = 8_000_000;
+/// Evaluations of one count, place or photosite that a class may take, hundredths of a second.
+const MOST_WORK: u64 = 4_000_000;
 
 /// What a kind of photosites has beyond others, in units of the means.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -144,6 +144,13 @@ fn laguerre(nodes: usize) -> Vec<(f64, f64)> {
     let solved = recurrence.symmetric_eigen();
     let node = |(index, place): (usize, &f64)| (*place, solved.eigenvectors[(0, index)].powi(2));
     solved.eigenvalues.iter().enumerate().map(node).collect()
+}
+
+/// The numbers below `count`, any first of them spread over all: bits in reverse order.
+fn scattered(count: usize) -> impl Iterator<Item = usize> {
+    let all = count.next_power_of_two();
+    let spare = usize::BITS - all.trailing_zeros();
+    (0..all).map(move |index| index.reverse_bits().checked_shr(spare).unwrap_or(0)).filter(move |index| *index < count)
 }
 
 /// For photosites that are hot and have a trap: exact for polynomials of degree 9.
@@ -265,7 +272,13 @@ impl Photosite {
         }
         let sum: f64 = kinds.iter().map(|(_, weight)| weight).sum();
         let mut found = Vec::new();
-        for (hot, weight) in kinds.into_iter().map(|(t, weight)| (t, weight / sum)) {
+        let mut foreseen = effort::Foreseen::of(kinds.len() - 1);
+        // Most photosites first, then hot ones from all over, which tell early how much work all are.
+        let order = std::iter::once(0).chain(scattered(kinds.len() - 1).map(|index| index + 1));
+        for (hot, weight) in order.map(|index| kinds[index]).map(|(t, weight)| (t, weight / sum)) {
+            if hot > 0.0 {
+                foreseen.begin_next();
+            }
             if effort::is_spent() {
                 break;
             }

@@ -317,6 +317,7 @@ impl SampleReader for PngReader {
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
         let channels = self.geometry.channels.len();
+        samples.reserve(rows * self.geometry.row_samples());
         for _ in 0..rows {
             let row = self.reader.next_row().map_err(|error| png_damage(&self.name, error))?;
             let Some(row) = row else { return Err(Error::cut_short(&self.name)) };
