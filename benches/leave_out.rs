@@ -1,6 +1,7 @@
 //! What leaving out saves: each piece of work with and without what a scene does not need; their ratio is the saving.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use cyanometer::camera::levels::BlackLevel;
 use cyanometer::camera::optics::{Exposure, Vignetting};
 use cyanometer::cfa::CfaPattern;
 use cyanometer::error::Result;
@@ -112,7 +113,7 @@ fn stages(criterion: &mut Criterion) {
     );
     let codes = MemoryFrame::new(header(QuantityKind::Adu, &["Y"]), plane.samples);
     let correct = |black| {
-        let settings = CorrectionSettings { black: Black::Level(black), cte: None };
+        let settings = CorrectionSettings { black: Black::Level(BlackLevel::Uniform(black)), cte: None };
         let Ok(stage) = CorrectFrame::new(&codes.header, &settings, None) else { panic!("codes can be corrected") };
         black_box(codes.through(&stage)).is_ok()
     };

@@ -467,7 +467,7 @@ fn defects_are_interpolated_within_their_class() {
     let isolated = [8, 10];
     let around = (4..=12).flat_map(|y| (6..=14).map(move |x| [y, x]));
     let mut kit = Kit { defects: around.filter(|[y, x]| y % 2 == 0 && x % 2 == 0).collect(), ..Kit::default() };
-    kit.black = Some(Black::Level(0.0));
+    kit.black = Some(Black::Level(0.0.into()));
     kit.defects.extend([[3, 3], [2, 2], [15, 4]]);
     let made = kit.correct(&frame);
     for y in 0..16 {

@@ -553,7 +553,7 @@ fn measured_samples_are_kept() {
     let cases = (method(), pattern(), sizes(), -2..2, -2..2, -99.0..99.0_f64);
     for_all(256, cases, |(method, cfa, size, x0, y0, black)| {
         let plane = plane(size, [x0, y0], cfa, |x, y, _| 1e3 * scatter(x, y, 1) - 300.0);
-        let stage = Demosaic::new(&plane.header, method, Black::Level(black), None).unwrap();
+        let stage = Demosaic::new(&plane.header, method, Black::Level(black.into()), None).unwrap();
         let made = through(&plane, &stage);
         for y in 0..size[1] {
             for x in 0..size[0] {
@@ -814,7 +814,7 @@ fn transfer_is_undone_to_the_rounding_of_samples() {
         let (still, mut moved) = (charge(&light, None), charge(&light, Some(cte)));
         // The charge as a converter of one code per electron would give it that neither rounds nor clips.
         moved.header.metadata.quantity = QuantityKind::Adu;
-        let restored = through(&moved, &correction(&moved.header, Black::Level(0.0), Some(cte)));
+        let restored = through(&moved, &correction(&moved.header, Black::Level(0.0.into()), Some(cte)));
         let brightest = f64::from(still.samples.iter().copied().fold(0.0, f32::max));
         // 2⁻²⁴ is half an ulp: of what is undone, of the result, and of what it is compared with.
         let gain = gain(cte, size);

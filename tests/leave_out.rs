@@ -157,8 +157,8 @@ fn dark_signal_far_below_the_read_noise_is_nothing() {
 fn a_black_level_of_zero_is_nothing_to_subtract() {
     let header = header(QuantityKind::Adu, Geometry::new(37, 12, &["Y"]));
     let codes = frame(header, |x, y, _| if x == 5 { f32::NAN } else { (4095.0 * scatter(x, y, 0)).floor() - 7.0 });
-    let correct = |black| {
-        let settings = CorrectionSettings { black: Black::Level(black), cte: None };
+    let correct = |black: f64| {
+        let settings = CorrectionSettings { black: Black::Level(black.into()), cte: None };
         CorrectFrame::new(&codes.header, &settings, None).unwrap()
     };
     let stage = correct(0.0);

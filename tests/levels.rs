@@ -124,7 +124,7 @@ fn equal_sites_are_a_uniform_level() {
         assert_same(&made(&short), &made(&long), method.names()[0]);
         let level =
             |black| Demosaic::new(&long.header, method, black, None).unwrap().header().uniform_black_adu().unwrap();
-        assert_eq!([level(Black::None), level(Black::Level(2.34))], [102.34, 102.34 - 2.34]);
+        assert_eq!([level(Black::None), level(Black::Level(2.34.into()))], [102.34, 102.34 - 2.34]);
     }
 }
 
@@ -161,16 +161,16 @@ fn a_crop_loses_what_the_whole_loses() {
 #[test]
 fn levels_by_site_that_no_word_is_left_for_are_refused() {
     let codes = with_levels(plane(12, 8, CfaPattern::Rggb.into()));
-    for black in [Black::None, Black::Level(100.0)] {
+    for black in [Black::None, Black::Level(100.0.into())] {
         let made = Demosaic::new(&codes.header, Method::Bilinear, black, None);
         refused(made, "what is left of its black level differs among photosites, which three planes cannot tell");
     }
     // Of a plane each site keeps its own.
-    let less = correct(&codes.header, Black::Level(100.0), None).unwrap();
+    let less = correct(&codes.header, Black::Level(100.0.into()), None).unwrap();
     let left = less.header().metadata.black_level_adu.unwrap();
     assert_eq!(left, BlackLevel::Sites(SITES.map(|level| level - 100.0)));
     assert_eq!(less.header().metadata.black_by_row, codes.header.metadata.black_by_row);
-    for black in [Black::None, Black::Level(100.0)] {
+    for black in [Black::None, Black::Level(100.0.into())] {
         let mut codes = codes.clone();
         codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord::new(12, 100.0, 0.1));
         refused(correct(&codes.header, black, Some(0.999)), "differs among photosites, so that it is no charge");
@@ -209,7 +209,7 @@ fn transfer_is_undone_behind_levels_by_site() {
     let mut after = expected.header.clone();
     after.metadata.black_level_adu = Some(0.0.into());
     let after = MemoryFrame::new(after, expected.samples);
-    let after = through(&after, &correct(&after.header, Black::Level(0.0), Some(0.9999)).unwrap());
+    let after = through(&after, &correct(&after.header, Black::Level(0.0.into()), Some(0.9999)).unwrap());
     // The first rounds to 32 bits once, the second twice, of codes below 2¹².
     let off = at_once.samples.iter().zip(&after.samples).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(off <= 2.0_f32.powi(-11), "{off}");
@@ -428,7 +428,7 @@ fn a_black_level_that_nobody_states_is_not_taken_as_zero() {
     let three = FrameHeader { name: "test".into(), ..three };
     refused(ToXyz::new(&three, &to_color(Space::Xyz)), complaint);
     // Who says that there is none goes on.
-    for black in [Black::None, Black::Level(0.0), Black::Level(70.0)] {
+    for black in [Black::None, Black::Level(0.0.into()), Black::Level(70.0.into())] {
         let made = Demosaic::new(&codes.header, Method::Bilinear, black, None).unwrap();
         assert_eq!(made.header().metadata.black_level_adu, Some(0.0.into()));
     }
@@ -457,7 +457,7 @@ fn a_mosaic_of_demosaicked_planes_has_lost_its_black() {
     assert_eq!((record.black_adu, record.black_deltas), (BlackLevel::Sites(SITES), true));
     let twice = through(&again, &Demosaic::new(&again.header, Method::Malvar, Black::Auto, None).unwrap());
     assert_same(&twice, &rgb, "demosaicked twice");
-    let more = Demosaic::new(&again.header, Method::Malvar, Black::Level(100.0), None);
+    let more = Demosaic::new(&again.header, Method::Malvar, Black::Level(100.0.into()), None);
     refused(more, "its black level is off already");
     refused(correct(&again.header, Black::None, Some(0.999)), "corrected already");
     // Where nothing was taken off, nothing is noted.

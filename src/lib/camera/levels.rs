@@ -58,6 +58,11 @@ impl BlackLevel {
         rest.iter().all(|level| *level == first).then_some(first)
     }
 
+    /// The largest of the four.
+    pub fn largest(self) -> f64 {
+        self.sites().into_iter().fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// The same with another value in place of each.
     #[must_use]
     pub fn map(self, f: impl Fn(f64) -> f64) -> Self {
@@ -172,7 +177,13 @@ impl RowBlack<'_> {
 impl BlackLevels {
     /// The same level everywhere.
     pub fn uniform_at(level: f64) -> Self {
-        Self { level: level.into(), sites: [level; 4], by_row: Vec::new(), by_column: Vec::new() }
+        Self::of_sites(level.into(), [0; 2])
+    }
+
+    /// The levels of a frame whose first photosite is `origin` on the sensor, where no row or column adds to them.
+    pub fn of_sites(level: BlackLevel, origin: [i32; 2]) -> Self {
+        let from = origin.map(|at| usize::from(at & 1 != 0));
+        Self { level, sites: level.beginning_at(from).sites(), by_row: Vec::new(), by_column: Vec::new() }
     }
 
     /// The levels of the frame of `size` (columns, rows) whose first photosite is `origin` on the sensor; deltas are counted
@@ -188,14 +199,10 @@ impl BlackLevels {
         origin: [i32; 2],
         size: [usize; 2],
     ) -> Result<Self, String> {
-        let levels = level.sites();
-        let odd = |at: i32| usize::from(at & 1 != 0);
-        let site = |x: usize, y: usize| levels[(y + odd(origin[1])) % 2 * 2 + (x + odd(origin[0])) % 2];
         Ok(Self {
-            level,
-            sites: [site(0, 0), site(1, 0), site(0, 1), site(1, 1)],
             by_row: part("black_by_row", "rows", by_row, origin[1], size[1])?,
             by_column: part("black_by_column", "columns", by_column, origin[0], size[0])?,
+            ..Self::of_sites(level, origin)
         })
     }
 

@@ -67,7 +67,7 @@ const GENERAL: &str = "General";
 /// What a user may say of a frame, in programs that read one.
 const OF_A_FRAME: [&str; 6] = ["cfa", "white", "black", "exposure", "f-number", "lens-transmittance"];
 /// Options that mean more to a program than to others; none is what the program is for.
-const APART: [(&str, &str, Option<&str>); 21] = [
+const APART: [(&str, &str, Option<&str>); 25] = [
     ("demosaic", "black", None),
     ("correct-frame", "black", None),
     ("correct-frame", "dark", None),
@@ -76,8 +76,6 @@ const APART: [(&str, &str, Option<&str>); 21] = [
     ("import-raw", "crop", None),
     ("predict-noise", "dark-frames", None),
     ("stack-frames", "frames", Some(READ)),
-    ("photon-transfer", "cfa", Some(READ)),
-    ("photon-transfer", "white", Some(READ)),
     ("render-radiance", "part", Some("The scene")),
     ("render-radiance", "patch", Some("The scene")),
     ("to-xyz", "white", Some("The white and the light")),
@@ -85,6 +83,12 @@ const APART: [(&str, &str, Option<&str>); 21] = [
     ("color-difference", "white", Some("The white and the light")),
     ("fit-matrix", "white", Some("The white and the light")),
     ("fit-matrix", "patch", Some("The evaluation of the matrix")),
+    ("fit-matrix", "part", Some("A chart or a raw file instead of a library")),
+    ("fit-matrix", "raw", Some("A chart or a raw file instead of a library")),
+    ("fit-matrix", "channel", Some("A chart or a raw file instead of a library")),
+    ("fit-matrix", "crop", Some("A chart or a raw file instead of a library")),
+    ("fit-matrix", "cfa", Some("A chart or a raw file instead of a library")),
+    ("fit-matrix", "metadata", Some("A chart or a raw file instead of a library")),
     ("fit-matrix", "patches", Some("A chart or a raw file instead of a library")),
     ("fit-matrix", "illuminant", Some("A chart or a raw file instead of a library")),
     ("fit-matrix", "temperature", Some("A chart or a raw file instead of a library")),

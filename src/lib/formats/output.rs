@@ -11,7 +11,7 @@ use super::png::{PngSettings, PngWriter};
 use super::register;
 use super::standard::open_stdout;
 use super::storing::Encoding;
-use super::tiff::{ExtraTag, TagValue, TiffSamples, TiffSettings, TiffTags, TiffWriter};
+use super::tiff::{ExtraTag, TagValue, TiffSamples, TiffSettings, TiffTags, TiffWriter, exif_block};
 use super::viewable::{self, Scaling, check_lossless};
 use super::yaml;
 use crate::color::{self, D65_XY, SRGB_PRIMARIES};
@@ -131,7 +131,8 @@ impl FrameWriter {
                 let scale = u16_scale(header.metadata.quantity, TiffSamples::U16);
                 let is_srgb = header.metadata.quantity == QuantityKind::Srgb;
                 let profile = icc::profile(header, sample_scale, f64::from(U16_FULL_SCALE))?;
-                let settings = PngSettings { scale, is_srgb, description, software, profile };
+                let exif = exif_block(&dng::of_exposure(&header.metadata), &name)?;
+                let settings = PngSettings { scale, is_srgb, description, software, profile, exif };
                 Encoder::Png(Box::new(PngWriter::create(target, &name, geometry, settings)?))
             }
         };

@@ -258,7 +258,7 @@ impl Metadata {
 
     /// What is possible, but may not be meant: a warning each.
     pub fn doubts(&self) -> Vec<String> {
-        let black = self.black_level_adu.map(|level| level.sites().into_iter().fold(f64::NEG_INFINITY, f64::max));
+        let black = self.black_level_adu.map(BlackLevel::largest);
         let levels = black.zip(self.white_level_adu).filter(|(black, white)| *black >= white.largest());
         let of_levels = levels.map(|(black, white)| {
             format!("the black level, {black} ADU, is no less than the white level, {} ADU", white.largest())

@@ -27,8 +27,15 @@ struct Arguments {
     /// Method: bi (bilinear), shti (smooth-hue), eci (effective-color), mhc (malvar)
     #[arg(long, default_value = Method::default().name(), value_parser = values::demosaicking())]
     method: Method,
-    /// Black level to remove: auto (from the metadata), none, or a number in the unit of the samples
-    #[arg(long, default_value = "auto", value_name = "auto|none|N", value_parser = values::black)]
+    /// Black level to remove: auto (from the metadata), none, a number in the unit of the samples, or four of them, of the 2x2
+    /// sites at the sensor's corner, row by row
+    #[arg(
+        long,
+        default_value = "auto",
+        value_name = "auto|none|N[,N,N,N]",
+        value_parser = values::black,
+        allow_hyphen_values = true
+    )]
     black: Black,
     /// Add a layer with the standard deviation of each pixel, from the sensor's noise model at the pixel's own level
     #[arg(long)]

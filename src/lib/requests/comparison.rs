@@ -4,8 +4,9 @@ use super::conversion::doubt_of_white;
 use super::notes::{self, Note};
 use super::values;
 use crate::analysis::comparison::{Comparison, ComparisonSettings, Side};
+use crate::analysis::statistics::Region;
 use crate::color::{Space, White};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::pipe;
 use crate::formats::register::check_inputs;
@@ -45,11 +46,12 @@ impl FrameOrColor {
         *self == Self::Frame("-".into())
     }
 
-    fn open(&self) -> Result<Side<FrameReader>> {
+    fn open(&self, part: usize, crop: Option<Region>) -> Result<Side<FrameReader>> {
         match self {
             Self::Color(color) => Ok(Side::Color(*color)),
             Self::Frame(path) => {
-                FrameReader::open(&InputOptions { path: Some(path.clone()), ..Default::default() }).map(Side::Frame)
+                let options = InputOptions { path: Some(path.clone()), part, crop, ..InputOptions::default() };
+                FrameReader::open(&options).map(Side::Frame)
             }
         }
     }
@@ -93,6 +95,12 @@ pub struct ColorPair {
     /// Luminance of the white in cd/m2; by default that in the metadata of an image, or 100 for colors given as numbers
     #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
     pub white_luminance: Option<f64>,
+    /// Part of a multi-part EXR or FITS, or page of a TIFF, counted from 0, of both images
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub part: usize,
+    /// Take a rectangle X,Y,W,H in pixels alone, of both images
+    #[arg(long, value_name = "X,Y,W,H", value_parser = values::region, allow_hyphen_values = true)]
+    pub crop: Option<Region>,
 }
 
 impl ColorPair {
@@ -108,9 +116,14 @@ impl ColorPair {
     /// Those of readers, and of [`Comparison::new`].
     pub fn open(&self) -> Result<(Comparison<FrameReader>, Vec<Note>)> {
         check_inputs([&self.a, &self.b].into_iter().filter_map(FrameOrColor::path).map(Some))?;
-        let Self { space, white, white_luminance, .. } = *self;
+        let Self { space, white, white_luminance, part, crop, .. } = *self;
+        let is_frame = |side: &FrameOrColor| side.path().is_some();
+        if (crop.is_some() || part > 0) && ![&self.a, &self.b].into_iter().any(is_frame) {
+            let option: &[_] = if crop.is_some() { &["crop"] } else { &["part"] };
+            return Err(Error::Usage("both are colors, of which there are no parts".into()).leave_out(option));
+        }
         let settings = ComparisonSettings { space, white, white_luminance };
-        let comparison = Comparison::new(self.a.open()?, self.b.open()?, &settings)?;
+        let comparison = Comparison::new(self.a.open(part, crop)?, self.b.open(part, crop)?, &settings)?;
         let mut notes = Vec::new();
         if comparison.white().is_none() && (white.is_some() || white_luminance.is_some()) {
             let text = "both are L*a*b* already; --white and --white-luminance have no effect";
@@ -150,7 +163,15 @@ mod tests {
     fn colors_that_need_no_white_say_so() {
         let color = |lightness: f64| FrameOrColor::Color([lightness, 0.0, 0.0]);
         let white = Some(White::D65);
-        let pair = ColorPair { a: color(50.0), b: color(53.0), space: Some(Space::Lab), white, white_luminance: None };
+        let pair = ColorPair {
+            a: color(50.0),
+            b: color(53.0),
+            space: Some(Space::Lab),
+            white,
+            white_luminance: None,
+            part: 0,
+            crop: None,
+        };
         let (mut comparison, notes) = pair.open().unwrap();
         assert!(matches!(&notes[..], [Note::Warning(text)] if text.contains("have no effect")), "{notes:?}");
         comparison.run(None, &mut |_| ()).unwrap();

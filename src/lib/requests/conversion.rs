@@ -94,7 +94,7 @@ impl Conversion {
     pub fn stage(&self, matrix: Option<CameraMatrix>, frame: &mut FrameHeader) -> Result<(ToXyz, Vec<Note>)> {
         self.white.check()?;
         if let Some(black) = self.black {
-            apply_black(frame, black)?;
+            apply_black(frame, black.into())?;
         }
         let Self { exposure_s, f_number, lens_transmittance, .. } = *self;
         SaidExposure { exposure_s, f_number, lens_transmittance }.apply(frame)?;
@@ -225,6 +225,10 @@ impl Conversion {
             notes.push(Note::Warning(format!("{}: {shown} {doubt}", frame.name)));
         }
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
+        if let Some(file) = self.matrix.as_deref().filter(|_| matrix.is_relative()) {
+            let text = format!("{}: XYZ are relative, Y = 1 for the white that saturates the camera", file.display());
+            notes.push(Note::Remark(text));
+        }
         if matrix.is_relative() && (self.exposure_s.is_some() || self.lens_transmittance.is_some()) {
             notes.push(Note::Warning(format!(
                 "{}: its XYZ are relative, and no exposure changes them; absolute ones take a matrix from spectra, or from a chart \
@@ -266,8 +270,14 @@ pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
             Ok((CameraMatrix::of_sensor(sensor, xyz_from_camera), Note::Remark(note)))
         }
         (_, Some(relative)) => {
-            let note = format!("{}: no --matrix is named; XYZ are relative, by {}", frame.name, relative.method);
-            Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Remark(note)))
+            let why = match measured {
+                Some(_) => "its exposure is not known, which --exposure and --f-number tell",
+                None => "it tells no calibration, which --matrix would",
+            };
+            let (name, method) = (&frame.name, &relative.method);
+            let note =
+                format!("{name}: XYZ are relative, Y = 1 for the white that saturates the camera: {why}; by {method}");
+            Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Warning(note)))
         }
         (_, None) => {
             let problem = format!("{}: neither its sensor nor its raw file tells a matrix", frame.name);

@@ -6,6 +6,7 @@ use super::independence::{Company, Role, check_files};
 use super::notes::Note;
 use super::options::{Input, SensorChoice};
 use super::values::{self, BlackChoice};
+use crate::camera::levels::BlackLevels;
 use crate::error::{Error, Result};
 use crate::formats::files::read_file;
 use crate::formats::input::{FrameReader, InputOptions, Linearizing};
@@ -37,14 +38,16 @@ pub struct Correction {
     /// The sensor that the frames come from.
     #[command(flatten)]
     pub sensor: SensorChoice,
-    /// Black level to remove: auto (from the metadata), none, a number of ADU, or that of the masked border, which
-    /// `import-raw --crop full` keeps: border (a level for each 2x2 site), rows or columns (and what each row or column is off)
+    /// Black level to remove: auto (from the metadata), none, a number of ADU, or four of the 2x2 sites at the sensor's corner, row
+    /// by row, or that of the masked border, which `import-raw --crop full` keeps: border (a level for each 2x2 site), rows or
+    /// columns (and what each row or column is off)
     #[arg(
         id = "black",
         long,
         default_value = "none",
-        value_name = "auto|none|N|border|rows|columns",
-        value_parser = values::black_or_border
+        value_name = "auto|none|N[,N,N,N]|border|rows|columns",
+        value_parser = values::black_or_border,
+        allow_hyphen_values = true
     )]
     pub black_choice: BlackChoice,
     /// Dark frame to subtract sample by sample, read with the --raw, --channel and --crop of the input; given more than once,
@@ -177,7 +180,7 @@ impl Correction {
         match self.black_choice {
             // A number is one of codes as they come.
             BlackChoice::Known(Black::Level(level)) => {
-                Black::Level(frame.metadata.adc.map_or(level, |adc| adc.sample(level)))
+                Black::Level(frame.metadata.adc.map_or(level, |adc| level.map(|code| adc.sample(code))))
             }
             BlackChoice::Known(black) => black,
             BlackChoice::Border(_) => Black::Auto,
@@ -246,7 +249,7 @@ impl Correction {
         let darks = self.frames(Role::FlatDark, light, company)?;
         let flats = self.frames(Role::Flat, light, company)?;
         let black = match self.black(light.frame) {
-            Black::Level(level) => Some(crate::camera::levels::BlackLevels::uniform_at(level)),
+            Black::Level(level) => Some(BlackLevels::of_sites(level, light.frame.geometry.origin)),
             _ => None,
         };
         let settings = DarkSettings { is_scaled, ..self.settings() };

@@ -3,7 +3,7 @@
 use super::notes::Note;
 use super::options::Input;
 use super::values;
-use crate::camera::levels::BlackLevel;
+use crate::camera::levels::{BlackLevel, BlackLevels};
 use crate::camera::optics::Exposure;
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
@@ -43,9 +43,9 @@ pub struct DescribedWithBlack {
     /// All but the black level.
     #[command(flatten)]
     pub described: Described,
-    /// Black level: the code of no light, 0 where it is off
-    #[arg(id = "black", long, value_name = "N", value_parser = values::number)]
-    pub black_level_adu: Option<f64>,
+    /// Black level: the code of no light, 0 where it is off; or four, of the 2x2 sites at the sensor's corner, row by row
+    #[arg(id = "black", long, value_name = "N[,N,N,N]", value_parser = values::black_level, allow_hyphen_values = true)]
+    pub black_level_adu: Option<BlackLevel>,
 }
 
 /// A frame to read, and what a user says of it.
@@ -165,16 +165,17 @@ impl SaidExposure {
             return Ok(());
         }
         let known = frame.metadata.exposure;
-        let other = |said: Option<f64>, known: Option<f64>| {
-            let differs = |known: &f64| said.is_some_and(|said| (said / known - 1.0).abs() > SAME_EXPOSURE);
-            known.filter(differs).map(|known| known.to_string())
-        };
         let [time, f_number] = [known.map(|known| known.exposure_s), known.map(|known| known.f_number)];
         let is_stated = |passed: &f64| *passed != 1.0 || frame.metadata.scene.is_some();
         let passed = known.map(|known| known.lens_transmittance).filter(is_stated);
-        agree(frame, "exposure time in s", other(self.exposure_s, time), &["exposure"])?;
-        agree(frame, "f-number", other(self.f_number, f_number), &["f_number"])?;
-        agree(frame, "transmittance of the lens", other(self.lens_transmittance, passed), &["lens_transmittance"])?;
+        agree(frame, "exposure time in s", other_than(self.exposure_s, time), &["exposure"])?;
+        agree(frame, "f-number", other_than(self.f_number, f_number), &["f_number"])?;
+        agree(
+            frame,
+            "transmittance of the lens",
+            other_than(self.lens_transmittance, passed),
+            &["lens_transmittance"],
+        )?;
         let [exposure_s, f_number] = [time.or(self.exposure_s), f_number.or(self.f_number)];
         let lens_transmittance = passed.or(self.lens_transmittance).unwrap_or(1.0);
         let Some((exposure_s, f_number)) = exposure_s.zip(f_number) else {
@@ -196,10 +197,11 @@ impl SaidExposure {
 /// # Errors
 ///
 /// [`Error::Usage`] where the metadata say another.
-pub fn apply_black(frame: &mut FrameHeader, black: f64) -> Result<()> {
-    let known = frame.black_levels()?.filter(|known| known.uniform() != Some(black));
+pub fn apply_black(frame: &mut FrameHeader, black: BlackLevel) -> Result<()> {
+    let said = BlackLevels::of_sites(black, frame.geometry.origin);
+    let known = frame.black_levels()?.filter(|known| known.has_deltas() || known.sites() != said.sites());
     agree(frame, "black level", known.map(|known| in_words(&known.level().sites())), &["black"])?;
-    frame.metadata.set_black_adu(Some(black.into()));
+    frame.metadata.set_black_adu(Some(black));
     Ok(())
 }
 
@@ -229,22 +231,23 @@ const LARGEST_CODE: f64 = 65_535.0;
 /// [`Error::Usage`] for one that is not below the white level, or where none is known the codes of 16 bits, where the metadata say
 /// nothing of no light.
 pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>> {
-    let Black::Level(level) = black else { return Ok(None) };
+    let Black::Level(black) = black else { return Ok(None) };
+    let (level, said) = (black.largest(), in_words(&black.sites()));
     let white = frame.metadata.white_level_adu.map(|white| white.largest());
     if let Some(white) = white.filter(|white| level >= *white && frame.metadata.black_level_adu.is_none()) {
-        let problem = format!("{}: --black {level} is not below the white level, {white} ADU", frame.name);
+        let problem = format!("{}: --black {said} is not below the white level, {white} ADU", frame.name);
         return Err(Error::Usage(problem).change(&["black", "white"]));
     }
     if white.is_none() && level >= LARGEST_CODE && frame.metadata.quantity == QuantityKind::Adu {
         let problem =
-            format!("{}: --black {level} is not below {LARGEST_CODE}, the largest code of 16 bits", frame.name);
+            format!("{}: --black {said} is not below {LARGEST_CODE}, the largest code of 16 bits", frame.name);
         return Err(Error::Usage(problem).change(&["black"]));
     }
-    Ok(other_black(frame, level))
+    Ok(other_black(frame, black))
 }
 
 /// A warning of a level to subtract that the metadata contradict.
-fn other_black(frame: &FrameHeader, level: f64) -> Option<Note> {
+fn other_black(frame: &FrameHeader, black: BlackLevel) -> Option<Note> {
     let levels = match frame.metadata.quantity {
         QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
             frame.metadata.dark_signal_e.map(|level| [level; 4])
@@ -253,11 +256,15 @@ fn other_black(frame: &FrameHeader, level: f64) -> Option<Note> {
     }?;
     let [low, high] = levels.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], at| [l.min(*at), h.max(*at)]);
     // A level that is rounded, or one for four sites, is meant.
-    let is_near = (low.floor()..=high.ceil()).contains(&level);
+    let is_near = match black {
+        BlackLevel::Uniform(level) => (low.floor()..=high.ceil()).contains(&level),
+        BlackLevel::Sites(said) => levels.iter().zip(said).all(|(known, said)| (known - said).abs() < 1.0),
+    };
     (!is_near).then(|| {
         Note::Warning(format!(
-            "{}: --black {level} is not the black level of its metadata, {}, which --black auto takes",
+            "{}: --black {} is not the black level of its metadata, {}, which --black auto takes",
             frame.name,
+            in_words(&black.sites()),
             in_words(&levels)
         ))
     })
@@ -307,6 +314,31 @@ impl DescribedWithBlack {
         }
         Ok(())
     }
+}
+
+impl DescribedWithBlack {
+    /// Puts what is said into the metadata of a frame of which the exposure time counts and the lens does not, and gives that
+    /// time in s; `tagged_s` is that of its file's tags.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::apply`], but a time needs no f-number.
+    pub fn apply_time(&self, frame: &mut FrameHeader, tagged_s: Option<f64>) -> Result<Option<f64>> {
+        let Described { exposure_s: said_s, f_number, .. } = self.described;
+        let known = frame.metadata.exposure;
+        let known_s = known.map(|known| known.exposure_s).or(tagged_s);
+        agree(frame, "exposure time in s", other_than(said_s, known_s), &["exposure"])?;
+        agree(frame, "f-number", other_than(f_number, known.map(|known| known.f_number)), &["f_number"])?;
+        let described = Described { exposure_s: None, f_number: None, ..self.described };
+        Self { described, ..*self }.apply(frame)?;
+        Ok(known_s.or(said_s))
+    }
+}
+
+/// What is known of an exposure, in words, where it is not what is said.
+fn other_than(said: Option<f64>, known: Option<f64>) -> Option<String> {
+    let differs = |known: &f64| said.is_some_and(|said| (said / known - 1.0).abs() > SAME_EXPOSURE);
+    known.filter(differs).map(|known| known.to_string())
 }
 
 /// Takes samples of unknown quantity for codes.
@@ -363,7 +395,7 @@ mod tests {
             exposure_s: Some(0.5),
             f_number: Some(4.0),
         };
-        DescribedWithBlack { described: said, black_level_adu: Some(64.0) }.apply(&mut plane).unwrap();
+        DescribedWithBlack { described: said, black_level_adu: Some(64.0.into()) }.apply(&mut plane).unwrap();
         let metadata = &plane.metadata;
         assert_eq!((metadata.quantity, metadata.unit.as_str()), (QuantityKind::Adu, QuantityKind::Adu.unit()));
         assert_eq!((metadata.cfa, metadata.white_level_adu), (said.cfa, Some(4095.0.into())));
@@ -372,7 +404,7 @@ mod tests {
         assert_eq!(metadata.exposure, Some(exposure));
         // What the frame says already may be said again.
         let before = plane.clone();
-        DescribedWithBlack { described: said, black_level_adu: Some(64.0) }.apply(&mut plane).unwrap();
+        DescribedWithBlack { described: said, black_level_adu: Some(64.0.into()) }.apply(&mut plane).unwrap();
         assert_eq!(plane, before);
     }
 
@@ -387,7 +419,8 @@ mod tests {
         let cases = [
             (Described { cfa: Some("bggr".parse().unwrap()), ..none }, None, "filter array is rggb", "cfa"),
             (Described { white_level_adu: Some(1.0), ..none }, None, "white level is 4095", "white"),
-            (none, Some(1.0), "black level is 1,2,3,4", "black"),
+            (none, Some(1.0.into()), "black level is 1,2,3,4", "black"),
+            (none, Some(BlackLevel::Sites([1.0, 2.0, 4.0, 3.0])), "black level is 1,2,3,4", "black"),
             (Described { exposure_s: Some(0.6), ..none }, None, "exposure time in s is 0.5", "exposure"),
             (Described { f_number: Some(8.0), ..none }, None, "f-number is 4", "f_number"),
         ];
@@ -417,7 +450,7 @@ mod tests {
         let white = Described { white_level_adu: Some(1.0), ..Described::default() };
         let complaint = "in: it holds three planes of electrons, which have no level of codes; leave out ";
         assert_eq!(said(white, &mut three), format!("{complaint}`white`"));
-        let black = DescribedWithBlack { black_level_adu: Some(1.0), ..DescribedWithBlack::default() }
+        let black = DescribedWithBlack { black_level_adu: Some(1.0.into()), ..DescribedWithBlack::default() }
             .apply(&mut three)
             .unwrap_err();
         assert_eq!(black.to_string(), format!("{complaint}`black`"));

@@ -1,6 +1,6 @@
 //! The black level: what no light reads, and what is left of it once something was subtracted.
 
-use crate::camera::levels::{BlackLevels, WhiteLevel};
+use crate::camera::levels::{BlackLevel, BlackLevels, WhiteLevel};
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
@@ -14,8 +14,8 @@ pub enum Black {
     Auto,
     /// Nothing.
     None,
-    /// A level in the unit of the samples.
-    Level(f64),
+    /// A level in the unit of the samples, or one for each of the 2×2 sites.
+    Level(BlackLevel),
 }
 
 impl Black {
@@ -28,19 +28,19 @@ impl Black {
     pub fn levels(self, frame: &FrameHeader) -> Result<BlackLevels> {
         let metadata = &frame.metadata;
         let level = match self {
-            Self::Level(level) if level != 0.0 && is_off(frame)? => {
+            Self::Level(level) if level.uniform() != Some(0.0) && is_off(frame)? => {
                 let problem = format!("{}: its black level is off already, as its metadata say", frame.name);
                 return Err(Error::Usage(problem).leave_out(&["black"]));
             }
             Self::Level(level) => level,
-            Self::None => 0.0,
+            Self::None => 0.0.into(),
             Self::Auto => match metadata.quantity {
-                QuantityKind::Electrons => metadata.dark_signal_e.ok_or_else(|| frame.missing("dark_signal_e"))?,
-                QuantityKind::ExpectedElectrons => 0.0,
+                QuantityKind::Electrons => metadata.dark_signal_e.ok_or_else(|| frame.missing("dark_signal_e"))?.into(),
+                QuantityKind::ExpectedElectrons => 0.0.into(),
                 _ => return frame.black_levels()?.ok_or_else(|| frame.missing("black_level_adu")),
             },
         };
-        Ok(BlackLevels::uniform_at(level))
+        Ok(BlackLevels::of_sites(level, frame.geometry.origin))
     }
 }
 

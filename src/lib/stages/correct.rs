@@ -82,7 +82,7 @@ impl CorrectFrame {
                 return Err(Error::Usage("dark frames hold the black level already".into()).leave_out(&["black"]));
             }
             Black::Auto => known_black.clone().ok_or_else(|| input.missing("black_level_adu"))?,
-            Black::Level(level) => BlackLevels::uniform_at(level),
+            Black::Level(level) => BlackLevels::of_sites(level, input.geometry.origin),
         };
         let is_subtracted = black != Black::None || darks.is_some();
         let mut bias_adu = 0.0;
@@ -282,7 +282,7 @@ mod tests {
             [metadata.uniform_black_adu().unwrap(), white.unwrap()]
         };
         assert_eq!(levels(Black::Auto, None, &[]), [0.0, 3991.0]);
-        assert_eq!(levels(Black::Level(100.0), None, &[]), [4.0, 3995.0]);
+        assert_eq!(levels(Black::Level(100.0.into()), None, &[]), [4.0, 3995.0]);
         assert_eq!(levels(Black::None, None, &[&frame, &frame]), [0.0, 3991.0]);
         // Of what lies above the bias a quarter was left.
         assert_eq!(levels(Black::None, Some(0.5), &[]), [116.0, 100.0 + 4.0 * 3995.0]);
@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(levels(Black::None, Some(0.5), &[&frame]), [0.0, 4.0 * 3991.0]);
         let mut unknown = frame.clone();
         unknown.metadata.black_level_adu = None;
-        let found = correct(&unknown, Black::Level(9.0), None, &[]).unwrap().header.metadata;
+        let found = correct(&unknown, Black::Level(9.0.into()), None, &[]).unwrap().header.metadata;
         assert_eq!((found.black_level_adu, found.white_level_adu), (Some(0.0.into()), Some(4086.0.into())));
         let found = correct(&unknown, Black::None, None, &[&frame]).unwrap().header.metadata;
         assert_eq!((found.black_level_adu, found.white_level_adu), (Some(0.0.into()), None));
@@ -322,7 +322,7 @@ mod tests {
         let bare = with(&|f| (f.metadata.adc, f.metadata.black_level_adu) = (None, None));
         assert!(matches!(refused(&bare, Black::Auto, None, &[]), Error::MissingKey { key: "black_level_adu", .. }));
         assert!(matches!(refused(&bare, Black::None, Some(0.99), &[]), Error::MissingKey { key: "adc", .. }));
-        assert!(correct(&bare, Black::Level(100.0), Some(0.99), &[]).is_ok());
+        assert!(correct(&bare, Black::Level(100.0.into()), Some(0.99), &[]).is_ok());
         let unlike = [
             with(&|f| f.geometry.width = 9),
             crop,

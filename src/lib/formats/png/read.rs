@@ -5,6 +5,7 @@ use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
 use crate::formats::foreign::png_damage;
 use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign};
+use crate::formats::tiff;
 use crate::frame::Geometry;
 use crate::metadata::{METADATA_BEGIN, Metadata};
 use crate::units::QuantityKind;
@@ -79,9 +80,16 @@ impl PngReader {
         let reader = decoder.read_info().map_err(damage)?;
         let embedded = embedded(reader.info());
         // Of what our programs made the metadata tell how samples are encoded, and the place is one on the sensor.
+        let mut own_tags = Metadata::new(QuantityKind::Unspecified);
         let (origin, notes) = match embedded {
             Some(_) => (place(&copy, start).unwrap_or_default(), Vec::new()),
-            None => ([0, 0], notes(reader.info())),
+            None => {
+                let mut notes = notes(reader.info());
+                if let Some(exif) = reader.info().exif_metadata.as_deref() {
+                    own_tags.exposure = tiff::exposure_of_block(exif, name, &mut notes)?;
+                }
+                ([0, 0], notes)
+            }
         };
         Ok(Self {
             name: name.into(),
@@ -90,7 +98,7 @@ impl PngReader {
             geometry: Geometry { origin, ..Geometry::new(width, height, channels) },
             stored,
             embedded,
-            own_tags: Metadata::new(QuantityKind::Unspecified),
+            own_tags,
             colors: colors(reader.info()),
             notes,
             reader,

@@ -46,6 +46,8 @@ pub struct PngSettings {
     pub software: String,
     /// A color profile, where samples are not sRGB.
     pub profile: Option<Vec<u8>>,
+    /// A block of Exif, a TIFF of tags alone.
+    pub exif: Option<Vec<u8>>,
 }
 
 /// Writes rows as a PNG of 16-bit integers, without a seek.
@@ -79,6 +81,7 @@ impl<W: Write + 'static> PngWriter<W> {
         info.color_type = if channels == 1 { ColorType::Grayscale } else { ColorType::Rgb };
         info.bit_depth = BitDepth::Sixteen;
         info.icc_profile = settings.profile.filter(|_| !settings.is_srgb).map(Into::into);
+        info.exif_metadata = settings.exif.map(Into::into);
         let output = Shared(Arc::new(Mutex::new(Inner { output, error: None })));
         let begun = begin(&output, info, settings.is_srgb, geometry.origin, [settings.description, settings.software]);
         let stream = begun.map_err(|problem| output.problem(name, problem))?;
@@ -201,7 +204,8 @@ mod tests {
 
     fn settings(is_srgb: bool) -> PngSettings {
         let scale = if is_srgb { 65_535.0 } else { 1.0 };
-        PngSettings { scale, is_srgb, description: OURS.into(), software: "cyanometer".into(), profile: None }
+        let (description, software) = (OURS.into(), "cyanometer".into());
+        PngSettings { scale, is_srgb, description, software, profile: None, exif: None }
     }
 
     fn written(geometry: &Geometry, samples: &[f32], together: usize, is_srgb: bool) -> (Vec<u8>, u64) {

@@ -76,7 +76,11 @@ fn is_integer(stored: SampleType) -> bool {
 }
 
 /// Exposure time and f-number, which count together; the transmittance of the lens, which no tag has, is 1.
-fn told_exposure(file: &mut TiffFile, directory: &Directory, notes: &mut Vec<String>) -> Result<Option<Exposure>> {
+pub(super) fn told_exposure(
+    file: &mut TiffFile,
+    directory: &Directory,
+    notes: &mut Vec<String>,
+) -> Result<Option<Exposure>> {
     let below = passed_over(file.below(directory, EXIF), "its Exif", notes)?;
     let mut found = [None; 2];
     for directory in [Some(directory), below.as_ref()].into_iter().flatten() {

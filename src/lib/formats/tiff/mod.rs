@@ -8,6 +8,7 @@
 mod capture;
 mod chunk;
 mod directory;
+mod exif;
 mod extent;
 mod first;
 mod grid;
@@ -20,6 +21,7 @@ mod write;
 
 pub(in crate::formats) use chunk::Predictor;
 pub use directory::{Directory, TiffFile, begins_so};
+pub use exif::{exif_block, exposure_of_block};
 pub(in crate::formats) use first::FirstImage;
 pub(in crate::formats) use layout::passed_over;
 pub use read::{FORMAT, TiffReader};

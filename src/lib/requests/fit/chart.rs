@@ -2,6 +2,7 @@
 
 use super::super::described::{Described, DescribedWithBlack};
 use super::super::notes::Note;
+use super::super::options::Selection;
 use super::super::values;
 use crate::analysis::characterization::regression::residuals;
 use crate::analysis::characterization::{
@@ -11,6 +12,7 @@ use crate::analysis::chart::fit::{ChartMatrix, Misfit, Patch, fit};
 use crate::analysis::chart::grid::Grid;
 use crate::analysis::chart::judgment::{Judgment, judge};
 use crate::analysis::chart::reading::{ChartReader, ReadPatch};
+use crate::camera::levels::BlackLevel;
 use crate::cfa::FilterArray;
 use crate::color::adaptation::Adaptation;
 use crate::color::{chromaticity, rows_of, xyz_of_chromaticity};
@@ -30,6 +32,10 @@ const MOST_MISFIT: f64 = 0.1;
 
 /// A chart, as a frame or as a table, the colors that it has, and the light on it.
 #[derive(Debug, Clone, Args)]
+#[command(mut_args(|option| match option.get_id().as_str() {
+    "part" | "raw" | "channel" | "crop" => option.requires("chart"),
+    _ => option,
+}))]
 pub struct ChartFit {
     /// Frame of a ColorChecker, a CFA plane of ADU such as a DNG: fit the matrix to its 24 patches
     #[arg(long, value_name = "FRAME", conflicts_with = "patches")]
@@ -40,6 +46,9 @@ pub struct ChartFit {
     /// CSV of means of patches: columns R, G, B, where known name, std_R, std_G, std_B, cov_RG, cov_RB, cov_GB
     #[arg(long, value_name = "FILE.csv")]
     pub patches: Option<PathBuf>,
+    /// What of its file is the frame of the chart.
+    #[command(flatten)]
+    pub selection: Selection,
     /// Filter array of the frame of the chart, where that does not say it: rggb, bggr, grbg, gbrg
     #[arg(long, value_name = "PATTERN", value_parser = str::parse::<FilterArray>, requires = "chart")]
     pub cfa: Option<FilterArray>,
@@ -180,9 +189,9 @@ impl ChartFit {
 
     /// Opens the frame of the chart, as it is described.
     fn open(&self, frame: &Path) -> Result<FrameReader> {
-        let path = Some(frame.to_owned());
-        let options = InputOptions { path, metadata: self.metadata.clone(), ..InputOptions::default() };
-        let [black_level_adu, white_level_adu] = [0, 1].map(|end| self.levels.map(|levels| levels[end]));
+        let options = InputOptions { metadata: self.metadata.clone(), ..self.selection.of(frame) };
+        let [black, white_level_adu] = [0, 1].map(|end| self.levels.map(|levels| levels[end]));
+        let black_level_adu = black.map(BlackLevel::Uniform);
         let described = Described { cfa: self.cfa, white_level_adu, ..Described::default() };
         DescribedWithBlack { described, black_level_adu }.open(&options)
     }

@@ -23,24 +23,40 @@ pub struct Input {
     /// Of which the next frame is taken.
     #[arg(skip)]
     pub sequence: Option<Sequence>,
-    /// Part of a multi-part EXR or FITS, or page of a TIFF, counted from 0
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    pub part: usize,
-    /// Read a file without a header: rows of u8, u16le, u16be or f32le, behind OFFSET bytes if given
-    #[arg(long, value_name = "WxH:TYPE[:OFFSET]", value_parser = str::parse::<Layout>)]
-    pub raw: Option<Layout>,
+    /// What of it is read.
+    #[command(flatten)]
+    pub selection: Selection,
     /// YAML file whose metadata replace those that come with the input
     #[arg(long, value_name = "FILE")]
     pub metadata: Option<PathBuf>,
     /// Print YAML to begin such a file with, each key explained
     #[arg(long)]
     pub metadata_template: bool,
+}
+
+/// What of a file is read as the frame, and how.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
+pub struct Selection {
+    /// Part of a multi-part EXR or FITS, or page of a TIFF, counted from 0
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub part: usize,
+    /// Read a file without a header: rows of u8, u16le, u16be or f32le, behind OFFSET bytes if given
+    #[arg(long, value_name = "WxH:TYPE[:OFFSET]", value_parser = str::parse::<Layout>)]
+    pub raw: Option<Layout>,
     /// Take one channel alone, by its name, as a single plane
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
     /// Take a rectangle X,Y,W,H in pixels alone; its photosites keep class, levels and noise
     #[arg(long, value_name = "X,Y,W,H", value_parser = values::region, allow_hyphen_values = true)]
     pub crop: Option<Region>,
+}
+
+impl Selection {
+    /// A file, of which this is read.
+    pub fn of(&self, path: &Path) -> InputOptions {
+        let Self { part, raw, channel, crop } = self.clone();
+        InputOptions { path: Some(path.to_owned()), part, raw, channel, crop, ..InputOptions::default() }
+    }
 }
 
 impl Input {
@@ -62,7 +78,7 @@ impl Input {
     /// What to open; channels besides R, G, B or Y are left out.
     pub fn options(&self) -> InputOptions {
         let path = self.path().map(Path::to_owned);
-        let Self { sequence, part, raw, metadata, channel, crop, .. } = self.clone();
+        let Self { sequence, selection: Selection { part, raw, channel, crop }, metadata, .. } = self.clone();
         InputOptions { path, sequence, part, raw, metadata, channel, crop, ..InputOptions::default() }
     }
 
@@ -73,8 +89,7 @@ impl Input {
 
     /// Another frame of the same camera, of which the same part of the sensor is read; its metadata are its own.
     pub fn beside(&self, path: &Path) -> InputOptions {
-        let Self { raw, channel, crop, .. } = self.clone();
-        InputOptions { path: Some(path.to_owned()), raw, channel, crop, ..InputOptions::default() }
+        Selection { part: 0, ..self.selection.clone() }.of(path)
     }
 }
 

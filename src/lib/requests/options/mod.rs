@@ -5,7 +5,7 @@ mod noise;
 mod scene;
 mod sensor;
 
-pub use frames::{Following, Input, Makes, Output};
+pub use frames::{Following, Input, Makes, Output, Selection};
 pub use noise::{DrawnNoise, NoiseChoice};
 pub use scene::{ExposureChoice, Lens, PictureChoice, SampleExposureChoice, SignalLevel, SpectrumChoice, Subject};
 pub use sensor::SensorChoice;

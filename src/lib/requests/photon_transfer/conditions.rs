@@ -6,8 +6,9 @@ use crate::formats::format::SampleType;
 use crate::formats::frame_list::{FrameKind, ListedFrame};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::metadata::FrameHeader;
-use crate::requests::described::Described;
+use crate::requests::described::{Described, DescribedWithBlack};
 use crate::requests::notes::Note;
+use crate::requests::options::Selection;
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use std::path::{Path, PathBuf};
@@ -26,42 +27,76 @@ pub struct Group {
 pub struct Head {
     /// As it is described.
     pub header: FrameHeader,
-    /// The exposure time in s, where the file tells it and no f-number.
+    /// The exposure time in s, where the file tells it or a user does.
     pub exposure_s: Option<f64>,
 }
 
-/// The head of a frame, as it is described.
-///
-/// # Errors
-///
-/// Those of the file; [`Error::Order`] for a frame of another stage.
-pub fn head_of(frame: &ListedFrame, described: &Described) -> Result<Head> {
-    let reader = FrameReader::open(&options(&frame.file))?;
-    let holds_to = reader.sample_type().and_then(SampleType::full_scale).map(f64::from);
-    if let Some((white, full)) = described.white_level_adu.zip(holds_to).filter(|(white, full)| white > full) {
-        let problem =
-            format!("{}: it holds codes to {full}, and the largest is said to be {white}", frame.file.display());
-        return Err(Error::Usage(problem).change(&["white"]));
-    }
-    let exposure_s = reader.exposure_s();
-    let mut head = reader.header().clone();
-    described.apply(&mut head)?;
-    let metadata = &head.metadata;
-    let holds = head.holds();
-    if metadata.demosaic.is_some()
-        || !matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Electrons | QuantityKind::Unspecified)
-    {
-        return Err(head.refuse(format!("it holds {holds}; photon transfer takes frames before they are demosaicked")));
-    }
-    if metadata.correction.is_some() {
-        return Err(head.refuse("it is corrected already; photon transfer takes frames as the camera gives them"));
-    }
-    Ok(Head { header: head, exposure_s })
+/// How each file is read, and what is said of all frames.
+#[derive(Debug, Clone)]
+pub struct Reading {
+    /// What of a file is its frame.
+    pub selection: Selection,
+    /// A file of metadata in place of those of each frame.
+    pub metadata: Option<PathBuf>,
+    /// What is said of the frames; of an exposure the time alone counts.
+    pub described: DescribedWithBlack,
 }
 
-/// A file as it is.
-pub fn options(file: &Path) -> InputOptions {
-    InputOptions { path: Some(file.to_owned()), ..InputOptions::default() }
+impl Reading {
+    /// The head of a frame, as it is described.
+    ///
+    /// # Errors
+    ///
+    /// Those of the file; [`Error::Order`] for a frame of another stage; [`Error::Usage`] for an exposure time that is not that
+    /// of the list.
+    pub fn head_of(&self, frame: &ListedFrame) -> Result<Head> {
+        let reader = FrameReader::open(&self.options(&frame.file))?;
+        let Described { white_level_adu, exposure_s: said_s, .. } = self.described.described;
+        let holds_to = reader.sample_type().and_then(SampleType::full_scale).map(f64::from);
+        if let Some((white, full)) = white_level_adu.zip(holds_to).filter(|(white, full)| white > full) {
+            let problem =
+                format!("{}: it holds codes to {full}, and the largest is said to be {white}", frame.file.display());
+            return Err(Error::Usage(problem).change(&["white"]));
+        }
+        if let Some((said, listed)) = said_s.zip(frame.exposure_s).filter(|(said, listed)| differ(*said, *listed)) {
+            let problem =
+                format!("{}: its exposure time is {listed} s by the list, not {said} s", frame.file.display());
+            return Err(Error::Usage(problem).leave_out(&["exposure"]));
+        }
+        let mut head = reader.header().clone();
+        let exposure_s = self.described.apply_time(&mut head, reader.exposure_s())?;
+        let metadata = &head.metadata;
+        let holds = head.holds();
+        if metadata.demosaic.is_some()
+            || !matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Electrons | QuantityKind::Unspecified)
+        {
+            let problem = format!("it holds {holds}; photon transfer takes frames before they are demosaicked");
+            return Err(head.refuse(problem));
+        }
+        if metadata.correction.is_some() {
+            return Err(head.refuse("it is corrected already; photon transfer takes frames as the camera gives them"));
+        }
+        Ok(Head { header: head, exposure_s })
+    }
+
+    /// Puts what is said into the metadata of a frame whose head was seen.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::head_of`].
+    pub fn describe(&self, frame: &mut FrameHeader) -> Result<()> {
+        self.described.apply_time(frame, None).map(drop)
+    }
+
+    /// What is read of a file.
+    pub fn options(&self, file: &Path) -> InputOptions {
+        InputOptions { metadata: self.metadata.clone(), ..self.selection.of(file) }
+    }
+}
+
+/// Whether two exposure times differ by more than what is written with other digits.
+fn differ(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() > 1e-3
 }
 
 /// Temperatures that lie so near to one another, in K, are those of one setting: sensors tell theirs frame by frame.
@@ -143,9 +178,9 @@ fn doubt_of_times(list: &str, groups: &[Group]) -> Option<Note> {
 /// The condition of a frame, by the list and by what it says itself, and what tells its light apart.
 fn condition(frame: &ListedFrame, Head { header: head, exposure_s }: &Head) -> Result<(Condition, String)> {
     let metadata = &head.metadata;
-    let own = metadata.exposure.map(|exposure| exposure.exposure_s).or(*exposure_s);
+    let own = *exposure_s;
     if let (Some(listed), Some(own)) = (frame.exposure_s, own)
-        && (listed / own - 1.0).abs() > 1e-3
+        && differ(listed, own)
     {
         return Err(head.refuse(format!("it was exposed for {own} s, and the list says {listed} s")));
     }

@@ -3,14 +3,14 @@
 mod checks;
 mod conditions;
 
-use super::described::Described;
+use super::described::{Described, DescribedWithBlack};
 use super::notes::Note;
+use super::options::Selection;
 use super::values;
 use crate::analysis::photon_transfer::{
     ClassFindings, Condition, Level, PatternView, Settings, Site, SiteSurvey, Survey, left_in_mean, of_class,
     pattern_view, survey,
 };
-use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::formats::frame_list::{self, FrameList};
 use crate::formats::many::OneOfMany;
@@ -19,7 +19,7 @@ use crate::text::counted;
 use crate::units::QuantityKind;
 use checks::{check_alike, check_apart, check_array, check_same_light, doubt_of_codes};
 use clap::Args;
-use conditions::{Group, grouped, head_of, in_folder, options};
+use conditions::{Group, Reading, grouped, in_folder};
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -30,12 +30,18 @@ pub struct PhotonTransfer {
     /// as YAML; an EMVA 1288 descriptor; or a directory of frames that say all that themselves
     #[arg(value_name = "LIST")]
     pub list: PathBuf,
-    /// Filter array of frames that do not say: rggb, bggr, grbg, gbrg, monochrome, or its period as 4x4:RRGGRRGGGGBBGGBB
-    #[arg(long, value_name = "PATTERN", value_parser = str::parse::<FilterArray>)]
-    pub cfa: Option<FilterArray>,
-    /// The largest code, where frames do not say
-    #[arg(long = "white", value_name = "N", value_parser = values::number)]
-    pub white_level_adu: Option<f64>,
+    /// What of each file is its frame.
+    #[command(flatten)]
+    pub selection: Selection,
+    /// YAML file whose metadata replace those that come with each of the frames
+    #[arg(long, value_name = "FILE")]
+    pub metadata: Option<PathBuf>,
+    /// Print YAML to begin such a file with, each key explained
+    #[arg(long)]
+    pub metadata_template: bool,
+    /// What is said of all frames.
+    #[command(flatten)]
+    pub described: DescribedWithBlack,
     /// Probability that an interval holds its number
     #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = values::fraction)]
     pub confidence: f64,
@@ -80,9 +86,8 @@ impl PhotonTransfer {
         } else {
             frame_list::read(&self.list)?
         };
-        let white_level_adu = self.white_level_adu.or(white_level_adu);
-        let described = Described { cfa: self.cfa, white_level_adu, ..Described::default() };
-        let heads = frames.par_iter().map(|frame| head_of(frame, &described)).collect::<Result<Vec<_>>>()?;
+        let read = self.reading(white_level_adu);
+        let heads = frames.par_iter().map(|frame| read.head_of(frame)).collect::<Result<Vec<_>>>()?;
         let Some(first) = heads.first() else {
             return Err(Error::format(&list_name, "it holds no frames"));
         };
@@ -104,7 +109,7 @@ impl PhotonTransfer {
         }
         let stacks = stacks(&groups);
         let surveys = groups.par_iter().enumerate().with_max_len(1);
-        let surveys = surveys.map(|(place, group)| survey_of(group, &described, top, stacks.contains(&place)));
+        let surveys = surveys.map(|(place, group)| survey_of(group, &read, top, stacks.contains(&place)));
         let mut surveys = surveys.collect::<Result<Vec<_>>>()?;
         check_array(first, &groups, &surveys)?;
         notes.extend(doubt_of_codes(&list_name, first, &groups, &surveys));
@@ -113,7 +118,7 @@ impl PhotonTransfer {
         let classes = classes(first, &groups, &surveys, temperature_k, &settings);
         for place in classes.iter().flat_map(|class| class.stacks).flatten().map(|(place, _)| place) {
             if surveys[place].picture.is_none() {
-                surveys[place] = survey_of(&groups[place], &described, top, true)?;
+                surveys[place] = survey_of(&groups[place], &read, top, true)?;
             }
         }
         let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys, draws)).collect();
@@ -133,6 +138,14 @@ impl PhotonTransfer {
         })
     }
 
+    /// How each file is read; a list may tell the largest code.
+    fn reading(&self, white_level_adu: Option<f64>) -> Reading {
+        let Self { selection, metadata, described, .. } = self.clone();
+        let white_level_adu = described.described.white_level_adu.or(white_level_adu);
+        let said = Described { white_level_adu, ..described.described };
+        Reading { selection, metadata, described: DescribedWithBlack { described: said, ..described } }
+    }
+
     /// Makes sure that its numbers are possible.
     fn check(&self) -> Result<()> {
         let usage = |problem: &str, key: &'static [&'static str]| Err(Error::Usage(problem.into()).change(key));
@@ -142,7 +155,7 @@ impl PhotonTransfer {
         if self.confidence >= 1.0 {
             return usage("no interval holds its number for certain", &["confidence"]);
         }
-        if self.white_level_adu.is_some_and(|white| white <= 0.0) {
+        if self.described.described.white_level_adu.is_some_and(|white| white <= 0.0) {
             return usage("the largest code is above 0", &["white"]);
         }
         Ok(())
@@ -164,12 +177,12 @@ fn notes_of(class: &ClassFindings) -> Vec<Note> {
 }
 
 /// Reads the frames of a condition.
-fn survey_of(group: &Group, described: &Described, top: Option<f64>, keeps: bool) -> Result<Survey> {
+fn survey_of(group: &Group, read: &Reading, top: Option<f64>, keeps: bool) -> Result<Survey> {
     /// Files that other groups may have open meanwhile.
     const OTHERS: usize = 64;
-    let mut frames = OneOfMany::open_all(group.files.iter().map(|file| options(file)).collect(), OTHERS)?;
+    let mut frames = OneOfMany::open_all(group.files.iter().map(|file| read.options(file)).collect(), OTHERS)?;
     for frame in &mut frames {
-        described.apply(frame.header_mut())?;
+        read.describe(frame.header_mut())?;
     }
     let found = survey(&mut frames, top, keeps)?;
     for site in &found.sites {

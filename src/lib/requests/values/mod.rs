@@ -13,7 +13,9 @@ pub use numbers::{
 };
 pub use places::{corners, patch, place, region, size};
 
+use self::numbers::finite_list;
 use super::border::Border;
+use crate::camera::levels::BlackLevel;
 use crate::cfa::{CfaPattern, FilterArray};
 use crate::stages::black::Black;
 use clap::builder::{PathBufValueParser, TypedValueParser};
@@ -36,7 +38,20 @@ fn file_of_kind(end: &'static str, advice: &'static str) -> impl TypedValueParse
     })
 }
 
-/// Reads a black level: `auto`, `none`, or a number.
+/// Reads a black level: a number, or four between commas, of the 2×2 sites row by row.
+///
+/// # Errors
+///
+/// What is expected, in words.
+pub fn black_level(text: &str) -> Result<BlackLevel, String> {
+    match finite_list(text).as_deref() {
+        Some([level]) => Ok(BlackLevel::Uniform(*level)),
+        Some([a, b, c, d]) => Ok(BlackLevel::Sites([*a, *b, *c, *d])),
+        _ => Err("give a number, or four between commas for the 2x2 sites row by row".into()),
+    }
+}
+
+/// Reads a black level: `auto`, `none`, or a number, or four by site.
 ///
 /// # Errors
 ///
@@ -45,7 +60,9 @@ pub fn black(text: &str) -> Result<Black, String> {
     match text.to_ascii_lowercase().as_str() {
         "auto" => Ok(Black::Auto),
         "none" => Ok(Black::None),
-        level => number(level).map(Black::Level).map_err(|_| "give auto, none or a number".into()),
+        level => {
+            black_level(level).map(Black::Level).map_err(|_| "give auto, none, a number, or four between commas".into())
+        }
     }
 }
 
@@ -61,7 +78,7 @@ pub fn black_or_border(text: &str) -> Result<BlackChoice, String> {
         "columns" => Ok(BlackChoice::Border(Border::Columns)),
         other => black(other)
             .map(BlackChoice::Known)
-            .map_err(|expected| expected.replace(" or a", ", border, rows, columns or a")),
+            .map_err(|expected| expected.replace("none, ", "none, border, rows, columns, ")),
     }
 }
 

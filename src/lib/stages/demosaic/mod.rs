@@ -49,7 +49,7 @@ use weights::WeightTable;
 /// // What is flat stays flat, less the black level, whatever the method.
 /// let plane = MemoryFrame::new(header, vec![300.0; 6 * 4]);
 /// for method in Method::ALL {
-///     let stage = Demosaic::new(&plane.header, method, Black::Level(100.0), Some(CfaPattern::Grbg))?;
+///     let stage = Demosaic::new(&plane.header, method, Black::Level(100.0.into()), Some(CfaPattern::Grbg))?;
 ///     assert_eq!(plane.through(&stage)?.0.samples, vec![200.0; 6 * 4 * 3]);
 /// }
 /// # Ok::<(), cyanometer::error::Error>(())

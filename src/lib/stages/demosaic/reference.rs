@@ -78,7 +78,7 @@ impl Plane<'_> {
         metadata.cfa = Some(self.pattern.into());
         let geometry = Geometry::new(self.width, self.height, &["Y"]);
         let header = FrameHeader { name: "test".into(), geometry, metadata };
-        let stage = Demosaic::new(&header, method, Black::Level(self.black), None).unwrap();
+        let stage = Demosaic::new(&header, method, Black::Level(self.black.into()), None).unwrap();
         let mut made = vec![0.0; 3 * self.samples.len()];
         let window = Window::new(self.height, 0, self.width, 1, self.samples);
         let counts = stage.apply_on(set, window, Rows::new(0, self.width, 3, &mut made));

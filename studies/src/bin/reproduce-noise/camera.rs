@@ -82,7 +82,7 @@ impl Camera {
 
 /// A plane demosaicked above a black level, ADU.
 pub fn demosaicked_above(black_adu: f64, plane: &MemoryFrame, method: Method) -> Result<MemoryFrame> {
-    Ok(plane.through(&Demosaic::new(&plane.header, method, Black::Level(black_adu), None)?)?.0)
+    Ok(plane.through(&Demosaic::new(&plane.header, method, Black::Level(black_adu.into()), None)?)?.0)
 }
 
 /// Moments of the pixels at the sites of each class, of a demosaicked frame or a plane.
