@@ -271,7 +271,7 @@ const MISTAKES: [(&str, i32, &str); 108] = [
     (
         "demosaic plane.exr --black dark",
         BAD_USAGE,
-        "`dark` is no value for --black <auto|none|N>: give auto, none or a number; see `demosaic --help`",
+        "`dark` is no value for --black <auto|none|N[,N,N,N]>: give auto, none, a number, or four between commas; see `demosaic --help`",
     ),
     ("demosaic rgb.exr", BAD_DATA, "rgb.exr: it holds three demosaicked planes of ADU; demosaicking is done once"),
     ("demosaic plane.exr -o no/where.exr", BAD_DATA, "no/where.exr: there is no directory `no`; make it first"),

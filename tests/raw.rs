@@ -201,8 +201,15 @@ fn a_raw_brings_its_matrix_along() {
     fs::write(shop.path("raw.dng"), small()).unwrap();
     shop.run("import-raw colors.dng -o plane.exr --write-matrix m.yaml", &[]);
     shop.run("demosaic colors.dng --method bi -o rgb.exr", &[]);
-    shop.run("to-xyz rgb.exr -o own.exr", &[]);
+    // That XYZ are relative is said where nobody asked for it: once of all frames, and of a matrix that says so with -v alone.
+    let said = |line: &str| String::from_utf8(shop.attempt(line, &[]).stderr).unwrap();
+    let warning = "to-xyz: warning: rgb.exr: XYZ are relative, Y = 1 for the white that saturates the camera: it tells no calibration, \
+                   which --matrix would; by ";
+    let warned = said("to-xyz rgb.exr rgb.exr -o {index}.exr");
+    assert!(warned.starts_with(warning) && warned.lines().count() == 1, "{warned}");
+    assert_eq!(said("to-xyz rgb.exr --quiet -o own.exr"), "");
     shop.run("to-xyz rgb.exr --matrix m.yaml -o file.exr", &[]);
+    assert!(said("to-xyz rgb.exr --matrix m.yaml -v -o x.exr").contains("to-xyz: m.yaml: XYZ are relative, Y = 1"));
     let [own, file] = ["own.exr", "file.exr"].map(|name| shop.frame(name));
     assert_eq!(own.samples, file.samples);
     assert_eq!(own.header.metadata.unit, "relative");

@@ -127,7 +127,10 @@ fn what_cannot_be_scaled_is_refused() {
             "render-radiance --electrons 0.3,1.1,3.3 --size 8x6 --viewable --sample-type f16 -o half.exr",
             "would not be the same once it is scaled back; write f32",
         ),
-        ("mosaic codes.exr --viewable -o plane.dng", "a DNG tells converters its white level; leave --viewable out"),
+        (
+            "correct-frame plane.exr --black auto --viewable -o plane.dng",
+            "a DNG of floats tells converters its white level, a whole number; leave out --viewable",
+        ),
         (
             "to-xyz rgb.exr --matrix matrix.yaml --space lab --white d65 --white-luminance 9000 --viewable -o lab.exr",
             "is no light that viewers show",
@@ -137,4 +140,30 @@ fn what_cannot_be_scaled_is_refused() {
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && told.contains(complaint), "{line}: {told}");
     }
+}
+
+/// Codes of a DNG fill 16 bits, and its levels go with them, black with its fraction; what we read are the codes, bit by bit.
+#[test]
+fn a_dng_of_scaled_codes_has_scaled_levels() {
+    let bench = set_up();
+    bench.run("render-radiance --electrons 3000,5000,7000 --size 32x24 --cfa rggb -o rates.exr", &[]);
+    bench.run("digitize rates.exr -o plain.dng", &[]);
+    bench.run("digitize rates.exr --viewable -o scaled.dng", &[]);
+    let told = |name: &str| {
+        fs::copy(bench.path(name), bench.path("alone.dng")).unwrap();
+        let mut bytes = bench.bytes(name);
+        // Metadata that nobody knows: the tags alone count.
+        let at = bytes.windows(7).position(|window| window == b"schema:").unwrap();
+        bytes[at] = b'x';
+        fs::write(bench.path("alone.dng"), bytes).unwrap();
+        bench.frame("alone.dng")
+    };
+    let [plain, scaled] = [told("plain.dng"), told("scaled.dng")];
+    let level =
+        |frame: &cyanometer::stream::MemoryFrame| frame.header.metadata.black_level_adu.unwrap().uniform().unwrap();
+    assert!((level(&scaled) - 16.0 * level(&plain)).abs() < 1e-4 && level(&plain).fract() != 0.0);
+    assert_eq!(scaled.header.metadata.white_level_adu, Some((16.0 * 4095.0).into()));
+    assert!(plain.samples.iter().zip(&scaled.samples).all(|(code, stored)| 16.0 * code == *stored));
+    assert_eq!(bench.frame("scaled.dng").samples, plain.samples);
+    assert_eq!(bench.sidecar("scaled.dng").samples, bench.sidecar("plain.dng").samples);
 }

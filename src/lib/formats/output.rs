@@ -302,7 +302,7 @@ impl FrameWriter {
                     Some((sample, _)) => Err(viewable::lost(&self.name, *sample)),
                 }
             }
-            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Png => {
+            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) | Encoding::Png => {
                 check_lossless(&self.name, scaling, samples, scaled, U16_FULL_SCALE)
             }
             _ => check_lossless(&self.name, scaling, samples, scaled, f32::INFINITY),

@@ -173,14 +173,15 @@ impl OutputOptions {
                 let samples = tiff_samples("TIFF", self.samples.unwrap_or(default), fits_u16, quantity)?;
                 Ok(Encoding::Tiff(samples, tiff_compression(compression)?))
             }
-            Format::Dng if self.is_viewable => {
-                Err(Error::Usage("a DNG tells converters its white level; leave --viewable out".into()))
-            }
             Format::Dng => {
                 let place = named(self.path.as_deref()).map(|path| path.display().to_string());
                 dng::check_frame(header, &place.unwrap_or_else(|| STDOUT_NAME.into()))?;
                 let default = if fits_u16 { SampleKind::U16 } else { SampleKind::F32 };
                 let samples = tiff_samples("DNG", self.samples.unwrap_or(default), fits_u16, quantity)?;
+                if self.is_viewable && samples == TiffSamples::F32 {
+                    let problem = "a DNG of floats tells converters its white level, a whole number";
+                    return Err(Error::Usage(problem.into()).leave_out(&["viewable"]));
+                }
                 Ok(Encoding::Dng(samples, dng_compression(compression, samples)?))
             }
             Format::Png => {
@@ -212,7 +213,10 @@ impl OutputOptions {
     ///
     /// Those of [`viewable::scale_of`].
     pub(super) fn scale(&self, header: &FrameHeader, encoding: Encoding) -> Result<f64> {
-        let fills_u16 = matches!(encoding, Encoding::Tiff(TiffSamples::U16, _) | Encoding::Png);
+        let fills_u16 = matches!(
+            encoding,
+            Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) | Encoding::Png
+        );
         if self.is_viewable { viewable::scale_of(header, fills_u16) } else { Ok(1.0) }
     }
 

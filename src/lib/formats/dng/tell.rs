@@ -65,12 +65,15 @@ impl Told {
             ));
         }
         let range = f64::from(white) - highest;
+        // Levels are those of the samples that are stored; shares of the range are the same on any scale.
+        let scale = metadata.sample_scale.unwrap_or(1.0);
+        let stored = black.as_ref().map(|black| black.map(|level| level * scale));
         let color = CameraColor::of_frame(metadata).filter(|_| cfa.has_three_classes());
 
         let mut raw = places(header, cfa);
-        raw.extend(black.iter().flat_map(|black| black_levels(black, geometry.width)));
+        raw.extend(stored.iter().flat_map(|black| black_levels(black, geometry.width)));
         if metadata.white_level_adu.is_some() {
-            raw.push(tags::WHITE_LEVEL.with(TagValue::Longs(vec![white])));
+            raw.push(tags::WHITE_LEVEL.with(TagValue::Longs(vec![scaled(white, scale)])));
         }
         raw.extend(noise_profile(header, cfa, range));
         Ok(Self {
@@ -78,9 +81,16 @@ impl Told {
             first: of_file(metadata, samples, color.as_ref()),
             exif: of_exposure(metadata),
             photometric: if cfa == FilterArray::Monochrome { LINEAR_RAW } else { CFA },
-            preview: Preview::new(geometry, cfa, black, range, color),
+            preview: Preview::new(geometry, cfa, stored, range * scale, color),
         })
     }
+}
+
+/// A level of codes among samples that are stored on a larger scale.
+fn scaled(white: u32, scale: f64) -> u32 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it fills 16 bits at most")]
+    let scaled = (f64::from(white) * scale) as u32;
+    scaled
 }
 
 /// The largest code, rounded down: the tag holds whole numbers, and a saturated sample shall be so. Of classes that differ the

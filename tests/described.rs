@@ -1,0 +1,206 @@
+//! What a user says of frames that do not say it: on every program that reads them, and with the same effect.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::camera::levels::BlackLevel;
+use cyanometer::camera::optics::Exposure;
+use std::fs;
+use support::dng::dng;
+use support::workshop::{BAD_USAGE, Workshop, programs};
+
+/// What describes a frame, and what of a file is taken for it.
+const OPTIONS: [&str; 7] = ["--cfa", "--black", "--white", "--exposure", "--f-number", "--channel", "--crop"];
+
+/// Programs that have not all of these, and what they have; their pages say why.
+const FEWER: [(&str, &[&str]); 7] = [
+    // Read no frames of a camera.
+    ("render-radiance", &["--cfa", "--exposure", "--f-number"]),
+    ("predict-noise", &["--cfa", "--white", "--exposure", "--f-number"]),
+    ("cyanometer", &[]),
+    // Three planes of colors: --white is the white that they refer to.
+    ("color-difference", &["--white", "--crop"]),
+    // Demosaicked planes, behind no array; --white is that of colors.
+    ("to-xyz", &["--black", "--white", "--exposure", "--f-number", "--channel", "--crop"]),
+    // Of a chart, whose levels are --levels; the others are those of a library.
+    ("fit-matrix", &["--cfa", "--white", "--exposure", "--f-number", "--channel", "--crop"]),
+    // A raw image is one plane.
+    ("import-raw", &["--cfa", "--black", "--white", "--exposure", "--f-number", "--crop"]),
+];
+
+#[test]
+fn every_program_that_reads_frames_takes_all_that_describes_them() {
+    let shop = Workshop::new();
+    for program in programs() {
+        let help = String::from_utf8(shop.run(&format!("{program} --help"), &[])).unwrap();
+        let has = |option: &&&str| help.lines().any(|line| line.split([' ', ',']).any(|word| word == **option));
+        let found: Vec<&str> = OPTIONS.iter().filter(has).copied().collect();
+        let expected = FEWER.iter().find(|(of, _)| *of == program).map_or(&OPTIONS[..], |(_, options)| options);
+        assert_eq!(found, expected, "{program}");
+    }
+}
+
+/// Flats and darks as a camera's software stores them: codes alone, in folders that tell which is which.
+fn codes_alone(shop: &Workshop) {
+    for (folder, electrons) in [("flats", [2000, 4000, 8000]), ("darks", [0, 0, 0])] {
+        fs::create_dir_all(shop.path("own").join(folder)).unwrap();
+        fs::create_dir_all(shop.path("bare").join(folder)).unwrap();
+        for (level, light) in electrons.iter().enumerate().take(if folder == "darks" { 1 } else { 3 }) {
+            for i in 0..2 {
+                let name = format!("{folder}/{light}-{i}");
+                let frame = level * 2 + i + if folder == "darks" { 10 } else { 0 };
+                let codes = shop.pipe(&format!(
+                    "render-radiance --electrons {light},{light},{light} --size 64x48 --exposure 0.01 | mosaic | \
+                     add-noise --frame {frame} | digitize"
+                ));
+                fs::write(shop.path(&format!("own/{name}.exr")), codes).unwrap();
+                let samples = shop.read(&format!("own/{name}.exr")).0;
+                let bytes: Vec<u8> = samples.iter().flat_map(|code| (*code as u16).to_le_bytes()).collect();
+                fs::write(shop.path(&format!("bare/{name}.raw")), bytes).unwrap();
+            }
+        }
+    }
+    // Of frames that tell no levels a list says which are of one light.
+    let row = |light: &str, i: usize| format!("flats/{light}-{i}.raw,flat,{light}\n");
+    let flats = ["2000", "4000", "8000"].iter().flat_map(|light| [row(light, 0), row(light, 1)]);
+    let list = "file,kind,level\n".to_owned() + &flats.collect::<String>();
+    fs::write(shop.path("bare/list.csv"), list + "darks/0-0.raw,dark,\ndarks/0-1.raw,dark,\n").unwrap();
+}
+
+/// The number of each class of a report in JSON.
+fn gains(report: &[u8]) -> Vec<(String, f64)> {
+    let report: serde_json::Value = serde_json::from_slice(report).unwrap();
+    let channels = report["channels"].as_array().unwrap();
+    let gain = |channel: &serde_json::Value| channel["gain_adu_per_e"]["value"].as_f64().unwrap();
+    channels.iter().map(|channel| (channel["name"].as_str().unwrap().into(), gain(channel))).collect()
+}
+
+#[test]
+fn flats_and_darks_of_codes_alone_are_described() {
+    let shop = Workshop::new();
+    codes_alone(&shop);
+    let measured = |line: &str| {
+        let output = shop.attempt(&format!("photon-transfer {line} --output-format json --quiet"), &[]);
+        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        gains(&output.stdout)
+    };
+    let bare = "bare/list.csv --raw 64x48:u16le --cfa grbg --white 65535 --exposure 0.01";
+    let cfa = shop.frame("own/flats/2000-0.exr").header.metadata.cfa.unwrap();
+    let bare = bare.replace("grbg", &cfa.to_string());
+    assert_eq!(measured(&format!("{bare} --black 512")), measured("own"));
+    // A part that begins at an odd photosite has the classes that it had.
+    let crop = "--crop 3,5,40,30";
+    assert_eq!(measured(&format!("{bare} {crop}")), measured(&format!("own {crop}")));
+    let said = |line: &str| {
+        let output = shop.attempt(&format!("photon-transfer {line}"), &[]);
+        assert_eq!(output.status.code(), Some(BAD_USAGE));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert!(said("own --exposure 0.02").ends_with(
+        "the exposure time in s is 0.01 by its metadata, which --metadata FILE can replace; leave out --exposure\n"
+    ));
+    assert!(said("own --f-number 5.6").contains("the f-number is 8 by its metadata"));
+    assert!(said("own --black 1,2,3,4").contains("the black level is "));
+    let list = fs::read_to_string(shop.path("bare/list.csv")).unwrap();
+    let timed = list
+        .replace("kind,level", "kind,level,exposure_s")
+        .replace("0\n", "0,0.02\n")
+        .replace("dark,\n", "dark,,0.02\n");
+    fs::write(shop.path("bare/timed.csv"), timed).unwrap();
+    let line = bare.replace("list.csv", "timed.csv");
+    assert!(said(&line).ends_with("its exposure time is 0.02 s by the list, not 0.01 s; leave out --exposure\n"));
+}
+
+/// One channel of frames of three planes is measured as a camera without filters.
+#[test]
+fn a_channel_of_flats_is_measured_alone() {
+    let shop = Workshop::new();
+    fs::create_dir(shop.path("three")).unwrap();
+    fs::create_dir(shop.path("green")).unwrap();
+    for (i, (kind, light)) in [("flat", 4000), ("flat", 4000), ("flat", 8000), ("flat", 8000), ("dark", 0), ("dark", 0)]
+        .into_iter()
+        .enumerate()
+    {
+        let chain = format!(
+            "render-radiance --electrons {light},{light},{light} --size 40x30 | add-noise --frame {i} | digitize"
+        );
+        fs::write(shop.path(&format!("three/{kind}{i}.exr")), shop.pipe(&chain)).unwrap();
+    }
+    let one = shop.attempt("photon-transfer three --channel G --output-format json --quiet", &[]).stdout;
+    let all = shop.attempt("photon-transfer three --output-format json --quiet", &[]).stdout;
+    let green = gains(&all).into_iter().find(|(name, _)| name == "G").unwrap().1;
+    assert_eq!(gains(&one).into_iter().map(|(_, gain)| gain).collect::<Vec<_>>(), [green]);
+    // What the complaint about an array of three planes advises can be done.
+    let said = shop.attempt("photon-transfer three --cfa rggb", &[]);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("which --channel NAME takes; leave out --cfa"));
+}
+
+#[test]
+fn the_difference_of_crops_is_that_of_the_parts() {
+    let shop = Workshop::new();
+    let chain = "mosaic | add-noise --seed 3 | digitize | demosaic | to-xyz";
+    for (name, seed) in [("a", 1), ("b", 2)] {
+        let light = "render-radiance SAMPLES/skies/clear_zenith.csv --size 24x16 --expose-to 0.5";
+        let xyz = shop.pipe(&format!("{light} | {}", chain.replace('3', &seed.to_string())));
+        fs::write(shop.path(&format!("{name}.exr")), xyz).unwrap();
+        // Statistics of a part by the program that cuts it.
+        let cut = shop.run(&format!("to-xyz {name}.exr --crop 5,3,8,9 --space xyz"), &[]);
+        fs::write(shop.path(&format!("{name}-part.exr")), cut).unwrap();
+    }
+    let report = |line: &str| shop.run(&format!("color-difference {line} --output-format json"), &[]);
+    assert_eq!(report("a.exr b.exr --crop 5,3,8,9"), report("a-part.exr b-part.exr"));
+    assert_ne!(report("a.exr b.exr --crop 5,3,8,9"), report("a.exr b.exr"));
+    let said = |line: &str| String::from_utf8(shop.attempt(&format!("color-difference {line}"), &[]).stderr).unwrap();
+    assert_eq!(
+        said("1,2,3 2,3,4 --crop 0,0,1,1"),
+        "color-difference: both are colors, of which there are no parts; leave out --crop\n"
+    );
+    assert!(said("a.exr b.exr --crop 20,0,8,8").contains("a.exr: "));
+}
+
+/// A raw file tells no exposure, and no array of its own kind: both are said, and a rectangle of it is taken.
+#[test]
+fn a_raw_file_is_described_and_cut() {
+    let shop = Workshop::new();
+    let strip: Vec<u8> = (0..120_u16).flat_map(|i| (300 + i * i % 977).to_le_bytes()).collect();
+    let more: [(u16, &[u32]); 3] = [(50714, &[64]), (50717, &[4000]), (50829, &[2, 3, 10, 12])];
+    fs::write(shop.path("raw.dng"), dng([12, 10], 16, 1, &strip, &more)).unwrap();
+    shop.run("import-raw raw.dng -o whole.exr", &[]);
+    shop.run("import-raw raw.dng --crop 1,2,5,4 --exposure 0.25 --f-number 4 -o part.exr", &[]);
+    shop.run("measure whole.exr --crop 1,2,5,4 -o whole.json", &[]);
+    shop.run("measure part.exr -o part.json", &[]);
+    assert_eq!(shop.bytes("part.json"), shop.bytes("whole.json"));
+    let part = shop.frame("part.exr").header;
+    assert_eq!(part.geometry.origin, [4, 4]);
+    let exposure = Exposure { exposure_s: 0.25, f_number: 4.0, lens_transmittance: 1.0 };
+    assert_eq!(part.metadata.exposure, Some(exposure));
+    let said = |line: &str| {
+        String::from_utf8(shop.attempt(&format!("import-raw raw.dng {line} -o x.exr"), &[]).stderr).unwrap()
+    };
+    assert!(said("--black 65").contains("the black level is 64 by its metadata, which --metadata FILE can replace"));
+    assert!(said("--crop half").contains("give active, full, default, or X,Y,W,H between commas"));
+    assert!(said("--crop 8,0,2,2").contains("does not lie within the frame of 9x8"));
+}
+
+/// A level for each of the 2x2 sites, counted from the sensor's corner, whatever part of the frame is read.
+#[test]
+fn black_is_said_by_site() {
+    let shop = Workshop::new();
+    let codes: Vec<u8> = (0..96_u16).flat_map(|i| (100 + i * 37 % 501).to_le_bytes()).collect();
+    fs::write(shop.path("a.raw"), codes).unwrap();
+    let line = "--raw 12x8:u16le --cfa rggb --white 4095";
+    let levels = [60.0, 61.5, -2.0, 64.0];
+    let said = levels.map(|level| level.to_string()).join(",");
+    shop.run(&format!("average-frames a.raw {line} --black {said} -o known.exr"), &[]);
+    assert_eq!(shop.frame("known.exr").header.metadata.black_level_adu, Some(BlackLevel::Sites(levels)));
+    for (program, rest) in [("correct-frame", ""), ("demosaic", "--method bi ")] {
+        for crop in ["", " --crop 3,1,8,6"] {
+            shop.run(&format!("{program} a.raw {line} {rest}--black {said}{crop} -o a.exr"), &[]);
+            shop.run(&format!("{program} known.exr {rest}--black auto{crop} -o b.exr"), &[]);
+            assert_eq!(shop.read("a.exr").0, shop.read("b.exr").0, "{program}{crop}");
+        }
+    }
+    let refused = String::from_utf8(shop.attempt(&format!("demosaic a.raw {line} --black 1,2,3 -o x.exr"), &[]).stderr);
+    assert!(refused.unwrap().contains("give auto, none, a number, or four between commas"));
+}
