@@ -58,6 +58,8 @@ fn sample_type(stored: &DataType) -> Option<SampleType> {
         (data_type::int16(), SampleType::I16),
         (data_type::uint32(), SampleType::U32),
         (data_type::int32(), SampleType::I32),
+        (data_type::uint64(), SampleType::U64),
+        (data_type::int64(), SampleType::I64),
         (data_type::float16(), SampleType::F16),
         (data_type::float32(), SampleType::F32),
         (data_type::float64(), SampleType::F64),
@@ -143,6 +145,8 @@ impl StoredArray {
             SampleType::I16 => pick(target, pixels, channel, step, |bytes| i16::from_ne_bytes(bytes).into()),
             SampleType::U32 => pick(target, pixels, channel, step, |bytes| to_sample(u32::from_ne_bytes(bytes).into())),
             SampleType::I32 => pick(target, pixels, channel, step, |bytes| to_sample(i32::from_ne_bytes(bytes).into())),
+            SampleType::U64 => pick(target, pixels, channel, step, |bytes| u64::from_ne_bytes(bytes) as f32),
+            SampleType::I64 => pick(target, pixels, channel, step, |bytes| i64::from_ne_bytes(bytes) as f32),
             SampleType::F16 => pick(target, pixels, channel, step, |bytes| f16::from_ne_bytes(bytes).to_f32()),
             SampleType::F32 => pick(target, pixels, channel, step, f32::from_ne_bytes),
             SampleType::F64 => {

@@ -158,6 +158,10 @@ pub enum SampleType {
     U32,
     /// 32-bit signed integer.
     I32,
+    /// 64-bit unsigned integer.
+    U64,
+    /// 64-bit signed integer.
+    I64,
     /// Half-precision float.
     F16,
     /// Single-precision float.
@@ -176,6 +180,8 @@ impl SampleType {
             Self::I16 => "i16",
             Self::U32 => "u32",
             Self::I32 => "i32",
+            Self::U64 => "u64",
+            Self::I64 => "i64",
             Self::F16 => "f16",
             Self::F32 => "f32",
             Self::F64 => "f64",
@@ -188,7 +194,7 @@ impl SampleType {
             Self::U8 | Self::I8 => 1,
             Self::U16 | Self::I16 | Self::F16 => 2,
             Self::U32 | Self::I32 | Self::F32 => 4,
-            Self::F64 => 8,
+            Self::U64 | Self::I64 | Self::F64 => 8,
         }
     }
 
@@ -208,7 +214,7 @@ impl SampleType {
 
     /// Whether it is an integer without sign.
     pub fn is_unsigned(self) -> bool {
-        matches!(self, Self::U8 | Self::U16 | Self::U32)
+        matches!(self, Self::U8 | Self::U16 | Self::U32 | Self::U64)
     }
 }
 

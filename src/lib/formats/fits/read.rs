@@ -213,7 +213,7 @@ fn no_image(name: &str, part: usize, kind: &Kind, after: Option<(usize, Array)>)
 
 /// How samples are stored, the size of the frame, and what else the header tells.
 fn described(name: &str, header: &Header, array: &Array) -> Result<(Form, Geometry, Told)> {
-    let form = Form::of(name, header, array.bitpix)?;
+    let form = Form::of(header, array.bitpix);
     let geometry = geometry(name, &array.axes)?;
     let mut told = keywords::read(header, geometry.channels.len(), array.bitpix > 0 && !form.is_scaled());
     told.notes.extend(form.notes());
@@ -242,13 +242,13 @@ fn geometry(name: &str, axes: &[u64]) -> Result<Geometry> {
     Ok(Geometry { width, height, origin: [0, 0], channels })
 }
 
+/// BZERO of integers of 64 bits without sign, and the bit that it stands for.
+const HALF_OF_64_BITS: f64 = 9_223_372_036_854_775_808.0;
+const SIGN_OF_64_BITS: u64 = 1 << 63;
+
 impl Form {
     /// Reads the keywords of samples.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Format`] for integers of 64 bits.
-    fn of(name: &str, header: &Header, bitpix: i64) -> Result<Self> {
+    fn of(header: &Header, bitpix: i64) -> Self {
         let (scale, zero) = (header.number("BSCALE").unwrap_or(1.0), header.number("BZERO").unwrap_or(0.0));
         let stored = match (bitpix, scale == 1.0, zero) {
             (8, true, -128.0) => SampleType::I8,
@@ -258,14 +258,14 @@ impl Form {
             (32, true, 2_147_483_648.0) => SampleType::U32,
             (32, ..) => SampleType::I32,
             (-32, ..) => SampleType::F32,
-            (-64, ..) => SampleType::F64,
-            _ => {
-                let problem = "its integers of 64 bits are not supported; store it as 32-bit integers or floats first";
-                return Err(Error::format(name, problem));
-            }
+            (64, true, HALF_OF_64_BITS) => SampleType::U64,
+            (64, ..) => SampleType::I64,
+            _ => SampleType::F64,
         };
         let blank = header.number("BLANK").filter(|_| bitpix > 0);
-        Ok(Self { stored, scale, zero, blank })
+        // Integers without sign are made of all their bits: doubles would round them beside so large a shift.
+        let shift = if stored == SampleType::U64 { zero } else { 0.0 };
+        Self { stored, scale, zero: zero - shift, blank: blank.map(|blank| blank + shift) }
     }
 
     /// Whether values are others than those that a program stored as integers or floats of this kind.
@@ -285,8 +285,8 @@ impl Form {
         let scaled = || format!("its samples are {zero} + {scale} times what is stored (BZERO, BSCALE)");
         let blank = self.blank.map(|blank| format!("samples stored as {blank} (BLANK) are undefined: they are NaN"));
         let rounded = || "its samples of 64 bits are rounded to 32".to_owned();
-        let is_double = self.stored == SampleType::F64;
-        self.is_scaled().then(scaled).into_iter().chain(blank).chain(is_double.then(rounded)).collect()
+        let is_wide = self.stored.bytes() == 8;
+        self.is_scaled().then(scaled).into_iter().chain(blank).chain(is_wide.then(rounded)).collect()
     }
 
     /// Appends the values of stored samples.
@@ -295,6 +295,10 @@ impl Form {
             SampleType::U8 | SampleType::I8 => self.values(stored, samples, |[byte]: [u8; 1]| byte.into()),
             SampleType::U16 | SampleType::I16 => self.values(stored, samples, |bytes| i16::from_be_bytes(bytes).into()),
             SampleType::U32 | SampleType::I32 => self.values(stored, samples, |bytes| i32::from_be_bytes(bytes).into()),
+            SampleType::U64 => {
+                self.values(stored, samples, |bytes| (u64::from_be_bytes(bytes) ^ SIGN_OF_64_BITS) as f64)
+            }
+            SampleType::I64 => self.values(stored, samples, |bytes| i64::from_be_bytes(bytes) as f64),
             SampleType::F64 => self.values(stored, samples, f64::from_be_bytes),
             _ => self.values(stored, samples, |bytes| f32::from_be_bytes(bytes).into()),
         }

@@ -80,7 +80,7 @@ impl Layout {
         let (chunk_width, chunk_rows) = (size(grid.chunk_width)?, size(grid.chunk_rows)?);
         let (across, down) = (size(grid.across)?, size(grid.down)?);
         let mut notes = Vec::new();
-        if stored == SampleType::F64 {
+        if stored.bytes() == 8 {
             notes.push("its samples of 64 bits are rounded to 32".into());
         }
         // No sample depends on these, so damaged ones are not worth refusing the image.
@@ -204,9 +204,11 @@ fn stored(file: &mut TiffFile, directory: &Directory, channels: u64) -> Result<S
         (1 | 4, 8) => SampleType::U8,
         (1 | 4, 16) => SampleType::U16,
         (1 | 4, 32) => SampleType::U32,
+        (1 | 4, 64) => SampleType::U64,
         (2, 8) => SampleType::I8,
         (2, 16) => SampleType::I16,
         (2, 32) => SampleType::I32,
+        (2, 64) => SampleType::I64,
         (3, 16) => SampleType::F16,
         (3, 32) => SampleType::F32,
         (3, 64) => SampleType::F64,
@@ -224,7 +226,7 @@ fn no_sample_type(format: u64, bits: u64) -> String {
             "{bits}-bit packed samples are not supported; unpack them to 16 bit or float (`oiiotool in.tif -d uint16 -o out.tif` does, but scales {} to 65535)",
             (1u64 << bits) - 1
         ),
-        (1 | 2 | 4, 33..=64) => format!(
+        (1 | 2 | 4, 33..=63) => format!(
             "{bits}-bit integers are not supported; convert it to float, for example with `oiiotool in.tif -d float -o out.tif`"
         ),
         (3, 24) => {

@@ -257,6 +257,8 @@ impl TiffReader {
             SampleType::I16 => self.convert(row, samples, |bytes| f32::from(i16::from_ne_bytes(bytes))),
             SampleType::U32 => self.convert(row, samples, |bytes| u32::from_ne_bytes(bytes) as f32),
             SampleType::I32 => self.convert(row, samples, |bytes| i32::from_ne_bytes(bytes) as f32),
+            SampleType::U64 => self.convert(row, samples, |bytes| u64::from_ne_bytes(bytes) as f32),
+            SampleType::I64 => self.convert(row, samples, |bytes| i64::from_ne_bytes(bytes) as f32),
             SampleType::F16 => self.convert(row, samples, |bytes| f16::from_ne_bytes(bytes).to_f32()),
             SampleType::F32 => self.convert(row, samples, f32::from_ne_bytes),
             SampleType::F64 => self.convert(row, samples, |bytes| {

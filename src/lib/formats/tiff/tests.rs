@@ -651,7 +651,7 @@ fn what_is_not_supported_is_refused_by_name() {
     };
     refused(gray().with(258, &[12]), "12-bit packed samples");
     refused(gray().with(258, &[1]), "1 bit");
-    refused(gray().with(258, &[64]), "64-bit integers");
+    refused(gray().with(258, &[48]), "48-bit integers");
     refused(gray().with(339, &[6]), "complex");
     refused(gray().with(259, &[50_000]), "ZSTD");
     refused(gray().with(259, &[7]), "JPEG");
