@@ -174,7 +174,7 @@ const MISTAKES: [(&str, i32, &str); 108] = [
     (
         "correct-frame codes.exr --dark codes.exr --black 3",
         BAD_USAGE,
-        "--dark <FILE> and --black <auto|none|N|border|rows|columns> exclude each other; see `correct-frame --help`",
+        "--dark <FILE> and --black <auto|none|N[,N,N,N]|border|rows|columns> exclude each other; see `correct-frame --help`",
     ),
     ("correct-frame codes.exr --dark missing.exr", BAD_DATA, "missing.exr: cannot open: no such file or directory"),
     (
