@@ -271,12 +271,12 @@ pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
         }
         (_, Some(relative)) => {
             let why = match measured {
-                Some(_) => "its exposure is not known, which --exposure and --f-number tell",
-                None => "it tells no calibration, which --matrix would",
+                Some(_) => "cd/m2 take its exposure, --exposure S and --f-number N",
+                None => "cd/m2 take a calibrated matrix, --matrix FILE",
             };
             let (name, method) = (&frame.name, &relative.method);
             let note =
-                format!("{name}: XYZ are relative, Y = 1 for the white that saturates the camera: {why}; by {method}");
+                format!("{name}: XYZ are relative, Y = 1 for the white that saturates the camera, by {method}; {why}");
             Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Warning(note)))
         }
         (_, None) => {

@@ -198,6 +198,7 @@ mod tests {
     use super::super::PngReader;
     use super::*;
     use crate::formats::format::SampleReader;
+    use crate::formats::tiff::{ExtraTag, TagValue, exif_block};
     use std::io::Seek;
 
     const OURS: &str = "schema: cyanometer/1\nquantity: adu\nnote: µ\n";
@@ -256,6 +257,18 @@ mod tests {
         assert_eq!([code_points.color_primaries, code_points.transfer_function], [1, 13]);
         assert!(code_points.matrix_coefficients == 0 && code_points.is_video_full_range_image);
         assert_eq!((reader.next_row().unwrap().unwrap().data(), unfit), (&[255, 255, 128, 0, 0, 0][..], 0));
+    }
+
+    /// What is not ours has the exposure of its Exif.
+    #[test]
+    fn an_exposure_comes_back() {
+        let ratio = |number, above, below| ExtraTag { number, value: TagValue::Ratios(vec![[above, below]]) };
+        let exif = exif_block(&[ratio(33434, 1, 50), ratio(33437, 8, 1)], "a.png").unwrap();
+        let settings = PngSettings { description: "a dog".into(), exif, ..settings(false) };
+        let mut writer = PngWriter::create(Vec::new(), "a.png", &Geometry::new(1, 1, &["Y"]), settings).unwrap();
+        writer.write_rows(&[7.0]).unwrap();
+        let told = opened(&writer.finish().unwrap().0).own_tags().exposure.unwrap();
+        assert_eq!((told.exposure_s, told.f_number), (0.02, 8.0));
     }
 
     /// A disk that has room for so many bytes.
