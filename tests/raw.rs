@@ -207,7 +207,7 @@ fn a_raw_brings_its_matrix_along() {
     shop.run("demosaic colors.dng --method bi -o rgb.exr", &[]);
     // That XYZ are relative is said where nobody asked for it: once of all frames, and of a matrix that says so with -v alone.
     let said = |line: &str| String::from_utf8(shop.attempt(line, &[]).stderr).unwrap();
-    let warning = "to-xyz: warning: rgb.exr: XYZ are relative, Y = 1 for the white that saturates the camera, by ColorMatrix1 of the DNG, \
+    let warning = "to-xyz: warning: XYZ are relative, Y = 1 for the white that saturates the camera, by ColorMatrix1 of the DNG, \
                    for the white of the exposure, not adapted; cd/m2 take a calibrated matrix, --matrix FILE\n";
     fs::copy(shop.path("rgb.exr"), shop.path("more.exr")).unwrap();
     let warned = said("to-xyz rgb.exr more.exr -o {stem}-own.exr");

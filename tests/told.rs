@@ -266,6 +266,19 @@ fn bare_frames_are_described() {
         text.split("xyz_from_camera:").nth(1).unwrap().lines().take(10).collect::<Vec<_>>().join(" ")
     };
     assert_eq!(elements("bare-m.yaml"), elements("m.yaml"));
+    // Corners are counted from the first sample of what is read; photosites keep their class.
+    let part = "--crop 3,1,237,159 --corners 17,19,217,19,217,139,17,139";
+    shop.run(&format!("fit-matrix --chart chart.exr {part} -o part-m.yaml"), &[]);
+    assert_eq!(elements("part-m.yaml"), elements("m.yaml"));
+    for option in ["--crop 0,0,1,1", "--channel G", "--cfa rggb", "--part 1", "--metadata bare.yaml"] {
+        let name = option.split(' ').next().unwrap();
+        assert_eq!(
+            said(&shop, &format!("fit-matrix SAMPLES/skies/sky912.exr {option} -o x.yaml"), BAD_USAGE),
+            format!(
+                "fit-matrix: no frame of a chart is named, --chart FRAME, which alone is described so; leave out {name}\n"
+            )
+        );
+    }
 
     let header = FrameHeader {
         name: "bare".into(),

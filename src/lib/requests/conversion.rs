@@ -274,9 +274,9 @@ pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
                 Some(_) => "cd/m2 take its exposure, --exposure S and --f-number N",
                 None => "cd/m2 take a calibrated matrix, --matrix FILE",
             };
-            let (name, method) = (&frame.name, &relative.method);
-            let note =
-                format!("{name}: XYZ are relative, Y = 1 for the white that saturates the camera, by {method}; {why}");
+            // Of several files it is said once: it is the same of all.
+            let method = &relative.method;
+            let note = format!("XYZ are relative, Y = 1 for the white that saturates the camera, by {method}; {why}");
             Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Warning(note)))
         }
         (_, None) => {

@@ -32,16 +32,12 @@ const MOST_MISFIT: f64 = 0.1;
 
 /// A chart, as a frame or as a table, the colors that it has, and the light on it.
 #[derive(Debug, Clone, Args)]
-#[command(mut_args(|option| match option.get_id().as_str() {
-    "part" | "raw" | "channel" | "crop" => option.requires("chart"),
-    _ => option,
-}))]
 pub struct ChartFit {
     /// Frame of a ColorChecker, a CFA plane of ADU such as a DNG: fit the matrix to its 24 patches
     #[arg(long, value_name = "FRAME", conflicts_with = "patches")]
     pub chart: Option<PathBuf>,
     /// Centers of the corner patches in pixels from the frame's first sample: dark skin, bluish green, black, white
-    #[arg(long, value_name = "X,Y,X,Y,X,Y,X,Y", value_parser = values::corners, requires = "chart", allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,X,Y,X,Y,X,Y", value_parser = values::corners, allow_hyphen_values = true)]
     pub corners: Option<[[f64; 2]; 4]>,
     /// CSV of means of patches: columns R, G, B, where known name, std_R, std_G, std_B, cov_RG, cov_RB, cov_GB
     #[arg(long, value_name = "FILE.csv")]
@@ -50,7 +46,7 @@ pub struct ChartFit {
     #[command(flatten)]
     pub selection: Selection,
     /// Filter array of the frame of the chart, where that does not say it: rggb, bggr, grbg, gbrg
-    #[arg(long, value_name = "PATTERN", value_parser = str::parse::<FilterArray>, requires = "chart")]
+    #[arg(long, value_name = "PATTERN", value_parser = str::parse::<FilterArray>)]
     pub cfa: Option<FilterArray>,
     /// Black and white level, ADU, of the frame of the chart, where that does not say them, or of the means in --patches, which
     /// without are shares of white level less black level
@@ -74,7 +70,7 @@ pub struct ChartFit {
     #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
     pub luminance: Option<f64>,
     /// YAML file whose metadata replace those that come with the frame of the chart
-    #[arg(long, value_name = "FILE", requires = "chart")]
+    #[arg(long, value_name = "FILE")]
     pub metadata: Option<PathBuf>,
     /// Let the noise of the patches alone weigh them: no error of references and matrix is estimated beside it
     #[arg(long)]
@@ -130,6 +126,31 @@ impl ChartFit {
     /// The light that is named, if one is.
     pub(super) fn light(&self) -> Result<Option<Light>> {
         self.illuminant.as_deref().or(self.temperature.as_deref()).map(Light::load).transpose()
+    }
+
+    /// Makes sure that what describes the frame of a chart has one to describe.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`].
+    pub(super) fn check(&self) -> Result<()> {
+        let Selection { part, raw, channel, crop } = &self.selection;
+        let of_frame: [(&'static [&'static str], bool); 7] = [
+            (&["corners"], self.corners.is_some()),
+            (&["cfa"], self.cfa.is_some()),
+            (&["metadata"], self.metadata.is_some()),
+            (&["part"], *part > 0),
+            (&["raw"], raw.is_some()),
+            (&["channel"], channel.is_some()),
+            (&["crop"], crop.is_some()),
+        ];
+        match of_frame.into_iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) if self.chart.is_none() => {
+                let problem = "no frame of a chart is named, --chart FRAME, which alone is described so";
+                Err(Error::Usage(problem.into()).leave_out(option))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Fits the matrix to the chart; none where no chart is named.

@@ -70,6 +70,7 @@ impl MatrixRequest {
     ///
     /// Those of [`Fit::run`], [`ChartFit::run`] and [`RawMatrix::run`]; [`Error::Usage`] where nothing to make one of is named.
     pub fn run(&self) -> Result<MatrixFound> {
+        self.chart.check()?;
         if let Some(fit) = &self.fit {
             return fit.run().map(|found| MatrixFound::Fitted(Box::new(found)));
         }
