@@ -489,6 +489,15 @@ fn darks_of_other_sensors_or_lit_scenes_are_refused() {
     let mut other = taken(0.0, 1);
     other.metadata.sensor.as_mut().unwrap().name = "other".into();
     refused(corrected(&frame, &other), "its sensor is other, but that of test is kaf-5101ce");
+    // As files of cameras tell it.
+    let set = |camera: &str, iso_speed: f64, mut header: FrameHeader| {
+        (header.metadata.camera, header.metadata.iso_speed) = (Some(camera.into()), Some(iso_speed));
+        header
+    };
+    let [frame_a, dark_a] = [taken(100.0, 1), taken(0.0, 1)].map(|header| set("A", 100.0, header));
+    assert!(corrected(&frame_a, &dark_a).unwrap().warnings().is_empty());
+    refused(corrected(&frame_a, &set("B", 100.0, dark_a.clone())), "its camera is B, but that of test is A");
+    refused(corrected(&frame_a, &set("A", 400.0, dark_a)), "its sensitivity is ISO 400, but that of test is ISO 100");
     for unsaid in [|m: &mut Metadata| m.scene = None, |m: &mut Metadata| (m.noise, m.scene) = (None, None)] {
         let mut silent = taken(0.0, 1);
         unsaid(&mut silent.metadata);

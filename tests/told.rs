@@ -521,3 +521,20 @@ fn columns_are_found_without_their_units() {
     assert_eq!(digest("south"), digest("south [mW m-2 sr-1 nm-1]"));
     assert_ne!(digest("north"), digest("south"));
 }
+
+/// Codes of one camera at several sensitivities are of several gains: they are not averaged, and are no photon transfer.
+#[test]
+fn exposures_of_several_sensitivities_do_not_go_together() {
+    let shop = Workshop::new();
+    for (name, iso_speed) in [("flat1.exr", 100.0), ("flat2.exr", 400.0)] {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some("rggb".parse().unwrap());
+        (metadata.camera, metadata.iso_speed) = (Some("A".into()), Some(iso_speed));
+        let header = FrameHeader { name: name.into(), geometry: Geometry::new(4, 4, &["Y"]), metadata };
+        write(&shop, name, &header, &[1100.0; 16]);
+    }
+    let averaged = said(&shop, "average-frames flat1.exr flat2.exr -o mean.exr", BAD_DATA);
+    assert!(averaged.contains("flat2.exr: its `iso_speed` is 400"), "{averaged}");
+    let transfer = said(&shop, "photon-transfer .", BAD_DATA);
+    assert!(transfer.contains("flat2.exr: its sensitivity (ISO) is not that of ./flat1.exr"), "{transfer}");
+}

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{CorrectionRecord, DefectsRecord, FlatRecord, FrameHeader, Metadata};
 use crate::stages::black::{Black, white_left};
-use crate::stages::darks::{DarkStack, check_alike, check_codes};
+use crate::stages::darks::{DarkStack, check_codes, check_setting};
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
 use crate::units::{Adu, QuantityKind};
@@ -66,7 +66,7 @@ impl CorrectFrame {
         check_codes(input)?;
         let mut warnings = Vec::new();
         if let Some(darks) = darks {
-            check_alike(input, darks.head())?;
+            check_setting(input, darks.head())?;
             darks.check_dark()?;
             warnings = darks.warnings_beside(input);
         }

@@ -127,9 +127,9 @@ impl Exposures {
 
 /// What is known of the camera and of how it was set, and nothing else.
 fn camera(frame: &FrameHeader) -> Metadata {
-    let Metadata { quantity, sensor, camera, exposure, adc, noise, white_level_adu, .. } =
+    let Metadata { quantity, sensor, camera, iso_speed, exposure, adc, noise, white_level_adu, .. } =
         frame.without_exposure().metadata;
-    Metadata { sensor, camera, exposure, adc, noise, white_level_adu, ..Metadata::new(quantity) }
+    Metadata { sensor, camera, iso_speed, exposure, adc, noise, white_level_adu, ..Metadata::new(quantity) }
 }
 
 /// What is known of its black level.

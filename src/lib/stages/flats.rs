@@ -8,7 +8,7 @@ use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise, Scene};
-use crate::stages::darks::{DarkFrames, DarkSettings, check_alike, check_codes};
+use crate::stages::darks::{DarkFrames, DarkSettings, check_alike, check_codes, check_setting};
 use crate::stages::defects::{Survey, add};
 use crate::stages::masters::Frames;
 use crate::stages::saturation::{DEFECTIVE, FullLevels, SATURATED};
@@ -87,7 +87,7 @@ impl<S: RowSource> FlatFrames<S> {
         let is_even = flats.iter().all(is_even);
         let pedestal = match DarkFrames::matched(&head, darks, biases, settings)? {
             Some(darks) => {
-                check_alike(&head, darks.stack().head())?;
+                check_setting(&head, darks.stack().head())?;
                 darks.stack().check_dark()?;
                 warnings.extend(darks.stack().warnings_beside(&head));
                 Pedestal::Frames(Box::new(darks))

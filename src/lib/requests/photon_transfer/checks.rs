@@ -39,6 +39,9 @@ pub fn check_alike(first: &FrameHeader, other: &FrameHeader) -> Result<()> {
     }
     let are_others =
         |of: fn(&Metadata) -> Option<f64>| of(&first.metadata).zip(of(&other.metadata)).is_some_and(|(a, b)| a != b);
+    if are_others(|metadata| metadata.iso_speed) {
+        return differs("sensitivity (ISO)");
+    }
     if are_others(Metadata::adu_per_e) {
         return differs("setting of the gain");
     }

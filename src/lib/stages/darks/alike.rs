@@ -67,12 +67,32 @@ pub(in crate::stages) fn check_alike(frame: &FrameHeader, dark: &FrameHeader) ->
     {
         return differs("sensor", b, a);
     }
+    if let (Some(a), Some(b)) = (&frame.metadata.camera, &dark.metadata.camera)
+        && a != b
+    {
+        return differs("camera", b.clone(), a.clone());
+    }
     if let Some((key, unit, its, theirs)) = other_codes(&frame.metadata, &dark.metadata) {
         return differs(key, format!("{theirs} {unit}"), format!("{its} {unit}"));
     }
     let seed = |metadata: &Metadata| metadata.noise.as_ref().map(|noise| noise.sensor_seed);
     match (seed(&frame.metadata), seed(&dark.metadata)) {
         (Some(a), Some(b)) if a != b => differs("sensor seed", b.to_string(), a.to_string()),
+        _ => Ok(()),
+    }
+}
+
+/// Makes sure that a dark frame is like `frame` and was taken at the same sensitivity, by which its codes mean the same charges.
+///
+/// # Errors
+///
+/// As [`check_alike`].
+pub(in crate::stages) fn check_setting(frame: &FrameHeader, dark: &FrameHeader) -> Result<()> {
+    check_alike(frame, dark)?;
+    match (frame.metadata.iso_speed, dark.metadata.iso_speed) {
+        (Some(a), Some(b)) if !is_same(a, b) => {
+            Err(dark.refuse(format!("its sensitivity is ISO {b}, but that of {} is ISO {a}", frame.name)))
+        }
         _ => Ok(()),
     }
 }

@@ -4,6 +4,6 @@ mod alike;
 mod frames;
 mod stack;
 
-pub(super) use alike::{check_alike, check_codes};
+pub(super) use alike::{check_alike, check_codes, check_setting};
 pub use frames::{DarkFrames, DarkLimits, LessDarks};
 pub use stack::{DarkSettings, DarkStack};

@@ -1,6 +1,6 @@
 //! How dark and bias frames count as one.
 
-use super::alike::{check_alike, check_codes, differences, is_same, lit, says_enough, says_enough_of_sensor};
+use super::alike::{check_codes, check_setting, differences, is_same, lit, says_enough, says_enough_of_sensor};
 use crate::camera::levels::BlackLevels;
 use crate::camera::readout::dark_current_law;
 use crate::error::{Error, Result};
@@ -142,7 +142,7 @@ impl DarkStack {
         let mut stack = Self::alike((*first).clone(), 1)?;
         for head in others {
             check_codes(head)?;
-            check_alike(first, head)?;
+            check_setting(first, head)?;
             stack.warnings.extend(differences(first, head));
             stack.lit = stack.lit.or_else(|| lit(head));
             stack.silent.extend((!says_enough(head)).then(|| head.name.clone()));
