@@ -214,7 +214,7 @@ fn a_raw_brings_its_matrix_along() {
     assert_eq!(warned, warning);
     assert_eq!(said("to-xyz rgb.exr --quiet -o own.exr"), "");
     shop.run("to-xyz rgb.exr --matrix m.yaml -o file.exr", &[]);
-    assert!(said("to-xyz rgb.exr --matrix m.yaml -v -o x.exr").contains("to-xyz: m.yaml: XYZ are relative, Y = 1"));
+    assert!(said("to-xyz rgb.exr --matrix m.yaml -v -o told.exr").contains("to-xyz: m.yaml: XYZ are relative, Y = 1"));
     let [own, file] = ["own.exr", "file.exr"].map(|name| shop.frame(name));
     assert_eq!(own.samples, file.samples);
     assert_eq!(own.header.metadata.unit, "relative");
