@@ -55,7 +55,8 @@ fn codes_alone(shop: &Workshop) {
                 ));
                 fs::write(shop.path(&format!("own/{name}.exr")), codes).unwrap();
                 let samples = shop.read(&format!("own/{name}.exr")).0;
-                let bytes: Vec<u8> = samples.iter().flat_map(|code| (*code as u16).to_le_bytes()).collect();
+                let bytes: Vec<u8> =
+                    samples.iter().flat_map(|code| code.to_string().parse::<u16>().unwrap().to_le_bytes()).collect();
                 fs::write(shop.path(&format!("bare/{name}.raw")), bytes).unwrap();
             }
         }
