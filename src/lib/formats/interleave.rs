@@ -46,14 +46,28 @@ pub(super) fn interleave_u16(
     scale: f32,
     order: impl Fn([u8; 2]) -> [u8; 2] + Copy,
 ) -> u64 {
+    if channels == 1 {
+        let mut unfit = 0_u32;
+        for (place, sample) in row.as_chunks_mut::<2>().0.iter_mut().zip(samples) {
+            let whole = rounded(sample * scale);
+            let fitting = whole.clamp(0, i32::from(u16::MAX));
+            unfit += u32::from(fitting != whole);
+            let [low, high, ..] = fitting.to_le_bytes();
+            *place = order([low, high]);
+        }
+        return unfit.into();
+    }
     let unfit: u32 =
         samples.iter().map(|sample| u32::from(!(0..=i32::from(u16::MAX)).contains(&rounded(sample * scale)))).sum();
-    interleave(samples, row, channels, |sample| {
-        let fitting = rounded(sample * scale).clamp(0, i32::from(u16::MAX));
-        let [low, high, ..] = fitting.to_le_bytes();
-        order([low, high])
-    });
+    interleave(samples, row, channels, |sample| order(nearest_u16(sample * scale).to_le_bytes()));
     unfit.into()
+}
+
+/// The nearest integer of 16 bits, ties to even; of NaN 0.
+pub(super) fn nearest_u16(value: f32) -> u16 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it lies between the ends")]
+    let nearest = rounded(value).clamp(0, i32::from(u16::MAX)) as u16;
+    nearest
 }
 
 /// The nearest integer, ties to even, for values from −1 to 65536; what is beyond becomes the nearer of these, and NaN
@@ -65,4 +79,47 @@ fn rounded(value: f32) -> i32 {
     #[expect(clippy::manual_clamp, reason = "`clamp` lets NaN pass, and here it must not")]
     let shifted = value.max(-1.0).min(65536.0) + SHIFT;
     shifted.to_bits().wrapping_sub(SHIFT.to_bits()).cast_signed()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ties to even, ends beyond the ends, 0 of NaN; the same and as many that do not fit of one channel as of three.
+    #[test]
+    fn samples_become_the_nearest_integers() {
+        let values = [
+            -1e9,
+            -0.75,
+            -0.5,
+            -0.0,
+            0.5,
+            1.5,
+            2.5,
+            70.499,
+            65_534.5,
+            65_535.4,
+            65_535.5,
+            1e9,
+            f32::INFINITY,
+            f32::NAN,
+            -3.0,
+        ];
+        let nearest = values.map(nearest_u16);
+        let expected = values.map(|value| value.round_ties_even().clamp(0.0, 65_535.0));
+        for ((value, nearest), expected) in values.iter().zip(nearest).zip(expected) {
+            assert_eq!(f32::from(nearest), if value.is_nan() { 0.0 } else { expected }, "{value}");
+        }
+        let stored = |channels: usize| {
+            let mut row = vec![0; 2 * values.len()];
+            let unfit = interleave_u16(&values, &mut row, channels, 1.0, |bytes| bytes);
+            let mut codes: Vec<u16> = row.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+            codes.sort_unstable();
+            (codes, unfit)
+        };
+        let mut sorted = nearest.to_vec();
+        sorted.sort_unstable();
+        assert_eq!(stored(1), (sorted, 7));
+        assert_eq!(stored(3), stored(1));
+    }
 }

@@ -6,6 +6,7 @@ use super::dng::{self, DngWriter};
 use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMARIES};
 use super::format::U16_FULL_SCALE;
 use super::icc;
+use super::interleave::nearest_u16;
 use super::places::{STDOUT_NAME, named, sidecar_path};
 use super::png::{PngSettings, PngWriter};
 use super::register;
@@ -16,7 +17,6 @@ use super::viewable::{self, Scaling, check_lossless};
 use super::yaml;
 use crate::color::{self, D65_XY, SRGB_PRIMARIES};
 use crate::error::{Error, Result};
-use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
 use crate::stream::{Counts, RowSink};
 use crate::text::visible;
@@ -310,13 +310,16 @@ impl FrameWriter {
     }
 
     fn check_f16(&self, to_store: &[f32]) -> Result<()> {
+        if !matches!(self.encoding, Encoding::Exr(ExrSamples::F16, _)) {
+            return Ok(());
+        }
         let overflows = |sample: &&f32| (F16_OVERFLOW..f32::INFINITY).contains(&sample.abs());
         match to_store.iter().find(overflows) {
-            Some(sample) if matches!(self.encoding, Encoding::Exr(ExrSamples::F16, _)) => Err(Error::Data(format!(
+            None => Ok(()),
+            Some(sample) => Err(Error::Data(format!(
                 "{}: the sample {sample} would become infinite as f16, which ends at 65504; write f32",
                 self.name
             ))),
-            _ => Ok(()),
         }
     }
 
@@ -332,8 +335,7 @@ impl FrameWriter {
             }
             Encoding::Tiff(TiffSamples::U16, _) | Encoding::Dng(TiffSamples::U16, _) | Encoding::Png => {
                 let scale = u16_scale(self.header.metadata.quantity, TiffSamples::U16);
-                let rounded = |sample: f32| (sample * scale).round_ties_even().clamp(0.0, U16_FULL_SCALE);
-                stored.extend(samples.iter().map(|&sample| to_sample(f64::from(rounded(sample)).max(0.0))));
+                stored.extend(samples.iter().map(|sample| f32::from(nearest_u16(sample * scale))));
             }
             _ => return digest.update_rows(samples, &self.header.geometry),
         }
