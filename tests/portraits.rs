@@ -156,6 +156,61 @@ fn a_figure_has_its_panels_and_what_it_cannot_be_is_told() {
     assert!(!shop.path("x.svg").exists());
 }
 
+/// One sample far off leaves the scale to all others, and is told; so are its row and column.
+#[test]
+fn samples_far_off_do_not_make_the_scale() {
+    let shop = Workshop::new();
+    let noise = |place: u16| 1000.0 + 10.0 * (f32::from(place.wrapping_mul(7919) % 997) / 997.0 - 0.5);
+    for (far, said) in
+        [(vec![], [false; 3]), (vec![(7, 1e6)], [true; 3]), (vec![(64 * 30 + 5, -1e6), (64 * 31 + 9, 3e4)], [true; 3])]
+    {
+        let mut samples: Vec<f32> = (0..64 * 48).map(noise).collect();
+        far.iter().for_each(|(place, value)| samples[*place] = *value);
+        let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        std::fs::write(shop.path("a.bin"), bytes).unwrap();
+        shop.run("measure --raw 64x48:f32le a.bin --plot plot.svg", &[]);
+        let svg = String::from_utf8(shop.bytes("plot.svg")).unwrap();
+        let count = far.len();
+        let wanted = [
+            format!("{count} of 3072 samples outside, as far as "),
+            format!("{count} of 64 columns outside, as far as "),
+            format!("{count} of 48 rows outside, as far as "),
+        ];
+        assert_eq!(wanted.map(|words| svg.contains(&words)), said, "{far:?}");
+        // Ticks tell the scale of the others.
+        assert!(!svg.contains(">1.0·10⁶<") && !svg.contains(">500000<"), "{far:?}");
+    }
+}
+
+/// Channels of several units have panels of their own; a single row has neither a profile along y nor pairs.
+#[test]
+fn units_and_single_rows_have_the_panels_that_they_can_have() {
+    let shop = Workshop::with_frames();
+    shop.run("to-xyz rgb.exr --matrix matrix.yaml --space xyy -o xyy.exr", &[]);
+    for (line, panels, labels) in [
+        // Two of histograms, four of profiles, two of correlations.
+        ("xyy.exr", 8, &[("share per cd m⁻²", 1), ("density", 1), ("mean − predicted mean / cd m⁻²", 2)][..]),
+        // Of XYZ one of a histogram, one of chromaticities, a profile and a correlation.
+        (
+            "xyz.exr --region 0,2,8,1",
+            4,
+            &[("distance along x / pixels", 1), ("distance along y / pixels", 0), ("row", 0)],
+        ),
+        ("xyz.exr --region 3,0,1,6", 4, &[("distance along x / pixels", 0), ("column", 0), ("row", 1)]),
+    ] {
+        shop.run(&format!("measure {line} --plot plot.svg"), &[]);
+        let svg = String::from_utf8(shop.bytes("plot.svg")).unwrap();
+        assert_eq!(svg.matches("<clipPath").count(), panels, "{line}");
+        for (label, count) in labels {
+            assert_eq!(svg.matches(&format!(">{label}</text>")).count(), *count, "{line}: {label}");
+        }
+    }
+    // Profiles name what their colors are: with those of histogram and correlations five legends.
+    shop.run("measure noisy.exr --plot plot.svg", &[]);
+    let svg = String::from_utf8(shop.bytes("plot.svg")).unwrap();
+    assert_eq!(svg.matches(">G</text>").count(), 5);
+}
+
 /// Frames that have no histogram: uniform expected electrons, and one that is saturated throughout.
 #[test]
 fn a_figure_says_why_it_shows_nothing() {

@@ -252,6 +252,13 @@ impl Axis {
     pub fn range(self, low: f64, high: f64) -> Self {
         Self { range: Some((low, high)), ..self }
     }
+
+    /// The same axis with this part of its range more at each end.
+    #[must_use]
+    pub fn widened(self, part: f64) -> Self {
+        let range = self.range.map(|(low, high)| (low - part * (high - low), high + part * (high - low)));
+        Self { range, ..self }
+    }
 }
 
 impl Marks {

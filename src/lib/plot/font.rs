@@ -23,6 +23,21 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| advance(glyph(c))).sum::<f64>() * size / f64::from(FACE.units_per_em())
 }
 
+/// The words of a text in lines that are no wider, but for a single word.
+pub(super) fn lines(text: &str, size: f64, most: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if width(&format!("{line} {word}"), size) <= most => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
 /// The outlines of a text in units of the font, y upward, and the scale that gives it a size.
 pub(super) fn outline(text: &str, size: f64) -> (Option<tiny_skia::Path>, f64) {
     let mut pen = Pen { path: PathBuilder::new(), x: 0.0 };

@@ -1,7 +1,7 @@
 //! Where the panels of a plot go.
 
 use super::drawing::{Drawing, Rect};
-use super::figure::{Anchor, Arrangement, Plot};
+use super::figure::{Anchor, Arrangement, Panel, Plot};
 use super::pane::Pane;
 use super::room::Room;
 use super::style::{MARGIN, TITLE, write};
@@ -39,24 +39,32 @@ pub(super) fn draw(plot: &Plot) -> Drawing {
         }
     };
     let widest = rooms.iter().map(|room| room.left).fold(0.0, f64::max);
-    // A legend that has no room within the frame stands above it.
-    for (index, (panel, room)) in plot.panels.iter().zip(&mut rooms).enumerate() {
-        if !Pane::new(panel, room, cell_of(index), widest, room.top).has_room_for_legend() {
-            room.put_legend_above(panel, width_of(index));
-        }
-    }
     let row_of = |index: usize| (index + usize::from(is_wide(0) && index > 0)) / columns;
-    let tallest = |row: usize| {
+    let tallest = |rooms: &[Room], row: usize| {
         let of_row = rooms.iter().enumerate().filter(|(index, _)| row_of(*index) == row);
         of_row.map(|(_, room)| room.top).fold(0.0, f64::max)
     };
-    for (index, (panel, room)) in plot.panels.iter().zip(&rooms).enumerate() {
-        // Edges of panels that share a row or a column are aligned.
-        let (left, top) = match plot.arrangement {
-            Arrangement::Pairs => (widest, tallest(row_of(index))),
-            _ if columns == 1 => (widest, room.top),
-            _ => (room.left, tallest(0)),
+    // Edges of panels that share a row or a column are aligned.
+    let edges = |rooms: &[Room], index: usize| match plot.arrangement {
+        Arrangement::Pairs => (widest, tallest(rooms, row_of(index))),
+        _ if columns == 1 => (widest, rooms[index].top),
+        _ => (rooms[index].left, tallest(rooms, 0)),
+    };
+    // A legend that has no room within the frame stands above it, and lowers the frames beside it, where others may then have none.
+    loop {
+        let lacks = |(index, panel): (usize, &Panel)| {
+            let (room, (left, top)) = (&rooms[index], edges(&rooms, index));
+            let has = room.legend.is_some() || Pane::new(panel, room, cell_of(index), left, top).has_room_for_legend();
+            (!has).then_some(index)
         };
+        let lacking: Vec<usize> = plot.panels.iter().enumerate().filter_map(lacks).collect();
+        if lacking.is_empty() {
+            break;
+        }
+        lacking.into_iter().for_each(|index| rooms[index].put_legend_above(&plot.panels[index], width_of(index)));
+    }
+    for (index, (panel, room)) in plot.panels.iter().zip(&rooms).enumerate() {
+        let (left, top) = edges(&rooms, index);
         Pane::new(panel, room, cell_of(index), left, top).draw(&mut drawing);
     }
     drawing

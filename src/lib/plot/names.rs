@@ -14,6 +14,8 @@ const REACHES: [f64; 9] = [0.0, 8.0, 18.0, 30.0, 45.0, 62.0, 82.0, 110.0, 150.0]
 const TURNS: u32 = 24;
 /// Points of one name share it within so many pixels.
 const NEAR: f64 = 12.0;
+/// Marks hide each other within so many.
+const HIDDEN: f64 = 3.0;
 /// Half the side of what a mark needs.
 const MARK: f64 = 6.0;
 /// Words stay so far apart.
@@ -43,7 +45,8 @@ pub(super) struct Obstacles<'a> {
 /// A name is left out where there is none in any of them.
 pub(super) fn place(names: &[(Point, &Name)], around: &Obstacles) -> Vec<Placed> {
     const TRIALS: usize = 12;
-    let mut order = names.to_vec();
+    let joined = joined(names);
+    let mut order: Vec<(Point, &Name)> = joined.iter().map(|(at, name)| (*at, name)).collect();
     let mut best: Vec<Placed> = Vec::new();
     for _ in 0..TRIALS {
         let (placed, missing) = trial(&order, around);
@@ -55,6 +58,20 @@ pub(super) fn place(names: &[(Point, &Name)], around: &Obstacles) -> Vec<Placed>
         order.insert(0, first);
     }
     best
+}
+
+/// Names of one color at all but one place, where one mark hides the other, as one: `piz, zips`.
+fn joined(names: &[(Point, &Name)]) -> Vec<(Point, Name)> {
+    let mut joined: Vec<(Point, Name)> = Vec::new();
+    for (at, name) in names {
+        let hidden = |(other, their): &&mut (Point, Name)| their.color == name.color && distance(*other, *at) < HIDDEN;
+        match joined.iter_mut().find(hidden) {
+            Some((_, their)) if their.text.split(", ").any(|text| text == name.text) => {}
+            Some((_, their)) => their.text = format!("{}, {}", their.text, name.text),
+            None => joined.push((*at, (*name).clone())),
+        }
+    }
+    joined
 }
 
 /// Places names in their order, and says which is the first that found none.

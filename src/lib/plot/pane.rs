@@ -103,8 +103,7 @@ impl<'a> Pane<'a> {
     /// Draws all, from the bottom up.
     pub fn draw(&self, drawing: &mut Drawing) {
         if !self.panel.has_axes {
-            let center = [self.area.left + 0.5 * self.area.width, self.area.top + 0.5 * self.area.height];
-            return write(drawing, &self.panel.title, center, LABEL, Anchor::Middle);
+            return self.write_alone(drawing);
         }
         self.panel.regions.iter().for_each(|region| self.draw_region(drawing, region));
         self.draw_ticks(drawing);
@@ -130,6 +129,16 @@ impl<'a> Pane<'a> {
         self.draw_legend(drawing, look, &mut covered);
         for (y, label) in self.horizontal_lines() {
             draw_line_label(drawing, label, y, self.area, &mut covered);
+        }
+    }
+
+    /// Writes the title of a panel without axes in its middle, in as many lines as its cell needs.
+    fn write_alone(&self, drawing: &mut Drawing) {
+        let lines = font::lines(&self.panel.title, LABEL, self.cell.width - 2.0 * MARGIN);
+        let center = self.cell.left + 0.5 * self.cell.width;
+        let first = self.area.top + 0.5 * (self.area.height - LINE * (lines.len().saturating_sub(1)) as f64);
+        for (index, text) in lines.iter().enumerate() {
+            write(drawing, text, [center, first + LINE * index as f64], LABEL, Anchor::Middle);
         }
     }
 

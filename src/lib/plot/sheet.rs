@@ -12,6 +12,8 @@ use crate::error::{Error, Result};
 const PLAIN_SIDE: f64 = 640.0;
 /// Lengths at that size: white about a picture, type, the distance of lines, and the bar.
 const MARGIN: f64 = 12.0;
+/// Between columns, so that captions as wide as their columns stay apart.
+const COLUMN_GAP: f64 = 28.0;
 const TEXT: f64 = 13.0;
 const LINE: f64 = 17.0;
 /// What stands above a bar: a line, and room to its topmost number.
@@ -74,17 +76,18 @@ pub fn sheet(tiles: &[Tile], columns: usize) -> Result<Pixels> {
     let size = Type { scale: (longest / PLAIN_SIDE).max(1.0) };
     let blocks: Vec<Block> = tiles.iter().map(|tile| Block::of(tile, size)).collect();
     let columns = columns.clamp(1, tiles.len().max(1));
-    let margin = size.of(MARGIN).ceil();
+    let [margin, gap] = [MARGIN, COLUMN_GAP].map(|length| size.of(length).ceil());
     let width = blocks.iter().map(|block| block.width).fold(0.0, f64::max);
     let heights: Vec<f64> =
         blocks.chunks(columns).map(|row| row.iter().map(|block| block.height).fold(0.0, f64::max)).collect();
-    let whole = [margin + columns as f64 * (width + margin), margin + heights.iter().map(|h| h + margin).sum::<f64>()];
+    let whole =
+        [2.0 * margin + columns as f64 * (width + gap) - gap, margin + heights.iter().map(|h| h + margin).sum::<f64>()];
     let mut drawing = Drawing::new(whole[0], whole[1], "");
     let mut pasted = Vec::new();
     let mut top = margin;
     for (row, height) in blocks.chunks(columns).zip(&heights) {
         for (column, block) in row.iter().enumerate() {
-            let left = margin + column as f64 * (width + margin);
+            let left = margin + column as f64 * (width + gap);
             block.draw(&mut drawing, &mut pasted, [left, top], width);
         }
         top += height + margin;

@@ -1,5 +1,6 @@
 //! Figures of a region: its histogram, profiles, autocorrelation and chromaticities beside what is predicted.
 
+use super::in_digits;
 use crate::analysis::statistics::RegionReport;
 use crate::analysis::statistics::portrait::{Foreseen, Likeness, Portrait};
 use crate::color::xyy_about;
@@ -9,9 +10,16 @@ use crate::units::{QuantityKind, typeset};
 use nalgebra::{Matrix2, Matrix3};
 use std::f64::consts::TAU;
 
-/// Bins of a histogram are about so many of its standard deviations wide, and reach so many to both sides.
-const BIN: f64 = 0.2;
-const REACH: f64 = 5.0;
+/// The middle of a histogram leaves out this share of the samples at each end; what is shown reaches this part of its width
+/// beyond: of a normal law 2.6 and 5.2 standard deviations.
+const LEFT_OUT: f64 = 0.005;
+const BEYOND: f64 = 0.5;
+/// So many bins make the middle; of a normal law they are about 0.2 standard deviations wide.
+const BINS: f64 = 26.0;
+/// Rows or columns far from all others are few up to this part of them; pixels are few that are so dim that the quotients which
+/// chromaticities are scatter without end.
+const FEW_LINES: f64 = 0.05;
+const FEW_PIXELS: f64 = 0.25;
 /// How much higher an axis is than what it shows.
 const HEADROOM: f64 = 1.08;
 /// The share of a normal law of two variables within its ellipse.
@@ -20,11 +28,18 @@ const WITHIN: f64 = 0.95;
 /// Draws a region of a frame: the histogram of each class or channel with the predicted law, means of columns and rows with the
 /// predicted band of ±σ of a mean, the autocorrelation along x and y beside the predicted, and of XYZ the chromaticities with the
 /// ellipses of the measured and of the predicted covariance.
+///
+/// Channels of several units have panels of their own. A few samples far from all others do not make the scale; a panel says how
+/// many lie outside.
 pub fn portrait(portrait: &Portrait, region: &RegionReport) -> Plot {
     let unsaid = without_spread(portrait);
-    let mut panels = vec![unsaid.map_or_else(|| histogram(portrait), in_words)];
+    let scales = scales(portrait);
+    let mut panels: Vec<Panel> = match unsaid {
+        Some(text) => vec![in_words(text)],
+        None => scales.iter().map(|scale| histogram(portrait, scale)).collect(),
+    };
     panels.extend(chromaticity(portrait, region));
-    panels.extend((0..2).map(|axis| profile(portrait, axis)));
+    panels.extend(scales.iter().flat_map(|scale| (0..2).map(move |axis| profile(portrait, scale, axis))));
     if unsaid.is_none() {
         panels.extend((0..2).map(|axis| correlation(portrait, axis)));
     }
@@ -36,19 +51,76 @@ pub fn portrait(portrait: &Portrait, region: &RegionReport) -> Plot {
     Plot { title, panels, arrangement: Arrangement::Pairs }
 }
 
+/// Classes or channels that share an axis, by their places, and its unit; empty where it is 1.
+struct Scale {
+    places: Vec<usize>,
+    unit: String,
+}
+
+impl Scale {
+    /// The unit behind words.
+    fn with_unit(&self, words: &str) -> String {
+        if self.unit.is_empty() { words.to_owned() } else { format!("{words} / {}", self.unit) }
+    }
+
+    /// The classes or channels, with the color of each.
+    fn groups<'a>(&self, portrait: &'a Portrait) -> impl Iterator<Item = (Color, &'a Likeness)> {
+        self.places.iter().map(|place| (color(portrait, *place), &portrait.groups[*place]))
+    }
+}
+
+/// One scale for all classes or channels, or for each unit.
+fn scales(portrait: &Portrait) -> Vec<Scale> {
+    let shown = |unit: &str| if ["1", "unspecified"].contains(&unit) { String::new() } else { typeset(unit) };
+    let units: Vec<&str> = portrait.unit.split(", ").collect();
+    let all = portrait.groups.len();
+    if units.len() != all {
+        return vec![Scale { places: (0..all).collect(), unit: shown(&portrait.unit) }];
+    }
+    let mut scales: Vec<Scale> = Vec::new();
+    for (place, unit) in units.into_iter().map(shown).enumerate() {
+        match scales.iter_mut().find(|scale| scale.unit == unit) {
+            Some(scale) => scale.places.push(place),
+            None => scales.push(Scale { places: vec![place], unit }),
+        }
+    }
+    scales
+}
+
+/// From where to where most values lie where a few are far off: within four times the range of their middle half about it. None
+/// where more than `part` of them are, or none.
+fn most(values: impl Iterator<Item = f64>, part: f64) -> Option<[f64; 2]> {
+    /// Values that are too few to tell.
+    const FEW: usize = 8;
+    const FENCE: f64 = 4.0;
+    let mut sorted: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let count = sorted.len();
+    if count < FEW {
+        return None;
+    }
+    let [low, high] = [sorted[count / 4], sorted[count - 1 - count / 4]];
+    let reach = FENCE * (high - low);
+    sorted.retain(|value| (low - reach..=high + reach).contains(value));
+    let far = count - sorted.len();
+    let are_few = far > 0 && (far == 1 || far as f64 <= part * count as f64);
+    let ends = sorted.first().copied().zip(sorted.last().copied());
+    ends.filter(|_| are_few && low < high).map(|(low, high)| [low, high])
+}
+
+/// What a panel says of what lies outside it.
+fn outside(count: u64, all: u64, what: &str, farthest: f64) -> String {
+    if count == 0 {
+        return String::new();
+    }
+    format!("{count} of {all} {what} outside, as far as {}", in_digits(farthest, 3).replace('-', "−"))
+}
+
 /// The color of a class or channel.
 fn color(portrait: &Portrait, index: usize) -> Color {
     match portrait.groups.len() {
         3 => [Color::Vermillion, Color::Green, Color::Blue][index],
         _ => Color::of_index(index),
-    }
-}
-
-/// The unit of a group in brackets behind a name; nothing where it is 1.
-fn with_unit(portrait: &Portrait, words: &str) -> String {
-    match portrait.unit.as_str() {
-        "1" | "unspecified" => words.to_owned(),
-        unit => format!("{words} / {}", typeset(unit)),
     }
 }
 
@@ -84,29 +156,27 @@ fn in_words(text: &str) -> Panel {
     panel
 }
 
-fn histogram(portrait: &Portrait) -> Panel {
-    let mut panel = Panel::new(
-        Axis::linear(&with_unit(portrait, words_of_reference(portrait))),
-        Axis::linear(&match portrait.unit.as_str() {
-            "1" | "unspecified" => "density".to_owned(),
-            unit => format!("share per {}", typeset(unit)),
-        }),
-    );
+fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
+    let density = if scale.unit.is_empty() { "density".to_owned() } else { format!("share per {}", scale.unit) };
+    let x = Axis::linear(&scale.with_unit(words_of_reference(portrait)));
+    let mut panel = Panel::new(x, Axis::linear(&density));
     let (mut highest, mut laws) = (0.0_f64, Vec::new());
-    for (index, group) in portrait.groups.iter().enumerate() {
-        let (Some(reference), Some(std)) = (reference(group), group.std().filter(|std| *std > 0.0)) else { continue };
+    let (mut beyond, mut all, mut farthest) = (0, 0, 0.0_f64);
+    for (color, group) in scale.groups(portrait) {
+        let Some(reference) = reference(group) else { continue };
+        let Some([from, to]) = group.histogram.middle(LEFT_OUT) else { continue };
         #[expect(clippy::cast_possible_truncation, reason = "a few bins; casts saturate")]
-        let times = ((BIN * std / group.histogram.width).round() as i64).max(1);
+        let times = (((to - from) / BINS / group.histogram.width).round() as i64).max(1);
         let bins = group.histogram.merged(times);
-        let total = bins.total() as f64;
-        let is_shown = |begin: f64| (begin - reference).abs() <= REACH * std + bins.width;
-        let (mut steps, mut predicted) = (Vec::new(), Vec::new());
-        let shown: Vec<i64> = bins.counts.keys().copied().filter(|bin| is_shown(bins.begin(*bin))).collect();
+        let total = bins.total();
+        let room = BEYOND * (to - from) + bins.width;
+        let is_shown = |bin: i64| (from - room..to + room).contains(&bins.begin(bin));
+        let shown: Vec<i64> = bins.counts.keys().copied().filter(|bin| is_shown(*bin)).collect();
         let (Some(first), Some(last)) = (shown.first(), shown.last()) else { continue };
+        let (mut steps, mut predicted) = (Vec::new(), Vec::new());
         for bin in *first..=*last {
             let (from, to) = (bins.begin(bin), bins.begin(bin + 1));
-            let count = bins.counts.get(&bin).copied().unwrap_or(0);
-            let density = count as f64 / total / bins.width;
+            let density = bins.counts.get(&bin).copied().unwrap_or(0) as f64 / total as f64 / bins.width;
             highest = highest.max(density);
             steps.extend([[from - reference, density], [to - reference, density]]);
             if let Some(foreseen) = &group.predicted {
@@ -114,8 +184,12 @@ fn histogram(portrait: &Portrait) -> Panel {
                 predicted.push([middle, share_between(foreseen, portrait.is_whole, from, to) / bins.width]);
             }
         }
-        panel.add(&group.name, color(portrait, index), Marks::Line(steps));
+        panel.add(&group.name, color, Marks::Line(steps));
         laws.extend(group.predicted.as_ref().map(|foreseen| (words_of_law(foreseen, portrait.is_whole), predicted)));
+        let within: u64 = bins.counts.range(first..=last).map(|(_, count)| count).sum();
+        (beyond, all) = (beyond + total - within, all + total);
+        let ends = bins.ends.map(|end| end - reference);
+        farthest = ends.into_iter().filter(|_| within < total).fold(farthest, farther);
     }
     for (index, (words, predicted)) in laws.into_iter().enumerate() {
         panel.add(if index == 0 { &words } else { "" }, Color::Black, Marks::Dashed(predicted));
@@ -123,7 +197,13 @@ fn histogram(portrait: &Portrait) -> Panel {
     if highest > 0.0 {
         panel.y = panel.y.range(0.0, HEADROOM * highest);
     }
+    panel.title = outside(beyond, all, "samples", farthest);
     panel
+}
+
+/// Of two deviations the larger.
+fn farther(one: f64, other: f64) -> f64 {
+    if other.abs() > one.abs() { other } else { one }
 }
 
 /// What the predicted law is called.
@@ -148,23 +228,31 @@ fn share_between(foreseen: &Foreseen, is_whole: bool, from: f64, to: f64) -> f64
     below(to) - below(from)
 }
 
-/// Means of columns (axis 0) or rows (axis 1).
-fn profile(portrait: &Portrait, axis: usize) -> Panel {
+/// Means of columns (axis 0) or rows (axis 1); nothing of a single one.
+fn profile(portrait: &Portrait, scale: &Scale, axis: usize) -> Panel {
     let one = ["column", "row"][axis];
     let along = match portrait.groups.first().map_or(1, |group| group.profiles[axis].step) {
         1 => one.to_owned(),
         step => format!("{one}, {step} together"),
     };
     let words = words_of_reference(portrait).replace("sample", "mean").replace("− mean", "− that of all");
-    let mut panel = Panel::new(Axis::linear(&along), Axis::linear(&with_unit(portrait, &words)));
-    let mut bands = Vec::new();
-    for (index, group) in portrait.groups.iter().enumerate() {
+    let mut panel = Panel::new(Axis::linear(&along), Axis::linear(&scale.with_unit(&words)));
+    let (mut bands, mut means) = (Vec::new(), Vec::new());
+    for (color, group) in scale.groups(portrait) {
         let Some(reference) = reference(group) else { continue };
         let points: Vec<[f64; 2]> = group.profiles[axis].points().map(|[at, mean]| [at, mean - reference]).collect();
-        let Some(([first, _], [last, _])) = points.first().copied().zip(points.last().copied()) else { continue };
-        panel.add("", color(portrait, index), Marks::Line(points));
+        let [[first, _], .., [last, _]] = points[..] else { continue };
+        means.extend(points.iter().map(|[_, mean]| *mean));
+        panel.add(&group.name, color, Marks::Line(points));
         let band = group.predicted.as_ref().and_then(|foreseen| foreseen.profile_std);
-        bands.extend(band.map(|stds| (color(portrait, index), stds[axis], [first, last])));
+        bands.extend(band.map(|stds| (color, stds[axis], [first, last])));
+    }
+    if let Some([low, high]) = most(means.iter().copied(), FEW_LINES) {
+        let far = means.iter().copied().filter(|mean| !(low..=high).contains(mean));
+        let farthest = far.clone().fold(0.0, farther);
+        panel.title = outside(far.count() as u64, means.len() as u64, &format!("{one}s"), farthest);
+        let widest = bands.iter().map(|(_, std, _)| *std).fold(0.0, f64::max);
+        panel.y = panel.y.range(f64::min(low, -widest), f64::max(high, widest)).widened(0.05);
     }
     if !bands.is_empty() {
         // For the legend: each class or channel has its own, in its color.
@@ -178,7 +266,7 @@ fn profile(portrait: &Portrait, axis: usize) -> Panel {
     panel
 }
 
-/// Correlations along x (axis 0) or y (axis 1).
+/// Correlations along x (axis 0) or y (axis 1); nothing where there are no pairs.
 fn correlation(portrait: &Portrait, axis: usize) -> Panel {
     /// How far groups stand beside each other, as a part of the distance of lags.
     const APART: f64 = 0.14;
@@ -188,6 +276,9 @@ fn correlation(portrait: &Portrait, axis: usize) -> Panel {
     for (index, group) in portrait.groups.iter().enumerate() {
         let correlations = &group.correlations[axis];
         let Some(step) = correlations.first().map(|first| first.lag as f64) else { continue };
+        if correlations.iter().all(|one| one.value.is_none()) {
+            continue;
+        }
         let beside = APART * step * (index as f64 - 0.5 * (portrait.groups.len() - 1) as f64);
         let seen = || correlations.iter().filter_map(|one| Some((one.lag as f64 + beside, one.value?, one.error)));
         panel.add(
@@ -229,7 +320,8 @@ fn chromaticity(portrait: &Portrait, region: &RegionReport) -> Option<Panel> {
     panel.equal_scale = true;
     let place = |[x, y, z]: [f64; 3]| [x / (x + y + z), y / (x + y + z)];
     let pixels: Vec<[f64; 2]> = portrait.pixels.iter().copied().map(place).collect();
-    panel.add(&format!("{} of the pixels", pixels.len()), Color::SkyBlue, Marks::Points(pixels));
+    let ranges = [0, 1].map(|axis| most(pixels.iter().map(|pixel| pixel[axis]), FEW_PIXELS));
+    panel.add(&format!("{} of the pixels", pixels.len()), Color::SkyBlue, Marks::Points(pixels.clone()));
     let measured = portrait.groups.iter().map(Likeness::mean).collect::<Option<Vec<_>>>();
     let covariance = region.covariance.as_deref();
     let ellipses = [
@@ -251,7 +343,36 @@ fn chromaticity(portrait: &Portrait, region: &RegionReport) -> Option<Panel> {
         let marks = if color == Color::Blue { Marks::Line(points) } else { Marks::Dashed(points) };
         panel.add(name, color, marks);
     }
+    keep_most(&mut panel, &pixels, ranges);
     Some(panel)
+}
+
+/// Ends the axes of chromaticities where those of most pixels end, or the ellipses, where a few pixels are far off.
+fn keep_most(panel: &mut Panel, pixels: &[[f64; 2]], ranges: [Option<[f64; 2]>; 2]) {
+    if ranges.iter().all(Option::is_none) {
+        return;
+    }
+    let ellipses: Vec<[f64; 2]> = panel
+        .series
+        .iter()
+        .filter_map(|series| match &series.marks {
+            Marks::Line(points) | Marks::Dashed(points) => Some(points.clone()),
+            _ => None,
+        })
+        .flatten()
+        .collect();
+    let range = |axis: usize| {
+        let own = ranges[axis].unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+        let others = if ranges[axis].is_some() { [].iter() } else { pixels.iter() };
+        let all = ellipses.iter().chain(others).map(|point| point[axis]).filter(|value| value.is_finite());
+        all.fold(own, |[low, high], value| [low.min(value), high.max(value)])
+    };
+    let [x, y] = [range(0), range(1)];
+    let is_within = |pixel: &&[f64; 2]| (x[0]..=x[1]).contains(&pixel[0]) && (y[0]..=y[1]).contains(&pixel[1]);
+    let far = pixels.len() - pixels.iter().filter(is_within).count();
+    panel.x = panel.x.clone().range(x[0], x[1]).widened(0.05);
+    panel.y = panel.y.clone().range(y[0], y[1]).widened(0.05);
+    panel.title = if far > 0 { format!("{far} of {} pixels outside", pixels.len()) } else { String::new() };
 }
 
 /// The ellipse of chromaticities about a mean of XYZ with a covariance, to first order.

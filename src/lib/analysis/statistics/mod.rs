@@ -8,6 +8,7 @@ pub mod check;
 mod expectation;
 mod grids;
 mod groups;
+pub mod histogram;
 mod laws;
 mod levels;
 mod measure;

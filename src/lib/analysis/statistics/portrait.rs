@@ -1,6 +1,7 @@
 //! What a figure of a region shows beside its moments: histograms, profiles, autocorrelations and some of its pixels, each beside
 //! what is predicted of it.
 
+use super::histogram::Histogram;
 use super::region::Region;
 use crate::cfa::{Class, FilterArray};
 use crate::metadata::FrameHeader;
@@ -9,14 +10,12 @@ use crate::propagation::taps::pooled;
 use crate::propagation::{FramePrediction, PixelMoments, gains};
 use crate::stream::{Passing, RowSource};
 use crate::units::QuantityKind;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 /// Lags of the autocorrelation, in pixels, or in periods of a filter array.
 pub const LAGS: usize = 8;
 /// Profiles have at most so many points; each is the mean of as many rows or columns as it takes.
 const MOST_POINTS: usize = 250;
-/// Histograms have at most so many bins at a time.
-const MOST_BINS: usize = 4096;
 /// So many pixels, evenly spread, are kept as they are.
 const KEPT_PIXELS: usize = 500;
 /// Of more channels the first are shown.
@@ -77,17 +76,6 @@ pub struct Foreseen {
     pub profile_std: Option<[f64; 2]>,
     /// Correlations along x, and along y, at each lag; none as before.
     pub correlations: Option<[Vec<f64>; 2]>,
-}
-
-/// Numbers of samples in bins of one width.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Histogram {
-    /// Width of a bin; bin k begins at k widths, less half of one of whole numbers.
-    pub width: f64,
-    /// Where bins begin: −½ of whole numbers, which lie in the middle of theirs.
-    pub shift: f64,
-    /// Samples in each.
-    pub counts: BTreeMap<i64, u64>,
 }
 
 /// Means along one direction.
@@ -329,11 +317,7 @@ impl Likeness {
             |axis: usize| Profile { step: steps[axis], sums: vec![(0.0, 0); size[axis].div_ceil(steps[axis])] };
         Self {
             name: name.to_owned(),
-            histogram: Histogram {
-                width: if is_codes { 1.0 } else { 0.0 },
-                shift: if is_codes { -0.5 } else { 0.0 },
-                counts: BTreeMap::new(),
-            },
+            histogram: Histogram::new(is_codes),
             profiles: [profile(0), profile(1)],
             correlations: [Vec::new(), Vec::new()],
             predicted,
@@ -400,50 +384,6 @@ impl Pairs {
     fn covariance(&self) -> f64 {
         let n = self.count as f64;
         self.product / n - self.first / n * (self.second / n)
-    }
-}
-
-impl Histogram {
-    /// Takes in finite samples; the first tell the width of bins, which doubles when they become too many.
-    fn add(&mut self, samples: impl Iterator<Item = f64> + Clone) {
-        if self.width == 0.0 {
-            let [low, high] =
-                samples.clone().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
-            if low > high {
-                return;
-            }
-            // A power of two, so that halves of bins meet exactly; at least what a sample can tell.
-            let finest = (high.abs().max(low.abs()) * f64::from(f32::EPSILON)).max(f64::from(f32::MIN_POSITIVE));
-            self.width = ((high - low) / 256.0).max(finest).log2().floor().exp2();
-        }
-        for sample in samples {
-            #[expect(clippy::cast_possible_truncation, reason = "a bin; casts saturate")]
-            let bin = (sample / self.width - self.shift).floor() as i64;
-            *self.counts.entry(bin).or_default() += 1;
-            while self.counts.len() > MOST_BINS {
-                *self = self.merged(2);
-            }
-        }
-    }
-
-    /// The same with bins so many times as wide.
-    #[must_use]
-    pub fn merged(&self, times: i64) -> Self {
-        let mut counts = BTreeMap::new();
-        for (bin, count) in &self.counts {
-            *counts.entry(bin.div_euclid(times)).or_default() += count;
-        }
-        Self { width: self.width * times as f64, shift: self.shift / times as f64, counts }
-    }
-
-    /// Where a bin begins.
-    pub fn begin(&self, bin: i64) -> f64 {
-        (bin as f64 + self.shift) * self.width
-    }
-
-    /// Samples in all bins.
-    pub fn total(&self) -> u64 {
-        self.counts.values().sum()
     }
 }
 

@@ -92,6 +92,48 @@ fn points_of_one_name_that_touch_share_it() {
 }
 
 #[test]
+fn names_of_one_color_whose_marks_hide_each_other_stand_together() {
+    let mut panel = Panel::new(Axis::linear("x").range(0.0, 10.0), Axis::linear("y").range(0.0, 10.0));
+    panel.add("", Color::Blue, Marks::Points(vec![[5.0, 5.0], [5.01, 5.0], [8.0, 5.0]]));
+    for (x, text) in [(5.0, "piz"), (5.01, "zips"), (8.0, "zip")] {
+        panel.name([x, 5.0], text, Color::Blue);
+    }
+    let words: Vec<String> = words(&Plot::new("", panel)).into_iter().map(|(word, _)| word).collect();
+    assert!(words.contains(&"piz, zips".into()) && words.contains(&"zip".into()), "{words:?}");
+    assert!(!words.contains(&"zips".into()), "{words:?}");
+}
+
+/// A legend above one panel lowers the frame beside it, which was just high enough for its own.
+#[test]
+fn no_legend_is_lost_beside_another() {
+    let mut panel = Panel::new(Axis::linear("x").range(0.0, 10.0), Axis::linear("y").range(0.0, 10.0));
+    let zigzag = |step: f64| (0..200).map(|i| [f64::from(i) * 0.05, if i % 2 == 0 { 0.0 } else { step }]).collect();
+    panel.add("low", Color::Blue, Marks::Line(zigzag(1.0)));
+    let mut full = panel.clone();
+    for index in 0..6 {
+        full.add(&format!("a series with a long name, {index}"), Color::of_index(index), Marks::Line(zigzag(10.0)));
+    }
+    for height in [2.0, 4.0, 6.0, 6.5, 7.0, 7.25, 7.5, 7.75, 8.0, 8.25, 8.5, 8.75] {
+        let mut panel = panel.clone();
+        panel.add("high", Color::Vermillion, Marks::Line(zigzag(height)));
+        let plot = Plot { title: "t".into(), panels: vec![panel, full.clone()], arrangement: Arrangement::Pairs };
+        let words: Vec<String> = words(&plot).into_iter().map(|(word, _)| word).collect();
+        assert!(words.contains(&"high".into()) && words.contains(&"low".into()), "{height}: {words:?}");
+    }
+}
+
+#[test]
+fn words_of_a_panel_without_axes_stay_within_its_cell() {
+    let mut panel = Panel::new(Axis::linear(""), Axis::linear(""));
+    (panel.has_axes, panel.title) = (false, "a long sentence of many words ".repeat(8));
+    let panels = vec![panel, two_panels().panels[0].clone()];
+    let plot = Plot { title: String::new(), panels, arrangement: Arrangement::Pairs };
+    let said: Vec<_> = words(&plot).into_iter().filter(|(word, _)| word.contains("sentence")).collect();
+    assert!(said.len() > 2);
+    assert!(said.iter().all(|(_, [left, _, right, _])| *left >= 0.0 && *right <= 520.0), "{said:?}");
+}
+
+#[test]
 fn every_series_is_seen_though_others_lie_over_it() {
     let places = vec![[1.0, 1.0], [2.0, 3.0], [3.0, 2.0]];
     let mut panel = Panel::new(Axis::linear("x").range(0.0, 4.0), Axis::linear("y").range(0.0, 4.0));

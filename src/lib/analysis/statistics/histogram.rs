@@ -1,0 +1,128 @@
+//! Numbers of samples by value, in bins that come with the samples.
+
+use std::collections::BTreeMap;
+
+/// Histograms have at most so many bins at a time.
+const MOST_BINS: usize = 4096;
+/// The bins that a histogram begins with are this part of the range of the middle two thirds of its first samples, or of all where
+/// these are the same.
+const FINEST: f64 = 64.0;
+/// Samples farther off are counted in this bin; doubles count no farther.
+const FARTHEST_BIN: f64 = 9e15;
+
+/// Numbers of samples in bins of one width.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Histogram {
+    /// Width of a bin; bin k begins at k widths, less half of one of whole numbers.
+    pub width: f64,
+    /// Where bins begin: −½ of whole numbers, which lie in the middle of theirs.
+    pub shift: f64,
+    /// Samples in each.
+    pub counts: BTreeMap<i64, u64>,
+    /// The lowest and the highest sample.
+    pub ends: [f64; 2],
+}
+
+impl Histogram {
+    /// No samples yet, codes or others.
+    pub(super) fn new(is_codes: bool) -> Self {
+        Self {
+            width: if is_codes { 1.0 } else { 0.0 },
+            shift: if is_codes { -0.5 } else { 0.0 },
+            counts: BTreeMap::new(),
+            ends: [f64::INFINITY, f64::NEG_INFINITY],
+        }
+    }
+
+    /// Takes in finite samples; the first tell the width of bins, which doubles when they become too many.
+    pub(super) fn add(&mut self, samples: impl Iterator<Item = f64> + Clone) {
+        if self.width == 0.0 {
+            let mut sorted: Vec<f64> = samples.clone().collect();
+            sorted.sort_by(f64::total_cmp);
+            let ([low, .., high] | [low @ high]) = sorted.as_slice() else { return };
+            // One sample far off makes no bins in which all others are one.
+            let sixth = sorted.len() / 6;
+            let middle = sorted[sorted.len() - 1 - sixth] - sorted[sixth];
+            let spread = if middle > 0.0 { middle } else { high - low };
+            // A power of two, so that halves of bins meet exactly; at least what a sample can tell.
+            let largest = sorted[sixth].abs().max(sorted[sorted.len() - 1 - sixth].abs());
+            let finest = (largest * f64::from(f32::EPSILON)).max(f64::from(f32::MIN_POSITIVE));
+            self.width = (spread / FINEST).max(finest).log2().floor().exp2();
+        }
+        for sample in samples {
+            self.ends = [self.ends[0].min(sample), self.ends[1].max(sample)];
+            #[expect(clippy::cast_possible_truncation, reason = "a bin that is no farther than doubles count")]
+            let bin = (sample / self.width - self.shift).floor().clamp(-FARTHEST_BIN, FARTHEST_BIN) as i64;
+            *self.counts.entry(bin).or_default() += 1;
+            while self.counts.len() > MOST_BINS {
+                *self = self.merged(2);
+            }
+        }
+    }
+
+    /// The same with bins so many times as wide.
+    #[must_use]
+    pub fn merged(&self, times: i64) -> Self {
+        let mut counts = BTreeMap::new();
+        for (bin, count) in &self.counts {
+            *counts.entry(bin.div_euclid(times)).or_default() += count;
+        }
+        Self { width: self.width * times as f64, shift: self.shift / times as f64, counts, ends: self.ends }
+    }
+
+    /// Where a bin begins.
+    pub fn begin(&self, bin: i64) -> f64 {
+        (bin as f64 + self.shift) * self.width
+    }
+
+    /// Samples in all bins.
+    pub fn total(&self) -> u64 {
+        self.counts.values().sum()
+    }
+
+    /// From where to where all samples lie but for this share of them at each end, and one where there are a few.
+    pub fn middle(&self, left_out: f64) -> Option<[f64; 2]> {
+        /// Of fewer samples none is left out.
+        const FEW: u64 = 20;
+        let total = self.total();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of the samples")]
+        let beyond = ((left_out * total as f64) as u64).max(u64::from(total >= FEW));
+        let reaches = |before: &mut u64, count: u64| {
+            *before += count;
+            *before > beyond
+        };
+        let (mut below, mut above) = (0, 0);
+        let first = self.counts.iter().find(|(_, count)| reaches(&mut below, **count))?.0;
+        let last = self.counts.iter().rev().find(|(_, count)| reaches(&mut above, **count))?.0;
+        Some([self.begin(*first), self.begin(last + 1)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn histogram(samples: &[f64]) -> Histogram {
+        let mut histogram = Histogram::new(false);
+        histogram.add(samples.iter().copied());
+        histogram
+    }
+
+    /// The middle of 0, 1 … 999, less 5 at each end, with a far sample or without; of few samples all.
+    #[test]
+    fn the_middle_leaves_out_what_is_far_and_bins_stay_fine() {
+        let mut samples: Vec<f64> = (0..1000).map(f64::from).collect();
+        for far in [0.0, -1e30, 1e30] {
+            samples[0] = far;
+            let histogram = histogram(&samples);
+            assert!(histogram.width <= 16.0, "{}", histogram.width);
+            let [low, high] = histogram.middle(0.005).unwrap();
+            assert!((5.0 - low).abs() <= 1.0 + histogram.width && (994.0 - high).abs() <= 1.0 + histogram.width);
+            assert_eq!(histogram.ends, [far.min(1.0), far.max(999.0)]);
+        }
+        let few = histogram(&[1.0, 2.0, 3.0, 100.0]);
+        let [low, high] = few.middle(0.005).unwrap();
+        assert!(low <= 1.0 && high >= 100.0);
+        assert_eq!(histogram(&[]).middle(0.005), None);
+    }
+}
