@@ -5,6 +5,7 @@ mod support;
 use cyanometer::color::ramp::ramp;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::picture::{PictureSettings, thumbnail};
+use cyanometer::units::QuantityKind;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// A picture that `preview` made.
@@ -88,6 +89,59 @@ fn planes_that_are_not_there_are_told() {
     }
     shop.run("preview xyz.exr --plane Y --range 0,100 -o gray.png", &[]);
     assert_eq!((Picture::read(&shop, "gray.png").width, Picture::read(&shop, "gray.png").height()), (8, 6));
+}
+
+/// A few numbers far off do not take the colors from all others, and are told; an even spread has all its numbers.
+#[test]
+fn false_colors_leave_numbers_far_off_to_the_ends() {
+    let shop = Workshop::new();
+    let ramp = ramp();
+    let mut numbers: Vec<f32> = (0..512_u16).map(f32::from).collect();
+    let picture = |numbers: &[f32]| {
+        let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+        std::fs::write(shop.path("row.bin"), bytes).unwrap();
+        shop.run("preview --raw 512x1:f32le row.bin --false-color -o row.png", &[]);
+        let picture = Picture::read(&shop, "row.png");
+        let corner = picture.width * (12 + 25) + 12;
+        (picture.height(), picture.pixels[corner..corner + 512].to_vec())
+    };
+    let (height, all) = picture(&numbers);
+    assert_eq!((all[0], all[511], all[256]), (ramp[0], ramp[255], ramp[128]));
+    numbers[7] = 1e6;
+    let (taller, others) = picture(&numbers);
+    // Ranks 2.555 and 508.445 of 511, where 7 has gone to the end: (257 − 2.555)/(509.445 − 2.555) · 255 = 128.0.
+    assert_eq!((others[7], others[257]), (ramp[255], ramp[128]));
+    assert!(others.windows(2).filter(|pair| pair[0] != pair[1]).count() > 200);
+    // A line below the picture says so.
+    assert_eq!(taller, height + 17);
+}
+
+/// One stretch for all planes: colors stay those of the light, of planes and of XYZ, which is not shown plane by plane.
+#[test]
+fn a_stretch_keeps_colors() {
+    let shop = Workshop::with_frames();
+    shop.run("render-radiance --electrons 9000,9000,3000 --size 40x30 -o planes.exr", &[]);
+    shop.run("preview planes.exr --range 0%,100% -o planes.png", &[]);
+    let pixel = Picture::read(&shop, "planes.png").pixels[0];
+    assert_eq!(pixel, [255, 255, 0], "white is the most of all planes, black the least");
+    // White light of D65 at four luminances, in a column, is gray from black to white.
+    let light = |luminance: f32| [0.950_46, 1.0, 1.089_06].map(|part| part * luminance);
+    shop.write_colors("light.exr", QuantityKind::Xyz, &[0.0, 10.0, 30.0, 40.0].map(light));
+    let shown = |range: &str| {
+        shop.run(&format!("preview light.exr --range {range} -o light.png"), &[]);
+        let pixels = Picture::read(&shop, "light.png").pixels;
+        // The four decimals of the matrix of sRGB are a code at most.
+        assert!(
+            pixels.iter().all(|[red, green, blue]| red.abs_diff(*green) < 2 && blue.abs_diff(*green) < 2),
+            "{pixels:?}"
+        );
+        pixels.iter().map(|pixel| pixel[1]).collect::<Vec<u8>>()
+    };
+    // A quarter and three quarters of white are codes 137 and 225.
+    assert_eq!(shown("0,40"), [0, 137, 225, 255]);
+    assert_eq!(shown("0%,100%"), [0, 137, 225, 255]);
+    // 20 of 30 is code 213.
+    assert_eq!(shown("10,40"), [0, 0, 213, 255]);
 }
 
 /// What is no number has a color that no number has, and the scale names it.

@@ -1,6 +1,8 @@
 //! Values of short fixed lists by their names: what options take and files hold.
 
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::de::{Deserializer, Error, Visitor};
+use std::fmt;
+use std::marker::PhantomData;
 
 /// A value of a short fixed list, known by a name on the command line and in files.
 pub trait Named: Copy + Send + Sync + 'static {
@@ -24,6 +26,13 @@ pub trait Named: Copy + Send + Sync + 'static {
     fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|value| value.all_names().any(|known| known.eq_ignore_ascii_case(name)))
     }
+}
+
+/// The place of a name among those that are known: as it is typed, or, where one alone is so, in another case.
+pub fn place_of<'a>(typed: &str, known: impl Iterator<Item = &'a str> + Clone) -> Option<usize> {
+    let mut others = known.clone().enumerate().filter(|(_, name)| name.eq_ignore_ascii_case(typed));
+    let other = || others.next().filter(|_| others.next().is_none()).map(|(place, _)| place);
+    known.clone().position(|name| name == typed).or_else(other)
 }
 
 /// The known name that is nearest to one that is typed, by letters that are added, left out, changed or swapped, the first of
@@ -52,11 +61,23 @@ pub fn nearest<'a>(
 ///
 /// The names that there are.
 pub(crate) fn deserialize<'de, T: Named, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
-    let name = String::deserialize(from)?;
-    T::named(&name).ok_or_else(|| {
-        let known: Vec<String> = T::ALL.iter().map(|value| format!("`{}`", value.name())).collect();
-        D::Error::custom(format_args!("unknown variant `{name}`, expected one of {}", known.join(", ")))
-    })
+    /// Finds the value inside the deserializer, which knows the place that a complaint is about.
+    struct Find<T>(PhantomData<T>);
+    impl<T: Named> Visitor<'_> for Find<T> {
+        type Value = T;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a name")
+        }
+
+        fn visit_str<E: Error>(self, name: &str) -> Result<T, E> {
+            T::named(name).ok_or_else(|| {
+                let known: Vec<String> = T::ALL.iter().map(|value| format!("`{}`", value.name())).collect();
+                E::custom(format_args!("unknown variant `{name}`, expected one of {}", known.join(", ")))
+            })
+        }
+    }
+    from.deserialize_str(Find(PhantomData))
 }
 
 /// Makes files hold a value by its name.
@@ -106,6 +127,13 @@ mod tests {
     }
 
     serde_by_name!(Meal);
+
+    #[test]
+    fn a_name_is_found_in_another_case_where_no_other_is_so() {
+        let place = |typed: &str| place_of(typed, ["x", "y", "Y", "sigma.Y"].into_iter());
+        assert_eq!(["y", "Y", "X", "SIGMA.y", "z"].map(place), [Some(1), Some(2), Some(0), Some(3), None]);
+        assert_eq!(place_of("A", ["a", "ä", "a"].into_iter()), None);
+    }
 
     #[test]
     fn one_name_is_written_and_all_are_read() {

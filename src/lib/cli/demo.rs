@@ -32,9 +32,9 @@ const STEPS: [(&str, &[&str]); 4] = [
     (
         "Pictures of it",
         &[
-            "preview 4-mosaic.tiff -o 4-mosaic.png",
+            "preview --caption 4-mosaic.tiff -o 4-mosaic.png",
             "to-xyz --matrix matrix.yaml --space srgb --white-luminance 30000 --quiet 5-rgb.exr -o 7-view.tiff",
-            "preview 7-view.tiff -o 7-view.png",
+            "preview --caption 7-view.tiff -o 7-view.png",
         ],
     ),
     (

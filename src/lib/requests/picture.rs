@@ -84,8 +84,8 @@ pub struct PictureOptions {
     #[arg(long, value_name = "N", conflicts_with = "zoom", value_parser = RangedU64ValueParser::<usize>::new().range(16..=8192))]
     fit: Option<usize>,
     /// What is black and what is white, or the ends of the false colors: full, LOW,HIGH in the unit of the samples, LOW%,HIGH%
-    /// of the pixels of each plane, or so many standard deviations about the mean of each plane, as in 4sigma; by default full,
-    /// in false color 0%,100%
+    /// of the pixels, all planes together, of XYZ of its luminances, or so many standard deviations about the mean of each plane,
+    /// as in 4sigma; by default full, in false color 0%,100%, or 0.5%,99.5% where a few pixels would stretch that to more than twice its length
     #[arg(long, value_name = "full|LOW,HIGH|LOW%,HIGH%|Nsigma", value_parser = range, allow_hyphen_values = true)]
     range: Option<Range>,
     /// Say below the picture what is seen: in these words, or by the frame's name, what it holds, mean and standard deviation;

@@ -41,7 +41,8 @@ pub struct PictureSettings {
     pub plane: Option<String>,
     /// Whether a plane is shown in false color, with a scale.
     pub false_color: bool,
-    /// What is black and what is white; the full range of the stage where there is none, in false color all that is shown.
+    /// What is black and what is white; the full range of the stage where there is none, in false color all that is shown, or all but
+    /// a few pixels far off.
     pub range: Option<Range>,
     /// Whether what is seen is said below the picture: in these words, or, where they are empty, by what the frame holds.
     pub caption: Option<String>,
@@ -60,7 +61,10 @@ pub fn write_png(source: &mut dyn RowSource, settings: &PictureSettings, path: &
     let shown = Shown::of(source, settings)?;
     match shown.bar {
         None => encode(&shown.bytes, shown.size, shown.samples_per_pixel, path),
-        Some(_) => write_sheet(vec![shown.tile(String::new(), Vec::new())], 1, path),
+        Some(_) => {
+            let caption = shown.scale.iter().cloned().collect();
+            write_sheet(vec![shown.tile(String::new(), caption)], 1, path)
+        }
     }
 }
 
@@ -171,7 +175,7 @@ struct Shown {
     samples_per_pixel: usize,
     bytes: Vec<u8>,
     bar: Option<ScaleBar>,
-    /// What is black and what is white, where there is no bar.
+    /// What is black and what is white, or what lies beyond the ends of the bar.
     scale: Option<String>,
 }
 
@@ -188,14 +192,15 @@ impl Shown {
         let zoom = settings.zoom.max(1);
         let size = reduced.size.map(|side| side * zoom);
         if settings.false_color {
-            let range = settings.range.unwrap_or(Range::Shares(0.0, 1.0));
+            let range = settings.range.unwrap_or_else(|| shade::usual_range(reduced));
             let (low, high) = shade::one_range(frame, range, reduced)?;
             let colors = ramp();
             let bytes = zoomed(&reduced.in_false_color((low, high), &colors, MISSING), reduced.size, 3, zoom);
             let missing = reduced.samples.iter().any(|sample| !sample.is_finite());
             let missing = missing.then(|| (MISSING, "not finite".to_owned()));
             let bar = ScaleBar { label: choice.label(frame), range: (low, high), colors, missing };
-            return Ok(Self { size, samples_per_pixel: 3, bytes, bar: Some(bar), scale: None });
+            let scale = shade::beyond(reduced, (low, high), range);
+            return Ok(Self { size, samples_per_pixel: 3, bytes, bar: Some(bar), scale });
         }
         let shade = Shade::new(frame, settings.range.unwrap_or(Range::Full), reduced)?;
         let planes = reduced.planes;

@@ -4,6 +4,7 @@ use crate::analysis::comparison::MAP_CHANNELS;
 use crate::error::{Error, Result};
 use crate::frame::bare_name;
 use crate::metadata::FrameHeader;
+use crate::names::place_of;
 use crate::stages::saturation::MASK_LAYER;
 use crate::units::{QuantityKind, typeset};
 
@@ -43,13 +44,14 @@ impl Choice {
                 ))),
             };
         };
-        let filter = filters(frame).into_iter().find(|filter| name == filter.to_string());
-        if filter.is_some() {
-            return Ok(Self { channels: vec![0], filter });
+        let filters = filters(frame);
+        let letters: Vec<String> = filters.iter().map(char::to_string).collect();
+        if let Some(place) = place_of(name, letters.iter().map(String::as_str)) {
+            return Ok(Self { channels: vec![0], filter: Some(filters[place]) });
         }
-        let place = (0..channels.len())
-            .find(|place| plane_name(frame, *place) == name)
-            .or_else(|| channels.iter().position(|channel| channel == name));
+        let names: Vec<String> = (0..channels.len()).map(|place| plane_name(frame, place)).collect();
+        let place = place_of(name, names.iter().map(String::as_str))
+            .or_else(|| place_of(name, channels.iter().map(String::as_str)));
         place
             .map(|place| all(&[place]))
             .ok_or_else(|| Error::Usage(format!("{}: there is no plane `{name}`; it has {}", frame.name, known(frame))))
@@ -222,7 +224,16 @@ mod tests {
         let find = |frame: &FrameHeader, name| {
             Choice::of(frame, Some(name), true).map(|choice| (choice.channels[0], choice.filter))
         };
-        for (name, place) in [("Y", 1), ("G", 1), ("sigma.Y", 5), ("sigma.G", 5), ("mask", 6), ("covariance.XX", 3)] {
+        for (name, place) in [
+            ("Y", 1),
+            ("y", 1),
+            ("Sigma.y", 5),
+            ("G", 1),
+            ("sigma.Y", 5),
+            ("sigma.G", 5),
+            ("mask", 6),
+            ("covariance.XX", 3),
+        ] {
             assert_eq!(find(&xyz, name).unwrap(), (place, None), "{name}");
         }
         let complaint = find(&xyz, "sigma").unwrap_err().to_string();

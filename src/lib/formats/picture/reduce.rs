@@ -128,16 +128,12 @@ impl Reduced {
     /// The values that have these shares of the finite pixels of a plane below them, linear between neighbors: type 7 of
     /// \[Hyndman1996]. None where no pixel is finite.
     pub fn quantiles<const N: usize>(&self, plane: usize, shares: [f64; N]) -> Option<[f64; N]> {
-        let mut finite: Vec<f32> = self.plane(plane).flatten().copied().filter(|sample| sample.is_finite()).collect();
-        finite.par_sort_unstable_by(f32::total_cmp);
-        let last = finite.len().checked_sub(1)?;
-        Some(shares.map(|share| {
-            let rank = share * last as f64;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the last")]
-            let below = (rank.floor() as usize).min(last);
-            let [low, high] = [finite[below], finite[(below + 1).min(last)]].map(f64::from);
-            low + (rank - below as f64) * (high - low)
-        }))
+        quantiles(self.plane(plane).flatten().copied(), shares)
+    }
+
+    /// The same of the pixels of all planes together.
+    pub fn quantiles_of_all<const N: usize>(&self, shares: [f64; N]) -> Option<[f64; N]> {
+        quantiles(self.samples.iter().copied(), shares)
     }
 
     /// The bytes of the first plane, its numbers along `colors` from one to another.
@@ -150,6 +146,19 @@ impl Reduced {
         };
         self.samples.par_iter().map(color).collect::<Vec<_>>().into_flattened()
     }
+}
+
+fn quantiles<const N: usize>(samples: impl Iterator<Item = f32>, shares: [f64; N]) -> Option<[f64; N]> {
+    let mut finite: Vec<f32> = samples.filter(|sample| sample.is_finite()).collect();
+    finite.par_sort_unstable_by(f32::total_cmp);
+    let last = finite.len().checked_sub(1)?;
+    Some(shares.map(|share| {
+        let rank = share * last as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the last")]
+        let below = (rank.floor() as usize).min(last);
+        let [low, high] = [finite[below], finite[(below + 1).min(last)]].map(f64::from);
+        low + (rank - below as f64) * (high - low)
+    }))
 }
 
 /// Moments of the samples of each plane, or of each class of a CFA plane.

@@ -2,7 +2,7 @@
 
 use super::planes::rounded;
 use super::reduce::Reduced;
-use crate::color::{linear_srgb_from_xyz, srgb_decode, srgb_encode};
+use crate::color::{D65_XY, linear_srgb_from_xyz, srgb_decode, srgb_encode, xyz_of_chromaticity};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::units::{QuantityKind, typeset};
@@ -16,18 +16,22 @@ pub enum Range {
     Full,
     /// In each plane by itself, from so many standard deviations below its mean to as many above.
     Deviations(f64),
-    /// In each plane by itself, from the sample that this share of all is below to another such one.
+    /// From the sample that this share of all is below to another such one, of all planes of a color picture together; of XYZ, of its
+    /// luminances.
     Shares(f64, f64),
-    /// From one value to another, in the unit of the samples.
+    /// From one value to another, in the unit of the samples; of XYZ, of the luminance of white light.
     Values(f64, f64),
 }
+
+/// The plane of XYZ that is luminance.
+const LUMINANCE: usize = 1;
 
 /// From samples to display values.
 pub(super) enum Shade {
     /// Each plane by itself, from its black to its white.
     Planes(Vec<(f64, f64)>),
-    /// XYZ through the matrix to linear sRGB.
-    Xyz(nalgebra::Matrix3<f64>),
+    /// XYZ through the matrix to linear light of the primaries of sRGB, from its black to its white.
+    Xyz(nalgebra::Matrix3<f64>, (f64, f64)),
     /// Encoded already.
     Encoded,
 }
@@ -41,7 +45,13 @@ impl Shade {
     pub fn new(frame: &FrameHeader, range: Range, reduced: &Reduced) -> Result<Self> {
         let planes = 0..reduced.planes;
         let none = || frame.refuse("none of its pixels has a number that is finite; there is nothing to show");
+        let is_xyz = frame.metadata.quantity == QuantityKind::Xyz && reduced.planes == 3;
         match range {
+            Range::Values(low, high) if is_xyz => Self::xyz(frame, (low, high)),
+            Range::Shares(low, high) if is_xyz => {
+                let ends = reduced.quantiles(LUMINANCE, [low, high]).ok_or_else(none)?;
+                Self::xyz(frame, ends.into())
+            }
             Range::Values(low, high) => Self::planes(frame, vec![(low, high); reduced.planes]),
             Range::Deviations(count) => {
                 let about = |plane| {
@@ -52,8 +62,9 @@ impl Shade {
                 Self::planes(frame, planes.map(about).collect())
             }
             Range::Shares(low, high) => {
-                let between = |plane| reduced.quantiles(plane, [low, high]).map(|[low, high]| (low, high));
-                Self::planes(frame, planes.map(between).collect::<Option<_>>().ok_or_else(none)?)
+                // One stretch for all planes keeps their colors.
+                let ends = reduced.quantiles_of_all([low, high]).ok_or_else(none)?;
+                Self::planes(frame, vec![ends.into(); reduced.planes])
             }
             Range::Full => Self::full(frame, reduced),
         }
@@ -84,7 +95,7 @@ impl Shade {
                          --white-luminance CD_PER_M2`",
                     )
                 })?;
-                return Ok(Self::Xyz(linear_srgb_from_xyz(white)));
+                return Ok(Self::Xyz(linear_srgb_from_xyz(white), (0.0, 1.0)));
             }
             QuantityKind::ExpectedElectrons | QuantityKind::Electrons => {
                 let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
@@ -111,6 +122,12 @@ impl Shade {
             }
         };
         Self::planes(frame, vec![ends; reduced.planes])
+    }
+
+    /// XYZ from one luminance of white light to another.
+    fn xyz(frame: &FrameHeader, ends: (f64, f64)) -> Result<Self> {
+        Self::planes(frame, vec![ends])?;
+        Ok(Self::Xyz(light(frame), ends))
     }
 
     fn planes(frame: &FrameHeader, ranges: Vec<(f64, f64)>) -> Result<Self> {
@@ -141,7 +158,10 @@ impl Shade {
                 let ranges: Vec<String> = names.iter().zip(ranges).map(range).collect();
                 Some(format!("black to white: {}{unit}", ranges.join(", ")))
             }
-            Self::Xyz(_) | Self::Encoded => {
+            Self::Xyz(_, (low, high)) if (*low, *high) != (0.0, 1.0) => {
+                Some(format!("black {}, white {}{unit}", rounded(*low), rounded(*high)))
+            }
+            Self::Xyz(..) | Self::Encoded => {
                 let white = frame.metadata.color.as_ref()?.white?;
                 let [_, luminance, _] = white;
                 Some(format!("white {} cd m⁻²", rounded(luminance)))
@@ -169,16 +189,26 @@ impl Shade {
                         *byte = curve.code((sample(place % planes, place / planes) - low) / (high - low));
                     }
                 }
-                Self::Xyz(matrix) => {
+                Self::Xyz(matrix, (low, high)) => {
                     for (x, pixel) in bytes.chunks_exact_mut(3).enumerate() {
                         let linear = matrix * Vector3::from_fn(|plane, _| sample(plane, x));
-                        pixel.iter_mut().zip(&linear).for_each(|(byte, value)| *byte = curve.code(*value));
+                        let code = |value: &f64| curve.code((value - low) / (high - low));
+                        pixel.iter_mut().zip(&linear).for_each(|(byte, value)| *byte = code(value));
                     }
                 }
             }
         });
         bytes
     }
+}
+
+/// From XYZ to linear light of the primaries of sRGB, 1 of white light of the luminance 1; white is that of the metadata, or D65.
+fn light(frame: &FrameHeader) -> nalgebra::Matrix3<f64> {
+    let white = frame.metadata.color.as_ref().and_then(|color| color.white);
+    let white = white.filter(|[_, luminance, _]| *luminance > 0.0);
+    linear_srgb_from_xyz(
+        white.map_or_else(|| xyz_of_chromaticity(D65_XY, 1.0), |white| white.map(|part| part / white[1])),
+    )
 }
 
 /// The code of a value of 0 to 1; 0 of NaN.
@@ -234,6 +264,30 @@ pub(super) fn is_picture(frame: &FrameHeader, range: Option<Range>) -> bool {
     }
 }
 
+/// What the ends of the false colors are where nobody says: all numbers; or, where a few would stretch that to more than twice its
+/// length, the middle 99 % of the pixels.
+pub(super) fn usual_range(reduced: &Reduced) -> Range {
+    const MIDDLE: [f64; 2] = [0.005, 0.995];
+    const MOST: f64 = 2.0;
+    match reduced.quantiles(0, [0.0, MIDDLE[0], MIDDLE[1], 1.0]) {
+        Some([least, low, high, most]) if low < high && most - least > MOST * (high - low) => {
+            Range::Shares(MIDDLE[0], MIDDLE[1])
+        }
+        _ => Range::Shares(0.0, 1.0),
+    }
+}
+
+/// What of the numbers of a single plane lies beyond the ends of the colors, in words.
+pub(super) fn beyond(reduced: &Reduced, (low, high): (f64, f64), range: Range) -> Option<String> {
+    let [least, most] = reduced.quantiles(0, [0.0, 1.0])?;
+    let ends = match range {
+        Range::Shares(low, high) => format!("colors end at {} % and {} %; ", 100.0 * low, 100.0 * high),
+        _ => String::new(),
+    };
+    let is_beyond = least < low || most > high;
+    is_beyond.then(|| format!("{ends}lowest {}, highest {}", rounded(least), rounded(most)))
+}
+
 /// The ends of the numbers of a single plane; of one that is the same everywhere, half of it to both sides.
 ///
 /// # Errors
@@ -248,7 +302,7 @@ pub(super) fn one_range(frame: &FrameHeader, range: Range, reduced: &Reduced) ->
     }
     match Shade::new(frame, range, reduced)? {
         Shade::Planes(ranges) => Ok(ranges[0]),
-        Shade::Encoded | Shade::Xyz(_) => Ok((0.0, 1.0)),
+        Shade::Encoded | Shade::Xyz(..) => Ok((0.0, 1.0)),
     }
 }
 
