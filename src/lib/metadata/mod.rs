@@ -22,6 +22,7 @@ use crate::camera::levels::{BlackLevel, WhiteLevel};
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::FilterArray;
+use crate::names::Named;
 use crate::units::QuantityKind;
 use serde::{Deserialize, Serialize};
 use serde_yaml::Mapping;
@@ -269,7 +270,7 @@ impl Metadata {
 
     /// What it says of the same thing in two ways that do not agree: a warning each.
     pub fn contradictions(&self) -> Vec<String> {
-        let mut known = QuantityKind::ALL.into_iter().filter(|kind| *kind != QuantityKind::Unspecified);
+        let mut known = QuantityKind::ALL.iter().filter(|kind| **kind != QuantityKind::Unspecified);
         let is_of_another = known.any(|kind| kind.unit() == self.unit);
         let unit = (is_of_another && self.unit != self.quantity.unit()).then(|| {
             format!(

@@ -12,7 +12,7 @@ pub use heading::unit_of_heading;
 pub use spectral::{OtherUnit, RadianceUnit, Stated, units_in};
 pub use wavelength::WavelengthUnit;
 
-use serde::{Deserialize, Serialize};
+use crate::names::{Named, serde_by_name};
 use std::fmt;
 
 /// Planck constant h in J s (exact, SI 2019).
@@ -46,8 +46,7 @@ pub fn kelvin(celsius: f64) -> f64 {
 }
 
 /// What the samples of a frame are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum QuantityKind {
     /// Nothing is known about the samples: another program's file without metadata.
     #[default]
@@ -79,9 +78,10 @@ pub enum QuantityKind {
     ColorDifference,
 }
 
-impl QuantityKind {
-    /// All of them.
-    pub const ALL: [Self; 13] = [
+serde_by_name!(QuantityKind);
+
+impl Named for QuantityKind {
+    const ALL: &'static [Self] = &[
         Self::Unspecified,
         Self::SpectralRadiance,
         Self::ExpectedElectrons,
@@ -97,6 +97,26 @@ impl QuantityKind {
         Self::ColorDifference,
     ];
 
+    fn name(self) -> &'static str {
+        match self {
+            Self::Unspecified => "unspecified",
+            Self::SpectralRadiance => "spectral_radiance",
+            Self::ExpectedElectrons => "expected_electrons",
+            Self::Electrons => "electrons",
+            Self::Adu => "adu",
+            Self::Xyz => "xyz",
+            Self::Xyy => "xyy",
+            Self::Lab => "lab",
+            Self::Luv => "luv",
+            Self::Cct => "cct",
+            Self::Srgb => "srgb",
+            Self::LinearSrgb => "linear_srgb",
+            Self::ColorDifference => "color_difference",
+        }
+    }
+}
+
+impl QuantityKind {
     /// The unit of the samples, in ASCII.
     pub fn unit(self) -> &'static str {
         match self {

@@ -4,6 +4,7 @@ use crate::analysis::statistics::Region;
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, THREE_PLANES};
 use crate::metadata::FrameHeader;
+use crate::names::place_of;
 use crate::stages::saturation::MASK_LAYER;
 use crate::units::QuantityKind;
 
@@ -13,7 +14,7 @@ use crate::units::QuantityKind;
 ///
 /// [`Error::Usage`] where there is no such channel.
 pub(super) fn take_channel(stored: &Geometry, channel: &str, name: &str) -> Result<(usize, Geometry)> {
-    let Some(place) = stored.channels.iter().position(|known| known == channel) else {
+    let Some(place) = place_of(channel, stored.channels.iter().map(String::as_str)) else {
         let mut some = stored.channels.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
         if stored.channels.len() > 8 {
             some += ", …";
