@@ -75,12 +75,71 @@ fn every_program_has_a_manual_page_and_completions_with_its_options() {
 #[test]
 fn the_front_door_completes_the_programs() {
     let shop = Workshop::new();
-    for shell in ["bash", "zsh", "fish"] {
+    for (shell, begin) in
+        [("bash", "opts=\""), ("zsh", "':program"), ("fish", "complete -c cyanometer -n __fish_use_subcommand")]
+    {
         let script = text(&shop, &format!("{FRONT} --completions {shell}"));
-        for program in PROGRAMS {
-            // The crate that writes them completes no positional arguments in fish.
-            assert!(shell == "fish" || script.contains(program), "{shell}: {program}");
+        let line = script.lines().find(|line| line.trim_start().starts_with(begin)).unwrap();
+        assert!(PROGRAMS.iter().all(|program| line.contains(program)), "{shell}: {line}");
+    }
+}
+
+/// What is known by name is completed beside files, and words that an option takes as they are.
+#[test]
+fn values_that_are_known_by_name_are_completed() {
+    let shop = Workshop::new();
+    for (program, option, known, unknown, files) in [
+        ("render-radiance", "sensor", &["kaf-5101ce", "nikon-d850"][..], "d65", true),
+        ("add-noise", "readout", &["kaf-5101ce", "imx219"], "nikon-d850", true),
+        ("render-radiance", "illuminant", &["d65", "a"], "3200K", true),
+        ("render-radiance", "primaries", &["rec2020"], "NAME", false),
+        ("fit-matrix", "reference", &["colorchecker"], "d65", true),
+        ("to-xyz", "white", &["d50", "e"], "X", false),
+        ("to-xyz", "adapt-to", &["d75"], "LIGHT", false),
+        ("predict-noise", "matrix", &["sensor"], "FILE", true),
+        ("demosaic", "cfa", &["grbg"], "PATTERN", false),
+        ("demosaic", "black", &["auto", "none"], "N", false),
+    ] {
+        for shell in ["bash", "zsh", "fish"] {
+            let script = text(&shop, &format!("{program} --completions {shell}"));
+            let (begin, end, with_files) = match shell {
+                "bash" => (format!("--{option})\n"), ";;", "compgen -f -W"),
+                "zsh" => (format!("--{option}=["), "\\\n", "_files"),
+                _ => (format!(" -l {option} "), "\ncomplete", "-r -F -a"),
+            };
+            let part = script.split(&begin).nth(1).unwrap().split(end).next().unwrap();
+            // Behind what the option is for.
+            let part =
+                if shell == "zsh" { part.rsplit(':').next().unwrap().to_owned() + part } else { part.to_owned() };
+            let has = |word: &str| {
+                let words = part.replace("\\t''", " ").replace(['(', ')', '"', '\n', '\''], " ");
+                words.split_whitespace().any(|one| one == word)
+            };
+            assert!(known.iter().all(|word| has(word)), "{shell} {program} --{option}: {part}");
+            assert!(shell == "zsh" || !has(unknown), "{shell} {program} --{option} has {unknown}: {part}");
+            assert_eq!(part.contains(with_files), files, "{shell} {program} --{option}: {part}");
         }
+    }
+}
+
+/// A manual page has the sections that others have, in their order.
+#[test]
+fn manual_pages_have_their_sections() {
+    let shop = Workshop::new();
+    const SECTIONS: [&str; 8] =
+        ["NAME", "SYNOPSIS", "DESCRIPTION", "EXAMPLES", "\"EXIT STATUS\"", "ENVIRONMENT", "FILES", "\"SEE ALSO\""];
+    for program in programs() {
+        let page = text(&shop, &format!("{program} --manual"));
+        let places: Vec<Option<usize>> = SECTIONS.iter().map(|name| page.find(&format!(".SH {name}\n"))).collect();
+        assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{program}: {places:?}");
+        let synopsis = page.split(".SH SYNOPSIS\n").nth(1).unwrap().lines().next().unwrap();
+        assert!(
+            synopsis.len() < 200 && synopsis.starts_with(&format!("\\fB{}\\fR ", program.replace('-', "\\-"))),
+            "{synopsis}"
+        );
+        let see = page.split(".SH \"SEE ALSO\"\n").nth(1).unwrap();
+        let own = format!("\\fB{}\\fR(1)", program.replace('-', "\\-"));
+        assert!(see.contains("(1)") && !see.split(", ").any(|one| one.trim() == own), "{program}: {see}");
     }
 }
 

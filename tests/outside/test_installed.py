@@ -53,6 +53,27 @@ class Installed(BuiltCase):
         data = self.prefix / "share/cyanometer"
         self.assertEqual({path.relative_to(data) for path in data.rglob("*") if path.is_file()}, source)
 
+    def test_examples_that_name_spectra_run_in_any_directory(self):
+        environment = {"PATH": f"{self.prefix}/bin:/usr/bin:/bin"}
+        elsewhere = self.directory / "elsewhere"
+        elsewhere.mkdir()
+        count = 0
+        for program in ("fit-matrix", "render-radiance"):
+            text = run(program, "--help", env=environment).split("\nExamples:\n")[1].replace(" \\\n      ", " ")
+            for line in text.splitlines():
+                if line.startswith("  ") and not line.startswith("  #"):
+                    run("bash", "-e", "-c", line, env=environment, cwd=elsewhere)
+                    count += 1
+        self.assertGreaterEqual(count, 6)
+        # Metadata name the spectrum as it was given, whatever the prefix.
+        self.assertIn("source: clear_zenith.csv\n", (elsewhere / "expected.exr.yaml").read_text())
+        self.assertNotIn(str(self.prefix), (elsewhere / "expected.exr.yaml").read_text())
+        # What lies at hand comes first.
+        (elsewhere / "clear_zenith.csv").write_text("no spectrum\n")
+        done = subprocess.run(["bash", "-c", "render-radiance clear_zenith.csv"], env=environment, cwd=elsewhere,
+                              capture_output=True, text=True, check=False)
+        self.assertIn("clear_zenith.csv: ", done.stderr)
+
     def test_pages_and_completions_are_there_for_every_program(self):
         share = self.prefix / "share"
         for program in PROGRAMS:

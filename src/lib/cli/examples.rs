@@ -5,7 +5,7 @@
 pub struct Example {
     /// The reason, in a few words.
     pub reason: &'static str,
-    /// What a shell is given; files are those of `sample_data`, and what other examples and the usual pipeline make.
+    /// What a shell is given; spectra are those of `sample_data`, by name, and what other examples and the usual pipeline make.
     pub command: &'static str,
 }
 
@@ -18,14 +18,14 @@ pub const EXAMPLES: [(&str, &[Example]); 17] = [
     (
         "fit-matrix",
         &[
-            example("A matrix from 912 computed skies", "fit-matrix sample_data/skies/sky912.exr -o matrix.yaml"),
+            example("A matrix from 912 computed skies", "fit-matrix sky912.exr -o matrix.yaml"),
             example(
                 "Trained on 20 of them, judged on skies measured elsewhere, with noise and without",
-                "fit-matrix sample_data/skies/sky912.exr --train 20 --evaluate sample_data/skies/kider2014.exr",
+                "fit-matrix sky912.exr --train 20 --evaluate kider2014.exr",
             ),
             example(
                 "With one sky kept exact, by another regression",
-                "fit-matrix sample_data/skies/sky912.exr --regression sky-rad-sppls -o exact.yaml",
+                "fit-matrix sky912.exr --regression sky-rad-sppls -o exact.yaml",
             ),
         ],
     ),
@@ -34,11 +34,11 @@ pub const EXAMPLES: [(&str, &[Example]); 17] = [
         &[
             example(
                 "A uniform sky, exposed to three quarters of full well",
-                "render-radiance sample_data/skies/clear_zenith.csv --size 640x480 --expose-to 0.75 -o expected.exr",
+                "render-radiance clear_zenith.csv --size 640x480 --expose-to 0.75 -o expected.exr",
             ),
             example(
                 "A library of skies as a chart, each a patch of 24x24 photosites",
-                "render-radiance sample_data/skies/sky912.exr --patch 24x24 --expose-to 0.75 -o chart.exr",
+                "render-radiance sky912.exr --patch 24x24 --expose-to 0.75 -o chart.exr",
             ),
             example(
                 "Electrons given outright",

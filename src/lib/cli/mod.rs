@@ -1,6 +1,7 @@
 //! The command line: start, complain, exit; what a program says beside its output.
 
 mod advice;
+mod completions;
 pub mod demo;
 mod documents;
 pub mod examples;

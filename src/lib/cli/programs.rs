@@ -36,8 +36,8 @@ pub const OWN: [&str; 4] = ["demo", "list", "keys", "template"];
 /// Behind the list of programs.
 const USUAL: &str = "
 The usual pipeline:
-  fit-matrix skies.exr -o matrix.yaml
-  render-radiance sky.csv | add-noise --seed 7 | digitize | mosaic | demosaic | to-xyz --matrix matrix.yaml -o xyz.exr
+  fit-matrix sky912.exr -o matrix.yaml
+  render-radiance clear_zenith.csv | add-noise --seed 7 | digitize | mosaic | demosaic | to-xyz --matrix matrix.yaml -o xyz.exr
 
 `cyanometer demo` runs it on skies that it carries; `cyanometer list` tells which sensors, spectra, lights and charts are known,
 `cyanometer keys` what sensor files, matrix files and metadata may hold, and `cyanometer template sensor|matrix|metadata` prints

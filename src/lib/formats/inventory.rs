@@ -2,7 +2,7 @@
 
 use super::cameras::Camera;
 use super::csv::SpectralTable;
-use super::data::{BUILT_IN, DATA_VARIABLE, Place, directories, known_cameras};
+use super::data::{BUILT_IN, DATA_VARIABLE, OF_SPECTRA, Place, directories, known_cameras};
 use super::files::read_file;
 use super::input::{FrameReader, InputOptions};
 use super::yaml;
@@ -63,7 +63,9 @@ impl Kind {
             Self::Sensors => "Sensors (--sensor NAME)",
             Self::Matrices => "Matrices (--matrix FILE)",
             Self::Observers => "Observers (all programs use the CIE 1931 2-degree one, which is built in)",
-            Self::Spectra => "Spectra and libraries (inputs of render-radiance, predict-noise and fit-matrix)",
+            Self::Spectra => {
+                "Spectra and libraries (inputs of render-radiance, predict-noise and fit-matrix, by name from any directory)"
+            }
             Self::Illuminants => "Illuminants (--illuminant, --adapt-to, --scene-white, --reference-light NAME)",
             Self::Charts => "Charts (--reference NAME)",
         }
@@ -75,7 +77,7 @@ impl Kind {
             Self::Sensors => &["sensors"],
             Self::Matrices => &["matrices", "sensors", ""],
             Self::Observers => &["observers"],
-            Self::Spectra => &["skies", "spectra"],
+            Self::Spectra => &OF_SPECTRA,
             Self::Illuminants => &["illuminants"],
             Self::Charts => &["charts"],
         }
@@ -159,6 +161,10 @@ fn files(directory: &Path) -> Vec<PathBuf> {
     paths
 }
 
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
+}
+
 fn ends_in(path: &Path, ends: &[&str]) -> bool {
     path.extension().is_some_and(|end| ends.iter().any(|known| end.eq_ignore_ascii_case(known)))
 }
@@ -171,7 +177,8 @@ fn of_file(kind: Kind, path: &Path) -> Option<Known> {
         let geometry = &reader.header().geometry;
         let [width, height, count] = [geometry.width, geometry.height, geometry.channels.len()];
         let about = format!("{} spectra ({width}x{height} pixels) of {count} wavelengths", width * height);
-        return Some(Known { name: path.display().to_string(), place: "file".into(), has: Vec::new(), about });
+        let place = path.parent().map_or(String::new(), |directory| directory.display().to_string());
+        return Some(Known { name: file_name(path), place, has: Vec::new(), about });
     }
     if !ends_in(path, &["csv", "yaml", "yml"]) {
         return None;
@@ -210,7 +217,7 @@ fn of_bytes(kind: Kind, path: &Path, bytes: &[u8], place: &str) -> Option<Known>
         Kind::Charts if is_table => named(stem, first_comment(bytes)),
         Kind::Spectra if is_table => {
             SpectralTable::parse(&shown, bytes).ok()?;
-            as_file(first_comment(bytes))
+            named(file_name(path), first_comment(bytes))
         }
         _ => None,
     }

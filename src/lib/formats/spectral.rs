@@ -2,6 +2,7 @@
 //! wavelength, as in `400.00-410.00nm`.
 
 use super::csv::SpectralTable;
+use super::data::spectrum_file;
 use super::files::{named, open_named, read_table, spool};
 use super::format::HEAD_BYTES;
 use super::input::{FrameReader, InputOptions};
@@ -87,15 +88,18 @@ pub enum Radiances {
     Image(Box<FrameReader>),
 }
 
-/// Opens a table or a spectral image; the standard input for `-` or none. An image that comes down a pipe is copied to a
+/// Opens a table or a spectral image, also one of a data directory by its bare name; the standard input for `-` or none. An image that comes down a pipe is copied to a
 /// temporary file first.
 ///
 /// # Errors
 ///
 /// Those of the readers, and [`Error::Disk`].
 pub fn open(options: &InputOptions) -> Result<Radiances> {
-    let path = named(options.path.as_deref());
-    let (mut file, name) = open_named(path)?;
+    let found = named(options.path.as_deref()).map(spectrum_file);
+    let path = found.as_deref();
+    let (mut file, opened) = open_named(path)?;
+    // As it was given: where data lie is no matter of a frame.
+    let name = options.path.as_ref().filter(|_| path.is_some()).map_or(opened, |path| path.display().to_string());
     let failed = |e| Error::disk(&name, "read", e);
     let mut head = Vec::new();
     (&mut file).take(HEAD_BYTES as u64).read_to_end(&mut head).map_err(failed)?;

@@ -4,8 +4,8 @@ mod curves;
 mod places;
 mod sensors;
 
-pub use places::DATA_VARIABLE;
-pub(super) use places::{BUILT_IN, Place, directories};
+pub(super) use places::{BUILT_IN, OF_SPECTRA, Place, directories};
+pub use places::{DATA_VARIABLE, spectrum_file};
 pub(super) use sensors::known_cameras;
 pub use sensors::{DEFAULT_SENSOR, LoadedSensor, SensorChanges, load_changed_sensor, load_description, load_sensor};
 

@@ -73,6 +73,21 @@ pub(in crate::formats) fn directories() -> Vec<PathBuf> {
     found
 }
 
+/// Directories of data directories in which spectra lie.
+pub(in crate::formats) const OF_SPECTRA: [&str; 2] = ["skies", "spectra"];
+
+/// The file of a spectrum, a library or what is told of one: that of this name, or, of a bare name of no file where the program runs,
+/// that of a data directory.
+pub fn spectrum_file(path: &Path) -> PathBuf {
+    let is_bare = path.file_name().is_some_and(|name| path == Path::new(name));
+    if !is_bare || path.symlink_metadata().is_ok() {
+        return path.to_owned();
+    }
+    let places = || OF_SPECTRA.iter().map(|place| Path::new(place).join(path));
+    let known = directories().into_iter().flat_map(|directory| places().map(move |file| directory.join(file)));
+    known.into_iter().find(|file| file.is_file()).unwrap_or_else(|| path.to_owned())
+}
+
 pub(super) fn find(file: &str) -> Result<Option<(Place, Vec<u8>)>> {
     for directory in directories() {
         let path = directory.join(file);

@@ -236,6 +236,12 @@ pub(in crate::formats) fn known_cameras() -> Result<(Place, Vec<Camera>)> {
 }
 
 fn unknown_sensor(name: &str, typed: &str) -> Error {
+    if Path::new(name).is_file() {
+        return Error::format(
+            name,
+            "its name ends neither in .yaml, as those of sensor files do, nor in .csv, as those of responses; is it another file?",
+        );
+    }
     let known = known_sensors();
     let near = nearest(typed, known.iter().map(String::as_str), |known| known.len() / 3);
     let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));

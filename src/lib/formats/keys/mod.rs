@@ -3,7 +3,9 @@
 //! The texts beside this one have a line for each key: its path, type, unit, default, who needs it, and what it is. Tests compare
 //! them with the types that readers fill, key by key.
 
-use crate::metadata::METADATA_TEMPLATE;
+use crate::analysis::characterization::MATRIX_SCHEMA;
+use crate::camera::sensor::SENSOR_SCHEMA;
+use crate::metadata::{METADATA_SCHEMA, METADATA_TEMPLATE};
 use crate::names::Named;
 
 /// A kind of file whose keys are described.
@@ -32,9 +34,6 @@ impl Named for KeyPage {
 /// A key: its path, type, unit, default, who needs it, and what it is.
 pub type Key = [&'static str; 6];
 
-/// The heads of the columns.
-const HEADS: Key = ["KEY", "TYPE", "UNIT", "DEFAULT", "NEEDED", "MEANING"];
-
 impl KeyPage {
     /// The keys, in the order in which files have them.
     pub fn keys(self) -> impl Iterator<Item = Key> {
@@ -49,19 +48,15 @@ impl KeyPage {
         })
     }
 
-    /// All keys as a table in plain text, under a line that says what it is of.
+    /// All keys in plain text, each over what it means, under a line that says what they are of.
     pub fn table(self) -> String {
-        let rows: Vec<Key> = std::iter::once(HEADS).chain(self.keys()).collect();
-        let widths: [usize; 5] =
-            std::array::from_fn(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or_default());
-        let line = |row: &Key| {
-            let cells = row.iter().zip(widths).map(|(cell, width)| {
-                let shown = if cell.is_empty() { "-" } else { cell };
-                format!("{shown:width$}  ")
-            });
-            format!("{}{}\n", cells.collect::<String>(), row[5])
+        let entry = |[path, kind, unit, default, needed, meaning]: Key| {
+            let of = [("", kind), ("", unit), ("default ", default), ("needed ", needed)];
+            let about = of.iter().filter(|(_, cell)| !cell.is_empty()).map(|(what, cell)| format!("{what}{cell}"));
+            let head = format!("{path}: {}", about.collect::<Vec<_>>().join("; "));
+            format!("{}\n{}\n", wrapped(&head, ""), wrapped(meaning, INDENT))
         };
-        format!("{}\n\n{}", self.title(), rows.iter().map(line).collect::<String>())
+        format!("{}\n\n{}", self.title(), self.keys().map(entry).collect::<String>())
     }
 
     fn title(self) -> &'static str {
@@ -80,6 +75,41 @@ impl KeyPage {
             Self::Metadata => METADATA_TEMPLATE,
         }
     }
+}
+
+/// What a key means stands so far from the edge, as does what has no room in the line of a key.
+const INDENT: &str = "    ";
+
+/// The words of a text in lines of at most 100 characters, but for a longer word; the first is indented so, the others by
+/// [`INDENT`].
+fn wrapped(text: &str, indent: &str) -> String {
+    const COLUMNS: usize = 100;
+    let mut lines = vec![indent.to_owned()];
+    for word in text.split(' ') {
+        match lines.last_mut() {
+            Some(line) if line.trim().is_empty() => line.push_str(word),
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= COLUMNS => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(format!("{INDENT}{word}")),
+        }
+    }
+    lines.join("\n")
+}
+
+/// What schemas begin with, and what is wanted there.
+pub(super) const KINDS: [(KeyPage, &str, &str, &str); 3] = [
+    (KeyPage::Sensor, "cyanometer-sensor/", "a sensor file, for --sensor", SENSOR_SCHEMA),
+    (KeyPage::Matrix, "cyanometer-matrix/", "a matrix file, for --matrix", MATRIX_SCHEMA),
+    (KeyPage::Metadata, "cyanometer/", "the metadata of a frame, for --metadata", METADATA_SCHEMA),
+];
+
+/// What a text says that it is, where it is one of our YAML files.
+pub fn kind_of(text: &str) -> Option<&'static str> {
+    let schema = text.lines().find_map(|line| line.strip_prefix("schema:"))?;
+    let schema = schema.trim().trim_matches(['"', '\'']);
+    KINDS.iter().find(|(_, begin, ..)| schema.starts_with(begin)).map(|(_, _, kind, _)| *kind)
 }
 
 /// All keys of all files.

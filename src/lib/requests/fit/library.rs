@@ -3,7 +3,7 @@
 use super::request::Fit;
 use crate::analysis::characterization::{Signals, signals};
 use crate::error::{Advice, Error, Result};
-use crate::formats::data::LoadedSensor;
+use crate::formats::data::{LoadedSensor, spectrum_file};
 use crate::formats::{csv, files, spectral};
 use crate::requests::notes::Note;
 use crate::spectrum::{Observer, SpectralLibrary, WavelengthGrid};
@@ -75,7 +75,9 @@ impl SeenLibrary {
 
 fn labels(fit: &Fit) -> Result<Vec<String>> {
     match &fit.labels {
-        Some((file, column)) => csv::text_column(&file.display().to_string(), &files::read_file(file)?, column),
+        Some((file, column)) => {
+            csv::text_column(&file.display().to_string(), &files::read_file(&spectrum_file(file))?, column)
+        }
         None if fit.hold_out.is_empty() => Ok(Vec::new()),
         None => Err(Error::Usage("--hold-out names labels; give them with --labels FILE:COLUMN".into())),
     }

@@ -1,0 +1,116 @@
+//! Completions for shells: options, and the values that are known by name.
+
+use super::programs;
+use crate::cfa::CfaPattern;
+use crate::color::rgb::NamedPrimaries;
+use crate::formats::inventory::{Kind, Known, known};
+use crate::names::Named;
+use clap::builder::PossibleValuesParser;
+use clap::{Arg, Command};
+use clap_complete::Shell;
+
+/// What the last cell of a sensor says that has no read-out.
+const NO_READOUT: &str = "none";
+
+/// A script that completes the program's options in a shell, and of their values those that are known by name, as
+/// `cyanometer list` has them when the script is made.
+///
+/// # Errors
+///
+/// Which shells there are.
+pub(super) fn script(shell: &str, command: &Command) -> Result<String, String> {
+    let shell: Shell = match shell {
+        "bash" => Shell::Bash,
+        "zsh" => Shell::Zsh,
+        "fish" => Shell::Fish,
+        other => return Err(format!("there are no completions for `{other}`; known are bash, zsh and fish")),
+    };
+    let mut command = command.clone();
+    let program = command.get_name().to_owned();
+    let values: Vec<Values> = command.get_arguments().filter_map(Values::of).collect();
+    for Values { id, words, .. } in &values {
+        // The crate takes what lives as long as the process, which ends with the script.
+        let parser = PossibleValuesParser::new(words.iter().map(|word| &*word.clone().leak()));
+        command = command.mut_arg(id, |option| option.value_parser(parser));
+    }
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut command, program.as_str(), &mut script);
+    let mut script = String::from_utf8_lossy(&script).into_owned();
+    for Values { words, .. } in values.iter().filter(|values| values.takes_files) {
+        let (without, with) = beside_files(shell, words);
+        script = script.replace(&without, &with);
+    }
+    if shell == Shell::Zsh && program == env!("CARGO_PKG_NAME") {
+        // Programs alone at the first place; behind it what completes the program.
+        script = script
+            .replace("'::program", "':program")
+            .replace("Arguments of the program:_default", "Arguments of the program:_normal");
+    }
+    if shell == Shell::Fish && program == env!("CARGO_PKG_NAME") {
+        // The crate completes no words but options in fish.
+        let words: Vec<&str> = programs::PROGRAMS.into_iter().chain(programs::OWN).collect();
+        script.push_str(&format!("complete -c {program} -n __fish_use_subcommand -f -a \"{}\"\n", words.join(" ")));
+    }
+    Ok(script)
+}
+
+/// Values of an option that are known by name.
+struct Values {
+    id: String,
+    words: Vec<String>,
+    /// Whether it takes files as well.
+    takes_files: bool,
+}
+
+impl Values {
+    /// What help shows of a value tells which there are: words in small letters are values themselves, others kinds of them.
+    fn of(option: &Arg) -> Option<Self> {
+        let long = option.get_long()?;
+        let [shown] = option.get_value_names()? else { return None };
+        let mut words: Vec<String> = Vec::new();
+        for part in shown.split('|') {
+            let is_value = part.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit());
+            match part {
+                "NAME" | "LIGHT" => words.extend(names(long)),
+                "PATTERN" => words.extend(CfaPattern::ALL.iter().map(ToString::to_string)),
+                part if is_value => words.push(part.to_owned()),
+                _ => {}
+            }
+        }
+        let takes_files = shown.split('|').any(|part| part.starts_with("FILE"));
+        (!words.is_empty()).then(|| Self { id: option.get_id().to_string(), words, takes_files })
+    }
+}
+
+/// The names that an option takes.
+fn names(long: &str) -> Vec<String> {
+    let of = |kind: Kind, is_one: fn(&Known) -> bool| -> Vec<String> {
+        known(kind).into_iter().filter(is_one).map(|known| known.name).collect()
+    };
+    match long {
+        "sensor" => of(Kind::Sensors, |_| true),
+        "readout" => of(Kind::Sensors, |sensor| sensor.has.last().is_some_and(|readout| readout != NO_READOUT)),
+        "reference" => of(Kind::Charts, |_| true),
+        // Temperatures are too many.
+        "illuminant" | "reference-light" | "adapt-to" | "scene-white" => {
+            of(Kind::Illuminants, |light| !light.name.ends_with('K'))
+        }
+        "primaries" => NamedPrimaries::ALL.iter().map(|set| set.name().to_owned()).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// How the crate writes that an option takes these words and nothing else, and how it is written that it takes files as well.
+fn beside_files(shell: Shell, words: &[String]) -> (String, String) {
+    let line = words.join(" ");
+    match shell {
+        Shell::Zsh => {
+            (format!(":({line})"), format!(":{{_alternative \"names\\:name\\:({line})\" \"files\\:file\\:_files\"}}"))
+        }
+        Shell::Fish => {
+            let listed = words.iter().map(|word| format!("{word}\\t''")).collect::<Vec<_>>().join("\n");
+            (format!("-r -f -a \"{listed}\""), format!("-r -F -a \"{listed}\""))
+        }
+        _ => (format!("compgen -W \"{line}\""), format!("compgen -f -W \"{line}\"")),
+    }
+}
