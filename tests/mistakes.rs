@@ -10,7 +10,33 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 108] = [
+const MISTAKES: [(&str, i32, &str); 113] = [
+    (
+        "photon-transfer codes.exr",
+        BAD_DATA,
+        "codes.exr: it is an EXR, a single frame; a list of flats and darks is wanted, a table with the columns file, kind, exposure_s, \
+         photons, temperature_k, temperature_c, level, or the directory that they are in",
+    ),
+    (
+        "render-radiance matrix.yaml",
+        BAD_DATA,
+        "matrix.yaml: it is a matrix file, for --matrix; a table is wanted here, as CSV",
+    ),
+    (
+        "to-xyz rgb.exr --matrix codes.exr",
+        BAD_DATA,
+        "codes.exr: it is no text but a binary file, such as a frame; a YAML file is wanted here",
+    ),
+    (
+        "measure codes.exr --metadata plane.exr",
+        BAD_DATA,
+        "plane.exr: it is no text but a binary file, such as a frame; a YAML file is wanted here",
+    ),
+    (
+        "render-radiance --dark --sensor codes.exr",
+        BAD_DATA,
+        "codes.exr: its name ends neither in .yaml, as those of sensor files do, nor in .csv, as those of responses; is it another file?",
+    ),
     (
         "measure codes.exr -o codes.xlsx",
         BAD_USAGE,

@@ -2,6 +2,7 @@
 
 use super::delimited::{self, Separator, decimal, number};
 use super::foreign::csv_complaint;
+use super::keys;
 use crate::error::{Error, Result};
 use csv::StringRecord;
 use flate2::read::GzDecoder;
@@ -63,8 +64,7 @@ impl Cells {
                     // The label of a row need not be a number.
                     None if by_rows && column == 0 => 0.0,
                     None => {
-                        let shown: String = text.chars().take(20).collect();
-                        return Err(refuse(format!("line {line}, column {}: `{shown}` is no number", column + 1)));
+                        return Err(refuse(format!("line {line}, column {}", column + 1) + &not_a_number(text)));
                     }
                 });
             }
@@ -75,6 +75,17 @@ impl Cells {
         let numbers =
             Array2::from_shape_vec((rows, width), numbers).map_err(|_| refuse("its rows differ in length".into()))?;
         Ok(Self { numbers, labels })
+    }
+}
+
+/// What is wrong with a cell, and what to do where it stands for a value that is missing.
+fn not_a_number(text: &str) -> String {
+    const MISSING: [&str; 10] = ["nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "inf", "-inf"];
+    let shown: String = text.chars().take(20).collect();
+    match MISSING.contains(&text.to_lowercase().as_str()) {
+        true => format!(": `{shown}` is no number; leave out the row of a missing value, or fill it in"),
+        false if text.is_empty() => " is empty; leave out the row of a missing value, or fill it in".into(),
+        false => format!(": `{shown}` is no number"),
     }
 }
 
@@ -90,6 +101,12 @@ impl<'a> Text<'a> {
     /// The text of a table; `is_of_numbers` where separators behind the last cell of a row mean nothing.
     pub(super) fn of(name: &str, bytes: &'a [u8], is_of_numbers: bool) -> Result<Self> {
         let decoded = delimited::decoded(name, bytes)?;
+        if decoded.contains('\0') {
+            return Err(Error::format(name, "it is not a CSV table but a binary file"));
+        }
+        if let Some(kind) = keys::kind_of(&decoded) {
+            return Err(Error::format(name, format!("it is {kind}; a table is wanted here, as CSV")));
+        }
         // Before any cell is told apart: each row is held as a whole.
         check_size(name, &decoded)?;
         let separator = Separator::of(&decoded);

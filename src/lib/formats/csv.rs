@@ -7,8 +7,10 @@
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
 use super::delimited;
 use super::foreign::csv_complaint;
+use super::keys;
 use super::radiance_unit::{self, FileSays};
 use crate::error::{Error, Result};
+use crate::names::place_of;
 use crate::spectrum::{Curve, SHORTEST_NM, check_wavelengths};
 use crate::units::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
 use csv::StringRecord;
@@ -59,6 +61,8 @@ pub struct SpectralTable {
     remarks: Vec<Stated>,
     /// Whether its wavelengths were given as wavenumbers.
     by_wavenumber: bool,
+    /// Whether nothing says what its columns are.
+    is_bare: bool,
 }
 
 impl SpectralTable {
@@ -68,12 +72,14 @@ impl SpectralTable {
     ///
     /// [`Error::Format`] naming line and column of what is no number, or what the table lacks.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self> {
-        let refuse = |problem: &str| Err(Error::format(name, problem));
         let bytes = unpacked(name, bytes)?;
-        let text = Text::of(name, &bytes, true)?;
-        if text.decoded.contains('\0') {
-            return refuse("it is not a CSV table but a binary file");
-        }
+        let text = Text::of(name, &bytes, true);
+        let parsed = text.and_then(|text| Self::of_text(name, &text));
+        parsed.map_err(|error| preamble(name, &bytes).unwrap_or(error))
+    }
+
+    fn of_text(name: &str, text: &Text) -> Result<Self> {
+        let refuse = |problem: &str| Err(Error::format(name, problem));
         let mut reader = text.reader(false);
         let mut first = StringRecord::new();
         if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, &e))? {
@@ -100,6 +106,12 @@ impl SpectralTable {
         if width < 2 || rows == 0 {
             return refuse("it needs a column of wavelengths in nm and at least one of values");
         }
+        if !has_header && holds_rows_without_names(&numbers) {
+            return refuse(
+                "its first row holds wavelengths, and its rows are spectra without names; begin each with a name, and the first \
+                 with a word, as in `name,400,410`",
+            );
+        }
         let values = numbers.slice(ndarray::s![.., 1..]);
         let (mut wavelength_nm, columns, values) = if by_rows {
             (first.iter().skip(1).filter_map(numeric).collect(), labels, values.to_owned())
@@ -123,7 +135,8 @@ impl SpectralTable {
         let (wavelength_nm, values) = sorted(wavelength_nm, values);
         check_nm(&wavelength_nm).map_err(|problem| Error::format(name, problem))?;
         let by_wavenumber = unit == WavelengthUnit::PerCentimeter;
-        Ok(Self { name: name.into(), wavelength_nm, columns, values, headings, remarks: comments.units, by_wavenumber })
+        let (name, remarks, is_bare) = (name.to_owned(), comments.units, !has_header);
+        Ok(Self { name, wavelength_nm, columns, values, headings, remarks, by_wavenumber, is_bare })
     }
 
     /// The file as messages call it.
@@ -138,8 +151,8 @@ impl SpectralTable {
     /// [`Error::Usage`] naming the columns that there are.
     pub fn column_index(&self, column: Option<&str>) -> Result<usize> {
         let Some(column) = column else { return Ok(0) };
-        let is_it = |name: &&str| *name == column;
-        let exact = self.columns.iter().position(|name| is_it(&name.as_str()));
+        let is_it = |name: &&str| name.eq_ignore_ascii_case(column);
+        let exact = place_of(column, self.columns.iter().map(String::as_str));
         // The name of `sky (mW m-2 sr-1 nm-1)` is `sky`, where no other column's is.
         let bare = || {
             let mut places = (0..self.columns.len()).filter(|place| is_it(&without_unit(&self.columns[*place])));
@@ -173,6 +186,12 @@ impl SpectralTable {
         if self.by_wavenumber && heading.is_none() && self.remarks.is_empty() && given.is_none() {
             let problem = "it is by wavenumber and does not say whether its radiance is per nm or per cm-1";
             return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
+        }
+        if self.is_bare && self.columns.len() == UVSPEC && self.remarks.is_empty() && given.is_none() {
+            let problem = "its seven columns without a heading look like what libRadtran's uvspec writes by default, irradiances and \
+                           mean intensities; have it write radiances, by `output_user lambda uu`, or give --radiance-unit where \
+                           they are";
+            return Err(Error::format(&self.name, problem));
         }
         self.check_filled(index)?;
         let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
@@ -246,6 +265,40 @@ impl SpectralTable {
             format!("{}: {which}{count} of {all} radiances are below 0, down to {least}, which no light is", self.name)
         })
     }
+}
+
+/// Columns beside wavelengths that uvspec writes by default: edir, edn, eup, uavgdir, uavgdn, uavgup.
+const UVSPEC: usize = 6;
+
+/// A complaint of lines that stand above the heading of a table, where there are any but one of units.
+fn preamble(name: &str, bytes: &[u8]) -> Option<Error> {
+    let decoded = delimited::decoded(name, bytes).ok()?;
+    if decoded.contains('\0') || keys::kind_of(&decoded).is_some() {
+        return None;
+    }
+    let [first, last, heading] = delimited::above_heading(&decoded)?;
+    let line = decoded.lines().nth(heading - 1)?;
+    let is_of_units = !matches!(WavelengthUnit::of_heading(line.split([',', ';', '\t']).next()?.trim()), Ok(None));
+    if first == last && is_of_units {
+        return None;
+    }
+    let lines = if first == last { format!("line {first} stands") } else { format!("lines {first} to {last} stand") };
+    Some(Error::format(
+        name,
+        format!("{lines} above the heading of its columns, line {heading}; put a # before what is no table"),
+    ))
+}
+
+/// Whether numbers without a heading are a row of wavelengths above spectra: the first goes one way and is that of wavelengths, the
+/// first of all others are not.
+fn holds_rows_without_names(numbers: &Array2<f64>) -> bool {
+    let (first, below) = (numbers.row(0), numbers.slice(ndarray::s![1.., 0]));
+    let ordered = |is_so: fn(&f64, &f64) -> bool| first.iter().zip(first.iter().skip(1)).all(|(a, b)| is_so(a, b));
+    first.len() > 2
+        && !below.is_empty()
+        && (ordered(|a, b| a < b) || ordered(|a, b| a > b))
+        && first.iter().all(|nm| *nm >= SHORTEST_NM)
+        && below.iter().all(|value| *value < SHORTEST_NM)
 }
 
 /// What comments say about units.
@@ -354,11 +407,17 @@ pub(super) fn check_nm(wavelength_nm: &[f64]) -> std::result::Result<(), String>
 /// Above this all wavelengths look like angstroms or wavenumbers, in nm: no silicon responds.
 const LONGEST_NM: f64 = 2000.0;
 
+/// Below this they are no wavelengths of light in µm either.
+const SHORTEST_UM: f64 = 0.1;
+
 /// Checks that wavelengths look like nm.
 fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
     let [first, .., last] = wavelength_nm else { return Ok(()) };
     let range = format!("its wavelengths run from {first} to {last} nm");
     let name = "name their unit in the heading, such as";
+    if *last < SHORTEST_UM {
+        return Err(format!("{range}, which no light has; its first column must hold wavelengths"));
+    }
     if *last < SHORTEST_NM {
         return Err(format!("{range}, which looks like micrometers; {name} `wavelength_um`"));
     }
@@ -485,7 +544,9 @@ mod tests {
             complaint("nm,L\n410,1\n400,2\n410,3\n"),
             "t.csv: the wavelength 410 nm stands there twice; leave out one"
         );
-        assert!(complaint("nm,L\n400,nan\n").contains("`nan` is no number"));
+        let missing = "leave out the row of a missing value, or fill it in";
+        assert_eq!(complaint("nm,L\n400,nan\n"), format!("t.csv: line 2, column 2: `nan` is no number; {missing}"));
+        assert_eq!(complaint("nm,L\n400,1\n410,\n420,1\n"), format!("t.csv: line 3, column 2 is empty; {missing}"));
         assert!(complaint("").contains("no rows"));
         assert_eq!(complaint("nm,L\n400,1\n410\n"), "t.csv: line 3 has 1 cell, the rows above it have 2");
         let marks = "part columns by semicolons or tabs where commas are those of decimals";
@@ -495,6 +556,56 @@ mod tests {
         assert!(complaint("nm;L\n400.5;1,5\n").contains("decimal points and decimal commas"));
         assert!(complaint("a b c\n400 1\n410 2\n").contains("line 1: 3 words stand above 2 columns"));
         assert!(complaint("FREQ,L\n14000,1\n").contains("holds frequencies"));
+    }
+
+    #[test]
+    fn what_stands_above_a_heading_is_told() {
+        let complaint = |text: &str| SpectralTable::parse("t", text.as_bytes()).unwrap_err().to_string();
+        let mark = "; put a # before what is no table";
+        let long: String = (0..40).map(|line| format!("word {line}: value\n")).collect();
+        for (text, lines) in [
+            (
+                "Instrument: A\nDate: 2020-01-01\n\nnm,L\n400,1\n410,2\n",
+                "lines 1 to 2 stand above the heading of its columns, line 4",
+            ),
+            (
+                "A title, with commas\nWavelength,L\n400,1\n410,2\n",
+                "line 1 stands above the heading of its columns, line 2",
+            ),
+            (
+                "Serial\t4711\nDate\tMay\nnm\tL\n400\t1\n410\t2\n",
+                "lines 1 to 2 stand above the heading of its columns, line 3",
+            ),
+            ("Sky, measured\nid,400,410\na,1,2\n", "line 1 stands above the heading of its columns, line 2"),
+            (&format!("{long}nm L\n400 1\n410 2\n"), "lines 1 to 40 stand above the heading of its columns, line 41"),
+        ] {
+            assert_eq!(complaint(text), format!("t: {lines}{mark}"), "{text}");
+        }
+        // A row of units belongs to the heading; what else is wrong is told of a table without such lines.
+        assert!(
+            complaint("wavelength,L\nnm,W/(m2 sr nm)\n400,1\n410,x\n").contains("line 4, column 2: `x` is no number")
+        );
+    }
+
+    #[test]
+    fn tables_that_are_something_else_are_told() {
+        let complaint = |text: &str| SpectralTable::parse("t", text.as_bytes()).unwrap_err().to_string();
+        let yaml = "schema: cyanometer-matrix/1\nunit: nits\nxyz_from_camera:\n- [1, 0, 0]\n";
+        assert_eq!(complaint(yaml), "t: it is a matrix file, for --matrix; a table is wanted here, as CSV");
+        assert_eq!(complaint("\u{1}\0ab,c\n"), "t: it is not a CSV table but a binary file");
+        let nameless = "its first row holds wavelengths, and its rows are spectra without names";
+        assert!(complaint("400,410,420\n0.1,0.2,0.3\n0.2,0.3,0.4\n").contains(nameless));
+        assert!(complaint("700;600;500\n1e-5;2e-5;3e-5\n").contains(nameless));
+        assert!(complaint("1e-5,2e-5\n3e-5,4e-5\n").contains("which no light has"));
+        // Columns without a heading: wavelengths go down, values go along.
+        assert!(SpectralTable::parse("t", b"400 101 102\n410 103 104\n").is_ok());
+        let uvspec = |columns: usize| -> String {
+            (0..3).map(|row| format!("{}.0{}\n", 400 + 10 * row, " 1.0e-5".repeat(columns))).collect()
+        };
+        let unit = |text: &str, given| SpectralTable::parse("t", text.as_bytes()).unwrap().radiance_unit(0, given);
+        let refused = unit(&uvspec(6), None).unwrap_err().to_string();
+        assert!(refused.contains("what libRadtran's uvspec writes by default"), "{refused}");
+        assert!(unit(&uvspec(6), Some(RadianceUnit::USUAL[2])).is_ok() && unit(&uvspec(5), None).is_ok());
     }
 
     #[test]

@@ -94,6 +94,31 @@ pub fn decoded<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>> {
     Ok(if has_old_ends { text.replace('\r', "\n").into() } else { text })
 }
 
+/// The lines that stand above the heading of a table, the first and the last, and that of the heading, from 1: the last line before
+/// the first of numbers, or that of wavelengths, is the heading.
+pub fn above_heading(text: &str) -> Option<[usize; 3]> {
+    /// So many lines are looked at.
+    const LOOKED_AT: usize = 200;
+    let mut last: Vec<&str> = text.lines().rev().take(ROWS_LOOKED_AT).collect();
+    last.reverse();
+    let separator = Separator::of(&last.join("\n"));
+    let said = |(_, line): &(usize, &str)| !line.trim().is_empty() && comment(line, None).is_none();
+    let lines = || text.lines().enumerate().filter(said).take(LOOKED_AT);
+    let is_number = |cell: &&str| number(cell).is_some() || decimal(cell).is_some();
+    let has_numbers = |line: &str| {
+        let cells = separator.cells(line);
+        // A word before one number may be a line of a preamble: `Serial, 4711`.
+        let least = if cells.first().is_some_and(is_number) { 2 } else { 3 };
+        cells.len() >= least && cells[1..].iter().all(&is_number)
+    };
+    let begins_so = |line: &str| separator.cells(line).first().is_some_and(is_number);
+    let place = lines().position(|(_, line)| has_numbers(line))?;
+    let of_numbers = lines().nth(place)?;
+    let heading = if begins_so(of_numbers.1) { place.checked_sub(1)? } else { place };
+    let last = lines().nth(heading.checked_sub(1)?)?.0;
+    Some([lines().next()?.0, last, lines().nth(heading)?.0].map(|index| index + 1))
+}
+
 /// What stands in a comment, if a line is one. Numbers behind semicolons are a row without a label where `row`, the first
 /// that is none, has as many.
 fn comment<'a>(line: &'a str, row: Option<&str>) -> Option<&'a str> {

@@ -1,20 +1,33 @@
 //! Lists of flats and darks: a table, a YAML list, or the descriptor of an EMVA 1288 measurement.
 
 use super::files::read_file;
-use super::{csv, delimited, yaml};
+use super::{csv, delimited, table, yaml};
 use crate::error::{Error, Result};
+use crate::names::{Named, serde_by_name};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// What a frame of a measurement shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameKind {
     /// Even light.
     Flat,
     /// No light.
     Dark,
+}
+
+serde_by_name!(FrameKind);
+
+impl Named for FrameKind {
+    const ALL: &'static [Self] = &[Self::Flat, Self::Dark];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Dark => "dark",
+        }
+    }
 }
 
 /// A frame as a list has it; what it does not say, the frame's own metadata may.
@@ -68,6 +81,14 @@ const LEAST_TEMPERATURE_K: f64 = 70.0;
 pub fn read(path: &Path) -> Result<FrameList> {
     let name = path.display().to_string();
     let bytes = read_file(path)?;
+    if let Some(format) = table::known_by(&bytes) {
+        let problem = format!(
+            "it is {}, a single frame; a list of flats and darks is wanted, a table with the columns {}, or the directory that they are in",
+            format.name,
+            COLUMNS.join(", ")
+        );
+        return Err(Error::format(&name, problem));
+    }
     let text = delimited::decoded(&name, &bytes)?;
     let mut list = if is_descriptor(&text) {
         descriptor(&name, &text)?
@@ -76,7 +97,7 @@ pub fn read(path: &Path) -> Result<FrameList> {
         let whole = if is_plain { format!("frames:\n{text}") } else { text.into_owned() };
         yaml::parse_strict(&name, whole.as_bytes())?
     } else {
-        FrameList { frames: table(&name, &bytes)?, white_level_adu: None }
+        FrameList { frames: of_table(&name, &bytes)?, white_level_adu: None }
     };
     if list.frames.is_empty() {
         return Err(Error::format(&name, "it lists no frames"));
@@ -132,7 +153,7 @@ fn check(name: &str, frame: &ListedFrame) -> Result<()> {
     }
 }
 
-fn table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
+fn of_table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
     let columns = csv::columns(name, bytes)?;
     if let Some(unknown) = columns.iter().find(|column| !COLUMNS.contains(&column.trim())) {
         let problem = format!("unknown column `{unknown}`; a list of frames has {}", COLUMNS.join(", "));
@@ -159,9 +180,9 @@ fn table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
     let kind_of = |row: usize| -> Result<Option<FrameKind>> {
         match kind.as_ref().map_or("", |cells| cells[row].trim()) {
             "" => Ok(None),
-            cell if cell.eq_ignore_ascii_case("flat") => Ok(Some(FrameKind::Flat)),
-            cell if cell.eq_ignore_ascii_case("dark") => Ok(Some(FrameKind::Dark)),
-            cell => Err(Error::format(name, format!("`{cell}` in row {} of `kind` is neither flat nor dark", row + 1))),
+            cell => FrameKind::named(cell).map(Some).ok_or_else(|| {
+                Error::format(name, format!("`{cell}` in row {} of `kind` is neither flat nor dark", row + 1))
+            }),
         }
     };
     let frame = |(row, file): (usize, &String)| {
@@ -272,7 +293,7 @@ mod tests {
             list.frames,
             [frame("a.tiff", FrameKind::Flat, Some(120.0)), frame("b.tiff", FrameKind::Dark, None)]
         );
-        let (_folder, path) = written("list.yaml", "- file: a.tiff\n  kind: flat\n- file: b.tiff\n  kind: dark\n");
+        let (_folder, path) = written("list.yaml", "- file: a.tiff\n  kind: Flat\n- file: b.tiff\n  kind: DARK\n");
         assert_eq!(read(&path).unwrap().frames.len(), 2);
         let (folder, path) = written(
             "data.txt",
@@ -283,6 +304,20 @@ mod tests {
         assert_eq!(list.frames[0].file, folder.path().join("images/b_0.png"));
         assert_eq!((list.frames[0].exposure_s, list.frames[0].photons), (Some(40_000.0 * 1e-9), Some(120.5)));
         assert_eq!(list.frames[1].kind, Some(FrameKind::Dark));
+    }
+
+    #[test]
+    fn a_frame_is_no_list_of_frames() {
+        for (bytes, kind) in [(&b"\x76\x2f\x31\x01\0"[..], "an EXR"), (b"\x89PNG\r\n\x1a\n\0", "a PNG")] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("a");
+            std::fs::write(&path, bytes).unwrap();
+            let said = read(&path).unwrap_err().to_string();
+            assert!(
+                said.contains(&format!("it is {kind}, a single frame; a list of flats and darks is wanted")),
+                "{said}"
+            );
+        }
     }
 
     #[test]

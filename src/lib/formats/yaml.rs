@@ -1,10 +1,10 @@
 //! YAML, read with limits: metadata, sensors and matrices all come through here.
 
 use super::foreign::{yaml_complaint, yaml_problem};
-use super::keys::KeyPage;
+use super::keys::{KINDS, KeyPage};
 use super::settings::{self, Settings};
 use super::{yaml_guard, yaml_writer};
-use crate::analysis::characterization::{CameraMatrix, MATRIX_SCHEMA};
+use crate::analysis::characterization::CameraMatrix;
 use crate::camera::readout::ReadOut;
 use crate::camera::sensor::{FLAT_SENSOR_SCHEMA, FlatSensor, Provenance, ResponseFiles, SENSOR_SCHEMA, Sensor};
 use crate::error::{Error, Result};
@@ -26,7 +26,10 @@ fn parse_raw(name: &str, text: &str) -> Result<Mapping> {
     }
     match raw {
         Value::Mapping(mapping) => Ok(mapping),
-        _ => Err(Error::format(name, "it is not a list of keys and values")),
+        _ => Err(Error::format(
+            name,
+            "it is not a list of keys and values, as sensors, matrices and metadata in YAML are",
+        )),
     }
 }
 
@@ -219,12 +222,6 @@ pub fn parse_matrix(name: &str, bytes: &[u8]) -> Result<CameraMatrix> {
 
 /// Makes sure that a file says what it is, and that it is nothing else of ours.
 fn check_schema(name: &str, raw: &Mapping, wanted: KeyPage) -> Result<()> {
-    /// What schemas begin with, and what is wanted there.
-    const KINDS: [(KeyPage, &str, &str, &str); 3] = [
-        (KeyPage::Sensor, "cyanometer-sensor/", "a sensor file, for --sensor", SENSOR_SCHEMA),
-        (KeyPage::Matrix, "cyanometer-matrix/", "a matrix file, for --matrix", MATRIX_SCHEMA),
-        (KeyPage::Metadata, "cyanometer/", "the metadata of a frame, for --metadata", METADATA_SCHEMA),
-    ];
     let [(.., kind, schema)] = KINDS.iter().filter(|(page, ..)| *page == wanted).collect::<Vec<_>>()[..] else {
         return Ok(());
     };

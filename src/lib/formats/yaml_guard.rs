@@ -26,13 +26,17 @@ const INDENTING: [char; 3] = ['-', '?', ':'];
 ///
 /// What is wrong, in words that follow the name of the file.
 pub fn checked_text(bytes: &[u8]) -> Result<&str, &'static str> {
+    let is_utf16 = bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]);
+    if !is_utf16 && bytes.contains(&0) {
+        return Err("it is no text but a binary file, such as a frame; a YAML file is wanted here");
+    }
     if bytes.len() > MAX_BYTES {
         return Err("it is longer than 1 MiB; no metadata, sensor or matrix is");
     }
-    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+    if is_utf16 {
         return Err("it is UTF-16 text; save it as UTF-8");
     }
-    let text = std::str::from_utf8(bytes).map_err(|_| "it is not UTF-8 text")?;
+    let text = std::str::from_utf8(bytes).map_err(|_| "it is not UTF-8 text; save it as UTF-8")?;
     let text = text.strip_prefix('\u{FEFF}').unwrap_or(text);
     let (mut depth, mut opened) = (0_usize, 0_usize);
     for bracket in text.bytes() {

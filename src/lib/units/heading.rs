@@ -300,7 +300,7 @@ mod tests {
 
     #[test]
     fn other_units_are_told_from_radiances() {
-        use OtherUnit::{AllWavelengths, Irradiance, PerFrequency, Photons, Scaled, Several, Unknown};
+        use OtherUnit::{AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Scaled, Several, Unknown};
         for (text, kind) in [
             ("irradiance (W m-2 nm-1)", Irradiance),
             ("E [W/m2/nm]", Irradiance),
@@ -318,7 +318,8 @@ mod tests {
             ("quanta/s/cm2/sr/nm", Photons),
             ("photon_radiance", Photons),
             ("mW/(m^2 cm^-1)", PerFrequency),
-            ("W m-2 sr-1 cm-1", PerFrequency),
+            ("W m-2 sr-1 cm-1", PerCentimeter),
+            ("W cm-2 sr-1 cm-1", PerCentimeter),
             ("W m-2 sr-1 Hz-1", PerFrequency),
             ("W m-2 sr-1", AllWavelengths),
             ("W.m^-2.sr^-1", AllWavelengths),

@@ -94,8 +94,10 @@ pub enum OtherUnit {
     Irradiance,
     /// Photons instead of energy.
     Photons,
-    /// Per interval of frequency, or of what may be wavenumber.
+    /// Per interval of frequency, or of what is wavenumber.
     PerFrequency,
+    /// Per centimeter, which may be one of wavelength or 1 cm⁻¹ of wavenumber.
+    PerCentimeter,
     /// Radiance over all wavelengths.
     AllWavelengths,
     /// With a number before it.
@@ -115,6 +117,9 @@ impl OtherUnit {
             Self::Irradiance => "an irradiance, which has no sr-1",
             Self::Photons => "a unit of photons, not of energy",
             Self::PerFrequency => "per interval of frequency or wavenumber, not of wavelength",
+            Self::PerCentimeter => {
+                "per cm, of wavelength as it is written; per cm-1 of wavenumber is `/ cm-1`, as in `W m-2 sr-1 / cm-1`"
+            }
             Self::AllWavelengths => "a radiance over all wavelengths, which has no nm-1",
             Self::Scaled => "a unit with a number before it",
             Self::BesideFactor => {
@@ -254,6 +259,7 @@ fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
         (-1, [(area, -2), (length, -1)]) if is_area(*area) => {
             Ok(RadianceUnit { power, area: *area, wavelength: interval(*length)? })
         }
+        (-1, [(Length::Centimeter, -3)]) => Err(OtherUnit::PerCentimeter),
         (-1, [(Length::Meter, -3)]) => {
             Ok(RadianceUnit { power, area: Length::Meter, wavelength: WavelengthUnit::Meter })
         }
@@ -271,7 +277,7 @@ fn interval(length: Length) -> Result<WavelengthUnit, OtherUnit> {
         Length::Angstrom => Ok(WavelengthUnit::Angstrom),
         Length::Meter => Ok(WavelengthUnit::Meter),
         // Whoever writes so may mean wavenumbers.
-        Length::Centimeter => Err(OtherUnit::PerFrequency),
+        Length::Centimeter => Err(OtherUnit::PerCentimeter),
         Length::Millimeter => Err(OtherUnit::Unknown),
     }
 }

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::formats::files::{read_file, sidecar_path};
 use crate::formats::format::SampleReader;
 use crate::formats::viewable::{Scaling, is_scale};
-use crate::formats::{register, yaml};
+use crate::formats::{register, yaml, yaml_guard};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
 use crate::stages::saturation::{MASK_LAYER, samples_tell};
@@ -31,8 +31,8 @@ pub(super) fn find_metadata(
     let from_file = |path: &Path| -> Result<Metadata> {
         let shown = path.display().to_string();
         let bytes = read_file(path)?;
-        let text = String::from_utf8(bytes).map_err(|_| Error::format(&shown, "it is not UTF-8 text"))?;
-        yaml::parse_metadata(&shown, &text)
+        let text = yaml_guard::checked_text(&bytes).map_err(|problem| Error::format(&shown, problem))?;
+        yaml::parse_metadata(&shown, text)
     };
     if let Some(path) = given {
         let metadata = from_file(path)?;

@@ -96,9 +96,10 @@ impl Scene {
                 let whole = [*width * patch[0], *height * patch[1]];
                 let size = self.size.unwrap_or(whole);
                 if size[0] > whole[0] || size[1] > whole[1] {
+                    let [columns, rows] = [size[0].div_ceil(*width), size[1].div_ceil(*height)];
                     return Err(Error::Usage(format!(
-                        "{source}: its {width}x{height} pixels in patches of {}x{} make {}x{} photosites, fewer than \
-                         --size {}x{}",
+                        "{source}: its {width}x{height} pixels in patches of {}x{} make {}x{} photosites, fewer than --size {}x{}; \
+                         give --patch {columns}x{rows} to show them all, or --sample N to show one everywhere",
                         patch[0], patch[1], whole[0], whole[1], size[0], size[1]
                     )));
                 }

@@ -177,6 +177,8 @@ impl Scene {
             (None, None) if count == 1 => Ok(0),
             (None, None) => {
                 const SHOWN: usize = 8;
+                // What holds no radiances is told first.
+                table.radiance_unit(0, self.spectrum.radiance_unit)?;
                 let names: Vec<&str> = table.columns.iter().take(SHOWN).map(String::as_str).collect();
                 let more = if count > SHOWN { " ..." } else { "" };
                 Err(Error::Usage(format!(

@@ -6,7 +6,7 @@ use crate::color::rgb::{Encoding, NamedPrimaries, Primaries};
 use crate::color::{White, chromaticity};
 use crate::names::Named;
 use crate::spectrum::{Observer, WavelengthGrid};
-use crate::units::RadianceUnit;
+use crate::units::{OtherUnit, RadianceUnit, Stated, unit_of_heading};
 
 /// Reads the temperature of a light in K, and keeps it as a light's name.
 ///
@@ -111,7 +111,11 @@ pub fn primaries(text: &str) -> Result<Primaries, String> {
 pub fn radiance_unit(text: &str) -> Result<RadianceUnit, String> {
     RadianceUnit::parse(text).ok_or_else(|| {
         let names: Vec<String> = RadianceUnit::USUAL.iter().map(ToString::to_string).collect();
-        format!("known units are {} and the like", names.join("; "))
+        let what = match unit_of_heading(text) {
+            Some(Stated::Other { kind, .. }) if kind != OtherUnit::Unknown => format!("that is {}; ", kind.in_words()),
+            _ => String::new(),
+        };
+        format!("{what}known units are {} and the like", names.join("; "))
     })
 }
 
@@ -133,6 +137,14 @@ pub fn wavelengths(text: &str) -> Result<WavelengthGrid, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn units_of_something_else_are_told() {
+        let said = |text: &str| radiance_unit(text).unwrap_err();
+        assert!(said("W m-2 nm-1").starts_with("that is an irradiance, which has no sr-1; known units are W cm-2"));
+        assert!(said("W cm-2 sr-1 cm-1").contains("per cm-1 of wavenumber is `/ cm-1`"));
+        assert!(said("bananas").starts_with("known units are "));
+    }
 
     #[test]
     fn what_help_shows_is_read_again() {
