@@ -1,6 +1,6 @@
 //! Completions for shells: options, and the values that are known by name.
 
-use super::programs;
+use super::roster;
 use crate::cfa::CfaPattern;
 use crate::color::rgb::NamedPrimaries;
 use crate::formats::inventory::{Kind, Known, known};
@@ -48,7 +48,7 @@ pub(super) fn script(shell: &str, command: &Command) -> Result<String, String> {
     }
     if shell == Shell::Fish && program == env!("CARGO_PKG_NAME") {
         // The crate completes no words but options in fish.
-        let words: Vec<&str> = programs::PROGRAMS.into_iter().chain(programs::OWN).collect();
+        let words: Vec<&str> = roster::PROGRAMS.into_iter().chain(roster::OWN).collect();
         script.push_str(&format!("complete -c {program} -n __fish_use_subcommand -f -a \"{}\"\n", words.join(" ")));
     }
     Ok(script)

@@ -1,7 +1,7 @@
 //! What is made of a program's definition of its arguments, and printed instead of running: its manual page, completions for
 //! shells, its line in a list of programs.
 
-use super::programs::PROGRAMS;
+use super::roster::PROGRAMS;
 use super::{completions, examples};
 use clap::Command;
 use clap_mangen::Man;

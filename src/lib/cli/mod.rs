@@ -14,6 +14,7 @@ mod memory;
 mod over_frames;
 pub mod pages;
 pub mod programs;
+mod roster;
 mod session;
 mod signals;
 mod usage;

@@ -1,6 +1,7 @@
 //! The other programs, which stand beside the one that runs: their names, what each says of itself, and how they are run.
 
 use super::documents::SUMMARY;
+pub use super::roster::{APART, OWN, PROGRAMS};
 use super::{complain, show};
 use crate::error::{Error, Result};
 use std::ffi::OsStr;
@@ -8,30 +9,6 @@ use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};
-
-/// All programs but the front door, about in the order in which a frame meets them.
-pub const PROGRAMS: [&str; 16] = [
-    "render-radiance",
-    "add-noise",
-    "digitize",
-    "mosaic",
-    "import-raw",
-    "correct-frame",
-    "demosaic",
-    "fit-matrix",
-    "to-xyz",
-    "stack-frames",
-    "average-frames",
-    "measure",
-    "predict-noise",
-    "photon-transfer",
-    "color-difference",
-    "preview",
-];
-/// Those that are linked with much that no other needs, so that they are executables of their own.
-pub const APART: [&str; 2] = ["import-raw", "stack-frames"];
-/// What the front door does itself: a demonstration, and pages.
-pub const OWN: [&str; 4] = ["demo", "list", "keys", "template"];
 
 /// Behind the list of programs.
 const USUAL: &str = "

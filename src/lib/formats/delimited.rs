@@ -97,13 +97,17 @@ pub fn decoded<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>> {
 /// The lines that stand above the heading of a table, the first and the last, and that of the heading, from 1: the last line before
 /// the first of numbers, or that of wavelengths, is the heading.
 pub fn above_heading(text: &str) -> Option<[usize; 3]> {
-    /// So many lines are looked at.
+    /// So many lines are looked at, where none is longer than people read.
     const LOOKED_AT: usize = 200;
+    const LONGEST: usize = 1 << 16;
     let mut last: Vec<&str> = text.lines().rev().take(ROWS_LOOKED_AT).collect();
     last.reverse();
+    if last.iter().copied().chain(text.lines().take(LOOKED_AT)).any(|line| line.len() > LONGEST) {
+        return None;
+    }
     let separator = Separator::of(&last.join("\n"));
     let said = |(_, line): &(usize, &str)| !line.trim().is_empty() && comment(line, None).is_none();
-    let lines = || text.lines().enumerate().filter(said).take(LOOKED_AT);
+    let lines = || text.lines().enumerate().take(LOOKED_AT).filter(said);
     let is_number = |cell: &&str| number(cell).is_some() || decimal(cell).is_some();
     let has_numbers = |line: &str| {
         let cells = separator.cells(line);
