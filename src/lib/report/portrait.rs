@@ -365,13 +365,15 @@ fn keep_most(panel: &mut Panel, pixels: &[[f64; 2]], ranges: [Option<[f64; 2]>; 
         let own = ranges[axis].unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
         let others = if ranges[axis].is_some() { [].iter() } else { pixels.iter() };
         let all = ellipses.iter().chain(others).map(|point| point[axis]).filter(|value| value.is_finite());
-        all.fold(own, |[low, high], value| [low.min(value), high.max(value)])
+        let [low, high] = all.fold(own, |[low, high], value| [low.min(value), high.max(value)]);
+        let room = 0.05 * (high - low);
+        [low - room, high + room]
     };
     let [x, y] = [range(0), range(1)];
     let is_within = |pixel: &&[f64; 2]| (x[0]..=x[1]).contains(&pixel[0]) && (y[0]..=y[1]).contains(&pixel[1]);
     let far = pixels.len() - pixels.iter().filter(is_within).count();
-    panel.x = panel.x.clone().range(x[0], x[1]).widened(0.05);
-    panel.y = panel.y.clone().range(y[0], y[1]).widened(0.05);
+    panel.x = panel.x.clone().range(x[0], x[1]);
+    panel.y = panel.y.clone().range(y[0], y[1]);
     panel.title = if far > 0 { format!("{far} of {} pixels outside", pixels.len()) } else { String::new() };
 }
 
