@@ -12,11 +12,11 @@ pub fn density(z: f64) -> f64 {
 /// Cumulative standard normal distribution, Φ(z), to full relative precision in the lower tail.
 pub fn cumulative(z: f64) -> f64 {
     let below = -z.abs();
-    if !(below > -FARTHEST) {
+    if below.is_nan() || below <= -f64::from(FARTHEST) {
         return 0.5 * libm::erfc(-z * FRAC_1_SQRT_2);
     }
-    let place = (-below * PLACES).round();
-    let h = below + place / PLACES;
+    let place = (-below * f64::from(PLACES)).round();
+    let h = below + place / f64::from(PLACES);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and bounded")]
     let terms = &TAYLOR[place as usize];
     let tail = terms.iter().rev().fold(0.0, |sum, term| sum * h + term);
@@ -24,8 +24,8 @@ pub fn cumulative(z: f64) -> f64 {
 }
 
 /// Places to a unit of z about which Φ is expanded, and how far down.
-const PLACES: f64 = 32.0;
-const FARTHEST: f64 = 10.0;
+const PLACES: u32 = 32;
+const FARTHEST: u32 = 10;
 
 /// Φ⁽ⁿ⁾(z₀)/n! at z₀ = 0, −1/32, −2/32 …: Φ⁽ⁿ⁺¹⁾ = (−1)ⁿ Heₙ φ. What is left off at 1/64 from there is (|z|/64)¹⁰/10! of Φ, less than
 /// 3·10⁻¹⁵.
@@ -42,8 +42,7 @@ static TAYLOR: LazyLock<Vec<[f64; 10]>> = LazyLock::new(|| {
         }
         terms
     };
-    let steps = 0..=(FARTHEST * PLACES) as u32;
-    steps.map(|step| at(-f64::from(step) / PLACES)).collect()
+    (0..=FARTHEST * PLACES).map(|step| at(-f64::from(step) / f64::from(PLACES))).collect()
 });
 
 /// A mean and a variance.
