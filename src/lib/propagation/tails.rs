@@ -64,8 +64,8 @@ const BLURRED: f64 = 0.8;
 /// Values of what photosites differ in that are gone through at most.
 const MOST_NODES: usize = 6000;
 
-/// Evaluations of one count, place or photosite that a class may take, hundredths of a second.
-const MOST_WORK: u64 = 4_000_000;
+/// Evaluations of one count, place or photosite that a class may take, a tenth of a second.
+const MOST_WORK: u64 = 8_000_000;
 
 /// What a kind of photosites has beyond others, in units of the means.
 #[derive(Debug, Clone, Copy, PartialEq)]

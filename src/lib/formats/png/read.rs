@@ -24,6 +24,8 @@ pub const FORMAT: FrameFormat = FrameFormat {
     }),
 };
 
+/// What is asked of the system at once.
+const READ_BYTES: usize = 64 << 10;
 /// What texts and color profiles may take.
 const TEXT_BYTES: usize = 16 << 20;
 /// What metadata in a compressed text may take.
@@ -69,7 +71,8 @@ impl PngReader {
         let length = file.seek(SeekFrom::End(0)).map_err(failed)?.saturating_sub(start);
         file.seek(SeekFrom::Start(start)).map_err(failed)?;
         let copy = file.try_clone().map_err(failed)?;
-        let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), Limits { bytes: TEXT_BYTES });
+        let input = BufReader::with_capacity(READ_BYTES, file);
+        let mut decoder = png::Decoder::new_with_limits(input, Limits { bytes: TEXT_BYTES });
         let damage = |error| png_damage(name, error);
         let header = decoder.read_header_info().map_err(damage)?;
         let refuse = |problem: String| Error::format(name, problem);
