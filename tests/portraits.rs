@@ -172,9 +172,9 @@ fn samples_far_off_do_not_make_the_scale() {
         let svg = String::from_utf8(shop.bytes("plot.svg")).unwrap();
         let count = far.len();
         let wanted = [
-            format!("{count} of 3072 samples outside, as far as "),
-            format!("{count} of 64 columns outside, as far as "),
-            format!("{count} of 48 rows outside, as far as "),
+            format!("{count} of 3072 samples beyond the axes, as far as "),
+            format!("{count} of 64 means of columns beyond the axes, as far as "),
+            format!("{count} of 48 means of rows beyond the axes, as far as "),
         ];
         assert_eq!(wanted.map(|words| svg.contains(&words)), said, "{far:?}");
         // Ticks tell the scale of the others.

@@ -81,6 +81,10 @@ class Installed(BuiltCase):
             self.assertIn(".TH", page)
             script = share / f"bash-completion/completions/{program}"
             self.assertIn(f"{program}\n", run("bash", "-c", f"source '{script}'; complete -p {program}"))
+            # What begins no option is a file, which bash offers where the script offers nothing.
+            offered = f"source '{script}'; COMP_WORDS=({program} x); COMP_CWORD=1; _{program} {program} x {program}"
+            if program != "cyanometer":
+                self.assertEqual(run("bash", "-c", f"{offered}; echo ${{#COMPREPLY[@]}}"), "0\n")
             self.assertTrue((share / f"zsh/site-functions/_{program}").read_text().startswith(f"#compdef {program}"))
             self.assertIn(f"complete -c {program}", (share / f"fish/vendor_completions.d/{program}.fish").read_text())
 

@@ -46,6 +46,14 @@ pub(super) fn script(shell: &str, command: &Command) -> Result<String, String> {
             .replace("'::program", "':program")
             .replace("Arguments of the program:_default", "Arguments of the program:_normal");
     }
+    if shell == Shell::Bash {
+        // A word that begins no option is a file, which bash completes where nothing else is offered; the crate offers options.
+        let options = "COMPREPLY=( $(compgen -W \"${opts}\" -- \"${cur}\") )\n            return 0\n            ;;";
+        script = script.replace(options, "return 0\n            ;;");
+        if program != env!("CARGO_PKG_NAME") {
+            script = script.replace(" || ${COMP_CWORD} -eq 1 ]]", " ]]");
+        }
+    }
     if shell == Shell::Fish && program == env!("CARGO_PKG_NAME") {
         // The crate completes no words but options in fish.
         let words: Vec<&str> = roster::PROGRAMS.into_iter().chain(roster::OWN).collect();

@@ -196,10 +196,13 @@ impl SpectralTable {
         self.check_filled(index)?;
         let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
         let (unit, assumed) = radiance_unit::settle(says, given)?;
+        let Some(times) = self.times_white(index, unit) else { return Ok((unit, assumed)) };
+        let bright = format!("in {unit} it would be {times:.1e} times as bright as a white cloud in the sun");
         if assumed.is_some() {
-            self.check_brightness(index, unit)?;
+            let problem = format!("it does not say the unit of its radiance; {bright}");
+            return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
         }
-        Ok((unit, assumed))
+        Ok((unit, Some(format!("{}: {bright}: is that its unit?", self.name))))
     }
 
     /// Refuses values that stand for none.
@@ -217,8 +220,8 @@ impl SpectralTable {
         Err(Error::format(&self.name, problem))
     }
 
-    /// Refuses radiances that no sky has, in a unit that nobody named.
-    fn check_brightness(&self, index: usize, unit: RadianceUnit) -> Result<()> {
+    /// How many times as bright as a white cloud in the sun radiances are in a unit, where no sky is so bright.
+    fn times_white(&self, index: usize, unit: RadianceUnit) -> Option<f64> {
         /// Spectral radiance of what scatters all the light of the sun evenly, as the whitest cloud does, at its brightest, in
         /// W cm⁻² sr⁻¹ nm⁻¹: the extraterrestrial irradiance of \[ASTM E490], 2.1 W m⁻² nm⁻¹, over π.
         const WHITE: f64 = 6.7e-5;
@@ -226,14 +229,7 @@ impl SpectralTable {
         const MOST: f64 = 100.0;
         let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
         let brightest = samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max);
-        if brightest > MOST * WHITE {
-            let problem = format!(
-                "it does not say the unit of its radiance; in {unit} it would be {:.1e} times as bright as a white cloud in the sun",
-                brightest / WHITE
-            );
-            return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
-        }
-        Ok(())
+        (brightest > MOST * WHITE).then_some(brightest / WHITE)
     }
 
     /// The first column as the relative power of a light, per interval of wavelength.
@@ -522,7 +518,9 @@ mod tests {
         let table = SpectralTable::parse("a", text.as_bytes()).unwrap();
         assert_eq!(table.wavelength_nm, [400.0, 500.0, 800.0]);
         let (unit, warning) = table.radiance_unit(0, None).unwrap();
-        assert_eq!((unit.to_string().as_str(), warning), ("mW m-2 sr-1 / cm-1", None));
+        assert_eq!(unit.to_string(), "mW m-2 sr-1 / cm-1");
+        // As the disk of the sun is.
+        assert!(warning.unwrap().contains("4.0e4 times as bright as a white cloud in the sun: is that its unit?"));
         for (value, nm) in table.values.row(0).iter().zip(&table.wavelength_nm) {
             let meters = nm * 1e-9;
             // W m⁻² sr⁻¹ per m is 10⁻¹³ W cm⁻² sr⁻¹ nm⁻¹.

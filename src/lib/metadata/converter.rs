@@ -23,18 +23,34 @@ pub struct AdcRecord {
     /// Whether samples are codes that were made straight.
     #[serde(default, skip_serializing_if = "std::ops::Not::not", rename = "linearized")]
     pub is_linearized: bool,
+    /// White level in ADU before anything was subtracted, where it was set below the highest code.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub white_adu: Option<f64>,
 }
 
 impl AdcRecord {
     /// A converter whose codes are straight.
     pub const fn new(bits: u32, bias_adu: f64, adu_per_e: f64) -> Self {
-        Self { bits, bias_adu, adu_per_e, linearization: None, is_linearized: false }
+        Self { bits, bias_adu, adu_per_e, linearization: None, is_linearized: false, white_adu: None }
     }
 
     /// The converter of a sensor as the description of its read-out has it.
     pub fn of_readout(readout: &ReadOut) -> Self {
         let straight = Self::new(readout.bits, readout.bias_adu, readout.adu_per_e);
         Self { linearization: readout.linearization, ..straight }
+    }
+
+    /// The same whose white level was set, unless that is the highest code or above it.
+    #[must_use]
+    pub fn with_white(self, white_adu: f64) -> Self {
+        let is_below = white_adu < self.sample(self.top_code().into());
+        Self { white_adu: is_below.then_some(white_adu), ..self }
+    }
+
+    /// By how much samples of full well are below white ones.
+    pub fn full_below_white(&self, full_well_e: f64) -> f64 {
+        let white = self.white_adu.unwrap_or_else(|| self.sample(self.top_code().into()));
+        (white - self.sample(self.full_code(full_well_e))).max(0.0)
     }
 
     /// The converter behind one of the amplifiers of a sensor, as it is set for all: K g for K, and K g o more than its bias.

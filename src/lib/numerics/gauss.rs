@@ -1,5 +1,6 @@
 //! Gauss's quadrature over panels.
 
+use nalgebra::DMatrix;
 use std::sync::LazyLock;
 
 /// Nodes of a panel.
@@ -72,4 +73,17 @@ pub fn interpolated(values: &[f64; NODES], x: f64) -> f64 {
 pub fn panel(low: f64, high: f64) -> impl Iterator<Item = (f64, f64)> {
     let (middle, half) = (f64::midpoint(low, high), 0.5 * (high - low));
     PANEL.iter().map(move |(x, weight)| (middle + half * x, half * weight))
+}
+
+/// Gauss and Laguerre's nodes and weights: eigenvalues of the matrix of the polynomials' recurrence, with 2k + 1 on its diagonal
+/// and k beside it.
+pub fn laguerre(nodes: usize) -> Vec<(f64, f64)> {
+    let recurrence = DMatrix::from_fn(nodes, nodes, |i, j| match i.abs_diff(j) {
+        0 => 2.0 * i as f64 + 1.0,
+        1 => i.max(j) as f64,
+        _ => 0.0,
+    });
+    let solved = recurrence.symmetric_eigen();
+    let node = |(index, place): (usize, &f64)| (*place, solved.eigenvectors[(0, index)].powi(2));
+    solved.eigenvalues.iter().enumerate().map(node).collect()
 }

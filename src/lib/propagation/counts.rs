@@ -3,6 +3,7 @@
 use crate::metadata::PoissonKind;
 use crate::random::poisson::probability;
 use nalgebra::DMatrix;
+use std::f64::consts::TAU;
 
 /// One of the two charges of a photosite: a count times a sensitivity max(0, 1 + σ z).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,6 +57,20 @@ impl Charge {
     /// The smallest standard deviation of the fixed pattern among counts that matter.
     pub fn least_pattern_std(&self) -> f64 {
         (self.rate - 9.5 * self.shot_std()).max(0.0) * self.pattern
+    }
+
+    /// The least −ln |E e^(iθn)| of the counts n of any photosite, which its sensitivity stretches.
+    pub fn damping(&self, angle: f64) -> f64 {
+        if self.is_certain() {
+            return 0.0;
+        }
+        let [least, most] = [(1.0 - 9.0 * self.pattern).max(0.0), 1.0 + 9.0 * self.pattern].map(|x| x * angle);
+        match self.shot {
+            Some(PoissonKind::Gaussian) => 0.5 * self.rate * least * least,
+            // Whole turns leave all.
+            _ if (most / TAU).floor() >= (least / TAU).ceil() => 0.0,
+            _ => self.rate * (1.0 - least.cos()).min(1.0 - most.cos()),
+        }
     }
 
     /// A charge that next to none of the photosites exceeds.

@@ -36,6 +36,13 @@ pub(super) fn within<T>(evaluations: u64, work: impl FnOnce() -> T) -> Option<T>
     (used < allowed).then_some(found)
 }
 
+/// The numbers below `count`, any first of them spread over all: bits in reverse order.
+pub(super) fn scattered(count: usize) -> impl Iterator<Item = usize> {
+    let all = count.next_power_of_two();
+    let spare = usize::BITS - all.trailing_zeros();
+    (0..all).map(move |index| index.reverse_bits().checked_shr(spare).unwrap_or(0)).filter(move |index| *index < count)
+}
+
 /// How much work equal parts will take, as the first of them tell.
 pub(super) struct Foreseen {
     parts: u64,
@@ -59,7 +66,8 @@ impl Foreseen {
             self.allowed = left();
         }
         let used = self.allowed - left();
-        if self.begun >= Self::TELLING && used.saturating_mul(self.parts) / self.begun > 2 * self.allowed {
+        if self.begun >= Self::TELLING && used.saturating_mul(self.parts) / self.begun > self.allowed.saturating_mul(2)
+        {
             spend(left());
         }
         self.begun += 1;
@@ -96,5 +104,15 @@ mod tests {
             done
         };
         assert_eq!([5, 9, 15, 21, 300].map(parts_done), [100, 100, 67, 16, 4]);
+    }
+
+    #[test]
+    fn scattered_numbers_are_all_and_spread_out() {
+        assert_eq!(scattered(8).collect::<Vec<_>>(), [0, 4, 2, 6, 1, 5, 3, 7]);
+        for count in [0, 1, 2, 5, 8, 100] {
+            let mut found: Vec<usize> = scattered(count).collect();
+            found.sort_unstable();
+            assert_eq!(found, (0..count).collect::<Vec<_>>());
+        }
     }
 }

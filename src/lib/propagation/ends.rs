@@ -143,7 +143,7 @@ impl Stretch {
                     let layers = if blur < 0.1 * code { [3.0 * blur, 9.0 * blur] } else { [0.5 * code; 2] };
                     ends.extend(layers.into_iter().flat_map(|layer| [distance - layer, distance + layer]));
                 }
-                edge += code;
+                edge = reading.edge_beyond(edge, code);
             }
         };
         let [near, far] = [self.from, self.from + self.direction * fine.min(self.extent)];

@@ -194,6 +194,23 @@ impl Reading {
         }
     }
 
+    /// The edge next above another; `code` is the width of the narrowest code.
+    pub fn edge_beyond(&self, edge: f64, code: f64) -> f64 {
+        // Beyond the codes none may be.
+        if self.is_bent() { self.edge_above(edge + 0.25 * code).max(edge + 0.25 * code) } else { edge + code }
+    }
+
+    /// That next below.
+    pub fn edge_below(&self, edge: f64, code: f64) -> f64 {
+        match self.asked {
+            Asked::Codes(adc, _) if self.is_bent() => {
+                let level = adc.level_at(edge - 0.25 * code + self.offset_e);
+                self.charge_at(&adc, (level - 0.5).floor() + 0.5)
+            }
+            _ => edge - code,
+        }
+    }
+
     /// The same without the highest code.
     pub fn without_highest(&self) -> Self {
         match self.asked {

@@ -29,7 +29,7 @@ fn is_cut(count: &Count, full_well_e: f64) -> bool {
 
 /// The same as normal laws, where full well is within reach and the other charge has a pattern, whose law full well cuts: charges
 /// below zero leave, and come back as none.
-pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
+pub(super) fn signed_nodes(law: &Law) -> Vec<Node> {
     let mut found = Vec::new();
     // Laws of more wells are cut off at their floors.
     if law.has_floors() {
@@ -39,7 +39,8 @@ pub(super) fn signed_nodes(law: &Law, reading: &Reading) -> Vec<Node> {
         let Some((counts, base)) = below_zero(charge).filter(|_| charge.is_rectified(law.full_well_e)) else {
             continue;
         };
-        let mut others = plain(other, law, reading);
+        // Full well cuts counts before read noise blurs them.
+        let mut others = plain(other, 0.0);
         others.retain(|other| is_cut(other, law.full_well_e));
         let Some(narrowest) = others.iter().map(|other| other.spread).min_by(f64::total_cmp) else { continue };
         let stretch = Stretch { widest_panel: 2.5 * narrowest, ..base };
@@ -78,7 +79,8 @@ pub(super) fn corrections(law: &Law, reading: &Reading, full: f64) -> Moments {
         return sum;
     }
     let others = |other: &Charge, signed: Vec<Count>| {
-        let mut each = plain(other, law, reading);
+        let noise_e = if full == f64::INFINITY { law.read_noise_e.max(reading.noise_e) } else { 0.0 };
+        let mut each = plain(other, noise_e);
         each.retain(|other| full == f64::INFINITY || !is_cut(other, full));
         each.extend_from_slice(&signed);
         let is_uncut = full == f64::INFINITY || other.most() < full;
@@ -110,9 +112,9 @@ fn add(sum: &mut Moments, weight: f64, moments: Moments) {
     }
 }
 
-/// The normal laws of the other charge.
-fn plain(other: &Charge, law: &Law, reading: &Reading) -> Vec<Count> {
-    let mut nodes = other.counts(law.read_noise_e.max(reading.noise_e).hypot(other.least_pattern_std()).max(1e-3));
+/// The normal laws of the other charge, as many as a sum needs that is as smooth as such noise.
+fn plain(other: &Charge, noise_e: f64) -> Vec<Count> {
+    let mut nodes = other.counts(noise_e.hypot(other.least_pattern_std()).max(1e-3));
     nodes.retain(|node| node.weight > LEAST_WEIGHT);
     nodes
 }
@@ -182,7 +184,11 @@ fn seams(reading: &Reading, other: &MeanVariance, full: f64) -> Vec<f64> {
     edges.extend(reading.rails_e());
     if let Some(code) = reading.visible_code_e() {
         let first = reading.edge_above(other.mean);
-        edges.extend((0..MOST_EDGES).map(|below| first - code * f64::from(below)));
+        let mut below = first;
+        for _ in 0..MOST_EDGES {
+            edges.push(below);
+            below = reading.edge_below(below, code);
+        }
     }
     let of_edge = |edge: f64| (-6..=6).map(move |step| edge - other.mean + 1.5 * f64::from(step) * other.std());
     edges.into_iter().filter(|edge| edge.is_finite()).flat_map(of_edge).collect()

@@ -21,10 +21,9 @@ use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::numerics::averages::Combine;
-use crate::numerics::gauss::panel;
+use crate::numerics::gauss::{laguerre, panel};
 use crate::numerics::rounding::SMOOTH;
 use crate::stages::noise::{NoiseModel, Tails};
-use nalgebra::DMatrix;
 use std::sync::LazyLock;
 
 /// Why the paper says nothing.
@@ -133,24 +132,12 @@ impl Codes {
     }
 }
 
-/// Gauss and Laguerre's nodes and weights: eigenvalues of the matrix of the polynomials' recurrence, with 2k + 1 on its diagonal
-/// and k beside it.
-fn laguerre(nodes: usize) -> Vec<(f64, f64)> {
-    let recurrence = DMatrix::from_fn(nodes, nodes, |i, j| match i.abs_diff(j) {
-        0 => 2.0 * i as f64 + 1.0,
-        1 => i.max(j) as f64,
-        _ => 0.0,
-    });
-    let solved = recurrence.symmetric_eigen();
-    let node = |(index, place): (usize, &f64)| (*place, solved.eigenvectors[(0, index)].powi(2));
-    solved.eigenvalues.iter().enumerate().map(node).collect()
-}
-
-/// The numbers below `count`, any first of them spread over all: bits in reverse order.
-fn scattered(count: usize) -> impl Iterator<Item = usize> {
-    let all = count.next_power_of_two();
-    let spare = usize::BITS - all.trailing_zeros();
-    (0..all).map(move |index| index.reverse_bits().checked_shr(spare).unwrap_or(0)).filter(move |index| *index < count)
+/// Excesses beyond which all together are less than 2·10⁻⁷ of the variance, where their square is `share` of that of the others: with
+/// ∫ t² e^(−t) dt from r on = (r² + 2r + 2) e^(−r).
+fn telling(share: f64) -> f64 {
+    const NEGLIGIBLE: f64 = 2e-7;
+    let is_beyond = |r: f64| share * (r * r + 2.0 * r + 2.0) * (-r).exp() < NEGLIGIBLE * (1.0 + 2.0 * share);
+    (0_u32..).map(f64::from).take_while(|r| *r < REACH).find(|r| is_beyond(*r)).unwrap_or(REACH)
 }
 
 /// For photosites that are hot and have a trap: exact for polynomials of degree 9.
@@ -274,7 +261,7 @@ impl Photosite {
         let mut found = Vec::new();
         let mut foreseen = effort::Foreseen::of(kinds.len() - 1);
         // Most photosites first, then hot ones from all over, which tell early how much work all are.
-        let order = std::iter::once(0).chain(scattered(kinds.len() - 1).map(|index| index + 1));
+        let order = std::iter::once(0).chain(effort::scattered(kinds.len() - 1).map(|index| index + 1));
         for (hot, weight) in order.map(|index| kinds[index]).map(|(t, weight)| (t, weight / sum)) {
             if hot > 0.0 {
                 foreseen.begin_next();
@@ -349,7 +336,7 @@ impl Photosite {
 
     /// Amplitudes of hot photosites; where `is_fine` as many as tell how codes are rounded.
     fn hot_nodes(&self, expected_e: f64, is_fine: bool) -> Option<Vec<(f64, f64)>> {
-        let mut knees = Vec::new();
+        let mut knees: Vec<Knee> = Vec::new();
         let mut codes: Option<Codes> = None;
         for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_hot()) {
             let hot_e = model.tails.hot_e;
@@ -359,9 +346,14 @@ impl Photosite {
                 let width = (cold.variance + shot + model.added().powi(2) + model.tails.rts_e.powi(2)).sqrt();
                 Knee { at: (level_e - cold.mean) / hot_e, width: width / hot_e }
             }));
+            // So bright few are that it does not matter whether they are cut off.
+            let variance = cold.variance + model.added().powi(2);
+            let farthest = telling(model.tails.hot_share * hot_e * hot_e / variance);
+            knees.retain(|knee| knee.at - 3.0 * knee.width < farthest);
             let Some(adc) = self.adc.filter(|_| is_fine) else { continue };
-            let blur_e = model.added().hypot(Law::of(model, light_e).least_pattern_std());
-            if adc.adu_per_e * blur_e >= SMOOTH {
+            let law = Law::of(model, light_e);
+            let blur_e = model.added().hypot(law.least_pattern_std());
+            if adc.adu_per_e * blur_e >= SMOOTH || !adc.is_bent() && law.counts_hide(&adc) {
                 continue;
             }
             // Shot noise blurs codes beyond so many electrons.

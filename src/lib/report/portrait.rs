@@ -113,7 +113,7 @@ fn outside(count: u64, all: u64, what: &str, farthest: f64) -> String {
     if count == 0 {
         return String::new();
     }
-    format!("{count} of {all} {what} outside, as far as {}", in_digits(farthest, 3).replace('-', "−"))
+    format!("{count} of {all} {what} beyond the axes, as far as {}", in_digits(farthest, 3).replace('-', "−"))
 }
 
 /// The color of a class or channel.
@@ -248,11 +248,14 @@ fn profile(portrait: &Portrait, scale: &Scale, axis: usize) -> Panel {
         bands.extend(band.map(|stds| (color, stds[axis], [first, last])));
     }
     if let Some([low, high]) = most(means.iter().copied(), FEW_LINES) {
-        let far = means.iter().copied().filter(|mean| !(low..=high).contains(mean));
-        let farthest = far.clone().fold(0.0, farther);
-        panel.title = outside(far.count() as u64, means.len() as u64, &format!("{one}s"), farthest);
+        const MARGIN: f64 = 0.05;
         let widest = bands.iter().map(|(_, std, _)| *std).fold(0.0, f64::max);
-        panel.y = panel.y.range(f64::min(low, -widest), f64::max(high, widest)).widened(0.05);
+        let [low, high] = [f64::min(low, -widest), f64::max(high, widest)];
+        let margin = MARGIN * (high - low);
+        let far = means.iter().copied().filter(|mean| !(low - margin..=high + margin).contains(mean));
+        let farthest = far.clone().fold(0.0, farther);
+        panel.title = outside(far.count() as u64, means.len() as u64, &format!("means of {one}s"), farthest);
+        panel.y = panel.y.range(low, high).widened(MARGIN);
     }
     if !bands.is_empty() {
         // For the legend: each class or channel has its own, in its color.
@@ -374,7 +377,7 @@ fn keep_most(panel: &mut Panel, pixels: &[[f64; 2]], ranges: [Option<[f64; 2]>; 
     let far = pixels.len() - pixels.iter().filter(is_within).count();
     panel.x = panel.x.clone().range(x[0], x[1]);
     panel.y = panel.y.clone().range(y[0], y[1]);
-    panel.title = if far > 0 { format!("{far} of {} pixels outside", pixels.len()) } else { String::new() };
+    panel.title = if far > 0 { format!("{far} of {} pixels beyond the axes", pixels.len()) } else { String::new() };
 }
 
 /// The ellipse of chromaticities about a mean of XYZ with a covariance, to first order.

@@ -103,6 +103,7 @@ impl Digitize {
         let adc = AdcRecord {
             linearization: of_sensor,
             is_linearized: false,
+            white_adu: None,
             bits: settings.bits.or(readout.map(|r| r.bits)).ok_or_else(|| needed("sensor.readout.bits"))?,
             bias_adu: settings
                 .bias_adu

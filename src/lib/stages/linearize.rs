@@ -50,6 +50,7 @@ impl Linearize {
         metadata.black_level_adu = metadata.black_level_adu.map(|level| level.map(sample));
         metadata.white_level_adu = metadata.white_level_adu.map(|level| level.map(sample));
         *metadata = metadata.becoming(QuantityKind::Adu);
+        let straight = metadata.white_level_adu.map_or(straight, |white| straight.with_white(white.largest()));
         metadata.adc = Some(straight);
         let table = (0..=straight.top_code()).map(|code| to_sample(sample(code.into()))).collect();
         Ok(Self { adc: straight, table })
@@ -76,10 +77,12 @@ impl Linearize {
 mod tests {
     use super::*;
     use crate::camera::linearity::Linearization;
+    use crate::camera::sensor::tests::kaf5101ce;
     use crate::cfa::CfaPattern;
     use crate::error::Error;
     use crate::frame::Geometry;
     use crate::metadata::Metadata;
+    use crate::stages::saturation::FullLevels;
 
     fn bent() -> FrameHeader {
         let mut metadata = Metadata::new(QuantityKind::Adu);
@@ -122,5 +125,21 @@ mod tests {
         let mut once = bent();
         Linearize::of(&mut once).unwrap();
         assert!(Linearize::of(&mut once).unwrap_err().to_string().contains("already"));
+    }
+
+    /// Full well at code 3900, and a white level that is set to 3000, 3950 and the highest code: the lower of both, straight.
+    #[test]
+    fn samples_are_full_from_the_lower_of_full_well_and_white() {
+        for (white, full) in [(3000.0, 3000.0), (3950.0, 3900.0), (4095.0, 3900.0)] {
+            let mut frame = bent();
+            let adc = frame.metadata.adc.unwrap();
+            let mut sensor = kaf5101ce();
+            sensor.readout.as_mut().unwrap().full_well_e = adc.electrons_at(3900.0);
+            frame.metadata.sensor = Some(sensor);
+            frame.metadata.white_level_adu = Some(white.into());
+            Linearize::of(&mut frame).unwrap();
+            let straight = AdcRecord { is_linearized: true, ..adc }.sample(full);
+            assert!((f64::from(FullLevels::of(&frame).unwrap().classes()[0]) - straight).abs() < 0.6, "{white}");
+        }
     }
 }

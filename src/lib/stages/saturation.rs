@@ -54,12 +54,11 @@ impl FullLevels {
                 let white = metadata.white_level_adu?;
                 // Both levels are shifted alike by what was subtracted.
                 let full_well_e = readout.map_or(f64::INFINITY, |readout| readout.full_well_e);
-                let below_top =
-                    |adc: AdcRecord| adc.sample(adc.top_code().into()) - adc.sample(adc.full_code(full_well_e));
+                let below_white = |adc: AdcRecord| adc.full_below_white(full_well_e);
                 // Of several amplifiers the lowest counts.
                 let of_taps = |adc: AdcRecord| match frame.taps() {
-                    None => below_top(adc),
-                    Some(taps) => (0..taps.count()).map(|tap| below_top(adc.of_tap(taps, tap))).fold(0.0, f64::max),
+                    None => below_white(adc),
+                    Some(taps) => (0..taps.count()).map(|tap| below_white(adc.of_tap(taps, tap))).fold(0.0, f64::max),
                 };
                 let missing = metadata.adc.map_or(0.0, of_taps);
                 white.classes().map(|level| level - missing)

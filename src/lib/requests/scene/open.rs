@@ -11,13 +11,14 @@ use crate::camera::sensor::Sensor;
 use crate::cfa::Class;
 use crate::error::{Error, Result};
 use crate::formats::csv::SpectralTable;
-use crate::formats::data::LoadedSensor;
+use crate::formats::data::{LoadedSensor, spectrum_file};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::frame::Geometry;
 use crate::requests::notes::{self, Note};
 use crate::spectrum::{SpectralLibrary, chart_columns};
 use crate::stream::RowSource;
+use std::path::Path;
 
 /// Error of a sum over wavelengths from which it is a warning.
 const TOLD_ERROR: f64 = 1e-2;
@@ -66,7 +67,11 @@ impl Scene {
             exposure = exposure.checked()?;
             light.scale(exposure.exposure_s);
             brightest_e = Some(fraction * full_well_e);
-            found.notes.push(Note::Remark(format!("exposure {} s", exposure.exposure_s)));
+            let text = format!("exposure {} s", exposure.exposure_s);
+            found.notes.push(match exposure.doubt() {
+                Some(_) => Note::Warning(format!("the scene takes an {text}; is the unit of its radiance right?")),
+                None => Note::Remark(text),
+            });
         }
         found.notes.extend(overfull(&light, loaded.sensor.readout.as_ref()));
         found.notes.extend(found.metadata.quadrature_error.map(inexact));
@@ -88,6 +93,7 @@ impl Scene {
             found.metadata.leave_out("render-radiance", what, "no class responds there");
         }
         let path = self.subject.input.clone();
+        found.notes.extend(path.as_deref().and_then(elsewhere).map(Note::Remark));
         let options = InputOptions { path, part: self.part, all_channels: true, ..InputOptions::default() };
         match spectral::open(&options)? {
             Radiances::Table(table) => self.light_of_table(&table, &sums, found),
@@ -189,6 +195,12 @@ impl Scene {
             }
         }
     }
+}
+
+/// Where a spectrum lies that is not at hand but comes with the programs.
+fn elsewhere(path: &Path) -> Option<String> {
+    let found = spectrum_file(path);
+    (found != path).then(|| format!("{}: {}", path.display(), found.display()))
 }
 
 /// A warning of light that fills photosites; none of light that does not, or that is not known before it is read.

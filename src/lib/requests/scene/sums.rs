@@ -91,6 +91,40 @@ impl<'a> Sums<'a> {
             // What rounds to none is no reason to warn.
             notes.push(if uncovered < 5e-5 { Note::Remark(text) } else { Note::Warning(text) });
         }
+        notes.extend(gap(sampled_nm, name).map(Note::Warning));
         Ok(Seen { camera: if is_followed { exact.clone() } else { of_sum }, exact })
+    }
+}
+
+/// A warning of wavelengths that are missing: steps much wider than most.
+fn gap(sampled_nm: &[f64], name: &str) -> Option<String> {
+    /// Times as wide as most, and nm, from which it is told.
+    const WIDE: f64 = 10.0;
+    const WIDE_NM: f64 = 20.0;
+    let mut steps: Vec<(f64, f64)> = sampled_nm.windows(2).map(|pair| (pair[1] - pair[0], pair[0])).collect();
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (usual, (widest, from)) = (steps.get(steps.len() / 2)?.0, *steps.last()?);
+    (widest > WIDE * usual && widest >= WIDE_NM).then(|| {
+        format!(
+            "{name}: nothing lies between {from} and {} nm, where its samples are otherwise {usual:.3} nm apart; a straight line is \
+             taken there",
+            from + widest
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missing_wavelengths_are_told() {
+        let told = |nm: &[f64]| gap(nm, "sky.csv");
+        let (low, high) = (360..=480, 620..=830);
+        let with_gap: Vec<f64> = low.chain(high).map(f64::from).collect();
+        assert!(told(&with_gap).unwrap().starts_with("sky.csv: nothing lies between 480 and 620 nm"));
+        for whole in [&[400.0, 700.0][..], &[360.0, 460.0, 830.0], &[400.0, 401.0, 402.0, 419.0], &[500.0]] {
+            assert_eq!(told(whole), None);
+        }
     }
 }
