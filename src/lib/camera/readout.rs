@@ -3,7 +3,7 @@
 use super::linearity::Linearization;
 use super::taps::Taps;
 use crate::cfa::FilterArray;
-use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, kelvin};
+use crate::units::{BOLTZMANN_EV_PER_K, CM_PER_UM, kelvin, of_per_cent};
 use serde::{Deserialize, Serialize};
 
 /// The smallest and the largest pitch in µm that does not look like another unit.
@@ -233,7 +233,7 @@ impl ReadOut {
         ];
         for (key, value, most) in patterns {
             if value > most {
-                return suspect(key, value, "fractions of 1", format!("per cent, which is {}", value / 100.0));
+                return suspect(key, value, "fractions of 1", format!("per cent, which is {}", of_per_cent(value)));
             }
         }
         if self.smear_line_s > MOST_SMEAR_LINE_S {

@@ -4,6 +4,7 @@ use crate::camera::readout::ReadOut;
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
 use crate::names::{Named, serde_by_name};
+use crate::units::of_per_cent;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -89,7 +90,7 @@ impl ResponseFiles {
         match self.peak_quantum_efficiency {
             Some(peak) if !(peak > 0.0 && peak <= 1.0) => {
                 let per_cent = if peak > 1.0 && peak <= 100.0 {
-                    format!("; as per cent it is {}", peak / 100.0)
+                    format!("; as per cent it is {}", of_per_cent(peak))
                 } else {
                     String::new()
                 };

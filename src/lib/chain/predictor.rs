@@ -181,8 +181,11 @@ impl Predictor {
                 Some((_, sites, causes)) => (sites, causes),
                 None => {
                     let sites = Sites::of(head, self.settings.equations).map_err(none)?;
-                    let [r, g, b] = sites.expected_e.map(|e| sites.photosite.causes(e).map_err(none));
-                    (sites, [r?, g?, b?])
+                    // One class after the other: of those after one that is not predicted nothing is worked out.
+                    let of_class = |e: f64| sites.photosite.causes(e).map_err(none);
+                    let [r, g, b] = sites.expected_e;
+                    let causes = [of_class(r)?, of_class(g)?, of_class(b)?];
+                    (sites, causes)
                 }
             };
             let prediction = sites.frame(head).map_err(none)?;

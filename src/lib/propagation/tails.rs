@@ -443,6 +443,9 @@ impl Photosite {
     pub(super) fn mixed_budget(&self, expected_e: f64) -> Budget {
         let [jumps, ..] = self.jump_cumulants();
         let (whole, of_means) = self.mixture(expected_e);
+        if whole.moments.variance.is_nan() {
+            return [f64::NAN; Cause::ALL.len()];
+        }
         let kinds = || self.each_of(expected_e, false, |site| site.budget(expected_e));
         let Some(kinds) = effort::within(MOST_WORK, kinds) else { return [f64::NAN; Cause::ALL.len()] };
         let mut budget =

@@ -38,6 +38,11 @@ pub const MM_PER_UM: f64 = 1e-3;
 /// Square centimeters in a square meter.
 pub const CM2_PER_M2: f64 = 1e4;
 
+/// A fraction of one in per cent, to twelve digits: of 99.999 it is 0.99999, not what binary fractions make of it.
+pub fn of_per_cent(x: f64) -> f64 {
+    format!("{:.11e}", x / 100.0).parse().unwrap_or(x / 100.0)
+}
+
 /// A temperature in K of one in °C, to the hundredth that people read.
 pub fn kelvin(celsius: f64) -> f64 {
     /// 0 °C in hundredths of a K (exact).

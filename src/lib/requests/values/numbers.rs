@@ -177,12 +177,7 @@ pub fn filling(text: &str) -> Result<f64, String> {
 fn per_cent(text: &str) -> String {
     let marked = text.trim().strip_suffix('%').and_then(|rest| positive(rest.trim()).ok());
     let found = marked.or_else(|| number(text).ok().filter(|x| (PER_CENT_FROM..=100.0).contains(x)));
-    found.map_or(String::new(), |x| format!("; {text} looks like per cent, which is {}", hundredth(x)))
-}
-
-/// A hundredth, to twelve digits: 99.999 is 0.99999, not what binary fractions make of it.
-fn hundredth(x: f64) -> f64 {
-    format!("{:.11e}", x / 100.0).parse().unwrap_or(x / 100.0)
+    found.map_or(String::new(), |x| format!("; {text} looks like per cent, which is {}", units::of_per_cent(x)))
 }
 
 /// From here on a number looks like per cent; below, like a fraction that is too large.
