@@ -448,7 +448,7 @@ mod tests {
             }
         }
         // A single row may lack the green that is lower: the lowest counts.
-        frame.geometry.height = 1;
-        assert_eq!(FullLevels::of(&frame).unwrap().of_row(0, 0), [4045.0, 3975.0]);
+        frame.geometry = Geometry { origin: [0, 1], ..Geometry::new(4, 1, &["Y"]) };
+        assert_eq!(FullLevels::of(&frame).unwrap().of_row(0, 0), [3975.0, 4045.0]);
     }
 }
