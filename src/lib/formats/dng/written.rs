@@ -253,8 +253,7 @@ fn what_the_raw_file_told_is_told_on() {
         demosaicked: false,
     };
     let dark = CorrectionRecord { dark_frames: 1, ..CorrectionRecord::of_black(0.0.into(), false) };
-    let changes: [&dyn Fn(&mut Metadata); 2] =
-        [&|m| m.average = Some(average.clone()), &|m| m.correction = Some(dark.clone())];
+    let changes: [&dyn Fn(&mut Metadata); 2] = [&|m| m.average = Some(average), &|m| m.correction = Some(dark.clone())];
     for change in changes {
         let mut other = header.clone();
         change(&mut other.metadata);

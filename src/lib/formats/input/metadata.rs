@@ -97,7 +97,7 @@ pub(super) fn placed(
         FoundIn::Sidecar(file) => (
             file.as_str(),
             format!(
-                "take `origin` out of {file} if that is right, or give metadata whose `origin` counts, --metadata FILE"
+                "if the file is right take `origin` out of {file}, else give metadata whose `origin` counts, --metadata FILE"
             ),
         ),
         FoundIn::Embedded | FoundIn::Tags => {

@@ -594,7 +594,7 @@ mod tests {
             let said = place(&crop, None).unwrap_err().to_string();
             let shown = sidecar(&crop).display().to_string();
             assert!(said.contains(&format!("begins at column 3, row 1 of the sensor by {shown} (`origin`), but at column 0, row 0 by the file itself")), "{said}");
-            assert!(said.ends_with("or give metadata whose `origin` counts, --metadata FILE"), "{said}");
+            assert!(said.ends_with(", else give metadata whose `origin` counts, --metadata FILE"), "{said}");
             assert_eq!(place(&crop, Some(&sidecar(&crop))).unwrap(), ([3, 1], 4.0));
             assert_eq!(place(&crop, Some(&sidecar(&whole))).unwrap(), ([0, 0], 1.0));
         }
