@@ -13,7 +13,7 @@ use cyanometer::error::Result;
 use cyanometer::formats::picture::{PictureSettings, write_png};
 use cyanometer::formats::yaml::{parse_metadata, write_metadata};
 use cyanometer::frame::{Geometry, to_sample};
-use cyanometer::metadata::{FrameHeader, Metadata, Scene};
+use cyanometer::metadata::{CameraSettings, FrameHeader, Metadata, Scene};
 use cyanometer::propagation::{self, Equations, Unpredictable};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
@@ -498,6 +498,29 @@ fn darks_of_other_sensors_or_lit_scenes_are_refused() {
     assert!(corrected(&frame_a, &dark_a).unwrap().warnings().is_empty());
     refused(corrected(&frame_a, &set("B", 100.0, dark_a.clone())), "its camera is B, but that of test is A");
     refused(corrected(&frame_a, &set("A", 400.0, dark_a)), "its sensitivity is ISO 400, but that of test is ISO 100");
+    let with = |settings: CameraSettings, mut header: FrameHeader| {
+        header.metadata.camera_settings = Some(settings);
+        header
+    };
+    let set = |gain: f64| CameraSettings { gain: Some(gain), ..CameraSettings::default() };
+    let settings = CameraSettings { e_per_adu: Some(0.8), offset: Some(21.0), readout_mode: None, ..set(139.0) };
+    let [frame_s, dark_s] = [taken(100.0, 1), taken(0.0, 1)].map(|header| with(settings.clone(), header));
+    assert!(corrected(&frame_s, &dark_s).unwrap().warnings().is_empty());
+    // What one of them alone tells is no difference.
+    assert!(corrected(&frame_s, &with(set(139.0), taken(0.0, 1))).is_ok());
+    for (other, said) in [
+        (set(0.0), "its gain in units of the camera is 0, but that of test is 139"),
+        (
+            CameraSettings { e_per_adu: Some(3.0), ..settings.clone() },
+            "its gain in e-/ADU is 3, but that of test is 0.8",
+        ),
+        (
+            CameraSettings { offset: Some(8.0), ..settings },
+            "its offset in units of the camera is 8, but that of test is 21",
+        ),
+    ] {
+        refused(corrected(&frame_s, &with(other, taken(0.0, 1))), said);
+    }
     for unsaid in [|m: &mut Metadata| m.scene = None, |m: &mut Metadata| (m.noise, m.scene) = (None, None)] {
         let mut silent = taken(0.0, 1);
         unsaid(&mut silent.metadata);

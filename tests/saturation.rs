@@ -18,6 +18,7 @@ use cyanometer::stages::saturation::FullLevels;
 use cyanometer::stream::{Counts, MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
 use serde_json::Value;
+use std::fs;
 use support::workshop::{BAD_DATA, Workshop};
 use support::{at, crop, frame, header, readout, scatter};
 
@@ -286,4 +287,38 @@ fn pictures_and_differences_tell_of_marked_pixels() {
         let said = String::from_utf8(done.stderr).unwrap();
         assert!(done.status.success() && said.contains(&text), "{line}: {said}");
     }
+}
+
+/// Codes without a header, and the full well of a sensor that is named: 1753 + 0.058824 · 5000 = 2047.12 ADU, far below white.
+#[test]
+fn the_full_well_of_a_sensor_marks_frames_of_cameras_and_their_flats() {
+    let shop = Workshop::new();
+    let readout = "width: 8, height: 6, cfa: rggb, full_well_e: 5000, dark_current_e_per_s: 1, temperature_k: 293, dcnu: 0, prnu: 0, \
+                   read_noise_e: 3, bits: 12, bias_adu: 1753, adu_per_e: 0.058824";
+    let sensor = format!("schema: cyanometer-sensor/2\nname: low\nreadout: {{{readout}}}\n");
+    fs::write(shop.path("low.yaml"), sensor).unwrap();
+    let plane = |name: &str, full: &[usize]| {
+        let code = |at: usize| if full.contains(&at) { 2047_u16 } else { 1900 + at as u16 };
+        fs::write(shop.path(name), (0..48).flat_map(|at| code(at).to_le_bytes()).collect::<Vec<u8>>()).unwrap();
+    };
+    plane("light.raw", &[3, 20]);
+    plane("flat.raw", &[30]);
+    let said = |command: &str| String::from_utf8(shop.attempt(command, &[]).stderr).unwrap();
+    let how = "--raw 8x6:u16le --cfa rggb --black 1753";
+    for white in ["", "--white 4095"] {
+        let told = said(&format!("correct-frame light.raw {how} {white} --sensor low.yaml -o black.exr"));
+        assert!(told.contains("2 samples are saturated"), "{told}");
+        let told = said(&format!("demosaic light.raw {how} {white} --sensor low.yaml -o rgb.exr"));
+        assert!(told.contains("pixels were made of saturated samples"), "{told}");
+        let told =
+            said(&format!("correct-frame light.raw {how} {white} --sensor low.yaml --flat flat.raw -o flat.exr"));
+        assert!(told.contains("1 photosites of the flats are saturated; they are marked"), "{told}");
+        let marks = shop.frame("flat.exr");
+        let Geometry { width, .. } = marks.header.geometry;
+        let mask: Vec<f32> = marks.samples.chunks_exact(width).skip(1).step_by(2).flatten().copied().collect();
+        let marked: Vec<usize> = (0..48).filter(|at| mask[*at] != 0.0).collect();
+        assert_eq!(marked, [3, 20, 30]);
+    }
+    let told = said(&format!("correct-frame light.raw {how} --white 4095 -o black.exr"));
+    assert!(!told.contains("saturated"), "{told}");
 }

@@ -325,12 +325,27 @@ fn a_chart_that_is_turned_is_told() {
     let absolute = format!("fit-matrix --chart chart.exr --luminance 100 -o m.yaml --corners {}", from(0));
     assert_eq!(
         said(&shop, &absolute, BAD_DATA),
-        "fit-matrix: chart.exr: its metadata have no `exposure`, which absolute XYZ take; give --metadata\n"
+        "fit-matrix: chart.exr: the metadata has no `exposure`; give --exposure S and --f-number N\n"
     );
     let text = "schema: cyanometer/1\nquantity: adu\ncfa: rggb\nblack_level_adu: 100\nwhite_level_adu: 4100\nexposure: {exposure_s: \
                 0.01, f_number: 8, lens_transmittance: 1}\n";
     fs::write(shop.path("chart.yaml"), text).unwrap();
     shop.run(&format!("{absolute} --metadata chart.yaml"), &[]);
+    let by_metadata = shop.bytes("m.yaml");
+    // As in other programs.
+    shop.run(&format!("{absolute} --exposure 0.01 --f-number 8"), &[]);
+    assert_eq!(shop.bytes("m.yaml"), by_metadata);
+    assert_eq!(
+        said(&shop, &format!("{absolute} --exposure 0.01"), BAD_USAGE),
+        "fit-matrix: chart.exr: an exposure is a time and an f-number, and one is not known; give --f-number\n"
+    );
+    assert_eq!(
+        said(&shop, &format!("{absolute} --metadata chart.yaml --exposure 0.02"), BAD_USAGE),
+        "fit-matrix: chart.exr: the exposure time in s is 0.01 by its metadata, which --metadata FILE can replace; leave out \
+         --exposure\n"
+    );
+    let table = "fit-matrix --patches none.csv --lens-transmittance 0.9";
+    assert!(said(&shop, table, BAD_USAGE).ends_with("which alone is described so; leave out --lens-transmittance\n"));
 }
 
 /// Writes a frame.

@@ -335,6 +335,32 @@ class Written(ProgramCase):
             # The relative standard deviation of a variance of n samples is √(2/n): five of them.
             self.assertAlmostEqual(found / (slope * x + offset), 1, delta=5 * np.sqrt(2 / samples.size))
 
+    def test_the_noise_profile_has_the_dark_pattern_and_not_that_of_the_response(self):
+        """A single frame has the variance of the line and that of PRNU, half the difference of two has not that of DCNU."""
+        slope_adu, dark_e, dcnu, prnu = 0.058824, 73.2, 0.2, 0.008
+        for electrons in (0, 1000, 10000):
+            scene = ["--electrons", f"{electrons},{electrons},{electrons}"]
+            self.run_program(["render-radiance", *scene, "--size", "600x400", "--cfa", "rggb", "-o", "rates.exr"])
+            frames = []
+            for number in (0, 1):
+                self.run_program(["add-noise", "rates.exr", "--frame", number, "-o", "noisy.exr"])
+                self.run_program(["digitize", "noisy.exr", "-o", "codes.dng"])
+                (_, raw), samples, _ = self.tags("codes.dng")
+                frames.append(samples.astype(float))
+            black, white = raw[50714][0] / raw[50714][1], raw[50717]
+            slope, offset = raw[51041][:2]
+            scale = white - black
+            told = (slope * slope_adu * electrons / scale + offset) * scale**2
+            single = np.mean([np.var(frame) for frame in frames])
+            pair = np.var(frames[0] - frames[1]) / 2
+            # Five standard deviations √(2/n) of a variance.
+            tolerance = 5 * np.sqrt(2 / samples.size)
+            pattern = (slope_adu * prnu * electrons) ** 2
+            self.assertAlmostEqual(single / (told + pattern), 1, delta=tolerance)
+            self.assertAlmostEqual(pair / (told - (slope_adu * dcnu * dark_e) ** 2), 1, delta=tolerance)
+            if electrons <= 1000:
+                self.assertAlmostEqual(single / told, 1, delta=0.05)
+
     def test_floats(self):
         self.frame("rggb")
         self.run_program(["correct-frame", "codes.exr", "--black", "auto", "-o", "signed.exr"])

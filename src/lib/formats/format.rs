@@ -17,6 +17,11 @@ pub trait SampleReader: Send {
     /// Size, place and channels.
     fn geometry(&self) -> &Geometry;
 
+    /// Whether the file itself says where on the sensor the frame begins; where it does not, its metadata may (`origin`).
+    fn tells_place(&self) -> bool {
+        self.geometry().origin != [0, 0]
+    }
+
     /// How samples are stored; none where channels differ in it.
     fn stored_as(&self) -> Option<SampleType>;
 

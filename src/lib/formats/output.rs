@@ -84,6 +84,7 @@ impl FrameWriter {
         let sample_scale = options.scale(header, encoding)?;
         let mut header = header.clone();
         header.metadata.sample_scale = (sample_scale != 1.0).then_some(sample_scale);
+        header.metadata.origin = Some(header.geometry.origin).filter(|origin| *origin != [0, 0]);
         let needs_seek = !matches!(encoding, Encoding::Exr(_, ExrCompression::None) | Encoding::Png);
         let target = Target::open(options.path.as_deref(), needs_seek)?;
         let name = target.name().to_owned();

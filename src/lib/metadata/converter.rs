@@ -133,8 +133,11 @@ impl AdcRecord {
         self.sample_slope(self.level_at(electrons)).powi(2) / 12.0
     }
 
-    /// The lowest code of a full photosite: the largest, or that of full well (electrons) where it is smaller.
+    /// The lowest code of a full photosite: the largest, or that of full well (electrons) where it is smaller. A full well that is
+    /// made of a code reads that code, whatever its last digit lost.
     pub fn full_code(&self, full_well_e: f64) -> f64 {
-        f64::from(self.top_code()).min(self.level_at(full_well_e).floor())
+        const LOST: f64 = 1e-9;
+        let level = self.level_at(full_well_e);
+        f64::from(self.top_code()).min((level + LOST * level.abs()).floor())
     }
 }

@@ -60,14 +60,15 @@ impl FrameHeader {
         }
     }
 
-    /// The same without what tells it from other exposures of its scene: its name, its seed and number, what its samples were
-    /// counted to be, where charge spilled, and what this version does not know.
+    /// The same without what tells it from other exposures of its scene: its name, its seed and number, how the camera was held, what
+    /// its samples were counted to be, where charge spilled, and what this version does not know.
     #[must_use]
     pub fn without_exposure(&self) -> Self {
         let mut head = Self { name: String::new(), ..self.clone() };
         head.metadata.history.clear();
         (head.metadata.samples, head.metadata.file, head.metadata.bloomed_photosites) = (None, None, None);
         head.metadata.averaged.clear();
+        head.metadata.orientation = None;
         if let Some(noise) = &mut head.metadata.noise {
             (noise.seed, noise.frame) = (0, 0);
         }

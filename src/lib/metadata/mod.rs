@@ -14,8 +14,9 @@ pub use correction::{
 pub use difference::Difference;
 pub use header::FrameHeader;
 pub use records::{
-    AdaptationRecord, BlackNoise, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
-    NoiseRecord, PoissonKind, PredictedRecord, RelativeMatrix, SamplesRecord, Scene, UpsamplingRecord,
+    AdaptationRecord, BlackNoise, CameraSettings, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut,
+    MatrixResidual, NoiseRecord, PoissonKind, PredictedRecord, ProfileRecord, RelativeMatrix, SamplesRecord, Scene,
+    UpsamplingRecord,
 };
 
 use crate::camera::levels::{BlackLevel, WhiteLevel};
@@ -50,6 +51,10 @@ pub struct Metadata {
     /// What stood before the photosites of a single plane; absent for planes that are complete.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cfa: Option<FilterArray>,
+    /// Columns and rows of the sensor before the first stored sample, where the frame does not begin at its corner. It stands in files
+    /// and streams alone: of a frame that is read, [`crate::frame::Geometry`] has the place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<[i32; 2]>,
     /// What no light reads in a frame of electrons: the mean dark signal, e⁻.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dark_signal_e: Option<f64>,
@@ -81,6 +86,15 @@ pub struct Metadata {
     /// The sensitivity that the camera was set to, ISO, as its raw file tells it; no number of ours hangs on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub iso_speed: Option<f64>,
+    /// What else the camera was set to, as its file tells it in units of the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_settings: Option<CameraSettings>,
+    /// How a picture is turned to be seen upright, as Exif numbers it, 1 to 8; rows and columns are those of the sensor all the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<u16>,
+    /// The noise of the codes as the raw file tells it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_profile: Option<ProfileRecord>,
     /// The temperature of the sensor during the exposure, as its file tells it; where none does, that of the sensor's read-out counts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor_temperature_k: Option<f64>,
@@ -166,6 +180,7 @@ impl Metadata {
             quantity,
             unit: quantity.unit().into(),
             cfa: None,
+            origin: None,
             dark_signal_e: None,
             black_level_adu: None,
             black_by_row: Vec::new(),
@@ -176,6 +191,9 @@ impl Metadata {
             sensor: None,
             camera: None,
             iso_speed: None,
+            camera_settings: None,
+            orientation: None,
+            noise_profile: None,
             sensor_temperature_k: None,
             exposure: None,
             relative_matrix: None,

@@ -164,6 +164,50 @@ pub struct RelativeMatrix {
     pub method: String,
 }
 
+/// What a camera was set to, in its own units, as its file tells it. No number of ours hangs on it, but frames of other settings
+/// are not of the same codes.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct CameraSettings {
+    /// Gain, in units of the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
+    /// What its driver takes for the electrons of an ADU.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub e_per_adu: Option<f64>,
+    /// Offset of the codes, in units of the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
+    /// Mode of the read-out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub readout_mode: Option<String>,
+}
+
+impl CameraSettings {
+    /// The first setting in which others differ, as far as both tell it: what it is, and what it is here and there.
+    pub fn other_than(&self, others: &Self) -> Option<(&'static str, String, String)> {
+        let number = |number: Option<f64>| number.map(|number| number.to_string());
+        [
+            ("gain in units of the camera", number(self.gain), number(others.gain)),
+            ("gain in e-/ADU", number(self.e_per_adu), number(others.e_per_adu)),
+            ("offset in units of the camera", number(self.offset), number(others.offset)),
+            ("mode of the read-out", self.readout_mode.clone(), others.readout_mode.clone()),
+        ]
+        .into_iter()
+        .find_map(|(what, here, there)| {
+            here.zip(there).filter(|(here, there)| here != there).map(|(here, there)| (what, here, there))
+        })
+    }
+}
+
+/// Variance of codes as a raw file tells it: S x + O over the signal x from 0 at black to 1 at white \[DNG2023, NoiseProfile].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProfileRecord {
+    /// S and O of each class; one pair holds for all.
+    pub lines: Vec<[f64; 2]>,
+    /// ADU from black to white in that file.
+    pub range_adu: f64,
+}
+
 /// What a black level is uncertain by that was measured in the masked border of the frame, variances in ADU².
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BlackNoise {

@@ -127,9 +127,11 @@ impl Exposures {
 
 /// What is known of the camera and of how it was set, and nothing else.
 fn camera(frame: &FrameHeader) -> Metadata {
-    let Metadata { quantity, sensor, camera, iso_speed, exposure, adc, noise, white_level_adu, .. } =
-        frame.without_exposure().metadata;
-    Metadata { sensor, camera, iso_speed, exposure, adc, noise, white_level_adu, ..Metadata::new(quantity) }
+    let Metadata {
+        quantity, sensor, camera, iso_speed, camera_settings, exposure, adc, noise, white_level_adu, ..
+    } = frame.without_exposure().metadata;
+    let of_quantity = Metadata::new(quantity);
+    Metadata { sensor, camera, iso_speed, camera_settings, exposure, adc, noise, white_level_adu, ..of_quantity }
 }
 
 /// What is known of its black level.

@@ -104,7 +104,7 @@ impl<S: RowSource> FlatFrames<S> {
         }
         let planes = head.geometry.channels.len();
         let classes = SiteClasses::of(&head, planes);
-        let full = FullLevels::of(&head);
+        let full = FullLevels::of(&of_sensor(&head, frame));
         let mut frames = Frames::new(flats, settings.averaging);
         frames.keep_largest();
         let transfer = cte.map(|cte| Transfer::undoing(cte, &head.geometry)).transpose()?;
@@ -242,6 +242,16 @@ impl<S: RowSource> FlatFrames<S> {
             shares_masters: false,
         }
     }
+}
+
+/// The head of flats whose metadata name no sensor with that of the frame that they are for, where both were taken with the same settings:
+/// what a user names counts for both.
+fn of_sensor(flats: &FrameHeader, frame: &FrameHeader) -> FrameHeader {
+    let mut head = flats.clone();
+    if head.metadata.sensor.is_none() && check_setting(frame, flats).is_ok() {
+        head.metadata.sensor.clone_from(&frame.metadata.sensor);
+    }
+    head
 }
 
 fn is_full(full: Option<FullLevels>, x: usize, y: usize, plane: usize, sample: f32) -> bool {

@@ -4,9 +4,10 @@
 //! does: from there on a layer, [`MASK_LAYER`], marks the pixels that used a full one. [`Marked`] adds the layer to the rows
 //! that come in, [`WithMask`] carries it through a stage, and [`Counted`] counts at the end.
 
+use crate::camera::levels::WhiteLevel;
 use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::Result;
-use crate::frame::{Rows, Window, mirror};
+use crate::frame::{Geometry, Rows, Window, mirror, to_sample};
 use crate::metadata::{AdcRecord, CorrectionRecord, FrameHeader};
 use crate::stream::{Counts, Footprint, RowSink, RowSource, Stage};
 use crate::units::QuantityKind;
@@ -38,6 +39,8 @@ pub const MASK_BITS: [(u32, &str); 4] = [
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FullLevels {
     levels: [f32; 3],
+    /// Those of the 2×2 sites at the sensor's corner, row by row, where black levels that differed within a class came off.
+    sites: Option<[f32; 4]>,
     pattern: Option<CfaPattern>,
     origin: [i32; 2],
 }
@@ -50,39 +53,33 @@ impl FullLevels {
         let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
         let levels = match metadata.quantity {
             QuantityKind::Electrons | QuantityKind::ExpectedElectrons => [readout?.full_well_e; 3],
-            QuantityKind::Adu | QuantityKind::Unspecified => {
-                let white = metadata.white_level_adu?;
-                // Both levels are shifted alike by what was subtracted.
-                let full_well_e = readout.map_or(f64::INFINITY, |readout| readout.full_well_e);
-                let below_white = |adc: AdcRecord| adc.full_below_white(full_well_e);
-                // Of several amplifiers the lowest counts.
-                let of_taps = |adc: AdcRecord| match frame.taps() {
-                    None => below_white(adc),
-                    Some(taps) => (0..taps.count()).map(|tap| below_white(adc.of_tap(taps, tap))).fold(0.0, f64::max),
-                };
-                let missing = metadata.adc.map_or(0.0, of_taps);
-                white.classes().map(|level| level - missing)
-            }
+            QuantityKind::Adu | QuantityKind::Unspecified => levels_of_codes(frame)?,
             _ => return None,
         };
-        #[expect(clippy::cast_possible_truncation, reason = "samples are floats, and so are their levels")]
-        let levels = levels.map(|level| level as f32);
         let pattern = metadata.cfa.and_then(FilterArray::bayer);
         let levels = match (metadata.cfa, pattern) {
             // Of arrays whose classes are not followed the lowest counts.
-            (Some(_), None) => [levels.into_iter().fold(f32::INFINITY, f32::min); 3],
+            (Some(_), None) => [levels.into_iter().fold(f64::INFINITY, f64::min); 3],
             _ => levels,
         };
-        levels.iter().all(|level| level.is_finite()).then_some(Self { levels, pattern, origin: frame.geometry.origin })
+        let of_site = |above: [f64; 4], site: usize| to_sample(levels[class_at(pattern, SITES[site])] + above[site]);
+        let sites = above_class(frame).map(|above| std::array::from_fn(|site| of_site(above, site)));
+        let levels = levels.map(to_sample);
+        let found = Self { levels, sites, pattern, origin: frame.geometry.origin };
+        levels.iter().all(|level| level.is_finite()).then_some(found)
     }
 
-    /// The levels of R, G and B.
+    /// The levels of R, G and B; where they differ among the photosites of a class, the lowest.
     pub fn classes(&self) -> [f32; 3] {
         self.levels
     }
 
     /// The levels of even and odd columns in row `y` of a plane.
     pub(super) fn of_row(&self, y: usize, channel: usize) -> [f32; 2] {
+        if let Some(sites) = self.sites {
+            let is_odd = |axis: usize, further: i64| usize::from((i64::from(self.origin[axis]) + further) & 1 != 0);
+            return [0, 1].map(|x| sites[2 * is_odd(1, y as i64) + is_odd(0, x)]);
+        }
         match self.pattern {
             Some(pattern) => pattern.row_classes(self.origin, y).map(|class| self.levels[class as usize]),
             None => [self.levels[channel.min(2)]; 2],
@@ -99,6 +96,71 @@ impl FullLevels {
                 }
             }
         }
+    }
+}
+
+/// The 2×2 sites at the sensor's corner, column and row, row by row.
+const SITES: [[i64; 2]; 4] = [[0, 0], [1, 0], [0, 1], [1, 1]];
+
+/// The class of a site; the first where there are no classes.
+fn class_at(pattern: Option<CfaPattern>, [x, y]: [i64; 2]) -> usize {
+    pattern.map_or(0, |pattern| pattern.class(x, y) as usize)
+}
+
+/// What came off the codes of a frame at each of the 2×2 sites, where nothing else was done to them.
+fn taken_off(frame: &FrameHeader) -> Option<[f64; 4]> {
+    match &frame.metadata.correction {
+        None => Some([0.0; 4]),
+        Some(record) => record.is_a_shift().then(|| record.black_adu.sites()),
+    }
+}
+
+/// The most that came off a class.
+fn most_of_class(off: [f64; 4], pattern: Option<CfaPattern>, class: usize) -> f64 {
+    let of_class = SITES.into_iter().zip(off).filter(|(site, _)| class_at(pattern, *site) == class);
+    of_class.map(|(_, off)| off).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// How far the sites of a plane are full above the level of their class: that is lowered by the most that came off any of them
+/// ([`super::black::white_left`]). None where it is the same for all.
+fn above_class(frame: &FrameHeader) -> Option<[f64; 4]> {
+    let Geometry { width, height, .. } = frame.geometry;
+    // A single row or column may lack the site off which most came.
+    let is_plane = !frame.leads_with_three_planes() && width > 1 && height > 1;
+    let off = taken_off(frame).filter(|_| is_plane)?;
+    let pattern = frame.metadata.cfa.and_then(FilterArray::bayer);
+    let above: [f64; 4] =
+        std::array::from_fn(|site| most_of_class(off, pattern, class_at(pattern, SITES[site])) - off[site]);
+    above.iter().any(|above| *above > 0.0).then_some(above)
+}
+
+/// The levels of full codes by class.
+fn levels_of_codes(frame: &FrameHeader) -> Option<[f64; 3]> {
+    let metadata = &frame.metadata;
+    let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+    let white = metadata.white_level_adu.map(WhiteLevel::classes);
+    // Of several amplifiers the lowest counts.
+    let of_taps = |adc: AdcRecord, level: &dyn Fn(AdcRecord) -> f64| match frame.taps() {
+        None => level(adc),
+        Some(taps) => (0..taps.count()).map(|tap| level(adc.of_tap(taps, tap))).fold(f64::INFINITY, f64::min),
+    };
+    if let Some(adc) = metadata.adc {
+        // Both levels are shifted alike by what was subtracted.
+        let full_well_e = readout.map_or(f64::INFINITY, |readout| readout.full_well_e);
+        let above_white = of_taps(adc, &|adc| -adc.full_below_white(full_well_e));
+        return Some(white?.map(|level| level + above_white));
+    }
+    // Frames of cameras do not tell their converter: that of the sensor which is named counts.
+    let Some((readout, off)) = readout.zip(taken_off(frame)) else { return white };
+    let full = of_taps(AdcRecord::of_readout(readout), &|adc| adc.full_code(readout.full_well_e));
+    let pattern = metadata.cfa.and_then(FilterArray::bayer);
+    let of_class = |class: usize| {
+        let off = most_of_class(off, pattern, if pattern.is_some() { class } else { 0 });
+        full - off
+    };
+    match white {
+        Some(white) => Some([0, 1, 2].map(|class| white[class].min(of_class(class)))),
+        None => (metadata.quantity == QuantityKind::Adu && samples_tell(frame)).then(|| [0, 1, 2].map(of_class)),
     }
 }
 
@@ -312,5 +374,81 @@ impl RowSink for Counted<'_> {
             self.rows_written += 1;
         }
         self.sink.write(samples)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::levels::BlackLevel;
+    use crate::camera::sensor::tests::kaf5101ce;
+    use crate::metadata::Metadata;
+
+    /// Codes of a camera that tells no converter, whose sensor is named: full well is at 1753 + 0.058824 · 20000 = 2929.48 ADU.
+    fn codes() -> FrameHeader {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some(CfaPattern::Rggb.into());
+        let mut sensor = kaf5101ce();
+        sensor.readout.as_mut().unwrap().full_well_e = 20_000.0;
+        metadata.sensor = Some(sensor);
+        metadata.white_level_adu = Some(4095.0.into());
+        FrameHeader { name: "codes".into(), geometry: Geometry::new(4, 4, &["Y"]), metadata }
+    }
+
+    #[test]
+    fn the_full_well_of_a_sensor_that_is_named_counts() {
+        let mut frame = codes();
+        let full = |frame: &FrameHeader| FullLevels::of(frame).map(|levels| levels.classes());
+        assert_eq!(full(&frame), Some([2929.0; 3]));
+        frame.metadata.white_level_adu = Some(WhiteLevel::Classes([2900.0, 3000.0, 4095.0]));
+        assert_eq!(full(&frame), Some([2900.0, 2929.0, 2929.0]));
+        // A frame that does not say its white level has that of the sensor.
+        frame.metadata.white_level_adu = None;
+        assert_eq!(full(&frame), Some([2929.0; 3]));
+        frame.metadata.quantity = QuantityKind::Unspecified;
+        assert_eq!(full(&frame), None);
+        // What came off lowers both.
+        let mut less = codes();
+        less.metadata.correction = Some(CorrectionRecord::of_black(100.0.into(), false));
+        less.metadata.white_level_adu = Some(3995.0.into());
+        assert_eq!(full(&less), Some([2829.0; 3]));
+        // How much dark frames took off is not known.
+        let dark = CorrectionRecord { dark_frames: 1, ..CorrectionRecord::of_black(0.0.into(), false) };
+        less.metadata.correction = Some(dark);
+        assert_eq!(full(&less), Some([3995.0; 3]));
+        less.metadata.white_level_adu = None;
+        assert_eq!(full(&less), None);
+        // A full well that was made of the white level is that, whatever its last digit lost.
+        let mut made = codes();
+        let readout = made.metadata.sensor.as_mut().unwrap().readout.as_mut().unwrap();
+        for adu_per_e in [0.3, 0.7, 1.1, 1.0 / 3.0] {
+            (readout.adu_per_e, readout.full_well_e) = (adu_per_e, (4095.0 - readout.bias_adu) / adu_per_e);
+            let adc = AdcRecord::of_readout(readout);
+            assert_eq!(AdcRecord { bits: 16, ..adc }.full_code(readout.full_well_e), 4095.0);
+        }
+    }
+
+    /// Two greens of different black levels: what is full in one is lower than in the other, once these are off.
+    #[test]
+    fn each_site_is_full_at_its_own_level() {
+        let mut frame = codes();
+        frame.metadata.sensor = None;
+        let off = [100.0, 120.0, 90.0, 50.0];
+        frame.metadata.correction = Some(CorrectionRecord::of_black(BlackLevel::Sites(off), false));
+        // As `correct-frame --black auto` leaves it.
+        frame.metadata.white_level_adu = Some(WhiteLevel::Classes([3995.0, 3975.0, 4045.0]));
+        for origin in [[0, 0], [1, 0], [2, 5]] {
+            frame.geometry.origin = origin;
+            let levels = FullLevels::of(&frame).unwrap();
+            assert_eq!(levels.classes(), [3995.0, 3975.0, 4045.0]);
+            for y in 0..4_u8 {
+                let is_odd = |axis: usize, further: u8| usize::from((origin[axis] + i32::from(further)) % 2 == 1);
+                let expected = [0, 1].map(|x| to_sample(4095.0 - off[2 * is_odd(1, y) + is_odd(0, x)]));
+                assert_eq!(levels.of_row(y.into(), 0), expected, "{origin:?} {y}");
+            }
+        }
+        // A single row may lack the green that is lower: the lowest counts.
+        frame.geometry = Geometry { origin: [0, 1], ..Geometry::new(4, 1, &["Y"]) };
+        assert_eq!(FullLevels::of(&frame).unwrap().of_row(0, 0), [3975.0, 4045.0]);
     }
 }

@@ -55,9 +55,7 @@ pub(super) fn describe(
     if levels.table.is_some() {
         notes.push("samples are made linear by its LinearizationTable".into());
     }
-    if tags::ORIENTATION.one(file, &image.first)?.is_some_and(|orientation| orientation > 1) {
-        notes.push("its Orientation is passed over: rows and columns stay those of the sensor".into());
-    }
+    metadata.orientation = told_orientation(tags::ORIENTATION.one(file, &image.first)?, notes);
     for tag in tags::OPCODES.into_iter().filter(|tag| tag.is_in(image.directory())) {
         notes.push(format!("its {}, corrections that converters make, is not applied", tag.1));
     }
@@ -161,6 +159,17 @@ fn told_exposure(file: &mut TiffFile, directories: &[&Directory], notes: &mut Ve
     };
     let (time, aperture) = (number(tags::EXPOSURE_TIME)?, number(tags::F_NUMBER)?);
     Ok(exposure_of(time, aperture, notes))
+}
+
+/// How a raw file says that its picture is turned, where it is; a note tells that nothing is turned here.
+pub(in crate::formats) fn told_orientation(number: Option<usize>, notes: &mut Vec<String>) -> Option<u16> {
+    let found = number.and_then(|number| u16::try_from(number).ok()).filter(|number| (2..=8).contains(number));
+    if let Some(number) = found {
+        notes.push(format!(
+            "rows and columns stay those of the sensor: its Orientation, {number}, is kept for a DNG that is made of it"
+        ));
+    }
+    found
 }
 
 /// The exposure of a raw file that tells so much of it, where both are known; notes tell what is passed over.

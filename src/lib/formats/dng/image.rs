@@ -16,6 +16,8 @@ const BLACK_IS_ZERO: u16 = 1;
 const MOST_DIRECTORIES: u64 = 64;
 /// Most photosites beside or below each other; a sensor has no more.
 const MOST_PHOTOSITES: usize = 1 << 20;
+/// What Software begins with in files that are written here.
+const SOFTWARE: &str = "cyanometer ";
 /// The version of the specification that is followed \[DNG2023].
 const VERSION: [usize; 4] = [1, 7, 1, 0];
 
@@ -78,14 +80,19 @@ impl RawImage {
         }
     }
 
-    /// Columns and rows of the sensor before the stored image: none, but in files that are written here, whose description
-    /// says so.
+    /// Columns and rows of the sensor before the stored image: none, but in files that are written here, whose description or
+    /// Software says so; another program may have changed one of the two.
     ///
     /// # Errors
     ///
     /// When such a file says what no sensor has.
     pub fn place(&self, file: &mut TiffFile, description: Option<&str>) -> Result<[usize; 2]> {
-        if !description.is_some_and(|text| text.starts_with(METADATA_BEGIN)) {
+        let is_described = description.is_some_and(|text| text.starts_with(METADATA_BEGIN));
+        let is_ours = is_described || {
+            let software = file.text(&self.first, Tag::Software).unwrap_or_default();
+            software.is_some_and(|software| software.starts_with(SOFTWARE))
+        };
+        if !is_ours {
             return Ok([0, 0]);
         }
         let mut along = |tag: DngTag| match tag.one(file, self.directory())? {

@@ -2,9 +2,15 @@
 
 use super::image::RawImage;
 use super::tags;
+use crate::camera::levels::WhiteLevel;
 use crate::camera::noise_profile::NoiseProfile;
+use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
-use crate::formats::tiff::TiffFile;
+use crate::formats::tiff::{ExtraTag, TagValue, TiffFile};
+use crate::frame::Geometry;
+use crate::metadata::{FrameHeader, Metadata, ProfileRecord};
+use crate::propagation::linear::LinearNoise;
+use crate::stages::noise::NoiseModel;
 
 /// Most classes of a profile, as many as a filter array names filters.
 const MOST_CLASSES: usize = 7;
@@ -33,4 +39,51 @@ pub(super) fn profile(file: &mut TiffFile, image: &RawImage, notes: &mut Vec<Str
         return Ok(None);
     }
     Ok(Some(NoiseProfile { lines: lines.to_vec() }))
+}
+
+/// The profile of a frame as its metadata keep it; none where its levels leave no range.
+pub(super) fn record(profile: &NoiseProfile, metadata: &Metadata, geometry: &Geometry) -> Option<ProfileRecord> {
+    let header = FrameHeader { name: String::new(), geometry: geometry.clone(), metadata: metadata.clone() };
+    let black = header.black_levels().ok().flatten()?.largest([geometry.width, geometry.height], |_, _| None)[0];
+    let range_adu = metadata.white_level_adu.map(WhiteLevel::largest)? - black;
+    (range_adu > 0.0).then(|| ProfileRecord { lines: profile.lines.clone(), range_adu })
+}
+
+/// The tag of a frame with `range` ADU from black to white, where its metadata know the noise: that which was drawn, or that which
+/// the raw file told.
+pub(super) fn tag(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<ExtraTag> {
+    let metadata = &header.metadata;
+    // Dark frames bring noise of their own, and averages have less.
+    let is_plain = metadata.correction.as_ref().is_none_or(|record| !record.took_frames() && record.is_plain());
+    if !is_plain || metadata.average.is_some() {
+        return None;
+    }
+    let numbers = match &metadata.noise {
+        Some(_) => drawn(header, cfa, range)?,
+        None => told(metadata, range)?,
+    };
+    Some(tags::NOISE_PROFILE.with(TagValue::Doubles(numbers)))
+}
+
+/// Variance over the signal x from 0 at black to 1 at white, S x + O for each class \[DNG2023, NoiseProfile], where the metadata
+/// know all that it follows from.
+fn drawn(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<Vec<f64>> {
+    let metadata = &header.metadata;
+    let (record, adc) = (metadata.noise.as_ref()?, metadata.adc.filter(|adc| !adc.is_bent())?);
+    // Charge that moved makes neighbors alike, and amplifiers have one each.
+    if record.cte.is_some() || header.taps().is_some() {
+        return None;
+    }
+    let line = LinearNoise::of(&NoiseModel::of(header, record).ok()?, &adc);
+    let planes = cfa.filters().len().max(1);
+    Some([line.slope_adu / range, line.offset_adu2 / (range * range)].repeat(planes))
+}
+
+/// What the raw file told, of so many ADU from black to white; none once codes were made straight.
+fn told(metadata: &Metadata, range: f64) -> Option<Vec<f64>> {
+    let ProfileRecord { lines, range_adu } = metadata.noise_profile.as_ref()?;
+    let scale = range_adu / range;
+    let numbers: Vec<f64> = lines.iter().flat_map(|[slope, offset]| [slope * scale, offset * scale * scale]).collect();
+    let is_sound = !numbers.is_empty() && numbers.iter().all(|number| (0.0..=1.0).contains(number));
+    (is_sound && metadata.adc.is_none_or(|adc| !adc.is_linearized)).then_some(numbers)
 }

@@ -102,6 +102,7 @@ impl DngReader {
         let noise_profile = noise::profile(&mut file, &image, &mut notes)?;
         let origin = [area.left + place[0], area.top + place[1]].map(|place| i32::try_from(place).unwrap_or(i32::MAX));
         let geometry = Geometry { origin, ..Geometry::new(area.width, area.height, &["Y"]) };
+        own_tags.noise_profile = noise_profile.as_ref().and_then(|found| noise::record(found, &own_tags, &geometry));
         // Decoding begins with the row of chunks that the area begins in.
         let begin = area.top / storage.chunk_rows * storage.chunk_rows;
         Ok(Self {

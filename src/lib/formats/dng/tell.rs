@@ -1,6 +1,7 @@
 //! What the tags of a DNG tell of a frame of ours.
 
 use super::image::{CFA, LINEAR_RAW};
+use super::noise;
 use super::preview::Preview;
 use super::ratio::{ratio, signed};
 use super::signals::CameraColor;
@@ -10,8 +11,6 @@ use crate::cfa::{FILTERS, FilterArray};
 use crate::error::{Error, Result};
 use crate::formats::tiff::{ExtraTag, TagValue, TiffSamples};
 use crate::metadata::{FrameHeader, Metadata};
-use crate::propagation::linear::LinearNoise;
-use crate::stages::noise::NoiseModel;
 use crate::stages::saturation::FullLevels;
 
 /// The version that is written, and the oldest that readers of integers and of floats must know.
@@ -75,7 +74,7 @@ impl Told {
         if metadata.white_level_adu.is_some() {
             raw.push(tags::WHITE_LEVEL.with(TagValue::Longs(vec![scaled(white, scale)])));
         }
-        raw.extend(noise_profile(header, cfa, range));
+        raw.extend(noise::tag(header, cfa, range));
         Ok(Self {
             raw,
             first: of_file(metadata, samples, color.as_ref()),
@@ -108,6 +107,13 @@ fn white(header: &FrameHeader, samples: TiffSamples, highest: f64) -> Result<u32
         )]
         (Some(white), _) => Ok(white.floor() as u32),
         (None, TiffSamples::U16) => Ok(u16::MAX.into()),
+        (None, TiffSamples::F32) if header.metadata.correction.as_ref().is_some_and(|record| record.took_frames()) => {
+            Err(header.refuse(
+                "a DNG of floats tells its white level, and how far the dark frames lowered that of this frame is not known: no \
+                 `black_level_adu` says what they took off; write an EXR or a TIFF, or add it to the metadata of the frame (a \
+                 sidecar, or --metadata FILE)",
+            ))
+        }
         (None, TiffSamples::F32) => Err(header.missing("white_level_adu")),
     }
 }
@@ -168,22 +174,6 @@ fn black_levels(black: &BlackLevels, width: usize) -> Vec<ExtraTag> {
     found
 }
 
-/// Variance over the signal x from 0 at black to 1 at white, S x + O for each class \[DNG2023, NoiseProfile], where the metadata
-/// know all that it follows from.
-fn noise_profile(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<ExtraTag> {
-    let metadata = &header.metadata;
-    let (record, adc) = (metadata.noise.as_ref()?, metadata.adc.filter(|adc| !adc.is_bent())?);
-    // Charge that moved makes neighbors alike, dark frames bring noise of their own, and amplifiers have one each.
-    let is_plain = metadata.correction.as_ref().is_none_or(|record| !record.took_frames() && record.is_plain());
-    if record.cte.is_some() || !is_plain || header.taps().is_some() {
-        return None;
-    }
-    let line = LinearNoise::of(&NoiseModel::of(header, record).ok()?, &adc);
-    let planes = cfa.filters().len().max(1);
-    let profile = [line.slope_adu / range, line.offset_adu2 / (range * range)];
-    Some(tags::NOISE_PROFILE.with(TagValue::Doubles(profile.repeat(planes))))
-}
-
 /// What holds for the whole file: version, camera, colors.
 fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor>) -> Vec<ExtraTag> {
     let backward = if samples == TiffSamples::U16 { BACKWARD_OF_INTEGERS } else { BACKWARD_OF_FLOATS };
@@ -194,7 +184,8 @@ fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor
         tags::UNIQUE_CAMERA_MODEL.with(TagValue::Text(model.clone())),
         tags::MAKE.with(TagValue::Text(NAMELESS.into())),
         tags::MODEL.with(TagValue::Text(model)),
-        tags::ORIENTATION.with(TagValue::Shorts(vec![1])),
+        tags::ORIENTATION
+            .with(TagValue::Shorts(vec![metadata.orientation.filter(|o| (1..=8).contains(o)).unwrap_or(1)])),
         tags::PREVIEW_COLOR_SPACE.with(TagValue::Longs(vec![SRGB])),
     ];
     if let Some(color) = color {

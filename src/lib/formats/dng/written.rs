@@ -10,7 +10,10 @@ use crate::formats::format::SampleReader;
 use crate::formats::tiff::{Directory, TiffCompression, TiffFile, TiffSamples};
 use crate::formats::yaml;
 use crate::frame::Geometry;
-use crate::metadata::{AdcRecord, DemosaicRecord, FrameHeader, Metadata, NoiseRecord, PoissonKind};
+use crate::metadata::{
+    AdcRecord, CorrectionRecord, DemosaicRecord, ExposuresRecord, FrameHeader, Metadata, NoiseRecord, PoissonKind,
+    ProfileRecord,
+};
 use crate::propagation::{Equations, Photosite};
 use crate::random::Source;
 use crate::stages::noise::NoiseModel;
@@ -130,6 +133,11 @@ fn floats_come_back_to_the_bit() {
         header.metadata.white_level_adu = None;
         let missing = self::bytes(&header, &samples, (TiffSamples::F32, compression), 7).unwrap_err();
         assert_eq!(missing.to_string(), "in: the metadata has no `white_level_adu`");
+        // Whoever gave one hears what became of it.
+        let dark = CorrectionRecord { dark_frames: 1, ..CorrectionRecord::of_black(0.0.into(), false) };
+        header.metadata.correction = Some(dark);
+        let lost = self::bytes(&header, &samples, (TiffSamples::F32, compression), 7).unwrap_err().to_string();
+        assert!(lost.contains("how far the dark frames lowered that of this frame is not known"), "{lost}");
     }
 }
 
@@ -209,6 +217,52 @@ fn the_noise_profile_is_the_variance_of_codes() {
     header.metadata.noise.as_mut().unwrap().cte = Some(0.9999);
     let (mut file, _, raw) = directories(&bytes(&header, &codes(&header), PLAIN, 4).unwrap());
     assert!(numbers(&mut file, &raw, tags::NOISE_PROFILE).is_empty());
+}
+
+/// What a raw file told of its picture and its noise is in the DNG that is made of it, on the scale of its range.
+#[test]
+fn what_the_raw_file_told_is_told_on() {
+    let mut header = frame([6, 4], [2, 1], "rggb");
+    let lines = vec![[1.2e-4, 3.4e-7], [1.1e-4, 3.3e-7], [1.3e-4, 3.5e-7]];
+    let range_adu = 4095.0 - 1757.25;
+    header.metadata.noise_profile = Some(ProfileRecord { lines: lines.clone(), range_adu });
+    header.metadata.orientation = Some(6);
+    let told = |header: &FrameHeader| {
+        let bytes = bytes(header, &codes(header), PLAIN, 4).unwrap();
+        let (mut file, first, raw) = directories(&bytes);
+        let orientation = numbers(&mut file, &first, tags::ORIENTATION);
+        let own = DngReader::open(stored(&bytes), "out.dng", RawArea::Active).unwrap().own_tags().clone();
+        (numbers(&mut file, &raw, tags::NOISE_PROFILE), orientation, own)
+    };
+    let (profile, orientation, own) = told(&header);
+    assert_eq!((&profile[..], &orientation[..]), (lines.as_flattened(), &[6.0][..]));
+    assert_eq!((own.noise_profile, own.orientation), (header.metadata.noise_profile.clone(), Some(6)));
+    // The same variances of a range that is twice as large.
+    let mut wide = header.clone();
+    wide.metadata.sensor = None;
+    wide.metadata.white_level_adu = Some(6432.0.into());
+    wide.metadata.black_level_adu = Some((6432.0 - 2.0 * range_adu).into());
+    let (profile, ..) = told(&wide);
+    assert!((profile[2] / 0.55e-4 - 1.0).abs() < 1e-12 && (profile[3] / 0.825e-7 - 1.0).abs() < 1e-12, "{profile:?}");
+    // Of an average, and once dark frames came off, it is another.
+    let average = ExposuresRecord {
+        frames: 2,
+        combine: crate::numerics::averages::Combine::Mean,
+        clip: None,
+        quantity: QuantityKind::Adu,
+        demosaicked: false,
+    };
+    let dark = CorrectionRecord { dark_frames: 1, ..CorrectionRecord::of_black(0.0.into(), false) };
+    let changes: [&dyn Fn(&mut Metadata); 2] = [&|m| m.average = Some(average), &|m| m.correction = Some(dark.clone())];
+    for change in changes {
+        let mut other = header.clone();
+        change(&mut other.metadata);
+        assert!(told(&other).0.is_empty());
+    }
+    header.metadata.noise_profile = None;
+    header.metadata.orientation = None;
+    let (profile, orientation, own) = told(&header);
+    assert_eq!((profile.len(), &orientation[..], own.orientation), (0, &[1.0][..], None));
 }
 
 #[test]

@@ -52,6 +52,10 @@ impl SampleReader for WithLayers {
         &self.geometry
     }
 
+    fn tells_place(&self) -> bool {
+        self.image.tells_place()
+    }
+
     fn stored_as(&self) -> Option<SampleType> {
         self.image.stored_as().filter(|stored| self.layers.stored_as() == Some(*stored))
     }

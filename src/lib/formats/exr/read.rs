@@ -300,6 +300,11 @@ impl SampleReader for ExrReader {
         &self.contents.geometry
     }
 
+    /// The data window always has a corner.
+    fn tells_place(&self) -> bool {
+        true
+    }
+
     fn stored_as(&self) -> Option<SampleType> {
         self.contents.stored_as
     }

@@ -11,11 +11,11 @@ const CARD_BYTES: usize = 80;
 /// A header may have this many bytes.
 const MOST_BYTES: usize = 64 << 20;
 /// Keywords that are kept besides those that begin with `NAXIS`; a header may have very many.
-const KEPT: [&str; 32] = [
+const KEPT: [&str; 33] = [
     "SIMPLE", "XTENSION", "BITPIX", "PCOUNT", "GCOUNT", "GROUPS", "ZIMAGE", "BSCALE", "BZERO", "BLANK", "BUNIT",
     "EXTNAME", "BAYERPAT", "COLORTYP", "XBAYROFF", "YBAYROFF", "ROWORDER", "EXPTIME", "EXPOSURE", "EXPOINUS",
     "FOCALLEN", "APTDIA", "FOCRATIO", "CCD-TEMP", "GAIN", "EGAIN", "PEDESTAL", "OFFSET", "BLKLEVEL", "INSTRUME",
-    "XBINNING", "YBINNING",
+    "READOUTM", "XBINNING", "YBINNING",
 ];
 
 /// The value of a card.

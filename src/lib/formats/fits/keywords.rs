@@ -4,7 +4,7 @@ use super::header::{Header, whole};
 use crate::camera::optics::Exposure;
 use crate::cfa::FilterArray;
 use crate::formats::exposure;
-use crate::metadata::Metadata;
+use crate::metadata::{CameraSettings, Metadata};
 use crate::text::visible;
 use crate::units::{QuantityKind, kelvin};
 use std::ops::RangeInclusive;
@@ -61,7 +61,8 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     let exposure_s = told_time(header);
     metadata.exposure = told_exposure(header, exposure_s, &mut notes);
     metadata.sensor_temperature_k = told_temperature(header, &mut notes);
-    pass_over(header, &mut notes);
+    metadata.camera_settings = told_settings(header);
+    note_settings(header, &mut notes);
     let exposure_s = exposure_s.filter(|seconds| *seconds > 0.0 && seconds.is_finite());
     Told { metadata, exposure_s, is_bottom_up, notes }
 }
@@ -125,12 +126,22 @@ fn told_exposure(header: &Header, exposure_s: Option<f64>, notes: &mut Vec<Strin
     exposure::of_parts(exposure_s, f_number, ["EXPTIME", "FOCALLEN and APTDIA, or FOCRATIO"], notes)
 }
 
+/// What the camera was set to; none where no keyword tells.
+fn told_settings(header: &Header) -> Option<CameraSettings> {
+    let found = CameraSettings {
+        gain: header.number("GAIN"),
+        e_per_adu: header.number("EGAIN").filter(|gain| *gain > 0.0),
+        offset: header.number("OFFSET").or_else(|| header.number("BLKLEVEL")),
+        readout_mode: header.text("READOUTM").map(|mode| visible(mode.trim()).into_owned()),
+    };
+    let is_finite = |number: Option<f64>| number.is_none_or(f64::is_finite);
+    let is_sound = [found.gain, found.e_per_adu, found.offset].into_iter().all(is_finite);
+    (is_sound && found != CameraSettings::default()).then_some(found)
+}
+
 /// Notes what a user may want to write into metadata or a sensor file, and what has no agreed meaning.
-fn pass_over(header: &Header, notes: &mut Vec<String>) {
+fn note_settings(header: &Header, notes: &mut Vec<String>) {
     let mut found = Vec::new();
-    if let Some(camera) = header.text("INSTRUME") {
-        found.push(format!("camera {camera}"));
-    }
     if let Some(gain) = header.number("EGAIN").filter(|gain| *gain > 0.0) {
         found.push(format!("{gain} e-/ADU (EGAIN), which is an `adu_per_e` of {}", 1.0 / gain));
     }
@@ -138,7 +149,10 @@ fn pass_over(header: &Header, notes: &mut Vec<String>) {
         found.push(format!("GAIN {gain} in units of the camera"));
     }
     if !found.is_empty() {
-        notes.push(format!("its header tells what is not used here: {}", found.join(", ")));
+        notes.push(format!(
+            "its header tells how the camera was set, which no number hangs on here, but frames of other settings are told by: {}",
+            found.join(", ")
+        ));
     }
     for key in ["PEDESTAL", "OFFSET", "BLKLEVEL"] {
         if let Some(level) = header.number(key).filter(|level| *level != 0.0) {

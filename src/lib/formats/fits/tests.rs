@@ -6,6 +6,7 @@ use super::read::FitsReader;
 use crate::error::Result;
 use crate::formats::format::{SampleReader, SampleType};
 use crate::formats::read_ahead::Pipe;
+use crate::metadata::CameraSettings;
 use crate::units::QuantityKind;
 use std::fs::File;
 use std::io::{Cursor, Seek, Write};
@@ -292,10 +293,18 @@ fn keywords_of_the_camera_are_used_or_told() {
     ]);
     assert_eq!((metadata.black_level_adu, metadata.quantity), (None, QuantityKind::Unspecified));
     assert_eq!(metadata.sensor_temperature_k, Some(263.15));
+    assert_eq!(metadata.camera.as_deref(), Some("ASI533MC"));
+    let settings = CameraSettings { gain: Some(100.0), e_per_adu: Some(0.5), ..CameraSettings::default() };
+    assert_eq!(metadata.camera_settings, Some(settings));
+    let (metadata, _) = told(&[("OFFSET", number(21.0)), ("READOUTM", text("High Gain Mode"))]);
+    let readout_mode = Some("High Gain Mode".to_owned());
+    let settings = CameraSettings { offset: Some(21.0), readout_mode, ..CameraSettings::default() };
+    assert_eq!(metadata.camera_settings, Some(settings));
+    assert_eq!(told(&[("EGAIN", number(-1.0))]).0.camera_settings, None);
     assert_eq!(told(&[("CCD-TEMP", number(-999.0))]).0.sensor_temperature_k, None);
     assert_eq!(
         notes,
-        "its header tells what is not used here: camera ASI533MC, 0.5 e-/ADU (EGAIN), which is an `adu_per_e` of 2, GAIN 100 in units of the camera; its PEDESTAL of -100 is not taken as the \
+        "its header tells how the camera was set, which no number hangs on here, but frames of other settings are told by: 0.5 e-/ADU (EGAIN), which is an `adu_per_e` of 2, GAIN 100 in units of the camera; its PEDESTAL of -100 is not taken as the \
          black level: programs disagree on its sign and scale"
     );
     assert_eq!(told(&[("BUNIT", text("ADU"))]).0.quantity, QuantityKind::Adu);

@@ -15,8 +15,21 @@ pub(super) struct Found {
     pub(super) metadata: Metadata,
     /// What describes the samples, as messages call it: the sidecar, or what the frame itself holds.
     pub(super) sidecar: Option<String>,
-    /// Whether they are those that the file itself holds.
-    pub(super) is_embedded: bool,
+    /// Where they were found.
+    pub(super) place: FoundIn,
+}
+
+/// Where metadata were found, in order of trust.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum FoundIn {
+    /// In the file of this name that the user gave.
+    Given(String),
+    /// In this file beside the frame.
+    Sidecar(String),
+    /// In the frame's own file.
+    Embedded,
+    /// In what the file format's own tags say.
+    Tags,
 }
 
 /// The metadata in order of trust: those of the file `given`, sidecar, embedded, the format's own tags.
@@ -27,7 +40,6 @@ pub(super) fn find_metadata(
     given: Option<&Path>,
 ) -> Result<Found> {
     path.map_or(Ok(()), register::note_sidecar)?;
-    let beside = |metadata, sidecar| Found { metadata, sidecar, is_embedded: false };
     let from_file = |path: &Path| -> Result<Metadata> {
         let shown = path.display().to_string();
         let bytes = read_file(path)?;
@@ -39,19 +51,66 @@ pub(super) fn find_metadata(
         let shown = path.display().to_string();
         yaml::check_misspelt(&shown, &metadata)?;
         doubt_of_metadata(&shown, metadata.contradictions());
-        return Ok(beside(metadata, None));
+        return Ok(Found { metadata, sidecar: None, place: FoundIn::Given(shown) });
     }
     if let Some(sidecar) = path.map(sidecar_path).filter(|sidecar| sidecar.is_file()) {
         let (metadata, shown) = (from_file(&sidecar)?, sidecar.display().to_string());
         // Another version may have written it: what is unknown is kept.
         doubt_of_metadata(&shown, yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()));
-        return Ok(beside(metadata, Some(shown)));
+        return Ok(Found { metadata, sidecar: Some(shown.clone()), place: FoundIn::Sidecar(shown) });
     }
     if let Some(text) = reader.embedded() {
         let describes = reader.describes_samples().then(|| "its metadata".to_owned());
-        return Ok(Found { metadata: yaml::parse_metadata(name, text)?, sidecar: describes, is_embedded: true });
+        let metadata = yaml::parse_metadata(name, text)?;
+        return Ok(Found { metadata, sidecar: describes, place: FoundIn::Embedded });
     }
-    Ok(beside(reader.own_tags().clone(), None))
+    Ok(Found { metadata: reader.own_tags().clone(), sidecar: None, place: FoundIn::Tags })
+}
+
+/// Where on the sensor a frame begins, of which its metadata say `told`: there, where the file itself does not say it. Where both do
+/// and differ, what the user gave counts, with a warning.
+///
+/// # Errors
+///
+/// [`Error::Format`] where other metadata and the file itself differ: one of the two was changed by another program, and nothing
+/// tells which.
+pub(super) fn placed(
+    reader: &dyn SampleReader,
+    told: Option<[i32; 2]>,
+    found_in: &FoundIn,
+    name: &str,
+) -> Result<[i32; 2]> {
+    let own = reader.geometry().origin;
+    let Some(told) = told.filter(|told| *told != own) else { return Ok(own) };
+    if !reader.tells_place() {
+        return Ok(told);
+    }
+    let words = |[column, row]: [i32; 2]| format!("column {column}, row {row}");
+    let (told_words, own_words) = (words(told), words(own));
+    let (by, advice) = match found_in {
+        FoundIn::Given(file) => {
+            register::doubt(format!(
+                "{name}: it begins at {told_words} of the sensor by {file} (`origin`), which counts, and at {own_words} by the file itself"
+            ));
+            return Ok(told);
+        }
+        FoundIn::Sidecar(file) => (
+            file.as_str(),
+            format!(
+                "if the file is right take `origin` out of {file}, else give metadata whose `origin` counts, --metadata FILE"
+            ),
+        ),
+        FoundIn::Embedded | FoundIn::Tags => {
+            ("its metadata", "give metadata whose `origin: [X, Y]` counts, --metadata FILE".to_owned())
+        }
+    };
+    Err(Error::format(
+        name,
+        format!(
+            "it begins at {told_words} of the sensor by {by} (`origin`), but at {own_words} by the file itself, so that another program \
+             changed one of the two; {advice}"
+        ),
+    ))
 }
 
 /// Warnings of what a file of metadata says.
@@ -68,11 +127,14 @@ fn doubt_of_metadata(name: &str, problems: impl IntoIterator<Item = String>) {
 pub(super) fn take_scaling(
     reader: &dyn SampleReader,
     metadata: &mut Metadata,
-    is_embedded: bool,
+    found_in: &FoundIn,
     name: &str,
 ) -> Result<Option<Scaling>> {
     let found = metadata.sample_scale.take();
-    let embedded = reader.embedded().filter(|_| !is_embedded).and_then(|text| yaml::parse_metadata(name, text).ok());
+    let embedded = reader
+        .embedded()
+        .filter(|_| *found_in != FoundIn::Embedded)
+        .and_then(|text| yaml::parse_metadata(name, text).ok());
     let scale = embedded.map_or(found, |embedded| embedded.sample_scale).unwrap_or(1.0);
     if !is_scale(scale) {
         let problem = format!("its `sample_scale`, {scale}, is no power of two, as 0.25 and 16 are");

@@ -8,7 +8,7 @@ mod options;
 pub use options::{InputOptions, Linearizing};
 
 use self::kept::{LEFT_OUT, cut, keep_planes, left_out, take_channel};
-use self::metadata::{Found, doubt_of_marks, find_metadata, take_scaling};
+use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
 use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
 use super::digest::SamplesDigest;
 use super::dng::{DngReader, RawArea};
@@ -20,6 +20,7 @@ use super::viewable::Scaling;
 use super::{headerless, register, table, tiff};
 use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
+use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
 use crate::stages::linearize::Linearize;
 use crate::stages::saturation::{MASK_BITS, MASK_LAYER, bits, with_mask};
@@ -185,11 +186,12 @@ impl FrameReader {
     /// Those of its metadata; [`Error::Usage`] where it has not the channel or the rectangle that is wanted.
     pub fn of(reader: Box<dyn SampleReader>, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
-        let Found { mut metadata, sidecar, is_embedded } =
+        let Found { mut metadata, sidecar, place } =
             find_metadata(reader.as_ref(), name, path, options.metadata.as_deref())?;
         let stored = reader.geometry();
         let to_come = metadata.frames_to_come.take().unwrap_or_default();
-        let scaling = take_scaling(reader.as_ref(), &mut metadata, is_embedded, name)?;
+        let scaling = take_scaling(reader.as_ref(), &mut metadata, &place, name)?;
+        let origin = placed(reader.as_ref(), metadata.origin.take(), &place, name)?;
         let (first_channel, geometry) = match &options.channel {
             Some(channel) => take_channel(stored, channel, name)?,
             None => (0, keep_planes(stored, options.all_channels, metadata.quantity)),
@@ -214,7 +216,7 @@ impl FrameReader {
             // The first program of the pipe reads it.
             register::note_upstream(Path::new(file))?;
         }
-        let mut header = FrameHeader { name: name.into(), geometry, metadata };
+        let mut header = FrameHeader { name: name.into(), geometry: Geometry { origin, ..geometry }, metadata };
         doubt_of_marks(&header, stored);
         let corner = options.crop.map_or(Ok([0, 0]), |crop| cut(&mut header, crop))?;
         let linearize = match &options.linearize {
@@ -487,8 +489,8 @@ impl RowSource for FrameReader {
 mod tests {
     use super::*;
     use crate::analysis::statistics::Region;
+    use crate::camera::levels::BlackLevel;
     use crate::formats::output::{FrameWriter, OutputOptions};
-    use crate::frame::Geometry;
     use crate::metadata::Metadata;
     use crate::stream::{Counts, RowSink};
     use std::path::PathBuf;
@@ -537,6 +539,109 @@ mod tests {
             let complaint = FrameReader::open(&options).err().unwrap().to_string();
             assert!(complaint.ends_with("does not lie within the frame of 7x6; give another `crop`"), "{complaint}");
         }
+    }
+
+    /// A frame of 4x4 codes behind an array, whose black level tells the sites, at a place of the sensor.
+    fn write_at(path: &Path, origin: [i32; 2]) {
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.cfa = Some("rggb".parse().unwrap());
+        metadata.black_level_adu = Some(BlackLevel::Sites([1.0, 2.0, 3.0, 4.0]));
+        metadata.white_level_adu = Some(4095.0.into());
+        let geometry = Geometry { origin, ..Geometry::new(4, 4, &["Y"]) };
+        let header = FrameHeader { name: "in".into(), geometry, metadata };
+        let options = OutputOptions { path: Some(path.to_owned()), ..OutputOptions::default() };
+        let mut writer = FrameWriter::create(&options, &header).unwrap();
+        writer.write(&[7.0; 16]).unwrap();
+        writer.finish(Counts::default()).unwrap();
+    }
+
+    /// Where a frame begins, and its first black level.
+    fn place(path: &Path, metadata: Option<&Path>) -> Result<([i32; 2], f64)> {
+        let options =
+            InputOptions { path: Some(path.into()), metadata: metadata.map(Into::into), ..Default::default() };
+        let (reader, _) = read(&options)?;
+        assert_eq!(reader.header().metadata.origin, None);
+        Ok((reader.header().geometry.origin, reader.header().black_levels()?.unwrap().row(0).at(0)))
+    }
+
+    fn sidecar(path: &Path) -> PathBuf {
+        crate::formats::files::sidecar_path(path)
+    }
+
+    /// Files that another program wrote anew without the place, beside the sidecar of the frame that they were.
+    #[test]
+    fn a_place_that_a_file_lost_is_that_of_its_metadata() {
+        let directory = tempfile::tempdir().unwrap();
+        let at = |name: &str| directory.path().join(name);
+        for end in ["tiff", "png", "dng", "exr"] {
+            let [crop, whole] = ["crop", "whole"].map(|name| at(&format!("{name}.{end}")));
+            write_at(&crop, [3, 1]);
+            write_at(&whole, [0, 0]);
+            assert_eq!(place(&crop, None).unwrap(), ([3, 1], 4.0), "{end}");
+            assert!(!std::fs::read_to_string(sidecar(&whole)).unwrap().contains("origin"));
+            // The file alone says it too, or what it carries.
+            let told = std::fs::read(sidecar(&crop)).unwrap();
+            std::fs::remove_file(sidecar(&crop)).unwrap();
+            assert_eq!(place(&crop, None).unwrap(), ([3, 1], 4.0), "{end}");
+            std::fs::copy(&whole, &crop).unwrap();
+            assert_eq!(place(&crop, None).unwrap(), ([0, 0], 1.0), "{end}");
+            std::fs::write(sidecar(&crop), &told).unwrap();
+            if end != "exr" {
+                assert_eq!(place(&crop, None).unwrap(), ([3, 1], 4.0), "{end}");
+                continue;
+            }
+            // A data window says where it begins: nothing tells which of the two is right.
+            let said = place(&crop, None).unwrap_err().to_string();
+            let shown = sidecar(&crop).display().to_string();
+            assert!(said.contains(&format!("begins at column 3, row 1 of the sensor by {shown} (`origin`), but at column 0, row 0 by the file itself")), "{said}");
+            assert!(said.ends_with(", else give metadata whose `origin` counts, --metadata FILE"), "{said}");
+            assert_eq!(place(&crop, Some(&sidecar(&crop))).unwrap(), ([3, 1], 4.0));
+            assert_eq!(place(&crop, Some(&sidecar(&whole))).unwrap(), ([0, 0], 1.0));
+        }
+        // A place that no position of a TIFF can tell.
+        let path = at("before.tiff");
+        write_at(&path, [-1, 3]);
+        assert_eq!(place(&path, None).unwrap(), ([-1, 3], 4.0));
+        // A crop of a crop moves on.
+        let crop = Some(Region { x: 2, y: 1, width: 2, height: 2 });
+        let (reader, _) = read(&InputOptions { path: Some(at("crop.tiff")), crop, ..InputOptions::default() }).unwrap();
+        assert_eq!(reader.header().geometry.origin, [5, 2]);
+    }
+
+    #[test]
+    fn a_dng_whose_description_another_program_wrote_keeps_its_place() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("crop.dng");
+        write_at(&path, [3, 1]);
+        let change = |from: &[u8], to: &[u8]| {
+            let mut bytes = std::fs::read(&path).unwrap();
+            let at = bytes.windows(from.len()).position(|window| window == from).unwrap();
+            bytes[at..at + to.len()].copy_from_slice(to);
+            std::fs::write(&path, bytes).unwrap();
+        };
+        change(b"schema: cyanometer/1", b"a chart, noon, west.");
+        // By its Software the positions are still those of ours.
+        assert_eq!(place(&path, None).unwrap(), ([3, 1], 4.0));
+        let told = std::fs::read(sidecar(&path)).unwrap();
+        std::fs::remove_file(sidecar(&path)).unwrap();
+        assert_eq!(place(&path, None).unwrap(), ([3, 1], 4.0));
+        std::fs::write(sidecar(&path), told).unwrap();
+        change(format!("cyanometer {}", env!("CARGO_PKG_VERSION")).as_bytes(), b"another one");
+        assert_eq!(place(&path, None).unwrap(), ([3, 1], 4.0));
+    }
+
+    #[test]
+    fn files_without_a_place_take_that_of_metadata_beside_them() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.fits");
+        let cards = ["SIMPLE  = T", "BITPIX  = 16", "NAXIS   = 2", "NAXIS1  = 2", "NAXIS2  = 2", "END"];
+        let mut bytes: Vec<u8> = cards.iter().flat_map(|card| format!("{card:<80}").into_bytes()).collect();
+        bytes.resize(2880, b' ');
+        bytes.resize(2 * 2880, 0);
+        std::fs::write(&path, bytes).unwrap();
+        let text = "schema: cyanometer/1\nquantity: adu\ncfa: rggb\nblack_level_adu: [1, 2, 3, 4]\norigin: [3, 1]\n";
+        std::fs::write(sidecar(&path), text).unwrap();
+        assert_eq!(place(&path, None).unwrap(), ([3, 1], 4.0));
     }
 
     #[test]

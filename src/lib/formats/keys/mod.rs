@@ -163,6 +163,8 @@ mod tests {
             KeyPage::Metadata => vec![
                 ("", field_names::<Metadata>()),
                 ("black_noise.", field_names::<BlackNoise>()),
+                ("camera_settings.", field_names::<CameraSettings>()),
+                ("noise_profile.", field_names::<ProfileRecord>()),
                 ("exposure.", field_names::<Exposure>()),
                 ("relative_matrix.", field_names::<RelativeMatrix>()),
                 ("scene.", field_names::<Scene>()),

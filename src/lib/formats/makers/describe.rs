@@ -8,7 +8,7 @@ use crate::color;
 use crate::color::calibration::{Calibration, Illuminated, Light};
 use crate::error::{Error, Result};
 use crate::formats::data::load_observer;
-use crate::formats::dng::{RawArea, Rectangle, exposure_of, temperature_k};
+use crate::formats::dng::{RawArea, Rectangle, exposure_of, temperature_k, told_orientation};
 use crate::metadata::{Metadata, RelativeMatrix};
 use crate::text::visible;
 use crate::units::QuantityKind;
@@ -69,9 +69,7 @@ pub(super) fn describe(head: &Head, name: &str, part: RawArea) -> Result<Describ
     metadata.exposure = exposure_of(positive(head.exposure_s), positive(head.f_number), &mut notes);
     metadata.relative_matrix = relative_matrix(head, cfa, &mut notes)?;
     metadata.iso_speed = head.iso.map(f64::from);
-    if head.orientation.is_some_and(|orientation| orientation > 1) {
-        notes.push("its Orientation is passed over: rows and columns stay those of the sensor".into());
-    }
+    metadata.orientation = told_orientation(head.orientation.map(usize::from), &mut notes);
     if head.images > 1 {
         notes.push(format!("of its {} raw images the first is read", head.images));
     }
@@ -251,7 +249,7 @@ pub(super) mod tests {
             assert_eq!(metadata.exposure.map(|exposure| exposure.f_number), Some(5.6));
             assert_eq!(metadata.iso_speed, Some(200.0));
             let said = notes.join("\n");
-            assert!(["Nikon D700", "Orientation is passed over"].iter().all(|text| said.contains(text)), "{said}");
+            assert!(["Nikon D700", "its Orientation, 6, is kept"].iter().all(|text| said.contains(text)), "{said}");
         }
     }
 

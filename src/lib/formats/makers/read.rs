@@ -76,6 +76,10 @@ impl SampleReader for MakersReader {
         &self.geometry
     }
 
+    fn tells_place(&self) -> bool {
+        true
+    }
+
     fn stored_as(&self) -> Option<SampleType> {
         Some(SampleType::U16)
     }

@@ -1,6 +1,6 @@
 //! Fitting a matrix to a chart of known colors, seen by the camera.
 
-use super::super::described::{Described, DescribedWithBlack};
+use super::super::described::{Described, DescribedWithBlack, SaidExposure};
 use super::super::notes::Note;
 use super::super::options::Selection;
 use super::super::values;
@@ -23,7 +23,8 @@ use crate::formats::input::{FrameReader, InputOptions};
 use crate::metadata::FrameHeader;
 use crate::requests::values::LightColor;
 use crate::stream::RowSource;
-use clap::Args;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, Command, FromArgMatches};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::path::{Path, PathBuf};
 
@@ -72,9 +73,52 @@ pub struct ChartFit {
     /// YAML file whose metadata replace those that come with the frame of the chart
     #[arg(long, value_name = "FILE")]
     pub metadata: Option<PathBuf>,
+    /// Exposure of the frame of the chart, where that does not say it.
+    #[command(flatten)]
+    pub exposure: ChartExposure,
     /// Let the noise of the patches alone weigh them: no error of references and matrix is estimated beside it
     #[arg(long)]
     pub no_misfit: bool,
+}
+
+/// What is said of the exposure of a chart's frame, by the options that tell how the samples of a library are exposed.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ChartExposure(SaidExposure);
+
+impl ChartExposure {
+    /// The options, by the name that they have here.
+    pub(super) const OPTIONS: [&str; 3] = ["exposure", "f_number", "lens_transmittance"];
+}
+
+impl Args for ChartExposure {
+    /// None of its own: those of a library's samples.
+    fn augment_args(command: Command) -> Command {
+        command
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        command
+    }
+}
+
+impl FromArgMatches for ChartExposure {
+    fn from_arg_matches(found: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        let is_of_library = matches!(found.try_contains_id("library"), Ok(true));
+        let [exposure_s, f_number, lens_transmittance] = Self::OPTIONS.map(|option| {
+            let is_known = found.try_contains_id(option).is_ok() && !is_of_library;
+            if is_known && found.value_source(option) == Some(ValueSource::CommandLine) {
+                found.try_get_one::<f64>(option).ok().flatten().copied()
+            } else {
+                None
+            }
+        });
+        Ok(Self(SaidExposure { exposure_s, f_number, lens_transmittance }))
+    }
+
+    fn update_from_arg_matches(&mut self, found: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(found)?;
+        Ok(())
+    }
 }
 
 /// A matrix fitted to a chart, with what was found out about it.
@@ -135,7 +179,8 @@ impl ChartFit {
     /// [`Error::Usage`].
     pub(super) fn check(&self) -> Result<()> {
         let Selection { part, raw, channel, crop } = &self.selection;
-        let of_frame: [(&'static [&'static str], bool); 7] = [
+        let SaidExposure { exposure_s, f_number, lens_transmittance } = self.exposure.0;
+        let of_frame: [(&'static [&'static str], bool); 10] = [
             (&["corners"], self.corners.is_some()),
             (&["cfa"], self.cfa.is_some()),
             (&["metadata"], self.metadata.is_some()),
@@ -143,6 +188,9 @@ impl ChartFit {
             (&["raw"], raw.is_some()),
             (&["channel"], channel.is_some()),
             (&["crop"], crop.is_some()),
+            (&["exposure"], exposure_s.is_some()),
+            (&["f_number"], f_number.is_some()),
+            (&["lens_transmittance"], lens_transmittance.is_some()),
         ];
         match of_frame.into_iter().find(|(_, is_given)| *is_given) {
             Some((option, _)) if self.chart.is_none() => {
@@ -214,7 +262,9 @@ impl ChartFit {
         let [black, white_level_adu] = [0, 1].map(|end| self.levels.map(|levels| levels[end]));
         let black_level_adu = black.map(BlackLevel::Uniform);
         let described = Described { cfa: self.cfa, white_level_adu, ..Described::default() };
-        DescribedWithBlack { described, black_level_adu }.open(&options)
+        let mut reader = DescribedWithBlack { described, black_level_adu }.open(&options)?;
+        self.exposure.0.apply(reader.header_mut())?;
+        Ok(reader)
     }
 
     /// Means of a table.
@@ -350,11 +400,7 @@ impl ChartFit {
             let problem = "absolute XYZ take the exposure of a frame, which means of patches do not have";
             return Err(Error::Usage(problem.into()).leave_out(&["luminance"]));
         };
-        let Some(exposure) = frame.metadata.exposure else {
-            let problem = "its metadata have no `exposure`, which absolute XYZ take";
-            return Err(frame.refuse(problem).give(&["metadata"]));
-        };
-        let exposure_s_sr = exposure.exposure_s_sr();
+        let exposure_s_sr = frame.exposure()?.exposure_s_sr();
         let black = frame.uniform_black_adu()?;
         let white = frame.metadata.white_level_adu.ok_or_else(|| frame.missing("white_level_adu"))?;
         Ok([luminance * exposure_s_sr / white.range_above(black); 3])

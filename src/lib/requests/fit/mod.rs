@@ -8,7 +8,7 @@ mod raw;
 mod request;
 mod training;
 
-pub use chart::{ChartFit, ChartFound};
+pub use chart::{ChartExposure, ChartFit, ChartFound};
 pub use raw::RawMatrix;
 
 pub use evaluation::{Conditions, DifferenceSummaries, Evaluation, Group, NoiseReport};
@@ -28,15 +28,19 @@ use training::Plan;
 
 /// A matrix from a library of spectra, from a chart, or from a raw file.
 #[derive(Debug, Clone, Args)]
-#[command(mut_group("Fit", |group| group.args(Fit::ids())))]
-#[command(mut_arg("chart", |chart| chart.conflicts_with_all(Fit::ids())))]
-#[command(mut_arg("patches", |patches| patches.conflicts_with_all(Fit::ids())))]
-#[command(mut_arg("from_raw", |from_raw| from_raw.conflicts_with_all(Fit::ids())))]
+#[command(mut_group("Fit", |group| group.args(Fit::own_ids())))]
+#[command(mut_arg("chart", |chart| chart.conflicts_with_all(Fit::own_ids())))]
+#[command(mut_arg("patches", |patches| patches.conflicts_with_all(Fit::own_ids())))]
+#[command(mut_arg("from_raw", |from_raw| from_raw.conflicts_with_all(Fit::own_ids())))]
 #[command(mut_args(|option| match option.get_id().as_str() {
-    "reference" | "reference_light" | "luminance" | "no_misfit" => option.conflicts_with_all(Fit::ids()),
-    "illuminant" | "temperature" => option.conflicts_with_all(Fit::ids()),
+    "reference" | "reference_light" | "luminance" | "no_misfit" => option.conflicts_with_all(Fit::own_ids()),
+    "illuminant" | "temperature" => option.conflicts_with_all(Fit::own_ids()),
     _ => option,
 }))]
+#[command(mut_arg("exposure", |exposure| exposure.help(
+    "Exposure time in s of every sample; with --expose-to, the aperture is chosen instead of the time. With --chart it is that of \
+     its frame, as are --f-number and --lens-transmittance"
+)))]
 #[command(mut_arg("library", |library| {
     library.required(false).required_unless_present_any(["chart", "patches", "from_raw"])
 }))]

@@ -1,5 +1,6 @@
 //! What is to be fitted: the options of a fit, and how they are read.
 
+use super::ChartExposure;
 use crate::analysis::characterization::regression::{Regression, Weights};
 use crate::color::White;
 use crate::error::{Error, Result};
@@ -151,6 +152,12 @@ impl Fit {
     /// The names of its options, those of the groups in it included.
     pub fn ids() -> Vec<clap::Id> {
         Self::augment_args(clap::Command::new("fit")).get_arguments().map(|option| option.get_id().clone()).collect()
+    }
+
+    /// The same but for those that a frame of a chart has too.
+    pub(super) fn own_ids() -> Vec<clap::Id> {
+        let is_own = |id: &clap::Id| !ChartExposure::OPTIONS.contains(&id.as_str());
+        Self::ids().into_iter().filter(is_own).collect()
     }
 
     /// Refuses a white that cannot be.

@@ -42,6 +42,10 @@ pub fn check_alike(first: &FrameHeader, other: &FrameHeader) -> Result<()> {
     if are_others(|metadata| metadata.iso_speed) {
         return differs("sensitivity (ISO)");
     }
+    let settings = first.metadata.camera_settings.as_ref().zip(other.metadata.camera_settings.as_ref());
+    if let Some((what, ..)) = settings.and_then(|(a, b)| a.other_than(b)) {
+        return differs(what);
+    }
     if are_others(Metadata::adu_per_e) {
         return differs("setting of the gain");
     }

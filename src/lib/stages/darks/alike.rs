@@ -82,18 +82,24 @@ pub(in crate::stages) fn check_alike(frame: &FrameHeader, dark: &FrameHeader) ->
     }
 }
 
-/// Makes sure that a dark frame is like `frame` and was taken at the same sensitivity, by which its codes mean the same charges.
+/// Makes sure that a dark frame is like `frame` and was taken at the same sensitivity and settings, by which its codes mean the same charges.
 ///
 /// # Errors
 ///
 /// As [`check_alike`].
 pub(in crate::stages) fn check_setting(frame: &FrameHeader, dark: &FrameHeader) -> Result<()> {
     check_alike(frame, dark)?;
-    match (frame.metadata.iso_speed, dark.metadata.iso_speed) {
-        (Some(a), Some(b)) if !is_same(a, b) => {
-            Err(dark.refuse(format!("its sensitivity is ISO {b}, but that of {} is ISO {a}", frame.name)))
+    if let (Some(a), Some(b)) = (frame.metadata.iso_speed, dark.metadata.iso_speed)
+        && !is_same(a, b)
+    {
+        return Err(dark.refuse(format!("its sensitivity is ISO {b}, but that of {} is ISO {a}", frame.name)));
+    }
+    let settings = frame.metadata.camera_settings.as_ref().zip(dark.metadata.camera_settings.as_ref());
+    match settings.and_then(|(a, b)| a.other_than(b)) {
+        Some((what, theirs, its)) => {
+            Err(dark.refuse(format!("its {what} is {its}, but that of {} is {theirs}", frame.name)))
         }
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 
