@@ -297,13 +297,16 @@ fn the_full_well_of_a_sensor_marks_frames_of_cameras_and_their_flats() {
                    read_noise_e: 3, bits: 12, bias_adu: 1753, adu_per_e: 0.058824";
     let sensor = format!("schema: cyanometer-sensor/2\nname: low\nreadout: {{{readout}}}\n");
     fs::write(shop.path("low.yaml"), sensor).unwrap();
-    let plane = |name: &str, full: &[usize]| {
-        let code = |at: usize| if full.contains(&at) { 2047_u16 } else { 1900 + at as u16 };
+    let plane = |name: &str, full: &[u16]| {
+        let code = |at: u16| if full.contains(&at) { 2047 } else { 1900 + at };
         fs::write(shop.path(name), (0..48).flat_map(|at| code(at).to_le_bytes()).collect::<Vec<u8>>()).unwrap();
     };
     plane("light.raw", &[3, 20]);
     plane("flat.raw", &[30]);
-    let said = |command: &str| String::from_utf8(shop.attempt(command, &[]).stderr).unwrap();
+    let said = |command: &str| {
+        let command = command.split_whitespace().collect::<Vec<_>>().join(" ");
+        String::from_utf8(shop.attempt(&command, &[]).stderr).unwrap()
+    };
     let how = "--raw 8x6:u16le --cfa rggb --black 1753";
     for white in ["", "--white 4095"] {
         let told = said(&format!("correct-frame light.raw {how} {white} --sensor low.yaml -o black.exr"));

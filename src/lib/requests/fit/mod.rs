@@ -2,13 +2,15 @@
 
 mod chart;
 mod evaluation;
+mod exposure;
 mod fitting;
 mod library;
 mod raw;
 mod request;
 mod training;
 
-pub use chart::{ChartExposure, ChartFit, ChartFound};
+pub use chart::{ChartFit, ChartFound};
+pub use exposure::ChartExposure;
 pub use raw::RawMatrix;
 
 pub use evaluation::{Conditions, DifferenceSummaries, Evaluation, Group, NoiseReport};
