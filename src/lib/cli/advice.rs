@@ -2,6 +2,9 @@
 
 use crate::error::Error;
 use clap::Command;
+use std::ffi::OsString;
+use std::io;
+use std::path::Path;
 
 /// What supplies a key that metadata lack, the better choice first; it counts where the program has all its options.
 const SUPPLIES: [(&str, &str); 13] = [
@@ -30,8 +33,40 @@ pub(super) fn advised(error: &Error, command: &Command) -> String {
         Error::Advised { error, advice } => {
             format!("{}; {}", advised(error, command), advice.in_words(|setting| option(setting, command)))
         }
+        Error::Disk { file, action: "open", source } if source.kind() == io::ErrorKind::NotFound => {
+            let words: Vec<OsString> = std::env::args_os().skip(1).collect();
+            let hint = misplaced(file, command, &in_text(&words));
+            hint.map_or_else(|| error.to_string(), |hint| format!("{error}; {hint}"))
+        }
         _ => error.to_string(),
     }
+}
+
+/// Arguments as texts.
+pub(super) fn in_text(words: &[OsString]) -> Vec<String> {
+    words.iter().map(|word| word.to_string_lossy().into_owned()).collect()
+}
+
+/// What a word may be that was taken for the name of an input, where there is no such file: the value of an option before it that takes
+/// one behind `=` alone, or the last of several, an output.
+fn misplaced(word: &str, command: &Command, words: &[String]) -> Option<String> {
+    let place = words.iter().position(|one| one == word)?;
+    let before = words.get(place.checked_sub(1)?)?;
+    let Some(long) = before.strip_prefix("--") else {
+        let is_last = place + 1 == words.len() && !before.starts_with('-');
+        return is_last.then(|| output_hint(word, command, words)).flatten();
+    };
+    let option = command.get_arguments().find(|argument| argument.get_long() == Some(long));
+    let takes_behind = option.is_some_and(clap::Arg::is_require_equals_set);
+    takes_behind.then(|| format!("a value of --{long} stands behind `=`, as in `--{long}={word}`"))
+}
+
+/// How an output is named, where a word that is none of an option looks like one and no output is named otherwise.
+pub(super) fn output_hint(word: &str, command: &Command, words: &[String]) -> Option<String> {
+    let is_named = words.iter().any(|one| one.starts_with("--output") || one.starts_with("-o"));
+    let takes_one = command.get_arguments().any(|one| one.get_long() == Some("output") && one.get_short() == Some('o'));
+    let is_file = !word.starts_with('-') && Path::new(word).extension().is_some();
+    (takes_one && is_file && !is_named).then(|| format!("for an output write `-o {word}`"))
 }
 
 /// The options that supply a key, or metadata that hold it.
@@ -72,6 +107,26 @@ mod tests {
 
     fn program(options: &[&'static str]) -> Command {
         options.iter().fold(Command::new("test"), |command, option| command.arg(Arg::new(*option).long(*option)))
+    }
+
+    #[test]
+    fn what_was_taken_for_an_input_may_be_another_word() {
+        let command = Command::new("test")
+            .arg(Arg::new("output").long("output").short('o'))
+            .arg(Arg::new("patches").long("patches").num_args(0..=1).require_equals(true))
+            .arg(Arg::new("sigma").long("sigma"));
+        for (line, word, wanted) in [
+            ("a.exr --patches 3x3", "3x3", Some("a value of --patches stands behind `=`, as in `--patches=3x3`")),
+            ("a.exr b.exr", "b.exr", Some("for an output write `-o b.exr`")),
+            ("a.exr b.exr", "a.exr", None),
+            ("a.exr b", "b", None),
+            ("a.exr b.exr -o c.exr", "b.exr", None),
+            ("--sigma a.exr", "a.exr", None),
+            ("a.exr", "a.exr", None),
+        ] {
+            let words: Vec<String> = line.split(' ').map(str::to_owned).collect();
+            assert_eq!(misplaced(word, &command, &words).as_deref(), wanted, "{line}");
+        }
     }
 
     #[test]

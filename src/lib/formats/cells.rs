@@ -79,7 +79,7 @@ impl Cells {
 }
 
 /// What is wrong with a cell, and what to do where it stands for a value that is missing.
-fn not_a_number(text: &str) -> String {
+pub(super) fn not_a_number(text: &str) -> String {
     const MISSING: [&str; 10] = ["nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "inf", "-inf"];
     let shown: String = text.chars().take(20).collect();
     match MISSING.contains(&text.to_lowercase().as_str()) {
@@ -101,6 +101,9 @@ impl<'a> Text<'a> {
     /// The text of a table; `is_of_numbers` where separators behind the last cell of a row mean nothing.
     pub(super) fn of(name: &str, bytes: &'a [u8], is_of_numbers: bool) -> Result<Self> {
         let decoded = delimited::decoded(name, bytes)?;
+        if let Some(what) = what_else(&decoded) {
+            return Err(Error::format(name, format!("it is {what}")));
+        }
         if decoded.contains('\0') {
             return Err(Error::format(name, "it is not a CSV table but a binary file"));
         }
@@ -135,6 +138,18 @@ impl<'a> Text<'a> {
             && first.iter().all(|cell| cell.bytes().all(|byte| byte.is_ascii_digit()))
             && !self.rows().lines().any(|line| !line.starts_with('#') && line.contains('.'))
     }
+}
+
+/// What a text is, by how it begins, that is no table.
+fn what_else(text: &str) -> Option<&'static str> {
+    const BEGINNINGS: [(&str, &str); 4] = [
+        ("PK\u{3}\u{4}", "a spreadsheet or another archive (ZIP); a table is wanted here: save its sheet as CSV"),
+        ("%PDF-", "a PDF; a table is wanted here, as CSV"),
+        ("<", "a page of HTML or XML; a table is wanted here, as CSV"),
+        ("{", "JSON; a table is wanted here, as CSV"),
+    ];
+    let text = text.trim_start();
+    BEGINNINGS.iter().find(|(begin, _)| text.starts_with(begin)).map(|(_, what)| *what)
 }
 
 /// Refuses a text of more cells, or of more in a line, than any table has, whatever parts them.

@@ -138,7 +138,7 @@ fn comment<'a>(line: &'a str, row: Option<&str>) -> Option<&'a str> {
 }
 
 /// Lines that are neither empty nor marked as comments.
-fn rows(text: &str) -> impl Iterator<Item = &str> {
+pub(super) fn rows(text: &str) -> impl Iterator<Item = &str> {
     text.lines().filter(|line| !line.trim().is_empty() && comment(line, None).is_none())
 }
 
