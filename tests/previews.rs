@@ -286,9 +286,10 @@ fn pictures_of_nothing_are_told() {
     let ramp: Vec<f32> = (0..64_u8).map(|step| f32::from(step) + 100.0).collect();
     write("ramp.bin", &ramp);
     let none = "none of its pixels has a number that is finite; there is nothing to show";
-    for options in ["", "--range 0,1", "--range 4sigma", "--range 1%,99%", "--false-color", "--false-color --range 0,1"]
+    for options in
+        ["", " --range 0,1", " --range 4sigma", " --range 1%,99%", " --false-color", " --false-color --range 0,1"]
     {
-        let done = shop.attempt(&format!("preview --raw 8x8:f32le nan.bin {options} -o a.png"), &[]);
+        let done = shop.attempt(&format!("preview --raw 8x8:f32le nan.bin{options} -o a.png"), &[]);
         assert_eq!(done.status.code(), Some(BAD_DATA), "{options}");
         let said = String::from_utf8_lossy(&done.stderr).into_owned();
         assert!(said.starts_with("preview: nan.bin: ") && said.ends_with(&format!("{none}\n")), "{options}: {said}");
@@ -296,15 +297,15 @@ fn pictures_of_nothing_are_told() {
     }
     assert!(shop.attempt("preview --raw 8x8:f32le one.bin -o a.png", &[]).status.success());
     for (options, range) in [
-        ("--range 0,99", Some("0 to 99.000")),
-        ("--range 164,200", Some("164.00 to 200.00")),
-        ("--range 0,99 --caption", Some("0 to 99.000")),
-        ("--range 0,99 --false-color", Some("0 to 99.000")),
-        ("--range 163,200", None),
-        ("--range 0,100 --false-color", None),
+        (" --range 0,99", Some("0 to 99.000")),
+        (" --range 164,200", Some("164.00 to 200.00")),
+        (" --range 0,99 --caption", Some("0 to 99.000")),
+        (" --range 0,99 --false-color", Some("0 to 99.000")),
+        (" --range 163,200", None),
+        (" --range 0,100 --false-color", None),
         ("", None),
     ] {
-        let done = shop.attempt(&format!("preview --raw 8x8:f32le ramp.bin {options} -o a.png"), &[]);
+        let done = shop.attempt(&format!("preview --raw 8x8:f32le ramp.bin{options} -o a.png"), &[]);
         assert!(done.status.success() && shop.path("a.png").exists());
         let said = String::from_utf8_lossy(&done.stderr);
         let wanted = range.map_or(String::new(), |range| {

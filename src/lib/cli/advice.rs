@@ -23,6 +23,9 @@ const SUPPLIES: [(&str, &str); 13] = [
     ("color.white", "--white-luminance CD_PER_M2"),
 ];
 
+/// What the names of reports end in.
+const REPORTS: [&str; 6] = ["txt", "text", "json", "yaml", "yml", "csv"];
+
 /// An error in words, with what to do about it in options that `command` has.
 pub(super) fn advised(error: &Error, command: &Command) -> String {
     match error {
@@ -65,7 +68,9 @@ fn misplaced(word: &str, command: &Command, words: &[String]) -> Option<String> 
 pub(super) fn output_hint(word: &str, command: &Command, words: &[String]) -> Option<String> {
     let is_named = words.iter().any(|one| one.starts_with("--output") || one.starts_with("-o"));
     let takes_one = command.get_arguments().any(|one| one.get_long() == Some("output") && one.get_short() == Some('o'));
-    let is_file = !word.starts_with('-') && Path::new(word).extension().is_some();
+    let ending = Path::new(word).extension().map(|end| end.to_string_lossy().to_ascii_lowercase());
+    let is_file = ending.is_some_and(|end| !has("output-format", command) || REPORTS.contains(&end.as_str()));
+    let is_file = is_file && !word.starts_with('-');
     (takes_one && is_file && !is_named).then(|| format!("for an output write `-o {word}`"))
 }
 
@@ -107,6 +112,14 @@ mod tests {
 
     fn program(options: &[&'static str]) -> Command {
         options.iter().fold(Command::new("test"), |command, option| command.arg(Arg::new(*option).long(*option)))
+    }
+
+    #[test]
+    fn an_output_that_is_a_report_ends_as_one() {
+        let output = Arg::new("output").long("output").short('o');
+        let command = Command::new("test").arg(output).arg(Arg::new("form").long("output-format"));
+        assert_eq!(output_hint("c.exr", &command, &[]), None);
+        assert_eq!(output_hint("c.json", &command, &[]).as_deref(), Some("for an output write `-o c.json`"));
     }
 
     #[test]

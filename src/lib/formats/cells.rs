@@ -1,7 +1,7 @@
 //! The cells of a table: from bytes to text, and from text to numbers.
 
 use super::delimited::{self, Separator, decimal, number};
-use super::foreign::csv_complaint;
+use super::foreign::{csv_complaint, line_of};
 use super::keys;
 use crate::error::{Error, Result};
 use csv::StringRecord;
@@ -34,9 +34,10 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Reads the rows, after `first` where that is one; each begins with a label where the table goes `by_rows`.
+    /// Reads the rows of `text`, after `first` where that is one; each begins with a label where the table goes `by_rows`.
     pub(super) fn read(
         name: &str,
+        text: &str,
         reader: &mut csv::Reader<&[u8]>,
         first: Option<&StringRecord>,
         by_rows: bool,
@@ -47,8 +48,10 @@ impl Cells {
         let mut at_hand = first.is_some();
         let [mut has_points, mut has_commas] = [false; 2];
         // One row at a time: as text a table takes many times the memory of its numbers.
-        while std::mem::take(&mut at_hand) || reader.read_record(&mut record).map_err(|e| csv_complaint(name, &e))? {
-            let line = record.position().map_or(0, csv::Position::line);
+        while std::mem::take(&mut at_hand)
+            || reader.read_record(&mut record).map_err(|e| csv_complaint(name, text, &e))?
+        {
+            let line = || line_of(text, record.position());
             (rows, width) = (rows + 1, record.len());
             if numbers.len() + width > MAX_CELLS {
                 return Err(refuse(format!("it has more than {MAX_CELLS} numbers; no table has")));
@@ -56,15 +59,15 @@ impl Cells {
             if by_rows {
                 labels.push(record[0].to_owned());
             }
-            for (column, text) in record.iter().enumerate() {
-                has_points |= text.contains('.') && number(text).is_some();
-                has_commas |= decimal(text).is_some();
-                numbers.push(match numeric(text) {
+            for (column, cell) in record.iter().enumerate() {
+                has_points |= cell.contains('.') && number(cell).is_some();
+                has_commas |= decimal(cell).is_some();
+                numbers.push(match numeric(cell) {
                     Some(value) => value,
                     // The label of a row need not be a number.
                     None if by_rows && column == 0 => 0.0,
                     None => {
-                        return Err(refuse(format!("line {line}, column {}", column + 1) + &not_a_number(text)));
+                        return Err(refuse(format!("line {}, column {}", line(), column + 1) + &not_a_number(cell)));
                     }
                 });
             }

@@ -24,7 +24,7 @@ use ndarray::{Array2, Axis};
 pub fn columns(name: &str, bytes: &[u8]) -> Result<Vec<String>> {
     let text = Text::of(name, bytes, false)?;
     let mut reader = text.reader(true);
-    let headers = reader.headers().map_err(|error| csv_complaint(name, &error))?;
+    let headers = reader.headers().map_err(|error| csv_complaint(name, text.rows(), &error))?;
     Ok(headers.iter().take(MAX_COLUMNS).map(ToOwned::to_owned).collect())
 }
 
@@ -34,8 +34,8 @@ pub fn columns(name: &str, bytes: &[u8]) -> Result<Vec<String>> {
 ///
 /// [`Error::Format`] for what is no CSV table, or has no such column, naming those that there are.
 pub fn text_column(name: &str, bytes: &[u8], column: &str) -> Result<Vec<String>> {
-    let not_csv = |error: csv::Error| csv_complaint(name, &error);
     let text = Text::of(name, bytes, false)?;
+    let not_csv = |error: csv::Error| csv_complaint(name, text.rows(), &error);
     let mut reader = text.reader(true);
     let headers = reader.headers().map_err(not_csv)?;
     let place = headers.iter().position(|header| header == column).ok_or_else(|| {
@@ -82,7 +82,7 @@ impl SpectralTable {
         let refuse = |problem: &str| Err(Error::format(name, problem));
         let mut reader = text.reader(false);
         let mut first = StringRecord::new();
-        if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, &e))? {
+        if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, text.rows(), &e))? {
             return refuse(if text.decoded.trim().is_empty() { "it is empty" } else { "it holds no rows" });
         }
         if text.is_ambiguous(&first) {
@@ -93,10 +93,10 @@ impl SpectralTable {
         }
         let has_header = numeric(&first[0]).is_none();
         if has_header {
-            misread::check_heading(name, &first)?;
+            misread::check_heading(name, text.rows(), &first)?;
         }
         let by_rows = has_header && first.len() > 2 && first.iter().skip(1).all(|cell| numeric(cell).is_some());
-        let below = if has_header && !by_rows { record_below(name, &mut reader)? } else { None };
+        let below = if has_header && !by_rows { record_below(name, text.rows(), &mut reader)? } else { None };
         let (units, at_hand) = match below {
             Some(record) if is_units(&first, &record) => (Some(record), None),
             record => (None, record.or_else(|| (!has_header).then(|| first.clone()))),
@@ -104,7 +104,7 @@ impl SpectralTable {
         if has_header && !by_rows {
             check_first_column(name, &first)?;
         }
-        let Cells { numbers, labels } = Cells::read(name, &mut reader, at_hand.as_ref(), by_rows)?;
+        let Cells { numbers, labels } = Cells::read(name, text.rows(), &mut reader, at_hand.as_ref(), by_rows)?;
         let (rows, width) = numbers.dim();
         if width < 2 || rows == 0 {
             return refuse("it needs a column of wavelengths in nm and at least one of values");
@@ -315,9 +315,9 @@ impl Comments {
 const MAX_COMMENTS: usize = 1000;
 
 /// The record below the header, if there is one.
-fn record_below(name: &str, reader: &mut csv::Reader<&[u8]>) -> Result<Option<StringRecord>> {
+fn record_below(name: &str, text: &str, reader: &mut csv::Reader<&[u8]>) -> Result<Option<StringRecord>> {
     let mut record = StringRecord::new();
-    let is_there = reader.read_record(&mut record).map_err(|e| csv_complaint(name, &e))?;
+    let is_there = reader.read_record(&mut record).map_err(|e| csv_complaint(name, text, &e))?;
     Ok(is_there.then_some(record))
 }
 

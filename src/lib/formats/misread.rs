@@ -3,11 +3,12 @@
 
 use super::cells::{not_a_number, numeric};
 use super::delimited::{self, number};
+use super::foreign::line_of;
 use super::keys;
 use crate::error::{Error, Result};
 use crate::spectrum::SHORTEST_NM;
 use crate::units::{WavelengthUnit, unit_of_heading};
-use csv::{Position, StringRecord};
+use csv::StringRecord;
 
 /// Columns that uvspec writes by default: the wavelength, edir, edn, eup, uavgdir, uavgdn, uavgup.
 pub(super) const UVSPEC: usize = 7;
@@ -17,9 +18,9 @@ pub(super) const UVSPEC: usize = 7;
 /// # Errors
 ///
 /// [`Error::Format`] naming line and column.
-pub(super) fn check_heading(name: &str, first: &StringRecord) -> Result<()> {
+pub(super) fn check_heading(name: &str, text: &str, first: &StringRecord) -> Result<()> {
     let refuse = |column: usize| {
-        let line = first.position().map_or(0, Position::line);
+        let line = line_of(text, first.position());
         let wrong = not_a_number(&first[column]);
         let hint = "its line looks like one of numbers (a heading begins with a word such as `wavelength_nm`)";
         Err(Error::format(name, format!("line {line}, column {}{wrong}; {hint}", column + 1)))
