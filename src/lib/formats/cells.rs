@@ -115,7 +115,7 @@ impl<'a> Text<'a> {
         }
         // Before any cell is told apart: each row is held as a whole.
         check_size(name, &decoded)?;
-        let separator = Separator::of(&decoded);
+        let separator = Separator::of(&decoded, is_of_numbers);
         let plain = delimited::plain(name, &decoded, separator, is_of_numbers)?;
         Ok(Self { decoded, plain, separator })
     }
@@ -138,7 +138,7 @@ impl<'a> Text<'a> {
     pub(super) fn is_ambiguous(&self, first: &StringRecord) -> bool {
         self.separator == Separator::Byte(b',')
             && first.len() > 2
-            && first.iter().all(|cell| cell.bytes().all(|byte| byte.is_ascii_digit()))
+            && first.iter().all(|cell| !cell.is_empty() && cell.bytes().all(|byte| byte.is_ascii_digit()))
             && !self.rows().lines().any(|line| !line.starts_with('#') && line.contains('.'))
     }
 }

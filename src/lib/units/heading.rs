@@ -325,11 +325,29 @@ mod tests {
     }
 
     #[test]
+    fn names_that_contradict_their_units_are_told() {
+        use OtherUnit::{Contradiction, Irradiance, Mean};
+        for (text, kind) in [
+            ("irradiance (W m-2 sr-1 nm-1)", Contradiction),
+            ("Irradiance, W m-2 sr-1 nm-1", Contradiction),
+            ("edir [mW m-2 sr-1 nm-1]", Contradiction),
+            ("photons (W m-2 sr-1 nm-1)", Contradiction),
+            ("radiance (W m-2 nm-1)", Contradiction),
+            ("spectral_radiance_w_per_m2_nm", Contradiction),
+            ("uavgdir", Mean),
+            ("radiance over irradiance (W m-2 nm-1)", Irradiance),
+        ] {
+            let found = unit_of_heading(text);
+            assert!(matches!(&found, Some(Stated::Other { kind: found, .. }) if *found == kind), "{text}: {found:?}");
+        }
+        for text in ["radiance (W m-2 sr-1 nm-1)", "radiance under an irradiance of 1 (W m-2 sr-1 nm-1)"] {
+            assert!(matches!(unit_of_heading(text), Some(Stated::Radiance(_))), "{text}");
+        }
+    }
+
+    #[test]
     fn other_units_are_told_from_radiances() {
-        use OtherUnit::{
-            AllWavelengths, Contradiction, Irradiance, Mean, PerCentimeter, PerFrequency, Photons, Scaled, Several,
-            Unknown,
-        };
+        use OtherUnit::{AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Scaled, Several, Unknown};
         for (text, kind) in [
             ("irradiance (W m-2 nm-1)", Irradiance),
             ("E [W/m2/nm]", Irradiance),
@@ -372,14 +390,6 @@ mod tests {
             ("Lw_W_m2_sr_um", Unknown),
             ("radiance_uW_cm2_sr_nm", Unknown),
             ("radiance (mW m-2 sr-1 nm-1) (W m-2 sr-1 nm-1)", Several),
-            ("irradiance (W m-2 sr-1 nm-1)", Contradiction),
-            ("Irradiance, W m-2 sr-1 nm-1", Contradiction),
-            ("edir [mW m-2 sr-1 nm-1]", Contradiction),
-            ("photons (W m-2 sr-1 nm-1)", Contradiction),
-            ("radiance (W m-2 nm-1)", Contradiction),
-            ("spectral_radiance_w_per_m2_nm", Contradiction),
-            ("radiance over irradiance (W m-2 nm-1)", Irradiance),
-            ("uavgdir", Mean),
             ("radiance (mW m-2 sr-1 nm-1, was W m-2 sr-1 nm-1)", Several),
         ] {
             assert!(
