@@ -210,3 +210,44 @@ fn the_demo_runs_in_an_empty_directory() {
     assert_eq!(again.status.code(), Some(BAD_USAGE));
     assert!(String::from_utf8_lossy(&again.stderr).contains("name a directory that is empty or new"));
 }
+
+/// The front door's own words are completed behind `list`, `keys` and `template`, and files by their endings where an option takes
+/// such alone.
+#[test]
+fn words_and_endings_are_completed() {
+    let shop = Workshop::new();
+    for name in ["a.svg", "b.png", "c.exr", "png.csv"] {
+        std::fs::write(shop.path(name), "").unwrap();
+    }
+    let complete = |program: &str, words: &[&str]| {
+        let script = text(&shop, &format!("{program} --completions bash"));
+        let (last, before) = words.split_last().unwrap();
+        let all: Vec<String> = words.iter().map(|word| format!("'{word}'")).collect();
+        let call = format!(
+            "COMP_WORDS=({program} {}); COMP_CWORD={}; _{program} {program} '{last}' '{}'; printf '%s\\n' \"${{COMPREPLY[@]}}\"",
+            all.join(" "),
+            words.len(),
+            before.last().unwrap_or(&program)
+        );
+        let output = std::process::Command::new("bash")
+            .args(["-c", &format!("{script}\n{call}")])
+            .current_dir(shop.path(""))
+            .output()
+            .unwrap();
+        let mut found: Vec<String> = String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect();
+        found.sort();
+        found
+    };
+    assert_eq!(complete(FRONT, &["keys", ""]), ["matrix", "metadata", "sensor"]);
+    assert_eq!(complete(FRONT, &["template", "s"]), ["sensor"]);
+    assert_eq!(complete(FRONT, &["list", "s"]), ["sensors", "spectra"]);
+    assert_eq!(complete(FRONT, &["meas"]), ["measure"]);
+    // Files, which bash completes where nothing is offered.
+    assert_eq!(complete(FRONT, &["measure", ""]), [""]);
+    assert_eq!(complete("measure", &["--plot", ""]), ["a.svg", "b.png"]);
+    assert_eq!(complete("preview", &["-o", ""]), ["b.png"]);
+    let zsh = text(&shop, "measure --completions zsh");
+    assert!(zsh.contains(r#":FILE.svg|png:_files -g "*.(svg|png)"'"#), "{zsh}");
+    let fish = text(&shop, &format!("{FRONT} --completions fish"));
+    assert!(fish.contains("__fish_seen_subcommand_from keys\" -f -a \"sensor matrix metadata\""), "{fish}");
+}

@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 113] = [
+const MISTAKES: [(&str, i32, &str); 128] = [
     (
         "photon-transfer codes.exr",
         BAD_DATA,
@@ -137,8 +137,51 @@ const MISTAKES: [(&str, i32, &str); 113] = [
     (
         "add-noise matrix.yaml",
         BAD_DATA,
-        "matrix.yaml: it is neither an EXR nor a DNG nor a PNG nor a FITS nor a TIFF file; it looks like text (a spectrum goes into \
-         `render-radiance`)",
+        "matrix.yaml: it is neither an EXR nor a DNG nor a PNG nor a FITS nor a TIFF file; it is a matrix file, for --matrix",
+    ),
+    (
+        "measure codes.exr.yaml",
+        BAD_DATA,
+        "codes.exr.yaml: it is neither an EXR nor a DNG nor a PNG nor a FITS nor a TIFF file; it holds the metadata of `codes.exr`: \
+         name that",
+    ),
+    (
+        "render-radiance zenit-sky",
+        BAD_DATA,
+        "zenit-sky: there is no such file; did you mean `clear_zenith.csv`? `cyanometer list spectra` tells those known by name",
+    ),
+    (
+        "fit-matrix no_data/skies/sky912.exr",
+        BAD_DATA,
+        "no_data/skies/sky912.exr: there is no such file; did you mean `sky912.exr`? `cyanometer list spectra` tells those known by name",
+    ),
+    (
+        "predict-noise measured_bleu.csv",
+        BAD_DATA,
+        "measured_bleu.csv: there is no such file; did you mean `measured_blue.csv`? `cyanometer list spectra` tells those known by name",
+    ),
+    (
+        "fit-matrix sky921.exr",
+        BAD_DATA,
+        "sky921.exr: there is no such file; did you mean `sky912.exr`? `cyanometer list spectra` tells those known by name",
+    ),
+    (
+        "render-radiance uvspec.csv",
+        BAD_DATA,
+        "uvspec.csv: its values are in `edir`, an irradiance, which has no sr-1; spectral radiances are wanted, such as W m-2 sr-1 nm-1; \
+         `uu` may hold them: choose it with --column 'uu'",
+    ),
+    (
+        "render-radiance mistyped.csv",
+        BAD_DATA,
+        "mistyped.csv: line 1, column 1: `40O` is no number; its line looks like one of numbers (a heading begins with a word such as \
+         `wavelength_nm`)",
+    ),
+    (
+        "render-radiance contradictory.csv",
+        BAD_DATA,
+        "contradictory.csv: its values are in `irradiance (W m-2 sr-1 nm-1)`, the name of one quantity beside the unit of another, one of \
+         which is wrong; give --radiance-unit",
     ),
     (
         "add-noise matrix.yaml --raw 4x3:u16",
@@ -327,7 +370,44 @@ const MISTAKES: [(&str, i32, &str); 113] = [
         BAD_DATA,
         "plane.exr: it holds a CFA plane of ADU, not three classes at each pixel; run `demosaic` first",
     ),
-    ("to-xyz rgb.exr --matrix missing.yaml", BAD_DATA, "missing.yaml: cannot open: no such file or directory"),
+    (
+        "to-xyz rgb.exr --matrix missing.yaml",
+        BAD_DATA,
+        "missing.yaml: there is no such file; `fit-matrix` makes a matrix, as in `fit-matrix sky912.exr -o matrix.yaml`",
+    ),
+    ("measure codes.exr -o out/", BAD_DATA, "out/: there is no directory of this name, and a file is wanted; name one"),
+    (
+        "render-radiance a.csv q.exr",
+        BAD_USAGE,
+        "unknown option or extra argument `q.exr`; for an output write `-o q.exr`; see `render-radiance --help`",
+    ),
+    (
+        "preview rgb.exr a.png",
+        BAD_USAGE,
+        "--output <FILE.png> is missing; for an output write `-o a.png`; see `preview --help`",
+    ),
+    (
+        "preview rgb.exr -o a.png --caption hello",
+        BAD_DATA,
+        "hello: cannot open: no such file or directory; a value of --caption stands behind `=`, as in `--caption=hello`",
+    ),
+    (
+        "photon-transfer matrix.yaml",
+        BAD_DATA,
+        "matrix.yaml: it is a matrix file, for --matrix; a list of flats and darks is wanted here",
+    ),
+    (
+        "render-radiance expected.exr",
+        BAD_DATA,
+        "expected.exr: it holds three planes of expected electrons, neither spectral radiance nor a picture in R, G, B; it is rendered \
+         already, for `add-noise`",
+    ),
+    (
+        "add-noise expected.exr --temperature 25C",
+        BAD_USAGE,
+        "`25C` is no value for --temperature <K>: give a temperature in K, above 0; 25 looks like degrees Celsius, which is 298.15 K; see \
+         `add-noise --help`",
+    ),
     (
         "to-xyz noisy.exr --matrix matrix.yaml",
         BAD_DATA,
@@ -516,6 +596,9 @@ fn mistakes_are_answered_in_one_line() {
     fs::write(shop.path("unit.yaml"), matrix("nits")).unwrap();
     shop.run("to-xyz rgb.exr --matrix relative.yaml -o relative.exr", &[]);
     fs::copy(shop.path("codes.exr"), shop.path("lit.exr")).unwrap();
+    fs::write(shop.path("uvspec.csv"), "lambda edir edn uu\n400 1 1 1\n410 1 1 1\n").unwrap();
+    fs::write(shop.path("mistyped.csv"), "40O,1e-5\n410,2e-5\n").unwrap();
+    fs::write(shop.path("contradictory.csv"), "nm,irradiance (W m-2 sr-1 nm-1)\n400,0.1\n410,0.2\n").unwrap();
     let files = shop.files();
     for (line, status, complaint) in MISTAKES {
         let output = shop.attempt(line, &[]);

@@ -205,10 +205,10 @@ fn units_and_single_rows_have_the_panels_that_they_can_have() {
             assert_eq!(svg.matches(&format!("{label}</text>")).count(), *count, "{line}: {label}");
         }
     }
-    // Profiles name what their colors are: with those of histogram and correlations five legends.
+    // Profiles name what their colors are, as correlations do; the histogram has the mean as well.
     shop.run("measure noisy.exr --plot plot.svg", &[]);
     let svg = String::from_utf8(shop.bytes("plot.svg")).unwrap();
-    assert_eq!(svg.matches(">G</text>").count(), 5);
+    assert_eq!((svg.matches(">G</text>").count(), svg.matches(">G, mean 273.21 e⁻</text>").count()), (4, 1));
 }
 
 /// Frames that have no histogram: uniform expected electrons, and one that is saturated throughout.
@@ -233,4 +233,33 @@ fn a_figure_says_why_it_shows_nothing() {
         // Each panel clips what it shows once.
         assert_eq!(svg.matches("<clipPath").count(), panels, "{name}");
     }
+}
+
+/// Where a region lies, what its mean is, and which share of it is not shown stand in its figure.
+#[test]
+fn a_figure_says_where_it_is_of_and_what_is_left_out() {
+    let shop = Workshop::new();
+    // Rows of 64 samples of which 1 in 16 is no number; the others are 500 to 507.
+    let sample = |place: u16| if place % 16 == 3 { f32::NAN } else { 500.0 + f32::from(place % 8) };
+    let bytes: Vec<u8> = (0..64 * 48).flat_map(|place| sample(place).to_le_bytes()).collect();
+    std::fs::write(shop.path("a.bin"), bytes).unwrap();
+    let figure = |options: &str| {
+        assert!(
+            shop.attempt(&format!("measure --raw 64x48:f32le a.bin{options} --plot plot.svg"), &[]).status.success()
+        );
+        String::from_utf8(shop.bytes("plot.svg")).unwrap()
+    };
+    // Of 15 finite samples 0 to 7 and 0 to 7 without one 3: 53/15.
+    let whole = figure("");
+    assert!(
+        whole.contains("64 × 48; 6.2 % are not finite</text>") && whole.contains(", mean 503.53</text>"),
+        "{whole}"
+    );
+    assert!(!whole.contains(">100<"));
+    let part = figure(" --region 32,24,32,24");
+    // Ticks of both profiles are those of the frame.
+    assert!(part.contains("32 × 24; 6.2 % are not finite</text>") && part.contains(">60<"), "{part}");
+    assert!(part.contains(">45<") || part.contains(">40<"), "{part}");
+    let full = figure(" --region 4,0,12,8");
+    assert!(!full.contains("not finite"), "{full}");
 }

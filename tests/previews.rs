@@ -272,3 +272,48 @@ fn a_caption_leaves_the_picture_as_it_is() {
     let output = shop.attempt("preview --raw 40x30:u8 --caption a.bin a.bin -o x.png", &[]);
     assert_eq!(output.status.code(), Some(BAD_USAGE));
 }
+
+/// A picture without a number, or of a range that no number lies in, is black or white all over: that is said.
+#[test]
+fn pictures_of_nothing_are_told() {
+    let shop = Workshop::new();
+    let write = |name: &str, samples: &[f32]| {
+        let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        std::fs::write(shop.path(name), bytes).unwrap();
+    };
+    write("nan.bin", &[f32::NAN; 64]);
+    write("one.bin", &[&[7.5][..], &[f32::INFINITY; 63]].concat());
+    let ramp: Vec<f32> = (0..64_u8).map(|step| f32::from(step) + 100.0).collect();
+    write("ramp.bin", &ramp);
+    let none = "none of its pixels has a number that is finite; there is nothing to show";
+    for options in
+        ["", " --range 0,1", " --range 4sigma", " --range 1%,99%", " --false-color", " --false-color --range 0,1"]
+    {
+        let done = shop.attempt(&format!("preview --raw 8x8:f32le nan.bin{options} -o a.png"), &[]);
+        assert_eq!(done.status.code(), Some(BAD_DATA), "{options}");
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert!(said.starts_with("preview: nan.bin: ") && said.ends_with(&format!("{none}\n")), "{options}: {said}");
+        assert!(!shop.path("a.png").exists());
+    }
+    assert!(shop.attempt("preview --raw 8x8:f32le one.bin -o a.png", &[]).status.success());
+    for (options, range) in [
+        (" --range 0,99", Some("0 to 99.000")),
+        (" --range 164,200", Some("164.00 to 200.00")),
+        (" --range 0,99 --caption", Some("0 to 99.000")),
+        (" --range 0,99 --false-color", Some("0 to 99.000")),
+        (" --range 163,200", None),
+        (" --range 0,100 --false-color", None),
+        ("", None),
+    ] {
+        let done = shop.attempt(&format!("preview --raw 8x8:f32le ramp.bin{options} -o a.png"), &[]);
+        assert!(done.status.success() && shop.path("a.png").exists());
+        let said = String::from_utf8_lossy(&done.stderr);
+        let wanted = range.map_or(String::new(), |range| {
+            format!(
+                "preview: warning: ramp.bin: all numbers, from 100.00 to 163.00, lie outside the range from {range}, which shows \
+                 nothing of them; give another with --range\n"
+            )
+        });
+        assert_eq!(said, wanted, "{options}");
+    }
+}

@@ -2,6 +2,9 @@
 
 use crate::error::Error;
 use clap::Command;
+use std::ffi::OsString;
+use std::io;
+use std::path::Path;
 
 /// What supplies a key that metadata lack, the better choice first; it counts where the program has all its options.
 const SUPPLIES: [(&str, &str); 13] = [
@@ -20,6 +23,9 @@ const SUPPLIES: [(&str, &str); 13] = [
     ("color.white", "--white-luminance CD_PER_M2"),
 ];
 
+/// What the names of reports end in.
+const REPORTS: [&str; 6] = ["txt", "text", "json", "yaml", "yml", "csv"];
+
 /// An error in words, with what to do about it in options that `command` has.
 pub(super) fn advised(error: &Error, command: &Command) -> String {
     match error {
@@ -30,8 +36,42 @@ pub(super) fn advised(error: &Error, command: &Command) -> String {
         Error::Advised { error, advice } => {
             format!("{}; {}", advised(error, command), advice.in_words(|setting| option(setting, command)))
         }
+        Error::Disk { file, action: "open", source } if source.kind() == io::ErrorKind::NotFound => {
+            let words: Vec<OsString> = std::env::args_os().skip(1).collect();
+            let hint = misplaced(file, command, &in_text(&words));
+            hint.map_or_else(|| error.to_string(), |hint| format!("{error}; {hint}"))
+        }
         _ => error.to_string(),
     }
+}
+
+/// Arguments as texts.
+pub(super) fn in_text(words: &[OsString]) -> Vec<String> {
+    words.iter().map(|word| word.to_string_lossy().into_owned()).collect()
+}
+
+/// What a word may be that was taken for the name of an input, where there is no such file: the value of an option before it that takes
+/// one behind `=` alone, or the last of several, an output.
+fn misplaced(word: &str, command: &Command, words: &[String]) -> Option<String> {
+    let place = words.iter().position(|one| one == word)?;
+    let before = words.get(place.checked_sub(1)?)?;
+    let Some(long) = before.strip_prefix("--") else {
+        let is_last = place + 1 == words.len() && !before.starts_with('-');
+        return is_last.then(|| output_hint(word, command, words)).flatten();
+    };
+    let option = command.get_arguments().find(|argument| argument.get_long() == Some(long));
+    let takes_behind = option.is_some_and(clap::Arg::is_require_equals_set);
+    takes_behind.then(|| format!("a value of --{long} stands behind `=`, as in `--{long}={word}`"))
+}
+
+/// How an output is named, where a word that is none of an option looks like one and no output is named otherwise.
+pub(super) fn output_hint(word: &str, command: &Command, words: &[String]) -> Option<String> {
+    let is_named = words.iter().any(|one| one.starts_with("--output") || one.starts_with("-o"));
+    let takes_one = command.get_arguments().any(|one| one.get_long() == Some("output") && one.get_short() == Some('o'));
+    let ending = Path::new(word).extension().map(|end| end.to_string_lossy().to_ascii_lowercase());
+    let is_file = ending.is_some_and(|end| !has("output-format", command) || REPORTS.contains(&end.as_str()));
+    let is_file = is_file && !word.starts_with('-');
+    (takes_one && is_file && !is_named).then(|| format!("for an output write `-o {word}`"))
 }
 
 /// The options that supply a key, or metadata that hold it.
@@ -72,6 +112,34 @@ mod tests {
 
     fn program(options: &[&'static str]) -> Command {
         options.iter().fold(Command::new("test"), |command, option| command.arg(Arg::new(*option).long(*option)))
+    }
+
+    #[test]
+    fn an_output_that_is_a_report_ends_as_one() {
+        let output = Arg::new("output").long("output").short('o');
+        let command = Command::new("test").arg(output).arg(Arg::new("form").long("output-format"));
+        assert_eq!(output_hint("c.exr", &command, &[]), None);
+        assert_eq!(output_hint("c.json", &command, &[]).as_deref(), Some("for an output write `-o c.json`"));
+    }
+
+    #[test]
+    fn what_was_taken_for_an_input_may_be_another_word() {
+        let command = Command::new("test")
+            .arg(Arg::new("output").long("output").short('o'))
+            .arg(Arg::new("patches").long("patches").num_args(0..=1).require_equals(true))
+            .arg(Arg::new("sigma").long("sigma"));
+        for (line, word, wanted) in [
+            ("a.exr --patches 3x3", "3x3", Some("a value of --patches stands behind `=`, as in `--patches=3x3`")),
+            ("a.exr b.exr", "b.exr", Some("for an output write `-o b.exr`")),
+            ("a.exr b.exr", "a.exr", None),
+            ("a.exr b", "b", None),
+            ("a.exr b.exr -o c.exr", "b.exr", None),
+            ("--sigma a.exr", "a.exr", None),
+            ("a.exr", "a.exr", None),
+        ] {
+            let words: Vec<String> = line.split(' ').map(str::to_owned).collect();
+            assert_eq!(misplaced(word, &command, &words).as_deref(), wanted, "{line}");
+        }
     }
 
     #[test]

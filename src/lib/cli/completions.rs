@@ -4,6 +4,7 @@ use super::roster;
 use crate::cfa::CfaPattern;
 use crate::color::rgb::NamedPrimaries;
 use crate::formats::inventory::{Kind, Known, known};
+use crate::formats::keys::KeyPage;
 use crate::names::Named;
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, Command};
@@ -40,11 +41,11 @@ pub(super) fn script(shell: &str, command: &Command) -> Result<String, String> {
         let (without, with) = beside_files(shell, words);
         script = script.replace(&without, &with);
     }
-    if shell == Shell::Zsh && program == env!("CARGO_PKG_NAME") {
-        // Programs alone at the first place; behind it what completes the program.
-        script = script
-            .replace("'::program", "':program")
-            .replace("Arguments of the program:_default", "Arguments of the program:_normal");
+    for option in command.get_arguments() {
+        script = with_endings(shell, option, script);
+    }
+    if program == env!("CARGO_PKG_NAME") {
+        script = of_front(shell, script);
     }
     if shell == Shell::Bash {
         // A word that begins no option is a file, which bash completes where nothing else is offered; the crate offers options.
@@ -54,12 +55,70 @@ pub(super) fn script(shell: &str, command: &Command) -> Result<String, String> {
             script = script.replace(" || ${COMP_CWORD} -eq 1 ]]", " ]]");
         }
     }
-    if shell == Shell::Fish && program == env!("CARGO_PKG_NAME") {
-        // The crate completes no words but options in fish.
-        let words: Vec<&str> = roster::PROGRAMS.into_iter().chain(roster::OWN).collect();
-        script.push_str(&format!("complete -c {program} -n __fish_use_subcommand -f -a \"{}\"\n", words.join(" ")));
-    }
     Ok(script)
+}
+
+/// The script of the front door: programs alone at the first place; behind it what completes the program, or its own words.
+fn of_front(shell: Shell, script: String) -> String {
+    let own = [("list", of_all::<Kind>()), ("keys", of_all::<KeyPage>()), ("template", of_all::<KeyPage>())];
+    match shell {
+        Shell::Zsh => {
+            let cases: String = own.iter().map(|(word, words)| format!("({word}) compadd {words};; ")).collect();
+            let action = format!("Arguments of the program:{{case $words[1] in {cases}(*) _normal;; esac}}");
+            script.replace("'::program", "':program").replace("Arguments of the program:_default", &action)
+        }
+        Shell::Bash => {
+            let case = |(word, words): &(&str, String)| {
+                format!(
+                    "                {word})\n                    COMPREPLY=( $(compgen -W \"{words}\" -- \"${{cur}}\") )\n\
+                     {:20}return 0\n{:20};;\n",
+                    "", ""
+                )
+            };
+            let cases: String = own.iter().map(case).collect();
+            let previous = "            case \"${prev}\" in\n";
+            let first = format!("            case \"${{COMP_WORDS[1]}}\" in\n{cases}            esac\n{previous}");
+            script.replacen(previous, &first, 1)
+        }
+        _ => {
+            // The crate completes no words but options in fish.
+            let programs: Vec<&str> = roster::PROGRAMS.into_iter().chain(roster::OWN).collect();
+            let begin = format!("complete -c {} -n", env!("CARGO_PKG_NAME"));
+            let line = |(word, words): &(&str, String)| {
+                format!("{begin} \"__fish_seen_subcommand_from {word}\" -f -a \"{words}\"\n")
+            };
+            let lines: String = own.iter().map(line).collect();
+            format!("{script}{begin} __fish_use_subcommand -f -a \"{}\"\n{lines}", programs.join(" "))
+        }
+    }
+}
+
+/// The names of all values, blanks between them.
+fn of_all<T: Named>() -> String {
+    T::ALL.iter().map(|value| value.name()).collect::<Vec<_>>().join(" ")
+}
+
+/// The script with files of these endings alone, and directories, where what help shows of a value tells them: `FILE.svg|png`.
+fn with_endings(shell: Shell, option: &Arg, script: String) -> String {
+    let Some([shown]) = option.get_value_names() else { return script };
+    let Some(endings) = shown.strip_prefix("FILE.") else { return script };
+    match shell {
+        Shell::Bash => {
+            let names = option.get_long().map(|long| format!("--{long}"));
+            let names = names.into_iter().chain(option.get_short().map(|short| format!("-{short}")));
+            let files = "COMPREPLY=($(compgen -f \"${cur}\"))";
+            let each = endings.replace('|', " ");
+            let some = format!(
+                "COMPREPLY=($(compgen -d -- \"${{cur}}\"; for end in {each}; do compgen -f -X \"!*.${{end}}\" -- \"${{cur}}\"; done))"
+            );
+            names.fold(script, |script, name| {
+                let begin = format!("{name})\n                    ");
+                script.replace(&format!("{begin}{files}"), &format!("{begin}{some}"))
+            })
+        }
+        Shell::Zsh => script.replace(&format!(":{shown}:_files'"), &format!(":{shown}:_files -g \"*.({endings})\"'")),
+        _ => script,
+    }
 }
 
 /// Values of an option that are known by name.
@@ -77,7 +136,8 @@ impl Values {
         let [shown] = option.get_value_names()? else { return None };
         let mut words: Vec<String> = Vec::new();
         for part in shown.split('|') {
-            let is_value = part.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit());
+            let is_value =
+                part.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit()) && !shown.starts_with("FILE.");
             match part {
                 "NAME" | "LIGHT" => words.extend(names(long)),
                 "PATTERN" => words.extend(CfaPattern::ALL.iter().map(ToString::to_string)),

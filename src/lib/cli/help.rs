@@ -103,7 +103,12 @@ pub(super) fn arranged(program: &'static str, command: &Command) -> Command {
     };
     let of_clap = [
         own("help", 'h', ArgAction::Help, "Print help: -h a summary, --help all of it with examples"),
-        own("version", 'V', ArgAction::Version, "Print project, version and commit"),
+        own(
+            "version",
+            'V',
+            ArgAction::Version,
+            "Print project and version, and the commit where the build was told it",
+        ),
     ];
     let place = |argument: &Arg| argument.get_long().and_then(|long| group(program, long, reads_frames));
     let mut arguments: Vec<(Option<usize>, Arg)> =

@@ -74,7 +74,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         Ok(arguments) => arguments,
         Err(error) if !error.use_stderr() => return ended(program, show(|| error.print())),
         Err(error) => {
-            complain(program, &usage::one_line(program, &error, &A::command()));
+            complain(program, &usage::one_line(program, &error, &A::command(), &advice::in_text(&words)));
             pipe::pass_failure_on();
             return ExitCode::from(2);
         }

@@ -2,12 +2,13 @@
 //!
 //! It tells what is wrong by kind and context; of its text only the first line of what has no kind here is taken.
 
+use super::advice::output_hint;
 use crate::formats::foreign::number_complaint;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// clap's complaint in one line about the arguments of `command`.
-pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command) -> String {
+/// clap's complaint in one line about the arguments of `command`, which are these words.
+pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, words: &[String]) -> String {
     let context = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.clone()),
         Some(ContextValue::Strings(texts)) => Some(texts.join(", ")),
@@ -19,6 +20,7 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command) ->
     let hint = suggestion.map_or(String::new(), |s| format!("; did you mean `{s}`?"));
     let problem = match error.kind() {
         ErrorKind::UnknownArgument => {
+            let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
             format!("unknown option or extra argument `{argument}`{hint}")
         }
         ErrorKind::InvalidValue if value.is_empty() => format!("{argument} needs a value"),
@@ -32,7 +34,14 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command) ->
                 .map_or(String::new(), |source| format!(": {}", number_complaint(&source.to_string())));
             format!("`{value}` is no value for {argument}{reason}")
         }
-        ErrorKind::MissingRequiredArgument if is_always_needed(&argument, command) => format!("{argument} is missing"),
+        ErrorKind::MissingRequiredArgument if is_always_needed(&argument, command) => {
+            let last = words.last().filter(|last| {
+                let ending = argument.strip_prefix("--output <FILE").and_then(|shown| shown.strip_suffix('>'));
+                words.len() > 1 && ending.is_some_and(|ending| ending.starts_with('.') && last.ends_with(ending))
+            });
+            let hint = last.and_then(|last| output_hint(last, command, words));
+            format!("{argument} is missing{}", hint.map_or(String::new(), |hint| format!("; {hint}")))
+        }
         ErrorKind::MissingRequiredArgument => {
             let any = argument.trim_start_matches('<').replace(">>", ">").replace('|', " or ");
             let any = if argument.starts_with("<--") { any } else { argument };
@@ -75,7 +84,7 @@ mod tests {
             .arg(Arg::new("size").long("size").num_args(2))
             .arg(Arg::new("dark").long("dark").action(ArgAction::SetTrue).conflicts_with("seed"))
             .arg(Arg::new("level").long("level").num_args(1).require_equals(true))
-            .arg(Arg::new("output").long("output").required(true))
+            .arg(Arg::new("output").long("output").short('o').required(true))
             .arg(Arg::new("clip").long("clip").action(ArgAction::SetTrue).requires("dark"))
             .arg(Arg::new("kappa").long("kappa").action(ArgAction::SetTrue).requires("any"))
             .group(ArgGroup::new("any").args(["seed", "method"]).multiple(true))
@@ -86,6 +95,8 @@ mod tests {
         for (line, wanted) in [
             ("--outptu a", "unknown option or extra argument `--outptu`; did you mean `--output`?"),
             ("a b --output c", "unknown option or extra argument `b`"),
+            ("a b.exr --output c", "unknown option or extra argument `b.exr`"),
+            ("a b.exr", "unknown option or extra argument `b.exr`; for an output write `-o b.exr`"),
             ("--output", "--output <output> needs a value"),
             (
                 "--output a --method ecii",
@@ -107,7 +118,9 @@ mod tests {
             let words = std::iter::once("measure").chain(line.split(' '));
             let error = command().try_get_matches_from(words).unwrap_err();
             let joined = if wanted.ends_with('?') { " See" } else { "; see" };
-            assert_eq!(one_line("measure", &error, &command()), format!("{wanted}{joined} `measure --help`"), "{line}");
+            let words: Vec<String> = line.split(' ').map(str::to_owned).collect();
+            let said = one_line("measure", &error, &command(), &words);
+            assert_eq!(said, format!("{wanted}{joined} `measure --help`"), "{line}");
         }
     }
 }

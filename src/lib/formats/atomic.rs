@@ -89,6 +89,9 @@ impl AtomicFile {
         if target.is_dir() {
             return Err(Error::format(&name, "it is a directory; name a file in it"));
         }
+        if name.ends_with('/') {
+            return Err(Error::format(&name, "there is no directory of this name, and a file is wanted; name one"));
+        }
         let (resolved, directory) = place_of(target, &name)?;
         let permissions = existing.map_or(Permissions::from_mode(0o666), |about| about.permissions());
         let (file, temporary) = match nameless(&directory, permissions.mode()) {

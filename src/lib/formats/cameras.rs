@@ -37,7 +37,8 @@ impl Camera {
     /// [`Error::Format`](crate::error::Error::Format) for what is no such index.
     pub(super) fn all(name: &str, index: &[u8]) -> Result<Vec<Self>> {
         let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(index);
-        reader.deserialize().map(|row| row.map_err(|error| csv_complaint(name, &error))).collect()
+        let text = std::str::from_utf8(index).unwrap_or_default();
+        reader.deserialize().map(|row| row.map_err(|error| csv_complaint(name, text, &error))).collect()
     }
 
     /// Its names, those of other models with the same sensor last.

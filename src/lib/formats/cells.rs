@@ -1,7 +1,7 @@
 //! The cells of a table: from bytes to text, and from text to numbers.
 
 use super::delimited::{self, Separator, decimal, number};
-use super::foreign::csv_complaint;
+use super::foreign::{csv_complaint, line_of};
 use super::keys;
 use crate::error::{Error, Result};
 use csv::StringRecord;
@@ -34,9 +34,10 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Reads the rows, after `first` where that is one; each begins with a label where the table goes `by_rows`.
+    /// Reads the rows of `text`, after `first` where that is one; each begins with a label where the table goes `by_rows`.
     pub(super) fn read(
         name: &str,
+        text: &str,
         reader: &mut csv::Reader<&[u8]>,
         first: Option<&StringRecord>,
         by_rows: bool,
@@ -47,8 +48,10 @@ impl Cells {
         let mut at_hand = first.is_some();
         let [mut has_points, mut has_commas] = [false; 2];
         // One row at a time: as text a table takes many times the memory of its numbers.
-        while std::mem::take(&mut at_hand) || reader.read_record(&mut record).map_err(|e| csv_complaint(name, &e))? {
-            let line = record.position().map_or(0, csv::Position::line);
+        while std::mem::take(&mut at_hand)
+            || reader.read_record(&mut record).map_err(|e| csv_complaint(name, text, &e))?
+        {
+            let line = || line_of(text, record.position());
             (rows, width) = (rows + 1, record.len());
             if numbers.len() + width > MAX_CELLS {
                 return Err(refuse(format!("it has more than {MAX_CELLS} numbers; no table has")));
@@ -56,15 +59,15 @@ impl Cells {
             if by_rows {
                 labels.push(record[0].to_owned());
             }
-            for (column, text) in record.iter().enumerate() {
-                has_points |= text.contains('.') && number(text).is_some();
-                has_commas |= decimal(text).is_some();
-                numbers.push(match numeric(text) {
+            for (column, cell) in record.iter().enumerate() {
+                has_points |= cell.contains('.') && number(cell).is_some();
+                has_commas |= decimal(cell).is_some();
+                numbers.push(match numeric(cell) {
                     Some(value) => value,
                     // The label of a row need not be a number.
                     None if by_rows && column == 0 => 0.0,
                     None => {
-                        return Err(refuse(format!("line {line}, column {}", column + 1) + &not_a_number(text)));
+                        return Err(refuse(format!("line {}, column {}", line(), column + 1) + &not_a_number(cell)));
                     }
                 });
             }
@@ -79,7 +82,7 @@ impl Cells {
 }
 
 /// What is wrong with a cell, and what to do where it stands for a value that is missing.
-fn not_a_number(text: &str) -> String {
+pub(super) fn not_a_number(text: &str) -> String {
     const MISSING: [&str; 10] = ["nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "inf", "-inf"];
     let shown: String = text.chars().take(20).collect();
     match MISSING.contains(&text.to_lowercase().as_str()) {
@@ -101,6 +104,9 @@ impl<'a> Text<'a> {
     /// The text of a table; `is_of_numbers` where separators behind the last cell of a row mean nothing.
     pub(super) fn of(name: &str, bytes: &'a [u8], is_of_numbers: bool) -> Result<Self> {
         let decoded = delimited::decoded(name, bytes)?;
+        if let Some(what) = what_else(&decoded) {
+            return Err(Error::format(name, format!("it is {what}")));
+        }
         if decoded.contains('\0') {
             return Err(Error::format(name, "it is not a CSV table but a binary file"));
         }
@@ -109,7 +115,7 @@ impl<'a> Text<'a> {
         }
         // Before any cell is told apart: each row is held as a whole.
         check_size(name, &decoded)?;
-        let separator = Separator::of(&decoded);
+        let separator = Separator::of(&decoded, is_of_numbers);
         let plain = delimited::plain(name, &decoded, separator, is_of_numbers)?;
         Ok(Self { decoded, plain, separator })
     }
@@ -132,9 +138,21 @@ impl<'a> Text<'a> {
     pub(super) fn is_ambiguous(&self, first: &StringRecord) -> bool {
         self.separator == Separator::Byte(b',')
             && first.len() > 2
-            && first.iter().all(|cell| cell.bytes().all(|byte| byte.is_ascii_digit()))
+            && first.iter().all(|cell| !cell.is_empty() && cell.bytes().all(|byte| byte.is_ascii_digit()))
             && !self.rows().lines().any(|line| !line.starts_with('#') && line.contains('.'))
     }
+}
+
+/// What a text is, by how it begins, that is no table.
+fn what_else(text: &str) -> Option<&'static str> {
+    const BEGINNINGS: [(&str, &str); 4] = [
+        ("PK\u{3}\u{4}", "a spreadsheet or another archive (ZIP); a table is wanted here: save its sheet as CSV"),
+        ("%PDF-", "a PDF; a table is wanted here, as CSV"),
+        ("<", "a page of HTML or XML; a table is wanted here, as CSV"),
+        ("{", "JSON; a table is wanted here, as CSV"),
+    ];
+    let text = text.trim_start();
+    BEGINNINGS.iter().find(|(begin, _)| text.starts_with(begin)).map(|(_, what)| *what)
 }
 
 /// Refuses a text of more cells, or of more in a line, than any table has, whatever parts them.

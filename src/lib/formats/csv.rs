@@ -7,7 +7,7 @@
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
 use super::delimited;
 use super::foreign::csv_complaint;
-use super::keys;
+use super::misread::{self, is_units};
 use super::radiance_unit::{self, FileSays};
 use crate::error::{Error, Result};
 use crate::names::place_of;
@@ -24,7 +24,7 @@ use ndarray::{Array2, Axis};
 pub fn columns(name: &str, bytes: &[u8]) -> Result<Vec<String>> {
     let text = Text::of(name, bytes, false)?;
     let mut reader = text.reader(true);
-    let headers = reader.headers().map_err(|error| csv_complaint(name, &error))?;
+    let headers = reader.headers().map_err(|error| csv_complaint(name, text.rows(), &error))?;
     Ok(headers.iter().take(MAX_COLUMNS).map(ToOwned::to_owned).collect())
 }
 
@@ -34,8 +34,8 @@ pub fn columns(name: &str, bytes: &[u8]) -> Result<Vec<String>> {
 ///
 /// [`Error::Format`] for what is no CSV table, or has no such column, naming those that there are.
 pub fn text_column(name: &str, bytes: &[u8], column: &str) -> Result<Vec<String>> {
-    let not_csv = |error: csv::Error| csv_complaint(name, &error);
     let text = Text::of(name, bytes, false)?;
+    let not_csv = |error: csv::Error| csv_complaint(name, text.rows(), &error);
     let mut reader = text.reader(true);
     let headers = reader.headers().map_err(not_csv)?;
     let place = headers.iter().position(|header| header == column).ok_or_else(|| {
@@ -75,15 +75,15 @@ impl SpectralTable {
         let bytes = unpacked(name, bytes)?;
         let text = Text::of(name, &bytes, true);
         let parsed = text.and_then(|text| Self::of_text(name, &text));
-        parsed.map_err(|error| preamble(name, &bytes).unwrap_or(error))
+        parsed.map_err(|error| misread::explained(name, &bytes).unwrap_or(error))
     }
 
     fn of_text(name: &str, text: &Text) -> Result<Self> {
         let refuse = |problem: &str| Err(Error::format(name, problem));
         let mut reader = text.reader(false);
         let mut first = StringRecord::new();
-        if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, &e))? {
-            return refuse("it holds no rows");
+        if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, text.rows(), &e))? {
+            return refuse(if text.decoded.trim().is_empty() { "it is empty" } else { "it holds no rows" });
         }
         if text.is_ambiguous(&first) {
             return refuse(
@@ -92,16 +92,19 @@ impl SpectralTable {
             );
         }
         let has_header = numeric(&first[0]).is_none();
+        if has_header {
+            misread::check_heading(name, text.rows(), &first)?;
+        }
         let by_rows = has_header && first.len() > 2 && first.iter().skip(1).all(|cell| numeric(cell).is_some());
-        let below = if has_header && !by_rows { record_below(name, &mut reader)? } else { None };
+        let below = if has_header && !by_rows { record_below(name, text.rows(), &mut reader)? } else { None };
         let (units, at_hand) = match below {
-            Some(record) if is_units(&record) => (Some(record), None),
+            Some(record) if is_units(&first, &record) => (Some(record), None),
             record => (None, record.or_else(|| (!has_header).then(|| first.clone()))),
         };
         if has_header && !by_rows {
             check_first_column(name, &first)?;
         }
-        let Cells { numbers, labels } = Cells::read(name, &mut reader, at_hand.as_ref(), by_rows)?;
+        let Cells { numbers, labels } = Cells::read(name, text.rows(), &mut reader, at_hand.as_ref(), by_rows)?;
         let (rows, width) = numbers.dim();
         if width < 2 || rows == 0 {
             return refuse("it needs a column of wavelengths in nm and at least one of values");
@@ -130,6 +133,8 @@ impl SpectralTable {
         };
         let heading = units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && !is_of_radiance(cell));
         let unit = wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength);
+        unit.map_or(Ok(()), |unit| check_stated(&wavelength_nm, unit))
+            .map_err(|problem| Error::format(name, problem))?;
         let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
         wavelength_nm.iter_mut().for_each(|wavelength: &mut f64| *wavelength = unit.nm(*wavelength));
         let (wavelength_nm, values) = sorted(wavelength_nm, values);
@@ -187,7 +192,7 @@ impl SpectralTable {
             let problem = "it is by wavenumber and does not say whether its radiance is per nm or per cm-1";
             return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
         }
-        if self.is_bare && self.columns.len() == UVSPEC && self.remarks.is_empty() && given.is_none() {
+        if self.is_bare && self.columns.len() + 1 == misread::UVSPEC && self.remarks.is_empty() && given.is_none() {
             let problem = "its seven columns without a heading look like what libRadtran's uvspec writes by default, irradiances and \
                            mean intensities; have it write radiances, by `output_user lambda uu`, or give --radiance-unit where \
                            they are";
@@ -203,6 +208,14 @@ impl SpectralTable {
             return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
         }
         Ok((unit, Some(format!("{}: {bright}: is that its unit?", self.name))))
+    }
+
+    /// The columns of which nothing says that they hold anything but radiances.
+    pub fn likely_radiances(&self) -> Vec<&str> {
+        let is_other =
+            |says: &Option<Stated>| matches!(says, Some(Stated::Other { kind, .. }) if kind.is_another_quantity());
+        let likely = self.columns.iter().zip(&self.headings).filter(|(_, says)| !is_other(says));
+        likely.map(|(column, _)| column.as_str()).collect()
     }
 
     /// Refuses values that stand for none.
@@ -263,28 +276,6 @@ impl SpectralTable {
     }
 }
 
-/// Columns beside wavelengths that uvspec writes by default: edir, edn, eup, uavgdir, uavgdn, uavgup.
-const UVSPEC: usize = 6;
-
-/// A complaint of lines that stand above the heading of a table, where there are any but one of units.
-fn preamble(name: &str, bytes: &[u8]) -> Option<Error> {
-    let decoded = delimited::decoded(name, bytes).ok()?;
-    if decoded.contains('\0') || keys::kind_of(&decoded).is_some() {
-        return None;
-    }
-    let [first, last, heading] = delimited::above_heading(&decoded)?;
-    let line = decoded.lines().nth(heading - 1)?;
-    let is_of_units = !matches!(WavelengthUnit::of_heading(line.split([',', ';', '\t']).next()?.trim()), Ok(None));
-    if first == last && is_of_units {
-        return None;
-    }
-    let lines = if first == last { format!("line {first} stands") } else { format!("lines {first} to {last} stand") };
-    Some(Error::format(
-        name,
-        format!("{lines} above the heading of its columns, line {heading}; put a # before what is no table"),
-    ))
-}
-
 /// Whether numbers without a heading are a row of wavelengths above spectra: the first goes one way and is that of wavelengths, the
 /// first of all others are not.
 fn holds_rows_without_names(numbers: &Array2<f64>) -> bool {
@@ -324,16 +315,10 @@ impl Comments {
 const MAX_COMMENTS: usize = 1000;
 
 /// The record below the header, if there is one.
-fn record_below(name: &str, reader: &mut csv::Reader<&[u8]>) -> Result<Option<StringRecord>> {
+fn record_below(name: &str, text: &str, reader: &mut csv::Reader<&[u8]>) -> Result<Option<StringRecord>> {
     let mut record = StringRecord::new();
-    let is_there = reader.read_record(&mut record).map_err(|e| csv_complaint(name, &e))?;
+    let is_there = reader.read_record(&mut record).map_err(|e| csv_complaint(name, text, &e))?;
     Ok(is_there.then_some(record))
-}
-
-/// Whether a record below the header holds units.
-fn is_units(record: &StringRecord) -> bool {
-    record.iter().all(|cell| numeric(cell).is_none())
-        && !matches!(WavelengthUnit::of_heading(record.get(0).unwrap_or_default()), Ok(None))
 }
 
 /// Refuses a header that names wavelengths in another column than the first.
@@ -356,10 +341,15 @@ fn check_first_column(name: &str, header: &StringRecord) -> Result<()> {
 /// What headings say about the unit of each curve: those of its column in a row of units and in the header; where curves are
 /// rows, those of the row and of the header's first cell.
 fn headings(columns: &[String], units: Option<&StringRecord>, corner: Option<&str>) -> Vec<Option<Stated>> {
-    let unit_below = |index: usize| units.and_then(|units| units.get(index + 1)).and_then(unit_of_heading);
+    let unit_below = |index: usize, column: &str| {
+        let cell = units?.get(index + 1)?;
+        let both = unit_of_heading(&format!("{column} ({cell})"));
+        let is_contradiction = matches!(&both, Some(Stated::Other { kind: OtherUnit::Contradiction, .. }));
+        if is_contradiction { both } else { unit_of_heading(cell) }
+    };
     let of_corner = corner.and_then(unit_of_heading);
     let one = |(index, column): (usize, &String)| {
-        unit_below(index).or_else(|| unit_of_heading(column)).or_else(|| of_corner.clone())
+        unit_below(index, column).or_else(|| unit_of_heading(column)).or_else(|| of_corner.clone())
     };
     columns.iter().enumerate().map(one).collect()
 }
@@ -423,6 +413,32 @@ fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
         ));
     }
     Ok(())
+}
+
+/// Refuses wavelengths that no light has in the unit that is said of them, where all are those of light in another.
+fn check_stated(wavelengths: &[f64], stated: WavelengthUnit) -> std::result::Result<(), String> {
+    const HEADINGS: [(WavelengthUnit, &str); 5] = [
+        (WavelengthUnit::Nanometer, "wavelength_nm"),
+        (WavelengthUnit::Micrometer, "wavelength_um"),
+        (WavelengthUnit::Angstrom, "wavelength_angstrom"),
+        (WavelengthUnit::PerCentimeter, "wavenumber_cm-1"),
+        (WavelengthUnit::Meter, "wavelength_m"),
+    ];
+    let are_seen = |unit: WavelengthUnit| {
+        let is_seen = |value: &f64| (SHORTEST_NM..=LONGEST_NM).contains(&unit.nm(*value));
+        (wavelengths.iter().any(is_seen), wavelengths.iter().all(is_seen))
+    };
+    let other = HEADINGS.iter().find(|(unit, _)| are_seen(*unit).1);
+    match other.filter(|_| !are_seen(stated).0 && wavelengths.len() > 1) {
+        Some((other, heading)) => {
+            let [low, high] = wavelengths
+                .iter()
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
+            let problem = format!("its wavelengths are said to be in {stated}, but {low} to {high} look like {other}");
+            Err(format!("{problem}; mend what says so, as in the heading `{heading}`"))
+        }
+        None => Ok(()),
+    }
 }
 
 /// A heading without the unit in brackets behind it.
@@ -545,7 +561,8 @@ mod tests {
         let missing = "leave out the row of a missing value, or fill it in";
         assert_eq!(complaint("nm,L\n400,nan\n"), format!("t.csv: line 2, column 2: `nan` is no number; {missing}"));
         assert_eq!(complaint("nm,L\n400,1\n410,\n420,1\n"), format!("t.csv: line 3, column 2 is empty; {missing}"));
-        assert!(complaint("").contains("no rows"));
+        assert_eq!(complaint(""), "t.csv: it is empty");
+        assert_eq!(complaint("# a\n"), "t.csv: it holds no rows");
         assert_eq!(complaint("nm,L\n400,1\n410\n"), "t.csv: line 3 has 1 cell, the rows above it have 2");
         let marks = "part columns by semicolons or tabs where commas are those of decimals";
         let wanted = format!("t.csv: line 2 has 3 cells, the rows above it have 2; {marks}");
@@ -591,6 +608,17 @@ mod tests {
         let yaml = "schema: cyanometer-matrix/1\nunit: nits\nxyz_from_camera:\n- [1, 0, 0]\n";
         assert_eq!(complaint(yaml), "t: it is a matrix file, for --matrix; a table is wanted here, as CSV");
         assert_eq!(complaint("\u{1}\0ab,c\n"), "t: it is not a CSV table but a binary file");
+        for (text, what) in [
+            (
+                "PK\u{3}\u{4}\0\0",
+                "a spreadsheet or another archive (ZIP); a table is wanted here: save its sheet as CSV",
+            ),
+            ("%PDF-1.7\n1 2\n", "a PDF; a table is wanted here, as CSV"),
+            ("<!DOCTYPE html>\n<p>400,1\n", "a page of HTML or XML; a table is wanted here, as CSV"),
+            (" {\"nm\": [400]}\n", "JSON; a table is wanted here, as CSV"),
+        ] {
+            assert_eq!(complaint(text), format!("t: it is {what}"));
+        }
         let nameless = "its first row holds wavelengths, and its rows are spectra without names";
         assert!(complaint("400,410,420\n0.1,0.2,0.3\n0.2,0.3,0.4\n").contains(nameless));
         assert!(complaint("700;600;500\n1e-5;2e-5;3e-5\n").contains(nameless));
@@ -654,7 +682,20 @@ mod tests {
                 refused("nm,E (W m-2 nm-1)\n400,1\n", given).contains("`W m-2 nm-1`, an irradiance, which has no sr-1")
             );
             assert!(refused("nm,photon_radiance\n400,1\n", given).contains("a unit of photons"));
+            assert!(refused("nm,uavgdir\n400,1\n", given).contains("a mean over all directions"));
         }
+        for text in [
+            "nm,irradiance (W m-2 sr-1 nm-1)\n400,1e-3\n",
+            "nm,irradiance\nnm,W m-2 sr-1 nm-1\n400,1e-3\n",
+            "nm,radiance (W m-2 nm-1)\n400,1e-3\n",
+            "nm,radiance\nnm,W m-2 nm-1\n400,1e-3\n",
+        ] {
+            assert!(refused(text, None).contains("the name of one quantity beside the unit of another"), "{text}");
+            assert_eq!(unit(text, given).unwrap().0, watts, "{text}");
+        }
+        let table = |text: &str| SpectralTable::parse("a", text.as_bytes()).unwrap();
+        let of_uvspec = table("lambda edir edn uavgdir uu\n400 1 1 1 1\n410 1 1 1 1\n");
+        assert_eq!(of_uvspec.likely_radiances(), ["uu"]);
         assert!(refused("nm,L (100 W m-2 sr-1 nm-1)\n400,1\n", None).contains("a number before it"));
         assert_eq!(unit("nm,L (100 W m-2 sr-1 nm-1)\n400,1\n", given).unwrap().0, watts);
         assert_eq!(
@@ -677,6 +718,28 @@ mod tests {
         let complaint = |text: &str| SpectralTable::parse("t", text.as_bytes()).unwrap_err().to_string();
         assert!(complaint("wavelength,L\n0.4,1\n0.7,2\n").contains("0.4 to 0.7 nm, which looks like micrometers"));
         assert!(complaint("wavelength,L\n4000,1\n7000,2\n").contains("looks like angstroms or wavenumbers"));
+        for (text, said) in [
+            (
+                "wavelength (um),L\n360,1\n830,2\n",
+                "in um, but 360 to 830 look like nm; mend what says so, as in the heading `wavelength_nm`",
+            ),
+            ("wavelength (A),L\n830,1\n360,2\n", "in angstrom, but 360 to 830 look like nm"),
+            ("nu (cm-1),L\n360,1\n830,2\n", "in cm-1, but 360 to 830 look like nm"),
+            ("wavelength (m),L\n360,1\n830,2\n", "in m, but 360 to 830 look like nm"),
+            (
+                "nm,L\n0.4,1\n0.7,2\n",
+                "in nm, but 0.4 to 0.7 look like um; mend what says so, as in the heading `wavelength_um`",
+            ),
+            ("nm,L\n4000,1\n7000,2\n", "in nm, but 4000 to 7000 look like angstrom"),
+            ("id nm,0.4,0.7\na,1,2\n", "in nm, but 0.4 to 0.7 look like um"),
+            ("# wavelength in um\nlambda L\n400 1\n700 1\n", "in um, but 400 to 700 look like nm"),
+        ] {
+            assert!(complaint(text).contains(said), "{text}: {}", complaint(text));
+        }
+        // A part of what is long, or short, is light.
+        for text in ["nm,L\n300,1\n4000,2\n", "nm,L\n1500,1\n4000,2\n", "um,L\n0.3,1\n10,2\n", "nm,L\n90,1\n150,2\n"] {
+            assert!(SpectralTable::parse("t", text.as_bytes()).is_ok(), "{text}");
+        }
         assert!(complaint("nu,L\n14000,1\n25000,2\n").contains("`wavenumber_cm-1`"));
         let table = SpectralTable::parse("t", b"nm,a,b\n400,1,1\n500,1,-2\n").unwrap();
         assert_eq!(table.negative(0), None);

@@ -23,11 +23,12 @@ pub enum Separator {
 
 impl Separator {
     /// What parts the cells of `text`: what makes two or more cells of the last of its first rows, all but the first of them
-    /// numbers; where nothing does, the first of comma, semicolon and tab that the first row has.
-    pub fn of(text: &str) -> Self {
+    /// numbers, or, in a table `of_numbers`, of the last that has no mistake; where nothing does, the first of comma, semicolon
+    /// and tab that the first row has.
+    pub fn of(text: &str, of_numbers: bool) -> Self {
         let rows: Vec<&str> = rows(text).take(ROWS_LOOKED_AT).collect();
-        let makes_numbers = |separator: &&Self| {
-            let cells: Vec<&str> = rows.last().map(|row| separator.cells(row)).unwrap_or_default();
+        let makes_numbers = |row: &str, separator: &&Self| {
+            let cells: Vec<&str> = separator.cells(row);
             let is_number =
                 |cell: &&str| number(cell).is_some() || **separator != Self::Byte(b',') && decimal(cell).is_some();
             let filled = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
@@ -35,7 +36,10 @@ impl Separator {
         };
         let first = rows.first().unwrap_or(&"").as_bytes();
         let in_first = || b",;\t".iter().find(|separator| first.contains(separator));
-        SEPARATORS.iter().find(makes_numbers).copied().unwrap_or_else(|| Self::Byte(*in_first().unwrap_or(&b',')))
+        let looked_at = if of_numbers { rows.len() } else { 1 };
+        let mut last = rows.iter().rev().take(looked_at);
+        let found = last.find_map(|row| SEPARATORS.iter().find(|separator| makes_numbers(row, separator)));
+        found.copied().unwrap_or_else(|| Self::Byte(*in_first().unwrap_or(&b',')))
     }
 
     fn cells(self, row: &str) -> Vec<&str> {
@@ -105,7 +109,7 @@ pub fn above_heading(text: &str) -> Option<[usize; 3]> {
     if last.iter().copied().chain(text.lines().take(LOOKED_AT)).any(|line| line.len() > LONGEST) {
         return None;
     }
-    let separator = Separator::of(&last.join("\n"));
+    let separator = Separator::of(&last.join("\n"), false);
     let said = |(_, line): &(usize, &str)| !line.trim().is_empty() && comment(line, None).is_none();
     let lines = || text.lines().enumerate().take(LOOKED_AT).filter(said);
     let is_number = |cell: &&str| number(cell).is_some() || decimal(cell).is_some();
@@ -138,7 +142,7 @@ fn comment<'a>(line: &'a str, row: Option<&str>) -> Option<&'a str> {
 }
 
 /// Lines that are neither empty nor marked as comments.
-fn rows(text: &str) -> impl Iterator<Item = &str> {
+pub(super) fn rows(text: &str) -> impl Iterator<Item = &str> {
     text.lines().filter(|line| !line.trim().is_empty() && comment(line, None).is_none())
 }
 

@@ -30,11 +30,20 @@ pub fn exr_complaint(name: &str, error: &ExrError) -> Error {
     }
 }
 
-/// What the crate `csv` complains of: rows of different lengths, bytes that are no text.
-pub fn csv_complaint(name: &str, error: &csv::Error) -> Error {
+/// The line of a record of `rows`, from 1: its position is that behind the record before, and empty lines and comments may follow
+/// there.
+pub fn line_of(rows: &str, position: Option<&csv::Position>) -> u64 {
+    let Some(position) = position else { return 0 };
+    let behind = usize::try_from(position.byte()).ok().and_then(|byte| rows.get(byte..)).unwrap_or_default();
+    let passed = behind.lines().take_while(|line| line.is_empty() || line.starts_with('#')).count();
+    position.line() + passed as u64
+}
+
+/// What the crate `csv` complains of in `rows`: rows of different lengths, bytes that are no text.
+pub fn csv_complaint(name: &str, rows: &str, error: &csv::Error) -> Error {
     let problem = match error.kind() {
         csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
-            let line = pos.as_ref().map_or(0, csv::Position::line);
+            let line = line_of(rows, pos.as_ref());
             let cells = if *len == 1 { "cell" } else { "cells" };
             let hint = if len > expected_len {
                 "; part columns by semicolons or tabs where commas are those of decimals"
@@ -327,6 +336,18 @@ mod tests {
         let refused = |bytes: &[u8]| SpectralTable::parse("t.csv", bytes).unwrap_err().to_string();
         assert_eq!(refused(b"nm,L\n400,1\n410\n"), "t.csv: line 3 has 1 cell, the rows above it have 2");
         assert_eq!(refused(b"nm,L\n400,\xFF\n"), "t.csv: line 2, column 2: `\u{FF}` is no number");
+        // Lines are counted as an editor does, whatever stands between rows.
+        for ends in ["\n", "\r\n"] {
+            let refused = |text: &str| refused(text.replace('\n', ends).as_bytes());
+            assert_eq!(
+                refused("# a\n\nnm,L\n400,1\n\n# b\n\n410\n"),
+                "t.csv: line 8 has 1 cell, the rows above it have 2"
+            );
+            assert_eq!(refused("# a\n\nnm,L\n400,1\n\n# b\n410,x\n"), "t.csv: line 7, column 2: `x` is no number");
+            assert_eq!(refused("\n% a\nnm L\n400 1\n\n410 x\n"), "t.csv: line 6, column 2: `x` is no number");
+            let wanted = "t.csv: line 3, column 1: `4OO` is no number";
+            assert!(refused("# a\n\n4OO,1\n410,2\n").starts_with(wanted));
+        }
     }
 
     #[derive(Debug, Serialize, Deserialize)]

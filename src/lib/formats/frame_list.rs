@@ -1,7 +1,7 @@
 //! Lists of flats and darks: a table, a YAML list, or the descriptor of an EMVA 1288 measurement.
 
 use super::files::read_file;
-use super::{csv, delimited, table, yaml};
+use super::{csv, delimited, keys, table, yaml};
 use crate::error::{Error, Result};
 use crate::names::{Named, serde_by_name};
 use serde::{Deserialize, Serialize};
@@ -90,6 +90,9 @@ pub fn read(path: &Path) -> Result<FrameList> {
         return Err(Error::format(&name, problem));
     }
     let text = delimited::decoded(&name, &bytes)?;
+    if let Some(kind) = keys::kind_of(&text) {
+        return Err(Error::format(&name, format!("it is {kind}; a list of flats and darks is wanted here")));
+    }
     let mut list = if is_descriptor(&text) {
         descriptor(&name, &text)?
     } else if is_yaml(path, &text) {

@@ -47,7 +47,7 @@ impl Named for Kind {
 
     fn other_names(self) -> &'static [&'static str] {
         match self {
-            Self::Sensors => &["sensor"],
+            Self::Sensors => &["sensor", "cameras", "camera"],
             Self::Matrices => &["matrix"],
             Self::Observers => &["observer"],
             Self::Spectra => &["spectrum", "skies"],

@@ -25,6 +25,7 @@ pub mod keys;
 mod ljpeg;
 pub mod makers;
 pub mod many;
+mod misread;
 pub mod output;
 pub mod picture;
 pub mod pipe;

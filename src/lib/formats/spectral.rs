@@ -2,7 +2,7 @@
 //! wavelength, as in `400.00-410.00nm`.
 
 use super::csv::SpectralTable;
-use super::data::spectrum_file;
+use super::data::{near_spectrum, spectrum_file};
 use super::files::{named, open_named, read_table, spool};
 use super::format::HEAD_BYTES;
 use super::input::{FrameReader, InputOptions};
@@ -97,7 +97,7 @@ pub enum Radiances {
 pub fn open(options: &InputOptions) -> Result<Radiances> {
     let found = named(options.path.as_deref()).map(spectrum_file);
     let path = found.as_deref();
-    let (mut file, opened) = open_named(path)?;
+    let (mut file, opened) = open_named(path).map_err(|error| with_near_name(error, path))?;
     // As it was given: where data lie is no matter of a frame.
     let name = options.path.as_ref().filter(|_| path.is_some()).map_or(opened, |path| path.display().to_string());
     let failed = |e| Error::disk(&name, "read", e);
@@ -114,6 +114,19 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
     }
     let bytes = read_table(io::Cursor::new(head).chain(file), &name)?;
     Ok(Radiances::Table(SpectralTable::parse(&name, &bytes)?))
+}
+
+/// A complaint of a file that is not there, with the spectrum of a data directory that may be meant.
+fn with_near_name(error: Error, path: Option<&Path>) -> Error {
+    match (error, path.and_then(near_spectrum)) {
+        (Error::Disk { file, source, .. }, Some(near)) if source.kind() == io::ErrorKind::NotFound => {
+            let problem = format!(
+                "there is no such file; did you mean `{near}`? `cyanometer list spectra` tells those known by name"
+            );
+            Error::format(&file, problem)
+        }
+        (error, _) => error,
+    }
 }
 
 /// Reads a whole library of spectra, CSV or spectral EXR, in W cm⁻² sr⁻¹ nm⁻¹, with what a user should be warned of; pixels

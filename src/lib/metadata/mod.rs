@@ -290,7 +290,9 @@ impl Metadata {
     pub fn contradictions(&self) -> Vec<String> {
         let mut known = QuantityKind::ALL.iter().filter(|kind| **kind != QuantityKind::Unspecified);
         let is_of_another = known.any(|kind| kind.unit() == self.unit);
-        let unit = (is_of_another && self.unit != self.quantity.unit()).then(|| {
+        // One of several channels has the unit of its own.
+        let is_own = self.unit == self.quantity.unit() || self.quantity.unit().split(", ").any(|own| own == self.unit);
+        let unit = (is_of_another && !is_own).then(|| {
             format!(
                 "its unit is `{}`, but that of its quantity, {}, is `{}`",
                 self.unit,

@@ -241,7 +241,11 @@ impl<'a> Pane<'a> {
         let foot = self.area.bottom() + TICK + LINE + LABEL + 3.0;
         write(drawing, &self.panel.x.label, [center, foot], LABEL, Anchor::Middle);
         write_upward(drawing, &self.panel.y.label, [self.cell.left + MARGIN + LABEL, middle], LABEL);
-        write(drawing, &self.panel.title, [center, self.cell.top + 6.0 + LABEL], LABEL, Anchor::Middle);
+        // Above the middle of the frame, or as near to it as the cell has room.
+        let half = 0.5 * font::width(&self.panel.title, LABEL) + 2.0;
+        let [first, last] = [self.cell.left + half, self.cell.right() - half];
+        let title = if first <= last { center.clamp(first, last) } else { 0.5 * (first + last) };
+        write(drawing, &self.panel.title, [title, self.cell.top + 6.0 + LABEL], LABEL, Anchor::Middle);
     }
 
     fn draw_lines(&self, drawing: &mut Drawing, series: &Series) {

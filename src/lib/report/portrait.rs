@@ -47,8 +47,26 @@ pub fn portrait(portrait: &Portrait, region: &RegionReport) -> Plot {
     let says = |panel: &Panel| !panel.has_axes || panel.series.iter().any(|series| !series.marks.is_empty());
     panels.retain(says);
     let size = format!("{} × {}", portrait.region.width, portrait.region.height);
-    let title = format!("{}: {}, {size}", portrait.name(), portrait.holds);
+    let left_out = left_out(portrait, region).map_or(String::new(), |words| format!("; {words}"));
+    let title = format!("{}: {}, {size}{left_out}", portrait.name(), portrait.holds);
     Plot { title, panels, arrangement: Arrangement::Pairs }
+}
+
+/// What of the pixels of a region is not shown, in words; none where all are.
+fn left_out(portrait: &Portrait, region: &RegionReport) -> Option<String> {
+    let all = (portrait.region.width * portrait.region.height) as f64;
+    let without = match portrait.quantity {
+        QuantityKind::Cct => "have no CCT",
+        _ => "are not finite",
+    };
+    let saturated = if region.leaves_saturated_out { region.saturated } else { 0 };
+    let others = region.defective.max(region.corrected) + region.beyond_model;
+    let parts: Vec<String> = [(region.not_finite, without), (saturated, "saturated"), (others, "marked")]
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{} % {what}", in_digits(100.0 * count as f64 / all, 2)))
+        .collect();
+    (!parts.is_empty()).then(|| parts.join(", "))
 }
 
 /// Classes or channels that share an axis, by their places, and its unit; empty where it is 1.
@@ -184,7 +202,7 @@ fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
                 predicted.push([middle, share_between(foreseen, portrait.is_whole, from, to) / bins.width]);
             }
         }
-        panel.add(&group.name, color, Marks::Line(steps));
+        panel.add(&with_mean(group, reference, &scale.unit), color, Marks::Line(steps));
         laws.extend(group.predicted.as_ref().map(|foreseen| (words_of_law(foreseen, portrait.is_whole), predicted)));
         let within: u64 = bins.counts.range(first..=last).map(|(_, count)| count).sum();
         (beyond, all) = (beyond + total - within, all + total);
@@ -199,6 +217,12 @@ fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     }
     panel.title = outside(beyond, all, "samples", farthest);
     panel
+}
+
+/// The name of a class or channel with the mean that deviations are counted from.
+fn with_mean(group: &Likeness, mean: f64, unit: &str) -> String {
+    let mean = in_digits(mean, 5).replace('-', "−");
+    format!("{}, mean {mean} {unit}", group.name).trim_end().to_owned()
 }
 
 /// Of two deviations the larger.
@@ -237,10 +261,13 @@ fn profile(portrait: &Portrait, scale: &Scale, axis: usize) -> Panel {
     };
     let words = words_of_reference(portrait).replace("sample", "mean").replace("− mean", "− that of all");
     let mut panel = Panel::new(Axis::linear(&along), Axis::linear(&scale.with_unit(&words)));
+    // Columns and rows are those of the frame.
+    let corner = [portrait.region.x, portrait.region.y][axis] as f64;
     let (mut bands, mut means) = (Vec::new(), Vec::new());
     for (color, group) in scale.groups(portrait) {
         let Some(reference) = reference(group) else { continue };
-        let points: Vec<[f64; 2]> = group.profiles[axis].points().map(|[at, mean]| [at, mean - reference]).collect();
+        let points: Vec<[f64; 2]> =
+            group.profiles[axis].points().map(|[at, mean]| [corner + at, mean - reference]).collect();
         let [[first, _], .., [last, _]] = points[..] else { continue };
         means.extend(points.iter().map(|[_, mean]| *mean));
         panel.add(&group.name, color, Marks::Line(points));

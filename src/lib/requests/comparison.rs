@@ -88,9 +88,9 @@ pub struct ColorPair {
     /// What colors given as numbers are, and what images without metadata hold; by default xyz
     #[arg(long, value_parser = values::one_of(&[Space::Xyz, Space::Lab]))]
     pub space: Option<Space>,
-    /// White of XYZ and xyY: d65, e, or its X,Y,Z on their scale, absolute or relative; by default that in the metadata of an
+    /// White of XYZ and xyY: d65, d50, e, or its X,Y,Z on their scale, absolute or relative; by default that in the metadata of an
     /// image, or d65
-    #[arg(long, value_name = "d65|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
+    #[arg(long, value_name = "d65|d50|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
     pub white: Option<White>,
     /// Luminance of the white in cd/m2; by default that in the metadata of an image, or 100 for colors given as numbers
     #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]

@@ -55,6 +55,11 @@ impl ShownFrames {
                 None => Ok(None),
             };
         }
+        // A caption that is taken for an input, behind a blank.
+        let inputs = self.input.frame.inputs.iter().filter(|input| has_caption && named(Some(input)).is_some());
+        if let Some((missing, error)) = inputs.filter_map(|input| Some((input, input.metadata().err()?))).next() {
+            return Err(Error::disk(&missing.display().to_string(), "open", error));
+        }
         if has_caption {
             let problem = "the frames of a sheet have captions, which say what each is";
             return Err(Error::Usage(problem.into()).leave_out(&["caption"]));

@@ -6,6 +6,32 @@ use super::spelling::{Base, Token, base, tokens};
 /// What the heading of a column says about the unit of its numbers; a name such as `irradiance` counts where there is no
 /// unit, and what stands in brackets where it looks like one.
 pub fn unit_of_heading(heading: &str) -> Option<Stated> {
+    let found = of_name_and_unit(heading)?;
+    let contradicts = match &found {
+        Stated::Radiance(_) => names(heading, &IRRADIANCES) && !names(heading, &RADIANCE) || names(heading, &PHOTONS),
+        Stated::Other { kind: OtherUnit::Irradiance, .. } => names(heading, &RADIANCE) && !names(heading, &IRRADIANCES),
+        Stated::Other { .. } => false,
+    };
+    Some(match contradicts {
+        true => Stated::Other { text: heading.trim().to_owned(), kind: OtherUnit::Contradiction },
+        false => found,
+    })
+}
+
+/// Words for irradiance; all but the first are libRadtran's.
+const IRRADIANCES: [&str; 8] = ["irradiance", "irradiances", "edir", "eglo", "edn", "eup", "edif", "eglobal"];
+/// libRadtran's words for means over directions.
+const MEANS: [&str; 6] = ["uavg", "uavgdir", "uavgdn", "uavgup", "uavgdif", "uavgglo"];
+const RADIANCE: [&str; 2] = ["radiance", "radiances"];
+const PHOTONS: [&str; 3] = ["photon", "photons", "quanta"];
+
+/// Whether one of some words stands in a heading.
+fn names(heading: &str, words: &[&str]) -> bool {
+    tokens(heading).iter().filter_map(Token::lower).any(|word| words.contains(&word.as_str()))
+}
+
+/// The same, where the name and the unit do not contradict each other.
+fn of_name_and_unit(heading: &str) -> Option<Stated> {
     let whole = |kind| Some(Stated::Other { text: heading.trim().to_owned(), kind });
     let radiances = units_among(&tokens(heading)).into_iter().filter(|found| matches!(found.says, Stated::Radiance(_)));
     let radiances: Vec<Stated> = radiances.map(|found| found.says).collect();
@@ -31,8 +57,8 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
     let named = |kind| Some(Stated::Other { text: heading.to_owned(), kind });
     let in_words = || {
         tokens.iter().filter_map(Token::lower).find_map(|word| match (word.as_str(), base(&word)) {
-            // The latter are libRadtran's.
-            ("irradiance" | "edir" | "eglo" | "edn" | "eup" | "edif" | "eglobal", _) => named(OtherUnit::Irradiance),
+            (word, _) if IRRADIANCES.contains(&word) => named(OtherUnit::Irradiance),
+            (word, _) if MEANS.contains(&word) => named(OtherUnit::Mean),
             ("reflectance" | "reflectivity" | "transmittance" | "transmission" | "albedo", _) => {
                 named(OtherUnit::Unknown)
             }
@@ -296,6 +322,27 @@ mod tests {
             assert_eq!((unit_of_heading(glued), wanted.is_some()), (wanted, true), "{glued}");
         }
         assert_eq!(RadianceUnit::parse("mWm-2sr-1nm-1"), RadianceUnit::parse("mW m-2 sr-1 nm-1"));
+    }
+
+    #[test]
+    fn names_that_contradict_their_units_are_told() {
+        use OtherUnit::{Contradiction, Irradiance, Mean};
+        for (text, kind) in [
+            ("irradiance (W m-2 sr-1 nm-1)", Contradiction),
+            ("Irradiance, W m-2 sr-1 nm-1", Contradiction),
+            ("edir [mW m-2 sr-1 nm-1]", Contradiction),
+            ("photons (W m-2 sr-1 nm-1)", Contradiction),
+            ("radiance (W m-2 nm-1)", Contradiction),
+            ("spectral_radiance_w_per_m2_nm", Contradiction),
+            ("uavgdir", Mean),
+            ("radiance over irradiance (W m-2 nm-1)", Irradiance),
+        ] {
+            let found = unit_of_heading(text);
+            assert!(matches!(&found, Some(Stated::Other { kind: found, .. }) if *found == kind), "{text}: {found:?}");
+        }
+        for text in ["radiance (W m-2 sr-1 nm-1)", "radiance under an irradiance of 1 (W m-2 sr-1 nm-1)"] {
+            assert!(matches!(unit_of_heading(text), Some(Stated::Radiance(_))), "{text}");
+        }
     }
 
     #[test]

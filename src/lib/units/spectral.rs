@@ -106,6 +106,10 @@ pub enum OtherUnit {
     BesideFactor,
     /// Two units of radiance.
     Several,
+    /// A mean over all directions, as libRadtran's `uavg`.
+    Mean,
+    /// A unit of radiance beside the name of another quantity, or the unit of another beside the name of radiance.
+    Contradiction,
     /// None that is known.
     Unknown,
 }
@@ -126,13 +130,15 @@ impl OtherUnit {
                 "a radiance beside a factor that may be in the values already or not; say what they are in as they stand"
             }
             Self::Several => "two units of radiance; say in which they are",
+            Self::Mean => "a mean over all directions, not the radiance of one",
+            Self::Contradiction => "the name of one quantity beside the unit of another, one of which is wrong",
             Self::Unknown => "no unit of spectral radiance that is known",
         }
     }
 
     /// Whether the numbers cannot be spectral radiances, whatever a user says.
     pub fn is_another_quantity(self) -> bool {
-        matches!(self, Self::Irradiance | Self::Photons | Self::PerFrequency)
+        matches!(self, Self::Irradiance | Self::Photons | Self::PerFrequency | Self::Mean)
     }
 }
 

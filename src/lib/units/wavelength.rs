@@ -2,6 +2,7 @@
 
 use super::NM_PER_CM;
 use super::spelling::{Base, Length, Token, base, tokens};
+use std::fmt;
 
 /// The unit in which a file gives wavelengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,6 +92,12 @@ impl WavelengthUnit {
             },
             _ => None,
         })
+    }
+}
+
+impl fmt::Display for WavelengthUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.symbol())
     }
 }
 

@@ -4,7 +4,7 @@ mod curves;
 mod places;
 mod sensors;
 
-pub(super) use places::{BUILT_IN, OF_SPECTRA, Place, directories};
+pub(super) use places::{BUILT_IN, OF_SPECTRA, Place, directories, near_spectrum};
 pub use places::{DATA_VARIABLE, spectrum_file};
 pub(super) use sensors::known_cameras;
 pub use sensors::{DEFAULT_SENSOR, LoadedSensor, SensorChanges, load_changed_sensor, load_description, load_sensor};
@@ -18,6 +18,7 @@ use crate::color::illuminant::Illuminant;
 use crate::color::upsampling::whole_nm;
 use crate::error::{Error, Result};
 use crate::spectrum::{Curve, Observer};
+use std::io;
 use std::path::Path;
 
 /// Reads a matrix file.
@@ -27,7 +28,15 @@ use std::path::Path;
 /// [`Error::Disk`] and [`Error::Format`].
 pub fn load_matrix(path: &Path) -> Result<CameraMatrix> {
     let shown = path.display().to_string();
-    let matrix = yaml::parse_matrix(&shown, &read_file(path)?)?;
+    let bytes = read_file(path).map_err(|error| match error {
+        Error::Disk { file, source, .. } if source.kind() == io::ErrorKind::NotFound => {
+            let problem =
+                "there is no such file; `fit-matrix` makes a matrix, as in `fit-matrix sky912.exr -o matrix.yaml`";
+            Error::format(&file, problem)
+        }
+        other => other,
+    })?;
+    let matrix = yaml::parse_matrix(&shown, &bytes)?;
     matrix.check().map_err(|problem| Error::format(&shown, problem))?;
     Ok(matrix)
 }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::formats::files::read_file;
+use crate::names::nearest;
 use std::path::{Path, PathBuf};
 
 /// The environment variable that names directories with data files, like `sample_data`.
@@ -88,6 +89,52 @@ pub fn spectrum_file(path: &Path) -> PathBuf {
     known.into_iter().find(|file| file.is_file()).unwrap_or_else(|| path.to_owned())
 }
 
+/// The spectrum of a data directory that a name of no file may mean: the nearest, also without the end of its name, or the first
+/// that has a word of it.
+pub(in crate::formats) fn near_spectrum(path: &Path) -> Option<String> {
+    let typed = path.file_name()?.to_str()?.to_lowercase();
+    let of = |directory: PathBuf| {
+        std::fs::read_dir(directory)
+            .into_iter()
+            .flatten()
+            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+    };
+    let mut known: Vec<String> = directories()
+        .iter()
+        .flat_map(|directory| OF_SPECTRA.map(|place| directory.join(place)))
+        .flat_map(of)
+        .filter(|name| name.ends_with(".csv") || name.ends_with(".exr"))
+        .collect();
+    known.sort();
+    known.dedup();
+    // Of a name with a directory that very file.
+    match path == Path::new(path.file_name()?) {
+        true => near(&typed, &known),
+        false => known.into_iter().find(|name| *name == typed),
+    }
+}
+
+/// The known name that is nearest to a typed one, or the first that has a word like one of it.
+fn near(typed: &str, known: &[String]) -> Option<String> {
+    /// Shorter words are in too many names.
+    const SHORTEST: usize = 4;
+    let stem = |name: &str| name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
+    let words = |name: &str| -> Vec<String> {
+        let of = stem(name);
+        of.split(|c: char| !c.is_alphabetic()).filter(|word| word.len() >= SHORTEST).map(str::to_owned).collect()
+    };
+    let stems: Vec<String> = known.iter().map(|name| stem(name)).collect();
+    let by_stem = nearest(&stem(typed), stems.iter().map(String::as_str), |known| known.len() / 3);
+    let of_stem = |found: &str| stems.iter().position(|stem| stem == found).map(|place| known[place].clone());
+    let shares_word = |name: &&String| {
+        let own = words(name);
+        words(typed)
+            .iter()
+            .any(|word| nearest(word, own.iter().map(String::as_str), |known| known.len() / SHORTEST).is_some())
+    };
+    by_stem.and_then(of_stem).or_else(|| known.iter().find(shares_word).cloned())
+}
+
 pub(super) fn find(file: &str) -> Result<Option<(Place, Vec<u8>)>> {
     for directory in directories() {
         let path = directory.join(file);
@@ -101,6 +148,24 @@ pub(super) fn find(file: &str) -> Result<Option<(Place, Vec<u8>)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_like_a_known_one_is_found() {
+        let known = ["clear_zenith.csv", "clear_zenith30.csv", "measured_blue.csv", "sky912.exr"].map(str::to_owned);
+        for (typed, wanted) in [
+            ("clear_zenth.csv", Some("clear_zenith.csv")),
+            ("clear_zenith", Some("clear_zenith.csv")),
+            ("clear-zenith30", Some("clear_zenith30.csv")),
+            ("zenit-sky", Some("clear_zenith.csv")),
+            ("blue_sky.csv", Some("measured_blue.csv")),
+            ("mesured", Some("measured_blue.csv")),
+            ("sky921.exr", Some("sky912.exr")),
+            ("mine.csv", None),
+            ("radiance.csv", None),
+        ] {
+            assert_eq!(near(typed, &known).as_deref(), wanted, "{typed}");
+        }
+    }
 
     #[test]
     fn no_path_in_a_sensor_file_is_opened() {

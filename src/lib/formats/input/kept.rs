@@ -3,26 +3,54 @@
 use crate::analysis::statistics::Region;
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, THREE_PLANES};
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, Metadata};
 use crate::names::place_of;
 use crate::stages::saturation::MASK_LAYER;
 use crate::units::QuantityKind;
 
-/// One channel alone, as the plane Y, and its place among those that are stored.
+/// What the names of layers of standard deviations begin with.
+const SIGMA: &str = "sigma.";
+
+/// One channel alone, as the plane Y, and its place among those that are stored; by the name that reports give it, or that it is
+/// stored by.
 ///
 /// # Errors
 ///
 /// [`Error::Usage`] where there is no such channel.
-pub(super) fn take_channel(stored: &Geometry, channel: &str, name: &str) -> Result<(usize, Geometry)> {
-    let Some(place) = place_of(channel, stored.channels.iter().map(String::as_str)) else {
-        let mut some = stored.channels.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
-        if stored.channels.len() > 8 {
+pub(super) fn take_channel(
+    stored: &Geometry,
+    channel: &str,
+    name: &str,
+    quantity: QuantityKind,
+) -> Result<(usize, Geometry)> {
+    let frame = FrameHeader { name: name.to_owned(), geometry: stored.clone(), metadata: Metadata::new(quantity) };
+    let called = |place: usize| match stored.channels[place].strip_prefix(SIGMA) {
+        Some(base) => {
+            let of = stored.channels.iter().position(|known| known == base);
+            format!("{SIGMA}{}", of.map_or(base, |of| frame.channel_name(of)))
+        }
+        None => frame.channel_name(place).to_owned(),
+    };
+    let names: Vec<String> = (0..stored.channels.len()).map(called).collect();
+    let named = place_of(channel, names.iter().map(String::as_str));
+    let Some(place) = named.or_else(|| place_of(channel, stored.channels.iter().map(String::as_str))) else {
+        let mut some = names.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
+        if names.len() > 8 {
             some += ", …";
         }
         let problem = format!("{name}: there is no channel `{channel}`; it has {some}");
         return Err(Error::Usage(problem).change(&["channel"]));
     };
     Ok((place, stored.with_channels(&["Y"])))
+}
+
+/// The unit of one channel, or of its standard deviation, of a frame whose channels may have one each.
+pub(super) fn unit_of(stored: &Geometry, place: usize, unit: &str) -> String {
+    let channel = &stored.channels[place];
+    let base = channel.strip_prefix(SIGMA).unwrap_or(channel);
+    let units: Vec<&str> = unit.split(", ").collect();
+    let own = stored.channels.iter().position(|known| known == base).and_then(|at| units.get(at));
+    own.filter(|_| units.len() > 1).map_or(unit, |own| *own).to_owned()
 }
 
 /// Cuts a frame down to a rectangle, and gives the column and row that come first.

@@ -193,7 +193,11 @@ impl FrameReader {
         let scaling = take_scaling(reader.as_ref(), &mut metadata, &place, name)?;
         let origin = placed(reader.as_ref(), metadata.origin.take(), &place, name)?;
         let (first_channel, geometry) = match &options.channel {
-            Some(channel) => take_channel(stored, channel, name)?,
+            Some(channel) => {
+                let (place, geometry) = take_channel(stored, channel, name, metadata.quantity)?;
+                metadata.unit = kept::unit_of(stored, place, &metadata.unit);
+                (place, geometry)
+            }
             None => (0, keep_planes(stored, options.all_channels, metadata.quantity)),
         };
         let left_out = match &options.channel {
@@ -658,6 +662,42 @@ mod tests {
         let none = InputOptions { channel: Some("Z".into()), ..options };
         let complaint = FrameReader::open(&none).err().unwrap().to_string();
         assert!(complaint.ends_with("there is no channel `Z`; it has R, G, B; give another `channel`"), "{complaint}");
+    }
+
+    /// Channels of several units have one each, and so have their standard deviations.
+    #[test]
+    fn a_channel_that_is_taken_alone_has_its_own_unit() {
+        let directory = tempfile::tempdir().unwrap();
+        let channels = ["CCT", "Duv", "Y", "sigma.CCT", "sigma.Duv", "sigma.Y"];
+        let path = Some(written(directory.path(), &channels, &Metadata::new(QuantityKind::Cct)));
+        for (channel, unit) in [("CCT", "K"), ("duv", "1"), ("Y", "cd m-2"), ("sigma.CCT", "K"), ("sigma.Y", "cd m-2")]
+        {
+            let options =
+                InputOptions { path: path.clone(), channel: Some(channel.to_owned()), ..InputOptions::default() };
+            let (reader, _) = read(&options).unwrap();
+            assert_eq!(reader.header().metadata.unit, unit, "{channel}");
+            assert!(reader.header().metadata.contradictions().is_empty(), "{channel}");
+        }
+        let (reader, _) = read(&InputOptions { path, ..InputOptions::default() }).unwrap();
+        assert_eq!(reader.header().metadata.unit, "K, 1, cd m-2");
+    }
+
+    /// XYZ are stored as R, G, B, and called X, Y, Z by reports.
+    #[test]
+    fn a_channel_is_taken_by_the_name_that_reports_give_it() {
+        let directory = tempfile::tempdir().unwrap();
+        let channels = ["R", "G", "B", "sigma.R", "sigma.G", "sigma.B"];
+        let path = Some(written(directory.path(), &channels, &Metadata::new(QuantityKind::Xyz)));
+        let taken = |channel: &str| {
+            let options =
+                InputOptions { path: path.clone(), channel: Some(channel.to_owned()), ..InputOptions::default() };
+            read(&options).map(|(_, samples)| samples[0])
+        };
+        for (channel, first) in [("X", 0.0), ("z", 20.0), ("G", 10.0), ("sigma.X", 30.0), ("sigma.B", 50.0)] {
+            assert_eq!(taken(channel).unwrap(), first, "{channel}");
+        }
+        let complaint = taken("W").unwrap_err().to_string();
+        assert!(complaint.contains("it has X, Y, Z, sigma.X, sigma.Y, sigma.Z;"), "{complaint}");
     }
 
     #[test]

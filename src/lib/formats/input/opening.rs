@@ -5,10 +5,11 @@ use crate::formats::files::{STDIN_NAME, spool};
 use crate::formats::format::{HEAD_BYTES, Opened, Readers, Streaming};
 use crate::formats::places::in_stream;
 use crate::formats::read_ahead::Pipe;
-use crate::formats::{pipe, table, tiff};
+use crate::formats::{keys, pipe, table, tiff};
 use crate::text::counted;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
 
 /// Whether an open file is one that can seek, and no pipe.
 pub(super) fn is_file(input: &File, name: &str) -> Result<bool> {
@@ -86,12 +87,33 @@ pub(super) fn readers_of(head: &[u8], name: &str) -> Result<Readers> {
         let hint = if head.len() < 8 {
             format!("; it has {} and no more", counted(head.len() as u64, "bytes"))
         } else if is_text(head) {
-            "; it looks like text (a spectrum goes into `render-radiance`)".into()
+            text_hint(name)
         } else {
             String::new()
         };
         Error::format(name, format!("it is neither {} file{hint}", table::names_of_read()))
     })
+}
+
+/// What a text is that was taken for a frame: one of our YAML files, by what a named file says, or, as it may be, a spectrum.
+fn text_hint(name: &str) -> String {
+    /// What tells the kind of a file stands near its beginning.
+    const LOOKED_AT: u64 = 1 << 16;
+    if let Some(frame) = name.strip_suffix(".yaml").filter(|frame| Path::new(frame).is_file()) {
+        return format!("; it holds the metadata of `{frame}`: name that");
+    }
+    let read = || -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        File::open(name)?.take(LOOKED_AT).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    let is_file = std::fs::metadata(name).is_ok_and(|about| about.is_file());
+    // What cannot be read again is told as any other text.
+    let bytes = if is_file { read().unwrap_or_default() } else { Vec::new() };
+    match keys::kind_of(&String::from_utf8_lossy(&bytes)) {
+        Some(kind) => format!("; it is {kind}"),
+        None => "; it looks like text (a spectrum goes into `render-radiance`)".into(),
+    }
 }
 
 /// Whether bytes are the beginning of a text, the last character perhaps cut off.

@@ -29,6 +29,14 @@ impl Named for KeyPage {
             Self::Metadata => "metadata",
         }
     }
+
+    fn other_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Sensor => &["sensors"],
+            Self::Matrix => &["matrices"],
+            Self::Metadata => &[],
+        }
+    }
 }
 
 /// A key: its path, type, unit, default, who needs it, and what it is.

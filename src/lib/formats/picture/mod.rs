@@ -6,6 +6,7 @@ mod shade;
 
 use super::atomic::Target;
 use super::foreign::png_complaint;
+use super::register;
 use crate::analysis::statistics::{MarkedRows, Region, Saturated};
 use crate::color::ramp::ramp;
 use crate::error::{Error, Result};
@@ -185,6 +186,9 @@ impl Shown {
         let choice = Choice::of(&frame, settings.plane.as_deref(), settings.false_color)?;
         let reduction = reduction(&frame, settings, &choice)?;
         let reduced = Reduced::read(source, &reduction, &choice, None)?;
+        if !reduced.has_numbers() {
+            return Err(shade::nothing(&frame));
+        }
         Self::paint(&frame, settings, &choice, &reduced)
     }
 
@@ -200,9 +204,12 @@ impl Shown {
             let missing = missing.then(|| (MISSING, "not finite".to_owned()));
             let bar = ScaleBar { label: choice.label(frame), range: (low, high), colors, missing };
             let scale = shade::beyond(reduced, (low, high), range);
+            let seen = [((low, high), reduced.quantiles(0, [0.0, 1.0]))];
+            shade::all_outside(frame, seen.into_iter()).into_iter().for_each(register::doubt);
             return Ok(Self { size, samples_per_pixel: 3, bytes, bar: Some(bar), scale });
         }
         let shade = Shade::new(frame, settings.range.unwrap_or(Range::Full), reduced)?;
+        shade.doubt(frame, reduced).into_iter().for_each(register::doubt);
         let planes = reduced.planes;
         Ok(Self {
             size,

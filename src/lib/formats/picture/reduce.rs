@@ -118,6 +118,11 @@ impl Reduced {
         self.samples.chunks_exact(self.size[0]).skip(plane).step_by(self.planes)
     }
 
+    /// Whether any pixel has a number.
+    pub fn has_numbers(&self) -> bool {
+        self.samples.iter().any(|sample| sample.is_finite())
+    }
+
     /// What is said of a plane.
     pub fn moments(&self, plane: usize) -> Moments {
         let mut moments = Moments::new(1);

@@ -44,7 +44,7 @@ impl Shade {
     /// [`Error::Usage`] for a range that shows nothing; [`Error::Format`] for quantities that are no picture.
     pub fn new(frame: &FrameHeader, range: Range, reduced: &Reduced) -> Result<Self> {
         let planes = 0..reduced.planes;
-        let none = || frame.refuse("none of its pixels has a number that is finite; there is nothing to show");
+        let none = || nothing(frame);
         let is_xyz = frame.metadata.quantity == QuantityKind::Xyz && reduced.planes == 3;
         match range {
             Range::Values(low, high) if is_xyz => Self::xyz(frame, (low, high)),
@@ -53,6 +53,7 @@ impl Shade {
                 Self::xyz(frame, ends.into())
             }
             Range::Values(low, high) => Self::planes(frame, vec![(low, high); reduced.planes]),
+            Range::Deviations(_) | Range::Full if !reduced.has_numbers() => Err(none()),
             Range::Deviations(count) => {
                 let about = |plane| {
                     let moments = reduced.moments(plane);
@@ -140,6 +141,21 @@ impl Shade {
         }
     }
 
+    /// A warning of a range that shows nothing: all numbers are below it, or all above.
+    pub fn doubt(&self, frame: &FrameHeader, reduced: &Reduced) -> Option<String> {
+        match self {
+            Self::Planes(ranges) => {
+                let each =
+                    ranges.iter().enumerate().map(|(plane, range)| (*range, reduced.quantiles(plane, [0.0, 1.0])));
+                all_outside(frame, each)
+            }
+            Self::Xyz(_, range) if *range != (0.0, 1.0) => {
+                all_outside(frame, [(*range, reduced.quantiles(LUMINANCE, [0.0, 1.0]))].into_iter())
+            }
+            Self::Xyz(..) | Self::Encoded => None,
+        }
+    }
+
     /// What is black and what is white, in the unit of the samples.
     pub fn words(&self, frame: &FrameHeader, names: &[String]) -> Option<String> {
         let unit = match typeset(&frame.metadata.unit) {
@@ -209,6 +225,36 @@ fn light(frame: &FrameHeader) -> nalgebra::Matrix3<f64> {
     linear_srgb_from_xyz(
         white.map_or_else(|| xyz_of_chromaticity(D65_XY, 1.0), |white| white.map(|part| part / white[1])),
     )
+}
+
+/// A complaint of a frame without numbers.
+pub(super) fn nothing(frame: &FrameHeader) -> Error {
+    frame.refuse("none of its pixels has a number that is finite; there is nothing to show")
+}
+
+/// A warning where of each plane all numbers, of which the least and the most are given, lie on one side of its range.
+pub(super) fn all_outside(
+    frame: &FrameHeader,
+    planes: impl Iterator<Item = ((f64, f64), Option<[f64; 2]>)>,
+) -> Option<String> {
+    let (mut range, mut ends) = (None, [f64::INFINITY, f64::NEG_INFINITY]);
+    for ((low, high), seen) in planes {
+        let Some([least, most]) = seen else { continue };
+        if !(most < low || least > high) {
+            return None;
+        }
+        range = Some((low, high));
+        ends = [ends[0].min(least), ends[1].max(most)];
+    }
+    let (low, high) = range?;
+    let [least, most] = ends.map(rounded);
+    Some(format!(
+        "{}: all numbers, from {least} to {most}, lie outside the range from {} to {}, which shows nothing of them; give another \
+         with --range",
+        frame.name,
+        rounded(low),
+        rounded(high)
+    ))
 }
 
 /// The code of a value of 0 to 1; 0 of NaN.

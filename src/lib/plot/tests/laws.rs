@@ -133,6 +133,23 @@ fn words_of_a_panel_without_axes_stay_within_its_cell() {
     assert!(said.iter().all(|(_, [left, _, right, _])| *left >= 0.0 && *right <= 520.0), "{said:?}");
 }
 
+/// Labels of the y axis as long as these put the frame far from the middle of its cell.
+#[test]
+fn the_title_of_a_panel_stays_within_its_cell() {
+    let title = "1 of 75 means of rows beyond the axes, as far as 158432";
+    let panel = || {
+        let mut panel = Panel::new(Axis::linear("row"), Axis::linear("mean").range(0.0, 123_456_789.0));
+        panel.title = title.into();
+        panel.add("a", Color::Blue, Marks::Line(vec![[0.0, 0.0], [1.0, 1e8]]));
+        panel
+    };
+    let plot = Plot { title: String::new(), panels: vec![panel(), panel()], arrangement: Arrangement::Pairs };
+    let titles: Vec<[f64; 4]> =
+        words(&plot).into_iter().filter(|(text, _)| text == title).map(|(_, bounds)| bounds).collect();
+    let [left, right] = titles[..] else { panic!("{titles:?}") };
+    assert!(left[0] >= 0.0 && left[2] <= right[0] && right[2] <= 1040.0, "{titles:?}");
+}
+
 #[test]
 fn every_series_is_seen_though_others_lie_over_it() {
     let places = vec![[1.0, 1.0], [2.0, 3.0], [3.0, 2.0]];

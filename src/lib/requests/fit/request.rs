@@ -19,7 +19,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Args)]
 #[command(group = ArgGroup::new("noisy").args(["evaluate", "noise_weight"]).multiple(true))]
 #[command(mut_arg("white_luminance", |option| option.help(
-    "Luminance of the white d65 or e in cd/m2; by default that at which the camera saturates, by the sensor file's matrix"
+    "Luminance of the white d65, d50 or e in cd/m2; by default that at which the camera saturates, by the sensor file's matrix"
 )))]
 pub struct Fit {
     /// Library of spectra, EXR or CSV

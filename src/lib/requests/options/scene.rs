@@ -112,7 +112,8 @@ pub struct PictureChoice {
     /// file says, or srgb
     #[arg(long, value_name = "NAME|X,Y,...", value_parser = values::primaries, allow_hyphen_values = true)]
     pub primaries: Option<Primaries>,
-    /// The light on the scene: d65, a, e, or a table of relative power (CSV); d65 by default
+    /// The light on the scene: a, d50, d55, d65, d75, e, a temperature such as 3200K, or a table of relative power (CSV); d65 by
+    /// default
     #[arg(long, value_name = "NAME|FILE")]
     pub illuminant: Option<String>,
     /// Luminance of R = G = B = 1 in cd/m2; 1000 by default

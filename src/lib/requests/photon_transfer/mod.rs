@@ -26,7 +26,7 @@ use std::path::PathBuf;
 /// Flats and darks, and what is asked of them.
 #[derive(Debug, Clone, Args)]
 pub struct PhotonTransfer {
-    /// List of flats and darks: a table with the columns file, kind (flat or dark), exposure_s, photons, temperature_k, level; the same
+    /// List of flats and darks: a table with the columns file, kind (flat or dark), exposure_s, photons, temperature_k or temperature_c, level; the same
     /// as YAML; an EMVA 1288 descriptor; or a directory of frames that say all that themselves
     #[arg(value_name = "LIST")]
     pub list: PathBuf,

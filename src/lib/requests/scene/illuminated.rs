@@ -91,8 +91,12 @@ impl Scene {
                 unread: None,
             },
             _ => {
-                let problem =
-                    format!("it holds {}, neither spectral radiance nor a picture in R, G, B", header.holds());
+                let next = match header.metadata.quantity {
+                    QuantityKind::ExpectedElectrons => "; it is rendered already, for `add-noise`",
+                    _ => "",
+                };
+                let holds = header.holds();
+                let problem = format!("it holds {holds}, neither spectral radiance nor a picture in R, G, B{next}");
                 return Err(header.refuse(problem));
             }
         };

@@ -184,7 +184,9 @@ impl Scene {
             (None, None) => {
                 const SHOWN: usize = 8;
                 // What holds no radiances is told first.
-                table.radiance_unit(0, self.spectrum.radiance_unit)?;
+                table
+                    .radiance_unit(0, self.spectrum.radiance_unit)
+                    .map_err(|error| beside(error, &table.columns[0], &table.likely_radiances()))?;
                 let names: Vec<&str> = table.columns.iter().take(SHOWN).map(String::as_str).collect();
                 let more = if count > SHOWN { " ..." } else { "" };
                 Err(Error::Usage(format!(
@@ -194,6 +196,18 @@ impl Scene {
                 )))
             }
         }
+    }
+}
+
+/// A complaint of the first column of a table, with the columns that may hold radiances where it does not.
+fn beside(error: Error, first: &str, likely: &[&str]) -> Error {
+    match (error, likely) {
+        (Error::Format { file, problem }, [column, others @ ..]) if *column != first => {
+            let which = if others.is_empty() { "" } else { ", the first of several," };
+            let advice = format!("`{column}`{which} may hold them: choose it with --column '{column}'");
+            Error::Format { file, problem: format!("{problem}; {advice}") }
+        }
+        (error, _) => error,
     }
 }
 

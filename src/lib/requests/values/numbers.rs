@@ -190,7 +190,11 @@ const PER_CENT_FROM: f64 = 5.0;
 /// What is expected, in words.
 pub fn kelvin(text: &str) -> Result<f64, String> {
     let text = text.strip_suffix(['K', 'k']).map_or(text, str::trim_end);
-    let celsius = number(text).ok().filter(|x| (-200.0..=0.0).contains(x));
+    let marked = text.strip_suffix(['C', 'c']).map(|number| number.trim_end_matches(['°', ' ']));
+    let celsius = match marked {
+        Some(degrees) => number(degrees).ok(),
+        None => number(text).ok().filter(|x| (-200.0..=0.0).contains(x)),
+    };
     let hint =
         celsius.map_or(String::new(), |x| format!("; {x} looks like degrees Celsius, which is {} K", units::kelvin(x)));
     positive(text).map_err(|_| format!("give a temperature in K, above 0{hint}"))

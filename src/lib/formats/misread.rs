@@ -1,0 +1,197 @@
+//! What a text is that is read as no table of spectra, or as another than was meant: a slip of the pen in its first row, lines above
+//! its heading, another program's form.
+
+use super::cells::{not_a_number, numeric};
+use super::delimited::{self, number};
+use super::foreign::line_of;
+use super::keys;
+use crate::error::{Error, Result};
+use crate::spectrum::SHORTEST_NM;
+use crate::units::{WavelengthUnit, unit_of_heading};
+use csv::StringRecord;
+
+/// Columns that uvspec writes by default: the wavelength, edir, edn, eup, uavgdir, uavgdn, uavgup.
+pub(super) const UVSPEC: usize = 7;
+
+/// Refuses a first row that is no heading but one of numbers with a mistake: as a heading it would be lost without a word.
+///
+/// # Errors
+///
+/// [`Error::Format`] naming line and column.
+pub(super) fn check_heading(name: &str, text: &str, first: &StringRecord) -> Result<()> {
+    let refuse = |column: usize| {
+        let line = line_of(text, first.position());
+        let wrong = not_a_number(&first[column]);
+        let hint = "its line looks like one of numbers (a heading begins with a word such as `wavelength_nm`)";
+        Err(Error::format(name, format!("line {line}, column {}{wrong}; {hint}", column + 1)))
+    };
+    let others: Vec<(usize, &str)> = first.iter().enumerate().skip(1).filter(|(_, cell)| !cell.is_empty()).collect();
+    let numbers: Vec<f64> = others.iter().filter_map(|(_, cell)| numeric(cell)).collect();
+    let corner = &first[0];
+    if numbers.is_empty() || 2 * numbers.len() < others.len() {
+        return Ok(());
+    }
+    let goes_one_way = numbers.is_sorted() || numbers.iter().rev().is_sorted();
+    let are_wavelengths = numbers.len() > 1 && goes_one_way && numbers.iter().all(|number| *number >= SHORTEST_NM);
+    let strange = others.iter().find(|(_, cell)| numeric(cell).is_none());
+    match strange {
+        // One of the wavelengths of a heading.
+        Some((column, _)) if are_wavelengths && !names_wavelengths(corner) => refuse(*column),
+        _ if are_wavelengths => Ok(()),
+        _ if is_mistyped_number(corner) => refuse(0),
+        _ if names_wavelengths(corner) => Ok(()),
+        // `x,0.52`: no column is called so, as one may be called by an angle.
+        None if numbers.len() == 1 && others[0].1.contains(['.', ',', 'e', 'E']) => refuse(0),
+        _ => Ok(()),
+    }
+}
+
+/// Whether a cell that is no number looks as if it should be one: it begins as one, or most of it are digits.
+fn is_mistyped_number(cell: &str) -> bool {
+    let unsigned = cell.trim_start_matches(['+', '-', '−', '.']);
+    let digits = cell.chars().filter(char::is_ascii_digit).count();
+    unsigned.starts_with(|c: char| c.is_ascii_digit()) || 2 * digits > cell.chars().count()
+}
+
+/// Whether a cell is the heading of a column of wavelengths, or of what people give instead.
+pub(super) fn names_wavelengths(cell: &str) -> bool {
+    let lower = cell.to_lowercase();
+    ["wavelength", "lambda", "λ", "wave", "wl", "nm"].iter().any(|begin| lower.starts_with(begin))
+        || !matches!(WavelengthUnit::of_heading(cell), Ok(None))
+}
+
+/// Whether a record below the header holds units: that of wavelengths, and, below what is no heading of wavelengths, nothing but
+/// units behind it, so that a title is told from a heading.
+pub(super) fn is_units(header: &StringRecord, record: &StringRecord) -> bool {
+    let is_unit = |cell: &str| {
+        ["", "-", "--", "–", "none"].contains(&cell)
+            || unit_of_heading(cell).is_some()
+            || unit_of_heading(&format!("({cell})")).is_some()
+    };
+    record.iter().all(|cell| numeric(cell).is_none())
+        && !matches!(WavelengthUnit::of_heading(record.get(0).unwrap_or_default()), Ok(None))
+        && (header.get(0).is_some_and(names_wavelengths) || record.iter().skip(1).all(is_unit))
+}
+
+/// What a text is that was read as no table, where that can be told.
+pub(super) fn explained(name: &str, bytes: &[u8]) -> Option<Error> {
+    let decoded = delimited::decoded(name, bytes).ok()?;
+    if decoded.contains('\0') || keys::kind_of(&decoded).is_some() {
+        return None;
+    }
+    uvspec(name, &decoded).or_else(|| preamble(name, &decoded))
+}
+
+/// A complaint of what uvspec writes by default where it is asked for radiances: below each row of irradiances a line of azimuths and
+/// a line for each direction.
+fn uvspec(name: &str, text: &str) -> Option<Error> {
+    /// So many rows are looked at.
+    const LOOKED_AT: usize = 16;
+    let widths: Vec<Option<usize>> = delimited::rows(text)
+        .take(LOOKED_AT)
+        .map(|line| line.split_whitespace().map(|cell| number(cell).map(drop)).collect::<Option<Vec<()>>>())
+        .map(|cells| cells.map(|cells| cells.len()))
+        .collect();
+    let is_so = widths.first() == Some(&Some(UVSPEC))
+        && widths.iter().all(Option::is_some)
+        && widths.iter().any(|width| *width != Some(UVSPEC));
+    let problem = "it looks like what libRadtran's uvspec writes by default, with lines of directions below each wavelength; have it \
+                   write a table of radiances, by `output_user lambda uu` in its input file";
+    is_so.then(|| Error::format(name, problem))
+}
+
+/// A complaint of lines that stand above the heading of a table, where there are any but one of units.
+fn preamble(name: &str, text: &str) -> Option<Error> {
+    let [first, last, heading] = delimited::above_heading(text)?;
+    let cells = |line: usize| -> Option<StringRecord> {
+        Some(text.lines().nth(line - 1)?.split([',', ';', '\t']).map(str::trim).collect())
+    };
+    if first == last && is_units(&cells(first)?, &cells(heading)?) {
+        return None;
+    }
+    let lines = if first == last { format!("line {first} stands") } else { format!("lines {first} to {last} stand") };
+    Some(Error::format(
+        name,
+        format!("{lines} above the heading of its columns, line {heading}; put a # before what is no table"),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::formats::csv::SpectralTable;
+
+    fn complaint(text: &str) -> String {
+        SpectralTable::parse("t", text.as_bytes()).map_or_else(|error| error.to_string(), |_| "read".into())
+    }
+
+    #[test]
+    fn a_mistake_in_the_first_row_makes_no_heading_of_it() {
+        for (text, place) in [
+            ("40O,0.5\n410,1\n420,2\n", "line 1, column 1: `40O` is no number"),
+            ("# sky\n\n4OO 0.5\n410 1\n", "line 3, column 1: `4OO` is no number"),
+            ("O400;0,5\n410;1\n", "line 1, column 1: `O400` is no number"),
+            ("400nm,1\n410,2\n", "line 1, column 1: `400nm` is no number"),
+            ("400 nm,1\n410,2\n", "line 1, column 1: `400 nm` is no number"),
+            ("4.0.0\t1\n410\t2\n", "line 1, column 1: `4.0.0` is no number"),
+            (",0.5\n410,1\n", "line 1, column 1 is empty"),
+            ("nan,0.5\n410,1\n", "line 1, column 1: `nan` is no number"),
+            ("x,5e-6\n410,6e-6\n", "line 1, column 1: `x` is no number"),
+            ("40O,0.1,0.2\n410,0.2,0.3\n", "line 1, column 1: `40O` is no number"),
+            ("40O,0.1,x\n410,0.2,0.3\n", "line 1, column 1: `40O` is no number"),
+            ("400,O.5\n410,1\n", "line 1, column 2: `O.5` is no number"),
+            ("id,400,41O,420\n1,1,2,3\n", "line 1, column 3: `41O` is no number"),
+        ] {
+            let found = complaint(text);
+            assert!(found.starts_with(&format!("t: {place}")), "{text}: {found}");
+        }
+        // Names that are numbers, and headings of wavelengths, are none.
+        for text in [
+            "wavelength,0.5\n400,1\n410,2\n",
+            "nm,30\n400,1\n410,2\n",
+            "x,30\n400,1\n410,2\n",
+            "sza,400,410\n30,1,2\n",
+            ",400,410\na,1,2\n",
+            "2024-05-01,400,410\na,1,2\n",
+            "lambda,a,30\n400,1,2\n410,1,2\n",
+        ] {
+            assert_eq!(complaint(text), "read", "{text}");
+        }
+    }
+
+    #[test]
+    fn a_title_is_no_heading() {
+        for text in [
+            "A title, with commas\nnm,L\n400,1\n410,2\n",
+            "A title\nnm,L\n400,1\n410,2\n",
+            "Sky; noon\nnm;L\n400;1\n410;2\n",
+        ] {
+            assert_eq!(
+                complaint(text),
+                "t: line 1 stands above the heading of its columns, line 2; put a # before what is no table",
+                "{text}"
+            );
+        }
+        for text in
+            ["x,sky\nnm,W/(m2 sr nm)\n400,1\n", "wavelength,sky\nnm,counts\n400,1\n", "x,R,G\nnm,-,counts\n400,1,2\n"]
+        {
+            let table = SpectralTable::parse("t", text.as_bytes()).unwrap();
+            assert!(["sky", "R"].contains(&table.columns[0].as_str()), "{table:?}");
+        }
+    }
+
+    /// libRadtran's manual: each wavelength has its line of irradiances, one of azimuths, and one for each direction, its cosine and
+    /// the radiance averaged over azimuths before the others.
+    #[test]
+    fn directions_between_rows_are_told() {
+        let block = |nm: f64| {
+            format!(
+                " {nm:.3}  1.0e+01  2.0e+01 3.0e+00 1.0e+00 2.0e+00 3.0e-01\n              0.000  90.000\n -1.0000 1.0e+00 9.0e-01 8.0e-01\n"
+            )
+        };
+        let text: String = [400.0, 410.0, 420.0].map(block).concat();
+        for text in [text.clone(), block(400.0), format!("# sky\n{text}")] {
+            let found = complaint(&text);
+            assert!(found.contains("libRadtran's uvspec") && found.contains("`output_user lambda uu`"), "{found}");
+        }
+    }
+}
