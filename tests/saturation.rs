@@ -5,6 +5,7 @@
 mod support;
 
 use cyanometer::cfa::{CfaPattern, Class};
+use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::frame::Geometry;
 use cyanometer::masking::Masking;
 use cyanometer::metadata::{AdcRecord, FrameHeader};
@@ -15,7 +16,7 @@ use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
 use cyanometer::stages::darks::{DarkFrames, DarkStack};
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stages::saturation::FullLevels;
-use cyanometer::stream::{Counts, MemoryFrame, Stage};
+use cyanometer::stream::{Counts, MemoryFrame, RowSource, Stage};
 use cyanometer::units::QuantityKind;
 use serde_json::Value;
 use std::fs;
@@ -268,14 +269,10 @@ fn pictures_and_differences_tell_of_marked_pixels() {
     for line in quiet.into_iter().chain(more) {
         shop.run(line, &[]);
     }
-    let options = cyanometer::formats::input::InputOptions {
-        path: Some(shop.path("xyz.exr")),
-        all_channels: true,
-        ..Default::default()
-    };
-    let mut reader = cyanometer::formats::input::FrameReader::open(&options).unwrap();
+    let options = InputOptions { path: Some(shop.path("xyz.exr")), all_channels: true, ..Default::default() };
+    let mut reader = FrameReader::open(&options).unwrap();
     let mut samples = Vec::new();
-    cyanometer::stream::RowSource::read(&mut reader, 24, &mut samples).unwrap();
+    RowSource::read(&mut reader, 24, &mut samples).unwrap();
     let channels = samples.len() / (32 * 24);
     let marked =
         samples.chunks_exact(32).skip(channels - 1).step_by(channels).flatten().filter(|mark| **mark != 0.0).count();
@@ -316,9 +313,13 @@ fn the_full_well_of_a_sensor_marks_frames_of_cameras_and_their_flats() {
         let told =
             said(&format!("correct-frame light.raw {how} {white} --sensor low.yaml --flat flat.raw -o flat.exr"));
         assert!(told.contains("1 photosites of the flats are saturated; they are marked"), "{told}");
-        let marks = shop.frame("flat.exr");
-        let Geometry { width, .. } = marks.header.geometry;
-        let mask: Vec<f32> = marks.samples.chunks_exact(width).skip(1).step_by(2).flatten().copied().collect();
+        let options = InputOptions { path: Some(shop.path("flat.exr")), ..Default::default() };
+        let mut marks = FrameReader::open(&options).unwrap();
+        marks.keep_mask();
+        let mut samples = Vec::new();
+        marks.read(6, &mut samples).unwrap();
+        // Rows of samples, each before that of its marks.
+        let mask: Vec<f32> = samples.chunks_exact(8).skip(1).step_by(2).flatten().copied().collect();
         let marked: Vec<usize> = (0..48).filter(|at| mask[*at] != 0.0).collect();
         assert_eq!(marked, [3, 20, 30]);
     }
