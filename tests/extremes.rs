@@ -747,8 +747,8 @@ fn any_sensor(index: u64) -> (&'static str, CameraSetup, [f64; 3]) {
     (kind, setup, light)
 }
 
-/// How long the prediction of one setting takes, CPU of all stages, and whether it is refused.
-fn predicted_in(setup: &CameraSetup, light: [f64; 3]) -> Option<(f64, bool)> {
+/// How long the prediction of one setting takes, CPU of all stages, and why it is refused where it is.
+fn predicted_in(setup: &CameraSetup, light: [f64; 3]) -> Option<(f64, Option<String>)> {
     setup.sensor.readout().unwrap().check().ok()?;
     let color = ColorSettings {
         xyz_from_camera: [[0.4, 0.3, 0.2], [0.2, 0.7, 0.1], [0.0, 0.1, 0.9]],
@@ -767,8 +767,8 @@ fn predicted_in(setup: &CameraSetup, light: [f64; 3]) -> Option<(f64, bool)> {
             let mut predictor =
                 Predictor::new(PredictorSettings { color: Some(color), ..PredictorSettings::of(setup.clone()) })
                     .ok()?;
-            let is_refused = predictor.predict(light).is_err();
-            Some((worked_s(start) - before, is_refused))
+            let refused = predictor.predict(light).err().map(|why| why.to_string());
+            Some((worked_s(start) - before, refused))
         };
         scope.spawn(run).join().unwrap()
     })
@@ -784,13 +784,14 @@ fn predictions_take_milliseconds() {
     let (mut refused, mut not_accepted) = (0, 0);
     for index in first..first + cameras() {
         let (kind, setup, light) = any_sensor(index);
-        let Some((seconds, is_refused)) = predicted_in(&setup, light) else {
+        let Some((seconds, why_refused)) = predicted_in(&setup, light) else {
             not_accepted += 1;
             continue;
         };
-        refused += u32::from(is_refused);
+        refused += u32::from(why_refused.is_some());
         if seconds > 0.01 {
-            eprintln!("{kind} {index}: {:.1} ms{}", 1e3 * seconds, if is_refused { ", refused" } else { "" });
+            let why = why_refused.map_or(String::new(), |why| format!(", refused: {why}"));
+            eprintln!("{kind} {index}: {:.1} ms{why}", 1e3 * seconds);
         }
         found.push((kind, index, seconds));
     }
