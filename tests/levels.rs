@@ -489,6 +489,9 @@ fn darks_of_other_sensors_or_lit_scenes_are_refused() {
     let mut other = taken(0.0, 1);
     other.metadata.sensor.as_mut().unwrap().name = "other".into();
     refused(corrected(&frame, &other), "its sensor is other, but that of test is kaf-5101ce");
+    let mut coarse = taken(0.0, 1);
+    coarse.metadata.white_level_adu = Some(1023.0.into());
+    refused(corrected(&frame, &coarse), "its white level is 1023 ADU, but that of test is 4095 ADU");
     // As files of cameras tell it.
     let set = |camera: &str, iso_speed: f64, mut header: FrameHeader| {
         (header.metadata.camera, header.metadata.iso_speed) = (Some(camera.into()), Some(iso_speed));

@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 128] = [
+const MISTAKES: [(&str, i32, &str); 129] = [
     (
         "photon-transfer codes.exr",
         BAD_DATA,
@@ -341,6 +341,11 @@ const MISTAKES: [(&str, i32, &str); 128] = [
         "demosaic plane.exr --black dark",
         BAD_USAGE,
         "`dark` is no value for --black <auto|none|N[,N,N,N]>: give auto, none, a number, or four between commas; see `demosaic --help`",
+    ),
+    (
+        "fit-matrix SAMPLES/skies/sky912.exr -o rgb.exr",
+        BAD_USAGE,
+        "rgb.exr: a matrix file is written as YAML; end its name in .yaml",
     ),
     ("demosaic rgb.exr", BAD_DATA, "rgb.exr: it holds three demosaicked planes of ADU; demosaicking is done once"),
     ("demosaic plane.exr -o no/where.exr", BAD_DATA, "no/where.exr: there is no directory `no`; make it first"),

@@ -161,6 +161,12 @@ fn relative_xyz_have_no_bright_white() {
     assert_eq!(said(&shop, &format!("{line} 0.95,1,1.09"), 0), "");
     let warning = said(&shop, &format!("{line} 95,100,109"), 0);
     assert!(warning.starts_with("to-xyz: warning: the white has Y = 100, but XYZ are relative"), "{warning}");
+    // Absolute XYZ have none that is next to black.
+    shop.write_colors("absolute.exr", QuantityKind::Xyz, &[[2000.0, 3000.0, 4000.0]]);
+    let line = "to-xyz absolute.exr --space lab -o out.exr --white";
+    assert_eq!(said(&shop, &format!("{line} 9500,10000,10900"), 0), "");
+    let warning = said(&shop, &format!("{line} 0.95,1,1.09"), 0);
+    assert!(warning.starts_with("to-xyz: warning: the white has Y = 1, but XYZ are absolute"), "{warning}");
     fs::copy(shop.path("relative.yaml"), shop.path("xyz.exr.yaml")).unwrap();
     let warning = said(&shop, "color-difference xyz.exr 0.2,0.3,0.5 --white 95,100,109", 0);
     assert!(warning.starts_with("color-difference: warning: the white has Y = 100, but XYZ are relative"), "{warning}");

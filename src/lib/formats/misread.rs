@@ -109,6 +109,16 @@ fn preamble(name: &str, text: &str) -> Option<Error> {
     if first == last && is_units(&cells(first)?, &cells(heading)?) {
         return None;
     }
+    // Where what seems to be the heading stands below one of wavelengths, it is a row with a mistake, which is told by its place.
+    let is_heading = |line: usize| {
+        let words = |line: &str| {
+            line.split([',', ';', '\t', ' ']).map(str::trim).find(|cell| !cell.is_empty()).map(str::to_owned)
+        };
+        text.lines().nth(line - 1).and_then(words).is_some_and(|cell| names_wavelengths(&cell))
+    };
+    if (first..=last).any(is_heading) && !is_heading(heading) {
+        return None;
+    }
     let lines = if first == last { format!("line {first} stands") } else { format!("lines {first} to {last} stand") };
     Some(Error::format(
         name,
@@ -155,6 +165,19 @@ mod tests {
             "lambda,a,30\n400,1,2\n410,1,2\n",
         ] {
             assert_eq!(complaint(text), "read", "{text}");
+        }
+    }
+
+    #[test]
+    fn a_mistake_below_a_heading_is_told_by_its_place() {
+        for (text, place) in [
+            ("wavelength (nm),radiance (W m-2 sr-1 nm-1)\n400,O.1\n500,0.1\n", "line 2, column 2: `O.1` is no number"),
+            ("wavelength (nm),L\n4O0,0.1\n500,0.1\n600,0.1\n", "line 2, column 1: `4O0` is no number"),
+            ("nm;L\n400;n/a\n500;0,1\n", "line 2, column 2: `n/a` is no number"),
+            ("lambda uu\n400 x\n500 0.1\n", "line 2, column 2: `x` is no number"),
+            ("wavelength,L\nnm,W/(m2 sr nm)\n400,O.1\n500,0.1\n", "line 3, column 2: `O.1` is no number"),
+        ] {
+            assert!(complaint(text).starts_with(&format!("t: {place}")), "{text}: {}", complaint(text));
         }
     }
 

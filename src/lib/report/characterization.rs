@@ -3,7 +3,7 @@
 use super::chart;
 use super::matrix_text::{differences_text, matrix_text};
 use super::trade_off::trade_off;
-use super::{ReportFormat, finished, in_form, shown, table, unwritable};
+use super::{ReportFormat, check_yaml_name, finished, in_form, shown, table, unwritable};
 use crate::analysis::characterization::CameraMatrix;
 use crate::analysis::characterization::noise_aware::TradeOff;
 use crate::color::difference::{Difference, DifferenceReport};
@@ -41,6 +41,7 @@ impl MatrixOutputs {
     ///
     /// [`Error::Usage`]; those of [`PlotFormat::of_path`] and [`register::announce`].
     pub fn check(&self, fit: &Fit) -> Result<()> {
+        check_yaml_name(self.output.as_deref(), "matrix")?;
         if let Some(plot) = &self.plot {
             PlotFormat::of_path(plot)?;
             if fit.noise_weight.is_none() {
@@ -74,6 +75,7 @@ impl MatrixOutputs {
         if self.output_format == Some(ReportFormat::Csv) && request.raw.from_raw.is_some() {
             return Err(Error::Usage("csv has one row for each patch of a chart; a raw file has none".into()));
         }
+        check_yaml_name(self.output.as_deref(), "matrix")?;
         register::announce(&[self.output.as_deref()])
     }
 

@@ -95,6 +95,26 @@ pub fn form_of<F: Named>(asked: Option<F>, output: Option<&Path>) -> Result<Opti
     }
 }
 
+/// Refuses the name of another kind of file for one of YAML, which would take the place of a frame or a table.
+///
+/// # Errors
+///
+/// [`Error::Usage`].
+pub fn check_yaml_name(output: Option<&Path>, what: &str) -> Result<()> {
+    let ending = named(output).and_then(Path::extension).map(|ending| ending.to_string_lossy().to_lowercase());
+    let is_yaml = |ending: &String| ["yaml", "yml"].contains(&ending.as_str());
+    let is_other = |ending: &String| {
+        !is_yaml(ending) && (OF_OTHERS.contains(&ending.as_str()) || LINES.contains(&ending.as_str()))
+    };
+    match (output, ending.filter(is_other)) {
+        (Some(output), Some(_)) => {
+            let shown = output.display();
+            Err(Error::Usage(format!("{shown}: a {what} file is written as YAML; end its name in .yaml")))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// What names of files of JSON lines end in.
 const LINES: [&str; 2] = ["jsonl", "ndjson"];
 

@@ -349,7 +349,11 @@ fn chromaticity(portrait: &Portrait, region: &RegionReport) -> Option<Panel> {
     let mut panel = Panel::new(Axis::linear("x"), Axis::linear("y"));
     panel.equal_scale = true;
     let place = |[x, y, z]: [f64; 3]| [x / (x + y + z), y / (x + y + z)];
-    let pixels: Vec<[f64; 2]> = portrait.pixels.iter().copied().map(place).collect();
+    let is_place = |place: &[f64; 2]| place.iter().all(|coordinate| coordinate.is_finite());
+    let pixels: Vec<[f64; 2]> = portrait.pixels.iter().copied().map(place).filter(is_place).collect();
+    if pixels.is_empty() {
+        return None;
+    }
     let ranges = [0, 1].map(|axis| most(pixels.iter().map(|pixel| pixel[axis]), FEW_PIXELS));
     panel.add(&format!("{} of the pixels", pixels.len()), Color::SkyBlue, Marks::Points(pixels.clone()));
     let measured = portrait.groups.iter().map(Likeness::mean).collect::<Option<Vec<_>>>();

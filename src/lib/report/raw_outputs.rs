@@ -1,6 +1,6 @@
 //! What a raw file tells of its camera, written beside the frame: its matrix as a matrix file, its noise as a read-out.
 
-use super::characterization;
+use super::{characterization, check_yaml_name};
 use crate::analysis::characterization::CameraMatrix;
 use crate::camera::noise_profile::ClassReadOut;
 use crate::camera::readout::ReadOut;
@@ -41,6 +41,8 @@ impl RawOutputs {
     /// [`register::announce`].
     pub fn jobs(&self, files: &RawFiles, output: &Output) -> Result<Vec<Job>> {
         let beside = [self.write_matrix.as_deref(), self.write_readout.as_deref()];
+        check_yaml_name(self.write_matrix.as_deref(), "matrix")?;
+        check_yaml_name(self.write_readout.as_deref(), "sensor")?;
         let jobs = jobs(&files.raws, output.output.as_deref(), output.extension(), &beside)?;
         let mut outputs = Vec::new();
         for Job { frame, beside, .. } in &jobs {

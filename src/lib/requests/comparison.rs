@@ -131,7 +131,9 @@ impl ColorPair {
         }
         let is_relative = |metadata: &Metadata| metadata.is_relative() || metadata.unit == RELATIVE_UNIT;
         let is_relative = comparison.frames().any(|frame| is_relative(&frame.header().metadata));
-        notes.extend(white.and_then(|white| doubt_of_white(white, is_relative)));
+        // Colors that are given have no scale that is known.
+        let is_of_frames = comparison.frames().next().is_some();
+        notes.extend(white.filter(|_| is_of_frames).and_then(|white| doubt_of_white(white, is_relative)));
         notes.extend(comparison.frames().flat_map(notes::of_reader));
         Ok((comparison, notes))
     }

@@ -24,6 +24,8 @@ use std::sync::Arc;
 
 /// Y of a relative white that must be one in cd/m².
 const BRIGHT_WHITE: f64 = 10.0;
+/// Y of a white in cd/m² that must be a relative one, or a chromaticity.
+const RELATIVE_WHITE: f64 = 2.0;
 
 /// Which colors are made of a frame, and by which matrix.
 #[derive(Debug, Clone, Args)]
@@ -245,9 +247,15 @@ impl Conversion {
     }
 }
 
-/// A warning of a white that is too bright to be meant on the scale of XYZ that are relative.
+/// A warning of a white that is too bright to be meant on the scale of XYZ that are relative, or too dim on that of absolute ones.
 pub(super) fn doubt_of_white(white: White, is_relative: bool) -> Option<Note> {
     match white {
+        White::Absolute([_, luminance, _]) if !is_relative && luminance <= RELATIVE_WHITE => {
+            Some(Note::Warning(format!(
+                "the white has Y = {luminance}, but XYZ are absolute: Y = {luminance} cd/m2 is next to black; give X,Y,Z in cd/m2, or a \
+             white by name and its luminance"
+            )))
+        }
         White::Absolute([_, luminance, _]) if is_relative && luminance > BRIGHT_WHITE => Some(Note::Warning(format!(
             "the white has Y = {luminance}, but XYZ are relative: Y = 1 is the white by which the camera saturates"
         ))),

@@ -93,6 +93,9 @@ impl Digitize {
             QuantityKind::Adu => {
                 return Err(input.refuse(format!("it holds {holds}: it is digitized already")));
             }
+            QuantityKind::Electrons => {
+                return Err(input.refuse(format!("it holds {holds}: `digitize` goes before `demosaic`")));
+            }
             _ => {
                 return Err(input.out_of_order(format!("it holds {holds}, not electrons of photosites"), "add-noise"));
             }

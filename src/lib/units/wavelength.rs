@@ -71,8 +71,11 @@ impl WavelengthUnit {
         if words().any(|word| word.starts_with("wavenumber")) {
             return Err("wavenumbers without the unit cm-1");
         }
-        if words().any(|word| matches!(word.as_str(), "hz" | "thz" | "freq" | "frequency")) {
+        if words().any(|word| matches!(word.as_str(), "hz" | "thz")) {
             return Err("frequencies");
+        }
+        if words().any(|word| matches!(word.as_str(), "freq" | "frequency")) {
+            return Err("frequencies (if they are wavenumbers, as MODTRAN calls them, write `FREQ (cm-1)`)");
         }
         if words().any(|word| matches!(word.as_str(), "ev" | "energy")) {
             return Err("energies of photons");

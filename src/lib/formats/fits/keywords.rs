@@ -47,15 +47,24 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     };
     let cfa = filters(header, channels, &mut notes);
     let is_code = |unit: &str| ["adu", "dn", "count", "counts"].iter().any(|name| unit.eq_ignore_ascii_case(name));
-    let is_adu = match header.text("BUNIT") {
+    let is_electron =
+        |unit: &str| ["electron", "electrons", "e-", "e"].iter().any(|name| unit.eq_ignore_ascii_case(name));
+    let unit = header.text("BUNIT");
+    let is_electrons = unit.is_some_and(is_electron);
+    let is_adu = match unit {
         Some(unit) if is_code(unit) => true,
+        Some(unit) if is_electron(unit) => false,
         Some(unit) => {
             notes.push(format!("its unit `{unit}` (BUNIT) is passed over"));
             false
         }
         None => cfa.is_some() && is_integer,
     };
-    let mut metadata = Metadata::new(if is_adu { QuantityKind::Adu } else { QuantityKind::Unspecified });
+    let mut metadata = Metadata::new(match (is_adu, is_electrons) {
+        (true, _) => QuantityKind::Adu,
+        (_, true) => QuantityKind::Electrons,
+        _ => QuantityKind::Unspecified,
+    });
     metadata.cfa = cfa;
     metadata.camera = header.text("INSTRUME").map(|camera| visible(camera).into_owned());
     let exposure_s = told_time(header);

@@ -308,6 +308,7 @@ fn keywords_of_the_camera_are_used_or_told() {
          black level: programs disagree on its sign and scale"
     );
     assert_eq!(told(&[("BUNIT", text("ADU"))]).0.quantity, QuantityKind::Adu);
+    assert_eq!(told(&[("BUNIT", text("electron")), ("BAYERPAT", text("RGGB"))]).0.quantity, QuantityKind::Electrons);
     let (metadata, notes) = told(&[("BUNIT", text("Jy/beam")), ("BAYERPAT", text("RGGB"))]);
     assert_eq!(
         (metadata.quantity, notes.as_str()),

@@ -612,6 +612,44 @@ mod tests {
         assert_eq!(reader.header().geometry.origin, [5, 2]);
     }
 
+    /// A PNG whose metadata another program dropped keeps its place; one whose place it changed, to the corner too, is refused.
+    #[test]
+    fn the_place_of_a_png_is_in_its_own_chunk() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("crop.png");
+        write_at(&path, [3, 1]);
+        std::fs::remove_file(sidecar(&path)).unwrap();
+        let written = std::fs::read(&path).unwrap();
+        let change = |kind: &[u8], of: &dyn Fn(&mut [u8])| {
+            let mut bytes = written.clone();
+            let mut at = 8;
+            while at < bytes.len() {
+                let length = u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+                let data = at + 8..at + 8 + length;
+                if &bytes[at + 4..at + 8] == kind {
+                    of(&mut bytes[data.clone()]);
+                    let mut sum = flate2::Crc::new();
+                    sum.update(&bytes[at + 4..data.end]);
+                    bytes[data.end..data.end + 4].copy_from_slice(&sum.sum().to_be_bytes());
+                }
+                at = data.end + 4;
+            }
+            assert_ne!(bytes, written);
+            std::fs::write(&path, bytes).unwrap();
+        };
+        change(b"oFFs", &|place| place.fill(0));
+        let said = place(&path, None).unwrap_err().to_string();
+        assert!(
+            said.contains("column 3, row 1 of the sensor by its metadata (`origin`), but at column 0, row 0"),
+            "{said}"
+        );
+        for kind in [b"iTXt", b"zTXt", b"tEXt"].into_iter().filter(|kind| written.windows(4).any(|at| at == *kind)) {
+            change(kind, &|text| text[0] = b'x');
+        }
+        let options = InputOptions { path: Some(path), ..InputOptions::default() };
+        assert_eq!(FrameReader::open(&options).unwrap().header().geometry.origin, [3, 1]);
+    }
+
     #[test]
     fn a_dng_whose_description_another_program_wrote_keeps_its_place() {
         let directory = tempfile::tempdir().unwrap();

@@ -49,6 +49,8 @@ pub struct PngReader {
     start: u64,
     reader: png::Reader<BufReader<File>>,
     geometry: Geometry,
+    /// Whether the file has its place, which may be the corner.
+    tells_place: bool,
     stored: SampleType,
     embedded: Option<String>,
     own_tags: Metadata,
@@ -82,23 +84,20 @@ impl PngReader {
         let [width, height] = size.map(|side| usize::try_from(side).unwrap_or(usize::MAX));
         let reader = decoder.read_info().map_err(damage)?;
         let embedded = embedded(reader.info());
-        // Of what our programs made the metadata tell how samples are encoded, and the place is one on the sensor.
+        // Of what our programs made the metadata tell how samples are encoded.
         let mut own_tags = Metadata::new(QuantityKind::Unspecified);
-        let (origin, notes) = match embedded {
-            Some(_) => (place(&copy, start).unwrap_or_default(), Vec::new()),
-            None => {
-                let mut notes = notes(reader.info());
-                if let Some(exif) = reader.info().exif_metadata.as_deref() {
-                    own_tags.exposure = tiff::exposure_of_block(exif, name, &mut notes)?;
-                }
-                ([0, 0], notes)
-            }
-        };
+        let mut notes = if embedded.is_some() { Vec::new() } else { notes(reader.info()) };
+        if let Some(exif) = reader.info().exif_metadata.as_deref().filter(|_| embedded.is_none()) {
+            own_tags.exposure = tiff::exposure_of_block(exif, name, &mut notes)?;
+        }
+        let place = place(&copy, start).unwrap_or_default();
+        let origin = place.unwrap_or_default();
         Ok(Self {
             name: name.into(),
             file: copy,
             start,
             geometry: Geometry { origin, ..Geometry::new(width, height, channels) },
+            tells_place: place.is_some(),
             stored,
             embedded,
             own_tags,
@@ -141,18 +140,18 @@ impl Chunk {
 /// # Errors
 ///
 /// Where the file ends before the samples: who reads these says so.
-fn place(file: &File, start: u64) -> io::Result<[i32; 2]> {
+fn place(file: &File, start: u64) -> io::Result<Option<[i32; 2]>> {
     let mut chunk = Chunk::first(file, start)?;
     while chunk.kind != *b"IDAT" {
         if (chunk.kind, chunk.length) == (PLACE, 9) {
             let mut told = [0; 9];
             file.read_exact_at(&mut told, chunk.data)?;
             let [a, b, c, d, e, f, g, h, unit] = told;
-            return Ok(if unit == 0 { [[a, b, c, d], [e, f, g, h]].map(i32::from_be_bytes) } else { [0, 0] });
+            return Ok((unit == 0).then(|| [[a, b, c, d], [e, f, g, h]].map(i32::from_be_bytes)));
         }
         chunk = Chunk::at(file, chunk.end())?;
     }
-    Ok([0, 0])
+    Ok(None)
 }
 
 /// The place behind the last chunk.
@@ -300,6 +299,10 @@ fn notes(info: &Info<'_>) -> Vec<String> {
 impl SampleReader for PngReader {
     fn geometry(&self) -> &Geometry {
         &self.geometry
+    }
+
+    fn tells_place(&self) -> bool {
+        self.tells_place
     }
 
     fn stored_as(&self) -> Option<SampleType> {

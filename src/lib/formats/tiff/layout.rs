@@ -20,6 +20,8 @@ const PHOTOMETRIC_LINEAR_RAW: u64 = 34892;
 #[derive(Debug)]
 pub(super) struct Layout {
     pub geometry: Geometry,
+    /// Whether the file has its place, which may be the corner.
+    pub tells_place: bool,
     pub tags: TiffTags,
     pub stored: SampleType,
     /// 8-bit MinIsWhite: the value meant is 255 − the value stored. Wider samples are taken as stored; OpenImageIO
@@ -84,14 +86,16 @@ impl Layout {
             notes.push("its samples of 64 bits are rounded to 32".into());
         }
         // No sample depends on these, so damaged ones are not worth refusing the image.
-        let origin = passed_over(origin(file, directory), "its place on the sensor", &mut notes)?;
+        let place = passed_over(place(file, directory), "its place on the sensor", &mut notes)?;
         let software = passed_over(file.text(directory, Tag::Software), "its tag Software", &mut notes)?;
         let tags = TiffTags { description: file.text(directory, Tag::ImageDescription)?, software };
+        let origin = place.unwrap_or_default();
         let geometry = Geometry { width, height, origin, channels: channel_names(channels, photometric) };
         let inverted =
             stored == SampleType::U8 && photometric == u64::from(PhotometricInterpretation::WhiteIsZero.to_u16());
         Ok(Self {
             geometry,
+            tells_place: place.is_some(),
             tags,
             stored,
             inverted,
@@ -295,13 +299,12 @@ fn predictor(
     }
 }
 
-/// The frame's place on the sensor, as OpenImageIO stores it: the position times the resolution. [0, 0] where there is
-/// none.
+/// The frame's place on the sensor, as OpenImageIO stores it: the position times the resolution.
 ///
 /// # Errors
 ///
 /// When a tag of it is damaged, or the place is not a whole number.
-fn origin(file: &mut TiffFile, directory: &Directory) -> Result<[i32; 2]> {
+fn place(file: &mut TiffFile, directory: &Directory) -> Result<Option<[i32; 2]>> {
     let mut pixels = |position: Tag, resolution: Tag| {
         let Some(position) = file.ratio(directory, position)? else { return Ok(None) };
         let resolution = file.ratio(directory, resolution)?.filter(|&r| r > 0.0).unwrap_or(1.0);
@@ -315,7 +318,7 @@ fn origin(file: &mut TiffFile, directory: &Directory) -> Result<[i32; 2]> {
         Ok(Some(whole as i32))
     };
     let (x, y) = (pixels(POSITION[0], Tag::XResolution)?, pixels(POSITION[1], Tag::YResolution)?);
-    Ok(x.zip(y).map_or([0, 0], |(x, y)| [x, y]))
+    Ok(x.zip(y).map(|(x, y)| [x, y]))
 }
 
 /// What the channels are called.

@@ -321,6 +321,10 @@ impl SampleReader for TiffReader {
         &self.layout.geometry
     }
 
+    fn tells_place(&self) -> bool {
+        self.layout.tells_place
+    }
+
     fn stored_as(&self) -> Option<SampleType> {
         Some(self.layout.stored)
     }

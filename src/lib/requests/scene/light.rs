@@ -152,11 +152,13 @@ pub(super) fn no_sample(name: &str, sample: usize, count: usize) -> Error {
 
 /// Electrons that can be.
 pub(super) fn checked(electrons: [f64; 3], name: &str) -> Result<[f64; 3]> {
-    if electrons.iter().any(|e| !(0.0..f64::INFINITY).contains(e)) {
-        return Err(Error::format(
-            name,
-            "its radiance is negative, not finite, or endless at this exposure: no electrons can be expected of it",
-        ));
+    if let Some(e) = electrons.into_iter().find(|e| !(0.0..f64::INFINITY).contains(e)) {
+        let what = match e {
+            _ if e < 0.0 => "negative, summed over what a class of photosites sees",
+            _ if e > 0.0 => "endless at this exposure",
+            _ => "no finite number",
+        };
+        return Err(Error::format(name, format!("its radiance is {what}: no electrons can be expected of it")));
     }
     match electrons.into_iter().find(|e| *e > f64::from(f32::MAX)) {
         Some(e) => Err(Error::format(name, format!("its radiance makes {e:.1e} electrons, more than a sample holds"))),

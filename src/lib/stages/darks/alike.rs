@@ -6,6 +6,10 @@ use crate::error::Result;
 use crate::metadata::{FrameHeader, Metadata};
 use crate::units::QuantityKind;
 
+/// White levels of one scale of codes are never so many times each other: other scales are other numbers of bits, and levels of one are
+/// told a few per cent apart.
+const MOST_WHITES: f64 = 1.5;
+
 /// Makes sure that a frame holds codes of photosites as the converter gave them, or another program's samples.
 pub(in crate::stages) fn check_codes(frame: &FrameHeader) -> Result<()> {
     let (metadata, holds) = (&frame.metadata, frame.holds());
@@ -74,6 +78,15 @@ pub(in crate::stages) fn check_alike(frame: &FrameHeader, dark: &FrameHeader) ->
     }
     if let Some((key, unit, its, theirs)) = other_codes(&frame.metadata, &dark.metadata) {
         return differs(key, format!("{theirs} {unit}"), format!("{its} {unit}"));
+    }
+    let whites = frame.metadata.white_level_adu.zip(dark.metadata.white_level_adu);
+    if let Some([a, b]) = whites.map(|(a, b)| [a.largest(), b.largest()])
+        && (a > MOST_WHITES * b || b > MOST_WHITES * a)
+    {
+        return Err(dark.refuse(format!(
+            "its white level is {b} ADU, but that of {} is {a} ADU: their codes are of different scales",
+            frame.name
+        )));
     }
     let seed = |metadata: &Metadata| metadata.noise.as_ref().map(|noise| noise.sensor_seed);
     match (seed(&frame.metadata), seed(&dark.metadata)) {
