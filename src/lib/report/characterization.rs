@@ -41,7 +41,6 @@ impl MatrixOutputs {
     ///
     /// [`Error::Usage`]; those of [`PlotFormat::of_path`] and [`register::announce`].
     pub fn check(&self, fit: &Fit) -> Result<()> {
-        check_yaml_name(self.output.as_deref(), "matrix")?;
         if let Some(plot) = &self.plot {
             PlotFormat::of_path(plot)?;
             if fit.noise_weight.is_none() {
@@ -75,7 +74,6 @@ impl MatrixOutputs {
         if self.output_format == Some(ReportFormat::Csv) && request.raw.from_raw.is_some() {
             return Err(Error::Usage("csv has one row for each patch of a chart; a raw file has none".into()));
         }
-        check_yaml_name(self.output.as_deref(), "matrix")?;
         register::announce(&[self.output.as_deref()])
     }
 
@@ -83,7 +81,7 @@ impl MatrixOutputs {
     ///
     /// # Errors
     ///
-    /// Those of [`Self::write`] and [`chart::chart`].
+    /// [`Error::Usage`] for a matrix file of the name of another kind; those of [`Self::write`] and [`chart::chart`].
     pub fn write_found(&self, found: &MatrixFound) -> Result<()> {
         match found {
             MatrixFound::Fitted(found) => self.write(found),
@@ -97,6 +95,7 @@ impl MatrixOutputs {
 
     /// Writes the matrix file of a chart, and its report.
     fn write_chart(&self, found: &ChartFound) -> Result<()> {
+        check_yaml_name(self.output.as_deref(), "matrix")?;
         let to_file = files::named(self.output.as_deref());
         let file = matrix(&found.matrix)?;
         if let Some(path) = to_file {
@@ -112,8 +111,9 @@ impl MatrixOutputs {
     ///
     /// # Errors
     ///
-    /// Those of [`characterization`] and of the disk.
+    /// [`Error::Usage`] for a matrix file of the name of another kind; those of [`characterization`] and of the disk.
     pub fn write(&self, found: &Characterization) -> Result<()> {
+        check_yaml_name(self.output.as_deref(), "matrix")?;
         let to_file = files::named(self.output.as_deref());
         if let Some(path) = to_file {
             output::write_text(Some(path), &matrix(&found.matrix)?)?;
