@@ -784,6 +784,13 @@ fn predictions_take_milliseconds() {
     let (mut refused, mut not_accepted) = (0, 0);
     for index in first..first + cameras() {
         let (kind, setup, light) = any_sensor(index);
+        if std::env::var_os("CYANOMETER_TELL").is_some() {
+            let readout = setup.sensor.readout.as_ref().unwrap();
+            eprintln!(
+                "{index} {light:?} {:?} {:?} {:?} darks {} {:?} {:?}",
+                readout, setup.exposure, setup.noise, setup.dark_frames, setup.method, setup.sensor.name
+            );
+        }
         let Some((seconds, why_refused)) = predicted_in(&setup, light) else {
             not_accepted += 1;
             continue;
