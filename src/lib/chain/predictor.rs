@@ -15,8 +15,9 @@ use crate::names::Named;
 use crate::numerics::normal::{self, MeanVariance};
 use crate::propagation::budget::{Budget, Cause};
 use crate::propagation::drift;
-use crate::propagation::frame::{Predicted, Sites, quantity_of_sites};
+use crate::propagation::frame::{Predicted, Sites, Unpredictable};
 use crate::propagation::gains;
+use crate::propagation::ground::quantity_of_sites;
 use crate::propagation::saturation;
 use crate::propagation::smooth_hue::FirstOrder;
 use crate::propagation::taps::{Group, pooled};
@@ -145,6 +146,19 @@ impl Predictor {
         self.heads.iter().map(|(stage, head)| (*stage, head))
     }
 
+    /// Has all frames expect so many signal electrons of R, G and B, and refuses what no formula tells before anything is worked out.
+    fn light(&mut self, electrons: [f64; 3]) -> Result<()> {
+        for (stage, head) in &mut self.heads {
+            if let Some(scene) = &mut head.metadata.scene {
+                scene.expected_electrons = Some(electrons);
+            }
+            if head.metadata.demosaic.is_none() && head.taps().is_none() {
+                Sites::check(head, self.settings.equations).map_err(|why| refused(*stage, electrons, why))?;
+            }
+        }
+        Ok(())
+    }
+
     /// Predicts the scene that expects so many signal electrons of R, G and B.
     ///
     /// # Errors
@@ -158,13 +172,9 @@ impl Predictor {
         // Photosites are the same from the converter, or the subtraction of dark frames, on.
         let mut known: Option<(Plane, Sites, [Budget; 3])> = None;
         let has_smear = self.sensor().readout.as_ref().is_some_and(|readout| readout.smear_line_s > 0.0);
-        for (stage, head) in &mut self.heads {
-            if let Some(scene) = &mut head.metadata.scene {
-                scene.expected_electrons = Some(electrons);
-            }
-            let none = |why| {
-                Error::Data(format!("nothing can be predicted of {} at {electrons:?} electrons: {why}", stage.name()))
-            };
+        self.light(electrons)?;
+        for (stage, head) in &self.heads {
+            let none = |why| refused(*stage, electrons, why);
             let is_pixels = head.metadata.demosaic.is_some();
             if is_pixels && head.readout().is_ok_and(|readout| readout.black_drift_e > 0.0) {
                 no_pixels = Some(PIXELS_IN_DRIFT.to_owned());
@@ -220,6 +230,11 @@ impl Predictor {
         }
         Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order, no_pixels })
     }
+}
+
+/// Says that nothing is predicted of a stage.
+fn refused(stage: ChainStage, electrons: [f64; 3], why: Unpredictable) -> Error {
+    Error::Data(format!("nothing can be predicted of {} at {electrons:?} electrons: {why}", stage.name()))
 }
 
 /// Why no pixels are predicted of a black level that drifts.

@@ -165,6 +165,15 @@ impl Photosite {
         self.models().any(|model| model.lines.has_lines())
     }
 
+    /// Makes sure that formulas are known for what photosites of these signals share.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`].
+    pub(super) fn check_shared(&self, expected_e: [f64; 3]) -> Predicted<()> {
+        if self.has_lines() { self.regime(expected_e).map(drop) } else { Ok(()) }
+    }
+
     /// What photosites of these signals share with others of their rows and columns, in squared units of their samples.
     ///
     /// # Errors
@@ -174,12 +183,9 @@ impl Photosite {
         if !self.has_lines() {
             return Ok([LineCovariance::default(); 3]);
         }
-        let regime = self.regime(expected_e);
+        let regime = self.regime(expected_e)?;
         if self.has_tails() {
-            return self.lines_of_unlike(regime, expected_e);
-        }
-        if self.drifts() && matches!(regime, Regime::Curved) {
-            return Err(Unpredictable::Beyond(DRIFT_CUT));
+            return self.lines_of_unlike(expected_e);
         }
         let mut slopes = [self.slope(); 3];
         let [row, column] = match regime {
@@ -192,7 +198,6 @@ impl Photosite {
                 let of_axis = |axis: Axis| self.curved(axis, expected_e);
                 [of_axis(Axis::Row)?, of_axis(Axis::Column)?]
             }
-            Regime::Unknown => return Err(Unpredictable::Beyond(TOO_COARSE)),
         };
         Ok(self.by_class(&row, &column, slopes))
     }
@@ -218,10 +223,7 @@ impl Photosite {
 
     /// The same of photosites that are unlike each other, to first order in what is shared: of hot ones that are full the gain of
     /// a row is nothing, and of readings beyond the codes its noise.
-    fn lines_of_unlike(&self, regime: Regime, expected_e: [f64; 3]) -> Predicted<[LineCovariance; 3]> {
-        if regime != Regime::Straight {
-            return Err(Unpredictable::Beyond(WITH_LINES));
-        }
+    fn lines_of_unlike(&self, expected_e: [f64; 3]) -> Predicted<[LineCovariance; 3]> {
         let slope = self.slope();
         let of_offsets =
             expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_read(expected_e)));
@@ -264,22 +266,28 @@ impl Photosite {
         self.adc.map_or(1.0, |adc| Law::of(&self.model, expected_e).mean_slope(&adc))
     }
 
-    fn regime(&self, expected_e: [f64; 3]) -> Regime {
+    /// How what is shared is told, where it is.
+    fn regime(&self, expected_e: [f64; 3]) -> Predicted<Regime> {
         let is_corrected = self.darks[0].is_some() || self.flat.is_some();
         let own = own(&self.model);
         let laws = expected_e.map(|expected_e| Law::of(&self.model, expected_e));
         let is_cut = laws.iter().any(|law| law.is_cut());
-        let Some(adc) = self.adc else { return if is_cut { Regime::Curved } else { Regime::Straight } };
-        let blur = expected_e.map(|expected_e| adc.adu_per_e * blur_e(&own, &adc, expected_e));
-        let least = blur.into_iter().fold(f64::INFINITY, f64::min);
-        let is_straight = !is_cut && !adc.is_bent() && laws.iter().all(|law| law.is_within(&adc));
-        if is_straight && least >= BLURRED {
-            return Regime::Straight;
-        }
-        match is_corrected {
-            false => Regime::Curved,
-            true if least >= BLURRED_ON_AVERAGE => Regime::OnAverage,
-            true => Regime::Unknown,
+        let blur = |adc: &AdcRecord| {
+            let of_class = |expected_e: f64| adc.adu_per_e * blur_e(&own, adc, expected_e);
+            expected_e.into_iter().map(of_class).fold(f64::INFINITY, f64::min)
+        };
+        let is_within = |adc: &AdcRecord| !adc.is_bent() && laws.iter().all(|law| law.is_within(adc));
+        let found = match &self.adc {
+            None => Some(if is_cut { Regime::Curved } else { Regime::Straight }),
+            Some(adc) if !is_cut && is_within(adc) && blur(adc) >= BLURRED => Some(Regime::Straight),
+            Some(_) if !is_corrected => Some(Regime::Curved),
+            Some(adc) => (blur(adc) >= BLURRED_ON_AVERAGE).then_some(Regime::OnAverage),
+        };
+        match found {
+            None if !self.has_tails() => Err(Unpredictable::Beyond(TOO_COARSE)),
+            Some(Regime::Curved) if self.drifts() && !self.has_tails() => Err(Unpredictable::Beyond(DRIFT_CUT)),
+            Some(regime) if regime == Regime::Straight || !self.has_tails() => Ok(regime),
+            _ => Err(Unpredictable::Beyond(WITH_LINES)),
         }
     }
 
@@ -411,7 +419,6 @@ enum Regime {
     Straight,
     OnAverage,
     Curved,
-    Unknown,
 }
 
 /// Why nothing is said of what rows and columns share.

@@ -18,6 +18,7 @@ mod ends;
 mod exposures;
 pub mod frame;
 pub mod gains;
+pub(crate) mod ground;
 mod law;
 mod level_variance;
 mod line_sampling;

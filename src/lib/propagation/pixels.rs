@@ -6,7 +6,7 @@
 
 use super::charge;
 use super::covariance::{Covariance, PAIRS};
-use super::frame::{corrected, quantity_of_sites};
+use super::ground::{corrected, quantity_of_sites};
 use super::level_variance::LevelVariance;
 use super::lines::{DRIFTING, LineTerms};
 use super::moments::Equations;

@@ -1,6 +1,7 @@
 //! How much of a frame is saturated, by the law of its scene.
 
-use super::frame::{FramePrediction, Sites, has_tails, of_frame, quantity_of_sites};
+use super::frame::{FramePrediction, Sites, of_frame};
+use super::ground::{has_tails, quantity_of_sites};
 use super::law::Law;
 use super::moments::{Equations, Prediction};
 use super::taps;
