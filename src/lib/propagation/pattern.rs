@@ -41,9 +41,16 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// Whether each photosite holds full well in every exposure, and no median is asked for.
-    fn is_full(&self) -> bool {
-        self.median_of.is_none() && self.law.extent()[0] >= self.law.full_well_e
+    /// Whether the means of photosites are alike, and no median is asked for: each holds full well in every exposure, all are read as
+    /// one code, or patterns are a millionth of what is drawn anew, 10⁻¹² of the variance.
+    fn is_even(&self) -> bool {
+        const NOTHING: f64 = 1e-6;
+        let Law { light, dark, full_well_e, read_noise_e, trap_e } = self.law;
+        let [least, most] = self.law.extent();
+        let is_one = || self.reading.is_one(least - trap_e, most.min(full_well_e) + trap_e);
+        let drawn_e = light.shot_std().hypot(dark.shot_std()).hypot(read_noise_e);
+        let patterns_e = (light.pattern * light.rate).hypot(dark.pattern * dark.rate);
+        self.median_of.is_none() && (least >= full_well_e || is_one() || patterns_e < NOTHING * drawn_e)
     }
 }
 
@@ -67,7 +74,7 @@ impl Shared {
     }
 
     fn work_out(light: &Seen, dark: &Seen) -> Self {
-        if light.is_full() && dark.is_full() {
+        if light.is_even() && dark.is_even() {
             return Self { light: 0.0, dark: 0.0, both: 0.0, median: None };
         }
         let (of_light, of_dark) = (Temporal::of(light), Temporal::of(dark));

@@ -148,8 +148,11 @@ fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
     static SMOOTH_NODES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(10));
     const WIDEST: f64 = 4.0;
     const NARROWEST: f64 = 1e-4;
-    let near: Vec<&Knee> =
-        knees.iter().filter(|knee| knee.at < REACH + 12.0 * knee.width && knee.at > -12.0 * knee.width).collect();
+    // Of a bend as wide as w means the twentieth derivative is below √19!/w²⁰, and ten nodes are off by (10!)²/20! times that: 2·10⁻¹¹.
+    const SMOOTH_WIDTH: f64 = 5.0;
+    let is_near =
+        |knee: &&Knee| knee.width < SMOOTH_WIDTH && knee.at < REACH + 12.0 * knee.width && knee.at > -12.0 * knee.width;
+    let near: Vec<&Knee> = knees.iter().filter(is_near).collect();
     if near.is_empty() && codes.is_none() {
         return Some(SMOOTH_NODES.clone());
     }
