@@ -17,7 +17,7 @@ use crate::propagation::budget::{Budget, Cause};
 use crate::propagation::drift;
 use crate::propagation::frame::{Predicted, Sites, Unpredictable};
 use crate::propagation::gains;
-use crate::propagation::ground::quantity_of_sites;
+use crate::propagation::ground::{has_tails, quantity_of_sites};
 use crate::propagation::saturation;
 use crate::propagation::smooth_hue::FirstOrder;
 use crate::propagation::taps::{Group, pooled};
@@ -155,6 +155,13 @@ impl Predictor {
             if head.metadata.demosaic.is_none() && head.taps().is_none() {
                 Sites::check(head, self.settings.equations).map_err(|why| refused(*stage, electrons, why))?;
             }
+        }
+        // Photosites that are unlike each other may take too long in codes, where their electrons do not; what is found is remembered.
+        let are_codes = |head: &&(ChainStage, FrameHeader)| {
+            quantity_of_sites(&head.1) == QuantityKind::Adu && head.1.metadata.demosaic.is_none() && has_tails(&head.1)
+        };
+        for (stage, head) in self.heads.iter().filter(are_codes).filter(|(_, head)| head.taps().is_none()) {
+            Sites::of(head, self.settings.equations).map_err(|why| refused(*stage, electrons, why))?;
         }
         Ok(())
     }

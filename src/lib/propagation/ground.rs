@@ -220,7 +220,7 @@ fn transferred(
 }
 
 /// Whether photosites of a frame are unlike each other.
-pub(super) fn has_tails(frame: &FrameHeader) -> bool {
+pub(crate) fn has_tails(frame: &FrameHeader) -> bool {
     noise_model(frame).is_ok_and(|model| !model.tails.is_none())
 }
 
