@@ -9,6 +9,7 @@ mod request;
 mod sums;
 
 pub use request::Scene;
+pub(super) use sums::own_xyz;
 
 use super::notes::Note;
 use crate::camera::optics::Exposure;
