@@ -98,3 +98,22 @@ impl Coordinates {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// L* of ten times the luminance of white is 116·∛10 − 16 = 233.9 \[CIE15].
+    #[test]
+    fn colors_far_above_their_white_are_told() {
+        let white = [95.0, 100.0, 108.0];
+        for space in [Space::Lab, Space::Luv, Space::LinearSrgb, Space::Srgb, Space::Xyz] {
+            let coordinates = Coordinates::new(space, white, None);
+            let is_told = |factor: f64| coordinates.of(white.map(|value| factor * value)).is_far_above_white;
+            let refers = !matches!(space, Space::Srgb | Space::Xyz);
+            assert_eq!([0.5, 9.9, 10.1, 100.0].map(is_told), [false, false, refers, refers], "{space:?}");
+        }
+        let lightest = Coordinates::new(Space::Lab, white, None).of(white.map(|value| 10.0 * value)).value[0];
+        assert!((lightest - 233.9).abs() < 0.05, "{lightest}");
+    }
+}

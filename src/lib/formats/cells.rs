@@ -99,8 +99,10 @@ pub(super) fn thousands(cell: &str) -> Option<String> {
         && decimals.is_none_or(|decimals| are_digits(decimals, 0..=40))
         // One point or comma alone is that of decimals.
         && (groups.len() > 2 || decimals.is_some() || !",.".contains(mark));
-    let plain: String = cell.chars().take_while(|c| "+-".contains(*c)).chain(groups[..groups.len() - 1].concat().chars()).collect();
-    let decimals = decimals.filter(|decimals| !decimals.is_empty()).map_or(String::new(), |decimals| format!(".{decimals}"));
+    let plain: String =
+        cell.chars().take_while(|c| "+-".contains(*c)).chain(groups[..groups.len() - 1].concat().chars()).collect();
+    let decimals =
+        decimals.filter(|decimals| !decimals.is_empty()).map_or(String::new(), |decimals| format!(".{decimals}"));
     is_so.then(|| format!("`{cell}` has marks of thousands; write it as {plain}{last}{decimals}, and so all numbers"))
 }
 

@@ -216,7 +216,10 @@ mod tests {
         for (text, place) in [
             ("400  1.234,5\n410  2.345,6\n", "line 1: `1.234,5` has marks of thousands; write it as 1234.5"),
             ("400 1,234.5\n410 2,345.6\n", "line 1: `1,234.5` has marks of thousands; write it as 1234.5"),
-            ("nm;L\n400;999,5\n410;12.345.678,25\n", "line 3: `12.345.678,25` has marks of thousands; write it as 12345678.25"),
+            (
+                "nm;L\n400;999,5\n410;12.345.678,25\n",
+                "line 3: `12.345.678,25` has marks of thousands; write it as 12345678.25",
+            ),
             ("nm L\n400 0.5\n410 1'234.5\n", "line 3: `1'234.5` has marks of thousands; write it as 1234.5"),
             ("nm,L\n400,\"1,234.5\"\n", "line 2, column 2: `1,234.5` has marks of thousands; write it as 1234.5"),
         ] {

@@ -354,7 +354,9 @@ impl Coverage {
     pub fn in_words(&self) -> String {
         let mut said = format!("standard deviations count {}", self.std_counts);
         if let Some([x, y, z]) = self.scene_error.map(|error| error.map(|part| 100.0 * part)) {
-            said += &format!("; of this scene's spectrum the matrix is off by {x:+.2} % of X, {y:+.2} % of Y and {z:+.2} % of Z");
+            said += &format!(
+                "; of this scene's spectrum the matrix is off by {x:+.2} % of X, {y:+.2} % of Y and {z:+.2} % of Z"
+            );
         }
         if let Some(residual) = &self.matrix_residual {
             said += &format!("; {}", residual.in_words());

@@ -113,9 +113,8 @@ impl Verdict {
         let all = regions.clone().flat_map(|(tests, _)| tests);
         let (tests, smallest_p) = all.fold((0, 1.0_f64), |(count, least), test| (count + 1, least.min(test.p)));
         let corrected_p = significance::of_smallest(smallest_p, tests);
-        let is_noiseless = regions
-            .flat_map(|(tests, _)| tests)
-            .all(|test| test.subject == Subject::Deviation && test.expected == 0.0);
+        let is_noiseless =
+            regions.flat_map(|(tests, _)| tests).all(|test| test.subject == Subject::Deviation && test.expected == 0.0);
         Ok(Self { level, tests, smallest_p, corrected_p, passed: corrected_p >= level, is_noiseless })
     }
 
