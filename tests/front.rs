@@ -151,6 +151,11 @@ fn the_front_door_runs_a_program_with_its_own_arguments_status_and_history() {
     let made = shop.run(&format!("{FRONT} {electrons}"), &[]);
     assert_eq!(made, shop.run(electrons, &[]));
     assert_eq!(text(&shop, &format!("{FRONT} measure --help")), text(&shop, "measure --help"));
+    assert_eq!(text(&shop, &format!("{FRONT} help measure")), text(&shop, "measure --help"));
+    assert_eq!(text(&shop, &format!("{FRONT} help")), text(&shop, &format!("{FRONT} --help")));
+    // What stands behind the name is not said again below.
+    let page = text(&shop, "mosaic --manual");
+    assert_eq!(page.matches("Keep of three planes what a Bayer color filter array lets through").count(), 1, "{page}");
     assert_eq!(shop.run(&format!("{FRONT} -- {electrons}"), &[]), made);
     for (line, status, said) in [
         ("measure missing.exr", BAD_DATA, "measure: missing.exr: cannot open"),

@@ -245,6 +245,9 @@ fn captions_count_what_measure_counts() {
         }
         let left_out = format!("left out: {saturated} saturated or marked");
         assert_eq!(tile.caption.contains(&left_out), !kept, "{name}: {:?}", tile.caption);
+        // Photosites at the white level are shown and counted, and it is said how many there are.
+        let full = format!("saturated: {saturated} of 2400 samples");
+        assert_eq!(tile.caption.contains(&full), kept, "{name}: {:?}", tile.caption);
         let words: Vec<&str> = if kept { vec!["a CFA plane of ADU"] } else { vec!["three demosaicked planes of ADU"] };
         assert!(tile.caption[0].starts_with(words[0]), "{:?}", tile.caption);
         assert!(tile.caption.last().unwrap().starts_with("black "), "{:?}", tile.caption);
