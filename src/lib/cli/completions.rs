@@ -48,19 +48,7 @@ pub(super) fn script(shell: &str, command: &Command) -> Result<String, String> {
         script = of_front(shell, script);
     }
     match (shell, spectra(&program)) {
-        (Shell::Zsh, Some(names)) => {
-            let files = |script: String, end: &str| {
-                let both =
-                    format!(":{{_alternative \"spectra\\:spectrum\\:({names})\" \"files\\:file\\:_files\"}}{end}");
-                let is_input = |line: &str| line.starts_with("':") || line.starts_with("'*:");
-                let lines = script.lines().map(|line| match line.strip_suffix(&format!(":_files{end}")) {
-                    Some(begin) if is_input(line) => begin.to_owned() + &both,
-                    _ => line.to_owned(),
-                });
-                lines.collect::<Vec<_>>().join("\n") + "\n"
-            };
-            script = files(script, "' \\");
-        }
+        (Shell::Zsh, Some(names)) => script = with_spectra(&script, &names),
         (Shell::Fish, Some(names)) => script += &format!("complete -c {program} -F -a \"{names}\"\n"),
         _ => {}
     }
@@ -136,6 +124,17 @@ fn spectra(program: &str) -> Option<String> {
     const TAKE_SPECTRA: [&str; 3] = ["render-radiance", "predict-noise", "fit-matrix"];
     let names = || known(Kind::Spectra).into_iter().map(|known| known.name).collect::<Vec<_>>().join(" ");
     TAKE_SPECTRA.contains(&program).then(names)
+}
+
+/// The script of zsh with names of spectra beside files where the input is completed.
+fn with_spectra(script: &str, names: &str) -> String {
+    let both = format!(":{{_alternative \"spectra\\:spectrum\\:({names})\" \"files\\:file\\:_files\"}}' \\");
+    let is_input = |line: &str| line.starts_with("':") || line.starts_with("'*:");
+    let line = |line: &str| match line.strip_suffix(":_files' \\") {
+        Some(begin) if is_input(line) => begin.to_owned() + &both,
+        _ => line.to_owned(),
+    };
+    script.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
 }
 
 /// The names of all values, blanks between them.

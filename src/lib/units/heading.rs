@@ -362,10 +362,17 @@ mod tests {
     }
 
     #[test]
+    fn light_as_the_eye_weights_it_is_told() {
+        for text in ["L (cd m-2)", "L [cd/m2]", "L (lm/(m2 sr nm))", "radiance lm/(m2 sr nm)", "L [nit/nm]"] {
+            let found = unit_of_heading(text);
+            assert!(matches!(found, Some(Stated::Other { kind: OtherUnit::Photometric, .. })), "{text}: {found:?}");
+            assert_eq!(RadianceUnit::parse(text), None, "{text}");
+        }
+    }
+
+    #[test]
     fn other_units_are_told_from_radiances() {
-        use OtherUnit::{
-            AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photometric, Photons, Scaled, Several, Unknown,
-        };
+        use OtherUnit::{AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Scaled, Several, Unknown};
         for (text, kind) in [
             ("irradiance (W m-2 nm-1)", Irradiance),
             ("E [W/m2/nm]", Irradiance),
@@ -396,11 +403,6 @@ mod tests {
             ("W sr-1 nm-1", Unknown),
             ("radiance (MW m-2 sr-1 nm-1)", Unknown),
             ("radiance (MW/m2)", Unknown),
-            ("L (cd m-2)", Photometric),
-            ("L [cd/m2]", Photometric),
-            ("L (lm/(m2 sr nm))", Photometric),
-            ("radiance lm/(m2 sr nm)", Photometric),
-            ("L [nit/nm]", Photometric),
             ("sky (%)", Unknown),
             ("sky (counts)", Unknown),
             ("sky [a.u.]", Unknown),
