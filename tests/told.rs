@@ -62,14 +62,13 @@ fn what_a_matrix_is_off_by_of_the_scene_is_told() {
         let found = f64::from(samples[16 * k]) / scene.true_xyz.unwrap()[k] - 1.0;
         assert!((found - error[k]).abs() < 2e-3, "{k}: {found} {}", error[k]);
     }
-    let report = String::from_utf8(shop.run("measure xyz.exr", &[])).unwrap();
+    let noisy = "add-noise | digitize | demosaic | to-xyz --matrix m.yaml | measure";
+    let report = String::from_utf8(shop.pipe(&format!("mosaic scene.exr | {noisy}"))).unwrap();
     let y = format!("{:+.2} % of Y", 100.0 * error[1]);
     assert!(report.contains("of this scene's spectrum the matrix is off by") && report.contains(&y), "{report}");
     // Of a scene without a spectrum nothing but the library's is known.
-    shop.pipe(
-        "render-radiance --electrons 1000,2000,3000 --size 16x12 | digitize | to-xyz --matrix m.yaml -o other.exr",
-    );
-    let report = String::from_utf8(shop.run("measure other.exr", &[])).unwrap();
+    let other = format!("render-radiance --electrons 1000,2000,3000 --size 16x12 | mosaic | {noisy}");
+    let report = String::from_utf8(shop.pipe(&other)).unwrap();
     assert!(report.contains("and may be by more of spectra unlike these"), "{report}");
 }
 

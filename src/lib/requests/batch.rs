@@ -127,7 +127,7 @@ pub fn check_known(pattern: Option<&Path>) -> Result<()> {
     for place in places.filter(|place| is_word(place)) {
         let whole = format!("{{{place}}}");
         if whole != STEM && numbered(Path::new(&whole), 0, 0).is_none() {
-            let near = nearest(place, PLACES, |known| known.len() / 2);
+            let near = nearest(place.split(':').next().unwrap_or_default(), PLACES, |known| known.len() / 2);
             let near = near.map_or(String::new(), |near| format!("; did you mean {{{near}}}? There"));
             let near = if near.is_empty() { "; there".to_owned() } else { near };
             return Err(Error::Usage(format!(
@@ -208,6 +208,22 @@ mod tests {
         let inputs: Vec<PathBuf> = inputs.iter().map(PathBuf::from).collect();
         let beside: Vec<Option<&Path>> = beside.iter().map(|path| path.map(Path::new)).collect();
         jobs(&inputs, frame.map(Path::new), "exr", &beside).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn places_that_there_are_not_are_told() {
+        for (pattern, said) in [
+            ("{steam}.png", "nothing stands for {steam}; did you mean {stem}? There are {stem}"),
+            ("{fram:04}.png", "nothing stands for {fram:04}; did you mean {frame}?"),
+            ("{xyz}.png", "nothing stands for {xyz}; there are {stem}"),
+            ("a-{stem.png", "the brace of {stem is not closed; write {stem}"),
+        ] {
+            let found = check_known(Some(Path::new(pattern))).unwrap_err().to_string();
+            assert!(found.contains(said), "{found}");
+        }
+        for pattern in ["{stem}-{frame:04}.png", "{index}.png", "a{.png", "{}.png", "plain.png"] {
+            assert!(check_known(Some(Path::new(pattern))).is_ok(), "{pattern}");
+        }
     }
 
     #[test]
