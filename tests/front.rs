@@ -104,7 +104,7 @@ fn values_that_are_known_by_name_are_completed() {
         for shell in ["bash", "zsh", "fish"] {
             let script = text(&shop, &format!("{program} --completions {shell}"));
             let (begin, end, with_files) = match shell {
-                "bash" => (format!("--{option})\n"), ";;", "compgen -f -W"),
+                "bash" => (format!("--{option})\n"), ";;", "; compgen -f --"),
                 "zsh" => (format!("--{option}=["), "\\\n", "_files"),
                 _ => (format!(" -l {option} "), "\ncomplete", "-r -F -a"),
             };
@@ -151,6 +151,11 @@ fn the_front_door_runs_a_program_with_its_own_arguments_status_and_history() {
     let made = shop.run(&format!("{FRONT} {electrons}"), &[]);
     assert_eq!(made, shop.run(electrons, &[]));
     assert_eq!(text(&shop, &format!("{FRONT} measure --help")), text(&shop, "measure --help"));
+    assert_eq!(text(&shop, &format!("{FRONT} help measure")), text(&shop, "measure --help"));
+    assert_eq!(text(&shop, &format!("{FRONT} help")), text(&shop, &format!("{FRONT} --help")));
+    // What stands behind the name is not said again below.
+    let page = text(&shop, "mosaic --manual");
+    assert_eq!(page.matches("Keep of three planes what a Bayer color filter array lets through").count(), 1, "{page}");
     assert_eq!(shop.run(&format!("{FRONT} -- {electrons}"), &[]), made);
     for (line, status, said) in [
         ("measure missing.exr", BAD_DATA, "measure: missing.exr: cannot open"),
@@ -244,6 +249,26 @@ fn words_and_endings_are_completed() {
     assert_eq!(complete(FRONT, &["meas"]), ["measure"]);
     // Files, which bash completes where nothing is offered.
     assert_eq!(complete(FRONT, &["measure", ""]), [""]);
+    // Behind a program what its own script offers, where that is loaded; spectra by name beside files.
+    let own = text(&shop, "render-radiance --completions bash");
+    let front = text(&shop, &format!("{FRONT} --completions bash"));
+    let behind = |words: &str, count: usize, last: &str, before: &str| {
+        let call = format!(
+            "COMP_WORDS=({FRONT} {words}); COMP_CWORD={count}; _{FRONT} {FRONT} '{last}' '{before}'; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+        );
+        let bash =
+            std::process::Command::new("bash").args(["-c", &format!("{own}\n{front}\n{call}")]).output().unwrap();
+        String::from_utf8_lossy(&bash.stdout).lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(behind("render-radiance --quadrature ''", 3, "", "--quadrature"), ["rectangle", "trapezoid", "simpson"]);
+    assert!(behind("render-radiance sky9", 2, "sky9", "render-radiance").contains(&"sky912.exr".to_owned()));
+    assert_eq!(behind("render-radiance --sensor kaf", 3, "kaf", "--sensor"), ["kaf-5101ce"]);
+    let zsh = text(&shop, "fit-matrix --completions zsh");
+    assert!(zsh.contains(r#"spectra\:spectrum\:("#) && zsh.contains("sky912.exr"), "{zsh}");
+    let fish = text(&shop, "predict-noise --completions fish");
+    assert!(
+        fish.lines().any(|line| line.starts_with("complete -c predict-noise -F -a") && line.contains("sky912.exr"))
+    );
     assert_eq!(complete("measure", &["--plot", ""]), ["a.svg", "b.png"]);
     assert_eq!(complete("preview", &["-o", ""]), ["b.png"]);
     let zsh = text(&shop, "measure --completions zsh");

@@ -10,7 +10,20 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 129] = [
+const MISTAKES: [(&str, i32, &str); 132] = [
+    (
+        "preview codes.exr plane.exr -o {steam}.png",
+        BAD_USAGE,
+        "{steam}.png: nothing stands for {steam}; did you mean {stem}? There are {stem}, {frame} and {index}, and {frame:05} for five \
+         digits",
+    ),
+    ("to-xyz rgb.exr matrix.yaml -o x.exr", BAD_USAGE, "matrix.yaml: it is no frame but a matrix file, for --matrix"),
+    (
+        "preview codes.exr --range 5%,1% -o x.png",
+        BAD_USAGE,
+        "`5%,1%` is no value for --range <full|LOW,HIGH|LOW%,HIGH%|Nsigma>: the lower share stands first, and both lie within 0% and \
+         100%, as in 1%,99%; see `preview --help`",
+    ),
     (
         "photon-transfer codes.exr",
         BAD_DATA,

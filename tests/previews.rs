@@ -79,7 +79,7 @@ fn planes_that_are_not_there_are_told() {
         ("preview plane.exr --plane C -o a.png", BAD_USAGE, "plane.exr: there is no plane `C`; it has Y, R, G, B"),
         ("preview rgb.exr --false-color -o a.png", BAD_USAGE, "say with --plane which: R, G, B"),
         ("preview xyz.exr --plane Y -o a.png", BAD_DATA, "give --range LOW,HIGH, or --false-color"),
-        ("preview rgb.exr --range 9%,1% -o a.png", BAD_USAGE, "shares of the pixels such as 1%,99%"),
+        ("preview rgb.exr --range 9%,1% -o a.png", BAD_USAGE, "the lower share stands first"),
         ("preview rgb.exr --fit 4 -o a.png", BAD_USAGE, "--fit"),
         ("preview rgb.exr --fit 40 --zoom 2 -o a.png", BAD_USAGE, "--zoom"),
     ] {
@@ -245,6 +245,9 @@ fn captions_count_what_measure_counts() {
         }
         let left_out = format!("left out: {saturated} saturated or marked");
         assert_eq!(tile.caption.contains(&left_out), !kept, "{name}: {:?}", tile.caption);
+        // Photosites at the white level are shown and counted, and it is said how many there are.
+        let full = format!("saturated: {saturated} of 2400 samples");
+        assert_eq!(tile.caption.contains(&full), kept, "{name}: {:?}", tile.caption);
         let words: Vec<&str> = if kept { vec!["a CFA plane of ADU"] } else { vec!["three demosaicked planes of ADU"] };
         assert!(tile.caption[0].starts_with(words[0]), "{:?}", tile.caption);
         assert!(tile.caption.last().unwrap().starts_with("black "), "{:?}", tile.caption);

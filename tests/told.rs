@@ -46,6 +46,54 @@ fn exposed() -> Workshop {
     shop
 }
 
+/// The error that a matrix makes of the scene's own spectrum goes with the frames: of a matrix that is fitted to this spectrum alone
+/// it is none, and of one that gives 1.1 times its Y it is 10 %.
+#[test]
+fn what_a_matrix_is_off_by_of_the_scene_is_told() {
+    let shop = Workshop::new();
+    shop.run("fit-matrix sky912.exr -o m.yaml", &[]);
+    shop.pipe("render-radiance clear_zenith.csv --size 16x12 --expose-to 0.5 -o scene.exr --quiet");
+    shop.pipe("digitize scene.exr --quiet | to-xyz --matrix m.yaml -o xyz.exr --quiet");
+    let error = shop.sidecar("xyz.exr").color.unwrap().scene_error.unwrap();
+    let scene = shop.sidecar("xyz.exr").scene.unwrap();
+    let (samples, _) = shop.read("xyz.exr");
+    for k in 0..3 {
+        // Rounding to a code moves a channel by up to 1e-3 of it at half of full well.
+        let found = f64::from(samples[16 * k]) / scene.true_xyz.unwrap()[k] - 1.0;
+        assert!((found - error[k]).abs() < 2e-3, "{k}: {found} {}", error[k]);
+    }
+    let noisy = "add-noise | digitize | demosaic | to-xyz --matrix m.yaml | measure";
+    let report = String::from_utf8(shop.pipe(&format!("mosaic scene.exr | {noisy}"))).unwrap();
+    let y = format!("{:+.2} % of Y", 100.0 * error[1]);
+    assert!(report.contains("of this scene's spectrum the matrix is off by") && report.contains(&y), "{report}");
+    // Of a scene without a spectrum nothing but the library's is known.
+    let other = format!("render-radiance --electrons 1000,2000,3000 --size 16x12 | mosaic | {noisy}");
+    let report = String::from_utf8(shop.pipe(&other)).unwrap();
+    assert!(report.contains("and may be by more of spectra unlike these"), "{report}");
+}
+
+#[test]
+fn colors_far_above_their_white_are_told() {
+    let shop = Workshop::new();
+    shop.run("fit-matrix sky912.exr -o m.yaml", &[]);
+    shop.pipe("render-radiance clear_zenith.csv --size 16x12 --expose-to 0.5 --quiet | digitize -o codes.exr --quiet");
+    let far = said(&shop, "to-xyz codes.exr --matrix m.yaml --space lab --white-luminance 100 -o lab.exr", 0);
+    let near = said(&shop, "to-xyz codes.exr --matrix m.yaml --space lab --white-luminance 5000 -o near.exr", 0);
+    let told = "192 colors are more than ten times as bright as their white";
+    assert_eq!((far.contains(told), near.contains("as their white")), (true, false), "{far}{near}");
+}
+
+#[test]
+fn a_check_of_a_frame_without_noise_says_so() {
+    let shop = Workshop::new();
+    let told = |rest: &str| {
+        let line = format!("render-radiance --electrons 1000,2000,3000 --size 64x48 | {rest} | measure --check");
+        String::from_utf8(shop.pipe(&line)).unwrap().contains("no law of noise was tested")
+    };
+    assert!(told("add-noise --without dcsn,dcnu,ssn,prnu,ron"));
+    assert!(!told("add-noise"));
+}
+
 #[test]
 fn noise_that_stands_in_two_frames_is_told() {
     let shop = exposed();

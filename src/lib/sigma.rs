@@ -81,8 +81,7 @@ impl<S: Propagating> WithSigma<S> {
     fn new(stage: S, noise: PixelNoise) -> Result<Self> {
         let mut header = stage.header().clone();
         header.geometry.channels.extend(stage.layers()?.into_iter().map(str::to_owned));
-        let residual = header.metadata.color.as_ref().and_then(|color| color.matrix_residual.clone());
-        header.metadata.uncertainty = Some(Coverage::noise_only(residual));
+        header.metadata.uncertainty = Some(Coverage::of_colors(header.metadata.color.as_ref()));
         Ok(Self { stage, header, noise })
     }
 

@@ -47,10 +47,18 @@ pub(super) fn script(shell: &str, command: &Command) -> Result<String, String> {
     if program == env!("CARGO_PKG_NAME") {
         script = of_front(shell, script);
     }
+    match (shell, spectra(&program)) {
+        (Shell::Zsh, Some(names)) => script = with_spectra(&script, &names),
+        (Shell::Fish, Some(names)) => script += &format!("complete -c {program} -F -a \"{names}\"\n"),
+        _ => {}
+    }
     if shell == Shell::Bash {
         // A word that begins no option is a file, which bash completes where nothing else is offered; the crate offers options.
         let options = "COMPREPLY=( $(compgen -W \"${opts}\" -- \"${cur}\") )\n            return 0\n            ;;";
-        script = script.replace(options, "return 0\n            ;;");
+        let offered = spectra(&program).map_or(String::new(), |names| {
+            format!("COMPREPLY=($(compgen -W \"{names}\" -- \"${{cur}}\"; compgen -f -- \"${{cur}}\"))\n            ")
+        });
+        script = script.replace(options, &format!("{offered}return 0\n            ;;"));
         if program != env!("CARGO_PKG_NAME") {
             script = script.replace(" || ${COMP_CWORD} -eq 1 ]]", " ]]");
         }
@@ -76,6 +84,20 @@ fn of_front(shell: Shell, script: String) -> String {
                 )
             };
             let cases: String = own.iter().map(case).collect();
+            // A program's own script completes what stands behind its name, once it is loaded.
+            let programs = roster::PROGRAMS.join("|");
+            let of_program = format!(
+                "                {programs})\n{:20}if [[ ${{COMP_CWORD}} -gt 1 ]]; then\n\
+                 {:24}declare -F _comp_load >/dev/null && _comp_load \"${{COMP_WORDS[1]}}\" ||\n\
+                 {:28}{{ declare -F __load_completion >/dev/null && __load_completion \"${{COMP_WORDS[1]}}\"; }}\n\
+                 {:24}i=\"$(complete -p \"${{COMP_WORDS[1]}}\" 2>/dev/null)\"\n\
+                 {:24}if [[ ${{i}} =~ -F\\ ([^\\ ]+) ]]; then\n\
+                 {:28}COMP_WORDS=(\"${{COMP_WORDS[@]:1}}\"); COMP_CWORD=$((COMP_CWORD - 1))\n\
+                 {:28}\"${{BASH_REMATCH[1]}}\" \"${{COMP_WORDS[0]}}\" \"${{cur}}\" \"${{prev}}\"\n\
+                 {:24}fi\n{:24}return 0\n{:20}fi\n{:20};;\n",
+                "", "", "", "", "", "", "", "", "", "", ""
+            );
+            let cases = cases + &of_program;
             let previous = "            case \"${prev}\" in\n";
             let first = format!("            case \"${{COMP_WORDS[1]}}\" in\n{cases}            esac\n{previous}");
             script.replacen(previous, &first, 1)
@@ -88,9 +110,31 @@ fn of_front(shell: Shell, script: String) -> String {
                 format!("{begin} \"__fish_seen_subcommand_from {word}\" -f -a \"{words}\"\n")
             };
             let lines: String = own.iter().map(line).collect();
+            let behind =
+                programs.iter().filter(|program| !roster::OWN.contains(program)).copied().collect::<Vec<_>>().join(" ");
+            let lines = lines
+                + &format!("{begin} \"__fish_seen_subcommand_from {behind}\" -x -a \"(__fish_complete_subcommand)\"\n");
             format!("{script}{begin} __fish_use_subcommand -f -a \"{}\"\n{lines}", programs.join(" "))
         }
     }
+}
+
+/// The names of spectra that are known, of a program whose input is one.
+fn spectra(program: &str) -> Option<String> {
+    const TAKE_SPECTRA: [&str; 3] = ["render-radiance", "predict-noise", "fit-matrix"];
+    let names = || known(Kind::Spectra).into_iter().map(|known| known.name).collect::<Vec<_>>().join(" ");
+    TAKE_SPECTRA.contains(&program).then(names)
+}
+
+/// The script of zsh with names of spectra beside files where the input is completed.
+fn with_spectra(script: &str, names: &str) -> String {
+    let both = format!(":{{_alternative \"spectra\\:spectrum\\:({names})\" \"files\\:file\\:_files\"}}' \\");
+    let is_input = |line: &str| line.starts_with("':") || line.starts_with("'*:");
+    let line = |line: &str| match line.strip_suffix(":_files' \\") {
+        Some(begin) if is_input(line) => begin.to_owned() + &both,
+        _ => line.to_owned(),
+    };
+    script.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
 }
 
 /// The names of all values, blanks between them.
@@ -179,6 +223,10 @@ fn beside_files(shell: Shell, words: &[String]) -> (String, String) {
             let listed = words.iter().map(|word| format!("{word}\\t''")).collect::<Vec<_>>().join("\n");
             (format!("-r -f -a \"{listed}\""), format!("-r -F -a \"{listed}\""))
         }
-        _ => (format!("compgen -W \"{line}\""), format!("compgen -f -W \"{line}\"")),
+        // Names first: the crate keeps what is offered in its order.
+        _ => (
+            format!("COMPREPLY=($(compgen -W \"{line}\" -- \"${{cur}}\"))"),
+            format!("COMPREPLY=($(compgen -W \"{line}\" -- \"${{cur}}\"; compgen -f -- \"${{cur}}\"))"),
+        ),
     }
 }

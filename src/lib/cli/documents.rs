@@ -41,7 +41,7 @@ fn manual(command: &Command) -> io::Result<Vec<u8>> {
     let mut page = Vec::new();
     let source = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
     // Examples are a section of their own, as is what calls it.
-    let plain = command.clone().after_long_help(None::<&str>);
+    let plain = without_summary(command.clone().after_long_help(None::<&str>));
     let man = Man::new(plain).source(source).manual(project);
     man.render_title(&mut page)?;
     man.render_name_section(&mut page)?;
@@ -52,6 +52,16 @@ fn manual(command: &Command) -> io::Result<Vec<u8>> {
     page.extend(format!("{}{}{}", exit_status(name), ENVIRONMENT, files(command)).bytes());
     page.extend(see_also(name).bytes());
     Ok(page)
+}
+
+/// The same with a description that does not begin with what stands behind the name.
+fn without_summary(command: Command) -> Command {
+    let long = command.get_long_about().map(ToString::to_string).unwrap_or_default();
+    let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+    match long.strip_prefix(&about).map(|rest| rest.trim_start().to_owned()) {
+        Some(rest) if !rest.is_empty() => command.long_about(rest),
+        _ => command,
+    }
 }
 
 /// How the program is called: its arguments, and that it has options.

@@ -4,7 +4,7 @@ use super::documents::SUMMARY;
 pub use super::roster::{APART, OWN, PROGRAMS};
 use super::{complain, show};
 use crate::error::{Error, Result};
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
@@ -50,9 +50,21 @@ pub fn called() -> Option<String> {
 /// Called first of all, so that the program finds all as the shell gave it.
 pub fn hand_over(front: &'static str) -> Option<ExitCode> {
     let mut words = std::env::args_os().skip(1);
-    let program = words.next()?;
+    let mut program = words.next()?;
+    let mut help = None;
+    if program == "help" {
+        // `cyanometer help measure`, as other front doors have it.
+        help = Some(OsString::from("--help"));
+        program =
+            words.next().filter(|word| PROGRAMS.into_iter().any(|known| OsStr::new(known) == word)).unwrap_or_default();
+        if program.is_empty() {
+            let error = std::env::current_exe().map(|this| Command::new(this).arg0(front).args(help).exec());
+            complain(front, &Error::disk(front, "run", error.unwrap_or_else(|error| error)).to_string());
+            return Some(ExitCode::FAILURE);
+        }
+    }
     let program = PROGRAMS.into_iter().find(|known| OsStr::new(known) == program)?;
-    let error = become_program(program, words);
+    let error = become_program(program, help.into_iter().chain(words));
     complain(front, &error.to_string());
     Some(ExitCode::from(error.exit_status()))
 }

@@ -20,7 +20,10 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
     let hint = suggestion.map_or(String::new(), |s| format!("; did you mean `{s}`?"));
     let problem = match error.kind() {
         ErrorKind::UnknownArgument => {
+            let meant = meant(&argument, command, words).map(|meant| format!("; did you mean `{meant}`?"));
+            let hint = meant.unwrap_or(hint);
             let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
+            let argument = one_dash(&argument, words).unwrap_or(&argument);
             format!("unknown option or extra argument `{argument}`{hint}")
         }
         ErrorKind::InvalidValue if value.is_empty() => format!("{argument} needs a value"),
@@ -64,6 +67,59 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
     format!("{problem}{joined} `{program} --help`")
 }
 
+/// Options as people guess them, and what they are here; it counts where the program has the option.
+const GUESSES: [(&str, &str); 22] = [
+    ("aperture", "--f-number"),
+    ("fnumber", "--f-number"),
+    ("time", "--exposure"),
+    ("exposure-time", "--exposure"),
+    ("shutter", "--exposure"),
+    ("bit-depth", "--bits"),
+    ("depth", "--bits"),
+    ("gain", "--slope"),
+    ("offset", "--bias"),
+    ("width", "--size"),
+    ("height", "--size"),
+    ("resolution", "--size"),
+    ("camera", "--sensor"),
+    ("roi", "--region"),
+    ("format", "--output-format"),
+    ("colormap", "--false-color"),
+    ("cmap", "--false-color"),
+    ("algorithm", "--method"),
+    ("bayer", "--pattern"),
+    ("ccm", "--matrix"),
+    ("illuminant", "--white"),
+    ("no-noise", "--without"),
+];
+
+/// The word with one dash that an option of a letter was taken from: `-s` of `-size`.
+fn one_dash<'a>(argument: &str, words: &'a [String]) -> Option<&'a str> {
+    let letter = argument.strip_prefix('-').filter(|letter| letter.chars().count() == 1 && *letter != "-")?;
+    let is_it = |word: &&String| word.strip_prefix('-').is_some_and(|rest| rest.len() > 1 && rest.starts_with(letter));
+    words.iter().find(is_it).map(String::as_str)
+}
+
+/// What was meant by an option that there is not: one with two dashes, the value of one that takes few, another's name for it.
+fn meant(argument: &str, command: &Command, words: &[String]) -> Option<String> {
+    let has = |long: &str| command.get_arguments().any(|option| option.get_long() == Some(long));
+    if let Some(word) = one_dash(argument, words) {
+        let long = word.trim_start_matches('-').split('=').next().unwrap_or_default();
+        return has(long).then(|| format!("-{word}"));
+    }
+    let typed = argument.strip_prefix("--")?;
+    let by_value = command.get_arguments().find_map(|option| {
+        let long = option.get_long()?;
+        let is_one = option.get_possible_values().iter().any(|value| value.matches(typed, true));
+        is_one.then(|| format!("--{long} {typed}"))
+    });
+    let by_name = || {
+        let guess = GUESSES.iter().find(|(guess, option)| *guess == typed && has(&option[2..]));
+        guess.map(|(_, option)| (*option).to_owned())
+    };
+    by_value.or_else(by_name)
+}
+
 /// Whether an argument, as clap shows it, is needed whatever options are given: of options those that are declared so.
 fn is_always_needed(shown: &str, command: &Command) -> bool {
     let named = |long: &str| shown == format!("--{long}") || shown.starts_with(&format!("--{long} "));
@@ -95,6 +151,11 @@ mod tests {
         for (line, wanted) in [
             ("--outptu a", "unknown option or extra argument `--outptu`; did you mean `--output`?"),
             ("a b --output c", "unknown option or extra argument `b`"),
+            ("--output c -size 1", "unknown option or extra argument `-size`; did you mean `--size`?"),
+            ("--output c -x", "unknown option or extra argument `-x`"),
+            ("--output c --eci", "unknown option or extra argument `--eci`; did you mean `--method eci`?"),
+            ("--output c --width 4", "unknown option or extra argument `--width`; did you mean `--size`?"),
+            ("--output c --aperture 8", "unknown option or extra argument `--aperture`"),
             ("a b.exr --output c", "unknown option or extra argument `b.exr`"),
             ("a b.exr", "unknown option or extra argument `b.exr`; for an output write `-o b.exr`"),
             ("--output", "--output <output> needs a value"),

@@ -9,6 +9,9 @@ use std::sync::Arc;
 /// Linear light that is so little outside 0…1 counts as inside: the roundings of the four decimals of the matrix.
 const GAMUT_MARGIN: f64 = 1e-6;
 
+/// Colors so many times as bright as white are hardly meant: they have L* = 116·∛10 − 16 = 234.
+const FAR_ABOVE_WHITE: f64 = 10.0;
+
 /// A space about a white.
 #[derive(Debug, Clone)]
 pub struct Coordinates {
@@ -26,6 +29,8 @@ pub struct Placed {
     pub value: [f64; 3],
     /// Whether it was clipped to a gamut.
     pub was_clipped: bool,
+    /// Whether it is far brighter than the white that it refers to.
+    pub is_far_above_white: bool,
     /// Whether it has no correlated color temperature.
     pub is_off_locus: bool,
 }
@@ -68,7 +73,9 @@ impl Coordinates {
                 <[f64; 3]>::from(linear).map(|v| srgb_encode(v.clamp(0.0, 1.0)))
             }
         };
-        Placed { value, was_clipped, is_off_locus }
+        let refers = matches!(self.space, Space::Lab | Space::Luv | Space::LinearSrgb);
+        let is_far_above_white = refers && xyz[1] > FAR_ABOVE_WHITE * self.white[1];
+        Placed { value, was_clipped, is_far_above_white, is_off_locus }
     }
 
     /// Derivatives of the coordinates in X, Y and Z at a color; none of a picture to look at, and where the color has no
@@ -89,5 +96,24 @@ impl Coordinates {
             Space::LinearSrgb => Some(self.srgb_from_xyz),
             Space::Srgb => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// L* of ten times the luminance of white is 116·∛10 − 16 = 233.9 \[CIE15].
+    #[test]
+    fn colors_far_above_their_white_are_told() {
+        let white = [95.0, 100.0, 108.0];
+        for space in [Space::Lab, Space::Luv, Space::LinearSrgb, Space::Srgb, Space::Xyz] {
+            let coordinates = Coordinates::new(space, white, None);
+            let is_told = |factor: f64| coordinates.of(white.map(|value| factor * value)).is_far_above_white;
+            let refers = !matches!(space, Space::Srgb | Space::Xyz);
+            assert_eq!([0.5, 9.9, 10.1, 100.0].map(is_told), [false, false, refers, refers], "{space:?}");
+        }
+        let lightest = Coordinates::new(Space::Lab, white, None).of(white.map(|value| 10.0 * value)).value[0];
+        assert!((lightest - 233.9).abs() < 0.05, "{lightest}");
     }
 }

@@ -81,10 +81,38 @@ impl Cells {
     }
 }
 
+/// What to do about a number with marks of thousands, `1.234,5`, `1,234.5` or `1'234`; nothing of another cell.
+pub(super) fn thousands(cell: &str) -> Option<String> {
+    let unsigned = cell.strip_prefix(['+', '-']).unwrap_or(cell);
+    let mark = unsigned.chars().find(|c| !c.is_ascii_digit()).filter(|c| ",.'’\u{a0}\u{202f}".contains(*c))?;
+    let groups: Vec<&str> = unsigned.split(mark).collect();
+    let (last, decimals) = match groups.last()?.split_once([',', '.']) {
+        Some((last, decimals)) => (last, Some(decimals)),
+        None => (*groups.last()?, None),
+    };
+    let are_digits = |text: &str, lengths: std::ops::RangeInclusive<usize>| {
+        lengths.contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit())
+    };
+    let between = &groups[1..groups.len() - 1];
+    let is_so = are_digits(groups[0], 1..=3)
+        && between.iter().chain([&last]).all(|group| are_digits(group, 3..=3))
+        && decimals.is_none_or(|decimals| are_digits(decimals, 0..=40))
+        // One point or comma alone is that of decimals.
+        && (groups.len() > 2 || decimals.is_some() || !",.".contains(mark));
+    let plain: String =
+        cell.chars().take_while(|c| "+-".contains(*c)).chain(groups[..groups.len() - 1].concat().chars()).collect();
+    let decimals =
+        decimals.filter(|decimals| !decimals.is_empty()).map_or(String::new(), |decimals| format!(".{decimals}"));
+    is_so.then(|| format!("`{cell}` has marks of thousands; write it as {plain}{last}{decimals}, and so all numbers"))
+}
+
 /// What is wrong with a cell, and what to do where it stands for a value that is missing.
 pub(super) fn not_a_number(text: &str) -> String {
     const MISSING: [&str; 10] = ["nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "inf", "-inf"];
     let shown: String = text.chars().take(20).collect();
+    if let Some(said) = thousands(text) {
+        return format!(": {said}");
+    }
     match MISSING.contains(&text.to_lowercase().as_str()) {
         true => format!(": `{shown}` is no number; leave out the row of a missing value, or fill it in"),
         false if text.is_empty() => " is empty; leave out the row of a missing value, or fill it in".into(),

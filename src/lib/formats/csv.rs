@@ -7,7 +7,7 @@
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
 use super::delimited;
 use super::foreign::csv_complaint;
-use super::misread::{self, is_units};
+use super::misread::{self, LONGEST_NM, is_units};
 use super::radiance_unit::{self, FileSays};
 use crate::error::{Error, Result};
 use crate::names::place_of;
@@ -93,7 +93,8 @@ impl SpectralTable {
         }
         let has_header = numeric(&first[0]).is_none();
         if has_header {
-            misread::check_heading(name, text.rows(), &first)?;
+            let comments: Vec<&str> = delimited::comments(&text.decoded).take(MAX_COMMENTS).collect();
+            misread::check_heading(name, text.rows(), &first, &comments)?;
         }
         let by_rows = has_header && first.len() > 2 && first.iter().skip(1).all(|cell| numeric(cell).is_some());
         let below = if has_header && !by_rows { record_below(name, text.rows(), &mut reader)? } else { None };
@@ -137,6 +138,7 @@ impl SpectralTable {
             .map_err(|problem| Error::format(name, problem))?;
         let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
         wavelength_nm.iter_mut().for_each(|wavelength: &mut f64| *wavelength = unit.nm(*wavelength));
+        check_order(&wavelength_nm).map_err(|problem| Error::format(name, problem))?;
         let (wavelength_nm, values) = sorted(wavelength_nm, values);
         check_nm(&wavelength_nm).map_err(|problem| Error::format(name, problem))?;
         let by_wavenumber = unit == WavelengthUnit::PerCentimeter;
@@ -371,6 +373,42 @@ fn sorted(wavelength_nm: Vec<f64>, values: Array2<f64>) -> (Vec<f64>, Array2<f64
     (order.iter().map(|place| wavelength_nm[*place]).collect(), values.select(Axis(1), &order))
 }
 
+/// Refuses wavelengths of which all but one are in order, and no other could be the one: a slip that sorting would hide.
+fn check_order(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
+    /// Of fewer nobody can tell the order.
+    const LEAST: usize = 4;
+    let breaks = |is_before: fn(&f64, &f64) -> bool| {
+        let in_order = |a: usize, b: usize| is_before(&wavelength_nm[a], &wavelength_nm[b]);
+        let last = wavelength_nm.len() - 1;
+        let broken: Vec<usize> = (0..last).filter(|place| !in_order(*place, place + 1)).collect();
+        // The place left out, those on both sides must be in order, and nothing else may be broken.
+        let mends = |place: usize| {
+            let is_touched = |at: &usize| *at == place || at + 1 == place;
+            broken.iter().all(is_touched) && (place == 0 || place == last || in_order(place - 1, place + 1))
+        };
+        let places = broken.first().map_or(0..0, |at| *at..at + 2);
+        (broken.len(), places.filter(|place| mends(*place)).collect::<Vec<_>>())
+    };
+    let [up, down] = [breaks(|a, b| a < b), breaks(|a, b| a > b)];
+    let (count, places) = if up.0 <= down.0 { up } else { down };
+    match places.as_slice() {
+        [place] if count > 0 && wavelength_nm.len() >= LEAST => {
+            let nm = |place: usize| wavelength_nm.get(place).map(f64::to_string);
+            let before = place.checked_sub(1).and_then(nm);
+            let beside = match (before, nm(place + 1)) {
+                (Some(before), Some(after)) => format!("between {before} and {after}"),
+                (Some(before), None) => format!("behind {before}"),
+                (None, after) => format!("before {}", after.unwrap_or_default()),
+            };
+            Err(format!(
+                "the wavelength {} nm stands {beside} nm, and all others are in order: mend it, or put it in its place",
+                wavelength_nm[*place]
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Refuses a wavelength that stands twice among ascending ones.
 fn check_unlike(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
     match wavelength_nm.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -389,9 +427,6 @@ pub(super) fn check_nm(wavelength_nm: &[f64]) -> std::result::Result<(), String>
         .and_then(|()| check_wavelengths(wavelength_nm))
         .and_then(|()| check_likely(wavelength_nm))
 }
-
-/// Above this all wavelengths look like angstroms or wavenumbers, in nm: no silicon responds.
-const LONGEST_NM: f64 = 2000.0;
 
 /// Below this they are no wavelengths of light in µm either.
 const SHORTEST_UM: f64 = 0.1;
@@ -469,6 +504,36 @@ mod tests {
         for separator in [";", "\t", "; "] {
             let text = format!("\u{FEFF}# a, b\n\nnm{separator}L (W/m2/sr/nm)\n400{separator}1\n410{separator}3\n");
             assert_eq!(SpectralTable::parse("a", text.as_bytes()).unwrap(), by_commas);
+        }
+    }
+
+    #[test]
+    fn a_slip_that_sorting_would_hide_is_told() {
+        let read = |nm: &[f64]| {
+            let rows: String = nm.iter().map(|nm| format!("{nm},1\n")).collect();
+            SpectralTable::parse("t", format!("nm,L\n{rows}").as_bytes()).map(drop).map_err(|error| error.to_string())
+        };
+        for (nm, place) in [
+            (&[400.0, 410.0, 240.0, 430.0][..], "240 nm stands between 410 and 430 nm"),
+            (&[400.0, 410.0, 4200.0, 430.0, 440.0], "4200 nm stands between 410 and 430 nm"),
+            (&[700.0, 690.0, 860.0, 670.0, 660.0], "860 nm stands between 690 and 670 nm"),
+            (&[4000.0, 410.0, 420.0, 430.0], "4000 nm stands before 410 nm"),
+            (&[400.0, 410.0, 420.0, 43.0], "43 nm stands behind 420 nm"),
+            (&[400.0, 410.0, 420.0, 430.0, 405.0], "405 nm stands behind 430 nm"),
+        ] {
+            let found = read(nm).unwrap_err();
+            assert!(found.starts_with(&format!("t: the wavelength {place}, and all others are in order")), "{found}");
+        }
+        // In order, the other way, two changed places, three, nobody can tell.
+        for nm in [
+            &[400.0, 410.0, 420.0, 430.0][..],
+            &[430.0, 420.0, 410.0, 400.0],
+            &[400.0, 420.0, 410.0, 430.0],
+            &[400.0, 450.0, 410.0, 440.0, 420.0, 430.0],
+            &[500.0, 510.0, 520.0, 400.0, 410.0, 420.0],
+            &[410.0, 400.0, 420.0],
+        ] {
+            assert_eq!(read(nm), Ok(()), "{nm:?}");
         }
     }
 

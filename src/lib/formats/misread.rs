@@ -1,7 +1,7 @@
 //! What a text is that is read as no table of spectra, or as another than was meant: a slip of the pen in its first row, lines above
 //! its heading, another program's form.
 
-use super::cells::{not_a_number, numeric};
+use super::cells::{not_a_number, numeric, thousands};
 use super::delimited::{self, number};
 use super::foreign::line_of;
 use super::keys;
@@ -13,12 +13,15 @@ use csv::StringRecord;
 /// Columns that uvspec writes by default: the wavelength, edir, edn, eup, uavgdir, uavgdn, uavgup.
 pub(super) const UVSPEC: usize = 7;
 
+/// Above this all wavelengths look like angstroms or wavenumbers, in nm: no silicon responds.
+pub(super) const LONGEST_NM: f64 = 2000.0;
+
 /// Refuses a first row that is no heading but one of numbers with a mistake: as a heading it would be lost without a word.
 ///
 /// # Errors
 ///
 /// [`Error::Format`] naming line and column.
-pub(super) fn check_heading(name: &str, text: &str, first: &StringRecord) -> Result<()> {
+pub(super) fn check_heading(name: &str, text: &str, first: &StringRecord, comments: &[&str]) -> Result<()> {
     let refuse = |column: usize| {
         let line = line_of(text, first.position());
         let wrong = not_a_number(&first[column]);
@@ -33,12 +36,18 @@ pub(super) fn check_heading(name: &str, text: &str, first: &StringRecord) -> Res
     }
     let goes_one_way = numbers.is_sorted() || numbers.iter().rev().is_sorted();
     let are_wavelengths = numbers.len() > 1 && goes_one_way && numbers.iter().all(|number| *number >= SHORTEST_NM);
+    // A heading behind a `#` is a comment, and the row below it none.
+    let is_headed = comments.iter().any(|comment| {
+        let cells: Vec<&str> = comment.split([',', ';', '\t']).map(str::trim).collect();
+        cells.len() == first.len() && names_wavelengths(cells[0])
+    });
     let strange = others.iter().find(|(_, cell)| numeric(cell).is_none());
     match strange {
         // One of the wavelengths of a heading.
         Some((column, _)) if are_wavelengths && !names_wavelengths(corner) => refuse(*column),
         _ if are_wavelengths => Ok(()),
         _ if is_mistyped_number(corner) => refuse(0),
+        _ if is_headed => refuse(0),
         _ if names_wavelengths(corner) => Ok(()),
         // `x,0.52`: no column is called so, as one may be called by an angle.
         None if numbers.len() == 1 && others[0].1.contains(['.', ',', 'e', 'E']) => refuse(0),
@@ -46,11 +55,14 @@ pub(super) fn check_heading(name: &str, text: &str, first: &StringRecord) -> Res
     }
 }
 
-/// Whether a cell that is no number looks as if it should be one: it begins as one, or most of it are digits.
+/// Whether a cell that is no number looks as if it should be one: it begins as one, most of it are digits, or a wavelength stands in
+/// it.
 fn is_mistyped_number(cell: &str) -> bool {
+    let runs = cell.split(|c: char| !c.is_ascii_digit());
+    let holds_wavelength = runs.filter_map(numeric).any(|number| (SHORTEST_NM..LONGEST_NM).contains(&number));
     let unsigned = cell.trim_start_matches(['+', '-', '−', '.']);
     let digits = cell.chars().filter(char::is_ascii_digit).count();
-    unsigned.starts_with(|c: char| c.is_ascii_digit()) || 2 * digits > cell.chars().count()
+    unsigned.starts_with(|c: char| c.is_ascii_digit()) || 2 * digits > cell.chars().count() || holds_wavelength
 }
 
 /// Whether a cell is the heading of a column of wavelengths, or of what people give instead.
@@ -79,7 +91,21 @@ pub(super) fn explained(name: &str, bytes: &[u8]) -> Option<Error> {
     if decoded.contains('\0') || keys::kind_of(&decoded).is_some() {
         return None;
     }
-    uvspec(name, &decoded).or_else(|| preamble(name, &decoded))
+    uvspec(name, &decoded).or_else(|| marks_of_thousands(name, &decoded)).or_else(|| preamble(name, &decoded))
+}
+
+/// A complaint of the first row of numbers of which one has marks of thousands, whatever parts them.
+fn marks_of_thousands(name: &str, text: &str) -> Option<Error> {
+    let of_row = |line: &str| -> Option<String> {
+        [&['\t'][..], &[';'], &[' ', '\t']].into_iter().find_map(|separators| {
+            let cells: Vec<&str> = line.split(separators).map(str::trim).filter(|cell| !cell.is_empty()).collect();
+            let marked = cells.iter().find_map(|cell| thousands(cell));
+            let are_numbers = cells.iter().all(|cell| numeric(cell).is_some() || thousands(cell).is_some());
+            marked.filter(|_| cells.len() > 1 && are_numbers)
+        })
+    };
+    let (index, said) = text.lines().enumerate().find_map(|(index, line)| Some((index, of_row(line)?)))?;
+    Some(Error::format(name, format!("line {}: {said}", index + 1)))
 }
 
 /// A complaint of what uvspec writes by default where it is asked for radiances: below each row of irradiances a line of azimuths and
@@ -150,6 +176,9 @@ mod tests {
             ("40O,0.1,x\n410,0.2,0.3\n", "line 1, column 1: `40O` is no number"),
             ("400,O.5\n410,1\n", "line 1, column 2: `O.5` is no number"),
             ("id,400,41O,420\n1,1,2,3\n", "line 1, column 3: `41O` is no number"),
+            ("# wavelength,radiance\nlambda400,0.1\n410,0.2\n", "line 2, column 1: `lambda400` is no number"),
+            ("wl=400nm;0,1\n410;0,2\n", "line 1, column 1: `wl=400nm` is no number"),
+            ("# wavelength,radiance\nlambda,30\n410,40\n", "line 2, column 1: `lambda` is no number"),
         ] {
             let found = complaint(text);
             assert!(found.starts_with(&format!("t: {place}")), "{text}: {found}");
@@ -178,6 +207,26 @@ mod tests {
             ("wavelength,L\nnm,W/(m2 sr nm)\n400,O.1\n500,0.1\n", "line 3, column 2: `O.1` is no number"),
         ] {
             assert!(complaint(text).starts_with(&format!("t: {place}")), "{text}: {}", complaint(text));
+        }
+    }
+
+    /// Which mark is that of decimals is plain where both stand, and yet no reader of ours guesses.
+    #[test]
+    fn marks_of_thousands_are_told() {
+        for (text, place) in [
+            ("400  1.234,5\n410  2.345,6\n", "line 1: `1.234,5` has marks of thousands; write it as 1234.5"),
+            ("400 1,234.5\n410 2,345.6\n", "line 1: `1,234.5` has marks of thousands; write it as 1234.5"),
+            (
+                "nm;L\n400;999,5\n410;12.345.678,25\n",
+                "line 3: `12.345.678,25` has marks of thousands; write it as 12345678.25",
+            ),
+            ("nm L\n400 0.5\n410 1'234.5\n", "line 3: `1'234.5` has marks of thousands; write it as 1234.5"),
+            ("nm,L\n400,\"1,234.5\"\n", "line 2, column 2: `1,234.5` has marks of thousands; write it as 1234.5"),
+        ] {
+            assert_eq!(complaint(text), format!("t: {place}, and so all numbers"), "{text}");
+        }
+        for text in ["400;1.234\n410;2.345\n", "nm,1.234,5\n400,1,2\n"] {
+            assert_eq!(complaint(text), "read", "{text}");
         }
     }
 

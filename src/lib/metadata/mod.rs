@@ -25,6 +25,7 @@ use crate::camera::sensor::Sensor;
 use crate::cfa::FilterArray;
 use crate::names::Named;
 use crate::units::QuantityKind;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use serde_yaml::Mapping;
 
@@ -255,6 +256,20 @@ impl Metadata {
     pub fn adu_per_e(&self) -> Option<f64> {
         let of_sensor = || self.sensor.as_ref()?.readout.as_ref().map(|readout| readout.adu_per_e);
         self.adc.map(|adc| adc.adu_per_e).or_else(of_sensor)
+    }
+
+    /// Relative error of X, Y and Z that a matrix makes of the scene's own spectrum, without noise: M K n / H beside the XYZ of
+    /// the spectrum. None where these, the electrons or the slope of straight codes are not known, or XYZ are 0.
+    ///
+    /// `xyz_from_adu` takes codes above black to absolute XYZ, exposure included.
+    pub fn scene_error(&self, xyz_from_adu: &Matrix3<f64>) -> Option<[f64; 3]> {
+        let scene = self.scene.as_ref()?;
+        let (own, electrons) = (scene.true_xyz?, scene.expected_electrons?);
+        let adu_per_e = self.adu_per_e()?;
+        let is_curved = self.adc.is_some_and(|adc| adc.is_bent());
+        let xyz = xyz_from_adu * Vector3::from(electrons.map(|n| adu_per_e * n));
+        let off: [f64; 3] = std::array::from_fn(|i| xyz[i] / own[i] - 1.0);
+        (!is_curved && off.iter().all(|part| part.is_finite())).then_some(off)
     }
 
     /// The temperature of the sensor in K: that which noise was drawn for, or which the exposure had, or else that of its read-out.

@@ -19,6 +19,9 @@ pub struct Scene {
     /// Expected signal electrons of R, G and B where the scene is uniform.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected_electrons: Option<[f64; 3]>,
+    /// XYZ of its spectrum in cd m⁻², which no camera has come near, where the scene is uniform and its spectrum was summed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub true_xyz: Option<[f64; 3]>,
     /// Focal length in mm where natural vignetting was applied.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vignetting_focal_length_mm: Option<f64>,
@@ -63,6 +66,7 @@ impl Scene {
             source: source.into(),
             uniform: false,
             expected_electrons: None,
+            true_xyz: None,
             vignetting_focal_length_mm: None,
             patch: None,
             source_width: None,
@@ -251,6 +255,9 @@ pub struct ColorRecord {
     /// How far the matrix is off without noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix_residual: Option<MatrixResidual>,
+    /// Relative error of X, Y and Z that the matrix makes of the scene's own spectrum, without noise, where that is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene_error: Option<[f64; 3]>,
 }
 
 /// How colors were adapted from one light to another.
@@ -276,6 +283,7 @@ impl ColorRecord {
             scene_white_xy: None,
             adapted: None,
             matrix_residual: None,
+            scene_error: None,
         }
     }
 
@@ -329,18 +337,38 @@ pub struct Coverage {
     /// What is beside the noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix_residual: Option<MatrixResidual>,
+    /// The same of the scene's own spectrum: relative error of X, Y and Z.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene_error: Option<[f64; 3]>,
 }
 
 impl Coverage {
     /// That of noise, beside what a matrix is off by.
     pub fn noise_only(matrix_residual: Option<MatrixResidual>) -> Self {
-        Self { std_counts: "noise only".into(), matrix_residual }
+        Self { std_counts: "noise only".into(), matrix_residual, scene_error: None }
+    }
+
+    /// That of the noise of colors, beside what their matrix is off by.
+    pub fn of_colors(record: Option<&ColorRecord>) -> Self {
+        let residual = record.and_then(|record| record.matrix_residual.clone());
+        Self { scene_error: record.and_then(|record| record.scene_error), ..Self::noise_only(residual) }
     }
 
     /// The same in words.
     pub fn in_words(&self) -> String {
-        let beside = self.matrix_residual.as_ref().map(|residual| format!("; {}", residual.in_words()));
-        format!("standard deviations count {}{}", self.std_counts, beside.unwrap_or_default())
+        let mut said = format!("standard deviations count {}", self.std_counts);
+        if let Some([x, y, z]) = self.scene_error.map(|error| error.map(|part| 100.0 * part)) {
+            said += &format!(
+                "; of this scene's spectrum the matrix is off by {x:+.2} % of X, {y:+.2} % of Y and {z:+.2} % of Z"
+            );
+        }
+        if let Some(residual) = &self.matrix_residual {
+            said += &format!("; {}", residual.in_words());
+            if self.scene_error.is_none() {
+                said += ", and may be by more of spectra unlike these";
+            }
+        }
+        said
     }
 }
 
@@ -408,6 +436,9 @@ pub struct SamplesRecord {
     /// Colors outside sRGB, clipped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub out_of_gamut: Option<u64>,
+    /// Colors more than ten times as bright as the white that they refer to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub far_above_white: Option<u64>,
     /// Colors without a correlated color temperature, NaN.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub off_locus: Option<u64>,

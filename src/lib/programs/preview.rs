@@ -4,6 +4,7 @@ use crate::cli::{self, Turn};
 use crate::error::Result;
 use crate::formats::picture::{thumbnail, write_picture, write_sheet};
 use crate::formats::register::announce;
+use crate::requests::batch::check_known;
 use crate::requests::picture::{PictureOptions, ShownFrames, each_to};
 use crate::requests::{self, values};
 use crate::stream::RowSource;
@@ -55,6 +56,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
             },
         );
     };
+    check_known(Some(output))?;
     announce(&[Some(output)])?;
     let mut tiles = Vec::new();
     for input in frames.each()? {

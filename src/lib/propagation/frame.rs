@@ -65,6 +65,7 @@ pub enum FramePrediction {
 /// #     source: "example".into(),
 /// #     uniform: true,
 /// #     expected_electrons: Some([1000.0, 4000.0, 9000.0]),
+/// #     true_xyz: None,
 /// #     vignetting_focal_length_mm: None,
 /// #     patch: None,
 /// #     source_width: None,

@@ -262,6 +262,12 @@ fn verdict_text(verdict: &Verdict, out: &mut String) {
         "{outcome}: {} tests, smallest p {:.3e}, corrected {:.3e}, level {:e}",
         verdict.tests, verdict.smallest_p, verdict.corrected_p, verdict.level
     );
+    if verdict.is_noiseless {
+        let _ = writeln!(
+            out,
+            "the frame should hold no noise: its values were compared with those expected, but no law of noise was tested"
+        );
+    }
 }
 
 /// Whether a report has predicted standard deviations, or layers of them.

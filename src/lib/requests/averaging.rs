@@ -238,8 +238,7 @@ impl Averaged {
         };
         if let Some(layers) = &layers {
             header.geometry.channels.extend(layers.names().iter().map(|name| (*name).to_owned()));
-            let residual = header.metadata.color.as_ref().and_then(|color| color.matrix_residual.clone());
-            header.metadata.uncertainty = Some(Coverage::noise_only(residual));
+            header.metadata.uncertainty = Some(Coverage::of_colors(header.metadata.color.as_ref()));
         }
         let has_marks = seen.marks.iter().any(|marks| *marks != 0);
         Ok(Self { header, seen, averaging, layers, has_marks, saturated, warnings })

@@ -1,8 +1,11 @@
 //! Several inputs, each with outputs of its own.
 
 use crate::error::{Error, Result};
-use crate::formats::places::{STEM, is_numbered, named, numbered, output_of, place, sidecar_path};
+use crate::formats::keys::kind_of;
+use crate::formats::places::{FRAME, INDEX, STEM, is_numbered, named, numbered, output_of, place, sidecar_path};
+use crate::names::nearest;
 use std::collections::{HashMap, HashSet};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// An input, and where what is made of it goes.
@@ -54,11 +57,26 @@ pub fn jobs(inputs: &[PathBuf], frame: Option<&Path>, extension: &str, beside: &
             beside: beside.iter().map(|pattern| of(*pattern, "yaml")).collect(),
         }
     };
+    inputs.iter().filter(|input| several && !is_sidecar(input)).try_for_each(|input| check_frame(input))?;
     let jobs: Vec<Job> = inputs.iter().filter(|input| !is_sidecar(input)).map(job).collect();
     if several {
         check_apart(&jobs)?;
     }
     Ok(jobs)
+}
+
+/// Makes sure that one of several inputs is no file of ours that an option names.
+fn check_frame(input: &Path) -> Result<()> {
+    /// What they say that they are stands this near to their beginning.
+    const LOOKED_AT: u64 = 1 << 12;
+    let is_yaml = input.extension().is_some_and(|end| end == "yaml" || end == "yml") && input.is_file();
+    let mut text = String::new();
+    let read =
+        is_yaml.then(|| std::fs::File::open(input).and_then(|file| file.take(LOOKED_AT).read_to_string(&mut text)));
+    match read.and_then(|_| kind_of(&text)) {
+        Some(kind) => Err(Error::Usage(format!("{}: it is no frame but {kind}", input.display()))),
+        None => Ok(()),
+    }
 }
 
 /// Makes sure that the directories of frames are there, before each frame complains of its own; those whose names hold numbers are
@@ -97,19 +115,31 @@ pub fn check_named(output: Option<&Path>) -> Result<()> {
 }
 
 /// Makes sure that a pattern has no places but those for names and numbers that there are.
-fn check_known(pattern: Option<&Path>) -> Result<()> {
+///
+/// # Errors
+///
+/// [`Error::Usage`] naming the place that there is none for, and the nearest that there is.
+pub fn check_known(pattern: Option<&Path>) -> Result<()> {
+    const PLACES: [&str; 3] = ["stem", FRAME, INDEX];
     let text = pattern.map(|pattern| pattern.to_string_lossy().into_owned()).unwrap_or_default();
     let is_word = |place: &str| !place.is_empty() && place.chars().all(|c| c.is_ascii_alphanumeric() || c == ':');
     let places = text.split('{').skip(1).filter_map(|rest| Some(rest.split_once('}')?.0));
     for place in places.filter(|place| is_word(place)) {
         let whole = format!("{{{place}}}");
         if whole != STEM && numbered(Path::new(&whole), 0, 0).is_none() {
+            let near = nearest(place.split(':').next().unwrap_or_default(), PLACES, |known| known.len() / 2);
+            let near = near.map_or(String::new(), |near| format!("; did you mean {{{near}}}? There"));
+            let near = if near.is_empty() { "; there".to_owned() } else { near };
             return Err(Error::Usage(format!(
-                "{text}: nothing stands for {whole}; there are {STEM}, {{frame}} and {{index}}, and {{frame:05}} for five digits"
+                "{text}: nothing stands for {whole}{near} are {STEM}, {{frame}} and {{index}}, and {{frame:05}} for five digits"
             )));
         }
     }
-    Ok(())
+    let opened = text.rsplit_once('{').map(|(_, rest)| rest).filter(|rest| !rest.contains('}'));
+    let meant = opened.and_then(|rest| PLACES.into_iter().find(|place| rest.starts_with(place)));
+    meant.map_or(Ok(()), |place| {
+        Err(Error::Usage(format!("{text}: the brace of {{{place} is not closed; write {{{place}}}")))
+    })
 }
 
 fn takes_a_name(pattern: &Path) -> bool {
@@ -178,6 +208,22 @@ mod tests {
         let inputs: Vec<PathBuf> = inputs.iter().map(PathBuf::from).collect();
         let beside: Vec<Option<&Path>> = beside.iter().map(|path| path.map(Path::new)).collect();
         jobs(&inputs, frame.map(Path::new), "exr", &beside).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn places_that_there_are_not_are_told() {
+        for (pattern, said) in [
+            ("{steam}.png", "nothing stands for {steam}; did you mean {stem}? There are {stem}"),
+            ("{fram:04}.png", "nothing stands for {fram:04}; did you mean {frame}?"),
+            ("{xyz}.png", "nothing stands for {xyz}; there are {stem}"),
+            ("a-{stem.png", "the brace of {stem is not closed; write {stem}"),
+        ] {
+            let found = check_known(Some(Path::new(pattern))).unwrap_err().to_string();
+            assert!(found.contains(said), "{found}");
+        }
+        for pattern in ["{stem}-{frame:04}.png", "{index}.png", "a{.png", "{}.png", "plain.png"] {
+            assert!(check_known(Some(Path::new(pattern))).is_ok(), "{pattern}");
+        }
     }
 
     #[test]

@@ -114,6 +114,10 @@ impl Conversion {
         let adapting = self.adapting(matrix.white_xy, &frame.name)?;
         let adaptation = adapting.map(|adapting| adapting.matrix()).transpose()?;
         let adapted = |rows| adaptation.map_or(rows, |by| rows_of(&(by * color::matrix(&rows))));
+        let per_exposure = frame.metadata.exposure.filter(|_| !matrix.is_relative());
+        let scene_error = per_exposure.and_then(|exposure| {
+            frame.metadata.scene_error(&(color::matrix(&matrix.xyz_from_camera) / exposure.exposure_s_sr()))
+        });
         let settings = ColorSettings {
             is_relative: matrix.is_relative(),
             xyz_from_camera: adapted(matrix.xyz_from_camera),
@@ -127,6 +131,7 @@ impl Conversion {
         if let Some(record) = &mut stage.header_mut().metadata.color {
             record.scene_white_xy = adapting.map(|adapting| adapting.to_xy).or(matrix.white_xy);
             record.adapted = adapting.map(Adapting::record);
+            record.scene_error = scene_error;
             notes.extend(self.doubt_of_light(record.scene_white_xy));
         }
         Ok((stage, notes))

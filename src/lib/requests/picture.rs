@@ -117,10 +117,11 @@ fn range(text: &str) -> std::result::Result<Range, String> {
         (Some(low), Some(high)) => {
             let shares = [number(low)?, number(high)?].map(|per_cent| per_cent / 100.0);
             let is_right = 0.0 <= shares[0] && shares[0] < shares[1] && shares[1] <= 1.0;
-            is_right.then_some(Range::Shares(shares[0], shares[1])).ok_or_else(wrong)
+            let order = || "the lower share stands first, and both lie within 0% and 100%, as in 1%,99%".to_owned();
+            is_right.then_some(Range::Shares(shares[0], shares[1])).ok_or_else(order)
         }
         (None, None) => Ok(Range::Values(number(low)?, number(high)?)),
-        _ => Err(wrong()),
+        _ => Err("one end is a share of the pixels, the other a value; give both alike, as in 1%,99%".to_owned()),
     }
 }
 

@@ -115,6 +115,7 @@ impl ToXyz {
             scene_white_xy: None,
             adapted: None,
             matrix_residual: settings.residual.clone(),
+            scene_error: None,
         };
         let scaled = record.xyz_from_adu(input.metadata.exposure);
         let xyz_from_adu = scaled.ok_or_else(|| input.missing("exposure"))?;
@@ -202,6 +203,7 @@ impl ToXyz {
 pub(super) fn place(coordinates: &Coordinates, xyz: [f64; 3], counts: &mut Counts) -> [f64; 3] {
     let placed = coordinates.of(xyz);
     counts.out_of_gamut += u64::from(placed.was_clipped);
+    counts.far_above_white += u64::from(placed.is_far_above_white);
     counts.off_locus += u64::from(placed.is_off_locus);
     // Where there is no temperature, what is no number is counted already.
     let is_finite = placed.value.iter().all(|value| value.is_finite());

@@ -22,6 +22,8 @@ pub struct Counts {
     pub dim_green: u64,
     /// Colors outside sRGB.
     pub out_of_gamut: u64,
+    /// Colors more than ten times as bright as the white that they refer to.
+    pub far_above_white: u64,
     /// Colors without a correlated color temperature.
     pub off_locus: u64,
     /// Pixels whose noise cannot be propagated.
@@ -50,6 +52,7 @@ impl Counts {
             undefined_hue: self.undefined_hue + other.undefined_hue,
             dim_green: self.dim_green + other.dim_green,
             out_of_gamut: self.out_of_gamut + other.out_of_gamut,
+            far_above_white: self.far_above_white + other.far_above_white,
             off_locus: self.off_locus + other.off_locus,
             propagation_void: self.propagation_void + other.propagation_void,
             saturated_samples: self.saturated_samples + other.saturated_samples,
@@ -73,6 +76,7 @@ impl Counts {
             undefined_hue: some(self.undefined_hue),
             dim_green: some(self.dim_green),
             out_of_gamut: some(self.out_of_gamut),
+            far_above_white: some(self.far_above_white),
             off_locus: some(self.off_locus),
             propagation_void: some(self.propagation_void),
             saturated: some(self.saturated_samples + self.saturated_pixels),
@@ -94,6 +98,7 @@ impl Counts {
             undefined_hue: count(record.undefined_hue),
             dim_green: count(record.dim_green),
             out_of_gamut: count(record.out_of_gamut),
+            far_above_white: count(record.far_above_white),
             off_locus: count(record.off_locus),
             propagation_void: count(record.propagation_void),
             saturated_samples: count(record.saturated),
@@ -137,6 +142,11 @@ impl Counts {
                  blue are biased; other methods do not divide",
             ),
             (self.out_of_gamut, "colors lie outside sRGB and were clipped"),
+            (
+                self.far_above_white,
+                "colors are more than ten times as bright as their white, L* above 234: is its luminance meant? --white-luminance is \
+                 in cd/m2; by default it is that at which the camera saturates",
+            ),
             (
                 self.off_locus,
                 "colors have no correlated color temperature, which is NaN: they lie more than 0.05 from black bodies, or beyond \

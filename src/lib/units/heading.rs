@@ -12,6 +12,12 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
         Stated::Other { kind: OtherUnit::Irradiance, .. } => names(heading, &RADIANCE) && !names(heading, &IRRADIANCES),
         Stated::Other { .. } => false,
     };
+    let found = match found {
+        Stated::Other { text, kind: OtherUnit::Unknown } if names(&text, &PHOTOMETRIC) => {
+            Stated::Other { text, kind: OtherUnit::Photometric }
+        }
+        found => found,
+    };
     Some(match contradicts {
         true => Stated::Other { text: heading.trim().to_owned(), kind: OtherUnit::Contradiction },
         false => found,
@@ -23,6 +29,8 @@ const IRRADIANCES: [&str; 8] = ["irradiance", "irradiances", "edir", "eglo", "ed
 /// libRadtran's words for means over directions.
 const MEANS: [&str; 6] = ["uavg", "uavgdir", "uavgdn", "uavgup", "uavgdif", "uavgglo"];
 const RADIANCE: [&str; 2] = ["radiance", "radiances"];
+/// Units of light as the eye weights it.
+const PHOTOMETRIC: [&str; 10] = ["lm", "lumen", "lumens", "cd", "candela", "candelas", "lx", "lux", "nit", "nits"];
 const PHOTONS: [&str; 3] = ["photon", "photons", "quanta"];
 
 /// Whether one of some words stands in a heading.
@@ -205,10 +213,16 @@ fn in_last_brackets(heading: &str) -> Option<&str> {
     None
 }
 
-/// What stands between the first and the last bracket of a heading.
+/// What stands between the first and the last bracket of a heading; of brackets that a word is divided by or multiplied with, `lm/(m2
+/// sr nm)`, the word and they.
 fn in_brackets(heading: &str) -> Option<&str> {
     let [open, close] = [heading.find(['(', '[']), heading.rfind([')', ']'])].map(Option::unwrap_or_default);
-    heading.get(open + 1..close).map(str::trim).filter(|text| !text.is_empty())
+    let before = heading.get(..open)?;
+    let text = match before.ends_with(['/', '*', '·']) {
+        true => heading.get(before.rfind(char::is_whitespace).map_or(0, |blank| blank + 1)..=close),
+        false => heading.get(open + 1..close),
+    };
+    text.map(str::trim).filter(|text| !text.is_empty())
 }
 
 /// Whether a text is the unit of something, known or not: it has powers or is divided, or is a unit or a scale that people
@@ -306,6 +320,8 @@ mod tests {
             ("E, W·m⁻²·nm⁻¹", "W·m⁻²·nm⁻¹"),
             ("L (µmol m⁻² s⁻¹ sr⁻¹ nm⁻¹)", "µmol m⁻² s⁻¹ sr⁻¹ nm⁻¹"),
             ("L (100 W/(m² sr nm))", "100 W/(m² sr nm)"),
+            ("radiance lm/(m2 sr nm)", "lm/(m2 sr nm)"),
+            ("L (cd/(m2 nm))", "cd/(m2 nm)"),
         ] {
             assert!(
                 matches!(unit_of_heading(heading), Some(Stated::Other { text, .. }) if text == written),
@@ -346,6 +362,15 @@ mod tests {
     }
 
     #[test]
+    fn light_as_the_eye_weights_it_is_told() {
+        for text in ["L (cd m-2)", "L [cd/m2]", "L (lm/(m2 sr nm))", "radiance lm/(m2 sr nm)", "L [nit/nm]"] {
+            let found = unit_of_heading(text);
+            assert!(matches!(found, Some(Stated::Other { kind: OtherUnit::Photometric, .. })), "{text}: {found:?}");
+            assert_eq!(RadianceUnit::parse(text), None, "{text}");
+        }
+    }
+
+    #[test]
     fn other_units_are_told_from_radiances() {
         use OtherUnit::{AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Scaled, Several, Unknown};
         for (text, kind) in [
@@ -378,8 +403,6 @@ mod tests {
             ("W sr-1 nm-1", Unknown),
             ("radiance (MW m-2 sr-1 nm-1)", Unknown),
             ("radiance (MW/m2)", Unknown),
-            ("L (cd m-2)", Unknown),
-            ("L [cd/m2]", Unknown),
             ("sky (%)", Unknown),
             ("sky (counts)", Unknown),
             ("sky [a.u.]", Unknown),

@@ -110,6 +110,8 @@ pub enum OtherUnit {
     Mean,
     /// A unit of radiance beside the name of another quantity, or the unit of another beside the name of radiance.
     Contradiction,
+    /// Of light as the eye weights it.
+    Photometric,
     /// None that is known.
     Unknown,
 }
@@ -132,13 +134,14 @@ impl OtherUnit {
             Self::Several => "two units of radiance; say in which they are",
             Self::Mean => "a mean over all directions, not the radiance of one",
             Self::Contradiction => "the name of one quantity beside the unit of another, one of which is wrong",
+            Self::Photometric => "of light as the eye weights it, from which no spectrum of energy follows",
             Self::Unknown => "no unit of spectral radiance that is known",
         }
     }
 
     /// Whether the numbers cannot be spectral radiances, whatever a user says.
     pub fn is_another_quantity(self) -> bool {
-        matches!(self, Self::Irradiance | Self::Photons | Self::PerFrequency | Self::Mean)
+        matches!(self, Self::Irradiance | Self::Photons | Self::PerFrequency | Self::Mean | Self::Photometric)
     }
 }
 
@@ -354,7 +357,7 @@ mod tests {
     use crate::units::heading::unit_of_heading;
 
     /// Spellings, and what one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    const RADIANCES: [(&str, f64); 55] = [
+    const RADIANCES: [(&str, f64); 57] = [
         ("W cm-2 sr-1 nm-1", 1.0),
         ("W m-2 sr-1 nm-1", 1e-4),
         ("W.m^-2.sr^-1.nm^-1", 1e-4),
@@ -404,6 +407,8 @@ mod tests {
         ("10**-3 W/(m**2 sr nm)", 1e-7),
         ("1e-6 W cm-2 sr-1 nm-1", 1e-6),
         ("0.001 W m-2 sr-1 nm-1", 1e-7),
+        ("1/nm W/(m2 sr)", 1e-4),
+        ("W 1/m2 1/sr 1/um", 1e-7),
         ("1E3 uW cm-2 sr-1 nm-1", 1e-3),
         // At 500 nm 1 cm⁻¹ is 0.025 nm, the wavenumber being 20 000 cm⁻¹.
         ("W cm-2 sr-1 / cm-1", 40.0),

@@ -137,7 +137,26 @@ pub(super) fn tokens(text: &str) -> Vec<Token> {
         }
     }
     let plain = plain.replace("(cm-1)-1", " / cm-1 ").replace(['(', ')'], " ");
-    plain.split_whitespace().flat_map(pieces).collect()
+    inverse(plain.split_whitespace().flat_map(pieces).collect())
+}
+
+/// The same with `1/nm` as the power that it is, `nm-1`.
+fn inverse(tokens: Vec<Token>) -> Vec<Token> {
+    let mut found: Vec<Token> = Vec::with_capacity(tokens.len());
+    for token in tokens {
+        match (found.as_slice(), token) {
+            ([.., Token::Number(one), Token::Per], Token::Factor { word, exponent })
+                if one == "1"
+                    && exponent.is_none_or(|power| power > 0)
+                    && matches!(base(&word), Some(Base::Length(_) | Base::SolidAngle)) =>
+            {
+                found.truncate(found.len() - 2);
+                found.push(Token::Factor { word, exponent: Some(-exponent.unwrap_or(1)) });
+            }
+            (_, token) => found.push(token),
+        }
+    }
+    found
 }
 
 /// Whether a text ends in the number 10.

@@ -291,6 +291,7 @@ mod tests {
             scene_white_xy: None,
             adapted: None,
             matrix_residual: None,
+            scene_error: None,
         });
         let header = FrameHeader { name: "frame".into(), geometry: Geometry::new(2, 1, channels), metadata };
         let samples = vec![1.0; header.geometry.row_samples()];

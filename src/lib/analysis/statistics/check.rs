@@ -75,6 +75,14 @@ pub struct Verdict {
     pub corrected_p: f64,
     /// Whether it is no smaller than the level.
     pub passed: bool,
+    /// Whether no sample should scatter: values were compared with values, and no law of noise was tested.
+    #[serde(skip_serializing_if = "is_scattered")]
+    pub is_noiseless: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_scattered(is_noiseless: &bool) -> bool {
+    !*is_noiseless
 }
 
 impl Verdict {
@@ -102,10 +110,12 @@ impl Verdict {
                 "{frame}: nothing can be checked: {not_finite} pixels are NaN or infinite"
             )));
         }
-        let all = regions.flat_map(|(tests, _)| tests);
+        let all = regions.clone().flat_map(|(tests, _)| tests);
         let (tests, smallest_p) = all.fold((0, 1.0_f64), |(count, least), test| (count + 1, least.min(test.p)));
         let corrected_p = significance::of_smallest(smallest_p, tests);
-        Ok(Self { level, tests, smallest_p, corrected_p, passed: corrected_p >= level })
+        let is_noiseless =
+            regions.flat_map(|(tests, _)| tests).all(|test| test.subject == Subject::Deviation && test.expected == 0.0);
+        Ok(Self { level, tests, smallest_p, corrected_p, passed: corrected_p >= level, is_noiseless })
     }
 
     /// Nothing where the check is passed.

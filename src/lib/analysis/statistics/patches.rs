@@ -314,6 +314,7 @@ mod tests {
             source: "chart".into(),
             uniform: false,
             expected_electrons: None,
+            true_xyz: None,
             vignetting_focal_length_mm: None,
             patch: Some([8, 6]),
             source_width: Some(5),
@@ -422,6 +423,7 @@ mod tests {
             scene_white_xy: None,
             adapted: None,
             matrix_residual: None,
+            scene_error: None,
         });
         let camera = Vector3::from(electrons.map(|e| 0.25 * e));
         let xyz: [f64; 3] = (color::matrix(&xyz_from_camera) / exposure.exposure_s_sr() * camera).into();

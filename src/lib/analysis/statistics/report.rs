@@ -24,7 +24,7 @@ pub struct Report {
 
 /// What standard deviations of a frame count.
 pub(super) fn coverage(frame: &FrameHeader) -> Coverage {
-    Coverage::noise_only(frame.metadata.color.as_ref().and_then(|color| color.matrix_residual.clone()))
+    Coverage::of_colors(frame.metadata.color.as_ref())
 }
 
 /// What is said of a region.

@@ -134,6 +134,10 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
     }
     let mut caption = vec![planes::stage(&frame, &choice, [region.width, region.height])];
     caption.extend(tally.groups.iter().map(|(name, moments)| seen(name, moments)));
+    if tally.full > 0 {
+        let all: u64 = tally.groups.iter().map(|(_, moments)| moments.count).sum();
+        caption.push(format!("saturated: {} of {all} samples", tally.full));
+    }
     let reasons = tally.left_out.into_iter().zip(["saturated or marked", "not finite"]).filter(|(count, _)| *count > 0);
     let reasons: Vec<String> = reasons.map(|(count, reason)| format!("{count} {reason}")).collect();
     if !reasons.is_empty() {

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
-use crate::stages::saturation::bits;
+use crate::stages::saturation::{FullLevels, bits, samples_tell};
 use crate::stream::{RowSource, fold};
 use crate::units::Any;
 use rayon::prelude::*;
@@ -172,6 +172,10 @@ pub(super) struct Tally {
     pub groups: Vec<(String, Moments)>,
     /// Pixels that marks leave out, and of the others those of which a sample is not finite.
     pub left_out: [u64; 2],
+    /// Samples among those counted that are at full well or the white level, where the samples tell it.
+    pub full: u64,
+    /// The level of each group from which they are.
+    levels: Vec<Option<f32>>,
     /// Place of the layer of marks among the channels.
     layer: Option<usize>,
     /// The marks that leave a pixel out.
@@ -188,6 +192,12 @@ impl Tally {
         let filters = choice.filters(frame);
         let of_class = |filter: &char| Choice { channels: vec![0], filter: Some(*filter) };
         let classes = filters.iter().map(|filter| Seen::of(frame, region, &of_class(filter))).collect();
+        let full = FullLevels::of(frame).filter(|_| samples_tell(frame)).map(|levels| levels.classes());
+        let level = |place: Option<usize>| full.and_then(|levels| levels.get(place?).copied());
+        let levels = match filters.as_slice() {
+            [] => choice.channels.iter().map(|channel| level(Some(*channel))).collect(),
+            filters => filters.iter().map(|filter| level("RGB".find(*filter))).collect(),
+        };
         let names = match filters.as_slice() {
             [] => choice.names(frame),
             filters => filters.iter().map(char::to_string).collect(),
@@ -195,6 +205,8 @@ impl Tally {
         Self {
             groups: names.into_iter().map(|name| (name, Moments::new(1))).collect(),
             left_out: [0; 2],
+            full: 0,
+            levels,
             // The layer itself is shown with all that it says.
             layer: rows.layer.filter(|layer| !choice.channels.contains(layer)),
             marks: rows.left_out,
@@ -218,23 +230,31 @@ impl Tally {
             self.is_out.push(reason.is_some());
         }
         if self.classes.is_empty() {
-            for ((_, moments), line) in self.groups.iter_mut().zip(planes) {
+            for (place, ((_, moments), line)) in self.groups.iter_mut().zip(planes).enumerate() {
                 self.line.clear();
                 self.line
                     .extend(line.iter().zip(&self.is_out).filter(|(_, is_out)| !**is_out).map(|(sample, _)| *sample));
+                self.full += full(&self.line, self.levels.get(place));
                 moments.add(&[&self.line]);
             }
             return;
         }
-        for ((_, moments), seen) in self.groups.iter_mut().zip(&self.classes) {
+        for (place, ((_, moments), seen)) in self.groups.iter_mut().zip(&self.classes).enumerate() {
             let Some(sites) = seen.row(y) else { continue };
             self.line.clear();
             let counted = planes[0].iter().zip(&self.is_out).zip(sites.iter().cycle());
             let counted = counted.filter(|((_, is_out), is_seen)| **is_seen && !**is_out);
             self.line.extend(counted.map(|((sample, _), _)| *sample));
+            self.full += full(&self.line, self.levels.get(place));
             moments.add(&[&self.line]);
         }
     }
+}
+
+/// How many samples are at a level or above, where one is known.
+fn full(samples: &[f32], level: Option<&Option<f32>>) -> u64 {
+    let Some(Some(level)) = level else { return 0 };
+    samples.iter().filter(|sample| *sample >= level).count() as u64
 }
 
 /// Which photosites of a row are of the class that is shown.

@@ -8,10 +8,10 @@ use super::conversion::doubt_of_white;
 use super::described::either;
 use super::notes::Note;
 use super::options::{ExposureChoice, NoiseChoice, SignalLevel, SpectrumChoice, Subject, WhiteChoice, defaults};
-use super::scene::{Scene, Uniform};
+use super::scene::{Scene, Uniform, own_xyz};
 use super::values;
 use crate::analysis::characterization::evaluation::{Filling, SampleExposure, of_sample, per_exposure};
-use crate::analysis::characterization::{CameraMatrix, signals, stimuli};
+use crate::analysis::characterization::{CameraMatrix, signals};
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::{CfaPattern, Class};
@@ -243,13 +243,10 @@ impl NoisePrediction {
         let color = self.color(&sensor, &mut notes)?;
         let is_absolute = color.as_ref().is_some_and(|color| !color.is_relative) && self.sweep.is_none();
         let true_xyz = radiance.filter(|_| is_absolute).and_then(|radiance| {
-            let grid = WavelengthGrid::default();
-            let found = data::load_observer().and_then(|observer| stimuli(&radiance, &observer, &grid));
-            found
+            own_xyz(&radiance)
                 .map_err(|why| notes.push(Note::Warning(format!("the XYZ of the spectrum itself are not told: {why}"))))
                 .ok()
         });
-        let true_xyz = true_xyz.map(|xyz| [xyz[(0, 0)], xyz[(0, 1)], xyz[(0, 2)]]);
         let conditions =
             Conditions { quadrature_error, true_xyz, ..self.conditions(&sensor, exposure, color.as_ref())? };
         let mut predictor = self.predictor(&sensor, exposure, color)?;

@@ -3,6 +3,7 @@
 use super::light::Light;
 use super::open::Prepared;
 use super::request::Scene;
+use super::sums::own_xyz;
 use crate::camera::optics::Vignetting;
 use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
@@ -57,6 +58,7 @@ impl Scene {
             source: source.clone(),
             uniform: is_uniform,
             expected_electrons: uniform.filter(|_| is_uniform),
+            true_xyz: found.radiance.as_ref().filter(|_| is_uniform).and_then(|radiance| own_xyz(radiance).ok()),
             vignetting_focal_length_mm: wanted.filter(|_| !is_negligible),
             patch: uniform.is_none().then_some(patch),
             source_width,

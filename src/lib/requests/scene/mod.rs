@@ -9,6 +9,7 @@ mod request;
 mod sums;
 
 pub use request::Scene;
+pub(super) use sums::own_xyz;
 
 use super::notes::Note;
 use crate::camera::optics::Exposure;
@@ -145,6 +146,7 @@ mod tests {
     use crate::numerics::quadrature::Rule;
     use crate::requests::options::{SignalLevel, Subject};
     use crate::requests::sensor::SensorRequest;
+    use nalgebra::{Matrix3, Vector3};
 
     const TREE: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -194,6 +196,31 @@ mod tests {
         let brightest = filled.electrons.into_iter().fold(0.0, f64::max);
         assert!((brightest / (0.5 * filled.sensor.readout().unwrap().full_well_e) - 1.0).abs() < 1e-12, "{brightest}");
         assert!(matches!(&filled.notes[0], Note::Remark(text) if text.starts_with("exposure ")), "{:?}", filled.notes);
+    }
+
+    /// XYZ of the spectrum are those that no camera changes; what a matrix makes of the electrons beside them is its error.
+    #[test]
+    fn a_uniform_scene_tells_the_xyz_of_its_spectrum() {
+        let scene = Scene { size: Some([2, 2]), ..spectrum("skies/clear_zenith.csv") };
+        let metadata = scene.open().unwrap().header().metadata.clone();
+        let told = metadata.scene.as_ref().unwrap().true_xyz.unwrap();
+        assert_eq!(told, own_xyz(&scene.uniform().unwrap().radiance.unwrap()).unwrap());
+        let electrons = metadata.scene.as_ref().unwrap().expected_electrons.unwrap();
+        let adu_per_e = metadata.adu_per_e().unwrap();
+        let off = [0.1, -0.25, 0.0];
+        let ratio = |k: usize| told[k] * (1.0 + off[k]) / (adu_per_e * electrons[k]);
+        let xyz_from_adu = Matrix3::from_diagonal(&Vector3::new(ratio(0), ratio(1), ratio(2)));
+        let found = metadata.scene_error(&xyz_from_adu).unwrap();
+        // A few roundings of doubles.
+        assert!(found.iter().zip(off).all(|(found, off)| (found - off).abs() < 1e-14), "{found:?}");
+        let filled = SignalLevel { expose_to: Some(0.5), ..SignalLevel::default() };
+        let filled = Scene { level: filled, ..scene.clone() }.open().unwrap();
+        assert_eq!(filled.header().metadata.scene.as_ref().unwrap().true_xyz, Some(told));
+
+        for unknown in [Scene { vignetting: true, size: None, ..scene }, given([1.0; 3])] {
+            let metadata = unknown.open().unwrap().header().metadata.clone();
+            assert_eq!((metadata.scene.as_ref().unwrap().true_xyz, metadata.scene_error(&xyz_from_adu)), (None, None));
+        }
     }
 
     #[test]

@@ -73,7 +73,7 @@ impl Scene {
                 None => Note::Remark(text),
             });
         }
-        found.notes.extend(overfull(&light, loaded.sensor.readout.as_ref()));
+        found.notes.extend(overfull(&light, loaded.sensor.readout.as_ref(), self.level.expose_to));
         found.notes.extend(found.metadata.quadrature_error.map(inexact));
         Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, found })
     }
@@ -218,10 +218,11 @@ fn elsewhere(path: &Path) -> Option<String> {
 }
 
 /// A warning of light that fills photosites; none of light that does not, or that is not known before it is read.
-fn overfull(light: &Light, readout: Option<&ReadOut>) -> Option<Note> {
+fn overfull(light: &Light, readout: Option<&ReadOut>, expose_to: Option<f64>) -> Option<Note> {
     let (Light::Uniform { electrons, source }, Some(readout)) = (light, readout) else { return None };
     let remedy = match source.as_str() {
         "--electrons" => "fewer of them keep",
+        _ if expose_to.is_some() => "a fraction of full well below 1, as --expose-to 0.8, keeps",
         _ => "a shorter exposure, or --expose-to 0.8 in place of --exposure, keeps",
     };
     let full = Class::ALL.into_iter().zip(electrons).filter(|(_, e)| **e >= readout.full_well_e);

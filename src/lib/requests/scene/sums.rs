@@ -2,10 +2,11 @@
 
 use super::light::Seen;
 use super::picture::Losses;
+use crate::analysis::characterization::stimuli;
 use crate::camera::optics::Exposure;
 use crate::camera::response::GridWeights;
 use crate::error::Result;
-use crate::formats::data::LoadedSensor;
+use crate::formats::data::{self, LoadedSensor};
 use crate::metadata::{Metadata, UpsamplingRecord};
 use crate::numerics::quadrature::Rule;
 use crate::requests::notes::Note;
@@ -94,6 +95,16 @@ impl<'a> Sums<'a> {
         notes.extend(gap(sampled_nm, name).map(Note::Warning));
         Ok(Seen { camera: if is_followed { exact.clone() } else { of_sum }, exact })
     }
+}
+
+/// XYZ of a radiance itself in cd m⁻², which no camera has come near.
+///
+/// # Errors
+///
+/// Those of [`stimuli`].
+pub(in crate::requests) fn own_xyz(radiance: &SpectralLibrary) -> Result<[f64; 3]> {
+    let xyz = stimuli(radiance, &data::load_observer()?, &WavelengthGrid::default())?;
+    Ok(std::array::from_fn(|i| xyz[(0, i)]))
 }
 
 /// A warning of wavelengths that are missing: steps much wider than most.
