@@ -32,6 +32,12 @@ impl Geometry {
         Self { origin: self.origin, ..Self::new(self.width, self.height, channels) }
     }
 
+    /// Column and row on the sensor of the frame's corner, and its width and height.
+    pub fn on_sensor(&self) -> [i64; 4] {
+        let [x, y] = self.origin.map(i64::from);
+        [x, y, self.width as i64, self.height as i64]
+    }
+
     /// Samples in one row of all channels.
     pub fn row_samples(&self) -> usize {
         self.width * self.channels.len()

@@ -4,7 +4,8 @@
 //! formula.
 
 pub mod camera;
-pub mod predicted;
+pub mod causes;
+mod predicted;
 pub mod predictor;
 
 pub use camera::{CameraSetup, CameraStages, uniform_frame};

@@ -53,7 +53,7 @@ pub struct ChainPrediction {
     /// How far to trust the linearization of smooth hue transition, where that is the method.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_order: Option<FirstOrder>,
-    /// Why nothing is told of pixels, the stages from demosaicking on, where nothing is.
+    /// Why stages from demosaicking on are left out, where any is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_pixels: Option<String>,
 }

@@ -4,6 +4,7 @@
 //! is predicted here is what `measure` compares such frames with.
 
 use super::camera::CameraSetup;
+use super::causes::Causes;
 use super::predicted::{CauseVariance, ChainPrediction, ChainStage, NoiseDeltaE, PhaseCovariance, StagePrediction};
 use crate::camera::sensor::Sensor;
 use crate::color::Space;
@@ -11,7 +12,7 @@ use crate::color::difference::DELTA_E_PER_JND;
 use crate::error::{Error, Result};
 use crate::metadata::{CorrectionRecord, FrameHeader, Scene};
 use crate::names::Named;
-use crate::numerics::normal;
+use crate::numerics::normal::{self, MeanVariance};
 use crate::propagation::budget::{Budget, Cause};
 use crate::propagation::drift;
 use crate::propagation::frame::{Predicted, Sites, quantity_of_sites};
@@ -19,7 +20,7 @@ use crate::propagation::gains;
 use crate::propagation::saturation;
 use crate::propagation::smooth_hue::FirstOrder;
 use crate::propagation::taps::{Group, pooled};
-use crate::propagation::{Equations, FramePrediction, PixelMoments, SiteCovariance, of_frame};
+use crate::propagation::{Equations, FramePrediction, SiteCovariance, of_frame};
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::PHASES;
 use crate::stages::to_xyz::ColorSettings;
@@ -164,15 +165,23 @@ impl Predictor {
             let none = |why| {
                 Error::Data(format!("nothing can be predicted of {} at {electrons:?} electrons: {why}", stage.name()))
             };
-            let of_readout = head.readout().map(|readout| (readout.taps.is_some(), readout.black_drift_e > 0.0));
-            let (has_taps, drifts) = of_readout.unwrap_or_default();
-            if head.metadata.demosaic.is_some() && (has_taps || drifts) {
-                no_pixels = Some(if has_taps { PIXELS_OF_TAPS } else { PIXELS_IN_DRIFT }.to_owned());
+            let is_pixels = head.metadata.demosaic.is_some();
+            if is_pixels && head.readout().is_ok_and(|readout| readout.black_drift_e > 0.0) {
+                no_pixels = Some(PIXELS_IN_DRIFT.to_owned());
                 continue;
             }
-            if has_taps {
-                let (prediction, causes) = self.settings.groups(head).map_err(none)?;
-                stages.push(self.settings.stage(*stage, head, &prediction, &causes));
+            if head.taps().is_some() {
+                match self.settings.of_taps(head) {
+                    Ok((prediction, causes)) => {
+                        if let (FramePrediction::Tapped(pixels), ChainStage::Lab) = (&prediction, *stage) {
+                            noise_delta_e =
+                                Some(self.settings.delta_e(pixels.noise_length(), &prediction, &pixels.covariance));
+                        }
+                        stages.push(self.settings.stage(*stage, head, &prediction, &causes));
+                    }
+                    Err(why) if is_pixels => no_pixels = Some(why.to_string()),
+                    Err(why) => return Err(none(why)),
+                }
                 continue;
             }
             let is_plane = head.metadata.cfa.is_some() || head.metadata.demosaic.is_some();
@@ -191,7 +200,13 @@ impl Predictor {
             let prediction = sites.frame(head).map_err(none)?;
             match &prediction {
                 FramePrediction::Pixels(mixture) if *stage == ChainStage::Lab => {
-                    noise_delta_e = Some(self.settings.delta_e(mixture));
+                    let length = match self.settings.equations {
+                        Equations::Exact => {
+                            mixture.noise_length(mixture.bias, [1.0 / PHASES.len() as f64; PHASES.len()])
+                        }
+                        Equations::Paper => normal::length(&Vector3::from(mixture.bias), &mixture.covariance),
+                    };
+                    noise_delta_e = Some(self.settings.delta_e(length, &prediction, &mixture.covariance));
                 }
                 FramePrediction::Pixels(mixture) if *stage == ChainStage::Demosaicked => {
                     let variances = mixture.sites.map(|site| site.moments.variance);
@@ -200,41 +215,43 @@ impl Predictor {
                 }
                 _ => {}
             }
-            stages.push(self.settings.stage(*stage, head, &prediction, &causes));
+            stages.push(self.settings.stage(*stage, head, &prediction, &Causes::Classes(causes)));
             known = Some((plane, sites, causes));
         }
         Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order, no_pixels })
     }
 }
 
-/// Why no pixels are predicted that several amplifiers have a part in.
-const PIXELS_OF_TAPS: &str = "the sensor is read through several amplifiers (`taps`), and pixels are made of photosites of one or of \
-                              more of them; `measure` predicts regions behind one";
-
 /// Why no pixels are predicted of a black level that drifts.
 const PIXELS_IN_DRIFT: &str = "the black level of the sensor drifts along rows (`black_drift_e`), and what pixels share by that is not \
                                predicted";
 
 impl PredictorSettings {
-    /// The photosites of a frame that several amplifiers read, and their variances by cause: means over all of a class.
-    fn groups(&self, head: &FrameHeader) -> Predicted<(FramePrediction, [Budget; 3])> {
+    /// A frame that several amplifiers read, and the variances of its photosites by cause: of photosites means over all of a class, of
+    /// pixels those behind each.
+    fn of_taps(&self, head: &FrameHeader) -> Predicted<(FramePrediction, Causes)> {
         let prediction = of_frame(head, self.equations)?;
+        let mut budgets = Vec::new();
+        for (tap, counts, sites) in Sites::of_taps(head, self.equations)? {
+            let of_class = |e: f64| sites.photosite.causes(e);
+            let [r, g, b] = sites.expected_e;
+            budgets.push((tap, counts, [of_class(r)?, of_class(g)?, of_class(b)?]));
+        }
+        let FramePrediction::Groups(groups) = &prediction else {
+            let of_taps = budgets.into_iter().map(|(tap, _, budgets)| (tap, budgets));
+            return Ok((prediction, Causes::Taps(of_taps.collect())));
+        };
         let mut causes = [[0.0; Cause::ALL.len()]; 3];
-        let mut counts = [0.0; 3];
-        for (part_counts, sites) in Sites::of_taps(head, self.equations)? {
-            for k in 0..3 {
-                let budget = sites.photosite.causes(sites.expected_e[k])?;
-                causes[k].iter_mut().zip(budget).for_each(|(sum, variance)| *sum += part_counts[k] * variance);
-                counts[k] += part_counts[k];
+        for (k, causes) in causes.iter_mut().enumerate() {
+            let n: f64 = budgets.iter().map(|(_, counts, _)| counts[k]).sum();
+            for (_, counts, budgets) in &budgets {
+                causes.iter_mut().zip(budgets[k]).for_each(|(sum, variance)| *sum += counts[k] * variance / n);
             }
         }
-        causes.iter_mut().zip(counts).for_each(|(causes, n)| causes.iter_mut().for_each(|sum| *sum /= n));
-        if let FramePrediction::Groups(groups) = &prediction {
-            for (causes, class) in causes.iter_mut().zip(pooled(groups)) {
-                causes[Cause::Taps as usize] = class.moments.variance - causes.iter().sum::<f64>();
-            }
+        for (causes, class) in causes.iter_mut().zip(pooled(groups)) {
+            causes[Cause::Taps as usize] = class.moments.variance - causes.iter().sum::<f64>();
         }
-        Ok((prediction, causes))
+        Ok((prediction, Causes::Classes(causes)))
     }
 
     fn stage(
@@ -242,7 +259,7 @@ impl PredictorSettings {
         stage: ChainStage,
         head: &FrameHeader,
         prediction: &FramePrediction,
-        causes: &[Budget; 3],
+        causes: &Causes,
     ) -> StagePrediction {
         let metadata = &head.metadata;
         let (mean, covariance) = self.mean_and_covariance(prediction, metadata.quantity == QuantityKind::Lab);
@@ -282,11 +299,12 @@ impl PredictorSettings {
             channels: (0..3).map(|index| head.channel_name(index).to_owned()).collect(),
             void: match prediction {
                 FramePrediction::Pixels(mixture) => mixture.void,
-                FramePrediction::Planes(_) | FramePrediction::Groups(_) => None,
+                FramePrediction::Planes(_) | FramePrediction::Groups(_) | FramePrediction::Tapped(_) => None,
             },
             mean,
             bias: match prediction {
                 FramePrediction::Pixels(mixture) if mixture.bias != [0.0; 3] => Some(mixture.bias),
+                FramePrediction::Tapped(pixels) if pixels.bias != [0.0; 3] => Some(pixels.bias),
                 _ => None,
             },
             std,
@@ -331,50 +349,13 @@ impl PredictorSettings {
                 let first_order = || gains::mean_pixel(&mixture.weights).of(&mixture.site_covariance());
                 (mixture.mean, if is_curved { mixture.covariance } else { first_order() })
             }
+            FramePrediction::Tapped(pixels) => (pixels.mean, pixels.covariance),
         }
     }
 
-    /// Variance by cause; none for mixtures by the paper's equations, which do not keep causes apart.
-    fn by_cause(
-        &self,
-        prediction: &FramePrediction,
-        causes: &[Budget; 3],
-        covariance: &Matrix3<f64>,
-    ) -> Vec<CauseVariance> {
-        let gains = match prediction {
-            FramePrediction::Planes(_) | FramePrediction::Groups(_) => None,
-            FramePrediction::Pixels(_) if self.equations == Equations::Paper => return Vec::new(),
-            FramePrediction::Pixels(mixture) => Some(gains::mean_pixel(&mixture.weights)),
-        };
-        let variance = |cause: Cause| {
-            let of_classes = [0, 1, 2].map(|class| causes[class][cause as usize]);
-            let Some(gains) = &gains else { return of_classes };
-            match cause.shared_by() {
-                None => gains.covariance(of_classes).diagonal().into(),
-                Some(axis) => {
-                    let shared = Matrix3::from_fn(|k, l| (of_classes[k] * of_classes[l]).max(0.0).sqrt());
-                    let none = Matrix3::zeros();
-                    let lines = if axis == 0 { [&shared, &none] } else { [&none, &shared] };
-                    gains.of_lines(lines).diagonal().into()
-                }
-            }
-        };
-        let mut found: Vec<CauseVariance> =
-            Cause::ALL.into_iter().map(|cause| CauseVariance { cause, variance: variance(cause) }).collect();
-        if let (Some(gains), FramePrediction::Pixels(mixture)) = (&gains, prediction) {
-            let sites = mixture.site_covariance();
-            let first_order = gains.of(&sites);
-            if !sites.is_independent() {
-                // What is curved in what rows and columns share.
-                let told = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i]).sum::<f64>());
-                let left = [0, 1, 2].map(|i| first_order[(i, i)] - told[i]);
-                let is_left = (0..3).any(|i| left[i].abs() > 1e-9 * first_order[(i, i)]);
-                let clipped = &mut found[Cause::ClippedPattern as usize].variance;
-                clipped.iter_mut().zip(left).filter(|_| is_left).for_each(|(clipped, left)| *clipped += left);
-            }
-            found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| covariance[(i, i)] - first_order[(i, i)]);
-        }
-        // Causes that the sensor does not know are not told of.
+    /// Variance by cause; none of causes that the sensor does not know.
+    fn by_cause(&self, prediction: &FramePrediction, causes: &Causes, covariance: &Matrix3<f64>) -> Vec<CauseVariance> {
+        let mut found = causes.of_stage(prediction, covariance, self.equations);
         let readout = self.camera.sensor.readout();
         let is_known = |cause: Cause| readout.as_ref().is_ok_and(|readout| cause.optional(readout) != Some(0.0));
         found.retain(|entry| is_known(entry.cause));
@@ -415,6 +396,10 @@ impl PredictorSettings {
                 };
                 own / (columns * rows) + of_rows + sites.column / columns
             }
+            FramePrediction::Tapped(pixels) => {
+                let phase = self.patch_at.map(|[x, y]| crate::stages::demosaic::stencil::phase(x, y));
+                pixels.patch_mean(phase, size)
+            }
             // Photosites of any place: what they have behind an amplifier, on average.
             FramePrediction::Groups(groups) => {
                 let n = size[0] as f64 * size[1] as f64;
@@ -428,18 +413,11 @@ impl PredictorSettings {
         }
     }
 
-    /// The color difference that noise makes in L*a*b*.
-    fn delta_e(&self, mixture: &PixelMoments) -> NoiseDeltaE {
-        let found = match self.equations {
-            Equations::Exact => mixture.noise_length(mixture.bias, [1.0 / PHASES.len() as f64; PHASES.len()]),
-            Equations::Paper => normal::length(&Vector3::from(mixture.bias), &mixture.covariance),
-        };
+    /// The color difference that noise makes in L*a*b*, `found` of a pixel.
+    fn delta_e(&self, found: MeanVariance, prediction: &FramePrediction, covariance: &Matrix3<f64>) -> NoiseDeltaE {
         // The mean of a patch is taken of XYZ, so that the curvature of L*a*b* does not bias it.
-        let of_patch = |size: [usize; 2]| {
-            let covariance =
-                self.patch_mean(&FramePrediction::Pixels(Box::new(mixture.clone())), &mixture.covariance, size);
-            normal::length(&Vector3::zeros(), &covariance).mean
-        };
+        let of_patch =
+            |size: [usize; 2]| normal::length(&Vector3::zeros(), &self.patch_mean(prediction, covariance, size)).mean;
         let pixels_needed = match self.wanted {
             Some(Uncertainty::Jnd(wanted)) => smallest_square(|side| of_patch([side; 2]) <= wanted * DELTA_E_PER_JND),
             _ => None,

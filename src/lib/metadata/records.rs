@@ -150,6 +150,10 @@ pub struct DemosaicRecord {
     /// Whether what rows and columns add came off with it.
     #[serde(default, skip_serializing_if = "is_false")]
     pub black_deltas: bool,
+    /// Column and row on the sensor of the plane's corner, and its width and height, where several amplifiers have read it: at its
+    /// edges pixels are made of what is mirrored there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plane: Option<[i64; 4]>,
 }
 
 /// A camera's matrix for relative XYZ.

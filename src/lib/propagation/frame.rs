@@ -13,13 +13,14 @@ use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
 use super::repeated;
+use super::spaces::{Channels, Curved, OTHER_COLORS, is_curved, white};
 use super::tails;
+use super::tapped::TappedPixels;
 use super::taps::{self, Group};
 use super::unpredictable::TOO_LONG;
 pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::levels::BlackLevel;
 use crate::color;
-use crate::color::luv::{luv_about, luv_from_xyz};
 use crate::error::Error;
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
 use crate::names::Named;
@@ -40,6 +41,8 @@ pub enum FramePrediction {
     Groups(Vec<Group>),
     /// Pixels that are weighted sums of photosites.
     Pixels(Box<PixelMoments>),
+    /// Such pixels where several amplifiers have read their photosites.
+    Tapped(Box<TappedPixels>),
 }
 
 /// Predicts a frame from its metadata alone.
@@ -95,10 +98,13 @@ pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePre
     if let Some(groups) = taps::groups(frame, equations, moments)? {
         return Ok(FramePrediction::Groups(groups));
     }
+    if taps::are_mixed(frame) {
+        return Ok(FramePrediction::Tapped(Box::new(tapped(frame, equations)?)));
+    }
     let prediction = Sites::of(frame, equations)?.frame(frame)?;
     match &prediction {
         FramePrediction::Pixels(pixels) => pixels.void.map_or(Ok(()), |why| Err(Unpredictable::Beyond(why)))?,
-        FramePrediction::Planes(_) | FramePrediction::Groups(_) => {}
+        FramePrediction::Planes(_) | FramePrediction::Groups(_) | FramePrediction::Tapped(_) => {}
     }
     Ok(prediction)
 }
@@ -185,14 +191,14 @@ impl Sites {
         Ok(sites)
     }
 
-    /// The photosites of each of the amplifiers that read a frame, with the numbers of R, G and B.
+    /// The photosites of each of the amplifiers that read a frame, with its number and those of R, G and B.
     ///
     /// # Errors
     ///
     /// As [`of_frame`].
-    pub fn of_taps(frame: &FrameHeader, equations: Equations) -> Predicted<Vec<([f64; 3], Self)>> {
+    pub fn of_taps(frame: &FrameHeader, equations: Equations) -> Predicted<Vec<(usize, [f64; 3], Self)>> {
         let parts = taps::parts(frame).into_iter();
-        parts.map(|part| Ok((part.counts, Self::of(&part.frame, equations)?))).collect()
+        parts.map(|part| Ok((part.tap, part.counts, Self::of(&part.frame, equations)?))).collect()
     }
 
     /// Predicts a frame that was made of these photosites; pixels say where their moments are void.
@@ -217,8 +223,7 @@ impl Sites {
         if has_tails && method == Method::SmoothHue {
             camera.void = Some(tails::CURVED);
         }
-        let is_curved =
-            matches!(metadata.quantity, QuantityKind::Xyy | QuantityKind::Lab | QuantityKind::Luv) && has_tails;
+        let is_curved = is_curved(metadata.quantity) && has_tails;
         let Some(record) = &metadata.color else {
             if metadata.quantity != quantity_of_sites(frame) {
                 return Err(Unpredictable::Missing("color"));
@@ -236,57 +241,69 @@ impl Sites {
             _ => camera.through(&xyz_from_adu, record.black_adu),
         };
         let xyz = if is_curved { PixelMoments { void: xyz.void.or(Some(tails::CURVED)), ..xyz } } else { xyz };
-        let pixels = match metadata.quantity {
-            QuantityKind::Xyz => xyz,
-            QuantityKind::Xyy => {
-                let local = color::xyy_about(xyz.mean).ok_or(Unpredictable::Beyond("its mean has no chromaticity"))?;
-                xyz.to_color(&local, |[x, y, z]| [x / (x + y + z), y / (x + y + z), y], |_, _| false, equations)
-            }
-            QuantityKind::Lab => {
-                let white = record.white.ok_or(Unpredictable::Missing("color.white"))?;
-                // L*a*b* is straight in what is dark.
-                let is_straight = |i: usize, brightest: f64| brightest < color::LAB_STRAIGHT_BELOW * white[i];
-                let local = color::lab_about(xyz.mean, white);
-                xyz.to_color(&local, |xyz| color::lab_from_xyz(xyz, white), is_straight, equations)
-            }
-            QuantityKind::Luv => {
-                let white = record.white.ok_or(Unpredictable::Missing("color.white"))?;
-                let local = luv_about(xyz.mean, white).ok_or(Unpredictable::Beyond("its mean has no chromaticity"))?;
-                xyz.to_color(&local, |xyz| luv_from_xyz(xyz, white), |_, _| false, equations)
-            }
-            QuantityKind::LinearSrgb => {
-                let white = record.white.ok_or(Unpredictable::Missing("color.white"))?;
-                xyz.through(&color::linear_srgb_from_xyz(white), 0.0)
-            }
-            _ => return Err(Unpredictable::Beyond("of colors XYZ, xyY, L*a*b*, L*u*v* and linear sRGB are predicted")),
+        let pixels = match (Curved::of(metadata)?, metadata.quantity) {
+            (Some(space), _) => xyz.to_color(space, equations)?,
+            (None, QuantityKind::Xyz) => xyz,
+            (None, QuantityKind::LinearSrgb) => xyz.through(&color::linear_srgb_from_xyz(white(metadata)?), 0.0),
+            _ => return Err(Unpredictable::Beyond(OTHER_COLORS)),
         };
         Ok(FramePrediction::Pixels(Box::new(pixels)))
     }
 }
 
 impl PixelMoments {
-    /// XYZ in a space that is curved in them but where `is_straight` up to a brightest value of a channel; void where noise is too
-    /// large a share of the others.
-    fn to_color(
-        &self,
-        local: &color::Local,
-        value: impl Fn([f64; 3]) -> [f64; 3],
-        is_straight: impl Fn(usize, f64) -> bool,
-        equations: Equations,
-    ) -> Self {
+    /// XYZ in a space that is curved in them; void where noise is too large a share of them.
+    fn to_color(&self, space: Curved, equations: Equations) -> Predicted<Self> {
+        let local = space.about(self.mean)?;
         if equations == Equations::Paper {
-            return self.linearized(local);
+            return Ok(self.linearized(&local));
         }
-        let is_quiet = |i: usize| {
-            let (mean, std) = (self.mean[i], self.covariance[(i, i)].max(0.0).sqrt());
-            is_straight(i, mean + 6.0 * std) || std <= curved::LARGEST_SHARE * mean
-        };
-        if (0..3).all(is_quiet) {
-            return self.curved(local, value);
+        if space.is_quiet(self.mean, &self.covariance) {
+            return Ok(self.curved(&local, |xyz| space.value(xyz)));
         }
-        let linearized = self.linearized(local);
-        Self { void: self.void.or(Some(curved::VOID)), ..linearized }
+        let linearized = self.linearized(&local);
+        Ok(Self { void: self.void.or(Some(curved::VOID)), ..linearized })
     }
+}
+
+/// Why the paper says nothing of pixels of several amplifiers.
+const OF_ONE: &str = "the paper's sensor is read through one amplifier, and several (`taps`) have a part in its pixels";
+
+/// Why nothing is said of smooth hue transition.
+const BY_HUE: &str = "smooth hue transition divides by green, and several amplifiers (`taps` of the sensor) have a part in its pixels; of \
+                      them bi, eci and mhc are predicted, and regions and crops behind one";
+
+/// Pixels of a frame that several amplifiers have a part in.
+fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> {
+    let metadata = &frame.metadata;
+    let record = metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
+    let beyond = |why: &'static str| Err(Unpredictable::Beyond(why));
+    if equations == Equations::Paper {
+        return beyond(OF_ONE);
+    }
+    if metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
+        return beyond(taps::FLATTENED);
+    }
+    if Method::named(&record.method) == Some(Method::SmoothHue) {
+        return beyond(BY_HUE);
+    }
+    let mut groups = Vec::new();
+    for part in taps::parts(&taps::with_footprint(frame)) {
+        let of_tap = FrameHeader { geometry: frame.geometry.clone(), ..part.frame };
+        let sites = Sites::of(&of_tap, equations)?;
+        if sites.photosite.drifts() {
+            return beyond(DRIFTING);
+        }
+        if sites.moments.iter().any(|site| site.lines != LineCovariance::default()) {
+            return beyond(taps::WITH_LINES);
+        }
+        if sites.photosite.has_tails() && is_curved(metadata.quantity) {
+            return beyond(tails::CURVED);
+        }
+        groups.push((part.tap, Group { counts: part.counts, sites: sites.moments }));
+    }
+    let black = subtracted(record.black, record.black_deltas)?;
+    TappedPixels::of(frame, &Channels::of(metadata, quantity_of_sites(frame))?, black, &groups)
 }
 
 /// What was subtracted, where it is the same at all photosites.

@@ -11,7 +11,7 @@ use super::moments::SiteCovariance;
 use crate::cfa::Class;
 use crate::stages::demosaic::stencil::{PHASES, REACH, phase};
 use crate::stages::demosaic::weights::Weights;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// What each class adds to a covariance of the three channels, per variance of its photosites.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,23 +126,11 @@ pub fn autocovariance(weights: &Weights, phase: usize, lag: [isize; 2]) -> Gains
 /// weights that repeat with the array's period, so only the rim is gone through site by site.
 pub fn patch_mean(weights: &Weights, phase: usize, size: [usize; 2]) -> Gains {
     let mut gains = Gains::zero();
-    let corner = PHASES[phase];
-    let count = size[0] as f64 * size[1] as f64;
     let [columns, rows] = size.map(distinct_sites);
-    let [width, height] = size.map(usize::cast_signed);
     let mut lines = [vec![LineWeights::default(); rows.len()], vec![LineWeights::default(); columns.len()]];
     for (row, &(y, times_y)) in rows.iter().enumerate() {
         for (column, &(x, times_x)) in columns.iter().enumerate() {
-            let mut weight = [0.0; 3];
-            for dy in (y - height + 1).max(-REACH)..=y.min(REACH) {
-                for dx in (x - width + 1).max(-REACH)..=x.min(REACH) {
-                    let pixel = phase_at(corner, [x - dx, y - dy]);
-                    for (channel, weight) in weight.iter_mut().enumerate() {
-                        *weight += weights.stencil(pixel, channel).at([dx, dy]);
-                    }
-                }
-            }
-            let mean = weight.map(|weight| weight / count);
+            let mean = in_mean(weights, phase, size, [x, y]);
             let class = weights.class(phase, [x, y]);
             gains.add(class, mean, mean, times_x * times_y);
             for (channel, mean) in mean.into_iter().enumerate() {
@@ -157,6 +145,42 @@ pub fn patch_mean(weights: &Weights, phase: usize, size: [usize; 2]) -> Gains {
         }
     }
     gains
+}
+
+/// What the site in a column and row from the corner of a patch gives to its mean.
+fn in_mean(weights: &Weights, phase: usize, size: [usize; 2], [x, y]: [isize; 2]) -> [f64; 3] {
+    let [width, height] = size.map(usize::cast_signed);
+    let mut weight = [0.0; 3];
+    for dy in (y - height + 1).max(-REACH)..=y.min(REACH) {
+        for dx in (x - width + 1).max(-REACH)..=x.min(REACH) {
+            let pixel = phase_at(PHASES[phase], [x - dx, y - dy]);
+            for (channel, weight) in weight.iter_mut().enumerate() {
+                *weight += weights.stencil(pixel, channel).at([dx, dy]);
+            }
+        }
+    }
+    let count = size[0] as f64 * size[1] as f64;
+    weight.map(|weight| weight / count)
+}
+
+/// The covariance of the means of a patch as in [`patch_mean`], of photosites that share nothing and have such variances at the places of
+/// the array.
+pub fn patch_mean_by_place(
+    weights: &Weights,
+    phase: usize,
+    size: [usize; 2],
+    variances: [f64; PHASES.len()],
+) -> Matrix3<f64> {
+    let [columns, rows] = size.map(distinct_sites);
+    let mut covariance = Matrix3::zeros();
+    for &(y, times_y) in &rows {
+        for &(x, times_x) in &columns {
+            let mean = Vector3::from(in_mean(weights, phase, size, [x, y]));
+            let variance = variances[phase_at(PHASES[phase], [x, y])];
+            covariance += times_x * times_y * variance * mean * mean.transpose();
+        }
+    }
+    covariance
 }
 
 /// What the sites of a row (axis 0), or column (1), `line` away from a pixel give to its channels.

@@ -5,6 +5,7 @@ use super::moments::{Equations, Prediction};
 use super::saturation;
 use super::taps::pooled;
 use crate::metadata::{FrameHeader, PredictedRecord};
+use nalgebra::Matrix3;
 
 /// Writes the predicted moments of a frame into its metadata, where there are any, and the shares of its classes that are
 /// saturated.
@@ -14,12 +15,12 @@ pub fn note(frame: &mut FrameHeader, equations: Equations) {
         let of = |classes: [Prediction; 3]| {
             (classes.map(|class| class.moments.mean), classes.map(|class| class.moments.std()))
         };
+        let stds = |covariance: &Matrix3<f64>| [0, 1, 2].map(|i| covariance[(i, i)].max(0.0).sqrt());
         let (mean, std) = match prediction {
             FramePrediction::Planes(classes) => of(classes),
             FramePrediction::Groups(groups) => of(pooled(&groups)),
-            FramePrediction::Pixels(pixels) => {
-                (pixels.mean, [0, 1, 2].map(|i| pixels.covariance[(i, i)].max(0.0).sqrt()))
-            }
+            FramePrediction::Pixels(pixels) => (pixels.mean, stds(&pixels.covariance)),
+            FramePrediction::Tapped(pixels) => (pixels.mean, stds(&pixels.covariance)),
         };
         PredictedRecord { mean, std, saturated: saturation::expected(frame) }
     });

@@ -37,6 +37,7 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
         Ok(FramePrediction::Pixels(pixels)) => {
             vec![[0, 1, 2].map(|k| (pixels.mean[k], pixels.covariance[(k, k)].max(0.0).sqrt()))]
         }
+        Ok(FramePrediction::Tapped(pixels)) => pixels.each_kind().collect(),
         Err(_) => return true,
     };
     let is_beyond = |(level, (mean, std)): (f32, (f64, f64))| f64::from(level) - mean > OUT_OF_REACH * std;

@@ -14,9 +14,9 @@ use crate::stages::demosaic::Method;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// Why nothing is said of pixels that several amplifiers have read.
-const MIXED: &str = "its pixels are made of photosites that several amplifiers (`taps` of the sensor) have read; of regions and crops \
-                     behind one of them, with the reach of demosaicking, pixels are predicted, and photosites everywhere";
+/// Why nothing is said of what several amplifiers have read, where it is not told apart.
+const MIXED: &str = "several amplifiers (`taps` of the sensor) have read it, and this is told of frames and crops behind one of them, \
+                     with the reach of demosaicking";
 
 /// Why nothing is said of flat fields.
 pub(super) const FLATTENED: &str = "it was divided by a flat field of a sensor that is read through several amplifiers (`taps`), and how their \
@@ -37,6 +37,8 @@ pub struct Group {
 
 /// Photosites of one amplifier, before anything is predicted.
 pub(super) struct Part {
+    /// Which of them.
+    pub tap: usize,
     /// How many of R, G and B there are.
     pub counts: [f64; 3],
     /// The frame as if all were read through it.
@@ -81,7 +83,7 @@ fn kinds(first: i64, length: usize, kind: impl Fn(i64) -> [usize; 3]) -> Vec<(i6
 pub(super) fn parts(frame: &FrameHeader) -> Vec<Part> {
     let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
     let Some(readout) = readout.filter(|readout| readout.taps.is_some()) else {
-        return vec![Part { counts: [1.0; 3], frame: frame.clone() }];
+        return vec![Part { tap: 0, counts: [1.0; 3], frame: frame.clone() }];
     };
     let Geometry { width, height, origin, .. } = frame.geometry;
     let [x0, y0] = origin.map(i64::from);
@@ -102,24 +104,32 @@ pub(super) fn parts(frame: &FrameHeader) -> Vec<Part> {
             }
         }
     }
-    found.into_iter().map(|(tap, counts)| Part { counts, frame: of_tap(frame, tap) }).collect()
+    found.into_iter().map(|(tap, counts)| Part { tap, counts, frame: of_tap(frame, tap) }).collect()
 }
 
-/// The frame with what its pixels are made of, as far as the sensor reaches.
-fn with_footprint(frame: &FrameHeader) -> Cow<'_, FrameHeader> {
+/// The frame with what its pixels are made of, as far as the plane reaches that they were made of, or else the sensor.
+pub(super) fn with_footprint(frame: &FrameHeader) -> Cow<'_, FrameHeader> {
     let Some(record) = &frame.metadata.demosaic else { return Cow::Borrowed(frame) };
-    let size = frame.readout().map_or([0; 2], |readout| [readout.width, readout.height]);
+    let of_sensor = || frame.readout().map_or([0; 4], |readout| [0, 0, readout.width.into(), readout.height.into()]);
+    let [x, y, width, height] = record.plane.unwrap_or_else(of_sensor);
     let reach = Method::named(&record.method).map_or(3, Method::reach) as i64;
     let mut grown = frame.clone();
     let geometry = &mut grown.geometry;
     let extents = [&mut geometry.width, &mut geometry.height];
-    for ((origin, extent), size) in geometry.origin.iter_mut().zip(extents).zip(size) {
+    let ends = [[x, x.saturating_add(width)], [y, y.saturating_add(height)]];
+    for ((origin, extent), [least, most]) in geometry.origin.iter_mut().zip(extents).zip(ends) {
         let (first, end) = (i64::from(*origin), i64::from(*origin) + *extent as i64);
-        let (grown_first, grown_end) = (first.min((first - reach).max(0)), end.max((end + reach).min(i64::from(size))));
+        let (grown_first, grown_end) = (first.min((first - reach).max(least)), end.max((end + reach).min(most)));
         *origin = i32::try_from(grown_first).unwrap_or(*origin);
         *extent = usize::try_from(grown_end - grown_first).unwrap_or(*extent);
     }
     Cow::Owned(grown)
+}
+
+/// Whether a frame is of pixels that several amplifiers have a part in.
+pub(super) fn are_mixed(frame: &FrameHeader) -> bool {
+    let is_demosaicked = frame.taps().is_some() && frame.metadata.demosaic.is_some();
+    is_demosaicked && parts(&with_footprint(frame)).len() > 1
 }
 
 /// The frame as the one amplifier reads it that reads all of its photosites, those included that its pixels are made of.
@@ -163,7 +173,7 @@ pub(super) fn groups(
         return Ok(None);
     }
     let mut found = Vec::new();
-    for Part { counts, frame } in parts {
+    for Part { counts, frame, .. } in parts {
         let sites = moments(&frame, equations)?;
         if sites.iter().any(|site| site.lines != LineCovariance::default()) {
             return Err(Unpredictable::Beyond(WITH_LINES));

@@ -437,7 +437,9 @@ fn moments(differences: &[Difference]) -> (Difference, Difference, Difference) {
 fn pixels_of(head: &FrameHeader) -> Predicted<Box<PixelMoments>> {
     match Sites::of(head, Equations::Exact)?.frame(head)? {
         FramePrediction::Pixels(pixels) => Ok(pixels),
-        FramePrediction::Planes(_) | FramePrediction::Groups(_) => Err(Unpredictable::Missing("demosaic")),
+        FramePrediction::Planes(_) | FramePrediction::Groups(_) | FramePrediction::Tapped(_) => {
+            Err(Unpredictable::Missing("demosaic"))
+        }
     }
 }
 

@@ -67,6 +67,7 @@ impl<'a> Assessment<'a> {
                 Predicted::of_plane_in_groups(groups)
             }
             (Some(FramePrediction::Groups(groups)), None) if is_three => Predicted::of_groups(groups),
+            (Some(FramePrediction::Tapped(pixels)), None) if is_three => Predicted::of_tapped(pixels),
             (Some(FramePrediction::Pixels(mixture)), None) if is_three => {
                 Predicted::of_pixels(mixture, sampling(mixture))
             }

@@ -8,7 +8,7 @@ use crate::cfa::Class;
 use crate::numerics::normal::MeanVariance;
 use crate::propagation::sampling::Sampling;
 use crate::propagation::taps::{Group, pooled};
-use crate::propagation::{LineCovariance, PixelMoments, Prediction, SiteCovariance};
+use crate::propagation::{LineCovariance, PixelMoments, Prediction, SiteCovariance, TappedPixels};
 use nalgebra::Matrix3;
 
 /// What is predicted of channels that are observed together; nothing by default.
@@ -117,6 +117,12 @@ impl Predicted {
             sampling,
             is_plane: true,
         }
+    }
+
+    /// Of mixed pixels that several amplifiers have a part in.
+    pub fn of_tapped(pixels: &TappedPixels) -> Self {
+        let grouped = Self::grouped(&pooled(&pixels.groups), &pixels.groups, pixels.sampling().clone());
+        Self::of_three(&pixels.covariance, Expected { mean: pixels.mean, is_plane: false, ..grouped })
     }
 
     /// Of mixed pixels that scatter as `sampling` says.

@@ -5,6 +5,7 @@ use crate::metadata::FrameHeader;
 use crate::propagation::sampling::{Place, Sampling};
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
 use nalgebra::Matrix3;
+use std::sync::Arc;
 
 /// The laws of a frame, kept for the frames after it: exposures of one scene differ in what no law hangs on.
 #[derive(Default)]
@@ -15,6 +16,23 @@ pub(super) struct Known {
     equations: Equations,
     pub prediction: Result<FramePrediction, Unpredictable>,
     pub samplings: Samplings,
+    /// Of regions of a frame that several amplifiers have read.
+    regions: Vec<(Region, Arc<Result<FramePrediction, Unpredictable>>)>,
+}
+
+impl Known {
+    /// What is predicted of a region of a frame that several amplifiers have read, with how it scatters.
+    pub fn of_region(&mut self, frame: &FrameHeader, region: Region) -> Arc<Result<FramePrediction, Unpredictable>> {
+        if let Some((_, known)) = self.regions.iter().find(|(of, _)| *of == region) {
+            return Arc::clone(known);
+        }
+        let found = Arc::new(propagation::of_frame(&region.header(frame), self.equations));
+        if let Ok(FramePrediction::Tapped(pixels)) = &*found {
+            pixels.sampling();
+        }
+        self.regions.push((region, Arc::clone(&found)));
+        found
+    }
 }
 
 impl Laws {
@@ -25,6 +43,7 @@ impl Laws {
         self.0.insert(known.unwrap_or_else(|| Known {
             prediction: propagation::of_frame(frame, equations),
             samplings: Samplings::default(),
+            regions: Vec::new(),
             head,
             equations,
         }))

@@ -11,7 +11,7 @@ use super::tally::{Tally, tallies};
 use super::watch::{Marks, Saturated, Watch};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
-use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
+use crate::propagation::{Equations, FramePrediction, PixelMoments};
 use crate::stream::RowSource;
 
 /// Reads a whole frame and works out the statistics of its regions.
@@ -90,19 +90,21 @@ fn measure_all(
     let frame = watch.header().clone();
     let levels = Levels::of(&frame)?;
     // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
-    let Known { prediction, samplings, .. } = laws.of(&frame, equations);
+    let known = laws.of(&frame, equations);
     // What several amplifiers have read differs from region to region.
-    let of_regions: Option<Vec<std::result::Result<FramePrediction, Unpredictable>>> = frame
-        .taps()
-        .map(|_| regions.iter().map(|region| propagation::of_frame(&region.header(&frame), equations)).collect());
+    let of_regions: Option<Vec<_>> =
+        frame.taps().map(|_| regions.iter().map(|region| known.of_region(&frame, *region)).collect());
+    let Known { prediction, samplings, .. } = known;
     if let Ok(FramePrediction::Pixels(mixture)) = prediction {
         for region in regions {
             samplings.of(mixture, &frame, *region);
         }
     }
     let mut portrait = is_drawn.then(|| {
-        let of_region = of_regions.as_ref().map_or(&*prediction, |of_regions| &of_regions[0]);
-        let drawn = of_region.as_ref().ok().filter(|drawn| !matches!(drawn, FramePrediction::Groups(_)));
+        let of_region = of_regions.as_ref().map_or(&*prediction, |of_regions| &*of_regions[0]);
+        let is_alike =
+            |drawn: &&FramePrediction| !matches!(drawn, FramePrediction::Groups(_) | FramePrediction::Tapped(_));
+        let drawn = of_region.as_ref().ok().filter(is_alike);
         Portrait::new(&frame, regions[0], drawn)
     });
     let tallies = match &mut portrait {
@@ -130,7 +132,7 @@ fn measure_all(
             None => samplings.of(mixture, &frame, *region),
             Some(_) => Samplings::default().of(mixture, &frame, *region),
         };
-        let prediction = of_regions.as_ref().map_or(&*prediction, |of_regions| &of_regions[index]);
+        let prediction = of_regions.as_ref().map_or(&*prediction, |of_regions| &*of_regions[index]);
         // What is left where pixels are left out by their values follows no formula; those of defects are any.
         let prediction = prediction.as_ref().ok().filter(|_| is_fair(marks));
         let assessment = Assessment::new(tally, &frame, *region, prediction, sampling);
@@ -140,7 +142,7 @@ fn measure_all(
     let regions = regions.iter().zip(&tallies).zip(&counts).enumerate().map(report).collect();
     let unpredicted = match &of_regions {
         None => prediction.as_ref().err(),
-        Some(of_regions) => of_regions.iter().find_map(|prediction| prediction.as_ref().err()),
+        Some(of_regions) => of_regions.iter().find_map(|prediction| (**prediction).as_ref().err()),
     };
     let unpredicted = unpredicted.map(ToString::to_string);
     let mut report = Report { regions, check: None, uncertainty: coverage(&frame), unpredicted };

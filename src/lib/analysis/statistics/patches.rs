@@ -326,7 +326,8 @@ mod tests {
 
     fn with_demosaic(mut frame: FrameHeader, method: &str) -> FrameHeader {
         let (cfa, black) = (CfaPattern::Rggb, 0.0.into());
-        frame.metadata.demosaic = Some(DemosaicRecord { method: method.into(), cfa, black, black_deltas: false });
+        frame.metadata.demosaic =
+            Some(DemosaicRecord { method: method.into(), cfa, black, black_deltas: false, plane: None });
         frame
     }
 

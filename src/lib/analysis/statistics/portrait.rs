@@ -277,6 +277,10 @@ impl Foreseen {
                 Self { mean, stds: vec![variance.max(0.0).sqrt()], profile_std: None, correlations: None }
             }
             FramePrediction::Pixels(mixture) => Self::of_pixels(mixture, index, patches),
+            FramePrediction::Tapped(pixels) => {
+                let (mean, variance) = (pixels.mean[index], pixels.covariance[(index, index)]);
+                Self { mean, stds: vec![variance.max(0.0).sqrt()], profile_std: None, correlations: None }
+            }
         };
         // Of a level that drifts from row to row no profile is told.
         let drifts = matches!(prediction, FramePrediction::Planes(classes) if classes[index].lines.drift != [0.0; 3]);

@@ -311,7 +311,8 @@ fn what_is_no_raw_is_refused() {
     }
     let mut demosaicked = changed(QuantityKind::Adu, &three);
     let (method, cfa) = ("bilinear".into(), "rggb".parse().unwrap());
-    demosaicked.metadata.demosaic = Some(DemosaicRecord { method, cfa, black: 0.0.into(), black_deltas: false });
+    demosaicked.metadata.demosaic =
+        Some(DemosaicRecord { method, cfa, black: 0.0.into(), black_deltas: false, plane: None });
     assert!(complaint(&demosaicked).ends_with("three demosaicked planes of ADU; write an EXR or a TIFF"));
     let mut unknown = good.clone();
     unknown.metadata.cfa = None;

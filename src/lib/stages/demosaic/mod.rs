@@ -96,6 +96,7 @@ impl Demosaic {
             cfa,
             black: black.level(),
             black_deltas: black.has_deltas(),
+            plane: input.taps().map(|_| input.geometry.on_sensor()),
         });
         let left = |before: Option<&BlackLevels>| {
             black_left(before, &black).ok_or_else(|| {

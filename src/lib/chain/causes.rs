@@ -1,0 +1,84 @@
+//! The variance of a stage by cause.
+
+use super::predicted::CauseVariance;
+use crate::propagation::budget::{Budget, Cause};
+use crate::propagation::gains;
+use crate::propagation::{Equations, FramePrediction, PixelMoments, TappedPixels};
+use nalgebra::Matrix3;
+
+/// Variances of photosites by cause.
+pub(super) enum Causes {
+    /// Of R, G and B.
+    Classes([Budget; 3]),
+    /// The same behind each amplifier.
+    Taps(Vec<(usize, [Budget; 3])>),
+}
+
+impl Causes {
+    /// Variances of the channels of a stage by cause; none for mixtures by the paper's equations, which do not keep causes apart.
+    pub fn of_stage(
+        &self,
+        prediction: &FramePrediction,
+        covariance: &Matrix3<f64>,
+        equations: Equations,
+    ) -> Vec<CauseVariance> {
+        match (self, prediction) {
+            (Self::Classes(causes), FramePrediction::Pixels(mixture)) if equations == Equations::Exact => {
+                of_pixels(mixture, causes, covariance)
+            }
+            (Self::Classes(causes), FramePrediction::Planes(_) | FramePrediction::Groups(_)) => {
+                each(|cause| [0, 1, 2].map(|class| causes[class][cause as usize]))
+            }
+            (Self::Taps(budgets), FramePrediction::Tapped(pixels)) => of_tapped(pixels, budgets, covariance),
+            _ => Vec::new(),
+        }
+    }
+}
+
+fn each(variance: impl Fn(Cause) -> [f64; 3]) -> Vec<CauseVariance> {
+    Cause::ALL.into_iter().map(|cause| CauseVariance { cause, variance: variance(cause) }).collect()
+}
+
+fn of_pixels(mixture: &PixelMoments, causes: &[Budget; 3], covariance: &Matrix3<f64>) -> Vec<CauseVariance> {
+    let gains = gains::mean_pixel(&mixture.weights);
+    let mut found = each(|cause| {
+        let of_classes = [0, 1, 2].map(|class| causes[class][cause as usize]);
+        match cause.shared_by() {
+            None => gains.covariance(of_classes).diagonal().into(),
+            Some(axis) => {
+                let shared = Matrix3::from_fn(|k, l| (of_classes[k] * of_classes[l]).max(0.0).sqrt());
+                let none = Matrix3::zeros();
+                let lines = if axis == 0 { [&shared, &none] } else { [&none, &shared] };
+                gains.of_lines(lines).diagonal().into()
+            }
+        }
+    });
+    let sites = mixture.site_covariance();
+    let first_order = gains.of(&sites);
+    if !sites.is_independent() {
+        // What is curved in what rows and columns share.
+        let told = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i]).sum::<f64>());
+        let left = [0, 1, 2].map(|i| first_order[(i, i)] - told[i]);
+        let is_left = (0..3).any(|i| left[i].abs() > 1e-9 * first_order[(i, i)]);
+        let clipped = &mut found[Cause::ClippedPattern as usize].variance;
+        clipped.iter_mut().zip(left).filter(|_| is_left).for_each(|(clipped, left)| *clipped += left);
+    }
+    found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| covariance[(i, i)] - first_order[(i, i)]);
+    found
+}
+
+/// What is between places of pixels that several amplifiers have a part in is theirs.
+fn of_tapped(pixels: &TappedPixels, budgets: &[(usize, [Budget; 3])], covariance: &Matrix3<f64>) -> Vec<CauseVariance> {
+    let of_tap = |tap: usize| budgets.iter().find(|(of, _)| *of == tap).map(|(_, causes)| causes);
+    let mut found = each(|cause| {
+        let of_site = |tap: usize, class: usize| of_tap(tap).map_or(0.0, |causes| causes[class][cause as usize]);
+        pixels.within(of_site).diagonal().into()
+    });
+    let between = pixels.between();
+    let told = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i]).sum::<f64>() + between[(i, i)]);
+    found[Cause::Taps as usize].variance = between.diagonal().into();
+    if pixels.bias != [0.0; 3] {
+        found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| covariance[(i, i)] - told[i]);
+    }
+    found
+}
