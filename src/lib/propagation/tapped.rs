@@ -210,7 +210,7 @@ impl Array {
     }
 
     /// What reads the photosite of a column and row of the plane.
-    fn tap(&self, at: [usize; 2]) -> usize {
+    pub fn tap(&self, at: [usize; 2]) -> usize {
         self.taps.tap(self.size, self.on_sensor(at))
     }
 

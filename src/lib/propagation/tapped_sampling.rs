@@ -181,3 +181,190 @@ impl Sums {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::moments::Prediction;
+    use super::super::sampling::Place;
+    use super::super::spaces::{Channels, Curved};
+    use super::super::taps::Group;
+    use super::*;
+    use crate::camera::sensor::tests::kaf5101ce;
+    use crate::camera::taps::{TapLayout, Taps};
+    use crate::cfa::CfaPattern;
+    use crate::frame::Geometry;
+    use crate::metadata::{DemosaicRecord, FrameHeader, Metadata};
+    use crate::names::Named;
+    use crate::stages::demosaic::Method;
+    use crate::stages::demosaic::weights::WeightTable;
+    use crate::units::QuantityKind;
+    use nalgebra::{DMatrix, DVector};
+
+    const PLANE: [i64; 4] = [3, 2, 33, 28];
+    const PART: [usize; 4] = [4, 0, 27, 25];
+
+    /// A part of a demosaicked plane of a sensor of 36×30 photosites.
+    fn frame(method: Method, layout: TapLayout, count: usize) -> FrameHeader {
+        let mut sensor = kaf5101ce();
+        let readout = sensor.readout.as_mut().unwrap();
+        (readout.width, readout.height) = (36, 30);
+        readout.taps = Some(Taps { layout, gain: vec![1.0; count], offset_e: vec![], read_noise_e: vec![] });
+        let mut metadata = Metadata::new(QuantityKind::Adu);
+        metadata.sensor = Some(sensor);
+        metadata.demosaic = Some(DemosaicRecord {
+            method: method.name().into(),
+            cfa: CfaPattern::Gbrg,
+            black: 0.0.into(),
+            black_deltas: false,
+            plane: Some(PLANE),
+        });
+        let [x, y, width, height] = PART;
+        let mut geometry = Geometry::new(width, height, &["R", "G", "B"]);
+        geometry.origin = [3 + i32::try_from(x).unwrap(), 2 + i32::try_from(y).unwrap()];
+        FrameHeader { name: "test".into(), geometry, metadata }
+    }
+
+    fn channels() -> Channels {
+        let matrix = Matrix3::new(0.4, 0.3, 0.2, 0.2, 0.7, 0.1, 0.0, 0.1, 0.9);
+        Channels { matrix, black: 2.0, space: None }
+    }
+
+    /// Groups of as many amplifiers, which differ by a share.
+    fn groups(count: usize, by: f64) -> Vec<(usize, Group)> {
+        let class = |k: usize, tap: usize| {
+            let [k, more] = [k as f64, by * tap as f64];
+            let variance = 4.0 + k + 1.5 * more;
+            let fourth = (0.2 + 0.3 * k - 0.1 * more) * variance.powi(2);
+            Prediction::of_cumulants(100.0 + 30.0 * k + 2.0 * more, variance, 2.0 + 3.0 * k + more, fourth)
+        };
+        (0..count).map(|tap| (tap, Group { counts: [1.0; 3], sites: [0, 1, 2].map(|k| class(k, tap)) })).collect()
+    }
+
+    /// Taps that are alike are one: sums in another order, relative 10⁻¹².
+    #[test]
+    fn taps_that_are_alike_are_one() {
+        for (method, layout, count) in [
+            (Method::Bilinear, TapLayout::Columns, 3),
+            (Method::EffectiveColor, TapLayout::Quadrants, 4),
+            (Method::Malvar, TapLayout::LeftRight, 2),
+        ] {
+            let groups = groups(count, 0.0);
+            let pixels = TappedPixels::of(&frame(method, layout, count), &channels(), 10.0, &groups).unwrap();
+            let [x, y, width, height] = PART;
+            let place = Place { frame: [33, 28], origin: [3, 2], corner: [x, y], size: [width, height] };
+            let weights = WeightTable::new(method, CfaPattern::Gbrg).about([1.0; 2]).through(&channels().matrix);
+            let (found, one) = (pixels.sampling(), Sampling::of(&weights, &groups[0].1.sites, &place));
+            let close =
+                |found: f64, one: f64, scale: f64| assert!((found - one).abs() < 1e-12 * scale, "{found} {one}");
+            for (a, [i, j]) in PAIRS.into_iter().enumerate() {
+                let scale = |of: &Matrix3<f64>| (of[(i, i)] * of[(j, j)]).sqrt();
+                close(found.covariance[(i, j)], one.covariance[(i, j)], scale(&one.covariance));
+                close(found.mean_covariance[(i, j)], one.mean_covariance[(i, j)], scale(&one.mean_covariance));
+                for b in 0..6 {
+                    close(found.spread[a][b], one.spread[a][b], (one.spread[a][a] * one.spread[b][b]).sqrt());
+                }
+            }
+            let mean = channels().matrix * Vector3::new(88.0, 118.0, 148.0);
+            (0..3).for_each(|i| close(pixels.mean[i], mean[i], mean[i]));
+        }
+    }
+
+    /// By full matrices over all pixels and photosites: sums of up to 10⁶ products, relative 10⁻¹¹.
+    #[test]
+    fn kinds_of_places_agree_with_full_matrices() {
+        let white = [120.0, 130.0, 140.0];
+        let lab = Channels { space: Some(Curved::Lab(white)), ..channels() };
+        for (method, layout, count, channels) in [
+            (Method::Bilinear, TapLayout::Columns, 3, channels()),
+            (Method::EffectiveColor, TapLayout::Quadrants, 4, channels()),
+            (Method::Bilinear, TapLayout::TopBottom, 2, lab),
+        ] {
+            let pixels = TappedPixels::of(&frame(method, layout, count), &channels, 10.0, &groups(count, 1.0)).unwrap();
+            check_by_full_matrices(&pixels, &format!("{method:?} {layout:?}"));
+        }
+    }
+
+    fn check_by_full_matrices(pixels: &TappedPixels, what: &str) {
+        let [x0, y0, width, height] = PART;
+        let [columns, rows] = [33_usize, 28];
+        let places: Vec<[usize; 2]> = (y0..y0 + height).flat_map(|y| (x0..x0 + width).map(move |x| [x, y])).collect();
+        let (n, sites) = (places.len(), columns * rows);
+        let count = n as f64;
+        let cumulant = |of: fn(&Prediction) -> f64| {
+            DVector::from_fn(sites, |s, _| of(pixels.array.site([s % columns, s / columns])))
+        };
+        let (second, third, fourth) =
+            (cumulant(|site| site.moments.variance), cumulant(|site| site.third), cumulant(Prediction::fourth));
+        // Weights of all pixels on all photosites, and what the mean leaves of them.
+        let mut weights = [(); 3].map(|()| DMatrix::<f64>::zeros(n, sites));
+        let mut beyond = Matrix3::<f64>::zeros();
+        for (a, at) in places.iter().enumerate() {
+            let kind = pixels.kind(*at);
+            beyond += kind.beyond / count;
+            for site in &kind.sites {
+                let to = [0, 1].map(|axis| at[axis].checked_add_signed(site.offset[axis]).unwrap());
+                (0..3).for_each(|i| weights[i][(a, to[1] * columns + to[0])] = site.weights[i]);
+            }
+        }
+        let less_mean = |matrix: &DMatrix<f64>| {
+            let mean = matrix.row_mean();
+            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |a, s| matrix[(a, s)] - mean[s])
+        };
+        let projected = weights.each_ref().map(less_mean);
+        let scaled = |matrix: &DMatrix<f64>| matrix * DMatrix::from_diagonal(&second);
+        let means = [0, 1, 2].map(|i| DVector::from_fn(n, |a, _| pixels.kind(places[a]).mean[i]));
+        let off = means.each_ref().map(|mean| mean.add_scalar(-mean.mean()));
+        let sampling = pixels.sampling();
+        let scaled = projected.each_ref().map(scaled);
+        // P C_ik P.
+        let c = |i: usize, k: usize| &scaled[i] * projected[k].transpose();
+        let c: Vec<DMatrix<f64>> = (0..9).map(|index| c(index / 3, index % 3)).collect();
+        let trace = |[i, k]: [usize; 2], [l, j]: [usize; 2]| c[3 * i + k].dot(&c[3 * l + j].transpose());
+        let form =
+            |i: usize, j: usize| DVector::from_fn(sites, |s, _| projected[i].column(s).dot(&projected[j].column(s)));
+        let linear = |i: usize, j: usize| projected[j].transpose() * &off[i] + projected[i].transpose() * &off[j];
+        let close = |found: f64, expected: f64, scale: f64| {
+            assert!((found - expected).abs() < 1e-11 * scale, "{what}: {found} {expected}");
+        };
+        let free = count - 1.0;
+        let sum = |of: &dyn Fn(usize) -> f64| (0..sites).map(of).sum::<f64>();
+        let forms: Vec<_> = PAIRS.iter().map(|&[i, j]| (form(i, j), linear(i, j))).collect();
+        for (a, [i, j]) in PAIRS.into_iter().enumerate() {
+            let own = c[3 * i + j].trace();
+            let expected = (own + off[i].dot(&off[j])) / free + beyond[(i, j)];
+            close(
+                sampling.covariance[(i, j)],
+                expected,
+                (sampling.covariance[(i, i)] * sampling.covariance[(j, j)]).sqrt(),
+            );
+            let of_means =
+                sum(&|s| weights[i].column(s).sum() * second[s] * weights[j].column(s).sum()) / count.powi(2);
+            close(sampling.mean_covariance[(i, j)], of_means, sampling.mean_covariance.diagonal().max());
+            for (b, [k, l]) in PAIRS.into_iter().enumerate() {
+                let ((q, g), (r, h)) = (&forms[a], &forms[b]);
+                let more = sum(&|s| {
+                    second[s] * g[s] * h[s] + third[s] * (q[s] * h[s] + g[s] * r[s]) + fourth[s] * q[s] * r[s]
+                });
+                let expected = (trace([i, k], [l, j]) + trace([i, l], [k, j]) + more) / (free * free);
+                close(sampling.spread[a][b], expected, (sampling.spread[a][a] * sampling.spread[b][b]).sqrt());
+            }
+        }
+        let over = |i: usize| means[i].mean();
+        (0..3).for_each(|i| close(pixels.mean[i], over(i), over(i).abs()));
+        let within = pixels.within(|tap, class| {
+            let site = |s: &usize| {
+                let at = [s % columns, s / columns];
+                let [x, y] = [at[0] as i64 + PLANE[0], at[1] as i64 + PLANE[1]];
+                pixels.array.tap(at) == tap && CfaPattern::Gbrg.class(x, y) as usize == class
+            };
+            (0..sites).find(site).map_or(0.0, |s| second[s])
+        });
+        for i in 0..3 {
+            let all =
+                (0..n).map(|a| (0..sites).map(|s| second[s] * weights[i][(a, s)].powi(2)).sum::<f64>()).sum::<f64>();
+            close(within[(i, i)], all / count, within[(i, i)]);
+            let whole = within[(i, i)] + off[i].norm_squared() / count + beyond[(i, i)];
+            close(pixels.covariance[(i, i)], whole, whole);
+        }
+    }
+}
