@@ -867,32 +867,3 @@ fn sigma_knows_the_taps_of_each_photosite() {
         assert!(of_smallest(smallest, 3 * places.len()) > 1e-4, "{smallest}");
     }
 }
-
-#[test]
-fn temporary_study() {
-    let taps = &several_taps()[4];
-    let scene = tapped([22, 18], [900.0, 2500.0, 1800.0], taps);
-    let laws = Mutex::new(Vec::new());
-    let some = [Region { x: 3, y: 2, width: 13, height: 14 }];
-    let of = |seed: u64| -> Vec<(String, f64)> {
-        let plane = plane_of(&digitized(&noisy(&scene, &settings(seed + 500_000))));
-        let camera = demosaicked(&plane, Method::Bilinear);
-        let mut known: Laws = laws.lock().unwrap().pop().unwrap_or_default();
-        let mut source = MemoryFrame::new(camera.header.clone(), camera.samples.clone());
-        let report =
-            measure_among(&mut known, &mut source, &some, Saturated::Kept, Equations::Exact, Some(0.5)).unwrap();
-        laws.lock().unwrap().push(known);
-        let mut found: Vec<(String, f64)> = report.regions[0]
-            .tests
-            .iter()
-            .map(|test| (format!("{:?} {:?}", test.subject, test.channels), test.p))
-            .collect();
-        found.push(("all".into(), corrected(&report.regions[0])));
-        found
-    };
-    let trials: Vec<Vec<(String, f64)>> = (0..8000).into_par_iter().map(of).collect();
-    for index in 0..trials[0].len() {
-        let count = |level: f64| trials.iter().filter(|trial| trial[index].1 < level).count();
-        eprintln!("study {} {} {} of 400 and 80", trials[0][index].0, count(0.05), count(0.01));
-    }
-}
