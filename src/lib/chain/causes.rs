@@ -9,7 +9,7 @@ use nalgebra::Matrix3;
 /// Variances of photosites by cause.
 pub(super) enum Causes {
     /// Of R, G and B.
-    Classes([Budget; 3]),
+    Classes(Box<[Budget; 3]>),
     /// The same behind each amplifier.
     Taps(Vec<(usize, [Budget; 3])>),
 }

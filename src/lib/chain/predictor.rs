@@ -232,7 +232,7 @@ impl Predictor {
                 }
                 _ => {}
             }
-            stages.push(self.settings.stage(*stage, head, &prediction, &Causes::Classes(causes)));
+            stages.push(self.settings.stage(*stage, head, &prediction, &Causes::Classes(Box::new(causes))));
             known = Some((plane, sites, causes));
         }
         Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order, no_pixels })
@@ -273,7 +273,7 @@ impl PredictorSettings {
         for (causes, class) in causes.iter_mut().zip(pooled(groups)) {
             causes[Cause::Taps as usize] = class.moments.variance - causes.iter().sum::<f64>();
         }
-        Ok((prediction, Causes::Classes(causes)))
+        Ok((prediction, Causes::Classes(Box::new(causes))))
     }
 
     fn stage(

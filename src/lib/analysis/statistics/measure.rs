@@ -117,11 +117,7 @@ fn measure_all(
     }
     let saturated = counts.iter().map(|marks| marks.saturated).find(|count| *count > 0);
     if let (Some(_), true, Some(pixels)) = (level, left_out, saturated) {
-        return Err(Error::Data(format!(
-            "{}: nothing can be checked: {pixels} pixels used saturated samples; without them the others are no fair sample",
-            frame.name
-        ))
-        .give(&["keep_saturated"]));
+        return Err(unfair(&frame, pixels));
     }
     let is_fair = |marks: &Marks| marks.beyond_model + if left_out { marks.saturated } else { 0 } == 0;
     if !is_fair(&counts[0]) {
@@ -154,6 +150,15 @@ fn measure_all(
         report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted.as_deref())?);
     }
     Ok((report, portrait))
+}
+
+/// Refuses to check a frame of which pixels were left out for their values.
+fn unfair(frame: &FrameHeader, pixels: u64) -> Error {
+    let problem = format!(
+        "{}: nothing can be checked: {pixels} pixels used saturated samples; without them the others are no fair sample",
+        frame.name
+    );
+    Error::Data(problem).give(&["keep_saturated"])
 }
 
 /// Makes sure that samples are not mixed in a way that no test knows.

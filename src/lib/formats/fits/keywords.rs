@@ -130,8 +130,8 @@ fn doubts_of_repeated(header: &Header) -> Vec<String> {
 fn first_of(what: &str, told: &[(&str, Option<f64>)], share: f64, doubts: &mut Vec<String>) -> Option<f64> {
     let mut known = told.iter().filter_map(|(key, number)| Some((*key, (*number)?)));
     let (first, counts) = known.next()?;
-    let differs = |other: f64| !((other - counts).abs() <= share * counts.abs().max(other.abs()));
-    if let Some((other, number)) = known.find(|(_, number)| differs(*number)) {
+    let is_alike = |other: f64| (other - counts).abs() <= share * counts.abs().max(other.abs());
+    if let Some((other, number)) = known.find(|(_, number)| !is_alike(*number)) {
         doubts.push(format!("its {what} is {counts} by {first} and {number} by {other}; {first} counts"));
     }
     Some(counts)
