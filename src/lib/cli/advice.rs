@@ -7,13 +7,14 @@ use std::io;
 use std::path::Path;
 
 /// What supplies a key that metadata lack, the better choice first; it counts where the program has all its options.
-const SUPPLIES: [(&str, &str); 13] = [
+const SUPPLIES: [(&str, &str); 14] = [
     ("sensor", "--sensor NAME|FILE, or all of --bits, --bias and --slope"),
     ("sensor.readout", "one that has it, --readout NAME|FILE, or a sensor that has it, --sensor NAME|FILE"),
     ("sensor.readout", "a sensor that has it, --sensor NAME|FILE"),
     ("sensor.response", "a sensor that has it, --sensor NAME|FILE"),
     ("sensor", "--sensor NAME|FILE"),
     ("exposure", "--exposure S and --f-number N"),
+    ("exposure_time_s", "--exposure S"),
     ("white_level_adu", "--white-luminance CD_PER_M2"),
     ("white_level_adu", "--white N"),
     ("black_level_adu", "--black N, 0 where it is off already"),

@@ -82,7 +82,10 @@ impl Calibration {
     ///
     /// Those of [`Self::mapped`]; that a matrix FM is missing.
     pub fn mapped_forward(&self, observer: &Observer, light: Light) -> Result<Mapped, String> {
-        let missing = || "it has no ForwardMatrix for each of its illuminants".to_owned();
+        let missing = || {
+            let has = if self.second.is_some() { "ColorMatrix1 and ColorMatrix2" } else { "ColorMatrix1" };
+            format!("it has no ForwardMatrix for each of its illuminants, but {has}, which `--own-matrix color` takes")
+        };
         if self.first.forward_matrix.is_none() || self.second.is_some_and(|second| second.forward_matrix.is_none()) {
             return Err(missing());
         }

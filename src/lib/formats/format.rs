@@ -45,11 +45,6 @@ pub trait SampleReader: Send {
     /// are found, they stand in.
     fn own_tags(&self) -> &Metadata;
 
-    /// The exposure time in s that the format's own tags tell, with an f-number or without.
-    fn exposure_s(&self) -> Option<f64> {
-        self.own_tags().exposure.map(|exposure| exposure.exposure_s)
-    }
-
     /// What the format's own tags say of the colors of R, G and B.
     fn colors(&self) -> ColorTags {
         ColorTags::default()

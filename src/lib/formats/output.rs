@@ -203,7 +203,7 @@ fn native_tags(header: &FrameHeader) -> ExrTags {
         _ => None,
     };
     ExrTags {
-        exposure_s: metadata.exposure.map(|e| e.exposure_s),
+        exposure_s: metadata.time_s().filter(|time_s| *time_s > 0.0),
         f_number: metadata.exposure.map(|e| e.f_number),
         iso_speed: metadata.iso_speed,
         // Absolute XYZ: unscaled (1, 1, 1) has Y = 1 cd m⁻². Of relative ones no luminance is known.

@@ -379,6 +379,9 @@ pub fn parse_metadata(name: &str, text: &str) -> Result<Metadata> {
     if let Some(exposure) = metadata.exposure {
         exposure.checked().map_err(|error| Error::format(name, error.to_string()))?;
     }
+    if let Some(time_s) = metadata.exposure_time_s.filter(|time_s| !(0.0..f64::INFINITY).contains(time_s)) {
+        return Err(Error::format(name, format!("its `exposure_time_s` is {time_s}, which is no time")));
+    }
     metadata.unknown = unknown;
     Ok(metadata)
 }

@@ -16,7 +16,7 @@ pub use header::FrameHeader;
 pub use records::{
     AdaptationRecord, BlackNoise, CameraSettings, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut,
     MatrixResidual, NoiseRecord, PoissonKind, PredictedRecord, ProfileRecord, RelativeMatrix, SamplesRecord, Scene,
-    UpsamplingRecord,
+    TakenAs, UpsamplingRecord,
 };
 
 use crate::camera::levels::{BlackLevel, WhiteLevel};
@@ -101,6 +101,12 @@ pub struct Metadata {
     /// Exposure time and lens.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
+    /// The exposure time in s of a frame whose f-number is not known, as that of a telescope; [`Self::time_s`] gives either.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_time_s: Option<f64>,
+    /// What the frame was taken as, where its file tells it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taken_as: Option<TakenAs>,
     /// The camera's own matrix for relative XYZ, as its raw file has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_matrix: Option<RelativeMatrix>,
@@ -196,6 +202,8 @@ impl Metadata {
             noise_profile: None,
             sensor_temperature_k: None,
             exposure: None,
+            exposure_time_s: None,
+            taken_as: None,
             relative_matrix: None,
             scene: None,
             quadrature_error: None,
@@ -264,6 +272,11 @@ impl Metadata {
         drawn.or(self.sensor_temperature_k).or_else(of_sensor)
     }
 
+    /// The exposure time in s, with an f-number or without.
+    pub fn time_s(&self) -> Option<f64> {
+        self.exposure.map(|exposure| exposure.exposure_s).or(self.exposure_time_s)
+    }
+
     /// What the converter adds, in ADU: as it was set, or as the sensor has it.
     pub fn bias_adu(&self) -> Option<f64> {
         let of_sensor = || self.sensor.as_ref()?.readout.as_ref().map(|readout| readout.bias_adu);
@@ -306,7 +319,14 @@ impl Metadata {
         let level = black.zip(bias).filter(|(black, bias)| *black < bias - 1.0).map(|(black, bias)| {
             format!("its black level, {black} ADU, is below the bias of its converter, {bias} ADU")
         });
-        unit.into_iter().chain(level).collect()
+        let times = self.exposure.zip(self.exposure_time_s).filter(|(exposure, alone)| exposure.exposure_s != *alone);
+        let time = times.map(|(exposure, alone)| {
+            format!(
+                "its `exposure_time_s`, {alone} s, is not the time of its `exposure`, {} s, which counts",
+                exposure.exposure_s
+            )
+        });
+        unit.into_iter().chain(level).chain(time).collect()
     }
 
     /// Sets a black level that no row or column adds to.

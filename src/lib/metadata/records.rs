@@ -199,6 +199,32 @@ impl CameraSettings {
     }
 }
 
+/// What a frame was taken as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TakenAs {
+    /// A picture of a scene.
+    Light,
+    /// Without light.
+    Dark,
+    /// Without light, of next to no exposure.
+    Bias,
+    /// Of even light.
+    Flat,
+}
+
+impl TakenAs {
+    /// With its article: `a dark frame`.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Light => "a light frame",
+            Self::Dark => "a dark frame",
+            Self::Bias => "a bias frame",
+            Self::Flat => "a flat",
+        }
+    }
+}
+
 /// Variance of codes as a raw file tells it: S x + O over the signal x from 0 at black to 1 at white \[DNG2023, NoiseProfile].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProfileRecord {

@@ -143,7 +143,7 @@ impl Dark {
 /// The noise of frames that is that of the sensor, of which bias frames of unknown exposure have no dark signal.
 fn dark_model(frame: &FrameHeader, record: &MasterRecord, of_sensor: NoiseModel) -> Option<NoiseModel> {
     let readout = frame.readout().ok()?;
-    let of_frame = || frame.metadata.exposure.map(|exposure| exposure.exposure_s);
+    let of_frame = || frame.metadata.time_s();
     let exposure_s = match record.kind {
         MasterKind::Bias => record.exposure_s.or(Some(0.0)),
         MasterKind::Dark => record.exposure_s.or_else(of_frame),

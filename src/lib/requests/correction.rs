@@ -2,7 +2,7 @@
 
 use super::border::measure_black;
 use super::described::{Described, doubt_of_black};
-use super::independence::{Company, Role, check_files};
+use super::independence::{Company, Role, check_contents, check_files};
 use super::notes::Note;
 use super::options::{Input, SensorChoice};
 use super::values::{self, BlackChoice};
@@ -13,7 +13,7 @@ use crate::formats::input::{FrameReader, InputOptions, Linearizing};
 use crate::formats::many::OneOfMany;
 use crate::formats::register::check_inputs;
 use crate::masking::Corrections;
-use crate::metadata::{DefectsRecord, FlatRecord, FrameHeader};
+use crate::metadata::{DefectsRecord, FlatRecord, FrameHeader, Scene, TakenAs};
 use crate::numerics::averages::{CLIP, Combine};
 use crate::stages::black::Black;
 use crate::stages::correct::{CorrectFrame, CorrectionSettings};
@@ -96,6 +96,8 @@ pub struct OpenCorrection {
     pub corrections: Corrections<OneOfMany>,
     /// What came up.
     pub notes: Vec<Note>,
+    /// Black and white level of the frame, as far as darks are taken for such on trust.
+    range_adu: Option<[f64; 2]>,
 }
 
 /// The frame that is corrected, where it comes from, and what is said of it.
@@ -109,9 +111,10 @@ impl Light<'_> {
     /// A complaint about an exposure that a frame beside this one does not tell, which no option supplies.
     fn in_its_own(&self, error: Error) -> Error {
         match error {
-            Error::MissingKey { file, key: "exposure" } if file != self.frame.name => {
-                let problem =
-                    format!("the metadata has no `exposure`; write it into {file}.yaml, as --metadata-template shows");
+            Error::MissingKey { file, key: "exposure_time_s" } if file != self.frame.name => {
+                let problem = format!(
+                    "nothing tells its exposure time; write `exposure_time_s` into {file}.yaml, as --metadata-template shows"
+                );
                 Error::format(&file, problem)
             }
             other => other,
@@ -306,6 +309,7 @@ impl Correction {
         let beyond = self.find_defects.map(|given| given.unwrap_or_else(|| beyond_chance(samples)));
         let flats = self.flats(light, &mut company)?;
         let mut warnings = [stage.warnings(), &company.check()?].concat();
+        self.check_contents(light)?;
         warnings.extend((!self.dark.is_empty()).then(|| doubt_of_dark(frame)).flatten());
         let dark_limits = match beyond.zip(self.darks(light, again).transpose()) {
             Some((beyond, darks)) => Some(darks?.survey(beyond)?),
@@ -329,6 +333,9 @@ impl Correction {
             darks.iter().flat_map(DarkFrames::frames).chain(flats.iter().flat_map(|(flats, _)| flats.frames()));
         let mut remarks: Vec<String> = sources.flat_map(|source| source.notes().to_vec()).collect();
         remarks.extend(darks.iter().flat_map(|darks| darks.stack().remarks().to_vec()));
+        let on_trust = darks.as_ref().and_then(|darks| darks.stack().taken_on_trust(frame));
+        remarks.extend(on_trust.clone().filter(|text| !warnings.contains(text)));
+        let range_adu = on_trust.and_then(|_| range_of(frame));
         let defects = self.defects_record(beyond, dark_limits.as_ref(), flats.is_some());
         let shares_masters = company.shares_darks().unwrap_or_else(|| {
             let problem =
@@ -343,7 +350,20 @@ impl Correction {
         warnings.extend(map.as_ref().and_then(|map| map.doubt(&list, frame)));
         notes.extend(warnings.into_iter().map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)));
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
-        Ok(OpenCorrection { stage, corrections, notes })
+        Ok(OpenCorrection { stage, corrections, notes, range_adu })
+    }
+
+    /// Makes sure that no frame beside `light` is a copy of it.
+    fn check_contents(&self, light: &Light) -> Result<()> {
+        let kinds = [
+            (Role::Dark, &self.dark),
+            (Role::Bias, &self.bias),
+            (Role::Flat, &self.flat),
+            (Role::FlatDark, &self.flat_dark),
+        ];
+        let beside = |role: Role| move |path: &PathBuf| (role, light.input.beside(path));
+        let others: Vec<_> = kinds.into_iter().flat_map(|(role, paths)| paths.iter().map(beside(role))).collect();
+        check_contents(&InputOptions { sequence: None, ..light.input.options() }, &others)
     }
 
     /// How defective photosites are told, where they are: by a list or map, and in frames, beyond so many standard deviations.
@@ -386,12 +406,42 @@ fn doubt_of_limits(beyond: f64) -> Option<String> {
 
 /// A warning of a frame that dark frames come off and that is one itself: a shell gives `--dark` the first of several names.
 fn doubt_of_dark(frame: &FrameHeader) -> Option<String> {
-    let scene = frame.metadata.scene.as_ref()?;
-    scene.is_dark().then(|| {
+    let is_unlit = frame.metadata.scene.as_ref().is_some_and(Scene::is_dark)
+        || matches!(frame.metadata.taken_as, Some(TakenAs::Dark | TakenAs::Bias));
+    is_unlit.then(|| {
         format!(
             "{}: no light fell on it: it is a dark frame itself; to take several names for --dark put them in quotes, \
              --dark 'dark-*.exr'",
             frame.name
+        )
+    })
+}
+
+/// Black and white level of a frame, where both are known.
+fn range_of(frame: &FrameHeader) -> Option<[f64; 2]> {
+    let [black, white] = [frame.metadata.black_level_adu?.largest(), frame.metadata.white_level_adu?.largest()];
+    (white > black).then_some([black, white])
+}
+
+/// A warning of what came off a frame and cannot well be its dark signal: a mean above that of the frame, or, where nothing tells that
+/// it is one, far up on the way from black to white.
+fn doubt_of_level(name: &str, [frame, dark]: [f64; 2], range_adu: Option<[f64; 2]>) -> Option<String> {
+    /// Dark signals that drift from frame to frame differ by less, in ADU and as a share.
+    const DRIFT: [f64; 2] = [1.0, 0.01];
+    /// Dark frames are below this share of the range.
+    const MOST_OF_RANGE: f64 = 0.25;
+    if dark - frame > DRIFT[0].max(DRIFT[1] * dark.abs()) {
+        return Some(format!(
+            "{name}: its mean is {frame:.1} ADU, below that of what came off, {dark:.1} ADU; are these dark or bias frames of it?"
+        ));
+    }
+    let [black, white] = range_adu?;
+    let share = (dark - black) / (white - black);
+    (share > MOST_OF_RANGE).then(|| {
+        format!(
+            "{name}: what came off has a mean of {dark:.1} ADU, {:.0} % of the way from black to white; dark frames are darker, and nothing \
+             tells that these are such",
+            100.0 * share
         )
     })
 }
@@ -416,7 +466,9 @@ impl OpenCorrection {
                 )
             }),
         ];
-        let doubt = map.as_ref().and_then(DefectMap::finding).map(Note::Warning);
+        let means = darks.as_ref().and_then(DarkFrames::means);
+        let level = means.and_then(|means| doubt_of_level(&self.header().name, means, self.range_adu));
+        let doubt = map.as_ref().and_then(DefectMap::finding).into_iter().chain(level).map(Note::Warning);
         said.into_iter().flatten().map(Note::Remark).chain(doubt).collect()
     }
 

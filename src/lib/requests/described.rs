@@ -8,7 +8,7 @@ use crate::camera::optics::Exposure;
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
-use crate::metadata::{FrameHeader, Metadata};
+use crate::metadata::{CorrectionRecord, FrameHeader, Metadata};
 use crate::stages::black::Black;
 use crate::units::QuantityKind;
 use clap::Args;
@@ -107,6 +107,26 @@ impl Described {
         Ok(reader)
     }
 
+    /// Opens a frame that dark frames come off, as it is described: of its exposure the time may be said alone.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`], but a time needs no f-number.
+    pub fn open_light(&self, options: &InputOptions) -> Result<FrameReader> {
+        let mut reader = FrameReader::open(options)?;
+        let frame = reader.header_mut();
+        match self.exposure_s.filter(|_| self.f_number.is_none() && frame.metadata.exposure.is_none()) {
+            Some(said_s) => {
+                let known_s = frame.metadata.exposure_time_s;
+                agree(frame, "exposure time in s", other_than(Some(said_s), known_s), &["exposure"])?;
+                Self { exposure_s: None, ..*self }.apply(frame)?;
+                frame.metadata.exposure_time_s = known_s.or(Some(said_s));
+            }
+            None => self.apply(frame)?,
+        }
+        Ok(reader)
+    }
+
     /// Puts what is said into the metadata of a frame. One of unknown quantity whose array or levels are said is one of ADU.
     ///
     /// # Errors
@@ -133,6 +153,15 @@ impl Described {
         if let Some(white) = self.white_level_adu {
             check_codes(frame, &["white"])?;
             let known = frame.metadata.white_level_adu.filter(|known| *known != white.into());
+            let lost_black = frame.metadata.correction.as_ref().is_some_and(CorrectionRecord::took_black);
+            if lost_black && frame.metadata.white_level_adu.is_none() {
+                let problem = format!(
+                    "{}: black came off its samples before a white level was known, so that saturated ones are neither marked nor \
+                     told by a level any more; correct it anew, with the white level given to `correct-frame`",
+                    frame.name
+                );
+                return Err(Error::Usage(problem).leave_out(&["white"]));
+            }
             agree(frame, "white level", known.map(|known| in_words(&known.classes())), &["white"])?;
             frame.metadata.white_level_adu = Some(white.into());
         }
@@ -165,7 +194,7 @@ impl SaidExposure {
             return Ok(());
         }
         let known = frame.metadata.exposure;
-        let [time, f_number] = [known.map(|known| known.exposure_s), known.map(|known| known.f_number)];
+        let [time, f_number] = [frame.metadata.time_s(), known.map(|known| known.f_number)];
         let is_stated = |passed: &f64| *passed != 1.0 || frame.metadata.scene.is_some();
         let passed = known.map(|known| known.lens_transmittance).filter(is_stated);
         agree(frame, "exposure time in s", other_than(self.exposure_s, time), &["exposure"])?;
@@ -188,6 +217,7 @@ impl SaidExposure {
             return Err(Error::Usage(problem).give(missing));
         };
         frame.metadata.exposure = Some(Exposure { exposure_s, f_number, lens_transmittance }.checked()?);
+        frame.metadata.exposure_time_s = None;
         Ok(())
     }
 }
@@ -228,13 +258,13 @@ const LARGEST_CODE: f64 = 65_535.0;
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for one that is not below the white level, or where none is known the codes of 16 bits, where the metadata say
-/// nothing of no light.
+/// [`Error::Usage`] for one that is not below the white level, or where none is known the codes of 16 bits.
 pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>> {
     let Black::Level(black) = black else { return Ok(None) };
     let (level, said) = (black.largest(), in_words(&black.sites()));
     let white = frame.metadata.white_level_adu.map(|white| white.largest());
-    if let Some(white) = white.filter(|white| level >= *white && frame.metadata.black_level_adu.is_none()) {
+    let are_codes = matches!(frame.metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
+    if let Some(white) = white.filter(|white| are_codes && level >= *white) {
         let problem = format!("{}: --black {said} is not below the white level, {white} ADU", frame.name);
         return Err(Error::Usage(problem).change(&["black", "white"]));
     }
@@ -318,15 +348,15 @@ impl DescribedWithBlack {
 
 impl DescribedWithBlack {
     /// Puts what is said into the metadata of a frame of which the exposure time counts and the lens does not, and gives that
-    /// time in s; `tagged_s` is that of its file's tags.
+    /// time in s; 0 is none.
     ///
     /// # Errors
     ///
     /// As [`Self::apply`], but a time needs no f-number.
-    pub fn apply_time(&self, frame: &mut FrameHeader, tagged_s: Option<f64>) -> Result<Option<f64>> {
+    pub fn apply_time(&self, frame: &mut FrameHeader) -> Result<Option<f64>> {
         let Described { exposure_s: said_s, f_number, .. } = self.described;
         let known = frame.metadata.exposure;
-        let known_s = known.map(|known| known.exposure_s).or(tagged_s);
+        let known_s = frame.metadata.time_s().filter(|time_s| *time_s > 0.0);
         agree(frame, "exposure time in s", other_than(said_s, known_s), &["exposure"])?;
         agree(frame, "f-number", other_than(f_number, known.map(|known| known.f_number)), &["f_number"])?;
         let described = Described { exposure_s: None, f_number: None, ..self.described };

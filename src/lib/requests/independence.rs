@@ -1,9 +1,11 @@
 //! Whether frames that count as independent are: noise that stands in two of them counts as if it were drawn twice.
 
 use crate::error::{Error, Result};
+use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::places::place;
-use crate::metadata::{DrawnExposures, FrameHeader};
+use crate::metadata::{DrawnExposures, FrameHeader, TakenAs};
 use crate::random::Source;
+use crate::stream::RowSource;
 use std::path::{Path, PathBuf};
 
 /// What a frame is taken for beside others.
@@ -32,6 +34,18 @@ impl Role {
             Self::Flat => "a flat",
             Self::FlatDark => "a dark frame of the flats",
             Self::Exposure => "an exposure",
+        }
+    }
+
+    /// What is wrong with a frame that was taken as something else; `Err` where it cannot be meant.
+    fn doubt_of(self, taken_as: TakenAs) -> std::result::Result<Option<&'static str>, ()> {
+        match (self, taken_as) {
+            (Self::Dark | Self::FlatDark | Self::Bias, TakenAs::Light | TakenAs::Flat)
+            | (Self::Flat, TakenAs::Dark | TakenAs::Bias) => Err(()),
+            (Self::Dark | Self::FlatDark, TakenAs::Bias) => Ok(Some("it has next to none of the dark signal")),
+            (Self::Bias, TakenAs::Dark) => Ok(Some("its dark signal comes off too")),
+            (Self::Flat, TakenAs::Light) => Ok(Some("a flat field is lit evenly")),
+            _ => Ok(None),
         }
     }
 
@@ -91,9 +105,26 @@ impl Company {
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] for frames of one kind with the same noise, and for frames of two kinds with the same samples.
+    /// [`Error::Format`] for frames of one kind with the same noise, for frames of two kinds with the same samples, and for those that
+    /// were taken as what they cannot be used as.
     pub fn check(&self) -> Result<Vec<String>> {
         let mut warnings = Vec::new();
+        for (role, frame) in &self.0 {
+            let Some(taken_as) = frame.metadata.taken_as else { continue };
+            let (name, taken, used) = (&frame.name, taken_as.in_words(), role.in_words());
+            match role.doubt_of(taken_as) {
+                Ok(None) => {}
+                Ok(Some(problem)) => {
+                    warnings.push(format!("{name}: it was taken as {taken} and is used as {used}; {problem}"))
+                }
+                Err(()) => {
+                    return Err(frame.refuse(format!(
+                        "it was taken as {taken}, by its own header or metadata (`taken_as`), and is given as {used}; name another \
+                         file, or correct what is said of it by `taken_as` in {name}.yaml"
+                    )));
+                }
+            }
+        }
         for (index, (role, frame)) in self.0.iter().enumerate() {
             for (other_role, other) in self.0[..index].iter().filter(|(other, _)| !other.may_be(*role)) {
                 let (name, its) = (&frame.name, &other.name);
@@ -135,13 +166,12 @@ impl Company {
 
     /// A warning for each bias frame that is exposed for longer than a frame from which it comes off.
     fn long_biases(&self) -> impl Iterator<Item = String> {
-        let exposure_s = |frame: &FrameHeader| frame.metadata.exposure.map(|exposure| exposure.exposure_s);
         let biases = self.0.iter().filter(|(role, _)| *role == Role::Bias);
         biases.filter_map(move |(_, bias)| {
-            let its = exposure_s(bias)?;
+            let its = bias.metadata.time_s()?;
             let others = self.0.iter().filter(|(role, _)| *role != Role::Bias);
             let (other, shorter) = others
-                .filter_map(|(_, other)| Some((other, exposure_s(other)?)))
+                .filter_map(|(_, other)| Some((other, other.metadata.time_s()?)))
                 .find(|(_, exposure_s)| its > exposure_s * (1.0 + SAME_EXPOSURE))?;
             Some(format!(
                 "{}: its exposure is {its} s, longer than that of {}, {shorter} s; a bias frame has next to none, and its dark \
@@ -150,6 +180,55 @@ impl Company {
             ))
         })
     }
+}
+
+/// Makes sure that none of some files has the very samples of another: noise is never drawn twice the same. Files whose samples are
+/// all of one level, and those whose metadata tell that they have no noise, are alone in being alike.
+///
+/// # Errors
+///
+/// [`Error::Format`] for a copy; those of the files.
+pub fn check_contents(light: &InputOptions, others: &[(Role, InputOptions)]) -> Result<()> {
+    let is_file = |options: &InputOptions| options.path.as_deref().is_some_and(Path::is_file);
+    if !is_file(light) {
+        return Ok(());
+    }
+    for (role, other) in others.iter().filter(|(_, other)| is_file(other)) {
+        let [mut a, mut b] = [FrameReader::open(light)?, FrameReader::open(other)?];
+        if a.header().is_noisy() && b.header().is_noisy() && hold_the_same(&mut a, &mut b)? {
+            return Err(b.header().refuse(format!(
+                "its samples are those of {}, every one; a copy of the frame is not {}",
+                a.header().name,
+                role.in_words()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Whether two frames have the same samples, which are not all the same; they are read up to the first that differs.
+fn hold_the_same(a: &mut FrameReader, b: &mut FrameReader) -> Result<bool> {
+    let (geometry, other) = (a.header().geometry.clone(), &b.header().geometry);
+    if [geometry.width, geometry.height] != [other.width, other.height] || geometry.channels != other.channels {
+        return Ok(false);
+    }
+    let step = geometry.step_rows(a.natural_rows().max(b.natural_rows())).max(1);
+    let (mut of_a, mut of_b, mut first, mut differs) = (Vec::new(), Vec::new(), None, false);
+    let mut read = 0;
+    while read < geometry.height {
+        let rows = step.min(geometry.height - read);
+        of_a.clear();
+        of_b.clear();
+        a.read(rows, &mut of_a)?;
+        b.read(rows, &mut of_b)?;
+        if of_a != of_b {
+            return Ok(false);
+        }
+        let level = *first.get_or_insert(of_a[0]);
+        differs |= of_a.iter().any(|sample| *sample != level);
+        read += rows;
+    }
+    Ok(differs)
 }
 
 /// Exposures that differ by no more than this are the same, written with other digits.

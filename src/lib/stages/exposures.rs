@@ -103,8 +103,8 @@ impl Exposures {
             or_unknown(metadata.sensor.as_ref().map(|sensor| format!("{}{seed}", sensor.name)))
         })?;
         compare("exposure", &|frame| {
-            let exposure = frame.metadata.exposure;
-            or_unknown(exposure.map(|exposure| format!("{} s at f/{}", exposure.exposure_s, exposure.f_number)))
+            let aperture = frame.metadata.exposure.map(|exposure| format!(" at f/{}", exposure.f_number));
+            or_unknown(frame.metadata.time_s().map(|time_s| format!("{time_s} s{}", aperture.unwrap_or_default())))
         })?;
         let (a, b) = (&first.metadata.scene, &frame.metadata.scene);
         if a != b {
@@ -128,10 +128,31 @@ impl Exposures {
 /// What is known of the camera and of how it was set, and nothing else.
 fn camera(frame: &FrameHeader) -> Metadata {
     let Metadata {
-        quantity, sensor, camera, iso_speed, camera_settings, exposure, adc, noise, white_level_adu, ..
+        quantity,
+        sensor,
+        camera,
+        iso_speed,
+        camera_settings,
+        exposure,
+        taken_as,
+        adc,
+        noise,
+        white_level_adu,
+        ..
     } = frame.without_exposure().metadata;
     let of_quantity = Metadata::new(quantity);
-    Metadata { sensor, camera, iso_speed, camera_settings, exposure, adc, noise, white_level_adu, ..of_quantity }
+    Metadata {
+        sensor,
+        camera,
+        iso_speed,
+        camera_settings,
+        exposure,
+        taken_as,
+        adc,
+        noise,
+        white_level_adu,
+        ..of_quantity
+    }
 }
 
 /// What is known of its black level.

@@ -8,7 +8,7 @@ use super::tags;
 use crate::camera::optics::Exposure;
 use crate::cfa::{FILTERS, FilterArray};
 use crate::error::Result;
-use crate::formats::exposure;
+use crate::formats::exposure::{self, ToldExposure};
 use crate::formats::tiff::{Directory, TiffFile, passed_over};
 use crate::metadata::Metadata;
 use crate::text::visible;
@@ -44,7 +44,7 @@ pub(super) fn describe(
     let directories: Vec<&Directory> = std::iter::once(&image.first).chain(&below).collect();
     let mut of_exposure = Vec::new();
     let exposure = told_exposure(file, &directories, &mut of_exposure);
-    metadata.exposure = passed_over(exposure, "its exposure", &mut of_exposure)?;
+    ToldExposure::describe(passed_over(exposure, "its exposure", &mut of_exposure)?, &mut metadata);
     notes.extend(of_exposure.into_iter().filter(|_| !is_ours));
     metadata.iso_speed = passed_over(told_sensitivity(file, &directories), "its sensitivity", notes)?;
     // No sample depends on it either.
@@ -150,8 +150,12 @@ fn told_sensitivity(file: &mut TiffFile, directories: &[&Directory]) -> Result<O
     }
 }
 
-/// Exposure time and f-number, where both are known.
-fn told_exposure(file: &mut TiffFile, directories: &[&Directory], notes: &mut Vec<String>) -> Result<Option<Exposure>> {
+/// Exposure time and f-number, or the time alone.
+fn told_exposure(
+    file: &mut TiffFile,
+    directories: &[&Directory],
+    notes: &mut Vec<String>,
+) -> Result<Option<ToldExposure>> {
     // Lenses without contacts leave zeros.
     let mut number = |tag: tags::DngTag| -> Result<Option<f64>> {
         let Some(directory) = directories.iter().find(|directory| tag.is_in(directory)) else { return Ok(None) };
@@ -172,14 +176,14 @@ pub(in crate::formats) fn told_orientation(number: Option<usize>, notes: &mut Ve
     found
 }
 
-/// The exposure of a raw file that tells so much of it, where both are known; notes tell what is passed over.
+/// The exposure of a raw file that tells so much of it; notes tell what is passed over.
 pub(in crate::formats) fn exposure_of(
     exposure_s: Option<f64>,
     f_number: Option<f64>,
     notes: &mut Vec<String>,
-) -> Option<Exposure> {
+) -> Option<ToldExposure> {
     let found = exposure::of_parts(exposure_s, f_number, ["ExposureTime", "FNumber"], notes);
-    if found.is_some() {
+    if matches!(found, Some(ToldExposure::Whole(_))) {
         notes.push("its lens is taken to lose no light: the file does not tell the transmittance".into());
     }
     found

@@ -201,8 +201,9 @@ fn of_file(metadata: &Metadata, samples: TiffSamples, color: Option<&CameraColor
 
 /// Exposure and sensitivity, as Exif has them; no tags where they are unknown.
 pub(in crate::formats) fn of_exposure(metadata: &Metadata) -> Vec<ExtraTag> {
-    let settings = metadata.exposure.map(|e| [(tags::EXPOSURE_TIME, e.exposure_s), (tags::F_NUMBER, e.f_number)]);
-    let settings = settings.into_iter().flatten().map(|(tag, value)| (tag, ratio(value)));
+    let aperture = metadata.exposure.map(|exposure| exposure.f_number);
+    let settings = [(tags::EXPOSURE_TIME, metadata.time_s()), (tags::F_NUMBER, aperture)];
+    let settings = settings.into_iter().filter_map(|(tag, value)| Some((tag, ratio(value?))));
     let mut found: Vec<ExtraTag> = settings
         .filter(|(_, [above, _])| *above > 0)
         .map(|(tag, ratio)| tag.with(TagValue::Ratios(vec![ratio])))
@@ -226,9 +227,9 @@ fn of_sensitivity(iso: f64) -> Vec<ExtraTag> {
     if whole > 0 { found } else { Vec::new() }
 }
 
-/// The name of the sensor, in the letters that the tags allow.
+/// The name of the sensor, or else of the camera, in the letters that the tags allow.
 fn camera_name(metadata: &Metadata) -> String {
-    let name = metadata.sensor.as_ref().map_or(NAMELESS, |sensor| sensor.name.trim());
+    let name = metadata.camera_names().map(str::trim).find(|name| !name.is_empty()).unwrap_or(NAMELESS);
     let ascii: String = name.chars().map(|c| if c == ' ' || c.is_ascii_graphic() { c } else { '_' }).collect();
     if ascii.is_empty() { NAMELESS.into() } else { ascii }
 }

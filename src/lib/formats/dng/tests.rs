@@ -418,7 +418,9 @@ fn the_largest_image_of_full_size_is_the_raw_one() {
     let reader = open(&first.file(&below), RawArea::Active).unwrap();
     assert_eq!(
         reader.notes(),
-        [String::from("its exposure time of 0.03333333333333333 s is passed over: it has no f-number (FNumber)")]
+        [String::from(
+            "its exposure time of 0.03333333333333333 s tells dark frames apart and no more: it has no f-number (FNumber)"
+        )]
     );
     assert_eq!(read(reader, 5).unwrap(), floats(&large));
 

@@ -109,9 +109,11 @@ fn own_tags(tags: &ExrTags, geometry: &Geometry, notes: &mut Vec<String>) -> Met
         metadata.unit = emissive_unit(tags);
     }
     metadata.iso_speed = tags.iso_speed.filter(|iso| *iso > 0.0 && iso.is_finite());
+    let is_time = |time_s: &f64| *time_s > 0.0 && time_s.is_finite();
+    metadata.exposure_time_s = tags.exposure_s.filter(is_time);
     if let Some((exposure_s, f_number)) = tags.exposure_s.zip(tags.f_number) {
         match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
-            Ok(exposure) => metadata.exposure = Some(exposure),
+            Ok(exposure) => (metadata.exposure, metadata.exposure_time_s) = (Some(exposure), None),
             Err(error) => notes.push(format!("its attributes expTime and aperture are passed over: {error}")),
         }
     }

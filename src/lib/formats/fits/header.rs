@@ -1,7 +1,7 @@
 //! The cards of a header, and what they say of the array behind them.
 
 use crate::error::{Error, Result};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 
 /// Bytes of a block: headers and arrays fill whole ones.
@@ -11,11 +11,11 @@ const CARD_BYTES: usize = 80;
 /// A header may have this many bytes.
 const MOST_BYTES: usize = 64 << 20;
 /// Keywords that are kept besides those that begin with `NAXIS`; a header may have very many.
-const KEPT: [&str; 33] = [
+const KEPT: [&str; 36] = [
     "SIMPLE", "XTENSION", "BITPIX", "PCOUNT", "GCOUNT", "GROUPS", "ZIMAGE", "BSCALE", "BZERO", "BLANK", "BUNIT",
     "EXTNAME", "BAYERPAT", "COLORTYP", "XBAYROFF", "YBAYROFF", "ROWORDER", "EXPTIME", "EXPOSURE", "EXPOINUS",
     "FOCALLEN", "APTDIA", "FOCRATIO", "CCD-TEMP", "GAIN", "EGAIN", "PEDESTAL", "OFFSET", "BLKLEVEL", "INSTRUME",
-    "READOUTM", "XBINNING", "YBINNING",
+    "READOUTM", "XBINNING", "YBINNING", "IMAGETYP", "FRAME", "OBSTYPE",
 ];
 
 /// The value of a card.
@@ -35,6 +35,8 @@ pub(super) enum Value {
 #[derive(Debug, Default)]
 pub(super) struct Header {
     cards: BTreeMap<String, Value>,
+    /// Keywords that stand there again with another value.
+    pub repeated: BTreeSet<String>,
     /// Its bytes, in whole blocks.
     pub bytes: u64,
 }
@@ -73,7 +75,11 @@ impl Header {
                 if let Some(value) = rest.strip_prefix("= ")
                     && (KEPT.contains(&keyword) || keyword.starts_with("NAXIS"))
                 {
-                    header.cards.entry(keyword.to_owned()).or_insert_with(|| value_of(value));
+                    let value = value_of(value);
+                    let counts = header.cards.entry(keyword.to_owned()).or_insert_with(|| value.clone());
+                    if *counts != value {
+                        header.repeated.insert(keyword.to_owned());
+                    }
                 }
             }
             if block.len() < BLOCK_BYTES {
@@ -86,7 +92,8 @@ impl Header {
     /// A header of these cards.
     #[cfg(test)]
     pub fn of(cards: &[(&str, Value)]) -> Self {
-        Self { cards: cards.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect(), bytes: 0 }
+        let cards = cards.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+        Self { cards, ..Self::default() }
     }
 
     /// The number of a keyword, which some programs write as a text; none where there is none.

@@ -1,16 +1,21 @@
 //! What keywords tell of the camera. Those of filter arrays are no part of the standard; programs agree on most of them.
 
 use super::header::{Header, whole};
-use crate::camera::optics::Exposure;
 use crate::cfa::FilterArray;
-use crate::formats::exposure;
-use crate::metadata::{CameraSettings, Metadata};
+use crate::formats::exposure::{self, ToldExposure};
+use crate::metadata::{CameraSettings, Metadata, TakenAs};
 use crate::text::visible;
 use crate::units::{QuantityKind, kelvin};
 use std::ops::RangeInclusive;
 
 /// Microseconds in a second.
 const US_PER_S: f64 = 1e6;
+
+/// Keywords of one thing whose numbers differ by more than this contradict each other; what is less is written with other digits.
+const SAME_NUMBER: f64 = 1e-3;
+
+/// The same of f-numbers, which are told in names, 5.6, and computed, 400/71.
+const SAME_APERTURE: f64 = 0.03;
 
 /// Temperatures that sensors have; programs write others where they know none.
 const SENSOR_K: RangeInclusive<f64> = 50.0..=400.0;
@@ -19,12 +24,12 @@ const SENSOR_K: RangeInclusive<f64> = 50.0..=400.0;
 #[derive(Debug)]
 pub(super) struct Told {
     pub metadata: Metadata,
-    /// Exposure time in s, with an f-number or without.
-    pub exposure_s: Option<f64>,
     /// The first row of the array is the lowest of the picture.
     pub is_bottom_up: bool,
     /// What was passed over, and why.
     pub notes: Vec<String>,
+    /// What contradicts itself.
+    pub doubts: Vec<String>,
 }
 
 /// Reads the keywords of an image of `channels` planes of integers or floats.
@@ -34,7 +39,7 @@ pub(super) struct Told {
 /// file that has none is taken to begin with its top row, as cameras write it. A single plane of integers behind filters is one
 /// of ADU.
 pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
-    let mut notes = Vec::new();
+    let (mut notes, mut doubts) = (Vec::new(), doubts_of_repeated(header));
     let is_bottom_up = match header.text("ROWORDER").map(str::to_ascii_uppercase).as_deref() {
         Some("TOP-DOWN") => false,
         Some("BOTTOM-UP") => true,
@@ -45,7 +50,7 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
             false
         }
     };
-    let cfa = filters(header, channels, &mut notes);
+    let cfa = filters(header, channels, &mut notes, &mut doubts);
     let is_code = |unit: &str| ["adu", "dn", "count", "counts"].iter().any(|name| unit.eq_ignore_ascii_case(name));
     let is_electron =
         |unit: &str| ["electron", "electrons", "e-", "e"].iter().any(|name| unit.eq_ignore_ascii_case(name));
@@ -67,18 +72,24 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     });
     metadata.cfa = cfa;
     metadata.camera = header.text("INSTRUME").map(|camera| visible(camera).into_owned());
-    let exposure_s = told_time(header);
-    metadata.exposure = told_exposure(header, exposure_s, &mut notes);
+    let exposure = told_exposure(header, told_time(header, &mut doubts), &mut notes, &mut doubts);
+    ToldExposure::describe(exposure, &mut metadata);
+    metadata.taken_as = taken_as(header, &mut doubts);
     metadata.sensor_temperature_k = told_temperature(header, &mut notes);
     metadata.camera_settings = told_settings(header);
     note_settings(header, &mut notes);
-    let exposure_s = exposure_s.filter(|seconds| *seconds > 0.0 && seconds.is_finite());
-    Told { metadata, exposure_s, is_bottom_up, notes }
+    Told { metadata, is_bottom_up, notes, doubts }
 }
 
 /// The filter array of a single plane.
-fn filters(header: &Header, channels: usize, notes: &mut Vec<String>) -> Option<FilterArray> {
-    let letters = header.text("BAYERPAT").or_else(|| header.text("COLORTYP"))?.to_ascii_uppercase();
+fn filters(header: &Header, channels: usize, notes: &mut Vec<String>, doubts: &mut Vec<String>) -> Option<FilterArray> {
+    let told = ["BAYERPAT", "COLORTYP"].map(|key| header.text(key).map(str::to_ascii_uppercase));
+    if let [Some(one), Some(other)] = &told
+        && one != other
+    {
+        doubts.push(format!("its filter array is `{one}` by BAYERPAT and `{other}` by COLORTYP; BAYERPAT counts"));
+    }
+    let letters = told.into_iter().flatten().next()?;
     if ["MONO", "NONE", "RGB", "COLOR"].contains(&letters.as_str()) {
         return None;
     }
@@ -109,10 +120,64 @@ fn filters(header: &Header, channels: usize, notes: &mut Vec<String>) -> Option<
     array
 }
 
+/// A doubt of each keyword that stands in the header again with another value.
+fn doubts_of_repeated(header: &Header) -> Vec<String> {
+    let doubt = |key: &String| format!("its keyword {key} stands there again with another value; the first counts");
+    header.repeated.iter().map(doubt).collect()
+}
+
+/// The first number of several keywords for one thing; a doubt of another that differs from it by more than a share.
+fn first_of(what: &str, told: &[(&str, Option<f64>)], share: f64, doubts: &mut Vec<String>) -> Option<f64> {
+    let mut known = told.iter().filter_map(|(key, number)| Some((*key, (*number)?)));
+    let (first, counts) = known.next()?;
+    let differs = |other: f64| !((other - counts).abs() <= share * counts.abs().max(other.abs()));
+    if let Some((other, number)) = known.find(|(_, number)| differs(*number)) {
+        doubts.push(format!("its {what} is {counts} by {first} and {number} by {other}; {first} counts"));
+    }
+    Some(counts)
+}
+
 /// Exposure time in s.
-fn told_time(header: &Header) -> Option<f64> {
-    let seconds = header.number("EXPTIME").or_else(|| header.number("EXPOSURE"));
-    seconds.or_else(|| Some(header.number("EXPOINUS")? / US_PER_S))
+fn told_time(header: &Header, doubts: &mut Vec<String>) -> Option<f64> {
+    let told = [
+        ("EXPTIME", header.number("EXPTIME")),
+        ("EXPOSURE", header.number("EXPOSURE")),
+        ("EXPOINUS", header.number("EXPOINUS").map(|us| us / US_PER_S)),
+    ];
+    first_of("exposure time in s", &told, SAME_NUMBER, doubts)
+}
+
+/// What the frame was taken as, by the words of capture programs and observatories; none where keywords differ.
+fn taken_as(header: &Header, doubts: &mut Vec<String>) -> Option<TakenAs> {
+    let told = ["IMAGETYP", "FRAME", "OBSTYPE"].into_iter().filter_map(|key| {
+        let text = header.text(key)?;
+        Some((key, text, kind_of(text)?))
+    });
+    let told: Vec<_> = told.collect();
+    let (key, text, kind) = *told.first()?;
+    if let Some((other, its, _)) = told.iter().find(|(.., other)| *other != kind) {
+        doubts.push(format!(
+            "it was taken as `{}` by {key} and as `{}` by {other}; neither is believed",
+            visible(text),
+            visible(its)
+        ));
+        return None;
+    }
+    Some(kind)
+}
+
+/// What a word for a kind of frame means: `Light Frame`, `DARKFLAT`, `zero`, `object` …; a dark frame of flats is one.
+fn kind_of(text: &str) -> Option<TakenAs> {
+    let text = text.to_ascii_lowercase();
+    let has = |words: &[&str]| words.iter().any(|word| text.contains(word));
+    let is = |words: &[&str]| words.contains(&text.as_str());
+    match () {
+        () if has(&["dark"]) => Some(TakenAs::Dark),
+        () if has(&["bias"]) || is(&["zero", "offset"]) => Some(TakenAs::Bias),
+        () if has(&["flat", "twilight"]) => Some(TakenAs::Flat),
+        () if has(&["light"]) || is(&["object", "science"]) => Some(TakenAs::Light),
+        () => None,
+    }
 }
 
 /// The temperature of the sensor in K.
@@ -128,10 +193,17 @@ fn told_temperature(header: &Header, notes: &mut Vec<String>) -> Option<f64> {
     is_possible.then_some(kelvin)
 }
 
-/// Exposure time and f-number, which count together; the transmittance of the lens, which no keyword has, is 1.
-fn told_exposure(header: &Header, exposure_s: Option<f64>, notes: &mut Vec<String>) -> Option<Exposure> {
+/// Exposure time and f-number, or the time alone; the transmittance of the lens, which no keyword has, is 1.
+fn told_exposure(
+    header: &Header,
+    exposure_s: Option<f64>,
+    notes: &mut Vec<String>,
+    doubts: &mut Vec<String>,
+) -> Option<ToldExposure> {
     let ratio = || Some(header.number("FOCALLEN")? / header.number("APTDIA").filter(|diameter| *diameter > 0.0)?);
-    let f_number = ratio().filter(|number| *number > 0.0).or_else(|| header.number("FOCRATIO"));
+    let told =
+        [("FOCALLEN and APTDIA", ratio().filter(|number| *number > 0.0)), ("FOCRATIO", header.number("FOCRATIO"))];
+    let f_number = first_of("f-number", &told, SAME_APERTURE, doubts);
     exposure::of_parts(exposure_s, f_number, ["EXPTIME", "FOCALLEN and APTDIA, or FOCRATIO"], notes)
 }
 

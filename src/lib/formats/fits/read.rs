@@ -8,6 +8,7 @@ use crate::formats::format::{
     FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign, Streaming, behind_zeros,
 };
 use crate::formats::read_ahead::Pipe;
+use crate::formats::register;
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::Metadata;
 use std::fs::File;
@@ -217,6 +218,7 @@ fn described(name: &str, header: &Header, array: &Array) -> Result<(Form, Geomet
     let geometry = geometry(name, &array.axes)?;
     let mut told = keywords::read(header, geometry.channels.len(), array.bitpix > 0 && !form.is_scaled());
     told.notes.extend(form.notes());
+    told.doubts.drain(..).for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
     Ok((form, geometry, told))
 }
 
@@ -359,10 +361,6 @@ impl SampleReader for FitsReader {
 
     fn own_tags(&self) -> &Metadata {
         &self.told.metadata
-    }
-
-    fn exposure_s(&self) -> Option<f64> {
-        self.told.exposure_s
     }
 
     fn notes(&self) -> &[String] {

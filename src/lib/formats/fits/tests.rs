@@ -276,11 +276,11 @@ fn keywords_of_the_camera_are_used_or_told() {
     }
     let (metadata, notes) = told(&[("EXPTIME", text("2.5"))]);
     assert_eq!(metadata.exposure, None);
-    assert!(notes.starts_with("its exposure time of 2.5 s is passed over: it has no f-number"));
+    assert!(notes.starts_with("its exposure time of 2.5 s tells dark frames apart and no more: it has no f-number"));
     assert!(told(&lens).1.starts_with("its f-number of 4 is passed over: it has no exposure time"));
     // Flats and darks need no f-number.
-    let seconds = |value: f64| keywords::read(&Header::of(&[("EXPTIME", number(value))]), 1, true).exposure_s;
-    assert_eq!([2.5, 0.0].map(seconds), [Some(2.5), None]);
+    let seconds = |value: f64| told(&[("EXPTIME", number(value))]).0.exposure_time_s;
+    assert_eq!([2.5, 0.0, -1.0].map(seconds), [Some(2.5), Some(0.0), None]);
     let (metadata, notes) = told(&[("EXPTIME", number(0.0)), ("FOCRATIO", number(4.0))]);
     assert_eq!(metadata.exposure, None);
     assert!(notes.starts_with("its exposure is passed over: an exposure of 0 s is impossible"));

@@ -1,5 +1,6 @@
 //! Opens frames of any format, from files and pipes, with the metadata that belongs to them.
 
+mod codes;
 mod kept;
 mod metadata;
 mod opening;
@@ -7,6 +8,7 @@ mod options;
 
 pub use options::{InputOptions, Linearizing};
 
+use self::codes::CodeCheck;
 use self::kept::{LEFT_OUT, cut, keep_planes, left_out, take_channel};
 use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
 use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
@@ -64,6 +66,7 @@ pub struct FrameReader {
     header: FrameHeader,
     rows_read: usize,
     check: Option<DigestCheck>,
+    codes: Option<CodeCheck>,
     mismatch: Option<String>,
     buffer: Vec<f32>,
     /// What stored samples were multiplied with for viewers.
@@ -188,6 +191,9 @@ impl FrameReader {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
         let Found { mut metadata, sidecar, place } =
             find_metadata(reader.as_ref(), name, path, options.metadata.as_deref())?;
+        if metadata.time_s().is_none() {
+            metadata.exposure_time_s = reader.own_tags().time_s();
+        }
         let stored = reader.geometry();
         let to_come = metadata.frames_to_come.take().unwrap_or_default();
         let scaling = take_scaling(reader.as_ref(), &mut metadata, &place, name)?;
@@ -236,6 +242,7 @@ impl FrameReader {
             rows_read: 0,
             // A digest is one of all samples.
             check: check.filter(|_| options.crop.is_none()),
+            codes: None,
             mismatch: None,
             buffer: Vec::new(),
             scaling,
@@ -276,11 +283,6 @@ impl FrameReader {
     /// The type of the stored samples; none where channels differ in it.
     pub fn sample_type(&self) -> Option<SampleType> {
         self.reader.stored_as()
-    }
-
-    /// The exposure time in s that the file's tags tell, with an f-number or without.
-    pub fn exposure_s(&self) -> Option<f64> {
-        self.reader.exposure_s()
     }
 
     /// What the file's tags say of its colors.
@@ -411,6 +413,15 @@ impl FrameReader {
         Ok(())
     }
 
+    /// Makes sure that rows hold what their metadata say, in the channels that are planes.
+    fn look_at_codes(&mut self, rows: &[f32]) -> Result<()> {
+        let Some(codes) = &mut self.codes else { return Ok(()) };
+        let geometry = &self.header.geometry;
+        let planes = if self.header.leads_with_three_planes() { 3 } else { 1 };
+        rows.chunks_exact(geometry.row_samples().max(1))
+            .try_for_each(|row| codes.look(&row[..planes * geometry.width], &self.header.name))
+    }
+
     fn check_digest(&mut self) {
         let Some(DigestCheck { expected, sidecar, digest }) = self.check.take() else { return };
         if digest.finish() != expected {
@@ -440,6 +451,7 @@ impl RowSource for FrameReader {
         let mut buffer = std::mem::take(&mut self.buffer);
         if !self.has_begun {
             self.has_begun = true;
+            self.codes = CodeCheck::of(&self.header).filter(|_| self.linearize.is_none());
             self.pass_over(self.corner[1], &mut buffer)?;
         }
         let stored = self.reader.geometry();
@@ -479,6 +491,7 @@ impl RowSource for FrameReader {
                 }
             }
         }
+        self.look_at_codes(&samples[first..])?;
         if let Some(linearize) = &self.linearize {
             let row_samples = self.header.geometry.row_samples();
             samples[first..].chunks_exact_mut(row_samples).for_each(|row| linearize.apply(&mut row[..kept * width]));

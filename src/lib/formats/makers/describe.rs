@@ -9,6 +9,7 @@ use crate::color::calibration::{Calibration, Illuminated, Light};
 use crate::error::{Error, Result};
 use crate::formats::data::load_observer;
 use crate::formats::dng::{RawArea, Rectangle, exposure_of, temperature_k, told_orientation};
+use crate::formats::exposure::ToldExposure;
 use crate::metadata::{Metadata, RelativeMatrix};
 use crate::text::visible;
 use crate::units::QuantityKind;
@@ -66,7 +67,8 @@ pub(super) fn describe(head: &Head, name: &str, part: RawArea) -> Result<Describ
     metadata.black_level_adu = Some(black);
     metadata.white_level_adu = Some(white.into());
     let positive = |number: Option<f64>| number.filter(|number| *number > 0.0 && number.is_finite());
-    metadata.exposure = exposure_of(positive(head.exposure_s), positive(head.f_number), &mut notes);
+    let exposure = exposure_of(positive(head.exposure_s), positive(head.f_number), &mut notes);
+    ToldExposure::describe(exposure, &mut metadata);
     metadata.relative_matrix = relative_matrix(head, cfa, &mut notes)?;
     metadata.iso_speed = head.iso.map(f64::from);
     metadata.orientation = told_orientation(head.orientation.map(usize::from), &mut notes);

@@ -3,6 +3,7 @@
 use super::PLACE;
 use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
+use crate::formats::exposure::ToldExposure;
 use crate::formats::foreign::png_damage;
 use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign};
 use crate::formats::tiff;
@@ -88,7 +89,7 @@ impl PngReader {
         let mut own_tags = Metadata::new(QuantityKind::Unspecified);
         let mut notes = if embedded.is_some() { Vec::new() } else { notes(reader.info()) };
         if let Some(exif) = reader.info().exif_metadata.as_deref().filter(|_| embedded.is_none()) {
-            own_tags.exposure = tiff::exposure_of_block(exif, name, &mut notes)?;
+            ToldExposure::describe(tiff::exposure_of_block(exif, name, &mut notes)?, &mut own_tags);
         }
         let place = place(&copy, start).unwrap_or_default();
         let origin = place.unwrap_or_default();

@@ -5,10 +5,9 @@
 use super::directory::{Directory, TiffFile};
 use super::layout::{Layout, PHOTOMETRIC_CFA, passed_over};
 use crate::camera::levels::{BlackLevel, WhiteLevel};
-use crate::camera::optics::Exposure;
 use crate::cfa::{FILTERS, FilterArray};
 use crate::error::Result;
-use crate::formats::exposure;
+use crate::formats::exposure::{self, ToldExposure};
 use crate::formats::format::SampleType;
 use crate::metadata::Metadata;
 use crate::units::QuantityKind;
@@ -46,7 +45,8 @@ const MOST_SITES: u64 = 64;
 pub(super) fn read(file: &mut TiffFile, directory: &Directory, layout: &mut Layout) -> Result<Metadata> {
     let mut metadata = Metadata::new(QuantityKind::Unspecified);
     let notes = &mut layout.notes;
-    metadata.exposure = passed_over(told_exposure(file, directory, notes), "its exposure", notes)?;
+    let exposure = passed_over(told_exposure(file, directory, notes), "its exposure", notes)?;
+    ToldExposure::describe(exposure, &mut metadata);
     let is_cfa = [CFA_DIMENSIONS, CFA_PATTERN].iter().any(|tag| directory.has(*tag))
         || passed_over(file.one(directory, Tag::PhotometricInterpretation), "its color", notes)?
             == Some(PHOTOMETRIC_CFA);
@@ -75,12 +75,12 @@ fn is_integer(stored: SampleType) -> bool {
     !matches!(stored, SampleType::F16 | SampleType::F32 | SampleType::F64)
 }
 
-/// Exposure time and f-number, which count together; the transmittance of the lens, which no tag has, is 1.
+/// Exposure time and f-number, or the time alone; the transmittance of the lens, which no tag has, is 1.
 pub(super) fn told_exposure(
     file: &mut TiffFile,
     directory: &Directory,
     notes: &mut Vec<String>,
-) -> Result<Option<Exposure>> {
+) -> Result<Option<ToldExposure>> {
     let below = passed_over(file.below(directory, EXIF), "its Exif", notes)?;
     let mut found = [None; 2];
     for directory in [Some(directory), below.as_ref()].into_iter().flatten() {
@@ -159,6 +159,7 @@ fn white(file: &mut TiffFile, directory: &Directory) -> Result<Option<WhiteLevel
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::optics::Exposure;
     use crate::cfa::CfaPattern;
     use crate::formats::format::SampleReader;
     use crate::formats::tiff::{
@@ -267,7 +268,7 @@ mod tests {
             (vec![(50717, TagValue::Longs(vec![0]))], "its white level is passed over: it is no single number above 0"),
             (
                 vec![(33434, TagValue::Ratios(vec![[1, 8]]))],
-                "its exposure time of 0.125 s is passed over: it has no f-number (FNumber)",
+                "its exposure time of 0.125 s tells dark frames apart and no more: it has no f-number (FNumber)",
             ),
             (
                 vec![(33437, TagValue::Ratios(vec![[8, 1]]))],

@@ -4,8 +4,8 @@ use super::capture::told_exposure;
 use super::directory::TiffFile;
 use super::layout::passed_over;
 use super::tags::{self, ExtraTag, Field};
-use crate::camera::optics::Exposure;
 use crate::error::Result;
+use crate::formats::exposure::ToldExposure;
 use crate::formats::files::spool;
 use tiff::tags::{Tag, Type};
 
@@ -66,7 +66,7 @@ fn put_directory(block: &mut Vec<u8>, fields: &[Field]) {
 /// # Errors
 ///
 /// [`crate::error::Error::Disk`].
-pub fn exposure_of_block(block: &[u8], name: &str, notes: &mut Vec<String>) -> Result<Option<Exposure>> {
+pub fn exposure_of_block(block: &[u8], name: &str, notes: &mut Vec<String>) -> Result<Option<ToldExposure>> {
     let told = TiffFile::open(spool(&mut &*block, name)?, name).and_then(|mut file| {
         let directory = file.directory(0)?;
         told_exposure(&mut file, &directory, notes)
@@ -85,7 +85,7 @@ mod tests {
         let version = ExtraTag { number: 36864, value: TagValue::Undefined(b"0300".to_vec()) };
         let block = exif_block(&[ratio(33437, 28, 10), ratio(33434, 1, 250), version], "a.png").unwrap().unwrap();
         let mut notes = Vec::new();
-        let told = exposure_of_block(&block, "a.png", &mut notes).unwrap().unwrap();
+        let Some(ToldExposure::Whole(told)) = exposure_of_block(&block, "a.png", &mut notes).unwrap() else { panic!() };
         assert_eq!((told.exposure_s, told.f_number, notes.len()), (0.004, 2.8, 0));
         assert_eq!(exif_block(&[], "a.png").unwrap(), None);
         // Cut anywhere it is no exposure, or a note.

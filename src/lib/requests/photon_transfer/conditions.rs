@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::formats::format::SampleType;
 use crate::formats::frame_list::{FrameKind, ListedFrame};
 use crate::formats::input::{FrameReader, InputOptions};
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, TakenAs};
 use crate::requests::described::{Described, DescribedWithBlack};
 use crate::requests::notes::Note;
 use crate::requests::options::Selection;
@@ -64,7 +64,7 @@ impl Reading {
             return Err(Error::Usage(problem).leave_out(&["exposure"]));
         }
         let mut head = reader.header().clone();
-        let exposure_s = self.described.apply_time(&mut head, reader.exposure_s())?;
+        let exposure_s = self.described.apply_time(&mut head)?;
         let metadata = &head.metadata;
         let holds = head.holds();
         if metadata.demosaic.is_some()
@@ -85,7 +85,7 @@ impl Reading {
     ///
     /// As [`Self::head_of`].
     pub fn describe(&self, frame: &mut FrameHeader) -> Result<()> {
-        self.described.apply_time(frame, None).map(drop)
+        self.described.apply_time(frame).map(drop)
     }
 
     /// What is read of a file.
@@ -191,7 +191,21 @@ fn condition(frame: &ListedFrame, Head { header: head, exposure_s }: &Head) -> R
     {
         return Err(head.refuse("the list and its metadata differ on whether light fell on it"));
     }
-    let kind = frame.kind.or(by_scene).or_else(|| by_name(&frame.file));
+    let by_header = metadata.taken_as.and_then(|taken_as| match taken_as {
+        TakenAs::Light => None,
+        TakenAs::Dark | TakenAs::Bias => Some(FrameKind::Dark),
+        TakenAs::Flat => Some(FrameKind::Flat),
+    });
+    let otherwise = frame.kind.or(by_scene).or_else(|| by_name(&frame.file));
+    if let (Some(otherwise), Some(told), Some(taken_as)) = (otherwise, by_header, metadata.taken_as)
+        && otherwise != told
+    {
+        return Err(head.refuse(format!(
+            "it was taken as {}, by its own header or metadata (`taken_as`), but the list or its name says another thing",
+            taken_as.in_words()
+        )));
+    }
+    let kind = otherwise.or(by_header);
     let kind = kind.ok_or_else(|| {
         head.refuse("nothing says whether it is a flat or a dark; name it in a list, or put it into a folder `flats` or `darks`")
     })?;

@@ -34,14 +34,15 @@ pub(super) fn lit(frame: &FrameHeader) -> Option<(String, String)> {
     (!scene.is_dark()).then(|| (frame.name.clone(), scene.source.clone()))
 }
 
-/// Whether the metadata of a frame tell its scene and its sensor.
+/// Whether the metadata of a frame tell its scene, or what it was taken as, and its sensor.
 pub(super) fn says_enough(frame: &FrameHeader) -> bool {
-    frame.metadata.scene.is_some() && says_enough_of_sensor(frame)
+    (frame.metadata.scene.is_some() || frame.metadata.taken_as.is_some()) && says_enough_of_sensor(frame)
 }
 
-/// Whether the metadata of a frame tell which sensor drew its noise; one without noise has any.
+/// Whether the metadata of a frame tell which sensor drew its noise, or its camera; one without noise has any.
 pub(super) fn says_enough_of_sensor(frame: &FrameHeader) -> bool {
-    frame.metadata.noise.is_some() || frame.metadata.scene.is_some() && frame.metadata.sensor.is_some()
+    let metadata = &frame.metadata;
+    metadata.noise.is_some() || metadata.camera.is_some() || metadata.scene.is_some() && metadata.sensor.is_some()
 }
 
 /// Makes sure that a dark frame shows the photosites of `frame`, of the same sensor as far as metadata tell.
@@ -126,9 +127,8 @@ fn other_codes(a: &Metadata, b: &Metadata) -> Option<(&'static str, &'static str
 
 /// What makes the dark signal of two frames differ.
 pub(super) fn differences(frame: &FrameHeader, dark: &FrameHeader) -> Vec<String> {
-    let exposure_s = |frame: &FrameHeader| frame.metadata.exposure.map(|exposure| exposure.exposure_s);
     let pairs = [
-        ("exposure", "s", exposure_s(dark).zip(exposure_s(frame))),
+        ("exposure", "s", dark.metadata.time_s().zip(frame.metadata.time_s())),
         ("temperature", "K", dark.metadata.temperature_k().zip(frame.metadata.temperature_k())),
     ];
     let warn = |(what, unit, pair): (&str, &str, Option<(f64, f64)>)| {

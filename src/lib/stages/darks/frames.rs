@@ -20,6 +20,10 @@ pub struct DarkFrames<S> {
     average: Vec<f64>,
     /// Photosites that were found to be off, and unstable, so far.
     found: [u64; 2],
+    /// Sums of what they came off so far, and of what came off.
+    sums: [f64; 2],
+    /// How many samples these are.
+    summed: u64,
 }
 
 impl<S: RowSource> DarkFrames<S> {
@@ -53,7 +57,16 @@ impl<S: RowSource> DarkFrames<S> {
             Frames::new(of_master, Averaging::of(&record.average))
         };
         let masters = stack.masters.iter().map(master).collect();
-        Self { stack, masters, rows_made: 0, made: Vec::new(), average: Vec::new(), found: [0; 2] }
+        Self {
+            stack,
+            masters,
+            rows_made: 0,
+            made: Vec::new(),
+            average: Vec::new(),
+            found: [0; 2],
+            sums: [0.0; 2],
+            summed: 0,
+        }
     }
 
     /// What is known of them.
@@ -74,6 +87,11 @@ impl<S: RowSource> DarkFrames<S> {
     /// Photosites that were found to be off, and unstable, so far.
     pub fn found(&self) -> [u64; 2] {
         self.found
+    }
+
+    /// The mean of what they came off so far, and of what came off; none of none.
+    pub fn means(&self) -> Option<[f64; 2]> {
+        (self.summed > 0).then(|| self.sums.map(|sum| sum / self.summed as f64))
     }
 
     /// Samples of theirs that were clipped so far.
@@ -238,12 +256,21 @@ impl<S: RowSource> RowSource for LessDarks<'_, S> {
         self.frame.read(rows, samples)?;
         let of_frame = self.frame.header().geometry.row_samples();
         let of_dark = self.darks.stack.head.geometry.row_samples();
+        let (mut sums, mut summed) = ([0.0; 2], 0);
         let darks = self.darks.next(rows)?;
         for (row, darks) in samples[start..].chunks_exact_mut(of_frame).zip(darks.chunks_exact(of_dark)) {
             for (sample, dark) in row.iter_mut().zip(darks) {
-                *sample = to_sample(f64::from(*sample) - dark);
+                let level = f64::from(*sample);
+                let left = level - dark;
+                if left.is_finite() {
+                    sums = [sums[0] + level, sums[1] + dark];
+                    summed += 1;
+                }
+                *sample = to_sample(left);
             }
         }
+        self.darks.sums = [self.darks.sums[0] + sums[0], self.darks.sums[1] + sums[1]];
+        self.darks.summed += summed;
         self.mark(self.darks.rows_made - rows, &mut samples[start..]);
         Ok(())
     }

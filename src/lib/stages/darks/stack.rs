@@ -57,7 +57,7 @@ impl Master {
             kind,
             average: averaging.record_of(members.iter().map(|member| heads[*member]))?,
             weight: 1.0,
-            exposure_s: metadata.exposure.map(|exposure| exposure.exposure_s),
+            exposure_s: metadata.time_s(),
             temperature_k: first.metadata.temperature_k(),
             noise: metadata.noise.as_ref().filter(|_| is_told).map(MasterNoise::of),
             identity: identity(members.iter().map(|member| heads[*member])),
@@ -207,7 +207,7 @@ impl DarkStack {
                 let mut masters = vec![of_group(nearest)?];
                 let of_bias = match biases.first() {
                     // One whose exposure is not known counts as one of none.
-                    Some(bias) => bias.metadata.exposure.map_or(Ok(0.0), |_| dose.at(bias))?,
+                    Some(bias) => bias.metadata.time_s().map_or(Ok(0.0), |_| dose.at(bias))?,
                     None => 0.0,
                 };
                 if nearest.dose <= of_bias {
@@ -283,8 +283,8 @@ impl DarkStack {
         }
     }
 
-    /// A warning where nothing says that they are dark frames of the sensor that took `frame`.
-    pub(super) fn taken_on_trust(&self, frame: &FrameHeader) -> Option<String> {
+    /// What is said where nothing says that they are dark frames of the sensor that took `frame`.
+    pub fn taken_on_trust(&self, frame: &FrameHeader) -> Option<String> {
         let named = match self.silent.as_slice() {
             [] if says_enough_of_sensor(frame) => return None,
             [] => self.head.name.clone(),
@@ -297,11 +297,18 @@ impl DarkStack {
         ))
     }
 
+    /// Whether `frame` tells its sensor, and what was drawn, more than they do, or they more than it: files of one camera tell alike.
+    fn tells_less_than(&self, frame: &FrameHeader) -> bool {
+        let (its, theirs) = (&frame.metadata, &self.head.metadata);
+        let is_drawn = its.noise.is_some() || theirs.noise.is_some();
+        is_drawn || its.camera.is_some() != theirs.camera.is_some()
+    }
+
     /// What a user should hear of them beside `frame`, from which they come off.
     pub(in crate::stages) fn warnings_beside(&self, frame: &FrameHeader) -> Vec<String> {
         let is_scaled = !self.remarks.is_empty();
         let mut warnings = if is_scaled || self.is_bias() { Vec::new() } else { differences(frame, &self.head) };
-        warnings.extend(self.taken_on_trust(frame));
+        warnings.extend(self.taken_on_trust(frame).filter(|_| self.tells_less_than(frame)));
         warnings.extend_from_slice(&self.warnings);
         warnings
     }
@@ -337,7 +344,7 @@ impl Dose {
 
     fn at(&self, head: &FrameHeader) -> Result<f64> {
         let law = head.metadata.temperature_k().filter(|_| self.knows_temperatures).map_or(1.0, dark_current_law);
-        Ok(head.exposure()?.exposure_s * law)
+        Ok(head.metadata.time_s().ok_or_else(|| head.missing("exposure_time_s"))? * law)
     }
 }
 

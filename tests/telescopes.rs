@@ -1,0 +1,280 @@
+//! Frames that other programs wrote, as calibration takes them: what their headers tell of each other, and what contradicts.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::formats::output::{FrameWriter, OutputOptions};
+use cyanometer::frame::Geometry;
+use cyanometer::metadata::{FrameHeader, Metadata, TakenAs};
+use cyanometer::stream::{Counts, RowSink};
+use std::fs;
+use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
+
+const SIZE: [usize; 2] = [16, 12];
+
+/// What a command says that ends with `status`.
+#[track_caller]
+fn said(shop: &Workshop, line: &str, status: i32) -> String {
+    let output = shop.attempt(line, &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(status), "{line}: {said}");
+    said
+}
+
+/// A FITS of codes about a level, which `seed` scatters, with these cards.
+fn write_fits(shop: &Workshop, name: &str, [level, seed]: [u32; 2], cards: &[(&str, &str)]) {
+    let [width, height] = SIZE.map(|side| side.to_string());
+    let always = [
+        ("SIMPLE", "T"),
+        ("BITPIX", "16"),
+        ("NAXIS", "2"),
+        ("NAXIS1", &width),
+        ("NAXIS2", &height),
+        ("BZERO", "32768"),
+        ("ROWORDER", "'TOP-DOWN'"),
+        ("BAYERPAT", "'RGGB'"),
+    ];
+    let cards = always.iter().chain(cards).map(|(key, value)| format!("{:<80}", format!("{key:<8}= {value}")));
+    let mut bytes: Vec<u8> = cards.chain([format!("{:<80}", "END")]).collect::<String>().into_bytes();
+    bytes.resize(bytes.len().next_multiple_of(2880), b' ');
+    for place in 0..u32::try_from(SIZE[0] * SIZE[1]).unwrap() {
+        let code = level + (place * 7919 + seed * 104_729 + place * place * (seed + 3)) % 11;
+        bytes.extend(i16::try_from(i64::from(code) - 32768).unwrap().to_be_bytes());
+    }
+    bytes.resize(bytes.len().next_multiple_of(2880), 0);
+    fs::write(shop.path(name), bytes).unwrap();
+}
+
+/// A light frame of 2 s, and a dark frame with these cards.
+fn night(dark: &[(&str, &str)]) -> Workshop {
+    let shop = Workshop::new();
+    write_fits(
+        &shop,
+        "light.fits",
+        [900, 1],
+        &[("EXPTIME", "2.0"), ("IMAGETYP", "'Light Frame'"), ("INSTRUME", "'A'")],
+    );
+    write_fits(&shop, "dark.fits", [100, 2], &[&[("INSTRUME", "'A'")], dark].concat());
+    shop
+}
+
+const DARK: (&str, &str) = ("IMAGETYP", "'Dark Frame'");
+
+#[test]
+fn times_are_compared_where_no_aperture_is_told() {
+    let line = "correct-frame light.fits --dark dark.fits -o out.exr";
+    let shop = night(&[DARK, ("EXPTIME", "2.0")]);
+    assert_eq!(said(&shop, line, 0), "");
+    assert_eq!(shop.sidecar("out.exr").exposure_time_s, Some(2.0));
+    assert_eq!(shop.sidecar("out.exr").taken_as, Some(TakenAs::Light));
+    let shop = night(&[DARK, ("EXPTIME", "30.0")]);
+    let differ = "its exposure is 30 s, but that of light.fits is 2 s; their dark signals differ\n";
+    assert_eq!(said(&shop, line, 0), format!("correct-frame: warning: dark.fits: {differ}"));
+    // What was converted still tells it.
+    for end in ["tiff", "exr", "dng"] {
+        for name in ["light", "dark"] {
+            let to = format!("correct-frame {name}.fits --black 0 -o {name}.{end}");
+            said(&shop, &to, 0);
+            assert!(shop.read(&format!("{name}.{end}")).1.exposure_time_s.is_some(), "{end}");
+        }
+    }
+}
+
+#[test]
+fn darks_are_scaled_by_times_alone() {
+    let shop = night(&[DARK, ("EXPTIME", "8.0")]);
+    write_fits(&shop, "bias.fits", [60, 3], &[("EXPTIME", "0.0"), ("IMAGETYP", "'Bias Frame'"), ("INSTRUME", "'A'")]);
+    let line = "correct-frame light.fits --dark dark.fits --bias bias.fits --scale-dark -o out.exr";
+    let scaled = said(&shop, line, 0);
+    assert!(scaled.contains("its temperature is not known"), "{scaled}");
+    // w = 2/8 of the dark, 3/4 of the bias.
+    let of = |name: &str| shop.read(name).0;
+    let (made, light, dark, bias) = (of("out.exr"), of("light.fits"), of("dark.fits"), of("bias.fits"));
+    for (at, made) in made.iter().enumerate().take(SIZE[0] * SIZE[1]) {
+        assert!((made - (light[at] - 0.25 * dark[at] - 0.75 * bias[at])).abs() < 1e-3, "{at}");
+    }
+    // A time that no file tells is said, and needs no f-number.
+    let shop = night(&[DARK, ("EXPTIME", "8.0")]);
+    write_fits(&shop, "light.fits", [900, 1], &[("INSTRUME", "'A'")]);
+    write_fits(&shop, "bias.fits", [60, 3], &[("INSTRUME", "'A'")]);
+    let missing = said(&shop, line, BAD_DATA);
+    assert!(missing.contains("`exposure_time_s`") && missing.ends_with("give --exposure S\n"), "{missing}");
+    said(&shop, &format!("{line} --exposure 2"), 0);
+    let other = of_two_times(&night(&[DARK, ("EXPTIME", "8.0")]), "--exposure 3");
+    assert!(other.contains("light.fits: the exposure time in s is 2 by its metadata"), "{other}");
+}
+
+fn of_two_times(shop: &Workshop, rest: &str) -> String {
+    said(shop, &format!("correct-frame light.fits --dark dark.fits {rest} -o out.exr"), BAD_USAGE)
+}
+
+#[test]
+fn what_a_frame_was_taken_as_is_what_it_is_used_as() {
+    let dark = |shop: &Workshop, status| said(shop, "correct-frame light.fits --dark dark.fits -o out.exr", status);
+    for (card, taken) in [
+        (("IMAGETYP", "'Flat Field'"), "a flat"),
+        (("IMAGETYP", "'LIGHT'"), "a light frame"),
+        (("OBSTYPE", "'OBJECT'"), "a light frame"),
+        (("FRAME", "'Flat'"), "a flat"),
+    ] {
+        let refused = dark(&night(&[card]), BAD_DATA);
+        let begin =
+            format!("correct-frame: dark.fits: it was taken as {taken}, by its own header or metadata (`taken_as`)");
+        assert!(refused.starts_with(&begin), "{refused}");
+    }
+    for card in [DARK, ("IMAGETYP", "'DARKFLAT'"), ("FRAME", "'Dark'"), ("IMAGETYP", "'masterDark'")] {
+        assert_eq!(dark(&night(&[card]), 0), "", "{card:?}");
+    }
+    let bias = dark(&night(&[("IMAGETYP", "'zero'")]), 0);
+    assert!(bias.contains("it was taken as a bias frame and is used as a dark frame"), "{bias}");
+    let both = dark(&night(&[DARK, ("FRAME", "'Light'")]), 0);
+    assert!(
+        both.contains("it was taken as `Dark Frame` by IMAGETYP and as `Light` by FRAME; neither is believed"),
+        "{both}"
+    );
+    let shop = night(&[DARK]);
+    let flat = said(&shop, "correct-frame light.fits --black 50 --flat dark.fits -o out.exr", BAD_DATA);
+    assert!(flat.contains("it was taken as a dark frame") && flat.contains("is given as a flat"), "{flat}");
+    write_fits(&shop, "light.fits", [900, 1], &[DARK, ("INSTRUME", "'A'")]);
+    assert!(dark(&shop, 0).contains("light.fits: no light fell on it: it is a dark frame itself"));
+}
+
+#[test]
+fn a_copy_of_the_frame_corrects_nothing() {
+    let shop = night(&[DARK]);
+    write_fits(&shop, "copy.fits", [900, 1], &[("INSTRUME", "'A'"), ("OBSERVER", "'me'")]);
+    for rest in ["--dark copy.fits", "--dark dark.fits --flat copy.fits --flat-dark dark.fits", "--bias copy.fits"] {
+        let refused = said(&shop, &format!("correct-frame light.fits {rest} -o out.exr"), BAD_DATA);
+        assert!(refused.contains("copy.fits: its samples are those of light.fits, every one"), "{refused}");
+    }
+    assert!(!shop.path("out.exr").exists());
+}
+
+#[test]
+fn a_dark_that_is_no_dark_is_told_by_its_level() {
+    // Nothing tells what it is, as of all frames of cameras: that alone is no warning.
+    let shop = night(&[]);
+    let line = "correct-frame light.fits --dark dark.fits -o out.exr";
+    assert_eq!(said(&shop, line, 0), "");
+    let told = said(&shop, &format!("{line} -v"), 0);
+    assert!(told.contains("dark.fits: the metadata do not tell whether it is a dark frame of the sensor"), "{told}");
+    // One that tells no camera beside one that does is doubtful.
+    write_fits(&shop, "dark.fits", [100, 2], &[]);
+    assert!(said(&shop, line, 0).contains("warning: dark.fits: the metadata do not tell"));
+    write_fits(&shop, "dark.fits", [1000, 2], &[("INSTRUME", "'A'")]);
+    let below = said(&shop, line, 0);
+    assert!(
+        below.contains("warning: light.fits: its mean is 905.") && below.contains("below that of what came off"),
+        "{below}"
+    );
+}
+
+#[test]
+fn keywords_that_contradict_each_other_are_told() {
+    let of = |cards: &[(&str, &str)]| {
+        let shop = Workshop::new();
+        write_fits(&shop, "a.fits", [900, 1], cards);
+        said(&shop, "measure a.fits -o out.txt", 0)
+    };
+    let warned = |what: &str| format!("measure: warning: a.fits: {what}\n");
+    assert_eq!(of(&[("EXPTIME", "2.0"), ("EXPOSURE", "2"), ("EXPOINUS", "2000000")]), "");
+    assert_eq!(
+        of(&[("EXPTIME", "2.0"), ("EXPOSURE", "3.0")]),
+        warned("its exposure time in s is 2 by EXPTIME and 3 by EXPOSURE; EXPTIME counts")
+    );
+    assert_eq!(
+        of(&[("EXPTIME", "2.0"), ("EXPTIME", "3.0")]),
+        warned("its keyword EXPTIME stands there again with another value; the first counts")
+    );
+    assert_eq!(of(&[("EXPTIME", "2.0"), ("FOCALLEN", "400"), ("APTDIA", "71"), ("FOCRATIO", "5.6")]), "");
+    assert_eq!(
+        of(&[("EXPTIME", "2.0"), ("FOCALLEN", "400"), ("APTDIA", "100"), ("FOCRATIO", "8")]),
+        warned("its f-number is 4 by FOCALLEN and APTDIA and 8 by FOCRATIO; FOCALLEN and APTDIA counts")
+    );
+    assert_eq!(
+        of(&[("COLORTYP", "'GRBG'")]),
+        warned("its filter array is `RGGB` by BAYERPAT and `GRBG` by COLORTYP; BAYERPAT counts")
+    );
+}
+
+#[test]
+fn a_white_level_comes_before_black_is_off() {
+    let shop = night(&[DARK]);
+    said(&shop, "correct-frame light.fits --dark dark.fits -o out.exr", 0);
+    let refused = said(&shop, "demosaic out.exr --white 905 -o rgb.exr", BAD_USAGE);
+    assert!(refused.contains("black came off its samples before a white level was known"), "{refused}");
+    assert!(refused.ends_with("leave out --white\n"), "{refused}");
+    // Given in time it marks what is saturated.
+    said(&shop, "correct-frame light.fits --dark dark.fits --white 905 -o out.exr", 0);
+    assert!(shop.sidecar("out.exr").mask_bits.len() == 4);
+}
+
+#[test]
+fn a_black_level_above_white_leaves_nothing() {
+    let shop = night(&[]);
+    for known in ["", "black_level_adu: 64\n"] {
+        fs::write(
+            shop.path("m.yaml"),
+            format!("schema: cyanometer/1\nquantity: adu\ncfa: rggb\nwhite_level_adu: 4095\n{known}"),
+        )
+        .unwrap();
+        for program in ["demosaic", "correct-frame"] {
+            let line = format!("{program} light.fits --metadata m.yaml --black 15000 -o out.exr");
+            let refused = said(&shop, &line, BAD_USAGE);
+            assert!(refused.contains("--black 15000 is not below the white level, 4095 ADU"), "{refused}");
+        }
+    }
+}
+
+/// Four black levels are those of the picture's first 2x2 photosites, whatever offsets the pattern has.
+#[test]
+fn black_levels_begin_at_the_corner_of_the_picture() {
+    let shop = Workshop::new();
+    for offsets in [["0", "0"], ["1", "0"], ["0", "1"], ["1", "1"]] {
+        write_fits(&shop, "a.fits", [900, 1], &[("XBAYROFF", offsets[0]), ("YBAYROFF", offsets[1])]);
+        said(&shop, "correct-frame a.fits --black 10,20,30,40 -o out.exr", 0);
+        let (before, after) = (shop.read("a.fits").0, shop.read("out.exr").0);
+        for (place, (before, after)) in before.iter().zip(&after).enumerate() {
+            let [x, y] = [place % SIZE[0], place / SIZE[0]];
+            assert_eq!(before - after, [10.0, 20.0, 30.0, 40.0][2 * (y % 2) + x % 2], "{offsets:?} {x},{y}");
+        }
+    }
+}
+
+/// A plane of any samples with these metadata.
+fn write_frame(shop: &Workshop, name: &str, metadata: &Metadata, samples: &[f32]) {
+    let geometry = Geometry::new(SIZE[0], SIZE[1], &["Y"]);
+    let header = FrameHeader { name: name.into(), geometry, metadata: metadata.clone() };
+    let options = OutputOptions { path: Some(shop.path(name)), ..Default::default() };
+    let mut writer = FrameWriter::create(&options, &header).unwrap();
+    writer.write(samples).unwrap();
+    writer.finish(Counts::default()).unwrap();
+}
+
+/// A frame of codes, of which another program made others and kept their metadata.
+#[test]
+fn codes_that_another_program_scaled_are_no_codes() {
+    let shop = Workshop::new();
+    shop.run("render-radiance --electrons 1000,2000,3000 --size 16x12 --cfa rggb -o scene.exr", &[]);
+    shop.run("add-noise scene.exr -o noisy.exr", &[]);
+    shop.run("digitize noisy.exr --bits 12 -o codes.tiff", &[]);
+    let (samples, metadata) = shop.read("codes.tiff");
+    let largest = samples.iter().copied().fold(0.0, f32::max);
+    assert!(largest * 16.0 > 4095.0);
+    for (factor, wrong) in
+        [(16.0, "but codes of its converter end at 4095"), (1.0 / 4095.0, "are whole numbers from 0 on")]
+    {
+        let scaled: Vec<f32> = samples.iter().map(|sample| sample * factor).collect();
+        write_frame(&shop, "scaled.exr", &metadata, &scaled);
+        let refused = said(&shop, "demosaic scaled.exr -o out.exr", BAD_DATA);
+        assert!(refused.contains("scaled.exr: it has a sample of") && refused.contains(wrong), "{refused}");
+    }
+    // Of a frame of a camera the white level tells it.
+    let mut of_camera = metadata;
+    of_camera.adc = None;
+    let scaled: Vec<f32> = samples.iter().map(|sample| sample * 16.0).collect();
+    write_frame(&shop, "scaled.exr", &of_camera, &scaled);
+    let refused = said(&shop, "demosaic scaled.exr -o out.exr", BAD_DATA);
+    assert!(refused.contains("but its white level is 4095 ADU, by its metadata"), "{refused}");
+}
