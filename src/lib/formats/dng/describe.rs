@@ -5,7 +5,6 @@ use super::color;
 use super::image::RawImage;
 use super::levels::Levels;
 use super::tags;
-use crate::camera::optics::Exposure;
 use crate::cfa::{FILTERS, FilterArray};
 use crate::error::Result;
 use crate::formats::exposure::{self, ToldExposure};
