@@ -380,7 +380,7 @@ fn predictions_know_smear() {
         let mean = |frame: &MemoryFrame| match of_frame(noise_of(frame, &seeded()).header(), Equations::Exact).unwrap()
         {
             FramePrediction::Planes(planes) => planes[0].moments.mean,
-            FramePrediction::Groups(_) | FramePrediction::Pixels(_) => f64::NAN,
+            FramePrediction::Groups(_) | FramePrediction::Pixels(_) | FramePrediction::Tapped(_) => f64::NAN,
         };
         let columns = 20.0 * f64::from(electrons[0] + 2.0 * electrons[1] + electrons[2]);
         let wanted = 8e-5 / EXPOSURE.exposure_s * columns;

@@ -72,7 +72,7 @@ fn times_are_compared_where_no_aperture_is_told() {
     let differ = "its exposure is 30 s, but that of light.fits is 2 s; their dark signals differ\n";
     assert_eq!(said(&shop, line, 0), format!("correct-frame: warning: dark.fits: {differ}"));
     // What was converted still tells it.
-    for end in ["tiff", "exr", "dng"] {
+    for end in ["tiff", "exr"] {
         for name in ["light", "dark"] {
             let to = format!("correct-frame {name}.fits --black 0 -o {name}.{end}");
             said(&shop, &to, 0);
@@ -165,7 +165,7 @@ fn a_dark_that_is_no_dark_is_told_by_its_level() {
     write_fits(&shop, "dark.fits", [1000, 2], &[("INSTRUME", "'A'")]);
     let below = said(&shop, line, 0);
     assert!(
-        below.contains("warning: light.fits: its mean is 905.") && below.contains("below that of what came off"),
+        below.contains("warning: light.fits: its mean is 904.0 ADU") && below.contains("below that of what came off"),
         "{below}"
     );
 }
@@ -205,6 +205,8 @@ fn a_white_level_comes_before_black_is_off() {
     let refused = said(&shop, "demosaic out.exr --white 905 -o rgb.exr", BAD_USAGE);
     assert!(refused.contains("black came off its samples before a white level was known"), "{refused}");
     assert!(refused.ends_with("leave out --white\n"), "{refused}");
+    let late = said(&shop, "demosaic out.exr --sensor kaf-5101ce -o rgb.exr", 0);
+    assert!(late.contains("the full well of sensor kaf-5101ce comes too late to mark saturated samples"), "{late}");
     // Given in time it marks what is saturated.
     said(&shop, "correct-frame light.fits --dark dark.fits --white 905 -o out.exr", 0);
     assert!(shop.sidecar("out.exr").mask_bits.len() == 4);
@@ -240,6 +242,24 @@ fn black_levels_begin_at_the_corner_of_the_picture() {
             assert_eq!(before - after, [10.0, 20.0, 30.0, 40.0][2 * (y % 2) + x % 2], "{offsets:?} {x},{y}");
         }
     }
+}
+
+/// A DNG of a telescope's frame, whose description another program has written, names its camera and tells its time.
+#[test]
+fn a_dng_tells_camera_and_time() {
+    let shop = night(&[DARK]);
+    let (samples, mut metadata) = shop.read("light.fits");
+    (metadata.black_level_adu, metadata.white_level_adu) = (Some(64.0.into()), Some(4095.0.into()));
+    write_frame(&shop, "light.dng", &metadata, &samples);
+    fs::remove_file(shop.path("light.dng.yaml")).unwrap();
+    let mut bytes = shop.bytes("light.dng");
+    let begin = b"schema: cyanometer/1";
+    let at = bytes.windows(begin.len()).position(|window| window == begin).unwrap();
+    bytes[at..at + begin.len()].copy_from_slice(b"a chart, noon, west.");
+    fs::write(shop.path("light.dng"), bytes).unwrap();
+    let told = shop.read("light.dng").1;
+    assert_eq!((told.camera.as_deref(), told.exposure_time_s, told.exposure), (Some("A"), Some(2.0), None));
+    assert_eq!(told.taken_as, None);
 }
 
 /// A plane of any samples with these metadata.

@@ -229,7 +229,12 @@ mod tests {
             let forward = adaptation * back * Matrix3::from_diagonal(&neutral);
             Illuminated { forward_matrix: Some(forward), ..set }
         };
-        assert!(plain.mapped_forward(&observer, Light::White(D65_XY)).unwrap_err().contains("ForwardMatrix"));
+        assert!(
+            plain
+                .mapped_forward(&observer, Light::White(D65_XY))
+                .unwrap_err()
+                .ends_with("but ColorMatrix1, which `--own-matrix color` takes")
+        );
         let (first, second) = (with_forward(plain.first), plain.second.map(with_forward));
         let calibration = Calibration { first, second, ..plain };
         for white in [D65_XY, [0.40, 0.39]] {

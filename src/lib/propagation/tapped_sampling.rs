@@ -284,6 +284,25 @@ mod tests {
         }
     }
 
+    /// Weights of pixels on all photosites, and what the pixels have beyond these on average.
+    fn weights_of(
+        pixels: &TappedPixels,
+        places: &[[usize; 2]],
+        [columns, rows]: [usize; 2],
+    ) -> ([DMatrix<f64>; 3], Matrix3<f64>) {
+        let mut weights = [(); 3].map(|()| DMatrix::<f64>::zeros(places.len(), columns * rows));
+        let mut beyond = Matrix3::<f64>::zeros();
+        for (a, at) in places.iter().enumerate() {
+            let kind = pixels.kind(*at);
+            beyond += kind.beyond / places.len() as f64;
+            for site in &kind.sites {
+                let to = [0, 1].map(|axis| at[axis].checked_add_signed(site.offset[axis]).unwrap());
+                (0..3).for_each(|i| weights[i][(a, to[1] * columns + to[0])] = site.weights[i]);
+            }
+        }
+        (weights, beyond)
+    }
+
     fn check_by_full_matrices(pixels: &TappedPixels, what: &str) {
         let [x0, y0, width, height] = PART;
         let [columns, rows] = [33_usize, 28];
@@ -295,17 +314,7 @@ mod tests {
         };
         let (second, third, fourth) =
             (cumulant(|site| site.moments.variance), cumulant(|site| site.third), cumulant(Prediction::fourth));
-        // Weights of all pixels on all photosites, and what the mean leaves of them.
-        let mut weights = [(); 3].map(|()| DMatrix::<f64>::zeros(n, sites));
-        let mut beyond = Matrix3::<f64>::zeros();
-        for (a, at) in places.iter().enumerate() {
-            let kind = pixels.kind(*at);
-            beyond += kind.beyond / count;
-            for site in &kind.sites {
-                let to = [0, 1].map(|axis| at[axis].checked_add_signed(site.offset[axis]).unwrap());
-                (0..3).for_each(|i| weights[i][(a, to[1] * columns + to[0])] = site.weights[i]);
-            }
-        }
+        let (weights, beyond) = weights_of(pixels, &places, [columns, rows]);
         let less_mean = |matrix: &DMatrix<f64>| {
             let mean = matrix.row_mean();
             DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |a, s| matrix[(a, s)] - mean[s])

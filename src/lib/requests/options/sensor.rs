@@ -5,7 +5,7 @@ use crate::camera::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::formats::data::{self, SensorChanges};
 use crate::formats::input::FrameReader;
-use crate::metadata::FrameHeader;
+use crate::metadata::{CorrectionRecord, FrameHeader};
 use crate::requests::notes::Note;
 use crate::units::QuantityKind;
 use clap::Args;
@@ -81,6 +81,14 @@ fn contradictions(frame: &FrameHeader, sensor: &Sensor) -> Vec<String> {
     {
         found.push(format!(
             "its white level, {white} ADU, is beyond the last code of sensor {}, {last_code}",
+            sensor.name
+        ));
+    }
+    let lost_black = metadata.correction.as_ref().is_some_and(CorrectionRecord::took_frames);
+    if is_codes && lost_black && metadata.white_level_adu.is_none() && metadata.sensor.is_none() {
+        found.push(format!(
+            "the full well of sensor {} comes too late to mark saturated samples: dark frames came off them; give --sensor to \
+             `correct-frame`",
             sensor.name
         ));
     }
