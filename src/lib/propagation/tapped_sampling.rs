@@ -303,6 +303,11 @@ mod tests {
         (weights, beyond)
     }
 
+    fn less_mean(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let mean = matrix.row_mean();
+        DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |a, s| matrix[(a, s)] - mean[s])
+    }
+
     fn check_by_full_matrices(pixels: &TappedPixels, what: &str) {
         let [x0, y0, width, height] = PART;
         let [columns, rows] = [33_usize, 28];
@@ -315,10 +320,6 @@ mod tests {
         let (second, third, fourth) =
             (cumulant(|site| site.moments.variance), cumulant(|site| site.third), cumulant(Prediction::fourth));
         let (weights, beyond) = weights_of(pixels, &places, [columns, rows]);
-        let less_mean = |matrix: &DMatrix<f64>| {
-            let mean = matrix.row_mean();
-            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |a, s| matrix[(a, s)] - mean[s])
-        };
         let projected = weights.each_ref().map(less_mean);
         let scaled = |matrix: &DMatrix<f64>| matrix * DMatrix::from_diagonal(&second);
         let means = [0, 1, 2].map(|i| DVector::from_fn(n, |a, _| pixels.kind(places[a]).mean[i]));
