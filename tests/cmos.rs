@@ -630,7 +630,7 @@ fn pixels_of_several_taps_scatter_as_predicted() {
             .collect();
         laws.iter().for_each(|law| assert!(law.sampling().count == 17.0 * 12.0));
         let of = |seed: u64| -> Vec<[f64; 9]> {
-            let of_frame = |(frame, law): (&MemoryFrame, &Box<TappedPixels>)| {
+            let of_frame = |(frame, law): (&MemoryFrame, &TappedPixels)| {
                 let sample = |index: usize, channel: usize| f64::from(at(frame, index % 17, index / 17, channel));
                 let n = 17.0 * 12.0;
                 let mean = [0, 1, 2].map(|c| (0..204).map(|index| sample(index, c)).sum::<f64>() / n);
@@ -647,7 +647,7 @@ fn pixels_of_several_taps_scatter_as_predicted() {
                 }
                 found
             };
-            made(seed).iter().zip(&laws).map(of_frame).collect()
+            made(seed).iter().zip(&laws).map(|(frame, law)| of_frame((frame, law))).collect()
         };
         let all: Vec<Vec<[f64; 9]>> = (0..seeds).into_par_iter().map(of).collect();
         for (frame, index) in (0..2).flat_map(|frame| (0..9).map(move |index| (frame, index))) {
