@@ -125,7 +125,8 @@ fn a_bias_that_is_exposed_for_long_is_told() {
     assert_eq!(
         said(&exposed(), "correct-frame light.exr --bias bias.exr -o out.exr", 0),
         "correct-frame: warning: bias.exr: its exposure is 2 s, longer than that of light.exr, 0.033 s; a bias frame has next to \
-         none, and its dark signal comes off too\n"
+         none, and its dark signal comes off too\ncorrect-frame: warning: light.exr: its mean is 1875.0 ADU, below that of what came \
+         off, 2021.5 ADU; are these dark or bias frames of it?\n"
     );
 }
 

@@ -233,7 +233,7 @@ mod tests {
             plain
                 .mapped_forward(&observer, Light::White(D65_XY))
                 .unwrap_err()
-                .ends_with("but ColorMatrix1, which `--own-matrix color` takes")
+                .ends_with(", which `--own-matrix color` takes")
         );
         let (first, second) = (with_forward(plain.first), plain.second.map(with_forward));
         let calibration = Calibration { first, second, ..plain };

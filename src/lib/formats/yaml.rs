@@ -528,7 +528,7 @@ mod tests {
         let sensor = all.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref()).unwrap();
         assert_eq!(sensor.check(), Ok(()));
         let given = serde_yaml::to_value(&all).unwrap().as_mapping().unwrap().len();
-        assert_eq!(given, 20, "a key of the template is not read");
+        assert_eq!(given, 22, "a key of the template is not read");
     }
 
     #[test]

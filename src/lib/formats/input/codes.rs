@@ -43,12 +43,24 @@ impl CodeCheck {
         Some(Self { largest, are_whole: adc.is_some(), is_ours, has_doubted: false })
     }
 
-    /// Looks at samples of one channel.
+    /// Looks at rows of the frame, in the channels that are planes.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::check`].
+    pub fn look(&mut self, rows: &[f32], frame: &FrameHeader) -> Result<()> {
+        let planes = if frame.leads_with_three_planes() { 3 } else { 1 };
+        let kept = planes * frame.geometry.width;
+        let mut rows = rows.chunks_exact(frame.geometry.row_samples().max(1));
+        rows.try_for_each(|row| self.check(&row[..kept], &frame.name))
+    }
+
+    /// Looks at samples.
     ///
     /// # Errors
     ///
     /// [`Error::Format`] where they are not what metadata of ours call them; where tags of the file do, it is a doubt.
-    pub fn look(&mut self, samples: &[f32], name: &str) -> Result<()> {
+    fn check(&mut self, samples: &[f32], name: &str) -> Result<()> {
         let is_wrong = |sample: &&f32| {
             sample.is_finite()
                 && (**sample > self.largest || self.are_whole && (**sample < 0.0 || sample.fract() != 0.0))

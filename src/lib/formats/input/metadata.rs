@@ -32,13 +32,22 @@ pub(super) enum FoundIn {
     Tags,
 }
 
-/// The metadata in order of trust: those of the file `given`, sidecar, embedded, the format's own tags.
+/// The metadata in order of trust: those of the file `given`, sidecar, embedded, the format's own tags. An exposure time that they do
+/// not tell is that of the tags.
 pub(super) fn find_metadata(
     reader: &dyn SampleReader,
     name: &str,
     path: Option<&Path>,
     given: Option<&Path>,
 ) -> Result<Found> {
+    let mut found = most_trusted(reader, name, path, given)?;
+    if found.metadata.time_s().is_none() {
+        found.metadata.exposure_time_s = reader.own_tags().time_s();
+    }
+    Ok(found)
+}
+
+fn most_trusted(reader: &dyn SampleReader, name: &str, path: Option<&Path>, given: Option<&Path>) -> Result<Found> {
     path.map_or(Ok(()), register::note_sidecar)?;
     let from_file = |path: &Path| -> Result<Metadata> {
         let shown = path.display().to_string();

@@ -191,9 +191,6 @@ impl FrameReader {
         let mut notes: Vec<String> = reader.notes().iter().map(|note| format!("{name}: {note}")).collect();
         let Found { mut metadata, sidecar, place } =
             find_metadata(reader.as_ref(), name, path, options.metadata.as_deref())?;
-        if metadata.time_s().is_none() {
-            metadata.exposure_time_s = reader.own_tags().time_s();
-        }
         let stored = reader.geometry();
         let to_come = metadata.frames_to_come.take().unwrap_or_default();
         let scaling = take_scaling(reader.as_ref(), &mut metadata, &place, name)?;
@@ -413,15 +410,6 @@ impl FrameReader {
         Ok(())
     }
 
-    /// Makes sure that rows hold what their metadata say, in the channels that are planes.
-    fn look_at_codes(&mut self, rows: &[f32]) -> Result<()> {
-        let Some(codes) = &mut self.codes else { return Ok(()) };
-        let geometry = &self.header.geometry;
-        let planes = if self.header.leads_with_three_planes() { 3 } else { 1 };
-        rows.chunks_exact(geometry.row_samples().max(1))
-            .try_for_each(|row| codes.look(&row[..planes * geometry.width], &self.header.name))
-    }
-
     fn check_digest(&mut self) {
         let Some(DigestCheck { expected, sidecar, digest }) = self.check.take() else { return };
         if digest.finish() != expected {
@@ -491,7 +479,8 @@ impl RowSource for FrameReader {
                 }
             }
         }
-        self.look_at_codes(&samples[first..])?;
+        let header = &self.header;
+        self.codes.as_mut().map_or(Ok(()), |codes| codes.look(&samples[first..], header))?;
         if let Some(linearize) = &self.linearize {
             let row_samples = self.header.geometry.row_samples();
             samples[first..].chunks_exact_mut(row_samples).for_each(|row| linearize.apply(&mut row[..kept * width]));
