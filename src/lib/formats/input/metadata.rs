@@ -41,7 +41,8 @@ pub(super) fn find_metadata(
     given: Option<&Path>,
 ) -> Result<Found> {
     let mut found = most_trusted(reader, name, path, given)?;
-    if found.metadata.time_s().is_none() {
+    // A file that is given stands for all that comes with the frame.
+    if given.is_none() && found.metadata.time_s().is_none() {
         found.metadata.exposure_time_s = reader.own_tags().time_s();
     }
     Ok(found)
