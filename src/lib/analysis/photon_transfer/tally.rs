@@ -109,44 +109,14 @@ impl Tally {
         &self.means
     }
 
-    /// Whether there are two: the first departs as far as the second, to the other side, and its sums are doubled.
-    fn are_two(&self) -> bool {
-        self.frames == 2
+    /// Frames of which departures are summed: the first of two departs as far as the second, to the other side.
+    fn summed(&self) -> usize {
+        if self.frames == 2 { 1 } else { self.frames }
     }
 
-    /// Adds a row of two frames, of which one departs as far as the other.
-    #[inline(always)]
-    fn add_pair(&mut self, site: &Site, bands: &[Vec<f32>], place: Range<usize>) {
-        let columns = self.size[0];
-        let count = columns as f64;
-        for (samples, band) in self.samples.chunks_exact_mut(columns).zip(bands) {
-            site.gather(&band[place.clone()], samples);
-        }
-        let (first, second) = self.samples.split_at_mut(columns);
-        if self.row_means.is_empty() {
-            let sums: Vec<f64> = first.iter().zip(&*second).map(|(first, second)| 0.5 * (first + second)).collect();
-            self.center = sum(&sums) / count;
-        }
-        let rows = PairRows {
-            first,
-            second,
-            means: &mut self.means,
-            of_columns: &mut self.column_means,
-            departures: &mut self.column_sums[..columns],
-            squares: &mut self.column_squares,
-        };
-        let found = rows.add(self.center, self.top);
-        self.at_ends[0] += found.at_top;
-        self.at_ends[1] += found.at_bottom;
-        self.row_means.push(found.above);
-        self.squares += found.above_squared;
-        self.frame_sums[0] += found.departure;
-        self.products[0] += found.product;
-        self.row_sums.extend([found.departure, -found.departure]);
-        self.row_squares.push(2.0 * found.squared);
-        let [second, fourth] = about(&self.samples[..columns], found.departure / count);
-        self.within[0] += 2.0 * second;
-        self.within[1] += 4.0 * fourth;
+    /// What sums of squares over them are multiplied with.
+    fn times(&self) -> f64 {
+        (self.frames / self.summed()) as f64
     }
 
     #[inline(always)]
@@ -182,9 +152,12 @@ impl Tally {
         self.row_means.push(sum(&self.above));
         self.squares += dot(&self.above, &self.above);
         self.squared.fill(0.0);
+        let (summed, times) = (self.summed(), self.times());
         let mut all = 0.0;
         let columns_of = self.column_sums.chunks_exact_mut(columns);
-        for ((index, samples), of_columns) in self.samples.chunks_exact_mut(columns).enumerate().zip(columns_of) {
+        for ((index, samples), of_columns) in
+            self.samples.chunks_exact_mut(columns).enumerate().zip(columns_of).take(summed)
+        {
             let [of_row, product, square] =
                 depart(samples, &self.means, &self.above, [of_columns, &mut self.column_squares]);
             self.frame_sums[index] += of_row;
@@ -197,15 +170,19 @@ impl Tally {
                 *squared += departure * departure;
             }
         }
-        self.row_squares.push(all);
-        self.within[0] += sum(&self.squared);
-        self.within[1] += dot(&self.squared, &self.squared);
+        if let Some(&of_row) = self.row_sums.last().filter(|_| summed < self.frames) {
+            self.row_sums.push(-of_row);
+        }
+        self.row_squares.push(times * all);
+        self.within[0] += times * sum(&self.squared);
+        self.within[1] += times * times * dot(&self.squared, &self.squared);
     }
 
     /// Gives the second of two frames what the first departed by, to the other side.
     fn complete(&mut self) {
-        if self.are_two() {
-            self.column_squares.iter_mut().for_each(|square| *square *= 2.0);
+        let times = self.times();
+        self.column_squares.iter_mut().for_each(|square| *square *= times);
+        if self.summed() < self.frames {
             self.frame_sums[1] = -self.frame_sums[0];
             self.products[1] = -self.products[0];
             let (first, second) = self.column_sums.split_at_mut(self.size[0]);
@@ -325,9 +302,6 @@ impl Kernel for AddRow<'_> {
 
     #[inline(always)]
     fn run(self) {
-        if self.tally.are_two() {
-            return self.tally.add_pair(self.site, self.bands, self.place);
-        }
         self.tally.gather(self.site, self.bands, self.place);
         self.tally.add_gathered();
     }
@@ -359,136 +333,6 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     lanes.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
-}
-
-/// A row of two frames, and what is kept of its columns.
-struct PairRows<'a> {
-    /// Samples of the first, in whose place comes what it departs by.
-    first: &'a mut [f64],
-    second: &'a [f64],
-    means: &'a mut [f64],
-    /// Σ (ȳ − c), Σ a and Σ a².
-    of_columns: &'a mut [f64],
-    departures: &'a mut [f64],
-    squares: &'a mut [f64],
-}
-
-/// Sums over a row of two frames, ȳ their mean and a what the first departs by.
-#[derive(Clone, Copy)]
-struct PairSums<T, C> {
-    /// Σ (ȳ − c) and Σ (ȳ − c)².
-    above: T,
-    above_squared: T,
-    /// Σ a, Σ a (ȳ − c) and Σ a².
-    departure: T,
-    product: T,
-    squared: T,
-    /// Samples at the top code and more, and at 0 and less.
-    at_top: C,
-    at_bottom: C,
-}
-
-impl<const N: usize> PairSums<[f64; N], [u64; N]> {
-    const NONE: Self = Self {
-        above: [0.0; N],
-        above_squared: [0.0; N],
-        departure: [0.0; N],
-        product: [0.0; N],
-        squared: [0.0; N],
-        at_top: [0; N],
-        at_bottom: [0; N],
-    };
-}
-
-impl PairRows<'_> {
-    #[inline(always)]
-    fn add(self, center: f64, top: f64) -> PairSums<f64, u64> {
-        let whole = self.first.len() / LANES * LANES;
-        let Self { first, second, means, of_columns, departures, squares } = self;
-        let (first, rest_first) = first.split_at_mut(whole);
-        let (second, rest_second) = second.split_at(whole);
-        let (means, rest_means) = means.split_at_mut(whole);
-        let (of_columns, rest_of_columns) = of_columns.split_at_mut(whole);
-        let (departures, rest_departures) = departures.split_at_mut(whole);
-        let (squares, rest_squares) = squares.split_at_mut(whole);
-        let lanes = PairRows { first, second, means, of_columns, departures, squares }.add_lanes::<LANES>(center, top);
-        let rest = PairRows {
-            first: rest_first,
-            second: rest_second,
-            means: rest_means,
-            of_columns: rest_of_columns,
-            departures: rest_departures,
-            squares: rest_squares,
-        };
-        let rest = rest.add_lanes::<1>(center, top);
-        let total = |lanes: [f64; LANES], [rest]: [f64; 1]| lanes.iter().sum::<f64>() + rest;
-        let counted = |lanes: [u64; LANES], [rest]: [u64; 1]| lanes.iter().sum::<u64>() + rest;
-        PairSums {
-            above: total(lanes.above, rest.above),
-            above_squared: total(lanes.above_squared, rest.above_squared),
-            departure: total(lanes.departure, rest.departure),
-            product: total(lanes.product, rest.product),
-            squared: total(lanes.squared, rest.squared),
-            at_top: counted(lanes.at_top, rest.at_top),
-            at_bottom: counted(lanes.at_bottom, rest.at_bottom),
-        }
-    }
-
-    /// The same of rows that are whole lanes.
-    #[inline(always)]
-    fn add_lanes<const N: usize>(self, center: f64, top: f64) -> PairSums<[f64; N], [u64; N]> {
-        let first = self.first.as_chunks_mut::<N>().0;
-        let second = self.second.as_chunks::<N>().0;
-        let columns = self.of_columns.as_chunks_mut::<N>().0.iter_mut();
-        let columns = columns.zip(self.departures.as_chunks_mut::<N>().0).zip(self.squares.as_chunks_mut::<N>().0);
-        let mut sums = PairSums::NONE;
-        for (((first, second), means), ((of_columns, departures), squares)) in
-            first.iter_mut().zip(second).zip(self.means.as_chunks_mut::<N>().0).zip(columns)
-        {
-            // Loaded whole, and stored whole, so that the lanes become a vector.
-            let (mut a, mut mean) = (*first, [0.0; N]);
-            let (mut of_column, mut departure, mut square) = (*of_columns, *departures, *squares);
-            for lane in 0..N {
-                let [one, other] = [a[lane], second[lane]];
-                sums.at_top[lane] += u64::from(one >= top) + u64::from(other >= top);
-                sums.at_bottom[lane] += u64::from(one <= 0.0) + u64::from(other <= 0.0);
-                mean[lane] = 0.5 * (one + other);
-                let above = mean[lane] - center;
-                a[lane] = one - mean[lane];
-                of_column[lane] += above;
-                departure[lane] += a[lane];
-                square[lane] += a[lane] * a[lane];
-                sums.above[lane] += above;
-                sums.above_squared[lane] += above * above;
-                sums.departure[lane] += a[lane];
-                sums.product[lane] += a[lane] * above;
-                sums.squared[lane] += a[lane] * a[lane];
-            }
-            (*first, *means, *of_columns, *departures, *squares) = (a, mean, of_column, departure, square);
-        }
-        sums
-    }
-}
-
-/// Σ (a − m)² and Σ (a − m)⁴.
-#[inline(always)]
-fn about(values: &[f64], middle: f64) -> [f64; 2] {
-    let (whole, rest) = values.as_chunks::<LANES>();
-    let mut lanes = [[0.0; LANES]; 2];
-    for values in whole {
-        for lane in 0..LANES {
-            let square = (values[lane] - middle) * (values[lane] - middle);
-            lanes[0][lane] += square;
-            lanes[1][lane] += square * square;
-        }
-    }
-    let mut sums = lanes.map(|lanes| lanes.iter().sum::<f64>());
-    for value in rest {
-        let square = (value - middle) * (value - middle);
-        sums[0] += square;
-        sums[1] += square * square;
-    }
-    sums
 }
 
 /// Takes from samples of a frame their means, adds what is left, and its square, to those of their columns; gives Σ a, Σ a (ȳ − c)
