@@ -300,10 +300,6 @@ impl Write for AtomicFile {
 
 /// The system's error without the temporary file's name, which means nothing to the user.
 fn plain(error: &io::Error) -> io::Error {
-    // The directory is there: some, such as those of the kernel, take no files.
-    if error.kind() == io::ErrorKind::NotFound {
-        return io::Error::new(error.kind(), "its directory takes no new files");
-    }
     error.raw_os_error().map_or_else(|| io::Error::from(error.kind()), io::Error::from_raw_os_error)
 }
 
