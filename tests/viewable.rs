@@ -47,12 +47,18 @@ fn samples(path: &Path) -> Vec<u32> {
     samples.into_iter().map(f32::to_bits).collect()
 }
 
-/// What is stored: the same read by metadata that say nothing of scales.
+/// What is stored: the same read without what the metadata say of scales, and of codes, which scaled ones would not be.
 fn stored(path: &Path) -> Vec<f32> {
-    let silent = path.with_file_name("silent.yaml");
-    fs::write(&silent, "schema: cyanometer/1\nquantity: unspecified\n").unwrap();
-    let options = InputOptions { path: Some(path.to_owned()), metadata: Some(silent), ..InputOptions::default() };
-    let mut reader = FrameReader::open(&options).unwrap();
+    let mut bytes = fs::read(path).unwrap();
+    for (known, unknown) in
+        [("sample_scale:", "sample_shape:"), ("\nadc:", "\nabc:"), ("\nwhite_level_adu:", "\nwhite_level_abc:")]
+    {
+        let place = bytes.windows(known.len()).position(|window| window == known.as_bytes());
+        place.into_iter().for_each(|place| bytes[place..][..known.len()].copy_from_slice(unknown.as_bytes()));
+    }
+    let copy = path.with_file_name(format!("bare-{}", path.file_name().unwrap().to_str().unwrap()));
+    fs::write(&copy, bytes).unwrap();
+    let mut reader = FrameReader::open(&InputOptions { path: Some(copy), ..InputOptions::default() }).unwrap();
     let mut samples = Vec::new();
     for _ in 0..reader.header().geometry.height {
         reader.read(1, &mut samples).unwrap();
