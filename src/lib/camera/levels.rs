@@ -3,6 +3,10 @@
 use crate::cfa::Class;
 use serde::{Deserialize, Serialize};
 
+/// How many times each other levels of one scale of codes are at most: white levels are told a few per cent apart, and codes lie above
+/// them by noise and by the habits of cameras; other scales are other numbers of bits.
+pub const OF_ONE_SCALE: f64 = 1.5;
+
 /// What no light reads: the same everywhere, or by the 2×2 sites at the sensor's corner, row by row.
 ///
 /// Sites hang on the photosite's place on the sensor, as the filter array does, so that a crop keeps them.

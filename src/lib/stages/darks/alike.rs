@@ -1,14 +1,11 @@
 //! Whether frames show the same photosites, and what makes their dark signals differ.
 
+use crate::camera::levels::OF_ONE_SCALE;
 use crate::camera::readout::ReadOut;
 use crate::cfa::FilterArray;
 use crate::error::Result;
 use crate::metadata::{FrameHeader, Metadata};
 use crate::units::QuantityKind;
-
-/// White levels of one scale of codes are never so many times each other: other scales are other numbers of bits, and levels of one are
-/// told a few per cent apart.
-const MOST_WHITES: f64 = 1.5;
 
 /// Makes sure that a frame holds codes of photosites as the converter gave them, or another program's samples.
 pub(in crate::stages) fn check_codes(frame: &FrameHeader) -> Result<()> {
@@ -82,7 +79,7 @@ pub(in crate::stages) fn check_alike(frame: &FrameHeader, dark: &FrameHeader) ->
     }
     let whites = frame.metadata.white_level_adu.zip(dark.metadata.white_level_adu);
     if let Some([a, b]) = whites.map(|(a, b)| [a.largest(), b.largest()])
-        && (a > MOST_WHITES * b || b > MOST_WHITES * a)
+        && (a > OF_ONE_SCALE * b || b > OF_ONE_SCALE * a)
     {
         return Err(dark.refuse(format!(
             "its white level is {b} ADU, but that of {} is {a} ADU: their codes are of different scales",

@@ -4,6 +4,7 @@ use super::stack::{DarkSettings, DarkStack, Master};
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
+use crate::numerics::vectors::{self, Kernel};
 use crate::stages::defects::{Survey, add};
 use crate::stages::masters::{Averaging, Frames};
 use crate::stages::saturation::DEFECTIVE;
@@ -87,6 +88,13 @@ impl<S: RowSource> DarkFrames<S> {
     /// Photosites that were found to be off, and unstable, so far.
     pub fn found(&self) -> [u64; 2] {
         self.found
+    }
+
+    fn add_means(&mut self, seen: &TakenOff) {
+        for (sum, lanes) in self.sums.iter_mut().zip(&seen.sums) {
+            *sum += lanes.iter().sum::<f64>();
+        }
+        self.summed += seen.counts.iter().sum::<u64>();
     }
 
     /// The mean of what they came off so far, and of what came off; none of none.
@@ -238,6 +246,57 @@ impl<'a, S: RowSource> LessDarks<'a, S> {
     }
 }
 
+/// Sums run in so many lanes.
+const LANES: usize = 8;
+
+/// Sums over finite samples of what dark frames came off, and of these; and how many there are.
+#[derive(Default)]
+struct TakenOff {
+    sums: [[f64; LANES]; 2],
+    counts: [u64; LANES],
+}
+
+/// Takes a row of dark frames off a row of samples.
+struct TakeOff<'a> {
+    row: &'a mut [f32],
+    darks: &'a [f64],
+    seen: &'a mut TakenOff,
+}
+
+impl TakeOff<'_> {
+    #[inline(always)]
+    fn one(sample: &mut f32, dark: f64, lane: usize, seen: &mut TakenOff) {
+        let level = f64::from(*sample);
+        let left = level - dark;
+        let counts = left.is_finite();
+        seen.sums[0][lane] += if counts { level } else { 0.0 };
+        seen.sums[1][lane] += if counts { dark } else { 0.0 };
+        seen.counts[lane] += u64::from(counts);
+        *sample = to_sample(left);
+    }
+}
+
+impl Kernel for TakeOff<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let length = self.row.len().min(self.darks.len());
+        let (row, rest) = self.row[..length].as_chunks_mut::<LANES>();
+        let (darks, rest_of_darks) = self.darks[..length].as_chunks::<LANES>();
+        let mut seen = std::mem::take(self.seen);
+        for (samples, darks) in row.iter_mut().zip(darks) {
+            for lane in 0..LANES {
+                Self::one(&mut samples[lane], darks[lane], lane, &mut seen);
+            }
+        }
+        for (lane, (sample, dark)) in rest.iter_mut().zip(rest_of_darks).enumerate() {
+            Self::one(sample, *dark, lane, &mut seen);
+        }
+        *self.seen = seen;
+    }
+}
+
 impl<S: RowSource> RowSource for LessDarks<'_, S> {
     fn header(&self) -> &FrameHeader {
         self.frame.header()
@@ -256,21 +315,12 @@ impl<S: RowSource> RowSource for LessDarks<'_, S> {
         self.frame.read(rows, samples)?;
         let of_frame = self.frame.header().geometry.row_samples();
         let of_dark = self.darks.stack.head.geometry.row_samples();
-        let (mut sums, mut summed) = ([0.0; 2], 0);
+        let mut seen = TakenOff::default();
         let darks = self.darks.next(rows)?;
         for (row, darks) in samples[start..].chunks_exact_mut(of_frame).zip(darks.chunks_exact(of_dark)) {
-            for (sample, dark) in row.iter_mut().zip(darks) {
-                let level = f64::from(*sample);
-                let left = level - dark;
-                if left.is_finite() {
-                    sums = [sums[0] + level, sums[1] + dark];
-                    summed += 1;
-                }
-                *sample = to_sample(left);
-            }
+            vectors::run(TakeOff { row, darks, seen: &mut seen });
         }
-        self.darks.sums = [self.darks.sums[0] + sums[0], self.darks.sums[1] + sums[1]];
-        self.darks.summed += summed;
+        self.darks.add_means(&seen);
         self.mark(self.darks.rows_made - rows, &mut samples[start..]);
         Ok(())
     }
