@@ -775,7 +775,7 @@ fn predicted_in(setup: &CameraSetup, light: [f64; 3]) -> Option<(f64, Option<Str
 }
 
 /// How long predictions of random sensors take: `CYANOMETER_CAMERAS=2000 cargo test --release --test extremes
-/// predictions_take -- --ignored --nocapture`; CYANOMETER_FIRST is the number of the first.
+/// predictions_take -- --ignored --nocapture`; CYANOMETER_FIRST is the number of the first; with CYANOMETER_TELL each is written out.
 #[test]
 #[ignore = "a measurement"]
 fn predictions_take_milliseconds() {

@@ -7,7 +7,6 @@ mod support;
 use cyanometer::analysis::statistics::{Saturated, measure};
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::{CfaPattern, Class};
-use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::metadata::{FrameHeader, PoissonKind, Scene};
 use cyanometer::numerics::vectors::Instructions;
 use cyanometer::propagation::pixels::PixelNoise;
@@ -19,7 +18,7 @@ use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
-use cyanometer::stream::{Counts, MemoryFrame, RowSink, Stage};
+use cyanometer::stream::{MemoryFrame, Stage};
 use std::io::Write;
 use std::process::Stdio;
 use support::workshop::Workshop;
@@ -436,14 +435,8 @@ fn programs_let_columns_wait() {
     ccd(&mut planes, |readout| (readout.smear_line_s, readout.blooming) = (6e-6, 0.5));
     let plane = mosaicked(&planes);
     let wanted = through(&plane, &noise_of(&plane, &seeded()));
-    let write = |name: &str, frame: &MemoryFrame| {
-        let options = OutputOptions { path: Some(shop.path(name)), ..Default::default() };
-        let mut writer = FrameWriter::create(&options, &frame.header).unwrap();
-        writer.write(&frame.samples).unwrap();
-        writer.finish(Counts::default()).unwrap();
-    };
-    write("plane.exr", &plane);
-    write("planes.exr", &planes);
+    shop.write("plane.exr", &plane.header, &plane.samples);
+    shop.write("planes.exr", &planes.header, &planes.samples);
     std::fs::create_dir(shop.path("waiting")).unwrap();
     let run = |line: &str, input: &[u8]| {
         let mut command = shop.command(line);

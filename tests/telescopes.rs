@@ -4,23 +4,12 @@
 
 mod support;
 
-use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata, TakenAs};
-use cyanometer::stream::{Counts, RowSink};
 use std::fs;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 const SIZE: [usize; 2] = [16, 12];
-
-/// What a command says that ends with `status`.
-#[track_caller]
-fn said(shop: &Workshop, line: &str, status: i32) -> String {
-    let output = shop.attempt(line, &[]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(status), "{line}: {said}");
-    said
-}
 
 /// A FITS of codes about a level, which `seed` scatters, with these cards.
 fn write_fits(shop: &Workshop, name: &str, [level, seed]: [u32; 2], cards: &[(&str, &str)]) {
@@ -65,17 +54,17 @@ const DARK: (&str, &str) = ("IMAGETYP", "'Dark Frame'");
 fn times_are_compared_where_no_aperture_is_told() {
     let line = "correct-frame light.fits --dark dark.fits -o out.exr";
     let shop = night(&[DARK, ("EXPTIME", "2.0")]);
-    assert_eq!(said(&shop, line, 0), "");
+    assert_eq!(shop.said(line, 0), "");
     assert_eq!(shop.sidecar("out.exr").exposure_time_s, Some(2.0));
     assert_eq!(shop.sidecar("out.exr").taken_as, Some(TakenAs::Light));
     let shop = night(&[DARK, ("EXPTIME", "30.0")]);
     let differ = "its exposure is 30 s, but that of light.fits is 2 s; their dark signals differ\n";
-    assert_eq!(said(&shop, line, 0), format!("correct-frame: warning: dark.fits: {differ}"));
+    assert_eq!(shop.said(line, 0), format!("correct-frame: warning: dark.fits: {differ}"));
     // What was converted still tells it.
     for end in ["tiff", "exr"] {
         for name in ["light", "dark"] {
             let to = format!("correct-frame {name}.fits --black 0 -o {name}.{end}");
-            said(&shop, &to, 0);
+            shop.said(&to, 0);
             assert!(shop.read(&format!("{name}.{end}")).1.exposure_time_s.is_some(), "{end}");
         }
     }
@@ -86,7 +75,7 @@ fn darks_are_scaled_by_times_alone() {
     let shop = night(&[DARK, ("EXPTIME", "8.0")]);
     write_fits(&shop, "bias.fits", [60, 3], &[("EXPTIME", "0.0"), ("IMAGETYP", "'Bias Frame'"), ("INSTRUME", "'A'")]);
     let line = "correct-frame light.fits --dark dark.fits --bias bias.fits --scale-dark -o out.exr";
-    let scaled = said(&shop, line, 0);
+    let scaled = shop.said(line, 0);
     assert!(scaled.contains("its temperature is not known"), "{scaled}");
     // w = 2/8 of the dark, 3/4 of the bias.
     let of = |name: &str| shop.read(name).0;
@@ -98,20 +87,20 @@ fn darks_are_scaled_by_times_alone() {
     let shop = night(&[DARK, ("EXPTIME", "8.0")]);
     write_fits(&shop, "light.fits", [900, 1], &[("INSTRUME", "'A'")]);
     write_fits(&shop, "bias.fits", [60, 3], &[("INSTRUME", "'A'")]);
-    let missing = said(&shop, line, BAD_DATA);
+    let missing = shop.said(line, BAD_DATA);
     assert!(missing.contains("`exposure_time_s`") && missing.ends_with("give --exposure S\n"), "{missing}");
-    said(&shop, &format!("{line} --exposure 2"), 0);
+    shop.said(&format!("{line} --exposure 2"), 0);
     let other = of_two_times(&night(&[DARK, ("EXPTIME", "8.0")]), "--exposure 3");
     assert!(other.contains("light.fits: the exposure time in s is 2 by its metadata"), "{other}");
 }
 
 fn of_two_times(shop: &Workshop, rest: &str) -> String {
-    said(shop, &format!("correct-frame light.fits --dark dark.fits {rest} -o out.exr"), BAD_USAGE)
+    shop.said(&format!("correct-frame light.fits --dark dark.fits {rest} -o out.exr"), BAD_USAGE)
 }
 
 #[test]
 fn what_a_frame_was_taken_as_is_what_it_is_used_as() {
-    let dark = |shop: &Workshop, status| said(shop, "correct-frame light.fits --dark dark.fits -o out.exr", status);
+    let dark = |shop: &Workshop, status| shop.said("correct-frame light.fits --dark dark.fits -o out.exr", status);
     for (card, taken) in [
         (("IMAGETYP", "'Flat Field'"), "a flat"),
         (("IMAGETYP", "'LIGHT'"), "a light frame"),
@@ -134,7 +123,7 @@ fn what_a_frame_was_taken_as_is_what_it_is_used_as() {
         "{both}"
     );
     let shop = night(&[DARK]);
-    let flat = said(&shop, "correct-frame light.fits --black 50 --flat dark.fits -o out.exr", BAD_DATA);
+    let flat = shop.said("correct-frame light.fits --black 50 --flat dark.fits -o out.exr", BAD_DATA);
     assert!(flat.contains("it was taken as a dark frame") && flat.contains("is given as a flat"), "{flat}");
     write_fits(&shop, "light.fits", [900, 1], &[DARK, ("INSTRUME", "'A'")]);
     assert!(dark(&shop, 0).contains("light.fits: no light fell on it: it is a dark frame itself"));
@@ -145,7 +134,7 @@ fn a_copy_of_the_frame_corrects_nothing() {
     let shop = night(&[DARK]);
     write_fits(&shop, "copy.fits", [900, 1], &[("INSTRUME", "'A'"), ("OBSERVER", "'me'")]);
     for rest in ["--dark copy.fits", "--dark dark.fits --flat copy.fits --flat-dark dark.fits", "--bias copy.fits"] {
-        let refused = said(&shop, &format!("correct-frame light.fits {rest} -o out.exr"), BAD_DATA);
+        let refused = shop.said(&format!("correct-frame light.fits {rest} -o out.exr"), BAD_DATA);
         assert!(refused.contains("copy.fits: its samples are those of light.fits, every one"), "{refused}");
     }
     assert!(!shop.path("out.exr").exists());
@@ -156,14 +145,14 @@ fn a_dark_that_is_no_dark_is_told_by_its_level() {
     // Nothing tells what it is, as of all frames of cameras: that alone is no warning.
     let shop = night(&[]);
     let line = "correct-frame light.fits --dark dark.fits -o out.exr";
-    assert_eq!(said(&shop, line, 0), "");
-    let told = said(&shop, &format!("{line} -v"), 0);
+    assert_eq!(shop.said(line, 0), "");
+    let told = shop.said(&format!("{line} -v"), 0);
     assert!(told.contains("dark.fits: the metadata do not tell whether it is a dark frame of the sensor"), "{told}");
     // One that tells no camera beside one that does is doubtful.
     write_fits(&shop, "dark.fits", [100, 2], &[]);
-    assert!(said(&shop, line, 0).contains("warning: dark.fits: the metadata do not tell"));
+    assert!(shop.said(line, 0).contains("warning: dark.fits: the metadata do not tell"));
     write_fits(&shop, "dark.fits", [1000, 2], &[("INSTRUME", "'A'")]);
-    let below = said(&shop, line, 0);
+    let below = shop.said(line, 0);
     assert!(
         below.contains("warning: light.fits: its mean is 904.0 ADU") && below.contains("below that of what came off"),
         "{below}"
@@ -175,7 +164,7 @@ fn keywords_that_contradict_each_other_are_told() {
     let of = |cards: &[(&str, &str)]| {
         let shop = Workshop::new();
         write_fits(&shop, "a.fits", [900, 1], cards);
-        said(&shop, "measure a.fits -o out.txt", 0)
+        shop.said("measure a.fits -o out.txt", 0)
     };
     let warned = |what: &str| format!("measure: warning: a.fits: {what}\n");
     assert_eq!(of(&[("EXPTIME", "2.0"), ("EXPOSURE", "2"), ("EXPOINUS", "2000000")]), "");
@@ -201,14 +190,14 @@ fn keywords_that_contradict_each_other_are_told() {
 #[test]
 fn a_white_level_comes_before_black_is_off() {
     let shop = night(&[DARK]);
-    said(&shop, "correct-frame light.fits --dark dark.fits -o out.exr", 0);
-    let refused = said(&shop, "demosaic out.exr --white 905 -o rgb.exr", BAD_USAGE);
+    shop.said("correct-frame light.fits --dark dark.fits -o out.exr", 0);
+    let refused = shop.said("demosaic out.exr --white 905 -o rgb.exr", BAD_USAGE);
     assert!(refused.contains("black came off its samples before a white level was known"), "{refused}");
     assert!(refused.ends_with("leave out --white\n"), "{refused}");
-    let late = said(&shop, "demosaic out.exr --sensor kaf-5101ce -o rgb.exr", 0);
+    let late = shop.said("demosaic out.exr --sensor kaf-5101ce -o rgb.exr", 0);
     assert!(late.contains("the full well of sensor kaf-5101ce comes too late to mark saturated samples"), "{late}");
     // Given in time it marks what is saturated.
-    said(&shop, "correct-frame light.fits --dark dark.fits --white 905 -o out.exr", 0);
+    shop.said("correct-frame light.fits --dark dark.fits --white 905 -o out.exr", 0);
     assert!(shop.sidecar("out.exr").mask_bits.len() == 4);
 }
 
@@ -223,7 +212,7 @@ fn a_black_level_above_white_leaves_nothing() {
         .unwrap();
         for program in ["demosaic", "correct-frame"] {
             let line = format!("{program} light.fits --metadata m.yaml --black 15000 -o out.exr");
-            let refused = said(&shop, &line, BAD_USAGE);
+            let refused = shop.said(&line, BAD_USAGE);
             assert!(refused.contains("--black 15000 is not below the white level, 4095 ADU"), "{refused}");
         }
     }
@@ -235,7 +224,7 @@ fn black_levels_begin_at_the_corner_of_the_picture() {
     let shop = Workshop::new();
     for offsets in [["0", "0"], ["1", "0"], ["0", "1"], ["1", "1"]] {
         write_fits(&shop, "a.fits", [900, 1], &[("XBAYROFF", offsets[0]), ("YBAYROFF", offsets[1])]);
-        said(&shop, "correct-frame a.fits --black 10,20,30,40 -o out.exr", 0);
+        shop.said("correct-frame a.fits --black 10,20,30,40 -o out.exr", 0);
         let (before, after) = (shop.read("a.fits").0, shop.read("out.exr").0);
         for (place, (before, after)) in before.iter().zip(&after).enumerate() {
             let [x, y] = [place % SIZE[0], place / SIZE[0]];
@@ -266,10 +255,7 @@ fn a_dng_tells_camera_and_time() {
 fn write_frame(shop: &Workshop, name: &str, metadata: &Metadata, samples: &[f32]) {
     let geometry = Geometry::new(SIZE[0], SIZE[1], &["Y"]);
     let header = FrameHeader { name: name.into(), geometry, metadata: metadata.clone() };
-    let options = OutputOptions { path: Some(shop.path(name)), ..Default::default() };
-    let mut writer = FrameWriter::create(&options, &header).unwrap();
-    writer.write(samples).unwrap();
-    writer.finish(Counts::default()).unwrap();
+    shop.write(name, &header, samples);
 }
 
 /// A frame of codes, of which another program made others and kept their metadata.
@@ -287,7 +273,7 @@ fn codes_that_another_program_scaled_are_no_codes() {
     {
         let scaled: Vec<f32> = samples.iter().map(|sample| sample * factor).collect();
         write_frame(&shop, "scaled.exr", &metadata, &scaled);
-        let refused = said(&shop, "demosaic scaled.exr -o out.exr", BAD_DATA);
+        let refused = shop.said("demosaic scaled.exr -o out.exr", BAD_DATA);
         assert!(refused.contains("scaled.exr: it has a sample of") && refused.contains(wrong), "{refused}");
     }
     // Of a frame of a camera the white level tells it.
@@ -295,6 +281,6 @@ fn codes_that_another_program_scaled_are_no_codes() {
     of_camera.adc = None;
     let scaled: Vec<f32> = samples.iter().map(|sample| sample * 16.0).collect();
     write_frame(&shop, "scaled.exr", &of_camera, &scaled);
-    let refused = said(&shop, "demosaic scaled.exr -o out.exr", BAD_DATA);
+    let refused = shop.said("demosaic scaled.exr -o out.exr", BAD_DATA);
     assert!(refused.contains("but its white level is 4095 ADU, by its metadata"), "{refused}");
 }

@@ -6,24 +6,14 @@ mod support;
 
 use cyanometer::camera::optics::Exposure;
 use cyanometer::formats::chart::load_reference;
-use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::metadata::{FrameHeader, HistoryEntry, Metadata};
-use cyanometer::stream::{Counts, RowSink};
+
 use cyanometer::units::QuantityKind;
 use nalgebra::{Matrix3, Vector3};
 use std::fs;
 use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
-
-/// What a command says that ends with `status`.
-#[track_caller]
-fn said(shop: &Workshop, line: &str, status: i32) -> String {
-    let output = shop.attempt(line, &[]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(status), "{line}: {said}");
-    said
-}
 
 /// A light frame, dark frames and a bias frame, each an exposure of its own but for `same`, which has the number of the light.
 fn exposed() -> Workshop {
@@ -77,8 +67,8 @@ fn colors_far_above_their_white_are_told() {
     let shop = Workshop::new();
     shop.run("fit-matrix sky912.exr -o m.yaml", &[]);
     shop.pipe("render-radiance clear_zenith.csv --size 16x12 --expose-to 0.5 --quiet | digitize -o codes.exr --quiet");
-    let far = said(&shop, "to-xyz codes.exr --matrix m.yaml --space lab --white-luminance 100 -o lab.exr", 0);
-    let near = said(&shop, "to-xyz codes.exr --matrix m.yaml --space lab --white-luminance 5000 -o near.exr", 0);
+    let far = shop.said("to-xyz codes.exr --matrix m.yaml --space lab --white-luminance 100 -o lab.exr", 0);
+    let near = shop.said("to-xyz codes.exr --matrix m.yaml --space lab --white-luminance 5000 -o near.exr", 0);
     let told = "192 colors are more than ten times as bright as their white";
     assert_eq!((far.contains(told), near.contains("as their white")), (true, false), "{far}{near}");
 }
@@ -97,7 +87,7 @@ fn a_check_of_a_frame_without_noise_says_so() {
 #[test]
 fn noise_that_stands_in_two_frames_is_told() {
     let shop = exposed();
-    let correct = |rest: &str, status| said(&shop, &format!("correct-frame light.exr {rest} -o out.exr"), status);
+    let correct = |rest: &str, status| shop.said(&format!("correct-frame light.exr {rest} -o out.exr"), status);
     assert_eq!(correct("--dark dark.exr --dark other.exr", 0), "");
     // What comes off a frame may come off its flats.
     assert_eq!(correct("--dark dark.exr --flat flat.exr --flat-dark dark.exr", 0), "");
@@ -123,7 +113,7 @@ fn noise_that_stands_in_two_frames_is_told() {
 #[test]
 fn a_bias_that_is_exposed_for_long_is_told() {
     assert_eq!(
-        said(&exposed(), "correct-frame light.exr --bias bias.exr -o out.exr", 0),
+        exposed().said("correct-frame light.exr --bias bias.exr -o out.exr", 0),
         "correct-frame: warning: bias.exr: its exposure is 2 s, longer than that of light.exr, 0.033 s; a bias frame has next to \
          none, and its dark signal comes off too\ncorrect-frame: warning: light.exr: its mean is 1875.0 ADU, below that of what came \
          off, 2021.5 ADU; are these dark or bias frames of it?\n"
@@ -133,8 +123,7 @@ fn a_bias_that_is_exposed_for_long_is_told() {
 #[test]
 fn maps_that_mark_nothing_are_told() {
     let shop = exposed();
-    let correct =
-        |map: &str| said(&shop, &format!("correct-frame light.exr --black auto --defects {map} -o out.exr"), 0);
+    let correct = |map: &str| shop.said(&format!("correct-frame light.exr --black auto --defects {map} -o out.exr"), 0);
     fs::write(shop.path("within.txt"), "15,11\n").unwrap();
     fs::write(shop.path("beyond.txt"), "16,11\n2000,3\n").unwrap();
     fs::write(shop.path("part.txt"), "x,y\n15,11\n2000,3\n").unwrap();
@@ -152,7 +141,7 @@ fn maps_that_mark_nothing_are_told() {
         geometry: Geometry::new(16, 12, &["Y"]),
         metadata: Metadata::new(QuantityKind::Unspecified),
     };
-    write(&shop, "zero.exr", &zero, &[0.0; 16 * 12]);
+    shop.write("zero.exr", &zero, &[0.0; 16 * 12]);
     let warning = "correct-frame: warning: zero.exr: it is 0 everywhere, and marks no photosite as defective\n";
     assert_eq!(correct("zero.exr"), warning);
 }
@@ -162,8 +151,8 @@ fn a_black_level_that_is_not_that_of_the_metadata_is_told() {
     let shop = exposed();
     for line in ["correct-frame light.exr -o out.exr", "demosaic light.exr -o out.exr"] {
         let program = line.split(' ').next().unwrap();
-        assert_eq!(said(&shop, &format!("{line} --black 1757"), 0), "", "a level may be rounded");
-        let warning = said(&shop, &format!("{line} --black 1700"), 0);
+        assert_eq!(shop.said(&format!("{line} --black 1757"), 0), "", "a level may be rounded");
+        let warning = shop.said(&format!("{line} --black 1700"), 0);
         let begin =
             format!("{program}: warning: light.exr: --black 1700 is not the black level of its metadata, 1757.30");
         assert!(warning.starts_with(&begin) && warning.ends_with(", which --black auto takes\n"), "{warning}");
@@ -180,11 +169,7 @@ fn frames_beside_a_plain_one_are_as_it_is_described() {
         fs::write(shop.path(&format!("{name}.raw")), codes).unwrap();
     }
     let correct = |rest: &str, status| {
-        said(
-            &shop,
-            &format!("correct-frame light.raw --raw 8x6:u16le --cfa rggb --white 4095 {rest} -o out.exr"),
-            status,
-        )
+        shop.said(&format!("correct-frame light.raw --raw 8x6:u16le --cfa rggb --white 4095 {rest} -o out.exr"), status)
     };
     // That no metadata tell what they are is no doubt of them.
     let on_trust = "dark.raw: the metadata do not tell whether it is a dark frame of the sensor that took light.raw\n";
@@ -208,17 +193,17 @@ fn relative_xyz_have_no_bright_white() {
     let text = "schema: cyanometer/1\nquantity: xyz\nunit: relative\n";
     fs::write(shop.path("relative.yaml"), text).unwrap();
     let line = "to-xyz xyz.exr --metadata relative.yaml --space lab -o out.exr --white";
-    assert_eq!(said(&shop, &format!("{line} 0.95,1,1.09"), 0), "");
-    let warning = said(&shop, &format!("{line} 95,100,109"), 0);
+    assert_eq!(shop.said(&format!("{line} 0.95,1,1.09"), 0), "");
+    let warning = shop.said(&format!("{line} 95,100,109"), 0);
     assert!(warning.starts_with("to-xyz: warning: the white has Y = 100, but XYZ are relative"), "{warning}");
     // Absolute XYZ have none that is next to black.
     shop.write_colors("absolute.exr", QuantityKind::Xyz, &[[2000.0, 3000.0, 4000.0]]);
     let line = "to-xyz absolute.exr --space lab -o out.exr --white";
-    assert_eq!(said(&shop, &format!("{line} 9500,10000,10900"), 0), "");
-    let warning = said(&shop, &format!("{line} 0.95,1,1.09"), 0);
+    assert_eq!(shop.said(&format!("{line} 9500,10000,10900"), 0), "");
+    let warning = shop.said(&format!("{line} 0.95,1,1.09"), 0);
     assert!(warning.starts_with("to-xyz: warning: the white has Y = 1, but XYZ are absolute"), "{warning}");
     fs::copy(shop.path("relative.yaml"), shop.path("xyz.exr.yaml")).unwrap();
-    let warning = said(&shop, "color-difference xyz.exr 0.2,0.3,0.5 --white 95,100,109", 0);
+    let warning = shop.said("color-difference xyz.exr 0.2,0.3,0.5 --white 95,100,109", 0);
     assert!(warning.starts_with("color-difference: warning: the white has Y = 100, but XYZ are relative"), "{warning}");
 }
 
@@ -230,7 +215,7 @@ fn marks_are_told_by_kind() {
     metadata.history.push(HistoryEntry { program: "test".into(), version: "1".into(), arguments: Vec::new() });
     let geometry = Geometry::new(6, 1, &["Y", "mask"]);
     let header = FrameHeader { name: "marked".into(), geometry, metadata };
-    write(&shop, "marked.exr", &header, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0, 1.0, 2.0, 6.0, 9.0, 8.0]);
+    shop.write("marked.exr", &header, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0, 1.0, 2.0, 6.0, 9.0, 8.0]);
     let begin = "preview: warning: marked.exr: ";
     let expected = [
         "2 of the pixels read were made of saturated samples",
@@ -238,7 +223,7 @@ fn marks_are_told_by_kind() {
         "2 of the pixels read are beyond the model of a correction",
     ]
     .map(|text| format!("{begin}{text}; they are taken as they are\n"));
-    assert_eq!(said(&shop, "preview marked.exr -o out.png", 0), expected.concat());
+    assert_eq!(shop.said("preview marked.exr -o out.png", 0), expected.concat());
 }
 
 /// A chart of 24 patches as a camera with this matrix reads it, with some scatter.
@@ -269,7 +254,7 @@ fn chart(shop: &Workshop) {
             samples.push(to_sample(100.0 + 2000.0 * signal[class] + 4.0 * chance() - 2.0));
         }
     }
-    write(shop, "chart.exr", &header, &samples);
+    shop.write("chart.exr", &header, &samples);
 }
 
 /// Dark frames of a camera are brought to the temperature that the file of the frame tells, by [HP2005, Eq. 6] in electronvolts.
@@ -284,12 +269,12 @@ fn temperatures_of_a_camera_count() {
         metadata.exposure = Some(Exposure { exposure_s: 1.0, f_number: 8.0, lens_transmittance: 1.0 });
         metadata.sensor_temperature_k = Some(temperature_k);
         let header = FrameHeader { name: name.into(), geometry: Geometry::new(4, 4, &["Y"]), metadata };
-        write(&shop, name, &header, &[sample; 16]);
+        shop.write(name, &header, &[sample; 16]);
     };
     frame("light.exr", 263.15, 1100.0);
     frame("dark.exr", 268.15, 300.0);
     assert!(
-        said(&shop, "correct-frame light.exr --dark dark.exr -o c.exr", 0)
+        shop.said("correct-frame light.exr --dark dark.exr -o c.exr", 0)
             .contains("dark.exr: its temperature is 268.15 K, but that of light.exr is 263.15 K")
     );
     shop.run("correct-frame light.exr --dark dark.exr --scale-dark --quiet -o c.exr", &[]);
@@ -314,8 +299,8 @@ fn bare_frames_are_described() {
     let bare = format!("fit-matrix --chart chart.exr --metadata bare.yaml {corners} -o bare-m.yaml");
     let missing =
         |key: &str, supply: &str| format!("fit-matrix: chart.exr: the metadata has no `{key}`; give {supply}\n");
-    assert_eq!(said(&shop, &bare, BAD_DATA), missing("cfa", "--cfa PATTERN"));
-    assert_eq!(said(&shop, &format!("{bare} --cfa rggb"), BAD_DATA), missing("black_level_adu", "--levels"));
+    assert_eq!(shop.said(&bare, BAD_DATA), missing("cfa", "--cfa PATTERN"));
+    assert_eq!(shop.said(&format!("{bare} --cfa rggb"), BAD_DATA), missing("black_level_adu", "--levels"));
     shop.run(&format!("{bare} --cfa rggb --levels 100,4100"), &[]);
     let elements = |name: &str| {
         let text = String::from_utf8(shop.bytes(name)).unwrap();
@@ -329,7 +314,7 @@ fn bare_frames_are_described() {
     for option in ["--crop 0,0,1,1", "--channel G", "--cfa rggb", "--part 1", "--metadata bare.yaml"] {
         let name = option.split(' ').next().unwrap();
         assert_eq!(
-            said(&shop, &format!("fit-matrix SAMPLES/skies/sky912.exr {option} -o x.yaml"), BAD_USAGE),
+            shop.said(&format!("fit-matrix SAMPLES/skies/sky912.exr {option} -o x.yaml"), BAD_USAGE),
             format!(
                 "fit-matrix: no frame of a chart is named, --chart FRAME, which alone is described so; leave out {name}\n"
             )
@@ -341,8 +326,8 @@ fn bare_frames_are_described() {
         geometry: Geometry::new(2, 2, &["Y"]),
         metadata: Metadata::new(QuantityKind::Unspecified),
     };
-    write(&shop, "a.exr", &header, &[70.0, 80.0, 90.0, 100.0]);
-    write(&shop, "b.exr", &header, &[72.0, 82.0, 92.0, 102.0]);
+    shop.write("a.exr", &header, &[70.0, 80.0, 90.0, 100.0]);
+    shop.write("b.exr", &header, &[72.0, 82.0, 92.0, 102.0]);
     let described = "--cfa rggb --black 64 --white 4095 --exposure 0.5 --f-number 8";
     shop.run(&format!("average-frames a.exr b.exr {described} -o mean.exr"), &[]);
     shop.run(&format!("stack-frames a.exr b.exr {described} -o both.zarr"), &[]);
@@ -356,9 +341,9 @@ fn bare_frames_are_described() {
     }
     let three = "mosaic three.exr --pattern rggb --white 4095 -o x.dng";
     let planes = FrameHeader { geometry: Geometry::new(2, 2, &["R", "G", "B"]), ..header };
-    write(&shop, "three.exr", &planes, &[70.0; 12]);
+    shop.write("three.exr", &planes, &[70.0; 12]);
     assert_eq!(
-        said(&shop, three, BAD_DATA),
+        shop.said(three, BAD_DATA),
         "mosaic: three.exr: the metadata has no `black_level_adu`; give --black N, 0 where it is off already\n"
     );
     shop.run(&format!("{three} --black 64"), &[]);
@@ -372,7 +357,7 @@ fn a_chart_that_is_turned_is_told() {
     let from = |first: usize| (0..4).map(|k| corners[(first + k) % 4]).collect::<Vec<_>>().join(",");
     shop.run(&format!("fit-matrix --chart chart.exr --corners {} -o m.yaml", from(0)), &[]);
     for first in 1..4 {
-        let complaint = said(&shop, &format!("fit-matrix --chart chart.exr --corners {}", from(first)), BAD_USAGE);
+        let complaint = shop.said(&format!("fit-matrix --chart chart.exr --corners {}", from(first)), BAD_USAGE);
         let begin = "fit-matrix: chart.exr: --corners begin at another patch than dark skin: turned, the chart fits its colors ";
         let end = format!(" times better; give --corners {}\n", from(0));
         assert!(complaint.starts_with(begin) && complaint.ends_with(&end), "{complaint}");
@@ -380,7 +365,7 @@ fn a_chart_that_is_turned_is_told() {
     // Absolute XYZ take an exposure, which metadata can supply.
     let absolute = format!("fit-matrix --chart chart.exr --luminance 100 -o m.yaml --corners {}", from(0));
     assert_eq!(
-        said(&shop, &absolute, BAD_DATA),
+        shop.said(&absolute, BAD_DATA),
         "fit-matrix: chart.exr: the metadata has no `exposure`; give --exposure S and --f-number N\n"
     );
     let text = "schema: cyanometer/1\nquantity: adu\ncfa: rggb\nblack_level_adu: 100\nwhite_level_adu: 4100\nexposure: {exposure_s: \
@@ -392,24 +377,16 @@ fn a_chart_that_is_turned_is_told() {
     shop.run(&format!("{absolute} --exposure 0.01 --f-number 8"), &[]);
     assert_eq!(shop.bytes("m.yaml"), by_metadata);
     assert_eq!(
-        said(&shop, &format!("{absolute} --exposure 0.01"), BAD_USAGE),
+        shop.said(&format!("{absolute} --exposure 0.01"), BAD_USAGE),
         "fit-matrix: chart.exr: an exposure is a time and an f-number, and one is not known; give --f-number\n"
     );
     assert_eq!(
-        said(&shop, &format!("{absolute} --metadata chart.yaml --exposure 0.02"), BAD_USAGE),
+        shop.said(&format!("{absolute} --metadata chart.yaml --exposure 0.02"), BAD_USAGE),
         "fit-matrix: chart.exr: the exposure time in s is 0.01 by its metadata, which --metadata FILE can replace; leave out \
          --exposure\n"
     );
     let table = "fit-matrix --patches none.csv --lens-transmittance 0.9";
-    assert!(said(&shop, table, BAD_USAGE).ends_with("which alone is described so; leave out --lens-transmittance\n"));
-}
-
-/// Writes a frame.
-fn write(shop: &Workshop, name: &str, header: &FrameHeader, samples: &[f32]) {
-    let options = OutputOptions { path: Some(shop.path(name)), ..OutputOptions::default() };
-    let mut writer = FrameWriter::create(&options, header).unwrap();
-    writer.write(samples).unwrap();
-    writer.finish(Counts::default()).unwrap();
+    assert!(shop.said(table, BAD_USAGE).ends_with("which alone is described so; leave out --lens-transmittance\n"));
 }
 
 #[test]
@@ -424,7 +401,7 @@ fn a_matrix_of_another_camera_is_told() {
              100}}\ncamera: {camera}\n"
         );
         fs::write(shop.path("rgb.yaml"), text).unwrap();
-        said(&shop, "to-xyz rgb.exr --metadata rgb.yaml --matrix a1.yaml -o out.exr", 0)
+        shop.said("to-xyz rgb.exr --metadata rgb.yaml --matrix a1.yaml -o out.exr", 0)
     };
     assert_eq!(of_camera("MAKER A1"), "");
     assert_eq!(
@@ -438,7 +415,7 @@ fn pictures_that_are_no_raws_and_no_scenes_are_told() {
     let shop = Workshop::new();
     fs::write(shop.path("a.jpg"), [[0xFF, 0xD8, 0xFF, 0xE0].as_slice(), &[0; 600]].concat()).unwrap();
     fs::copy(shop.path("a.jpg"), shop.path("b.jpg")).unwrap();
-    let complaint = said(&shop, "import-raw a.jpg b.jpg -o {stem}.exr", BAD_DATA);
+    let complaint = shop.said("import-raw a.jpg b.jpg -o {stem}.exr", BAD_DATA);
     let lines: Vec<&str> = complaint.lines().collect();
     assert!(lines[0].contains("for measurements give the camera's raw file"), "{complaint}");
     assert_eq!(lines[2], "import-raw: 2 of 2 inputs failed");
@@ -447,8 +424,8 @@ fn pictures_that_are_no_raws_and_no_scenes_are_told() {
         geometry: Geometry::new(2, 2, &["Y"]),
         metadata: Metadata::new(QuantityKind::Unspecified),
     };
-    write(&shop, "gray.exr", &gray, &[0.5; 4]);
-    let complaint = said(&shop, "render-radiance gray.exr -o out.exr", BAD_DATA);
+    shop.write("gray.exr", &gray, &[0.5; 4]);
+    let complaint = shop.said("render-radiance gray.exr -o out.exr", BAD_DATA);
     assert!(complaint.contains("of a gray picture store the plane three times, as R, G and B"), "{complaint}");
 }
 
@@ -459,7 +436,7 @@ fn a_sensor_has_one_linearization() {
                   dark_current_e_per_s: 0.5, temperature_k: 293, dcnu: 0.1, prnu: 0.006, read_noise_e: 3, bits: 14, bias_adu: 512, \
                   adu_per_e: 0.4, linearization: {polynomial: [1.0], codes: [0, 1], linear: [0, 1]}}\n";
     fs::write(shop.path("s.yaml"), sensor).unwrap();
-    let complaint = said(&shop, "render-radiance --dark --size 2x2 --sensor s.yaml -o out.exr", BAD_DATA);
+    let complaint = shop.said("render-radiance --dark --size 2x2 --sensor s.yaml -o out.exr", BAD_DATA);
     assert!(
         complaint.contains("a linearization is `polynomial`, or `codes` and `linear`, but not both"),
         "{complaint}"
@@ -473,7 +450,7 @@ fn descriptions_that_a_sensor_contradicts_are_told() {
     fs::write(shop.path("plain.raw"), bytes).unwrap();
     let demosaic = |rest: &str, status| {
         let line = format!("demosaic plain.raw --raw 16x12:u16le --sensor kaf-5101ce {rest} -o rgb.exr");
-        said(&shop, &line, status)
+        shop.said(&line, status)
     };
     assert_eq!(demosaic("--black 1753 --cfa rggb --white 4095", 0), "");
     assert_eq!(
@@ -512,7 +489,7 @@ fn saturated_pixels_that_nothing_marks_are_told() {
     for (file, is_told) in [("xyz.tiff", true), ("xyz.exr", false)] {
         let line = format!("to-xyz rgb.exr --matrix matrix.yaml --quiet -o {file}");
         assert!(shop.attempt(&line, &[]).status.success());
-        let heard = said(&shop, &format!("measure {file}"), 0);
+        let heard = shop.said(&format!("measure {file}"), 0);
         let told = "48 of its pixels were made of saturated samples, by its sidecar, and nothing marks which";
         assert_eq!(heard.contains(told), is_told, "{heard}");
     }
@@ -525,11 +502,11 @@ fn a_comment_that_contradicts_the_heading_is_told() {
     fs::write(shop.path("two.csv"), table).unwrap();
     let line = "render-radiance two.csv --size 2x2 -o out.exr";
     assert_eq!(
-        said(&shop, line, 0),
+        shop.said(line, 0),
         "render-radiance: warning: two.csv: its heading says mW m-2 sr-1 nm-1, which counts, and a comment W m-2 sr-1 nm-1; \
          say which with --radiance-unit\n"
     );
-    assert_eq!(said(&shop, &format!("{line} --radiance-unit mW/m2/sr/nm"), 0), "");
+    assert_eq!(shop.said(&format!("{line} --radiance-unit mW/m2/sr/nm"), 0), "");
 }
 
 /// Sidecars that somebody edited: a key that is misspelt, and what contradicts itself.
@@ -542,11 +519,11 @@ fn edited_sidecars_are_told_of() {
         ("unit: ADU", "unit: e-", "its unit is `e-`, but that of its quantity, ADU, is `ADU`"),
         ("black_level_adu:", "black_level_adu: 0 # ", "its black level, 0 ADU, is below the bias of its converter, "),
     ];
-    assert_eq!(said(&shop, "measure codes.exr", 0), "");
+    assert_eq!(shop.said("measure codes.exr", 0), "");
     for (old, new, told) in edits {
         assert!(sidecar.contains(old), "{sidecar}");
         fs::write(shop.path("codes.exr.yaml"), sidecar.replace(old, new)).unwrap();
-        let heard = said(&shop, "measure codes.exr", 0);
+        let heard = shop.said("measure codes.exr", 0);
         assert!(heard.contains(&format!("measure: warning: codes.exr.yaml: {told}")), "{heard}");
     }
 }
@@ -555,7 +532,7 @@ fn edited_sidecars_are_told_of() {
 #[test]
 fn codes_that_f16_rounds_are_told() {
     let shop = Workshop::with_frames();
-    let heard = said(&shop, "mosaic codes.exr --sample-type f16 -o half.exr", 0);
+    let heard = shop.said("mosaic codes.exr --sample-type f16 -o half.exr", 0);
     let told =
         "f16 holds codes to 2048 as they are, and rounds those above, by steps of 2 at the white level, 4095 ADU; f32";
     assert!(heard.contains(told), "{heard}");
@@ -570,11 +547,11 @@ fn sidecar(shop: &Workshop) -> String {
 fn images_that_are_overexposed_or_cut_are_told() {
     let shop = Workshop::new();
     let skies = format!("{TREE}/sample_data/skies/sky912.exr");
-    let heard = said(&shop, &format!("render-radiance {skies} --patch 2x2 --exposure 1 -o out.exr"), 0);
+    let heard = shop.said(&format!("render-radiance {skies} --patch 2x2 --exposure 1 -o out.exr"), 0);
     assert!(heard.contains("samples expect full well or more, and will be saturated"), "{heard}");
     assert!(sidecar(&shop).contains("saturated: "));
-    assert_eq!(said(&shop, &format!("render-radiance {skies} --patch 2x2 --expose-to 0.5 -o out.exr"), 0), "");
-    let heard = said(&shop, &format!("render-radiance {skies} --size 8x6 --expose-to 0.5 -o out.exr"), 0);
+    assert_eq!(shop.said(&format!("render-radiance {skies} --patch 2x2 --expose-to 0.5 -o out.exr"), 0), "");
+    let heard = shop.said(&format!("render-radiance {skies} --size 8x6 --expose-to 0.5 -o out.exr"), 0);
     assert!(heard.contains("--size 8x6 shows a corner of its 38x24 pixels in patches of 1x1"), "{heard}");
 }
 
@@ -602,10 +579,10 @@ fn exposures_of_several_sensitivities_do_not_go_together() {
         metadata.cfa = Some("rggb".parse().unwrap());
         (metadata.camera, metadata.iso_speed) = (Some("A".into()), Some(iso_speed));
         let header = FrameHeader { name: name.into(), geometry: Geometry::new(4, 4, &["Y"]), metadata };
-        write(&shop, name, &header, &[1100.0; 16]);
+        shop.write(name, &header, &[1100.0; 16]);
     }
-    let averaged = said(&shop, "average-frames flat1.exr flat2.exr -o mean.exr", BAD_DATA);
+    let averaged = shop.said("average-frames flat1.exr flat2.exr -o mean.exr", BAD_DATA);
     assert!(averaged.contains("flat2.exr: its `iso_speed` is 400"), "{averaged}");
-    let transfer = said(&shop, "photon-transfer .", BAD_DATA);
+    let transfer = shop.said("photon-transfer .", BAD_DATA);
     assert!(transfer.contains("flat2.exr: its sensitivity (ISO) is not that of ./flat1.exr"), "{transfer}");
 }

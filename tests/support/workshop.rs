@@ -96,6 +96,15 @@ impl Workshop {
         output.stdout
     }
 
+    /// What a command says that ends with `status`.
+    #[track_caller]
+    pub fn said(&self, line: &str, status: i32) -> String {
+        let output = self.attempt(line, &[]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(status), "{line}: {said}");
+        said
+    }
+
     pub fn spawn(&self, line: &str, input: Stdio) -> Child {
         self.command(line)
             .stdin(input)
@@ -176,9 +185,14 @@ impl Workshop {
             geometry: Geometry::new(1, pixels.len(), &["R", "G", "B"]),
             metadata: Metadata::new(quantity),
         };
-        let options = OutputOptions { path: Some(self.path(name)), ..Default::default() };
-        let mut writer = FrameWriter::create(&options, &header).unwrap();
-        writer.write(pixels.as_flattened()).unwrap();
+        self.write(name, &header, pixels.as_flattened());
+    }
+
+    /// Writes a frame.
+    pub fn write(&self, name: &str, header: &FrameHeader, samples: &[f32]) {
+        let options = OutputOptions { path: Some(self.path(name)), ..OutputOptions::default() };
+        let mut writer = FrameWriter::create(&options, header).unwrap();
+        writer.write(samples).unwrap();
         writer.finish(Counts::default()).unwrap();
     }
 }

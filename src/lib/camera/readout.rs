@@ -290,6 +290,16 @@ impl ReadOut {
         self.taps.as_ref().map_or(0, |taps| taps.tap([self.width, self.height], at))
     }
 
+    /// The taps that read a column (axis 0) or row (1) of the sensor: before the middle and behind it.
+    pub fn taps_of_line(&self, axis: usize, line: i64) -> [usize; 2] {
+        let middle = [self.width, self.height].map(|extent| i64::from(extent / 2));
+        [-1, 0].map(|side| {
+            let mut at = middle.map(|middle| middle + side);
+            at[axis] = line;
+            self.tap(at)
+        })
+    }
+
     /// The read-out as if all went through one of its taps.
     #[must_use]
     pub fn of_tap(&self, tap: usize) -> Self {

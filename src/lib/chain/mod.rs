@@ -4,8 +4,8 @@
 //! formula.
 
 pub mod camera;
-pub mod causes;
-mod predicted;
+mod causes;
+pub mod predicted;
 pub mod predictor;
 
 pub use camera::{CameraSetup, CameraStages, uniform_frame};

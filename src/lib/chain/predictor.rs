@@ -148,22 +148,21 @@ impl Predictor {
 
     /// Has all frames expect so many signal electrons of R, G and B, and refuses what no formula tells before anything is worked out.
     fn light(&mut self, electrons: [f64; 3]) -> Result<()> {
-        for (stage, head) in &mut self.heads {
+        for (_, head) in &mut self.heads {
             if let Some(scene) = &mut head.metadata.scene {
                 scene.expected_electrons = Some(electrons);
             }
-            if head.metadata.demosaic.is_none() && head.taps().is_none() {
-                Sites::check(head, self.settings.equations).map_err(|why| refused(*stage, electrons, why))?;
-            }
         }
+        let equations = self.settings.equations;
+        let of_sites = || self.heads().filter(|(_, head)| head.metadata.demosaic.is_none() && head.taps().is_none());
+        let mut checks = of_sites().map(|(stage, head)| (stage, Sites::check(head, equations)));
+        checks.try_for_each(|(stage, check)| check.map_err(|why| refused(stage, electrons, why)))?;
         // Photosites that are unlike each other may take too long in codes, where their electrons do not; what is found is remembered.
-        let are_codes = |head: &&(ChainStage, FrameHeader)| {
-            quantity_of_sites(&head.1) == QuantityKind::Adu && head.1.metadata.demosaic.is_none() && has_tails(&head.1)
-        };
-        for (stage, head) in self.heads.iter().filter(are_codes).filter(|(_, head)| head.taps().is_none()) {
-            Sites::of(head, self.settings.equations).map_err(|why| refused(*stage, electrons, why))?;
-        }
-        Ok(())
+        let are_codes = |head: &FrameHeader| quantity_of_sites(head) == QuantityKind::Adu && has_tails(head);
+        let mut codes = of_sites().filter(|(_, head)| are_codes(head));
+        codes.try_for_each(|(stage, head)| {
+            Sites::of(head, equations).map(drop).map_err(|why| refused(stage, electrons, why))
+        })
     }
 
     /// Predicts the scene that expects so many signal electrons of R, G and B.

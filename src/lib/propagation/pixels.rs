@@ -13,6 +13,7 @@ use super::moments::Equations;
 use super::photosite::Photosite;
 use super::repeated::average_of;
 use super::smooth_hue;
+use super::tapped::Axis;
 use super::taps;
 use crate::camera::taps::Taps;
 use crate::cfa::Class;
@@ -26,7 +27,6 @@ use crate::stages::demosaic::stencil::{Stencil, phase};
 use crate::stages::demosaic::weights::WeightTable;
 use crate::stages::noise::NoiseModel;
 use crate::units::QuantityKind;
-use std::collections::BTreeMap;
 
 /// Tells the covariance of the demosaicked R, G and B of a pixel from its place and level.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,22 +68,10 @@ impl Places {
         Self { length, reach, examples, kinds: Vec::new() }
     }
 
-    /// The same of lines that amplifiers read, `taps` telling those of each.
-    fn of_taps(length: usize, reach: usize, taps: impl Fn(usize) -> [usize; 2]) -> Self {
-        let of_lines: Vec<[usize; 2]> = (0..length).map(taps).collect();
-        let is_at_edge = |place: usize| place < reach || place + reach >= length;
-        let around = |place: usize| of_lines[place.saturating_sub(reach)..(place + reach + 1).min(length)].to_vec();
-        let key = |place: usize| (is_at_edge(place).then_some(place), place % 2, around(place));
-        let mut known = BTreeMap::new();
-        let mut examples = Vec::new();
-        let kind = |place: usize| {
-            *known.entry(key(place)).or_insert_with(|| {
-                examples.push(place);
-                examples.len() - 1
-            })
-        };
-        let kinds = (0..length).map(kind).collect();
-        Self { length, reach, examples, kinds }
+    /// The same of lines from `first` on the sensor on, `taps` telling the amplifiers of each.
+    fn of_taps(first: i64, length: usize, reach: usize, taps: impl Fn(i64) -> [usize; 2]) -> Self {
+        let Axis { kinds, examples, .. } = Axis::of(first, length, 0..length, reach, taps);
+        Self { length, reach, examples: examples.into_iter().map(|(place, _)| place).collect(), kinds }
     }
 
     fn kind(&self, place: usize) -> usize {
@@ -382,16 +370,9 @@ fn places(frame: &FrameHeader, reach: usize) -> [Places; 2] {
     let Some(readout) = readout.filter(|readout| readout.taps.is_some()) else {
         return extents.map(|extent| Places::new(extent, reach));
     };
-    let middle = [readout.width, readout.height].map(|extent| i64::from(extent / 2));
     [0, 1].map(|axis| {
-        let taps = |place: usize| {
-            [0, 1].map(|side| {
-                let mut at = middle.map(|middle| middle - 1 + side);
-                at[axis] = i64::from(geometry.origin[axis]) + place as i64;
-                readout.tap(at)
-            })
-        };
-        Places::of_taps(extents[axis], reach, taps)
+        let first = i64::from(geometry.origin[axis]);
+        Places::of_taps(first, extents[axis], reach, |line| readout.taps_of_line(axis, line))
     })
 }
 

@@ -69,9 +69,9 @@ pub(super) struct Axis {
     /// Those of the rectangle.
     pub lines: Range<usize>,
     /// The kinds of these.
-    kinds: Vec<usize>,
+    pub kinds: Vec<usize>,
     /// One of each kind, and how many there are.
-    examples: Vec<(usize, f64)>,
+    pub examples: Vec<(usize, f64)>,
 }
 
 /// Pixels of one kind.
@@ -111,7 +111,7 @@ const WITHIN: u8 = 64;
 
 impl Axis {
     /// Of a plane of so many lines from `first` on, of which `lines` are the rectangle's; `taps` reads a line.
-    fn of(first: i64, length: usize, lines: Range<usize>, reach: usize, taps: impl Fn(i64) -> [usize; 2]) -> Self {
+    pub fn of(first: i64, length: usize, lines: Range<usize>, reach: usize, taps: impl Fn(i64) -> [usize; 2]) -> Self {
         let code = |line: i64| {
             let [a, b] = taps(line).map(|tap| u8::try_from(tap).unwrap_or_default());
             2 * (4 * a + b) + u8::from(line.rem_euclid(2) == 1)
@@ -173,18 +173,11 @@ impl Array {
         let plane = record.plane.ok_or(Unpredictable::Missing("demosaic.plane"))?;
         let geometry = &frame.geometry;
         let extents = [geometry.width, geometry.height];
-        let middle = [readout.width, readout.height].map(|extent| i64::from(extent / 2));
         let axis = |axis: usize| {
             let (first, length) = (plane[axis], usize::try_from(plane[axis + 2]).ok()?);
             let start = usize::try_from(i64::from(geometry.origin[axis]).checked_sub(first)?).ok()?;
             let lines = start..start.checked_add(extents[axis])?;
-            let taps = |line: i64| {
-                [-1, 0].map(|side| {
-                    let mut at = middle.map(|middle| middle + side);
-                    at[axis] = line;
-                    readout.tap(at)
-                })
-            };
+            let taps = |line: i64| readout.taps_of_line(axis, line);
             (lines.end <= length && !lines.is_empty()).then(|| Axis::of(first, length, lines, method.reach(), taps))
         };
         let axes = axis(0).zip(axis(1)).ok_or(Unpredictable::Beyond(ELSEWHERE))?;

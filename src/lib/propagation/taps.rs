@@ -87,12 +87,13 @@ pub(super) fn parts(frame: &FrameHeader) -> Vec<Part> {
     };
     let Geometry { width, height, origin, .. } = frame.geometry;
     let [x0, y0] = origin.map(i64::from);
-    let middle = [readout.width, readout.height].map(|extent| i64::from(extent / 2));
-    let parity = |line: i64| usize::from(line.rem_euclid(2) == 1);
-    let [left, right] = [0, 1].map(|side| middle[0] - 1 + side);
-    let [above, below] = [0, 1].map(|side| middle[1] - 1 + side);
-    let columns = kinds(x0, width, |x| [readout.tap([x, above]), readout.tap([x, below]), parity(x)]);
-    let rows = kinds(y0, height, |y| [readout.tap([left, y]), readout.tap([right, y]), parity(y)]);
+    let lines = |axis: usize, first: i64, length: usize| {
+        kinds(first, length, |line| {
+            let [one, other] = readout.taps_of_line(axis, line);
+            [one, other, usize::from(line.rem_euclid(2) == 1)]
+        })
+    };
+    let (columns, rows) = (lines(0, x0, width), lines(1, y0, height));
     let pattern: Option<CfaPattern> = frame.metadata.cfa.and_then(|array| array.bayer());
     let mut found: BTreeMap<usize, [f64; 3]> = BTreeMap::new();
     for (y, of_rows) in &rows {

@@ -128,8 +128,7 @@ pub fn check_known(pattern: Option<&Path>) -> Result<()> {
         let whole = format!("{{{place}}}");
         if whole != STEM && numbered(Path::new(&whole), 0, 0).is_none() {
             let near = nearest(place.split(':').next().unwrap_or_default(), PLACES, |known| known.len() / 2);
-            let near = near.map_or(String::new(), |near| format!("; did you mean {{{near}}}? There"));
-            let near = if near.is_empty() { "; there".to_owned() } else { near };
+            let near = near.map_or_else(|| "; there".to_owned(), |near| format!("; did you mean {{{near}}}? There"));
             return Err(Error::Usage(format!(
                 "{text}: nothing stands for {whole}{near} are {STEM}, {{frame}} and {{index}}, and {{frame:05}} for five digits"
             )));

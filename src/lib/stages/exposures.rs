@@ -127,31 +127,18 @@ impl Exposures {
 
 /// What is known of the camera and of how it was set, and nothing else.
 fn camera(frame: &FrameHeader) -> Metadata {
-    let Metadata {
-        quantity,
-        sensor,
-        camera,
-        iso_speed,
-        camera_settings,
-        exposure,
-        taken_as,
-        adc,
-        noise,
-        white_level_adu,
-        ..
-    } = frame.without_exposure().metadata;
-    let of_quantity = Metadata::new(quantity);
+    let known = frame.without_exposure().metadata;
     Metadata {
-        sensor,
-        camera,
-        iso_speed,
-        camera_settings,
-        exposure,
-        taken_as,
-        adc,
-        noise,
-        white_level_adu,
-        ..of_quantity
+        sensor: known.sensor,
+        camera: known.camera,
+        iso_speed: known.iso_speed,
+        camera_settings: known.camera_settings,
+        exposure: known.exposure,
+        taken_as: known.taken_as,
+        adc: known.adc,
+        noise: known.noise,
+        white_level_adu: known.white_level_adu,
+        ..Metadata::new(known.quantity)
     }
 }
 

@@ -230,31 +230,30 @@ impl Tally {
             self.is_out.push(reason.is_some());
         }
         if self.classes.is_empty() {
-            for (place, ((_, moments), line)) in self.groups.iter_mut().zip(planes).enumerate() {
+            for (((_, moments), line), level) in self.groups.iter_mut().zip(planes).zip(&self.levels) {
                 self.line.clear();
                 self.line
                     .extend(line.iter().zip(&self.is_out).filter(|(_, is_out)| !**is_out).map(|(sample, _)| *sample));
-                self.full += full(&self.line, self.levels.get(place));
+                self.full += full(&self.line, *level);
                 moments.add(&[&self.line]);
             }
             return;
         }
-        for (place, ((_, moments), seen)) in self.groups.iter_mut().zip(&self.classes).enumerate() {
+        for (((_, moments), seen), level) in self.groups.iter_mut().zip(&self.classes).zip(&self.levels) {
             let Some(sites) = seen.row(y) else { continue };
             self.line.clear();
             let counted = planes[0].iter().zip(&self.is_out).zip(sites.iter().cycle());
             let counted = counted.filter(|((_, is_out), is_seen)| **is_seen && !**is_out);
             self.line.extend(counted.map(|((sample, _), _)| *sample));
-            self.full += full(&self.line, self.levels.get(place));
+            self.full += full(&self.line, *level);
             moments.add(&[&self.line]);
         }
     }
 }
 
 /// How many samples are at a level or above, where one is known.
-fn full(samples: &[f32], level: Option<&Option<f32>>) -> u64 {
-    let Some(Some(level)) = level else { return 0 };
-    samples.iter().filter(|sample| *sample >= level).count() as u64
+fn full(samples: &[f32], level: Option<f32>) -> u64 {
+    level.map_or(0, |level| samples.iter().filter(|sample| **sample >= level).count() as u64)
 }
 
 /// Which photosites of a row are of the class that is shown.
