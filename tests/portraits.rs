@@ -156,6 +156,12 @@ fn a_figure_has_its_panels_and_what_it_cannot_be_is_told() {
     assert!(!shop.path("x.svg").exists());
 }
 
+/// All that a figure says, lines that belong together too.
+fn words(svg: &str) -> String {
+    let lines = svg.split("</text>").filter_map(|before| before.rsplit('>').next());
+    lines.collect::<Vec<_>>().join(" ")
+}
+
 /// One sample far off leaves the scale to all others, and is told; so are its row and column.
 #[test]
 fn samples_far_off_do_not_make_the_scale() {
@@ -176,10 +182,53 @@ fn samples_far_off_do_not_make_the_scale() {
             format!("{count} of 64 means of columns beyond the axes, as far as "),
             format!("{count} of 48 means of rows beyond the axes, as far as "),
         ];
-        assert_eq!(wanted.map(|words| svg.contains(&words)), said, "{far:?}");
+        let all = words(&svg);
+        assert_eq!(wanted.map(|words| all.contains(&words)), said, "{far:?}");
         // Ticks tell the scale of the others.
         assert!(!svg.contains(">1.0·10⁶<") && !svg.contains(">500000<"), "{far:?}");
     }
+}
+
+/// A heap of saturated samples leaves the axis to all others, and is told; no normal law is drawn over it. Nothing is heaped where all is within the codes.
+#[test]
+fn saturated_samples_do_not_make_the_scale() {
+    let shop = Workshop::new();
+    let figure = |electrons: &str| {
+        let render = format!("render-radiance --electrons {electrons} --size 200x160 -o expected.exr");
+        for line in [&render, "add-noise expected.exr --seed 3 -o noisy.exr", "digitize noisy.exr -o codes.exr"] {
+            assert!(shop.attempt(line, &[]).status.success(), "{line}");
+        }
+        assert!(shop.attempt("measure codes.exr --plot plot.svg", &[]).status.success());
+        String::from_utf8(shop.bytes("plot.svg")).unwrap()
+    };
+    let is_law = |line: &&str| line.contains("stroke=\"#000000\"") && line.contains("stroke-dasharray");
+    let laws = |svg: &str| svg.lines().filter(is_law).count();
+    let (plain, saturated) = (figure("8000,12000,20000"), figure("8000,12000,40100"));
+    assert!(!plain.contains("in its highest bin"));
+    assert!(words(&saturated).contains(" % of B in its highest bin, beyond the axis"));
+    assert!(laws(&plain) > laws(&saturated), "{} {}", laws(&plain), laws(&saturated));
+}
+
+/// Color temperatures are shown by their inverses, in which equal steps are equally visible: 4000 K are 250 MK⁻¹.
+#[test]
+fn color_temperatures_are_shown_by_their_inverses() {
+    let shop = Workshop::with_frames();
+    assert!(shop.attempt("to-xyz rgb.exr --matrix matrix.yaml --space cct -o cct.exr", &[]).status.success());
+    let mut frame = shop.frame("cct.exr");
+    let kelvin = |place: usize| if place.is_multiple_of(2) { 4000.0 } else { 1e6 };
+    let [width, planes] = [frame.header.geometry.width, frame.header.geometry.channels.len()];
+    for row in frame.samples.chunks_exact_mut(width * planes) {
+        row[..width].iter_mut().enumerate().for_each(|(place, sample)| *sample = kelvin(place));
+    }
+    let (_, portrait) = drawn(&frame, &[]);
+    let inverse = &portrait.groups[0];
+    assert_eq!((inverse.name.as_str(), portrait.unit.as_str()), ("1/CCT", "MK-1, 1, cd m-2"));
+    // Half of the pixels of an even number of columns each: 250 and 1.
+    assert!((inverse.mean().unwrap() - 125.5).abs() < 1e-4, "{:?}", inverse.mean());
+    assert!(inverse.histogram.ends.iter().zip([1.0, 250.0]).all(|(end, wanted)| (end - wanted).abs() < 1e-4));
+    assert!(shop.attempt("measure cct.exr --plot plot.svg", &[]).status.success());
+    let svg = String::from_utf8(shop.bytes("plot.svg")).unwrap();
+    assert!(svg.contains("sample − mean / MK⁻¹") && svg.contains(">1/CCT</text>"));
 }
 
 /// Channels of several units have panels of their own; a single row has neither a profile along y nor pairs.

@@ -61,6 +61,8 @@ pub enum Scale {
     Linear,
     /// Equal factors are equally long.
     Log10,
+    /// Equal steps of the inverse are equally long, as those of color temperatures are about equally visible.
+    Reciprocal,
 }
 
 /// What one direction of a panel means.

@@ -242,10 +242,13 @@ impl<'a> Pane<'a> {
         write(drawing, &self.panel.x.label, [center, foot], LABEL, Anchor::Middle);
         write_upward(drawing, &self.panel.y.label, [self.cell.left + MARGIN + LABEL, middle], LABEL);
         // Above the middle of the frame, or as near to it as the cell has room.
-        let half = 0.5 * font::width(&self.panel.title, LABEL) + 2.0;
-        let [first, last] = [self.cell.left + half, self.cell.right() - half];
-        let title = if first <= last { center.clamp(first, last) } else { 0.5 * (first + last) };
-        write(drawing, &self.panel.title, [title, self.cell.top + 6.0 + LABEL], LABEL, Anchor::Middle);
+        for (index, line) in self.room.title.iter().enumerate() {
+            let half = 0.5 * font::width(line, LABEL) + 2.0;
+            let [first, last] = [self.cell.left + half, self.cell.right() - half];
+            let middle = if first <= last { center.clamp(first, last) } else { 0.5 * (first + last) };
+            let baseline = self.cell.top + 6.0 + LABEL + LINE * index as f64;
+            write(drawing, line, [middle, baseline], LABEL, Anchor::Middle);
+        }
     }
 
     fn draw_lines(&self, drawing: &mut Drawing, series: &Series) {

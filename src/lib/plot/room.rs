@@ -21,6 +21,8 @@ pub(super) struct Room<'a> {
     pub legend: Option<Legend<'a>>,
     /// How far the title and the legend reach down.
     pub head: f64,
+    /// The title, in as many lines as the cell needs.
+    pub title: Vec<String>,
 }
 
 /// A label above the frame.
@@ -44,10 +46,10 @@ impl<'a> Room<'a> {
 
         let top_labels = top_labels(panel, &x);
         let rows = arrange(&top_labels, 0.0, cell_width - left - RIGHT).iter().map(|(row, _)| row + 1).max();
-        let title = if panel.title.is_empty() { 0.0 } else { LABEL + 10.0 };
-        let head = 8.0 + title;
+        let title = font::lines(&panel.title, LABEL, cell_width - 2.0 * MARGIN);
+        let head = 8.0 + if title.is_empty() { 0.0 } else { 10.0 + LABEL + LINE * (title.len() - 1) as f64 };
         let top = head + rows.map_or(0.0, |rows| rows as f64 * LINE + 2.0);
-        Self { x, y, top_labels, left, top, bottom, legend: None, head }
+        Self { x, y, top_labels, left, top, bottom, legend: None, head, title }
     }
 
     /// Makes room for the legend above the frame.

@@ -39,10 +39,13 @@ impl Ruler {
             (0.0, 1.0)
         } else if is_wide(low, high) {
             let room = 0.05 * (high - low);
-            (low - room, high + room)
+            // The inverse of what is positive stays so.
+            let highest = if scale == Scale::Reciprocal { 0.5 * high } else { f64::INFINITY };
+            (low - room, (high + room).min(highest))
         } else {
             let room = match scale {
                 Scale::Log10 => 0.5,
+                Scale::Reciprocal => 0.1 * low.abs(),
                 Scale::Linear if low.abs() < 1.0 / LARGEST => 1.0,
                 Scale::Linear => 0.1 * low.abs(),
             };
@@ -67,6 +70,8 @@ impl Ruler {
             _ if value.is_nan() => return None,
             Scale::Log10 if value <= 0.0 => f64::NEG_INFINITY,
             Scale::Log10 => value.log10(),
+            Scale::Reciprocal if value <= 0.0 => f64::NEG_INFINITY,
+            Scale::Reciprocal => -value.recip(),
             Scale::Linear => value,
         };
         Some(((at.clamp(self.low, self.high) - self.low) / (self.high - self.low)).clamp(0.0, 1.0))
@@ -82,6 +87,7 @@ impl Ruler {
                 values.iter().zip(labels).filter_map(tick).collect()
             }
             Scale::Log10 => self.log_ticks(count),
+            Scale::Reciprocal => self.reciprocal_ticks(count),
         }
     }
 
@@ -121,6 +127,31 @@ impl Ruler {
         }
         ticks
     }
+
+    /// Round numbers, the roundest first, each where it has room beside those before.
+    fn reciprocal_ticks(&self, count: f64) -> Vec<Tick> {
+        const DIGITS: [f64; 9] = [1.0, 2.0, 5.0, 3.0, 4.0, 1.5, 6.0, 8.0, 2.5];
+        let [lowest, highest] = [self.low, self.high].map(|place| (-place).max(1.0 / LARGEST).recip().log10());
+        #[expect(clippy::cast_possible_truncation, reason = "logarithms within ±100")]
+        let decades = (lowest - 1e-9).floor() as i32..=(highest + 1e-9).floor() as i32;
+        let apart = count.max(1.0).recip();
+        let mut ticks: Vec<Tick> = Vec::new();
+        for digit in DIGITS {
+            // Quotients by whole powers are the doubles next to what they stand for.
+            let of_decade = |decade: i32| match decade {
+                0.. => digit * 10_f64.powi(decade),
+                _ => digit / 10_f64.powi(-decade),
+            };
+            for value in decades.clone().map(of_decade) {
+                let Some(tick) = self.tick(value, Some(value.to_string())) else { continue };
+                if ticks.iter().all(|other| (other.place - tick.place).abs() >= apart) {
+                    ticks.push(tick);
+                }
+            }
+        }
+        ticks.sort_by(|a, b| a.place.total_cmp(&b.place));
+        ticks
+    }
 }
 
 /// A value along its scale; `None` for what the scale cannot show.
@@ -128,6 +159,7 @@ fn position(scale: Scale, value: f64) -> Option<f64> {
     match scale {
         Scale::Linear => (value.abs() <= LARGEST).then_some(value),
         Scale::Log10 => (1.0 / LARGEST..=LARGEST).contains(&value).then(|| value.log10()),
+        Scale::Reciprocal => (1.0 / LARGEST..=LARGEST).contains(&value).then(|| -value.recip()),
     }
 }
 
@@ -241,6 +273,17 @@ mod tests {
         // 1…9 in each of three decades, and the end.
         assert_eq!(ticks.len(), 28);
         assert!((ticks[1].place - 2_f64.log10() / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn reciprocal_ticks_are_round_and_apart() {
+        let axis = |low, high| Axis { scale: Scale::Reciprocal, ..Axis::linear("").range(low, high) };
+        assert_eq!(labels(&axis(1000.0, 1e6), 8.0), ["1000", "1500", "2000", "3000", "10000"]);
+        let ruler = Ruler::new(&axis(2000.0, 10_000.0), std::iter::empty());
+        // Mired: 500 to 100, of which 250 are 4000 K.
+        assert!((ruler.place(4000.0).unwrap() - 250.0 / 400.0).abs() < 1e-12);
+        assert_eq!([ruler.place(0.0), ruler.place(-5.0), ruler.place_within(-5.0)], [None, None, Some(0.0)]);
+        assert_eq!(labels(&axis(0.1, 0.4), 4.0), ["0.1", "0.15", "0.2", "0.4"]);
     }
 
     #[test]

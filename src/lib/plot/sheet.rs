@@ -1,7 +1,7 @@
 //! Pictures of pixels with words about them: a bar that says what colors mean, captions, several in a grid.
 
 use super::drawing::{Drawing, Ink, Outline, Rect, Stroke, Text};
-use super::figure::{Anchor, Axis};
+use super::figure::{Anchor, Axis, Scale};
 use super::font;
 use super::png::painted;
 use super::ruler::{Ruler, Tick};
@@ -40,10 +40,29 @@ pub struct ScaleBar {
     pub label: String,
     /// The numbers of the first and of the last color.
     pub range: (f64, f64),
+    /// How the numbers between are spread over the colors.
+    pub scale: Scale,
     /// The colors, at equal steps.
     pub colors: Vec<[u8; 3]>,
     /// The color of what is no number, and what that is called; none where there is no such pixel.
     pub missing: Option<([u8; 3], String)>,
+}
+
+impl ScaleBar {
+    fn ruler(&self) -> Ruler {
+        let axis = Axis { label: String::new(), scale: self.scale, range: Some(self.range) };
+        Ruler::new(&axis, std::iter::empty())
+    }
+
+    /// The color of each finite number, beyond the ends that of the nearest; of others `missing`.
+    pub(crate) fn colors_of(&self, missing: [u8; 3]) -> impl Fn(f32) -> [u8; 3] {
+        let (ruler, last) = (self.ruler(), (self.colors.len() - 1) as f64);
+        move |number| {
+            let place = ruler.place_within(f64::from(number)).filter(|_| number.is_finite());
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the colors")]
+            place.map_or(missing, |place| self.colors[(place * last).round() as usize])
+        }
+    }
 }
 
 /// A picture and what is said of it.
@@ -215,7 +234,7 @@ impl Bar {
     /// A bar as high as the picture, or as its numbers need.
     fn of(meaning: &ScaleBar, height: f64, size: Type) -> Self {
         let height = height.max(size.of(LEAST_BAR)).round();
-        let ruler = Ruler::new(&Axis::linear("").range(meaning.range.0, meaning.range.1), std::iter::empty());
+        let ruler = meaning.ruler();
         let most = (height / size.of(2.6 * TEXT)).clamp(3.0, 12.0);
         // One number says nothing of the others.
         let enough = |ticks: &Vec<Tick>| ticks.len() > 1;
@@ -282,7 +301,8 @@ mod tests {
     fn tile(size: [usize; 2], rgb: [u8; 3], bar: bool, caption: &[&str]) -> Tile {
         let picture = Pixels { size, rgb: rgb.repeat(size[0] * size[1]) };
         let colors = (0..=255).map(|code| [code, 0, 0]).collect();
-        let meaning = ScaleBar { label: "Y / cd m⁻²".into(), range: (0.0, 10.0), colors, missing: None };
+        let meaning =
+            ScaleBar { label: "Y / cd m⁻²".into(), range: (0.0, 10.0), scale: Scale::Linear, colors, missing: None };
         let name = caption.first().map(|name| (*name).to_owned()).unwrap_or_default();
         let caption = caption.iter().skip(1).map(|line| (*line).to_owned()).collect();
         Tile { picture, bar: bar.then_some(meaning), name, caption }

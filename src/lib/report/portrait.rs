@@ -2,6 +2,7 @@
 
 use super::in_digits;
 use crate::analysis::statistics::RegionReport;
+use crate::analysis::statistics::histogram::Histogram;
 use crate::analysis::statistics::portrait::{Foreseen, Likeness, Portrait};
 use crate::color::xyy_about;
 use crate::numerics::normal::cumulative;
@@ -180,6 +181,7 @@ fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     let mut panel = Panel::new(x, Axis::linear(&density));
     let (mut highest, mut laws) = (0.0_f64, Vec::new());
     let (mut beyond, mut all, mut farthest) = (0, 0, 0.0_f64);
+    let mut piles = Vec::new();
     for (color, group) in scale.groups(portrait) {
         let Some(reference) = reference(group) else { continue };
         let Some([from, to]) = group.histogram.middle(LEFT_OUT) else { continue };
@@ -192,18 +194,26 @@ fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
         let shown: Vec<i64> = bins.counts.keys().copied().filter(|bin| is_shown(*bin)).collect();
         let (Some(first), Some(last)) = (shown.first(), shown.last()) else { continue };
         let (mut steps, mut predicted) = (Vec::new(), Vec::new());
+        let pile = Pile::of(&bins);
         for bin in *first..=*last {
             let (from, to) = (bins.begin(bin), bins.begin(bin + 1));
             let density = bins.counts.get(&bin).copied().unwrap_or(0) as f64 / total as f64 / bins.width;
-            highest = highest.max(density);
+            highest = highest.max(if pile.is_some_and(|pile| pile.bin == bin) { 0.0 } else { density });
             steps.extend([[from - reference, density], [to - reference, density]]);
-            if let Some(foreseen) = &group.predicted {
+            if let Some(foreseen) = group.predicted.as_ref().filter(|_| pile.is_none()) {
                 let middle = 0.5 * (from + to) - reference;
                 predicted.push([middle, share_between(foreseen, portrait.is_whole, from, to) / bins.width]);
             }
         }
         panel.add(&with_mean(group, reference, &scale.unit), color, Marks::Line(steps));
-        laws.extend(group.predicted.as_ref().map(|foreseen| (words_of_law(foreseen, portrait.is_whole), predicted)));
+        piles.extend(pile.map(|pile| pile.words(&group.name)));
+        laws.extend(
+            group
+                .predicted
+                .as_ref()
+                .filter(|_| pile.is_none())
+                .map(|foreseen| (words_of_law(foreseen, portrait.is_whole), predicted)),
+        );
         let within: u64 = bins.counts.range(first..=last).map(|(_, count)| count).sum();
         (beyond, all) = (beyond + total - within, all + total);
         let ends = bins.ends.map(|end| end - reference);
@@ -215,8 +225,37 @@ fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     if highest > 0.0 {
         panel.y = panel.y.range(0.0, HEADROOM * highest);
     }
-    panel.title = outside(beyond, all, "samples", farthest);
+    let words = outside(beyond, all, "samples", farthest);
+    panel.title = [words].into_iter().chain(piles).filter(|words| !words.is_empty()).collect::<Vec<_>>().join("; ");
     panel
+}
+
+/// Samples at an end of the range, such as saturated ones, so many that all others would be next to nothing beside them; they
+/// reach beyond the axis, and follow no normal law.
+#[derive(Debug, Clone, Copy)]
+struct Pile {
+    bin: i64,
+    is_highest: bool,
+    share: f64,
+}
+
+impl Pile {
+    fn of(bins: &Histogram) -> Option<Self> {
+        /// So many times as high as any other bin.
+        const HIGH: u64 = 3;
+        let (&first, &last) = (bins.counts.keys().next()?, bins.counts.keys().next_back()?);
+        let count = |bin: i64| bins.counts.get(&bin).copied().unwrap_or(0);
+        let others = |end: i64| bins.counts.iter().filter(|(bin, _)| **bin != end).map(|(_, count)| *count).max();
+        let is_high = |end: i64| others(end).is_some_and(|others| count(end) > HIGH * others);
+        let end = [last, first].into_iter().find(|end| is_high(*end))?;
+        let share = count(end) as f64 / bins.total() as f64;
+        Some(Self { bin: end, is_highest: end == last, share })
+    }
+
+    fn words(self, name: &str) -> String {
+        let end = if self.is_highest { "highest" } else { "lowest" };
+        format!("{} % of {name} in its {end} bin, beyond the axis", in_digits(100.0 * self.share, 2))
+    }
 }
 
 /// The name of a class or channel with the mean that deviations are counted from.

@@ -155,7 +155,7 @@ pub fn typeset(unit: &str) -> String {
     let mut raised = false;
     let raise = |c: char| {
         raised = match c {
-            '-' => true,
+            '-' | '^' => true,
             digit => raised && digit.is_ascii_digit(),
         };
         match (c, raised) {
@@ -166,7 +166,7 @@ pub fn typeset(unit: &str) -> String {
             (other, _) => other,
         }
     };
-    unit.chars().map(raise).collect()
+    unit.chars().map(raise).filter(|c| *c != '^').collect()
 }
 
 impl fmt::Display for QuantityKind {

@@ -97,6 +97,21 @@ pub struct Correlation {
     pub error: f64,
 }
 
+/// Whether the inverse of a channel is shown: color temperatures, whose noise is even in it alone, and which are far apart where
+/// colors differ by little.
+fn is_inverse(frame: &FrameHeader, channel: &str) -> bool {
+    frame.metadata.quantity == QuantityKind::Cct && channel == "CCT"
+}
+
+/// The units of the channels as they are shown.
+fn unit(frame: &FrameHeader) -> String {
+    let unit = &frame.metadata.unit;
+    match unit.strip_prefix("K,").filter(|_| frame.metadata.quantity == QuantityKind::Cct) {
+        Some(others) => format!("MK-1,{others}"),
+        None => unit.clone(),
+    }
+}
+
 /// Sums over pairs of deviations.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Pairs {
@@ -129,7 +144,8 @@ impl Portrait {
             Some(_) => Class::ALL.map(|class| class.letter().to_owned()).to_vec(),
             None => {
                 let shown = frame.geometry.channels.len().min(MOST_CHANNELS);
-                (0..shown).map(|index| frame.channel_name(index).to_owned()).collect()
+                let names = (0..shown).map(|index| frame.channel_name(index).to_owned());
+                names.map(|name| if is_inverse(frame, &name) { format!("1/{name}") } else { name }).collect()
             }
         };
         let steps = [0, 1].map(|axis| {
@@ -142,7 +158,7 @@ impl Portrait {
         };
         let size = [region.width, region.height];
         let foreseen = |index: usize| {
-            let prediction = prediction.filter(|_| names.len() == 3)?;
+            let prediction = prediction.filter(|_| names.len() == 3 && frame.metadata.quantity != QuantityKind::Cct)?;
             Some(Foreseen::of(prediction, index, share(index), steps, size, frame.metadata.is_transferred()))
         };
         let is_codes = frame.metadata.quantity == QuantityKind::Adu;
@@ -151,7 +167,7 @@ impl Portrait {
         Self {
             region,
             quantity: frame.metadata.quantity,
-            unit: frame.metadata.unit.clone(),
+            unit: unit(frame),
             holds: frame.holds(),
             groups,
             pixels: Vec::new(),
@@ -182,12 +198,18 @@ impl Portrait {
         let (y, frame_width) = (y - top, self.frame.geometry.width);
         let channels = if self.classes.is_some() { 1 } else { self.groups.len() };
         let line = |channel: usize| &row[channel * frame_width + x..][..width];
+        let is_inverse: Vec<bool> =
+            (0..channels).map(|channel| is_inverse(&self.frame, self.frame.channel_name(channel))).collect();
         let mut lines = Vec::new();
         for channel in 0..channels {
             for offset in 0..self.period[0] {
                 let of_site = |sites: &Vec<Option<usize>>| sites[y % self.period[1] * self.period[0] + offset];
                 let Some(group) = self.classes.as_ref().map_or(Some(channel), of_site) else { continue };
-                let samples: Vec<f32> = line(channel).iter().skip(offset).step_by(self.period[0]).copied().collect();
+                let mut samples: Vec<f32> =
+                    line(channel).iter().skip(offset).step_by(self.period[0]).copied().collect();
+                if is_inverse[channel] {
+                    samples.iter_mut().for_each(|kelvin| *kelvin = 1e6 / *kelvin);
+                }
                 self.is_whole &= samples.iter().all(|sample| !sample.is_finite() || sample.fract() == 0.0);
                 let deviations = self.groups[group].take(&samples, y, offset, self.period[0]);
                 lines.push(Line { group, deviations });

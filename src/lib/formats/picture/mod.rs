@@ -12,7 +12,7 @@ use crate::color::ramp::ramp;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
-use crate::plot::{Pixels, ScaleBar, Tile, sheet};
+use crate::plot::{Pixels, Scale, ScaleBar, Tile, sheet};
 use crate::stream::RowSource;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -200,13 +200,14 @@ impl Shown {
         let zoom = settings.zoom.max(1);
         let size = reduced.size.map(|side| side * zoom);
         if settings.false_color {
-            let range = settings.range.unwrap_or_else(|| shade::usual_range(reduced));
+            let is_temperature = choice.is_temperature(frame);
+            let range = settings.range.unwrap_or_else(|| shade::usual_range(reduced, is_temperature));
             let (low, high) = shade::one_range(frame, range, reduced)?;
-            let colors = ramp();
-            let bytes = zoomed(&reduced.in_false_color((low, high), &colors, MISSING), reduced.size, 3, zoom);
             let missing = reduced.samples.iter().any(|sample| !sample.is_finite());
             let missing = missing.then(|| (MISSING, "not finite".to_owned()));
-            let bar = ScaleBar { label: choice.label(frame), range: (low, high), colors, missing };
+            let scale = if is_temperature && low > 0.0 { Scale::Reciprocal } else { Scale::Linear };
+            let bar = ScaleBar { label: choice.label(frame), range: (low, high), scale, colors: ramp(), missing };
+            let bytes = zoomed(&reduced.in_false_color(&bar, MISSING), reduced.size, 3, zoom);
             let scale = shade::beyond(reduced, (low, high), range);
             let seen = [((low, high), reduced.quantiles(0, [0.0, 1.0]))];
             shade::all_outside(frame, seen.into_iter()).into_iter().for_each(register::doubt);

@@ -74,6 +74,11 @@ impl Choice {
         self.filter.map_or_else(|| filters(frame), |filter| vec![filter])
     }
 
+    /// Whether a single plane of color temperatures is shown.
+    pub fn is_temperature(&self, frame: &FrameHeader) -> bool {
+        frame.metadata.quantity == QuantityKind::Cct && self.names(frame) == ["CCT"]
+    }
+
     /// What stands beside the scale of a single plane: the quantity and its unit.
     pub fn label(&self, frame: &FrameHeader) -> String {
         let [place] = self.channels[..] else { return typeset(&frame.metadata.unit) };
@@ -279,5 +284,8 @@ mod tests {
             ("Y / cd m⁻², 4 × 3", vec!["Y".to_owned()])
         );
         assert_eq!(typeset("W cm-2 sr-1 nm-1"), "W cm⁻² sr⁻¹ nm⁻¹");
+        // As other programs write powers.
+        assert_eq!(typeset("W.cm^-2.sr^-1.nm^-1"), "W.cm⁻².sr⁻¹.nm⁻¹");
+        assert_eq!(typeset("J/m^2"), "J/m²");
     }
 }

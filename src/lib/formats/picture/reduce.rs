@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
+use crate::plot::ScaleBar;
 use crate::stages::saturation::{FullLevels, bits, samples_tell};
 use crate::stream::{RowSource, fold};
 use crate::units::Any;
@@ -141,15 +142,10 @@ impl Reduced {
         quantiles(self.samples.iter().copied(), shares)
     }
 
-    /// The bytes of the first plane, its numbers along `colors` from one to another.
-    pub fn in_false_color(&self, (low, high): (f64, f64), colors: &[[u8; 3]], missing: [u8; 3]) -> Vec<u8> {
-        let last = (colors.len() - 1) as f64;
-        let color = |sample: &f32| {
-            let place = ((f64::from(*sample) - low) / (high - low) * last).round().clamp(0.0, last);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the colors")]
-            if sample.is_finite() { colors[place as usize] } else { missing }
-        };
-        self.samples.par_iter().map(color).collect::<Vec<_>>().into_flattened()
+    /// The bytes of the first plane, its numbers along the colors of a bar.
+    pub fn in_false_color(&self, bar: &ScaleBar, missing: [u8; 3]) -> Vec<u8> {
+        let color = bar.colors_of(missing);
+        self.samples.par_iter().map(|sample| color(*sample)).collect::<Vec<_>>().into_flattened()
     }
 }
 

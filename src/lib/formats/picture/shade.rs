@@ -312,10 +312,12 @@ pub(super) fn is_picture(frame: &FrameHeader, range: Option<Range>) -> bool {
 
 /// What the ends of the false colors are where nobody says: all numbers; or, where a few would stretch that to more than twice its
 /// length, the middle 99 % of the pixels.
-pub(super) fn usual_range(reduced: &Reduced) -> Range {
+pub(super) fn usual_range(reduced: &Reduced, is_temperature: bool) -> Range {
     const MIDDLE: [f64; 2] = [0.005, 0.995];
     const MOST: f64 = 2.0;
-    match reduced.quantiles(0, [0.0, MIDDLE[0], MIDDLE[1], 1.0]) {
+    // Of color temperatures the length is that of their inverses.
+    let along = |value: f64| if is_temperature { -value.recip() } else { value };
+    match reduced.quantiles(0, [0.0, MIDDLE[0], MIDDLE[1], 1.0]).map(|ends| ends.map(along)) {
         Some([least, low, high, most]) if low < high && most - least > MOST * (high - low) => {
             Range::Shares(MIDDLE[0], MIDDLE[1])
         }
