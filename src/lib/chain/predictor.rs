@@ -348,8 +348,7 @@ impl PredictorSettings {
         match prediction {
             FramePrediction::Planes(classes) => {
                 let sites = SiteCovariance::of(classes);
-                let own = Matrix3::from_diagonal(&sites.own.into());
-                (classes.map(|class| class.moments.mean), own + sites.row + sites.column)
+                (classes.map(|class| class.moments.mean), sites.own_of_planes() + sites.row + sites.column)
             }
             FramePrediction::Groups(groups) => {
                 let classes = pooled(groups);
@@ -408,7 +407,7 @@ impl PredictorSettings {
             FramePrediction::Planes(classes) => {
                 let sites = SiteCovariance::of(classes);
                 let [columns, rows] = size.map(|extent| extent as f64);
-                let own = Matrix3::from_diagonal(&sites.own.into());
+                let own = sites.own_of_planes();
                 let of_rows = if sites.drifts() {
                     let shared = drift::of_mean_of_rows(size[1], sites.drift_rows);
                     (sites.row - sites.drift) / rows + sites.drift * shared

@@ -133,6 +133,10 @@ impl Sites {
                 return Err(Unpredictable::Beyond("charge transfer before rows and columns that share noise"));
             }
             moments.iter_mut().zip(lines).for_each(|(moments, lines)| moments.lines = lines);
+            if frame.geometry.channels.len() == 3 && frame.metadata.demosaic.is_none() {
+                let beyond = photosite.beyond_lines(expected_e, &lines)?;
+                moments.iter_mut().zip(beyond).for_each(|(moments, together)| moments.lines.together = together);
+            }
         }
         let sites = Self { photosite, expected_e, moments };
         let sites = match &frame.metadata.average {

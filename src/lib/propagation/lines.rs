@@ -23,14 +23,12 @@
 //! The covariance matrix of all photosites of a frame is then block plus low rank: D + Σ_rows Z R Zᵀ + Σ_columns Z S Zᵀ, Z
 //! telling the classes, D diagonal with the variance of each less R_kk + S_kk.
 
-use super::covariance::PAIRS;
 use super::curved::NODES;
 
 use super::law::Law;
 use super::masters::Dark;
 use super::moments::{Equations, LineCovariance};
 use super::photosite::Photosite;
-use super::reading::{Reading, codes_of};
 use super::unpredictable::{Predicted, TOO_LONG, Unpredictable};
 use crate::metadata::{AdcRecord, AverageRecord};
 use crate::numerics::averages::Combine;
@@ -45,7 +43,7 @@ const BLURRED: f64 = 0.6;
 const BLURRED_ON_AVERAGE: f64 = 0.45;
 
 /// Values of what is shared that are gone through at most.
-const MOST_NODES: usize = 700;
+pub(super) const MOST_NODES: usize = 700;
 
 /// Why nothing is said of what rows and columns share where more would be needed.
 pub(super) const TOO_COARSE: &str = "what rows or columns share goes over many codes, and what each photosite has of its own blurs \
@@ -76,16 +74,16 @@ const NOT_IN_THE_PAPER: &str = "the paper has no equations for noise of rows and
 
 /// Along rows or along columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Axis {
+pub(super) enum Axis {
     Row,
     Column,
 }
 
 impl Axis {
-    const ALL: [Self; 2] = [Self::Row, Self::Column];
+    pub const ALL: [Self; 2] = [Self::Row, Self::Column];
 
     /// Temporal noise in e⁻, fixed offsets in e⁻, and relative response.
-    fn parts(self, lines: &LineNoise) -> [f64; 3] {
+    pub fn parts(self, lines: &LineNoise) -> [f64; 3] {
         match self {
             Self::Row => {
                 let LineNoise { row_noise_e, black_drift_e, .. } = *lines;
@@ -97,7 +95,7 @@ impl Axis {
     }
 
     /// The model without them.
-    fn without(self, model: &NoiseModel) -> NoiseModel {
+    pub fn without(self, model: &NoiseModel) -> NoiseModel {
         let lines = match self {
             Self::Row => {
                 LineNoise { row_noise_e: 0.0, black_drift_e: 0.0, dsnu_row_e: 0.0, prnu_row: 0.0, ..model.lines }
@@ -195,11 +193,16 @@ impl Photosite {
                 Axis::ALL.map(|axis| self.straight(axis, expected_e, slopes))
             }
             Regime::Curved => {
-                let of_axis = |axis: Axis| self.curved(axis, expected_e);
+                let of_axis = |axis: Axis| self.curved(&[axis], expected_e);
                 [of_axis(Axis::Row)?, of_axis(Axis::Column)?]
             }
         };
         Ok(self.by_class(&row, &column, slopes))
+    }
+
+    /// Whether photosites of these signals follow what they share on a curve.
+    pub(super) fn is_curved_in_lines(&self, expected_e: [f64; 3]) -> Predicted<bool> {
+        Ok(!self.has_tails() && self.regime(expected_e)? == Regime::Curved)
     }
 
     /// What is shared as each class has it, with the part of the drift by such slopes to the charge.
@@ -213,6 +216,7 @@ impl Photosite {
             column: of_class(column, k),
             drift: [0, 1, 2].map(|l| drift * slopes[k] * slopes[l]),
             drift_rows,
+            together: [0.0; 3],
         })
     }
 
@@ -335,68 +339,6 @@ impl Photosite {
             LineTerms { constant: terms.constant - of_one * axis.parts(&self.model.lines)[0].powi(2), ..terms }
         })
     }
-
-    /// R by sums over what is shared.
-    fn curved(&self, axis: Axis, expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
-        let [temporal, fixed, response] = axis.parts(&self.model.lines);
-        let offset_e = temporal.hypot(fixed);
-        if offset_e == 0.0 && response == 0.0 {
-            return Ok(Matrix3::zeros());
-        }
-        let rest = axis.without(&self.model);
-        let brightest = expected_e.into_iter().fold(0.0, f64::max);
-        let blurs = expected_e.map(|expected_e| self.adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e)));
-        let blur_e = blurs.into_iter().fold(f64::INFINITY, f64::min);
-        let finest_e = blur_e.max(self.adc.map_or(0.0, |adc| FINEST / adc.adu_per_e));
-        let offsets = nodes(offset_e, finest_e);
-        let shot_e = if self.model.signal_shot { brightest.sqrt() } else { 0.0 };
-        let at_full = shot_e.hypot(brightest * rest.response()).max(1.0);
-        let gains = nodes(brightest * response, finest_e.min(at_full));
-        if offsets.len() * gains.len() > MOST_NODES {
-            return Err(Unpredictable::Beyond(TOO_COARSE));
-        }
-        let mut first = [0.0; 3];
-        let mut second = [0.0; 6];
-        let laws = expected_e.map(|expected_e| Law::of(&rest, expected_e));
-        for &(u, of_u) in &gains {
-            let gained = laws.map(|law| law.gained(1.0 + response * u));
-            for &(v, of_v) in &offsets {
-                let mean = |k: usize| self.mean_at(&laws[k], &gained[k], offset_e * v);
-                let of_red = mean(0);
-                let same = |k: usize, other: usize| expected_e[k] == expected_e[other];
-                let of_green = if same(1, 0) { of_red } else { mean(1) };
-                let of_blue = if same(2, 0) {
-                    of_red
-                } else if same(2, 1) {
-                    of_green
-                } else {
-                    mean(2)
-                };
-                let means = [of_red, of_green, of_blue];
-                for (sum, mean) in first.iter_mut().zip(means) {
-                    *sum += of_u * of_v * mean;
-                }
-                for (sum, [k, l]) in second.iter_mut().zip(PAIRS) {
-                    *sum += of_u * of_v * means[k] * means[l];
-                }
-            }
-        }
-        let mut found = Matrix3::zeros();
-        for (square, [k, l]) in second.into_iter().zip(PAIRS) {
-            found[(k, l)] = square - first[k] * first[l];
-            found[(l, k)] = found[(k, l)];
-        }
-        Ok(found)
-    }
-
-    /// The mean reading of photosites of a row, about the center that `law` has.
-    fn mean_at(&self, law: &Law, gained: &Law, offset_e: f64) -> f64 {
-        match self.adc {
-            // What is added to electrons is in them.
-            None => gained.expect(&law.of_electrons())[0] + offset_e,
-            Some(adc) => gained.expect(&Reading { offset_e, ..law.of_codes(&adc, codes_of(&adc)) })[0],
-        }
-    }
 }
 
 /// What two photosites of signals x and y in one row, or column, share, in e²: a + b (x + y) + c x y.
@@ -424,9 +366,6 @@ enum Regime {
 /// Why nothing is said of what rows and columns share.
 const WITH_LINES: &str = "full well or an end of the codes cuts off what rows or columns share, on a sensor that has hot \
                                      pixels or random telegraph signals";
-
-/// Codes that are told apart, in codes.
-const FINEST: f64 = 0.04;
 
 /// What of a photosite's own spread blurs codes, e⁻: shot noise counts as far as whole electrons are no whole codes.
 pub(super) fn blur_e(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> f64 {

@@ -22,6 +22,7 @@ pub(crate) mod ground;
 mod law;
 mod level_variance;
 mod line_sampling;
+mod line_sums;
 pub mod linear;
 mod lines;
 mod lookup;

@@ -92,6 +92,8 @@ pub struct LineCovariance {
     pub drift: [f64; 3],
     /// Rows from one knot of the drift to the next; 0 where there is none.
     pub drift_rows: f64,
+    /// Of three planes: what samples of one place share with one of another class beyond what they do by row and by column.
+    pub together: [f64; 3],
 }
 
 /// The covariance of photosites: what each has by itself, and what those of a row and of a column share, by classes.
@@ -107,13 +109,15 @@ pub struct SiteCovariance {
     pub drift: Matrix3<f64>,
     /// Rows from one knot of the drift to the next.
     pub drift_rows: f64,
+    /// Of three planes: what samples of one place share with one of another class beyond what they do by row and by column.
+    pub together: Matrix3<f64>,
 }
 
 impl SiteCovariance {
     /// That of photosites that share nothing.
     pub fn independent(own: [f64; 3]) -> Self {
         let none = Matrix3::zeros();
-        Self { own, row: none, column: none, drift: none, drift_rows: 0.0 }
+        Self { own, row: none, column: none, drift: none, drift_rows: 0.0, together: none }
     }
 
     /// That of photosites of these moments.
@@ -130,7 +134,13 @@ impl SiteCovariance {
             column: Matrix3::from_fn(|k, l| sites[k].lines.column[l]),
             drift: Matrix3::from_fn(|k, l| sites[k].lines.drift[l]),
             drift_rows: sites[0].lines.drift_rows,
+            together: Matrix3::from_fn(|k, l| sites[k].lines.together[l]),
         }
+    }
+
+    /// Covariance of what three samples of one place have apart from rows and columns.
+    pub fn own_of_planes(&self) -> Matrix3<f64> {
+        Matrix3::from_diagonal(&self.own.into()) + self.together
     }
 
     /// Whether photosites share nothing.

@@ -117,6 +117,7 @@ impl Temporal {
             column: less(one.lines.column, self.lines.column),
             drift: less(one.lines.drift, self.lines.drift),
             drift_rows: one.lines.drift_rows,
+            together: one.lines.together,
         };
         // Sixth cumulants mark photosites that are unlike each other.
         Prediction { sixth: one.sixth, common: one.common, lines, ..found }

@@ -60,7 +60,7 @@ impl Predicted {
         let population = if sites.is_independent() {
             expected.sampling.covariance
         } else {
-            sites.row + sites.column + Matrix3::from_diagonal(&sites.own.into())
+            sites.row + sites.column + sites.own_of_planes()
         };
         Self::of_three(&population, expected)
     }

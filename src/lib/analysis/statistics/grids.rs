@@ -184,9 +184,15 @@ fn without_drift(channels: &[Prediction; 3]) -> [Prediction; 3] {
 
 /// Three channels alike, all of a class.
 pub(super) fn alike(prediction: &Prediction, class: Class) -> [Prediction; 3] {
-    let LineCovariance { row, column, drift, drift_rows } = prediction.lines;
+    let LineCovariance { row, column, drift, drift_rows, .. } = prediction.lines;
     let of_class = |shared: [f64; 3]| [shared[class as usize]; 3];
-    let lines = LineCovariance { row: of_class(row), column: of_class(column), drift: of_class(drift), drift_rows };
+    let lines = LineCovariance {
+        row: of_class(row),
+        column: of_class(column),
+        drift: of_class(drift),
+        drift_rows,
+        together: [0.0; 3],
+    };
     [Prediction { lines, ..*prediction }; 3]
 }
 
@@ -209,7 +215,7 @@ fn add_drift(found: &mut Sampling, sites: &SiteCovariance, grids: &[Grid]) {
     let [one, two, three] = drift.traces();
     let lines = rows.iter().map(|rows| drift.with_lines(rows)).fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
     let row = sites.row - sites.drift;
-    let own = Matrix3::from_diagonal(&sites.own.into());
+    let own = sites.own_of_planes();
     let free = (found.count - 1.0).max(f64::MIN_POSITIVE);
     // tr AU, of channels.
     let beside: Matrix3<f64> = own * one + row * lines[0] + sites.column * lines[1];
@@ -236,7 +242,7 @@ fn add_drift(found: &mut Sampling, sites: &SiteCovariance, grids: &[Grid]) {
 /// The same where no black level drifts.
 fn without_drift_sampling(channels: &[Prediction; 3], grids: &[Grid]) -> Sampling {
     let sites = SiteCovariance::of(channels);
-    let own = Matrix3::from_diagonal(&sites.own.into());
+    let own = sites.own_of_planes();
     let count: f64 = grids.iter().map(Grid::count).sum();
     let free = (count - 1.0).max(f64::MIN_POSITIVE);
     // Eigenvalues and how often they come, of the mean of each grid last.

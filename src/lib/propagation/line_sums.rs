@@ -1,0 +1,267 @@
+//! Sums over what rows and columns share, where samples follow it on a curve.
+//!
+//! The mean sample m(u, v) of photosites whose response differs by u, and to whose charge v is added, is smooth on the scale of
+//! what is a photosite's own. Where that is next to nothing beside a code, m is a staircase of v: its steps lie where a code begins,
+//! less the charge, or each count of it, and the sum over v has panels between them. Of u it is smooth even then, as far as shot
+//! noise, or what is added, blurs it.
+
+use super::covariance::PAIRS;
+use super::law::Law;
+use super::lines::{Axis, MOST_NODES, TOO_COARSE, blur_e, nodes};
+use super::moments::LineCovariance;
+use super::photosite::Photosite;
+use super::reading::{Reading, codes_of};
+use super::unpredictable::{Predicted, Unpredictable};
+use crate::metadata::AdcRecord;
+use crate::numerics::gauss::panel;
+use crate::numerics::normal::density;
+use nalgebra::Matrix3;
+
+/// What blurs codes, in codes, below which steps are gone along one by one.
+const SHARP: f64 = 0.04;
+
+/// Values of what is shared that are gone through at most where codes follow it by steps.
+const MOST_STEPPED: usize = 2000;
+
+/// Standard deviations beyond which what is shared does not count.
+const REACH: f64 = 6.5;
+
+/// ADU per electron up to which shot noise blurs codes as a normal law does.
+const FEW: f64 = 0.2;
+
+/// A step of the mean sample, in standard deviations of what is shared, and over what width.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Step {
+    at: f64,
+    width: f64,
+}
+
+/// What rows or columns share, or both.
+struct Shared {
+    /// What is added to the charge, e⁻.
+    offset_e: f64,
+    /// Relative response.
+    response: f64,
+    /// What is a photosite's own, or other lines'.
+    laws: [Law; 3],
+    /// What of that blurs codes, e⁻, by class.
+    blur_e: [f64; 3],
+    expected_e: [f64; 3],
+}
+
+impl Photosite {
+    /// Covariances, by classes, of photosites that share such lines, by sums over what these share.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`] where they are too many.
+    pub(super) fn curved(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
+        let mut rest = self.model;
+        let [mut offset_e, mut response] = [0.0_f64; 2];
+        for axis in axes {
+            let [temporal, fixed, of_response] = axis.parts(&self.model.lines);
+            offset_e = offset_e.hypot(temporal.hypot(fixed));
+            response = response.hypot(of_response);
+            rest = axis.without(&rest);
+        }
+        if offset_e == 0.0 && response == 0.0 {
+            return Ok(Matrix3::zeros());
+        }
+        let of_class = |expected_e: f64| self.adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e));
+        let laws = expected_e.map(|expected_e| Law::of(&rest, expected_e));
+        let shared = Shared { offset_e, response, laws, blur_e: expected_e.map(of_class), expected_e };
+        let sharp = self.adc.filter(|adc| adc.adu_per_e * shared.least_blur_e() < SHARP);
+        let gains = shared.gains(sharp.as_ref())?;
+        let smooth = if sharp.is_none() { nodes(offset_e, shared.least_blur_e()) } else { Vec::new() };
+        if smooth.len() * gains.len() > MOST_NODES {
+            return Err(Unpredictable::Beyond(TOO_COARSE));
+        }
+        let (mut first, mut second) = ([0.0; 3], [0.0; 6]);
+        let mut all = 0;
+        for (u, of_u) in gains {
+            let gained = laws.map(|law| law.gained(1.0 + response * u));
+            let offsets = match &sharp {
+                Some(adc) => &shared.offsets(adc, &gained)?,
+                None => &smooth,
+            };
+            all += offsets.len();
+            if all > MOST_STEPPED {
+                return Err(Unpredictable::Beyond(TOO_COARSE));
+            }
+            for (v, of_v) in offsets {
+                let means = self.means(&shared, &gained, offset_e * v);
+                for (sum, mean) in first.iter_mut().zip(means) {
+                    *sum += of_u * of_v * mean;
+                }
+                for (sum, [k, l]) in second.iter_mut().zip(PAIRS) {
+                    *sum += of_u * of_v * means[k] * means[l];
+                }
+            }
+        }
+        let mut found = Matrix3::zeros();
+        for (square, [k, l]) in second.into_iter().zip(PAIRS) {
+            found[(k, l)] = square - first[k] * first[l];
+            found[(l, k)] = found[(k, l)];
+        }
+        Ok(found)
+    }
+
+    /// What three samples of one place, each of its class, share by row and column together beyond what they share by either: where
+    /// codes are no straight lines there is more than the sum.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::curved`].
+    pub(super) fn beyond_lines(&self, expected_e: [f64; 3], lines: &[LineCovariance; 3]) -> Predicted<[[f64; 3]; 3]> {
+        let shares = |axis: &Axis| axis.parts(&self.model.lines).iter().any(|part| *part > 0.0);
+        if !Axis::ALL.iter().all(shares) || !self.is_curved_in_lines(expected_e)? {
+            return Ok([[0.0; 3]; 3]);
+        }
+        let both = self.curved(&Axis::ALL, expected_e)?;
+        let beyond =
+            |k: usize, l: usize| if k == l { 0.0 } else { both[(k, l)] - lines[k].row[l] - lines[k].column[l] };
+        Ok([0, 1, 2].map(|k| [0, 1, 2].map(|l| beyond(k, l))))
+    }
+
+    /// The mean readings of photosites of a line, each about the center that its law has.
+    fn means(&self, shared: &Shared, gained: &[Law; 3], offset_e: f64) -> [f64; 3] {
+        let mean = |k: usize| {
+            let law = &shared.laws[k];
+            match self.adc {
+                // What is added to electrons is in them.
+                None => gained[k].expect(&law.of_electrons())[0] + offset_e,
+                Some(adc) => gained[k].expect(&Reading { offset_e, ..law.of_codes(&adc, codes_of(&adc)) })[0],
+            }
+        };
+        let same = |k: usize, other: usize| shared.expected_e[k] == shared.expected_e[other];
+        let of_red = mean(0);
+        let of_green = if same(1, 0) { of_red } else { mean(1) };
+        let of_blue = match [same(2, 0), same(2, 1)] {
+            [true, _] => of_red,
+            [_, true] => of_green,
+            _ => mean(2),
+        };
+        [of_red, of_green, of_blue]
+    }
+}
+
+impl Shared {
+    fn least_blur_e(&self) -> f64 {
+        self.blur_e.into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Responses to go through, with their weights.
+    fn gains(&self, sharp: Option<&AdcRecord>) -> Predicted<Vec<(f64, f64)>> {
+        let brightest = (0..3).max_by(|a, b| self.expected_e[*a].total_cmp(&self.expected_e[*b])).unwrap_or(0);
+        let (law, spread_e) = (&self.laws[brightest], self.expected_e[brightest] * self.response);
+        let at_full = law.light.shot_std().hypot(law.least_pattern_std()).max(1.0);
+        let Some(adc) = sharp else { return Ok(nodes(spread_e, self.least_blur_e().min(at_full))) };
+        // Brighter lines have more counts, whose law is smooth in the light; what is added blurs them too.
+        let blur_e = law.light.shot_std().hypot(self.offset_e);
+        if self.response == 0.0 || blur_e > 0.0 {
+            return Ok(nodes(spread_e, blur_e.hypot(self.least_blur_e()).min(at_full)));
+        }
+        let mut steps = Vec::new();
+        for k in 0..3 {
+            let spread_e = self.expected_e[k] * self.response;
+            let full = [self.laws[k].full_well_e];
+            let charge_e = self.laws[k].light.rate + self.laws[k].dark.rate;
+            let at = |level_e: f64| Step { at: (level_e - charge_e) / spread_e, width: self.blur_e[k] / spread_e };
+            steps.extend(edges(adc, charge_e, REACH * spread_e)?.into_iter().chain(full).map(at));
+        }
+        stepped(steps)
+    }
+
+    /// What is added, in standard deviations of it, with weights, where codes follow it by steps.
+    fn offsets(&self, adc: &AdcRecord, gained: &[Law; 3]) -> Predicted<Vec<(f64, f64)>> {
+        if self.offset_e == 0.0 {
+            return Ok(vec![(0.0, 1.0)]);
+        }
+        let mut steps = Vec::new();
+        for (k, law) in gained.iter().enumerate() {
+            if gained[..k].contains(law) {
+                continue;
+            }
+            for charge_e in charges(law, adc)? {
+                let at = |edge_e: f64| Step {
+                    at: (edge_e - charge_e) / self.offset_e,
+                    width: self.blur_e[k] / self.offset_e,
+                };
+                steps.extend(edges(adc, charge_e, REACH * self.offset_e)?.into_iter().map(at));
+                too_many(steps.len())?;
+            }
+        }
+        stepped(steps)
+    }
+}
+
+fn too_many(steps: usize) -> Predicted<()> {
+    if steps > MOST_STEPPED { Err(Unpredictable::Beyond(TOO_COARSE)) } else { Ok(()) }
+}
+
+/// Charges from which what is added leads to steps: each count where codes tell counts apart, else their mean, which shot noise blurs;
+/// and full well where that is within reach.
+fn charges(law: &Law, adc: &AdcRecord) -> Predicted<Vec<f64>> {
+    const LEAST_WEIGHT: f64 = 1e-10;
+    let full = law.full_well_e;
+    let counted = [&law.light, &law.dark].into_iter().filter(|charge| charge.shot_std() > 0.0);
+    let rate: f64 = counted.map(|charge| charge.rate).sum();
+    let mean = law.light.rate + law.dark.rate;
+    let mut found = if rate == 0.0 || adc.adu_per_e <= FEW {
+        vec![mean]
+    } else {
+        too_many((18.0 * rate.sqrt()) as usize)?;
+        let counts =
+            super::counts::Charge { rate, pattern: 0.0, ..if law.light.rate > 0.0 { law.light } else { law.dark } };
+        let counts = counts.counts(0.0).into_iter().filter(|count| count.weight > LEAST_WEIGHT);
+        counts.map(|count| mean - rate + count.electrons).collect()
+    };
+    found.iter_mut().for_each(|charge| *charge = charge.min(full));
+    if law.reaches_full_well() {
+        found.push(full);
+    }
+    found.dedup();
+    Ok(found)
+}
+
+/// Charges at which codes begin, within reach of one.
+fn edges(adc: &AdcRecord, charge_e: f64, reach_e: f64) -> Predicted<Vec<f64>> {
+    let top = f64::from(adc.top_code());
+    let [first, last] =
+        [charge_e - reach_e, charge_e + reach_e].map(|charge| (adc.level_at(charge) - 0.5).clamp(-1.0, top));
+    let (first, last) = (first.floor().max(0.0), last.ceil().min(top - 1.0));
+    if last < first {
+        return Ok(Vec::new());
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "numbers of codes")]
+    let (first, last) = (first as u32, last as u32);
+    too_many((last - first) as usize)?;
+    Ok((first..=last).map(|code| adc.electrons_at(f64::from(code) + 0.5)).collect())
+}
+
+/// Standard normal numbers and their weights for a function that is flat but for such steps.
+fn stepped(mut steps: Vec<Step>) -> Predicted<Vec<(f64, f64)>> {
+    /// Panels no wider than this follow the normal law.
+    const WIDEST: f64 = 1.625;
+    /// Widths of a step on either side of it, and of a panel across it, over which the rule follows its law to 10⁻⁹.
+    const BESIDE: [f64; 6] = [-9.0, -6.0, -2.0, 2.0, 6.0, 9.0];
+    const LEAST: f64 = 1e-9;
+    steps.retain(|step| step.at.abs() < REACH + 9.0 * step.width);
+    let mut ends: Vec<f64> = (-4..=4).map(|step| WIDEST * f64::from(step)).collect();
+    for step in steps {
+        match step.width > LEAST {
+            true => ends.extend(BESIDE.map(|widths| step.at + widths * step.width)),
+            false => ends.push(step.at),
+        }
+    }
+    ends.retain(|end| end.abs() <= REACH);
+    ends.sort_by(f64::total_cmp);
+    ends.dedup_by(|next, kept| *next - *kept < LEAST);
+    too_many(ends.len() * crate::numerics::gauss::NODES)?;
+    let of_panel =
+        |pair: &[f64]| panel(pair[0], pair[1]).map(|(z, weight)| (z, weight * density(z))).collect::<Vec<_>>();
+    let mut found: Vec<(f64, f64)> = ends.windows(2).flat_map(of_panel).collect();
+    let sum: f64 = found.iter().map(|(_, weight)| weight).sum();
+    found.iter_mut().for_each(|(_, weight)| *weight /= sum);
+    Ok(found)
+}
