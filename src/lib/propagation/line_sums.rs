@@ -6,6 +6,7 @@
 //! noise, or what is added, blurs it.
 
 use super::covariance::PAIRS;
+use super::effort;
 use super::law::Law;
 use super::lines::{Axis, MOST_NODES, TOO_COARSE, blur_e, nodes};
 use super::moments::LineCovariance;
@@ -17,11 +18,11 @@ use crate::numerics::gauss::panel;
 use crate::numerics::normal::density;
 use nalgebra::Matrix3;
 
-/// What blurs codes, in codes, below which steps are gone along one by one.
-const SHARP: f64 = 0.04;
-
 /// Values of what is shared that are gone through at most where codes follow it by steps.
-const MOST_STEPPED: usize = 2000;
+const MOST_STEPPED: usize = 6000;
+
+/// Evaluations that a sum may take, a tenth of a second.
+const MOST_WORK: u64 = 16_000_000;
 
 /// Standard deviations beyond which what is shared does not count.
 const REACH: f64 = 6.5;
@@ -56,6 +57,11 @@ impl Photosite {
     ///
     /// [`Unpredictable::Beyond`] where they are too many.
     pub(super) fn curved(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
+        let found = effort::within(MOST_WORK, || self.curved_within(axes, expected_e));
+        found.unwrap_or(Err(Unpredictable::Beyond(TOO_COARSE)))
+    }
+
+    fn curved_within(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
         let mut rest = self.model;
         let [mut offset_e, mut response] = [0.0_f64; 2];
         for axis in axes {
@@ -70,14 +76,18 @@ impl Photosite {
         let of_class = |expected_e: f64| self.adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e));
         let laws = expected_e.map(|expected_e| Law::of(&rest, expected_e));
         let shared = Shared { offset_e, response, laws, blur_e: expected_e.map(of_class), expected_e };
-        let sharp = self.adc.filter(|adc| adc.adu_per_e * shared.least_blur_e() < SHARP);
-        let gains = shared.gains(sharp.as_ref())?;
-        let smooth = if sharp.is_none() { nodes(offset_e, shared.least_blur_e()) } else { Vec::new() };
-        if smooth.len() * gains.len() > MOST_NODES {
+        let mut gains = shared.gains(None)?;
+        let smooth = nodes(offset_e, shared.least_blur_e());
+        let sharp = self.adc.filter(|_| smooth.len() * gains.len() > MOST_NODES);
+        if let Some(adc) = &sharp {
+            gains = shared.gains(Some(adc))?;
+        } else if smooth.len() * gains.len() > MOST_NODES {
             return Err(Unpredictable::Beyond(TOO_COARSE));
         }
         let (mut first, mut second) = ([0.0; 3], [0.0; 6]);
         let mut all = 0;
+        let mut foreseen: Option<effort::Foreseen> = None;
+        let lines = gains.len();
         for (u, of_u) in gains {
             let gained = laws.map(|law| law.gained(1.0 + response * u));
             let offsets = match &sharp {
@@ -88,7 +98,12 @@ impl Photosite {
             if all > MOST_STEPPED {
                 return Err(Unpredictable::Beyond(TOO_COARSE));
             }
+            let foreseen = foreseen.get_or_insert_with(|| effort::Foreseen::of(lines * offsets.len()));
             for (v, of_v) in offsets {
+                foreseen.begin_next();
+                if effort::is_spent() {
+                    return Err(Unpredictable::Beyond(TOO_COARSE));
+                }
                 let means = self.means(&shared, &gained, offset_e * v);
                 for (sum, mean) in first.iter_mut().zip(means) {
                     *sum += of_u * of_v * mean;
@@ -154,20 +169,22 @@ impl Shared {
     fn gains(&self, sharp: Option<&AdcRecord>) -> Predicted<Vec<(f64, f64)>> {
         let brightest = (0..3).max_by(|a, b| self.expected_e[*a].total_cmp(&self.expected_e[*b])).unwrap_or(0);
         let (law, spread_e) = (&self.laws[brightest], self.expected_e[brightest] * self.response);
-        let at_full = law.light.shot_std().hypot(law.least_pattern_std()).max(1.0);
-        let Some(adc) = sharp else { return Ok(nodes(spread_e, self.least_blur_e().min(at_full))) };
-        // Brighter lines have more counts, whose law is smooth in the light; what is added blurs them too.
-        let blur_e = law.light.shot_std().hypot(self.offset_e);
-        if self.response == 0.0 || blur_e > 0.0 {
-            return Ok(nodes(spread_e, blur_e.hypot(self.least_blur_e()).min(at_full)));
+        // Brighter lines have more counts, whose law is smooth in the light whatever is read of each.
+        if self.response == 0.0 || law.light.shot_std() > 0.0 {
+            return Ok(nodes(spread_e, law.light.shot_std().hypot(self.least_blur_e())));
         }
+        let Some(adc) = sharp.filter(|_| self.offset_e == 0.0) else {
+            let at_full = law.least_pattern_std().max(1.0);
+            return Ok(nodes(spread_e, self.least_blur_e().hypot(self.offset_e).min(at_full)));
+        };
         let mut steps = Vec::new();
         for k in 0..3 {
             let spread_e = self.expected_e[k] * self.response;
             let full = [self.laws[k].full_well_e];
             let charge_e = self.laws[k].light.rate + self.laws[k].dark.rate;
             let at = |level_e: f64| Step { at: (level_e - charge_e) / spread_e, width: self.blur_e[k] / spread_e };
-            steps.extend(edges(adc, charge_e, REACH * spread_e)?.into_iter().chain(full).map(at));
+            steps
+                .extend(edges(adc, charge_e, REACH * spread_e + 9.0 * self.blur_e[k])?.into_iter().chain(full).map(at));
         }
         stepped(steps)
     }
@@ -187,7 +204,7 @@ impl Shared {
                     at: (edge_e - charge_e) / self.offset_e,
                     width: self.blur_e[k] / self.offset_e,
                 };
-                steps.extend(edges(adc, charge_e, REACH * self.offset_e)?.into_iter().map(at));
+                steps.extend(edges(adc, charge_e, REACH * self.offset_e + 9.0 * self.blur_e[k])?.into_iter().map(at));
                 too_many(steps.len())?;
             }
         }
@@ -236,7 +253,8 @@ fn edges(adc: &AdcRecord, charge_e: f64, reach_e: f64) -> Predicted<Vec<f64>> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "numbers of codes")]
     let (first, last) = (first as u32, last as u32);
     too_many((last - first) as usize)?;
-    Ok((first..=last).map(|code| adc.electrons_at(f64::from(code) + 0.5)).collect())
+    let all = (first..=last).map(|code| adc.electrons_at(f64::from(code) + 0.5));
+    Ok(all.filter(|edge| (edge - charge_e).abs() <= reach_e).collect())
 }
 
 /// Standard normal numbers and their weights for a function that is flat but for such steps.
@@ -246,7 +264,9 @@ fn stepped(mut steps: Vec<Step>) -> Predicted<Vec<(f64, f64)>> {
     /// Widths of a step on either side of it, and of a panel across it, over which the rule follows its law to 10⁻⁹.
     const BESIDE: [f64; 6] = [-9.0, -6.0, -2.0, 2.0, 6.0, 9.0];
     const LEAST: f64 = 1e-9;
-    steps.retain(|step| step.at.abs() < REACH + 9.0 * step.width);
+    // Wide ones the panels follow as they are.
+    const WIDE: f64 = 0.5;
+    steps.retain(|step| step.width < WIDE && step.at.abs() < REACH + 9.0 * step.width);
     let mut ends: Vec<f64> = (-4..=4).map(|step| WIDEST * f64::from(step)).collect();
     for step in steps {
         match step.width > LEAST {
@@ -264,4 +284,76 @@ fn stepped(mut steps: Vec<Step>) -> Predicted<Vec<(f64, f64)>> {
     let sum: f64 = found.iter().map(|(_, weight)| weight).sum();
     found.iter_mut().for_each(|(_, weight)| *weight /= sum);
     Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metadata::PoissonKind;
+    use crate::propagation::Equations;
+    use crate::stages::noise::{LineNoise, NoiseModel, Tails};
+    use std::f64::consts::TAU;
+
+    /// Photosites of one bit, whose codes change at 50 000 e⁻, of no noise but of rows, of columns, and 20 e⁻ of their own.
+    fn of_one_bit(row_noise_e: f64, column_noise_e: f64) -> Photosite {
+        let lines = LineNoise { row_noise_e, column_noise_e, ..LineNoise::default() };
+        let model = NoiseModel {
+            dark_e: 0.0,
+            dcnu: 0.0,
+            prnu: 0.0,
+            read_noise_e: OWN_E,
+            full_well_e: 1e6,
+            dark_shot: false,
+            signal_shot: false,
+            poisson: PoissonKind::Exact,
+            lines,
+            tails: Tails::default(),
+        };
+        let adc = AdcRecord::new(1, 0.0, 1e-5);
+        Photosite::of_electrons(model, Equations::Exact).digitized(adc)
+    }
+
+    const OWN_E: f64 = 20.0;
+
+    /// Two normal numbers of correlation ρ are both above their means with the probability 1/4 + asin ρ/2π \[Sheppard1899], so that codes
+    /// of one bit about their step have the covariance asin ρ/2π.
+    #[test]
+    fn codes_of_one_bit_have_the_covariance_of_two_signs() {
+        for row in [5.0, 50.0, 400.0, 5e3, 2e4] {
+            for column in [0.0, 300.0, 1e4] {
+                let site = of_one_bit(row, column);
+                let all = row * row + column * column + OWN_E * OWN_E;
+                let of_signs = |shared: f64| (shared / all).asin() / TAU;
+                let middle = [5e4; 3];
+                let of_rows = site.curved(&[Axis::Row], middle).unwrap()[(0, 1)];
+                assert!(
+                    (of_rows - of_signs(row * row)).abs() < 1e-8,
+                    "{row} {column}: {of_rows} {}",
+                    of_signs(row * row)
+                );
+                let lines = site.lines(middle).unwrap();
+                let beyond = site.beyond_lines(middle, &lines).unwrap()[0][2];
+                let shared = if column > 0.0 { row * row + column * column } else { row * row };
+                let wanted = of_signs(shared) - of_signs(row * row) - of_signs(column * column);
+                assert!((beyond - wanted).abs() < 3e-8, "{row} {column}: {beyond} {wanted}");
+            }
+        }
+    }
+
+    /// Whatever the charge, a code of one bit has the variance p (1 − p), of which what is shared is less.
+    #[test]
+    fn what_is_shared_is_no_more_than_there_is() {
+        for off in [-9e3, -2e3, -30.0, 0.0, 30.0, 7e3] {
+            let site = of_one_bit(5e3, 0.0);
+            let expected = [5e4 + off; 3];
+            let shared = site.curved(&[Axis::Row], expected).unwrap()[(0, 0)];
+            let whole = site.moments(expected[0]).moments;
+            assert!((whole.variance - whole.mean * (1.0 - whole.mean)).abs() < 1e-9);
+            assert!(
+                shared <= whole.variance && shared > 0.97 * whole.variance,
+                "{off}: {shared} of {}",
+                whole.variance
+            );
+        }
+    }
 }

@@ -395,9 +395,6 @@ pub(super) fn nodes(spread: f64, blur: f64) -> Vec<(f64, f64)> {
     // and higher powers of the ratio.
     let ratio = spread / blur;
     if ratio <= 0.05 {
-        return vec![(-1.0, 0.5), (1.0, 0.5)];
-    }
-    if ratio <= 0.3 {
         let third = 3.0_f64.sqrt();
         return vec![(0.0, 2.0 / 3.0), (-third, 1.0 / 6.0), (third, 1.0 / 6.0)];
     }
