@@ -465,7 +465,10 @@ fn snr_db(signal: [f64; 3], std: [f64; 3], saturated: Option<[f64; 3]>) -> [Opti
 fn spread_of(by_cause: &[CauseVariance], fixed: bool) -> Option<[f64; 3]> {
     let chosen = by_cause.iter().filter(|entry| entry.cause.is_fixed_pattern() == fixed);
     let sum = chosen.fold([0.0; 3], |sum, entry| [0, 1, 2].map(|i| sum[i] + entry.variance[i]));
-    (!by_cause.is_empty()).then(|| sum.map(|variance| variance.max(0.0).sqrt()))
+    let all = by_cause.iter().fold([0.0; 3], |all, entry| [0, 1, 2].map(|i| all[i] + entry.variance[i].abs()));
+    // What is left of causes that cancel is rounding.
+    let part = |i: usize| if sum[i] > 1e-13 * all[i] { sum[i].sqrt() } else { 0.0 };
+    (!by_cause.is_empty()).then(|| [0, 1, 2].map(part))
 }
 
 /// Pixels of the smallest square that is large enough; none up to 2²⁰ on a side.

@@ -2,13 +2,14 @@
 
 use super::charge::sensitivity;
 use super::law::Law;
-use super::masters::Dark;
+use super::masters::{Dark, MOST_DARKS};
 use super::moments::Equations;
 use super::pattern::Shared;
 use super::photosite::Photosite;
-use super::unpredictable::{Predicted, TOO_LONG, Unpredictable};
+use super::unpredictable::{OFFSETS_TOO_LONG, Predicted, TOO_LONG, Unpredictable};
 use crate::camera::readout::ReadOut;
 use crate::metadata::AdcRecord;
+use crate::numerics::averages::Combine;
 use crate::stages::noise::{LineNoise, NoiseModel};
 use serde::Serialize;
 
@@ -196,6 +197,12 @@ fn share_what_is_left(mut budget: Budget, fixed: f64, whole: f64) -> Budget {
     budget
 }
 
+/// Causes that are found as differences of others.
+const DIFFERENCES: [Cause; 4] = [Cause::FullWell, Cause::Quantization, Cause::Rails, Cause::ClippedPattern];
+
+/// The share of all causes below which a difference of them is rounding.
+const ROUNDED_AWAY: f64 = 1e-14;
+
 impl Photosite {
     /// The variance of its samples by cause, in e² or ADU².
     pub fn budget(&self, expected_e: f64) -> Budget {
@@ -215,9 +222,41 @@ impl Photosite {
     ///
     /// [`Unpredictable::Beyond`].
     pub fn causes(&self, expected_e: f64) -> Predicted<Budget> {
-        let budget = self.budget(expected_e);
-        let is_known = !self.has_tails() || budget.iter().all(|variance| !variance.is_nan());
-        if is_known { Ok(budget) } else { Err(Unpredictable::Beyond(TOO_LONG)) }
+        let mut budget = self.told_apart(self.budget(expected_e), expected_e);
+        if budget.iter().any(|variance| variance.is_nan()) {
+            return Err(Unpredictable::Beyond(if self.has_tails() { TOO_LONG } else { OFFSETS_TOO_LONG }));
+        }
+        let all: f64 = budget.iter().map(|variance| variance.abs()).sum();
+        for cause in DIFFERENCES {
+            let found = &mut budget[cause as usize];
+            *found = if found.abs() < ROUNDED_AWAY * all { 0.0 } else { *found };
+        }
+        Ok(budget)
+    }
+
+    /// The same with what rounding does to the means of photosites as part of the fixed pattern, so that the causes of either kind add up
+    /// to what is drawn anew in each exposure, and to what is not.
+    fn told_apart(&self, mut budget: Budget, expected_e: f64) -> Budget {
+        let is_told =
+            self.adc.is_some() && self.flat.is_none() && self.equations == Equations::Exact && !self.has_tails();
+        let are_means = self.darks.iter().flatten().all(|dark| dark.combine == Combine::Mean);
+        if !is_told || !are_means {
+            return budget;
+        }
+        let temporal_of =
+            |site: Self, expected_e: f64| site.temporal_variance(expected_e, site.moments(expected_e).moments.variance);
+        let of_dark = |dark: &Dark| dark.weight.powi(2) * temporal_of(self.of_dark(dark), 0.0) / f64::from(dark.frames);
+        let light = Self { darks: [None; MOST_DARKS], ..*self };
+        let temporal = temporal_of(light, expected_e) + self.darks.iter().flatten().map(of_dark).sum::<f64>();
+        let whole: f64 = budget.iter().sum();
+        let told: f64 =
+            Cause::ALL.iter().filter(|cause| !cause.is_fixed_pattern()).map(|cause| budget[*cause as usize]).sum();
+        let fixed = told - temporal.min(whole);
+        if fixed.is_nan() || fixed.abs() > 1e-9 * whole {
+            budget[Cause::Quantization as usize] -= fixed;
+            budget[Cause::ClippedPattern as usize] += fixed;
+        }
+        budget
     }
 
     /// The variance, over photosites, of the means that each has over exposures.

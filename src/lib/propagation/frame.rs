@@ -15,7 +15,7 @@ use super::spaces::{Channels, Curved, OTHER_COLORS, is_curved, white};
 use super::tails;
 use super::tapped::TappedPixels;
 use super::taps::{self, Group};
-use super::unpredictable::TOO_LONG;
+use super::unpredictable::{OFFSETS_TOO_LONG, TOO_LONG};
 pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::color;
 use crate::metadata::FrameHeader;
@@ -124,8 +124,8 @@ impl Sites {
         let ground = Ground::of(frame, equations)?;
         let (frame, photosite, expected_e) = (&*ground.frame, ground.photosite, ground.smeared.expected_e);
         let mut moments = ground.moments()?;
-        if photosite.has_tails() && moments.iter().any(|site| site.moments.variance.is_nan()) {
-            return Err(Unpredictable::Beyond(TOO_LONG));
+        if moments.iter().any(|site| site.moments.variance.is_nan()) {
+            return Err(Unpredictable::Beyond(if photosite.has_tails() { TOO_LONG } else { OFFSETS_TOO_LONG }));
         }
         if ground.quantity != QuantityKind::ExpectedElectrons {
             let lines = photosite.lines(expected_e)?;

@@ -30,6 +30,7 @@ pub mod masters;
 mod memory;
 pub mod moments;
 mod node;
+mod offsets;
 pub mod paper;
 mod pattern;
 pub mod photosite;

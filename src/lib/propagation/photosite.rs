@@ -196,7 +196,8 @@ impl Photosite {
                 variance += 2.0 * weight * other.weight * both;
             }
         }
-        let variance = variance.max(0.0);
+        // What takes too long is no number.
+        let variance = if variance.is_nan() { variance } else { variance.max(0.0) };
         // Patterns that cancel take what is flat in their law with them.
         let left = if fourth < 0.0 { (variance / apart).powi(2) } else { 1.0 };
         Prediction::of_cumulants(mean, variance, third, fourth * left)
@@ -254,6 +255,10 @@ impl Photosite {
         let shared = Shared::of(seen(law, median_of), seen(of_dark, dark_median_of));
         if self.model.offsets() == 0.0 && dark.model.offsets() == 0.0 {
             return shared;
+        }
+        let no_median = median_of.or(dark_median_of).is_none();
+        if let Some(exact) = no_median.then(|| self.shared_over_offsets(adc, [law, of_dark], dark, is_fine)).flatten() {
+            return exact;
         }
         self.with_offsets(shared, dark, [law.mean_slope(adc), of_dark.mean_slope(adc)])
     }

@@ -142,7 +142,7 @@ impl Photosite {
     }
 
     /// E v of samples that nothing came off.
-    fn temporal_variance(&self, expected_e: f64, whole: f64) -> f64 {
+    pub(super) fn temporal_variance(&self, expected_e: f64, whole: f64) -> f64 {
         let shows_codes = |adc: &AdcRecord| Dark::mean_of(self.model, 1).std_codes(adc, expected_e) < VISIBLE;
         let fixed = match self.adc.filter(|_| !self.has_tails() && self.equations == Equations::Exact) {
             Some(adc) if shows_codes(&adc) => self.shared(&adc, (expected_e, None), (self, None), true).light,

@@ -1,0 +1,158 @@
+//! Fixed offsets of photosites where codes show or end: with the offset u a photosite is one of a sensor whose readings are off by u.
+//!
+//! What light and dark frames share is, with u ~ N(0, σ²) and patterns of the charge beside it, by the law of total covariance
+//!
+//! cov(y, y') = E cov(y, y' | u) + cov(E(y|u), E(y'|u)).
+//!
+//! The means follow u as smoothly as read noise lets them, so that equal steps, a fraction of it, are exact to rounding.
+
+use super::effort;
+use super::law::Law;
+use super::memory::Memory;
+use super::pattern::{Seen, Shared};
+use super::photosite::Photosite;
+use super::reading::codes_of;
+use crate::metadata::AdcRecord;
+use crate::numerics::normal::density;
+use crate::numerics::rounding::REACH;
+
+/// Steps at most, where there is next to no read noise.
+const MOST_STEPS: f64 = 4096.0;
+
+/// Evaluations beyond which nothing is said.
+const MOST: u64 = 30_000_000;
+
+impl Photosite {
+    /// What codes, and those of dark frames, share of patterns and offsets, where offsets of the two are the same but for their size, and
+    /// an end of the codes or the codes show (`is_fine`); none where slopes tell, or offsets differ. NaN where it takes too long.
+    pub(super) fn shared_over_offsets(
+        &self,
+        adc: &AdcRecord,
+        laws: [Law; 2],
+        dark: &Self,
+        is_fine: bool,
+    ) -> Option<Shared> {
+        let models = [&self.model, &dark.model];
+        let sigmas = models.map(|model| model.offsets());
+        let product = sigmas[0] * sigmas[1];
+        let is_one = (self.model.offsets_shared_with(&dark.model) - product).abs() <= 1e-9 * product;
+        let is_straight = !is_fine && adc.linearization.is_none() && laws.iter().all(|law| law.is_within(adc));
+        if !is_one || is_straight {
+            return None;
+        }
+        let seen = [0, 1].map(|k| {
+            let law = Law { read_noise_e: models[k].read_noise(), ..laws[k] };
+            Seen { law, reading: law.of_codes(adc, codes_of(adc)), median_of: None, is_fine }
+        });
+        thread_local! { static KNOWN: Memory<([Seen; 2], [f64; 2]), Shared> = const { Memory::new() }; }
+        Some(KNOWN.with(|known| known.recall((seen, sigmas), |(seen, sigmas)| over_offsets(seen, sigmas))))
+    }
+}
+
+/// What two laws share whose readings are off by σ z and σ' z, z normal.
+fn over_offsets(seen: &[Seen; 2], sigmas: &[f64; 2]) -> Shared {
+    let steepness = |k: usize| sigmas[k] / seen[k].law.read_noise_e.max(1e-9);
+    let steepest = steepness(0).max(steepness(1));
+    let step = ((1.0 + steepest * steepest).sqrt().recip() / 1.3).max(2.0 * REACH / MOST_STEPS);
+    let has_patterns = seen.iter().any(|seen| seen.law.light.pattern > 0.0 || seen.law.dark.pattern > 0.0);
+    let sums = effort::within(MOST, || {
+        let (mut means, mut products) = ([0.0; 2], [0.0; 3]);
+        let steps = (REACH / step).ceil();
+        let mut z = -steps * step;
+        while z <= (steps + 0.5) * step && !effort::is_spent() {
+            let weight = step * density(z);
+            let off = [0, 1].map(|k| Seen { reading: seen[k].reading.off_by(sigmas[k] * z), ..seen[k] });
+            let [light, dark] = off.map(|seen| seen.law.expect(&seen.reading)[0]);
+            means = [means[0] + weight * light, means[1] + weight * dark];
+            let within =
+                has_patterns.then(|| Shared::of(off[0], off[1])).map_or([0.0; 3], |s| [s.light, s.dark, s.both]);
+            for (sum, (product, within)) in
+                products.iter_mut().zip([light * light, dark * dark, light * dark].into_iter().zip(within))
+            {
+                *sum += weight * (product + within);
+            }
+            z += step;
+        }
+        (means, products)
+    });
+    let Some(([light, dark], products)) = sums else {
+        return Shared { light: f64::NAN, dark: f64::NAN, both: f64::NAN, median: None };
+    };
+    let both = products[2] - light * dark;
+    let variance = |square: f64, mean: f64| (square - mean * mean).max(0.0);
+    Shared { light: variance(products[0], light), dark: variance(products[1], dark), both, median: None }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metadata::PoissonKind;
+    use crate::numerics::normal::cumulative;
+    use crate::propagation::Equations;
+    use crate::propagation::budget::Cause;
+    use crate::stages::noise::{LineNoise, NoiseModel, Tails};
+
+    fn site(dsnu_e: f64, read_noise_e: f64, [bits, adu_per_e, bias_adu]: [f64; 3]) -> Photosite {
+        let model = NoiseModel {
+            dark_e: 0.0,
+            dcnu: 0.0,
+            prnu: 0.0,
+            read_noise_e,
+            full_well_e: 50_000.0,
+            dark_shot: true,
+            signal_shot: true,
+            poisson: PoissonKind::Exact,
+            lines: LineNoise { dsnu_e, ..LineNoise::default() },
+            tails: Tails::default(),
+        };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
+        let adc = AdcRecord::new(bits as u32, bias_adu, adu_per_e);
+        Photosite::of_electrons(model, Equations::Exact).digitized(adc)
+    }
+
+    /// Temporal and fixed variance of codes without light, by the probabilities of all codes at each of many offsets.
+    fn by_codes(dsnu_e: f64, read_noise_e: f64, [bits, adu_per_e, bias_adu]: [f64; 3]) -> [f64; 2] {
+        let top = bits.exp2() - 1.0;
+        let (step, mut z) = (2e-3, -8.0);
+        let [mut temporal, mut mean, mut square] = [0.0; 3];
+        while z < 8.0 {
+            let level = bias_adu + adu_per_e * dsnu_e * z;
+            let (mut first, mut second, mut code) = (0.0, 0.0, 1.0);
+            while code <= top && code < level + 12.0 * adu_per_e * read_noise_e + 2.0 {
+                let share = cumulative((level - code + 0.5) / (adu_per_e * read_noise_e));
+                first += share;
+                second += share * (2.0 * code - 1.0);
+                code += 1.0;
+            }
+            let weight = step * (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+            temporal += weight * (second - first * first);
+            mean += weight * first;
+            square += weight * first * first;
+            z += step;
+        }
+        [temporal, square - mean * mean]
+    }
+
+    /// Offsets that an end of the codes cuts off, and such as are read by coarse codes: exact after dark frames, and in the two parts.
+    #[test]
+    fn offsets_are_exact_beside_ends_and_over_coarse_codes() {
+        for (dsnu_e, read_noise_e, adc) in
+            [(100.0, 50.0, [12.0, 1.8, 205.0]), (80.0, 20.0, [8.0, 0.005, 10.3]), (80.0, 20.0, [8.0, 0.005, 10.5])]
+        {
+            let [temporal, fixed] = by_codes(dsnu_e, read_noise_e, adc);
+            let one = site(dsnu_e, read_noise_e, adc);
+            for frames in [0, 1, 4] {
+                let left = if frames == 0 { 1.0 } else { 0.0 };
+                let anew = if frames == 0 { 1.0 } else { 1.0 + 1.0 / f64::from(frames) };
+                let causes = one.less_dark_frames(frames).causes(0.0).unwrap();
+                let part = |is_fixed: bool| -> f64 {
+                    let of_part = Cause::ALL.iter().filter(|cause| cause.is_fixed_pattern() == is_fixed);
+                    of_part.map(|cause| causes[*cause as usize]).sum()
+                };
+                let all = temporal * anew + fixed * left;
+                assert!((part(false) - temporal * anew).abs() < 1e-4 * all, "{frames} {} {temporal}", part(false));
+                assert!((part(true) - fixed * left).abs() < 1e-4 * all, "{frames} {} {fixed}", part(true));
+            }
+        }
+    }
+}
