@@ -227,7 +227,9 @@ fn charges(law: &Law, adc: &AdcRecord) -> Predicted<Vec<f64>> {
     let mut found = if rate == 0.0 || adc.adu_per_e <= FEW {
         vec![mean]
     } else {
-        too_many((18.0 * rate.sqrt()) as usize)?;
+        if 18.0 * rate.sqrt() > MOST_STEPPED as f64 {
+            return Err(Unpredictable::Beyond(TOO_COARSE));
+        }
         let counts =
             super::counts::Charge { rate, pattern: 0.0, ..if law.light.rate > 0.0 { law.light } else { law.dark } };
         let counts = counts.counts(0.0).into_iter().filter(|count| count.weight > LEAST_WEIGHT);

@@ -201,13 +201,13 @@ impl Portrait {
         let is_inverse: Vec<bool> =
             (0..channels).map(|channel| is_inverse(&self.frame, self.frame.channel_name(channel))).collect();
         let mut lines = Vec::new();
-        for channel in 0..channels {
+        for (channel, is_inverse) in is_inverse.into_iter().enumerate() {
             for offset in 0..self.period[0] {
                 let of_site = |sites: &Vec<Option<usize>>| sites[y % self.period[1] * self.period[0] + offset];
                 let Some(group) = self.classes.as_ref().map_or(Some(channel), of_site) else { continue };
                 let mut samples: Vec<f32> =
                     line(channel).iter().skip(offset).step_by(self.period[0]).copied().collect();
-                if is_inverse[channel] {
+                if is_inverse {
                     samples.iter_mut().for_each(|kelvin| *kelvin = 1e6 / *kelvin);
                 }
                 self.is_whole &= samples.iter().all(|sample| !sample.is_finite() || sample.fract() == 0.0);
