@@ -179,7 +179,7 @@ fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     let density = if scale.unit.is_empty() { "density".to_owned() } else { format!("share per {}", scale.unit) };
     let x = Axis::linear(&scale.with_unit(words_of_reference(portrait)));
     let mut panel = Panel::new(x, Axis::linear(&density));
-    let (mut highest, mut laws) = (0.0_f64, Vec::new());
+    let (mut highest, mut heaped, mut laws) = (0.0_f64, 0.0_f64, Vec::new());
     let (mut beyond, mut all, mut farthest) = (0, 0, 0.0_f64);
     let mut piles = Vec::new();
     for (color, group) in scale.groups(portrait) {
@@ -198,7 +198,10 @@ fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
         for bin in *first..=*last {
             let (from, to) = (bins.begin(bin), bins.begin(bin + 1));
             let density = bins.counts.get(&bin).copied().unwrap_or(0) as f64 / total as f64 / bins.width;
-            highest = highest.max(if pile.is_some_and(|pile| pile.bin == bin) { 0.0 } else { density });
+            match pile {
+                Some(pile) if pile.bin == bin => heaped = heaped.max(density),
+                _ => highest = highest.max(density),
+            }
             steps.extend([[from - reference, density], [to - reference, density]]);
             if let Some(foreseen) = group.predicted.as_ref().filter(|_| pile.is_none()) {
                 let middle = 0.5 * (from + to) - reference;
@@ -221,6 +224,11 @@ fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     }
     for (index, (words, predicted)) in laws.into_iter().enumerate() {
         panel.add(if index == 0 { &words } else { "" }, Color::Black, Marks::Dashed(predicted));
+    }
+    // Heaps alone make the scale themselves.
+    if highest == 0.0 {
+        piles.clear();
+        highest = heaped;
     }
     if highest > 0.0 {
         panel.y = panel.y.range(0.0, HEADROOM * highest);
@@ -246,7 +254,7 @@ impl Pile {
         let (&first, &last) = (bins.counts.keys().next()?, bins.counts.keys().next_back()?);
         let count = |bin: i64| bins.counts.get(&bin).copied().unwrap_or(0);
         let others = |end: i64| bins.counts.iter().filter(|(bin, _)| **bin != end).map(|(_, count)| *count).max();
-        let is_high = |end: i64| others(end).is_some_and(|others| count(end) > HIGH * others);
+        let is_high = |end: i64| others(end).is_none_or(|others| count(end) > HIGH * others);
         let end = [last, first].into_iter().find(|end| is_high(*end))?;
         let share = count(end) as f64 / bins.total() as f64;
         Some(Self { bin: end, is_highest: end == last, share })
