@@ -4,6 +4,7 @@ use clap::Parser;
 use cyanometer::cli;
 use cyanometer::error::Result;
 use cyanometer::formats::makers::{self, Worker};
+use cyanometer::formats::output::SampleKind;
 use cyanometer::report::RawOutputs;
 use cyanometer::requests::RawFiles;
 use cyanometer::requests::batch::Job;
@@ -59,6 +60,9 @@ fn import(job: &Job, arguments: &Arguments, session: &cli::Session) -> Result<()
     let texts = RawOutputs::of(&reader, job)?;
     let mut stage = Import::new(reader.header())?;
     session.sign(stage.header_mut());
-    session.drive(reader, &stage, &Output { output: job.frame.clone(), ..arguments.output.clone() })?;
+    // Floats of other programs need not be whole.
+    let of_floats = reader.sample_type().filter(|stored| stored.is_float()).map(|_| SampleKind::F32);
+    let sample_type = arguments.output.sample_type.or(of_floats);
+    session.drive(reader, &stage, &Output { output: job.frame.clone(), sample_type, ..arguments.output.clone() })?;
     RawOutputs::write(&texts)
 }

@@ -122,6 +122,40 @@ class Correction(ProgramCase):
         self.close(found["Y"], wanted)
         self.assertFalse(found["mask"].any())
 
+    def test_sigma_behind_flats_of_another_exposure(self):
+        """Camera frames, of which a sensor file alone tells the noise: flats exposed for eight times as long have eight times the dark
+        signal, whose noise goes into every frame that they divide."""
+        dark_e_per_s, read_e, gain, bias = 1500.0, 4.0, 0.5, 200.0
+        shape, pattern = (240, 320), 1 + 0.2 * self.chance.normal(size=(240, 320))
+        sensor = ["schema: cyanometer-sensor/1", "name: own", "width: 320", "height: 240", "pixel_pitch_um: 5", "cfa: rggb"]
+        sensor += ["full_well_e: 100000", f"dark_current_e_per_s: {dark_e_per_s}", "temperature_k: 293", "dcnu: 0.2", "prnu: 0"]
+        sensor += [f"read_noise_e: {read_e}", "bits: 16", f"bias_adu: {bias}", f"adu_per_e: {gain}"]
+        (self.directory / "own.yaml").write_text("\n".join(sensor) + "\n")
+
+        def expose(name, light_e, exposure):
+            counts = self.chance.poisson(light_e + pattern * dark_e_per_s * exposure)
+            codes = (bias + gain * (counts + self.chance.normal(0, read_e, shape))).round().astype("<u2")
+            codes.tofile(self.directory / name)
+            settings = f"exposure: {{exposure_s: {exposure}, f_number: 8.0, lens_transmittance: 1.0}}"
+            lines = ["schema: cyanometer/1", "quantity: adu", "cfa: rggb", settings]
+            (self.directory / f"{name}.yaml").write_text("\n".join(lines) + "\n")
+
+        for name, light_e, exposure in (
+            ("light.raw", 20000, 1),
+            ("dark.raw", 0, 1),
+            ("flat.raw", 8000, 8),
+            ("flat-dark.raw", 0, 8),
+        ):
+            expose(name, light_e, exposure)
+        words = ["--raw", "320x240:u16le", "--sensor", "own.yaml", "--dark", "dark.raw", "--flat", "flat.raw", "--flat-dark", "flat-dark.raw"]
+        self.run_program(["correct-frame", "-q", "light.raw", *words, "-o", "corrected.exr"])
+        planes = self.frame(["demosaic", "-q", "corrected.exr", "--sigma"])
+        for name, site in (("R", np.s_[::2, ::2]), ("B", np.s_[1::2, 1::2])):
+            there = planes[name][site]
+            told = np.mean(planes[f"sigma.{name}"][site].astype(float) ** 2)
+            # Five standard deviations of a variance of so many samples; the level of a pixel tells its noise to first order.
+            self.assertAlmostEqual(there.var() / told, 1, delta=5 * math.sqrt(2 / there.size) + 0.01)
+
     def test_defects(self):
         light = self.codes("light.raw", 3000, 50)
         self.codes("dark.raw", 500, 0)

@@ -361,6 +361,23 @@ class Written(ProgramCase):
             if electrons <= 1000:
                 self.assertAlmostEqual(single / told, 1, delta=0.05)
 
+    def test_floats_between_codes_are_not_rounded(self):
+        """Floats that lie between codes stay what they are in TIFF by default, and are refused where they would be rounded."""
+        between = (self.frame("rggb") + np.float32(0.25)).astype("<f4")
+        rows, columns = between.shape
+        between.tofile(self.directory / "between.raw")
+        levels = ["--raw", f"{columns}x{rows}:f32le", "--cfa", "rggb", "--black", 1753, "--white", 4095, "--exposure", 0.033]
+        self.run_program(["mosaic", "-q", "between.raw", *levels, "-o", "between.exr"])
+        for name in ("between.tiff", "between.png"):
+            failed = self.attempt(["mosaic", "-q", "between.exr", "-o", name])
+            self.assertEqual(failed.returncode, 1)
+            self.assertIn("lies between codes, and 16-bit integers would round it", failed.stderr.decode())
+        self.run_program(["mosaic", "-q", "between.exr", "--sample-type", "f32", "-o", "between.dng"])
+        self.run_program(["import-raw", "-q", "between.dng", "-o", "imported.tiff"])
+        np.testing.assert_array_equal(self.tags("between.dng")[1], between)
+        imported = self.planes((self.directory / "imported.tiff").read_bytes(), ".tiff")
+        np.testing.assert_array_equal(next(iter(imported.values())), between)
+
     def test_floats(self):
         self.frame("rggb")
         self.run_program(["correct-frame", "codes.exr", "--black", "auto", "-o", "signed.exr"])

@@ -106,7 +106,8 @@ impl StackWriter {
         let mut metadata = header.metadata;
         // What is counted of a file's samples stands in its sidecar.
         let known = metadata.samples.take().unwrap_or_else(|| Counts::default().record(String::new()));
-        metadata.samples = Some(SamplesRecord { digest: digest.finish(), ..known });
+        let one_value = digest.is_of_one_value();
+        metadata.samples = Some(SamplesRecord { digest: digest.finish(), one_value, ..known });
         self.records.push(yaml::write_metadata(&metadata)?);
         self.frames += 1;
         if self.records.len() == RECORDS_PER_CHUNK { self.write_records() } else { Ok(()) }

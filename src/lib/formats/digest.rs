@@ -5,7 +5,12 @@ use crate::stages::saturation::MASK_LAYER;
 use sha2::{Digest, Sha256};
 
 /// Digest of samples as little-endian 32-bit floats.
-pub struct SamplesDigest(Kind);
+pub struct SamplesDigest {
+    kind: Kind,
+    /// The one value that all samples have so far; none of no samples, and of samples that differ.
+    value: Option<f32>,
+    differ: bool,
+}
 
 enum Kind {
     Blake3(Box<blake3::Hasher>),
@@ -15,16 +20,24 @@ enum Kind {
 impl SamplesDigest {
     /// The digest that sidecars are written with, BLAKE3, of no samples yet.
     pub fn new() -> Self {
-        Self(Kind::Blake3(Box::default()))
+        Self::of(Kind::Blake3(Box::default()))
+    }
+
+    fn of(kind: Kind) -> Self {
+        Self { kind, value: None, differ: false }
     }
 
     /// The digest, of no samples yet, to compare with `expected`: SHA-256 where it says so, as older sidecars do.
     pub fn like(expected: &str) -> Self {
-        if expected.starts_with("sha256:") { Self(Kind::Sha256(Box::default())) } else { Self::new() }
+        if expected.starts_with("sha256:") { Self::of(Kind::Sha256(Box::default())) } else { Self::new() }
     }
 
     /// Adds samples.
     pub fn update(&mut self, samples: &[f32]) {
+        if let (false, Some(first)) = (self.differ, samples.first()) {
+            let value = *self.value.get_or_insert(*first);
+            self.differ = samples.iter().any(|sample| sample.to_bits() != value.to_bits());
+        }
         if cfg!(target_endian = "little") {
             self.update_bytes(bytemuck::cast_slice(samples));
         } else {
@@ -44,7 +57,7 @@ impl SamplesDigest {
     }
 
     fn update_bytes(&mut self, bytes: &[u8]) {
-        match &mut self.0 {
+        match &mut self.kind {
             Kind::Blake3(digest) => {
                 digest.update(bytes);
             }
@@ -52,9 +65,14 @@ impl SamplesDigest {
         }
     }
 
+    /// Whether all samples have one value: such frames are alike though each was exposed by itself.
+    pub fn is_of_one_value(&self) -> bool {
+        !self.differ
+    }
+
     /// The digest of all samples: `blake3:` or `sha256:`, and hexadecimal digits.
     pub fn finish(self) -> String {
-        match self.0 {
+        match self.kind {
             Kind::Blake3(digest) => format!("blake3:{}", digest.finalize().to_hex()),
             Kind::Sha256(digest) => format!("sha256:{}", hex(&digest.finalize())),
         }

@@ -1,5 +1,7 @@
 //! Rows of planes as rows of pixels.
 
+use crate::numerics::vectors::{self, Kernel};
+
 /// Interleaves the channels of a row.
 pub(super) fn interleave<const BYTES: usize>(
     samples: &[f32],
@@ -63,6 +65,32 @@ pub(super) fn interleave_u16(
     unfit.into()
 }
 
+/// The first of some samples that is finite and no whole number.
+pub(super) fn between_codes(samples: &[f32]) -> Option<f32> {
+    vectors::run(AnyBetween(samples)).then(|| samples.iter().copied().find(|sample| is_between(*sample)))?
+}
+
+/// Whether a sample is finite and no whole number. No branches, and no function, so that the loop over samples becomes vectors.
+#[inline(always)]
+fn is_between(sample: f32) -> bool {
+    // Between 2²³ and 2²⁴ are whole numbers alone, as 1.5·2²³ and a size below 2²² is; larger samples are whole, or beyond all codes.
+    const SHIFT: f32 = 12_582_912.0;
+    const LARGEST: f32 = 4_194_304.0;
+    (sample.abs() < LARGEST) & (sample + SHIFT - SHIFT != sample)
+}
+
+/// Whether any of some samples is between whole numbers.
+struct AnyBetween<'a>(&'a [f32]);
+
+impl Kernel for AnyBetween<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        self.0.iter().fold(false, |any, sample| any | is_between(*sample))
+    }
+}
+
 /// The nearest integer of 16 bits, ties to even; of NaN 0.
 pub(super) fn nearest_u16(value: f32) -> u16 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it lies between the ends")]
@@ -84,6 +112,19 @@ fn rounded(value: f32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn samples_between_codes_are_found() {
+        let whole = [0.0, -0.0, 1.0, -7.0, 65_535.0, 4_194_303.0, 8e9, f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+        assert_eq!(between_codes(&whole.repeat(9)), None);
+        for between in [0.5, -0.5, 1e-30, 65_535.5, 2_097_151.5, -1.25] {
+            for place in [0, 7, 40, 89] {
+                let mut samples = whole.repeat(9);
+                samples[place] = between;
+                assert_eq!(between_codes(&samples), Some(between), "{place}");
+            }
+        }
+    }
 
     /// Ties to even, ends beyond the ends, 0 of NaN; the same and as many that do not fit of one channel as of three.
     #[test]

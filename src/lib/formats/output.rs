@@ -6,7 +6,7 @@ use super::dng::{self, DngWriter};
 use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMARIES};
 use super::format::U16_FULL_SCALE;
 use super::icc;
-use super::interleave::nearest_u16;
+use super::interleave::{between_codes, nearest_u16};
 use super::places::{STDOUT_NAME, named, sidecar_path};
 use super::png::{PngSettings, PngWriter};
 use super::register;
@@ -17,7 +17,7 @@ use super::viewable::{self, Scaling, check_lossless};
 use super::yaml;
 use crate::color::{self, D65_XY, SRGB_PRIMARIES};
 use crate::error::{Error, Result};
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, SamplesRecord};
 use crate::stream::{Counts, RowSink};
 use crate::text::visible;
 use crate::units::{QuantityKind, RELATIVE_UNIT};
@@ -174,7 +174,8 @@ impl FrameWriter {
         let sidecar = match self.record {
             Some((digest, mut sidecar)) => {
                 let mut metadata = self.header.metadata;
-                metadata.samples = Some(counts.record(digest.finish()));
+                let one_value = digest.is_of_one_value();
+                metadata.samples = Some(SamplesRecord { one_value, ..counts.record(digest.finish()) });
                 let text = yaml::write_metadata(&metadata)?;
                 let written = sidecar.write_all(text.as_bytes()).and_then(|()| sidecar.flush());
                 written.map_err(|e| Error::disk(sidecar.name(), "write", e))?;
@@ -280,6 +281,7 @@ impl RowSink for FrameWriter {
             }
         };
         self.check_f16(to_store)?;
+        self.check_whole(samples)?;
         self.update_digest(samples, to_store);
         self.encode(to_store)?;
         self.scaled = scaled;
@@ -319,6 +321,23 @@ impl FrameWriter {
             None => Ok(()),
             Some(sample) => Err(Error::Data(format!(
                 "{}: the sample {sample} would become infinite as f16, which ends at 65504; write f32",
+                self.name
+            ))),
+        }
+    }
+
+    /// Refuses codes that 16-bit integers would round, as those of floats that another program scaled; what is beyond their ends is
+    /// counted, and told at the end.
+    fn check_whole(&self, samples: &[f32]) -> Result<()> {
+        let advice = match self.encoding {
+            Encoding::Tiff(TiffSamples::U16, _) => "write 32-bit floats (f32)",
+            Encoding::Png => "write an EXR or a TIFF of 32-bit floats (f32)",
+            _ => return Ok(()),
+        };
+        match between_codes(samples).filter(|_| self.header.metadata.quantity == QuantityKind::Adu) {
+            None => Ok(()),
+            Some(sample) => Err(Error::Data(format!(
+                "{}: the sample {sample} lies between codes, and 16-bit integers would round it; {advice}",
                 self.name
             ))),
         }

@@ -158,9 +158,10 @@ impl OutputOptions {
         if format != Format::Exr && self.separates_layers {
             return Err(Error::Usage("an EXR alone has layers; write one, or leave --separate-layers out".into()));
         }
-        // An average of codes lies between them.
-        let Metadata { demosaic, correction, average, .. } = &header.metadata;
-        let changed = demosaic.is_some() || correction.is_some() || average.is_some();
+        // An average of codes lies between them, as do codes that were made straight.
+        let Metadata { demosaic, correction, average, adc, .. } = &header.metadata;
+        let is_straight = adc.is_some_and(|adc| adc.is_linearized);
+        let changed = demosaic.is_some() || correction.is_some() || average.is_some() || is_straight;
         let fits_u16 = quantity == QuantityKind::Adu && !changed || quantity == QuantityKind::Srgb;
         let compression = self.compression.unwrap_or(CompressionKind::None);
         match format {

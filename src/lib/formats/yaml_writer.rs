@@ -1,12 +1,12 @@
-//! Writes YAML that our own reader takes, whatever strings it holds.
+//! Writes YAML that our own reader takes, whatever strings it holds, and whose numbers are numbers to readers of YAML 1.1 too.
 
 use super::yaml_guard::{checked_text, may_count, may_indent};
 use crate::error::{Error, Result};
 use serde::Serialize;
 use serde_yaml::value::TaggedValue;
-use serde_yaml::{Mapping, Value};
+use serde_yaml::{Mapping, Number, Value};
 
-/// What stands in for a string until the text around it is written; a string that holds it has a stand-in too.
+/// What stands in for a string or number until the text around it is written; a string that holds it has a stand-in too.
 const STAND_IN: &str = "QuotedStringNo";
 /// Digits of a stand-in's number.
 const DIGITS: usize = 8;
@@ -95,23 +95,32 @@ fn has_escaped(value: &Value, escaped: &dyn Fn(char) -> bool) -> bool {
             mapping.iter().any(|(key, value)| has_escaped(key, escaped) || has_escaped(value, escaped))
         }
         Value::Tagged(tagged) => has_escaped(&tagged.value, escaped),
-        Value::Null | Value::Bool(_) | Value::Number(_) => false,
+        Value::Number(number) => with_point_and_sign(number).is_some(),
+        Value::Null | Value::Bool(_) => false,
     }
 }
 
-/// A value whose strings with something to be `escaped` are stood in for by numbers in `quoted`.
+/// A number with an exponent as readers of YAML 1.1 know it; none for one that is written so anyway. To them `1e-6`, which has no
+/// point, and `1.5e300`, whose exponent has no sign, are text \[YAML 1.1, type float\].
+fn with_point_and_sign(number: &Number) -> Option<String> {
+    let text = number.to_string();
+    let (mantissa, exponent) = text.split_once('e')?;
+    let point = if mantissa.contains('.') { "" } else { ".0" };
+    let sign = if exponent.starts_with(['-', '+']) { "" } else { "+" };
+    (!point.is_empty() || !sign.is_empty()).then(|| format!("{mantissa}{point}e{sign}{exponent}"))
+}
+
+/// A value whose strings with something to be `escaped`, and numbers of another form, are stood in for by places in `quoted`.
 fn stood_in(value: &Value, escaped: &dyn Fn(char) -> bool, quoted: &mut Vec<String>) -> Value {
+    let mut stand_in = |whole: String| {
+        let start = format!("{STAND_IN}{:0DIGITS$}", quoted.len());
+        let padding = whole.len().saturating_sub(start.len());
+        quoted.push(whole);
+        Value::String(start + &PADDING.to_string().repeat(padding))
+    };
     match value {
-        Value::String(string) => {
-            if !is_escaped(string, escaped) {
-                return value.clone();
-            }
-            let whole = in_quotes(string, escaped);
-            let start = format!("{STAND_IN}{:0DIGITS$}", quoted.len());
-            let padding = whole.len().saturating_sub(start.len());
-            quoted.push(whole);
-            Value::String(start + &PADDING.to_string().repeat(padding))
-        }
+        Value::String(string) if is_escaped(string, escaped) => stand_in(in_quotes(string, escaped)),
+        Value::Number(number) => with_point_and_sign(number).map_or_else(|| value.clone(), stand_in),
         Value::Sequence(items) => items.iter().map(|item| stood_in(item, escaped, quoted)).collect::<Vec<_>>().into(),
         Value::Mapping(mapping) => {
             let pairs =
@@ -122,7 +131,7 @@ fn stood_in(value: &Value, escaped: &dyn Fn(char) -> bool, quoted: &mut Vec<Stri
             let value = stood_in(&tagged.value, escaped, quoted);
             Value::Tagged(Box::new(TaggedValue { tag: tagged.tag.clone(), value }))
         }
-        Value::Null | Value::Bool(_) | Value::Number(_) => value.clone(),
+        Value::String(_) | Value::Null | Value::Bool(_) => value.clone(),
     }
 }
 
@@ -211,6 +220,27 @@ mod tests {
     fn plain_strings_stay_plain() {
         let text = write("it", &["L*a*b* [cd/m2]", "--seed", "a!"]).unwrap();
         assert_eq!(text, "- L*a*b* [cd/m2]\n- --seed\n- a!\n");
+    }
+
+    /// The pattern is that of floats in YAML 1.1, decimal, <https://yaml.org/type/float.html>, with the point that it needs.
+    #[test]
+    fn numbers_are_numbers_to_readers_of_yaml_1_1() {
+        let is_float = |text: &str| {
+            let text = text.strip_prefix('-').unwrap_or(text);
+            let (mantissa, exponent) = text.split_once('e').map_or((text, None), |(m, e)| (m, Some(e)));
+            let are_digits = |digits: &str| digits.bytes().all(|digit| digit.is_ascii_digit());
+            let (whole, fraction) = mantissa.split_once('.').unwrap_or_default();
+            let is_signed = |e: &str| e.strip_prefix(['-', '+']).is_some_and(|e| !e.is_empty() && are_digits(e));
+            !whole.is_empty() && are_digits(whole) && are_digits(fraction) && exponent.is_none_or(is_signed)
+        };
+        let numbers = [1e-6, -1e-6, 1.5e-7, 1e20, -2.5e300, 5e-324, f64::MAX, 0.1, 3.0, -0.0];
+        let text = write("it", &numbers).unwrap();
+        assert!(text.starts_with("- 1.0e-6\n- -1.0e-6\n- 1.5e-7\n"), "{text}");
+        assert!(text.lines().all(|line| is_float(&line[2..])), "{text}");
+        assert_eq!(serde_yaml::from_str::<Vec<f64>>(&text).unwrap(), numbers);
+        // Text stays text, and what is no finite number what it was.
+        assert_eq!(write("it", &["1e-6", "1.5e300"]).unwrap(), "- '1e-6'\n- '1.5e300'\n");
+        assert_eq!(write("it", &[f64::INFINITY]).unwrap(), "- .inf\n");
     }
 
     #[test]

@@ -278,6 +278,12 @@ pub struct FlatRecord {
     pub photosites: Vec<u64>,
     /// Whether the metadata of all its frames say that they were lit evenly.
     pub even: bool,
+    /// Exposure of the frames in s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_s: Option<f64>,
+    /// Temperature of the sensor in K.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_k: Option<f64>,
     /// The noise that was drawn in them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<MasterNoise>,

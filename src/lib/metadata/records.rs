@@ -438,6 +438,9 @@ pub struct SamplesRecord {
     /// `blake3:`, or `sha256:` in older sidecars, and the digest of all samples as little-endian 32-bit floats, rows top
     /// to bottom, in each row channel by channel.
     pub digest: String,
+    /// Whether all samples have one value. Exposures whose samples do are alike without being copies.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub one_value: bool,
     /// Photosites whose charge was clipped at full well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub full_well: Option<u64>,

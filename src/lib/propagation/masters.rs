@@ -74,7 +74,13 @@ impl Dark {
     fn of(frame: &FrameHeader, record: &MasterRecord, of_sensor: Option<NoiseModel>) -> Option<Self> {
         let model = match &record.noise {
             Some(noise) => NoiseModel::of(frame, &noise.record()).ok()?,
-            None => dark_model(frame, record, of_sensor?)?,
+            None => {
+                let exposure_s = match record.kind {
+                    MasterKind::Bias => record.exposure_s.or(Some(0.0)),
+                    MasterKind::Dark => record.exposure_s.or_else(|| frame.metadata.time_s()),
+                };
+                model_at(frame, exposure_s?, record.temperature_k, of_sensor?)?
+            }
         };
         let AverageRecord { frames, combine, clip } = record.average;
         let is_bias = record.kind == MasterKind::Bias;
@@ -140,15 +146,15 @@ impl Dark {
     }
 }
 
-/// The noise of frames that is that of the sensor, of which bias frames of unknown exposure have no dark signal.
-fn dark_model(frame: &FrameHeader, record: &MasterRecord, of_sensor: NoiseModel) -> Option<NoiseModel> {
+/// The noise of frames that is that of the sensor, of another exposure, and temperature where it is known.
+fn model_at(
+    frame: &FrameHeader,
+    exposure_s: f64,
+    temperature_k: Option<f64>,
+    of_sensor: NoiseModel,
+) -> Option<NoiseModel> {
     let readout = frame.readout().ok()?;
-    let of_frame = || frame.metadata.time_s();
-    let exposure_s = match record.kind {
-        MasterKind::Bias => record.exposure_s.or(Some(0.0)),
-        MasterKind::Dark => record.exposure_s.or_else(of_frame),
-    };
-    let (temperature_k, exposure_s) = (record.temperature_k.unwrap_or(readout.temperature_k), exposure_s?);
+    let temperature_k = temperature_k.unwrap_or(readout.temperature_k);
     let hot_e = readout.hot_pixel_e_per_s(temperature_k) * exposure_s;
     let tails = Tails { hot_e, ..of_sensor.tails };
     Some(NoiseModel { dark_e: readout.dark_current_e_per_s(temperature_k) * exposure_s, tails, ..of_sensor })
@@ -221,7 +227,10 @@ impl Flat {
         let AverageRecord { frames, combine, clip } = record.average;
         let model = match &record.noise {
             Some(noise) => NoiseModel::of(frame, &noise.record()).ok()?,
-            None => of_sensor?,
+            None => match record.exposure_s.or_else(|| frame.metadata.time_s()) {
+                Some(exposure_s) => model_at(frame, exposure_s, record.temperature_k, of_sensor?)?,
+                None => of_sensor?,
+            },
         };
         let three = |values: &[f64]| match values {
             [one] => Some([*one; 3]),

@@ -9,6 +9,7 @@
 use super::effort;
 use super::law::Law;
 use super::memory::Memory;
+use super::moments::Prediction;
 use super::pattern::{Seen, Shared};
 use super::photosite::Photosite;
 use super::reading::codes_of;
@@ -23,13 +24,14 @@ const MOST_STEPS: f64 = 4096.0;
 const MOST: u64 = 30_000_000;
 
 impl Photosite {
-    /// What codes, and those of dark frames, share of patterns and offsets, where offsets of the two are the same but for their size, and
-    /// an end of the codes or the codes show (`is_fine`); none where slopes tell, or offsets differ. NaN where it takes too long.
+    /// What codes, and those of dark frames, or `medians` of so many of them, share of patterns and offsets, where offsets of the two are
+    /// the same but for their size, and an end of the codes or the codes show (`is_fine`); none where slopes tell, or offsets differ. NaN
+    /// where it takes too long.
     pub(super) fn shared_over_offsets(
         &self,
         adc: &AdcRecord,
         laws: [Law; 2],
-        dark: &Self,
+        (dark, medians): (&Self, [Option<u32>; 2]),
         is_fine: bool,
     ) -> Option<Shared> {
         let models = [&self.model, &dark.model];
@@ -42,7 +44,7 @@ impl Photosite {
         }
         let seen = [0, 1].map(|k| {
             let law = Law { read_noise_e: models[k].read_noise(), ..laws[k] };
-            Seen { law, reading: law.of_codes(adc, codes_of(adc)), median_of: None, is_fine }
+            Seen { law, reading: law.of_codes(adc, codes_of(adc)), median_of: medians[k], is_fine }
         });
         thread_local! { static KNOWN: Memory<([Seen; 2], [f64; 2]), Shared> = const { Memory::new() }; }
         Some(KNOWN.with(|known| known.recall((seen, sigmas), |(seen, sigmas)| over_offsets(seen, sigmas))))
@@ -51,19 +53,29 @@ impl Photosite {
 
 /// What two laws share whose readings are off by σ z and σ' z, z normal.
 fn over_offsets(seen: &[Seen; 2], sigmas: &[f64; 2]) -> Shared {
-    let steepness = |k: usize| sigmas[k] / seen[k].law.read_noise_e.max(1e-9);
+    // Medians scatter less.
+    let narrowing = |k: usize| seen[k].median_of.map_or(1.0, |count| f64::from(count).sqrt());
+    let steepness = |k: usize| sigmas[k] * narrowing(k) / seen[k].law.read_noise_e.max(1e-9);
     let steepest = steepness(0).max(steepness(1));
     let step = ((1.0 + steepest * steepest).sqrt().recip() / 1.3).max(2.0 * REACH / MOST_STEPS);
     let has_patterns = seen.iter().any(|seen| seen.law.light.pattern > 0.0 || seen.law.dark.pattern > 0.0);
     let sums = effort::within(MOST, || {
-        let (mut means, mut products) = ([0.0; 2], [0.0; 3]);
+        let (mut means, mut products, mut moments) = ([0.0; 2], [0.0; 3], [0.0; 4]);
         let steps = (REACH / step).ceil();
         let mut z = -steps * step;
         while z <= (steps + 0.5) * step && !effort::is_spent() {
             let weight = step * density(z);
             let off = [0, 1].map(|k| Seen { reading: seen[k].reading.off_by(sigmas[k] * z), ..seen[k] });
-            let [light, dark] = off.map(|seen| seen.law.expect(&seen.reading)[0]);
+            let medians = off.map(|seen| seen.median_of.and_then(|_| Shared::of(seen, seen).median));
+            let mean = |k: usize| match &medians[k] {
+                Some(median) => median.moments.mean - seen[k].reading.center,
+                None => off[k].law.expect(&off[k].reading)[0],
+            };
+            let [light, dark] = [mean(0), mean(1)];
             means = [means[0] + weight * light, means[1] + weight * dark];
+            if let Some(median) = &medians[1] {
+                moments.iter_mut().zip(about(dark, median)).for_each(|(sum, moment)| *sum += weight * moment);
+            }
             let within =
                 has_patterns.then(|| Shared::of(off[0], off[1])).map_or([0.0; 3], |s| [s.light, s.dark, s.both]);
             for (sum, (product, within)) in
@@ -73,23 +85,38 @@ fn over_offsets(seen: &[Seen; 2], sigmas: &[f64; 2]) -> Shared {
             }
             z += step;
         }
-        (means, products)
+        (means, products, moments)
     });
-    let Some(([light, dark], products)) = sums else {
+    let Some(([light, dark], products, moments)) = sums else {
         return Shared { light: f64::NAN, dark: f64::NAN, both: f64::NAN, median: None };
     };
     let both = products[2] - light * dark;
     let variance = |square: f64, mean: f64| (square - mean * mean).max(0.0);
-    Shared { light: variance(products[0], light), dark: variance(products[1], dark), both, median: None }
+    let median = seen[1].median_of.map(|_| Prediction::about(seen[1].reading.center, &moments));
+    Shared { light: variance(products[0], light), dark: variance(products[1], dark), both, median }
+}
+
+/// Moments 1 to 4 of a law whose mean is `mean`.
+fn about(mean: f64, law: &Prediction) -> [f64; 4] {
+    let (variance, third) = (law.moments.variance, law.third);
+    let square = mean * mean;
+    [
+        mean,
+        square + variance,
+        mean * (square + 3.0 * variance) + third,
+        square * (square + 6.0 * variance) + 4.0 * mean * third + 3.0 * variance * variance + law.fourth(),
+    ]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::metadata::PoissonKind;
+    use crate::numerics::averages::Combine;
     use crate::numerics::normal::cumulative;
     use crate::propagation::Equations;
     use crate::propagation::budget::Cause;
+    use crate::propagation::masters::Dark;
     use crate::stages::noise::{LineNoise, NoiseModel, Tails};
 
     fn site(dsnu_e: f64, read_noise_e: f64, [bits, adu_per_e, bias_adu]: [f64; 3]) -> Photosite {
@@ -153,6 +180,47 @@ mod tests {
                 assert!((part(false) - temporal * anew).abs() < 1e-4 * all, "{frames} {} {temporal}", part(false));
                 assert!((part(true) - fixed * left).abs() < 1e-4 * all, "{frames} {} {fixed}", part(true));
             }
+        }
+    }
+
+    /// Mean and variance of a code less the median of five others, at photosites of all offsets, by the probabilities of all codes: the
+    /// third of five in rising order reaches a code where three or more do.
+    fn less_median_of_five(dsnu_e: f64, read_noise_e: f64, [bits, adu_per_e, bias_adu]: [f64; 3]) -> [f64; 2] {
+        let top = bits.exp2() - 1.0;
+        let (step, mut z) = (2e-3, -8.0);
+        let [mut temporal, mut mean, mut square] = [0.0; 3];
+        while z < 8.0 {
+            let level = bias_adu + adu_per_e * dsnu_e * z;
+            let (mut one, mut middle, mut code) = ([0.0; 2], [0.0; 2], 1.0);
+            while code <= top && code < level + 12.0 * adu_per_e * read_noise_e + 2.0 {
+                let p = cumulative((level - code + 0.5) / (adu_per_e * read_noise_e));
+                let of_median = p.powi(3) * (10.0 - 15.0 * p + 6.0 * p * p);
+                let both = [&mut one, &mut middle].into_iter().zip([p, of_median]);
+                both.for_each(|(sum, p)| *sum = [sum[0] + p, sum[1] + p * (2.0 * code - 1.0)]);
+                code += 1.0;
+            }
+            let weight = step * (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+            temporal += weight * (one[1] - one[0] * one[0] + middle[1] - middle[0] * middle[0]);
+            mean += weight * (one[0] - middle[0]);
+            square += weight * (one[0] - middle[0]).powi(2);
+            z += step;
+        }
+        [mean, temporal + square - mean * mean]
+    }
+
+    #[test]
+    fn medians_of_dark_frames_are_exact_beside_offsets() {
+        for (dsnu_e, read_noise_e, adc) in
+            [(8.0, 3.0, [12.0, 0.12, 100.0]), (5.0, 2.0, [12.0, 0.12, 100.4]), (100.0, 50.0, [8.0, 0.009, 0.3])]
+        {
+            let one = site(dsnu_e, read_noise_e, adc);
+            let record = Dark { combine: Combine::Median, ..Dark::mean_of(one.model, 5) };
+            let after = Photosite { darks: [Some(record), None, None], ..one };
+            let adc_record = one.adc.unwrap();
+            let [mean, variance] = less_median_of_five(dsnu_e, read_noise_e, adc);
+            let found = after.less_dark(&adc_record, 0.0, true).moments;
+            assert!((found.mean - mean).abs() < 1e-6, "{} {mean}", found.mean);
+            assert!((found.variance / variance - 1.0).abs() < 1e-5, "{} {variance}", found.variance);
         }
     }
 }

@@ -377,7 +377,7 @@ impl<'a> Temporal<'a> {
                     _ => beyond(code),
                 };
                 let expected_e = (x * self.law.light.rate + y * self.law.dark.rate).min(self.law.full_well_e);
-                let near = ends.code(adc.level_at(expected_e));
+                let near = ends.code(adc.level_at(expected_e + self.reading.offset_e));
                 median(count, near, at_least, |code| adc.sample(code) - self.reading.center)
             }
             _ => {
@@ -394,16 +394,22 @@ impl<'a> Temporal<'a> {
         }
     }
 
-    /// The probability that charge and read noise are no less than a level.
+    /// The probability that a reading, jumps and all, is no less than a level.
     fn reaches(&self, level_e: f64, [x, y]: [f64; 2], is_affordable: bool) -> f64 {
-        if !is_affordable {
-            return self.charge(x, y).plus(NearlyNormal::normal(0.0, self.law.read_noise_e.powi(2))).exceeds(level_e);
-        }
-        // Ties go upward.
-        let reading = Reading::beyond(self.law.read_noise_e, level_e - 1e-12 * level_e.abs().max(1.0));
-        let full = self.law.full_well_e;
-        let at_full = if full.is_finite() { reading.at(full, 0.0)[0] } else { 1.0 };
-        self.sum(&reading, at_full, x, y)
+        let noise_e = self.law.read_noise_e;
+        let reaches = |jump: &Jump| {
+            let offset_e = jump.reading.offset_e;
+            if !is_affordable {
+                let read = self.charge(x, y).plus(NearlyNormal::normal(0.0, noise_e.powi(2)));
+                return jump.share * read.exceeds(level_e - offset_e);
+            }
+            // Ties go upward.
+            let reading = Reading::beyond(noise_e, level_e - 1e-12 * level_e.abs().max(1.0)).off_by(offset_e);
+            let full = self.law.full_well_e;
+            let at_full = if full.is_finite() { reading.at(full, 0.0)[0] } else { 1.0 };
+            jump.share * self.sum(&reading, at_full, x, y)
+        };
+        self.jumps.iter().map(reaches).sum()
     }
 
     fn sum(&self, reading: &Reading, at_full: f64, x: f64, y: f64) -> f64 {

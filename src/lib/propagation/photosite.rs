@@ -170,7 +170,8 @@ impl Photosite {
     /// and everything else is drawn anew. Where nothing is clipped it is that of light, and of the dose of dark current
     /// that is left.
     ///
-    /// How codes are rounded counts where `shows_codes`; a level that is not known to a fraction of a code does not tell it.
+    /// How codes are rounded counts where `shows_codes`; a level that is not known to a fraction of a code does not tell it. That of dark
+    /// frames is known.
     pub(super) fn less_dark(&self, adc: &AdcRecord, expected_e: f64, shows_codes: bool) -> Prediction {
         let light = self.adu(adc, expected_e);
         let darks: Vec<(&Dark, Self)> = self.darks.iter().flatten().map(|dark| (dark, self.of_dark(dark))).collect();
@@ -179,11 +180,16 @@ impl Photosite {
         let mut apart = variance;
         for (index, (dark, site)) in darks.iter().enumerate() {
             let code = site.adu(adc, 0.0);
-            let median_of = site.visible_median(dark, adc).filter(|_| shows_codes);
+            let median_of = site.visible_median(dark, adc);
             let is_fine = shows_codes && self.rounds_as(adc, expected_e, dark, site);
-            let shared = self.shared(adc, (expected_e, None), (site, median_of), is_fine);
+            let shared = self.shared(adc, (expected_e, None), (site, median_of.filter(|_| shows_codes)), is_fine);
             let weight = dark.weight;
-            let average = shared.median.unwrap_or_else(|| dark.averaged(&code, shared.dark, site.temporal_third(adc)));
+            let own = if shows_codes {
+                shared
+            } else {
+                site.shared(adc, (0.0, None), (site, median_of), site.rounds_as(adc, 0.0, dark, site))
+            };
+            let average = own.median.unwrap_or_else(|| dark.averaged(&code, own.dark, site.temporal_third(adc)));
             mean -= weight * average.moments.mean;
             third -= weight.powi(3) * average.third;
             fourth += weight.powi(4) * average.fourth();
@@ -256,8 +262,8 @@ impl Photosite {
         if self.model.offsets() == 0.0 && dark.model.offsets() == 0.0 {
             return shared;
         }
-        let no_median = median_of.or(dark_median_of).is_none();
-        if let Some(exact) = no_median.then(|| self.shared_over_offsets(adc, [law, of_dark], dark, is_fine)).flatten() {
+        let medians = [median_of, dark_median_of];
+        if let Some(exact) = self.shared_over_offsets(adc, [law, of_dark], (dark, medians), is_fine) {
             return exact;
         }
         self.with_offsets(shared, dark, [law.mean_slope(adc), of_dark.mean_slope(adc)])

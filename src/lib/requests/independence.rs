@@ -183,7 +183,7 @@ impl Company {
 }
 
 /// Makes sure that none of some files has the very samples of another: noise is never drawn twice the same. Files whose samples are
-/// all of one level, and those whose metadata tell that they have no noise, are alone in being alike.
+/// all of one level, and those whose metadata tell that they have no noise, or each its own, are alone in being alike.
 ///
 /// # Errors
 ///
@@ -195,7 +195,7 @@ pub fn check_contents(light: &InputOptions, others: &[(Role, InputOptions)]) -> 
     }
     for (role, other) in others.iter().filter(|(_, other)| is_file(other)) {
         let [mut a, mut b] = [FrameReader::open(light)?, FrameReader::open(other)?];
-        if a.header().is_noisy() && b.header().is_noisy() && hold_the_same(&mut a, &mut b)? {
+        if may_be_copies(a.header(), b.header()) && hold_the_same(&mut a, &mut b)? {
             return Err(b.header().refuse(format!(
                 "its samples are those of {}, every one; a copy of the frame is not {}",
                 a.header().name,
@@ -234,10 +234,20 @@ fn hold_the_same(a: &mut FrameReader, b: &mut FrameReader) -> Result<bool> {
 /// Exposures that differ by no more than this are the same, written with other digits.
 const SAME_EXPOSURE: f64 = 1e-6;
 
-/// Whether two frames have the same noisy samples, as their sidecars tell.
+/// Whether two frames have the same noisy samples, as their sidecars tell, and are not alike by chance: samples of one value, or
+/// coarse codes of few photosites, of exposures that were each drawn by itself.
 pub(super) fn are_copies(a: &FrameHeader, b: &FrameHeader) -> bool {
-    let digest = |frame: &FrameHeader| frame.metadata.samples.as_ref().map(|samples| samples.digest.clone());
-    digest(a).is_some() && digest(a) == digest(b) && a.is_noisy() && b.is_noisy()
+    let digest = |frame: &'_ FrameHeader| {
+        let samples = frame.metadata.samples.as_ref().filter(|samples| !samples.one_value)?;
+        Some(samples.digest.clone())
+    };
+    digest(a).is_some() && digest(a) == digest(b) && may_be_copies(a, b)
+}
+
+/// Whether frames with the same samples may be copies: not where noise is in neither, or was drawn for each by itself.
+fn may_be_copies(a: &FrameHeader, b: &FrameHeader) -> bool {
+    let are_drawn_apart = a.metadata.noise.is_some() && b.metadata.noise.is_some() && shared_noise(a, b).is_none();
+    a.is_noisy() && b.is_noisy() && !are_drawn_apart
 }
 
 /// Seed and number of an exposure whose noise is in both of two frames, or of which both are averages.
@@ -311,10 +321,23 @@ mod tests {
         };
         let copies =
             |sources: &[Source]| [0, 1].map(|number| (Role::Flat, with_digest(&number.to_string(), sources, number)));
-        let error = checked(&copies(&[Source::Ron])).unwrap_err().to_string();
+        // Those of cameras, whose noise nobody drew.
+        let of_camera = || {
+            copies(&[Source::Ron]).map(|(role, mut frame)| {
+                (frame.metadata.noise, frame.metadata.scene) = (None, None);
+                (role, frame)
+            })
+        };
+        let error = checked(&of_camera()).unwrap_err().to_string();
         assert!(error.starts_with("1: its samples are those of 0, by the digests of both"), "{error}");
-        // Exposures without noise are alike.
+        // Exposures without noise are alike; so are, by chance, those of coarse codes that were each drawn, and those of one value.
         assert!(checked(&copies(&[])).unwrap().is_empty());
+        assert!(checked(&copies(&[Source::Ron])).unwrap().is_empty());
+        let dull = of_camera().map(|(role, mut frame)| {
+            frame.metadata.samples.as_mut().unwrap().one_value = true;
+            (role, frame)
+        });
+        assert!(checked(&dull).unwrap().is_empty());
     }
 
     #[test]

@@ -235,6 +235,8 @@ impl<S: RowSource> FlatFrames<S> {
             means_adu: means.means.clone(),
             photosites: means.photosites.clone(),
             even: self.is_even,
+            exposure_s: metadata.time_s(),
+            temperature_k: metadata.temperature_k(),
             // Where charge has spilled over, what was drawn is not the noise that it tells.
             noise: metadata.noise.as_ref().filter(|_| metadata.bloomed_photosites <= Some(0)).map(MasterNoise::of),
             black_adu,

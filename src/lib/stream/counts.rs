@@ -68,6 +68,7 @@ impl Counts {
         let some = |count: u64| (count > 0).then_some(count);
         SamplesRecord {
             digest,
+            one_value: false,
             full_well: some(self.full_well),
             clipped_low: some(self.clipped_low),
             clipped_high: some(self.clipped_high),

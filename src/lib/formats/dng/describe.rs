@@ -61,6 +61,17 @@ pub(super) fn describe(
     Ok(metadata)
 }
 
+/// A doubt of the black level of an image without one, which then is 0 \[DNG2023, BlackLevel], where its masked photosites may read
+/// something else.
+pub(super) fn doubt_of_black(image: &RawImage, active: Rectangle) -> Option<&'static str> {
+    let directory = image.directory();
+    let is_masked = tags::MASKED_AREAS.is_in(directory) || active != Rectangle::whole(image.size);
+    (is_masked && !tags::BLACK_LEVEL.is_in(directory)).then_some(
+        "it has masked photosites and no BlackLevel, which by DNG is then 0; look at what they read, `import-raw --crop full` and \
+         `correct-frame --black border`, or give --black",
+    )
+}
+
 /// The notes on the part of the image that is read.
 ///
 /// # Errors

@@ -11,6 +11,7 @@ use super::tags;
 use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
 use crate::formats::format::{FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign};
+use crate::formats::register;
 use crate::formats::tiff::TiffFile;
 use crate::frame::Geometry;
 use crate::metadata::METADATA_BEGIN;
@@ -96,6 +97,9 @@ impl DngReader {
         describe::note_area(&mut file, &image, active, area, &mut notes)?;
         let is_ours = description.as_deref().is_some_and(|text| text.starts_with(METADATA_BEGIN));
         let mut own_tags = describe::describe(&mut file, &image, on_sensor, &levels, is_ours, &mut notes)?;
+        if let Some(doubt) = describe::doubt_of_black(&image, active).filter(|_| !is_ours) {
+            register::doubt(format!("{name}: {doubt}"));
+        }
         if part == RawArea::Full {
             own_tags.masked_areas = area::masked(&mut file, &image, active, place)?;
         }
