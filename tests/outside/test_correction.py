@@ -127,9 +127,9 @@ class Correction(ProgramCase):
         signal, whose noise goes into every frame that they divide."""
         dark_e_per_s, read_e, gain, bias = 1500.0, 4.0, 0.5, 200.0
         shape, pattern = (240, 320), 1 + 0.2 * self.chance.normal(size=(240, 320))
-        sensor = ["schema: cyanometer-sensor/1", "name: own", "width: 320", "height: 240", "pixel_pitch_um: 5", "cfa: rggb"]
-        sensor += ["full_well_e: 100000", f"dark_current_e_per_s: {dark_e_per_s}", "temperature_k: 293", "dcnu: 0.2", "prnu: 0"]
-        sensor += [f"read_noise_e: {read_e}", "bits: 16", f"bias_adu: {bias}", f"adu_per_e: {gain}"]
+        sensor = ["schema: cyanometer-sensor/2", "name: own", "readout:", "  width: 320", "  height: 240", "  pixel_pitch_um: 5"]
+        sensor += ["  cfa: rggb", "  full_well_e: 100000", f"  dark_current_e_per_s: {dark_e_per_s}", "  temperature_k: 293"]
+        sensor += ["  dcnu: 0.2", "  prnu: 0", f"  read_noise_e: {read_e}", "  bits: 16", f"  bias_adu: {bias}", f"  adu_per_e: {gain}"]
         (self.directory / "own.yaml").write_text("\n".join(sensor) + "\n")
 
         def expose(name, light_e, exposure):

@@ -363,20 +363,22 @@ class Written(ProgramCase):
 
     def test_floats_between_codes_are_not_rounded(self):
         """Floats that lie between codes stay what they are in TIFF by default, and are refused where they would be rounded."""
-        between = (self.frame("rggb") + np.float32(0.25)).astype("<f4")
-        rows, columns = between.shape
-        between.tofile(self.directory / "between.raw")
-        levels = ["--raw", f"{columns}x{rows}:f32le", "--cfa", "rggb", "--black", 1753, "--white", 4095, "--exposure", 0.033]
-        self.run_program(["mosaic", "-q", "between.raw", *levels, "-o", "between.exr"])
-        for name in ("between.tiff", "between.png"):
-            failed = self.attempt(["mosaic", "-q", "between.exr", "-o", name])
+        self.frame("rggb")
+        self.run_program(["correct-frame", "codes.exr", "--black", "auto", "-o", "between.dng"])
+        written = self.directory / "between.dng"
+        # A stranger's, without metadata of ours.
+        begin = b"schema: cyanometer/1"
+        self.assertIn(begin, written.read_bytes())
+        written.write_bytes(written.read_bytes().replace(begin, b"x" * len(begin)))
+        (self.directory / "between.dng.yaml").unlink()
+        self.run_program(["import-raw", "-q", "between.dng", "-o", "imported.tiff"])
+        imported = self.planes((self.directory / "imported.tiff").read_bytes(), ".tiff")
+        np.testing.assert_array_equal(next(iter(imported.values())), self.tags("between.dng")[1])
+        for name in ("rounded.tiff", "rounded.png"):
+            failed = self.attempt(["import-raw", "-q", "between.dng", "--sample-type", "u16", "-o", name])
             self.assertEqual(failed.returncode, 1)
             self.assertIn("lies between codes, and 16-bit integers would round it", failed.stderr.decode())
-        self.run_program(["mosaic", "-q", "between.exr", "--sample-type", "f32", "-o", "between.dng"])
-        self.run_program(["import-raw", "-q", "between.dng", "-o", "imported.tiff"])
-        np.testing.assert_array_equal(self.tags("between.dng")[1], between)
-        imported = self.planes((self.directory / "imported.tiff").read_bytes(), ".tiff")
-        np.testing.assert_array_equal(next(iter(imported.values())), between)
+            self.assertFalse((self.directory / name).exists())
 
     def test_floats(self):
         self.frame("rggb")

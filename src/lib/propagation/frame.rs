@@ -230,11 +230,15 @@ impl PixelMoments {
         if equations == Equations::Paper {
             return Ok(self.linearized(&local));
         }
-        if space.is_quiet(self.mean, &self.covariance) {
-            return Ok(self.curved(&local, |xyz| space.value(xyz)));
-        }
-        let linearized = self.linearized(&local);
-        Ok(Self { void: self.void.or(Some(curved::VOID)), ..linearized })
+        let why = if space.is_quiet(self.mean, &self.covariance) {
+            match self.curved(&local, |xyz| space.value(xyz)) {
+                Some(curved) => return Ok(curved),
+                None => curved::FAR_FROM_NORMAL,
+            }
+        } else {
+            curved::VOID
+        };
+        Ok(Self { void: self.void.or(Some(why)), ..self.linearized(&local) })
     }
 }
 

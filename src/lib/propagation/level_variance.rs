@@ -71,7 +71,7 @@ impl LevelVariance {
     fn new(photosite: &Photosite, class: usize, average: Option<&AverageRecord>, largest: f64) -> Self {
         // Patterns that are cut off at zero, tails, and codes that are not straight take long to predict.
         let is_rectified = photosite.model.response().max(photosite.model.dcnu) > 0.2;
-        let is_bent = photosite.adc.is_some_and(|adc| adc.is_bent());
+        let is_bent = photosite.adc.is_some_and(|adc| adc.linearization.is_some());
         let is_slow = is_rectified || is_bent || photosite.has_tails();
         let step = largest / STEPS as f64;
         let one = |expected_e: f64| {

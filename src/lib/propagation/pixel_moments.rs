@@ -1,6 +1,6 @@
 //! Moments of pixels that are weighted sums of photosites: demosaicked, and what is made of them.
 
-use super::curved;
+use super::curved::{self, PixelLaw};
 use super::gains;
 use super::moments::SiteCovariance;
 use super::moments::{Equations, Prediction};
@@ -96,14 +96,17 @@ impl PixelMoments {
     }
 
     /// The same pixels in a space that is not linear in these channels, `local` about their means without noise and `value` the
-    /// color of any: weights by the Jacobian, mean and covariance by [`curved::moments`].
+    /// color of any: weights by the Jacobian, mean and covariance by [`curved::moments`]; none where that has none.
     #[must_use]
-    pub(super) fn curved(&self, local: &color::Local, value: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
+    pub(super) fn curved(&self, local: &color::Local, value: impl Fn([f64; 3]) -> [f64; 3]) -> Option<Self> {
         let straight = self.through(&local.jacobian, 0.0);
-        let phases = self.phase_covariances();
-        let laws: [_; PHASES.len()] = std::array::from_fn(|phase| (phases[phase], self.third_cumulants(phase)));
-        let (mean, covariance) = curved::moments(self.mean, &laws, value);
-        Self { mean, bias: [0, 1, 2].map(|i| mean[i] - local.value[i]), covariance, ..straight }
+        let further = self.beyond_weights();
+        let laws: [_; PHASES.len()] = std::array::from_fn(|phase| {
+            let law = self.law(phase);
+            PixelLaw { covariance: law.covariance + further, ..law }
+        });
+        let (mean, covariance) = curved::moments(self.mean, &laws, value)?;
+        Some(Self { mean, bias: [0, 1, 2].map(|i| mean[i] - local.value[i]), covariance, ..straight })
     }
 
     /// The same to first order, with the bias of second order.
@@ -114,23 +117,13 @@ impl PixelMoments {
         Self { mean: [0, 1, 2].map(|i| local.value[i] + bias[i]), bias, ..straight }
     }
 
-    /// Third joint cumulants of the channels of a pixel of one phase.
-    fn third_cumulants(&self, phase: usize) -> curved::Third {
-        let mut third = [[[0.0; 3]; 3]; 3];
-        for y in -REACH..=REACH {
-            for x in -REACH..=REACH {
-                let w = [0, 1, 2].map(|channel| self.weights.stencil(phase, channel).at([x, y]));
-                let of_site = self.sites[self.weights.class(phase, [x, y]) as usize].third;
-                for (a, plane) in third.iter_mut().enumerate() {
-                    for (b, row) in plane.iter_mut().enumerate() {
-                        for (c, cumulant) in row.iter_mut().enumerate() {
-                            *cumulant += of_site * w[a] * w[b] * w[c];
-                        }
-                    }
-                }
-            }
-        }
-        third
+    /// Cumulants of the channels of a pixel of one phase, by the weights.
+    fn law(&self, phase: usize) -> PixelLaw {
+        let offsets = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| [x, y]));
+        PixelLaw::of(offsets.map(|offset| {
+            let weights = [0, 1, 2].map(|channel| self.weights.stencil(phase, channel).at(offset));
+            (weights, &self.sites[self.weights.class(phase, offset) as usize])
+        }))
     }
 
     /// Covariance of a pixel of each phase of the filter array; what the second order adds counts for all alike.

@@ -5,7 +5,7 @@
 //! photosites; over the rectangle there is so much of each kind, and what is between the means of kinds is variance like what is
 //! within them.
 
-use super::curved::{self, Third};
+use super::curved::{self, PixelLaw};
 use super::gains;
 use super::moments::Prediction;
 use super::sampling::Sampling;
@@ -256,8 +256,9 @@ impl Kind {
                 return Err(Unpredictable::Beyond(curved::VOID));
             }
             let local = space.about(mean)?;
-            let law = (covariance, third(array, &sites));
-            (mean, covariance) = curved::moments(mean, &[law], |xyz| space.value(xyz));
+            let law = PixelLaw::of(sites.iter().map(|site| (site.weights, &array.sites[site.tap][site.class])));
+            let found = curved::moments(mean, &[law], |xyz| space.value(xyz));
+            (mean, covariance) = found.ok_or(Unpredictable::Beyond(curved::FAR_FROM_NORMAL))?;
             bias = [0, 1, 2].map(|i| mean[i] - local.value[i]);
             from_camera = local.jacobian * channels.matrix;
             sites.iter_mut().for_each(|site| site.weights = through(&local.jacobian, site.weights));
@@ -293,18 +294,6 @@ impl Kind {
 
 fn index([x, y]: [isize; 2]) -> usize {
     (y + REACH).cast_unsigned() * SIDE + (x + REACH).cast_unsigned()
-}
-
-/// Third joint cumulants of the channels of a pixel.
-fn third(array: &Array, sites: &[Site]) -> Third {
-    let entry = |a: usize, b: usize, c: usize| -> f64 {
-        let of_site = |site: &Site| {
-            let w = site.weights;
-            array.sites[site.tap][site.class].third * w[a] * w[b] * w[c]
-        };
-        sites.iter().map(of_site).sum()
-    };
-    [0, 1, 2].map(|a| [0, 1, 2].map(|b| [0, 1, 2].map(|c| entry(a, b, c))))
 }
 
 impl TappedPixels {
