@@ -1,6 +1,7 @@
 //! Moments of a normal variable that is rounded to whole numbers and clipped to a range.
 
 use super::normal::{cumulative, density};
+use nalgebra::Complex;
 
 /// The codes that a number is rounded to: the nearest, ties away from zero, from the lowest to the highest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +23,7 @@ pub const SMOOTH: f64 = 1.25;
 /// 10⁻⁷/σ¹³, is below 10⁻¹².
 const WIDE: f64 = 2.5;
 
-/// The standard deviation in codes from which five terms of the series of a mean will do.
+/// The standard deviation in codes from which five terms of the series of moments will do.
 const FEW_TERMS: f64 = 0.3;
 
 /// What rounding adds to the mean of a normal variable that no end is near.
@@ -44,6 +45,40 @@ fn of_rounding(mean: f64, sigma: f64) -> f64 {
         m += 1.0;
     }
     sum / std::f64::consts::PI
+}
+
+/// What rounding adds to moments 1 to 4, about a whole number from which the mean is off by `x`, of a normal variable that no end is
+/// near, beside those of a uniform error.
+///
+/// With G(t) = e^(ixt − σ²t²/2) sin(t/2)/(t/2), the characteristic function of the variable and a uniform error, that of its codes is
+/// Σ G(t + 2πm) (Poisson's summation over whole numbers), and moments are its derivatives at 0. With r = 1/2πm and a = ix − 2πmσ²
+/// that of m ≠ 0 is, from h¹ to h⁴,
+///
+/// (−1)ᵐ e^(2πimx − 2π²m²σ²) r [h − r h² + (r² − 1/24) h³ − (r³ − r/24) h⁴] [1 + a h + (a² − σ²) h²/2 + (a³ − 3aσ²) h³/6].
+fn moments_of_rounding(x: f64, sigma: f64) -> [f64; 4] {
+    let square = sigma * sigma;
+    let turn = Complex::from_polar(1.0, std::f64::consts::TAU * (x - x.round()));
+    let q = (-2.0 * std::f64::consts::PI * std::f64::consts::PI * square).exp();
+    let mut found = [0.0; 4];
+    let (mut damping, mut next) = (q, q * q * q);
+    let (mut direction, mut m) = (-turn, 1.0);
+    while damping > 1e-18 {
+        let r = 1.0 / (std::f64::consts::TAU * m);
+        let a = Complex::new(-square / r, x);
+        let (e2, e3) = (0.5 * (a * a - square), a * (a * a - 3.0 * square) / 6.0);
+        let s3 = r * r - 1.0 / 24.0;
+        let terms = [Complex::from(1.0), a - r, e2 - a * r + s3, e3 - e2 * r + (a - r) * s3];
+        // (−i)ʲ j!, and m and −m together.
+        let scale = direction * (2.0 * damping * r);
+        let factors = [-Complex::i(), Complex::from(-2.0), 6.0 * Complex::i(), Complex::from(24.0)];
+        for ((found, term), factor) in found.iter_mut().zip(terms).zip(factors) {
+            *found += (scale * term * factor).re;
+        }
+        damping *= next;
+        next *= q * q;
+        (direction, m) = (-direction * turn, m + 1.0);
+    }
+    found
 }
 
 /// Powers 1 to 4.
@@ -87,6 +122,11 @@ impl Rounding {
         let is_free = mean - reach > self.lowest && mean + reach < self.highest;
         if is_free && sigma >= SMOOTH {
             return about(mean - center, sigma * sigma + 1.0 / 12.0, -1.0 / 120.0);
+        }
+        if is_free && sigma >= FEW_TERMS {
+            let smooth = about(mean - center, sigma * sigma + 1.0 / 12.0, -1.0 / 120.0);
+            let waves = moments_of_rounding(mean - center, sigma);
+            return [0, 1, 2, 3].map(|j| smooth[j] + waves[j]);
         }
         if mean + reach < self.lowest - 0.5 || mean - reach > self.highest + 0.5 {
             return powers(self.code(mean) - center);
