@@ -59,6 +59,8 @@ pub struct SpectralTable {
     headings: Vec<Option<Stated>>,
     /// What comments say about units.
     remarks: Vec<Stated>,
+    /// What a comment that begins as `Unit:` says they are, where that is no radiance.
+    other_quantity: Option<Stated>,
     /// Whether its wavelengths were given as wavenumbers.
     by_wavenumber: bool,
     /// Whether nothing says what its columns are.
@@ -142,8 +144,9 @@ impl SpectralTable {
         let (wavelength_nm, values) = sorted(wavelength_nm, values);
         check_nm(&wavelength_nm).map_err(|problem| Error::format(name, problem))?;
         let by_wavenumber = unit == WavelengthUnit::PerCentimeter;
-        let (name, remarks, is_bare) = (name.to_owned(), comments.units, !has_header);
-        Ok(Self { name, wavelength_nm, columns, values, headings, remarks, by_wavenumber, is_bare })
+        let (name, is_bare) = (name.to_owned(), !has_header);
+        let Comments { units: remarks, other_quantity, .. } = comments;
+        Ok(Self { name, wavelength_nm, columns, values, headings, remarks, other_quantity, by_wavenumber, is_bare })
     }
 
     /// The file as messages call it.
@@ -188,7 +191,9 @@ impl SpectralTable {
     ///
     /// Those of [`radiance_unit::settle`].
     pub fn radiance_unit(&self, index: usize, given: Option<RadianceUnit>) -> Result<(RadianceUnit, Option<String>)> {
-        let heading = self.headings.get(index).and_then(Option::as_ref);
+        let names_radiance = self.remarks.iter().any(|remark| matches!(remark, Stated::Radiance(_)));
+        let other = self.other_quantity.as_ref().filter(|_| !names_radiance);
+        let heading = self.headings.get(index).and_then(Option::as_ref).or(other);
         let place = "in the heading, as in `radiance (W m-2 sr-1 nm-1)`";
         if self.by_wavenumber && heading.is_none() && self.remarks.is_empty() && given.is_none() {
             let problem = "it is by wavenumber and does not say whether its radiance is per nm or per cm-1";
@@ -215,7 +220,7 @@ impl SpectralTable {
     /// The columns of which nothing says that they hold anything but radiances.
     pub fn likely_radiances(&self) -> Vec<&str> {
         let is_other =
-            |says: &Option<Stated>| matches!(says, Some(Stated::Other { kind, .. }) if kind.is_another_quantity());
+            |says: &Option<Stated>| matches!(says, Some(Stated::Other { kind, .. }) if kind.conversion().is_some());
         let likely = self.columns.iter().zip(&self.headings).filter(|(_, says)| !is_other(says));
         likely.map(|(column, _)| column.as_str()).collect()
     }
@@ -294,6 +299,7 @@ fn holds_rows_without_names(numbers: &Array2<f64>) -> bool {
 #[derive(Debug, Default)]
 struct Comments {
     units: Vec<Stated>,
+    other_quantity: Option<Stated>,
     wavelength: Option<WavelengthUnit>,
 }
 
@@ -303,6 +309,7 @@ impl Comments {
         let mut found = Self::default();
         for line in delimited::comments(text).take(MAX_COMMENTS) {
             found.units.extend(units_in(line));
+            found.other_quantity = found.other_quantity.or_else(|| other_quantity(line));
             let counts =
                 |clause: &&str| ["wavelength", "wavenumber"].iter().any(|word| clause.to_lowercase().contains(word));
             let mut clauses = line.split([',', ';']).filter(counts);
@@ -311,6 +318,17 @@ impl Comments {
         }
         found
     }
+}
+
+/// The quantity that a comment such as `Unit: %` or `units of values = counts` states, where it is no spectral radiance.
+fn other_quantity(comment: &str) -> Option<Stated> {
+    let (before, stated) = comment.split_once([':', '='])?;
+    let mut words = before.split(|c: char| !c.is_alphanumeric());
+    let states = words.any(|word| ["unit", "units"].contains(&word.to_lowercase().as_str()));
+    let is_other = |stated: &Stated| matches!(stated, Stated::Other { kind, .. } if kind.conversion().is_some());
+    states
+        .then(|| unit_of_heading(stated).or_else(|| unit_of_heading(&format!("({})", stated.trim()))))?
+        .filter(is_other)
 }
 
 /// So many comments are searched for units.
@@ -347,7 +365,8 @@ fn headings(columns: &[String], units: Option<&StringRecord>, corner: Option<&st
         let cell = units?.get(index + 1)?;
         let both = unit_of_heading(&format!("{column} ({cell})"));
         let is_contradiction = matches!(&both, Some(Stated::Other { kind: OtherUnit::Contradiction, .. }));
-        if is_contradiction { both } else { unit_of_heading(cell) }
+        let alone = || unit_of_heading(cell).or_else(|| unit_of_heading(&format!("({cell})")));
+        if is_contradiction { both } else { alone() }
     };
     let of_corner = corner.and_then(unit_of_heading);
     let one = |(index, column): (usize, &String)| {
@@ -748,6 +767,43 @@ mod tests {
             );
             assert!(refused("nm,photon_radiance\n400,1\n", given).contains("a unit of photons"));
             assert!(refused("nm,uavgdir\n400,1\n", given).contains("a mean over all directions"));
+            for (text, quantity, conversion) in [
+                (
+                    "nm,L (W m-2 sr-1)\n400,1\n",
+                    "`W m-2 sr-1`, a radiance over all",
+                    "divide the value of each band by the width",
+                ),
+                ("nm,reflectance (%)\n400,1\n", "`reflectance (%)`, a ratio", "as a fraction of 1, by the radiance"),
+                ("nm,sky\nnm,%\n400,1\n", "`%`, a ratio", "as a fraction of 1, by the radiance"),
+                ("nm,sky (counts)\n400,1\n", "`counts`, what an instrument reads", "by the calibration"),
+                ("nm,L (J m-2 sr-1 nm-1)\n400,1\n", "of energy, a radiance summed over time", "by the time in s"),
+                ("# Unit: W m-2 sr-1\nnm,L\n400,1\n", "`W m-2 sr-1`, a radiance over all", "the width of the band"),
+                ("# units of values = reflectance\nnm,L\n400,1\n", "a ratio", "as a fraction of 1, by the radiance"),
+                ("# Unit: %\nnm,L\n400,1\n", "`%`, a ratio", "as a fraction of 1, by the radiance"),
+            ] {
+                let refused = refused(text, given);
+                assert!(refused.contains(quantity) && refused.contains(conversion), "{text}: {refused}");
+                assert!(!refused.contains("radiance_unit"), "{refused}");
+            }
+        }
+        // In passing comments may speak of other things.
+        for text in [
+            "# of an irradiance of 3 W m-2\nnm,L\n400,1\n",
+            "# Unit: W m-2 sr-1 nm-1, band radiance: W m-2 sr-1\nnm,L\n400,1\n",
+            "# wavelength unit: nm\nnm,L\n400,1\n",
+        ] {
+            assert_eq!(unit(text, given).unwrap().0, watts, "{text}");
+        }
+        // 1 erg is 10⁻⁷ J.
+        for text in [
+            "nm,L (erg s-1 cm-2 sr-1 nm-1)\n400,1\n",
+            "nm,L\nnm,erg/(s cm2 sr nm)\n400,1\n",
+            "# Unit: erg s-1 cm-2 sr-1 nm-1\nnm,L\n400,1\n",
+            "nm,radiance_erg_per_s_cm2_sr_nm\n400,1\n",
+        ] {
+            let found = unit(text, None).unwrap().0;
+            assert!((found.in_w_per_cm2_sr_nm(500.0) / 1e-7 - 1.0).abs() < 1e-15, "{text}");
+            assert_eq!(unit(text, RadianceUnit::parse("erg/s/cm2/sr/nm")).unwrap().0, found);
         }
         for text in [
             "nm,irradiance (W m-2 sr-1 nm-1)\n400,1e-3\n",
