@@ -16,6 +16,7 @@ pub mod fits;
 pub mod foreign;
 pub mod format;
 pub mod frame_list;
+pub mod free_space;
 pub mod headerless;
 mod icc;
 pub mod input;
