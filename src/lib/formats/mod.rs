@@ -51,6 +51,7 @@ pub mod table;
 pub mod tiff;
 pub mod unread;
 mod viewable;
+mod wavelengths;
 pub mod yaml;
 pub mod yaml_guard;
 pub mod yaml_writer;

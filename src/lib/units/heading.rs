@@ -394,21 +394,9 @@ mod tests {
     }
 
     #[test]
-    fn other_units_are_told_from_radiances() {
-        use OtherUnit::{
-            AllWavelengths, Energy, Irradiance, PerCentimeter, PerFrequency, Photons, Ratio, Reading, Scaled, Several,
-            Unknown,
-        };
+    fn ratios_readings_and_energies_are_told() {
+        use OtherUnit::{AllWavelengths, Energy, Irradiance, PerCentimeter, PerFrequency, Ratio, Reading, Unknown};
         for (text, kind) in [
-            ("irradiance (W m-2 nm-1)", Irradiance),
-            ("E [W/m2/nm]", Irradiance),
-            ("W/m²/µm", Irradiance),
-            ("W m-3", Irradiance),
-            ("irradiance", Irradiance),
-            ("spectral_irradiance_w_per_m2_nm", Irradiance),
-            ("edir", Irradiance),
-            ("eglo", Irradiance),
-            ("Wm-2nm-1", Irradiance),
             ("transmittance", Ratio),
             ("reflectance (%)", Ratio),
             ("Reflectance", Ratio),
@@ -425,6 +413,28 @@ mod tests {
             ("erg s-2 cm-2 sr-1 nm-1", Unknown),
             ("sky [mV]", Reading),
             ("sky (DN)", Reading),
+            ("sky (%)", Ratio),
+            ("sky (counts)", Reading),
+        ] {
+            let found = unit_of_heading(text);
+            assert!(matches!(&found, Some(Stated::Other { kind: found, .. }) if *found == kind), "{text}: {found:?}");
+            assert_eq!(RadianceUnit::parse(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn other_units_are_told_from_radiances() {
+        use OtherUnit::{AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Scaled, Several, Unknown};
+        for (text, kind) in [
+            ("irradiance (W m-2 nm-1)", Irradiance),
+            ("E [W/m2/nm]", Irradiance),
+            ("W/m²/µm", Irradiance),
+            ("W m-3", Irradiance),
+            ("irradiance", Irradiance),
+            ("spectral_irradiance_w_per_m2_nm", Irradiance),
+            ("edir", Irradiance),
+            ("eglo", Irradiance),
+            ("Wm-2nm-1", Irradiance),
             ("photons s-1 m-2 sr-1 nm-1", Photons),
             ("L (umol m-2 s-1 sr-1 nm-1)", Photons),
             ("µmol/m2/s", Photons),
@@ -443,8 +453,6 @@ mod tests {
             ("W sr-1 nm-1", Unknown),
             ("radiance (MW m-2 sr-1 nm-1)", Unknown),
             ("radiance (MW/m2)", Unknown),
-            ("sky (%)", Ratio),
-            ("sky (counts)", Reading),
             ("sky [a.u.]", Unknown),
             ("L (flick)", Unknown),
             ("radiance (W/m2/xy/nm)", Unknown),
@@ -462,6 +470,10 @@ mod tests {
             );
             assert_eq!(RadianceUnit::parse(text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn names_are_no_units() {
         for text in [
             "radiance",
             "L",
