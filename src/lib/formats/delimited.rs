@@ -206,8 +206,9 @@ pub fn plain(name: &str, text: &str, separator: Separator, trims: bool) -> Resul
             match separator {
                 Separator::Byte(byte) => plain.push_str(without_surplus(line, byte, widest)),
                 Separator::Blanks => push_cells(&mut plain, line, width).map_err(|words| {
+                    let stand = if words == 1 { "word stands" } else { "words stand" };
                     let problem = format!(
-                        "line {}: {words} words stand above {width} columns that are parted by blanks; part all cells by tabs, \
+                        "line {}: {words} {stand} above {width} columns that are parted by blanks; part all cells by tabs, \
                          commas or semicolons",
                         index + 1
                     );
