@@ -238,7 +238,7 @@ fn light(frame: &FrameHeader) -> nalgebra::Matrix3<f64> {
 fn about_inverse(reduced: &Reduced, plane: usize, count: f64) -> (f64, f64) {
     let moments = reduced.inverse_moments(plane);
     let (mean, spread) = (moments.mean[0], count * moments.std(0).unwrap_or(0.0));
-    let high = if mean > spread { (mean - spread).recip() } else { f64::from(reduced.moments(plane).max[0]) };
+    let high = if mean > spread { (mean - spread).recip() } else { reduced.moments(plane).max[0] };
     ((mean + spread).recip(), high)
 }
 
