@@ -282,7 +282,7 @@ fn pages_tell_keys_templates_and_what_is_known() {
     let found = String::from_utf8(found.stdout).unwrap();
     assert!(found.contains("matrices/mine.yaml ") && found.contains("to XYZ"), "{found}");
     for line in
-        ["cyanometer list lenses", "cyanometer keys frames", "cyanometer template", "cyanometer template sensor matrix"]
+        ["cyanometer list lenses", "cyanometer keys lenses", "cyanometer template", "cyanometer template sensor matrix"]
     {
         let refused = shop.attempt(line, &[]);
         assert_eq!(refused.status.code(), Some(BAD_USAGE), "{line}");

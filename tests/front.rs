@@ -71,6 +71,39 @@ fn every_program_has_a_manual_page_and_completions_with_its_options() {
     }
 }
 
+/// What people type in place of `list`, `keys` and `template` is answered, and keys are found by their names.
+#[test]
+fn the_front_door_answers_what_people_type() {
+    let shop = Workshop::new();
+    let told = |words: &str| text(&shop, &format!("{FRONT} {words}"));
+    for (typed, meant) in [
+        ("--list sensors imx219", "list sensors imx219"),
+        ("--list observers", "list observers"),
+        ("--template sensor", "template sensor"),
+        ("--describe-keys", "keys"),
+        ("--keys", "keys"),
+    ] {
+        assert_eq!(told(typed), told(meant), "{typed}");
+    }
+    let found = told("keys sensor Full_Well");
+    assert!(found.contains("readout.full_well_e: number; e-") && found.lines().count() < 6, "{found}");
+    assert!(told("keys full_well_e").contains("readout.full_well_e: number"));
+    for (typed, said) in [
+        (
+            "keys sensor imx219",
+            "there is no key `imx219` in such files; `cyanometer keys sensor` describes all; `cyanometer list sensors imx219` tells of \
+             that sensor",
+        ),
+        ("keys bananas", "keys knows no `bananas`; name one of sensor, matrix, metadata, or a part of a key"),
+        (
+            "--template",
+            "template prints one file; name one of sensor, matrix, metadata, as in `cyanometer template sensor`",
+        ),
+    ] {
+        assert_eq!(shop.said(&format!("{FRONT} {typed}"), BAD_USAGE).trim_end(), format!("{FRONT}: {said}"), "{typed}");
+    }
+}
+
 /// The names of programs are completed behind `cyanometer`.
 #[test]
 fn the_front_door_completes_the_programs() {

@@ -189,6 +189,27 @@ fn samples_far_off_do_not_make_the_scale() {
     }
 }
 
+/// What lies within the axes of a panel is drawn and not told as beyond, though it is beyond the middle of its own class.
+#[test]
+fn what_another_class_makes_room_for_is_not_beyond() {
+    let shop = Workshop::new();
+    // R within 1 of 1000 but for a sample 30 off, which B's spread of 100 has room for; one of G is beyond all.
+    let head = header(QuantityKind::Electrons, Geometry::new(64, 48, &["R", "G", "B"]));
+    let part = |x: usize, y: usize, channel: usize| ((x * 131 + y * 7919 + channel * 17) % 997) as f32 / 997.0 - 0.5;
+    let sample = |x: usize, y: usize, channel: usize| match (channel, x, y) {
+        (0, 7, 0) => 1030.0,
+        (1, 9, 3) => 2000.0,
+        (2, ..) => 1000.0 + 200.0 * part(x, y, channel),
+        _ => 1000.0 + 2.0 * part(x, y, channel),
+    };
+    let made = frame(head, sample);
+    shop.write("a.exr", &made.header, &made.samples);
+    assert!(shop.attempt("measure a.exr --plot plot.svg", &[]).status.success());
+    let all = words(&String::from_utf8(shop.bytes("plot.svg")).unwrap());
+    let wanted = format!("1 of {} samples beyond the axes, as far as 100", 3 * 64 * 48);
+    assert!(all.contains(&wanted), "{all}");
+}
+
 /// A heap of saturated samples leaves the axis to all others, and is told; no normal law is drawn over it. Nothing is heaped where all is within the codes.
 #[test]
 fn saturated_samples_do_not_make_the_scale() {

@@ -4,7 +4,7 @@ mod support;
 
 use cyanometer::color::ramp::ramp;
 use cyanometer::formats::input::{FrameReader, InputOptions};
-use cyanometer::formats::picture::{PictureSettings, thumbnail};
+use cyanometer::formats::picture::{PictureSettings, Range, thumbnail};
 use cyanometer::units::QuantityKind;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
@@ -252,6 +252,54 @@ fn captions_count_what_measure_counts() {
         assert!(tile.caption[0].starts_with(words[0]), "{:?}", tile.caption);
         assert!(tile.caption.last().unwrap().starts_with("black "), "{:?}", tile.caption);
     }
+}
+
+/// A plane of several units is told in its own; the range of color temperatures is one of their inverses, and never below 0.
+#[test]
+fn a_plane_is_told_in_its_own_unit() {
+    let shop = Workshop::with_frames();
+    assert!(shop.attempt("to-xyz rgb.exr --matrix matrix.yaml --space cct -o cct.exr", &[]).status.success());
+    let mut frame = shop.frame("cct.exr");
+    let [width, planes] = [frame.header.geometry.width, frame.header.geometry.channels.len()];
+    for row in frame.samples.chunks_exact_mut(width * planes) {
+        let kelvin = |place: usize| if place.is_multiple_of(2) { 4000.0 } else { 20_000.0 };
+        row[..width].iter_mut().enumerate().for_each(|(place, sample)| *sample = kelvin(place));
+    }
+    shop.write("hot.exr", &frame.header, &frame.samples);
+    let shown = |name: &str, plane: &str, range: Range, false_color: bool| {
+        let path = Some(shop.path(name));
+        let mut reader = FrameReader::open(&InputOptions { path, ..InputOptions::default() }).unwrap();
+        let plane = Some(plane.to_owned());
+        let settings = PictureSettings { plane, false_color, range: Some(range), ..PictureSettings::default() };
+        thumbnail(&mut reader, &settings).unwrap()
+    };
+    for (plane, unit) in [("Y", " cd m⁻²"), ("CCT", " K"), ("Duv", "")] {
+        let tile = shown("cct.exr", plane, Range::Values(-1.0, 9.0), false);
+        assert_eq!(tile.caption.last().unwrap(), &format!("black −1.0000, white 9.0000{unit}"));
+    }
+    // Half of the pixels each 1/4000 and 1/20000: the mean is 1/6666.7, the standard deviation 10⁻⁴ and some.
+    for (count, high) in [(1.0, 20_000.0), (4.0, 20_000.0), (0.5, 10_000.0)] {
+        let (low_end, high_end) = shown("hot.exr", "CCT", Range::Deviations(count), true).bar.unwrap().range;
+        let pixels = (frame.header.geometry.height * width) as f64;
+        let spread = count * 1e-4 * (pixels / (pixels - 1.0)).sqrt();
+        assert!((low_end * (1.5e-4 + spread) - 1.0).abs() < 1e-5, "{count}: {low_end}");
+        assert!((high_end / high - 1.0).abs() < 0.05, "{count}: {high_end}");
+        let tile = shown("hot.exr", "CCT", Range::Deviations(count), false);
+        assert!(!tile.caption.last().unwrap().contains('−'), "{:?}", tile.caption);
+    }
+}
+
+/// A long caption has lines as long as the picture is wide, or as people read.
+#[test]
+fn a_long_caption_is_parted() {
+    let shop = Workshop::new();
+    std::fs::write(shop.path("a.bin"), [60_u8; 40 * 30]).unwrap();
+    let text = "a caption of a picture that says at some length what is seen and why ".repeat(12);
+    let line = "preview --raw 40x30:u8 --range 0,255 a.bin -o a.png";
+    let made = shop.command(line).arg(format!("--caption={text}")).output().unwrap();
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let picture = Picture::read(&shop, "a.png");
+    assert!(picture.width < 520 && picture.height() > 30 + 12 * 17, "{} {}", picture.width, picture.height());
 }
 
 /// A caption stands below the picture, which stays as it is.

@@ -8,7 +8,7 @@ use cyanometer::formats::digest::SamplesDigest;
 use cyanometer::formats::format::SampleType;
 use cyanometer::formats::output::{SampleKind, doubt_of_codes};
 use cyanometer::formats::places::STACK_DESCRIPTION;
-use cyanometer::formats::{register, yaml};
+use cyanometer::formats::{free_space, register, yaml};
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, SamplesRecord};
 use cyanometer::stages::saturation::bits;
@@ -91,6 +91,14 @@ impl StackWriter {
             None => self.form.insert(Form::of(&header, &self.store, self.options, self.directory.name())?),
         };
         let geometry = &header.geometry;
+        if !self.options.is_compressed {
+            let bytes = form.arrays.iter().map(|array| array.part.row_bytes(geometry.width) as u64).sum::<u64>();
+            free_space::check_directory(
+                self.directory.path(),
+                self.directory.name(),
+                bytes.saturating_mul(geometry.height as u64),
+            )?;
+        }
         let (mut digest, mut rows, mut left) = (SamplesDigest::new(), Vec::new(), geometry.height);
         let step = geometry.step_rows(frame.natural_rows()).max(1);
         while left > 0 {

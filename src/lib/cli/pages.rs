@@ -3,7 +3,7 @@
 use super::show;
 use crate::error::{Error, Result};
 use crate::formats::inventory::{self, Kind};
-use crate::formats::keys::{KeyPage, tables};
+use crate::formats::keys::KeyPage;
 use crate::names::Named;
 use std::ffi::OsString;
 use std::io::Write;
@@ -24,15 +24,32 @@ pub fn list(words: &[OsString]) -> Result<()> {
     write(&kinds.into_iter().map(|kind| inventory::page(kind, &words)).collect::<Vec<_>>().join("\n"))
 }
 
-/// Describes the keys of files: of the kinds that `words` name, or of all.
+/// Describes the keys of files: of the kinds that `words` begin with, or of all; where other words follow, those in whose paths one of
+/// these stands.
 ///
 /// # Errors
 ///
-/// As [`list`].
+/// [`Error::Usage`] where there are none; [`Error::Disk`] where they cannot be written.
 pub fn keys(words: &[OsString]) -> Result<()> {
-    let pages = named::<KeyPage>("keys", words)?;
-    let text = pages.iter().map(|page| page.table()).collect::<Vec<_>>().join("\n");
-    write(if pages.is_empty() { tables() } else { text }.as_str())
+    let words: Vec<String> = words.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+    let count = words.iter().position(|word| KeyPage::named(word).is_none()).unwrap_or(words.len());
+    let (pages, words) = words.split_at(count);
+    let pages: Vec<KeyPage> = pages.iter().filter_map(|page| KeyPage::named(page)).collect();
+    let wanted = if pages.is_empty() { KeyPage::ALL } else { &pages };
+    let text: Vec<String> = wanted.iter().filter_map(|page| page.table_of(words)).collect();
+    if !text.is_empty() {
+        return write(&text.join("\n"));
+    }
+    let asked = words.join("`, `");
+    let known = match pages[..] {
+        [page] => format!("there is no key `{asked}` in such files; `cyanometer keys {}` describes all", page.name()),
+        _ => format!("keys knows no `{asked}`; name one of {}, or a part of a key", known::<KeyPage>()),
+    };
+    let is_one = |word: &&String| inventory::known(Kind::Sensors).iter().any(|one| one.name.eq_ignore_ascii_case(word));
+    let sensor = words.iter().find(is_one);
+    let sensor =
+        sensor.map_or(String::new(), |name| format!("; `cyanometer list sensors {name}` tells of that sensor"));
+    Err(Error::Usage(known + &sensor))
 }
 
 /// Prints a file to begin with, of the one kind that `words` name.
@@ -43,7 +60,12 @@ pub fn keys(words: &[OsString]) -> Result<()> {
 pub fn template(words: &[OsString]) -> Result<()> {
     match named::<KeyPage>("template", words)?[..] {
         [page] => write(page.template()),
-        _ => Err(Error::Usage(format!("template prints one file; name one of {}", known::<KeyPage>()))),
+        _ => {
+            let kinds = known::<KeyPage>();
+            Err(Error::Usage(format!(
+                "template prints one file; name one of {kinds}, as in `cyanometer template sensor`"
+            )))
+        }
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::places::{STDOUT_NAME, named};
 use super::standard::open_stdout;
-use super::{pipe, register};
+use super::{free_space, pipe, register};
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, IsTerminal, Read, Seek, SeekFrom, Write};
@@ -386,6 +386,20 @@ impl Target {
     /// The regular file that is being written, if it is one.
     pub fn named_file(&self) -> Option<&Path> {
         self.path.as_deref()
+    }
+
+    /// Refuses an output of so many bytes where a file that it goes to has no room for it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`free_space::check`].
+    pub fn check_room(&self, bytes: u64) -> Result<()> {
+        let check = |file: &File| free_space::check(file, &self.name, bytes);
+        match &self.kind {
+            Kind::Named(file) => check(file.output.get_ref()),
+            Kind::Stream(output) => check(output.get_ref()),
+            Kind::Spooled { spool, output } => check(spool.get_ref()).and_then(|()| check(output)),
+        }
     }
 
     /// Sends off what is spooled, gives a file its name.

@@ -8,6 +8,7 @@ use csv::StringRecord;
 use flate2::read::GzDecoder;
 use ndarray::Array2;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::io::Read;
 
 /// A table may unpack to this much.
@@ -19,6 +20,8 @@ const SMALL_BYTES: u64 = 16 << 20;
 const MAX_CELLS: usize = 1 << 25;
 /// A table may have this many columns: as text they take many times the memory of their numbers.
 pub(super) const MAX_COLUMNS: usize = 1 << 20;
+/// So many curves of a table may hold what is no number.
+const MAX_SPOILED: usize = 1 << 12;
 
 /// A finite number with a decimal point or a decimal comma, if it is one.
 pub(super) fn numeric(cell: &str) -> Option<f64> {
@@ -27,14 +30,17 @@ pub(super) fn numeric(cell: &str) -> Option<f64> {
 
 /// A table's rows below its header.
 pub(super) struct Cells {
-    /// Shape rows × columns; 0 where a row's label is no number.
+    /// Shape rows × columns; 0 where a row's label is no number, NaN where another cell is none.
     pub(super) numbers: Array2<f64>,
     /// What the rows begin with, where they have labels.
     pub(super) labels: Vec<String>,
+    /// The curves, from 0, that have a cell that is no number, and the complaint of the first of these.
+    pub(super) spoiled: BTreeMap<usize, String>,
 }
 
 impl Cells {
-    /// Reads the rows of `text`, after `first` where that is one; each begins with a label where the table goes `by_rows`.
+    /// Reads the rows of `text`, after `first` where that is one; each begins with a label where the table goes `by_rows`. What is no
+    /// number spoils its curve alone, where the table has others.
     pub(super) fn read(
         name: &str,
         text: &str,
@@ -46,6 +52,7 @@ impl Cells {
         let (mut numbers, mut labels, mut rows, mut width) = (Vec::new(), Vec::new(), 0, 0);
         let mut record = first.cloned().unwrap_or_default();
         let mut at_hand = first.is_some();
+        let mut spoiled = BTreeMap::new();
         let [mut has_points, mut has_commas] = [false; 2];
         // One row at a time: as text a table takes many times the memory of its numbers.
         while std::mem::take(&mut at_hand)
@@ -67,7 +74,13 @@ impl Cells {
                     // The label of a row need not be a number.
                     None if by_rows && column == 0 => 0.0,
                     None => {
-                        return Err(refuse(format!("line {}, column {}", line(), column + 1) + &not_a_number(cell)));
+                        let problem = format!("line {}, column {}", line(), column + 1) + &not_a_number(cell);
+                        let curve = if by_rows { Some(rows - 1) } else { column.checked_sub(1) };
+                        let Some(curve) = curve.filter(|_| spoiled.len() < MAX_SPOILED) else {
+                            return Err(refuse(problem));
+                        };
+                        spoiled.entry(curve).or_insert(problem);
+                        f64::NAN
                     }
                 });
             }
@@ -77,7 +90,11 @@ impl Cells {
         }
         let numbers =
             Array2::from_shape_vec((rows, width), numbers).map_err(|_| refuse("its rows differ in length".into()))?;
-        Ok(Self { numbers, labels })
+        let curves = if by_rows { rows } else { width.saturating_sub(1) };
+        match spoiled.first_key_value() {
+            Some((_, problem)) if spoiled.len() == curves => Err(refuse(problem.clone())),
+            _ => Ok(Self { numbers, labels, spoiled }),
+        }
     }
 }
 

@@ -97,13 +97,15 @@ fn shares(name: &str, colors: Vec<[f64; 3]>) -> Result<Vec<[f64; 3]>> {
 
 /// A table of reflectances.
 fn reflectances(name: String, bytes: &[u8]) -> Result<Reference> {
-    let table = SpectralTable::parse(&name, bytes).map_err(|error| match error {
+    let told = |error| match error {
         Error::Format { file, problem } => Error::Format {
             file,
             problem: format!("{problem}; a reference has columns X,Y,Z, x,y,Y or L,a,b, or is a table of reflectances"),
         },
         other => other,
-    })?;
+    };
+    let table = SpectralTable::parse(&name, bytes).map_err(told)?;
+    (0..table.columns.len()).try_for_each(|index| table.check(index)).map_err(told)?;
     let mut curves = Vec::with_capacity(table.columns.len());
     for (index, column) in table.columns.iter().enumerate() {
         let curve = Curve::new(table.wavelength_nm.clone(), table.values.row(index).to_vec());

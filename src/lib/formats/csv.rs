@@ -7,14 +7,16 @@
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
 use super::delimited;
 use super::foreign::csv_complaint;
-use super::misread::{self, LONGEST_NM, is_units};
+use super::misread::{self, is_units};
 use super::radiance_unit::{self, FileSays};
+use super::wavelengths::{check_nm, check_order, check_stated};
 use crate::error::{Error, Result};
 use crate::names::place_of;
-use crate::spectrum::{Curve, SHORTEST_NM, check_wavelengths};
+use crate::spectrum::{Curve, SHORTEST_NM};
 use crate::units::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
 use csv::StringRecord;
 use ndarray::{Array2, Axis};
+use std::collections::BTreeMap;
 
 /// The names of the columns of a table of any kind; `name` is the file in messages.
 ///
@@ -53,12 +55,16 @@ pub struct SpectralTable {
     pub wavelength_nm: Vec<f64>,
     /// Names of the curves.
     pub columns: Vec<String>,
-    /// Values, shape curves × wavelengths.
+    /// Values, shape curves × wavelengths; those of a curve count where [`Self::check`] lets it pass.
     pub values: Array2<f64>,
+    /// The curves that have a cell that is no number, and the complaint of it.
+    spoiled: BTreeMap<usize, String>,
     /// What the heading of each curve says about its unit.
     headings: Vec<Option<Stated>>,
     /// What comments say about units.
     remarks: Vec<Stated>,
+    /// What a comment that begins as `Unit:` says they are, where that is no radiance.
+    other_quantity: Option<Stated>,
     /// Whether its wavelengths were given as wavenumbers.
     by_wavenumber: bool,
     /// Whether nothing says what its columns are.
@@ -70,7 +76,7 @@ impl SpectralTable {
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] naming line and column of what is no number, or what the table lacks.
+    /// [`Error::Format`] naming line and column of what is no number where that spoils all curves, or what the table lacks.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self> {
         let bytes = unpacked(name, bytes)?;
         let text = Text::of(name, &bytes, true);
@@ -105,7 +111,8 @@ impl SpectralTable {
         if has_header && !by_rows {
             check_first_column(name, &first)?;
         }
-        let Cells { numbers, labels } = Cells::read(name, text.rows(), &mut reader, at_hand.as_ref(), by_rows)?;
+        let Cells { numbers, labels, spoiled } =
+            Cells::read(name, text.rows(), &mut reader, at_hand.as_ref(), by_rows)?;
         let (rows, width) = numbers.dim();
         if width < 2 || rows == 0 {
             return refuse("it needs a column of wavelengths in nm and at least one of values");
@@ -117,38 +124,46 @@ impl SpectralTable {
             );
         }
         let values = numbers.slice(ndarray::s![.., 1..]);
-        let (mut wavelength_nm, columns, values) = if by_rows {
+        let (wavelengths, columns, values) = if by_rows {
             (first.iter().skip(1).filter_map(numeric).collect(), labels, values.to_owned())
         } else {
-            let columns = match has_header {
-                true => first.iter().skip(1).map(ToOwned::to_owned).collect(),
-                false => (1..width).map(|column| format!("column{column}")).collect(),
-            };
-            (numbers.column(0).to_vec(), columns, values.t().to_owned())
+            (numbers.column(0).to_vec(), names(has_header.then_some(&first), width), values.t().to_owned())
         };
         let comments = Comments::of(&text.decoded);
         let headings = headings(&columns, units.as_ref(), by_rows.then_some(&first[0]));
-        let is_of_radiance = |cell: &str| {
-            let unknown = |stated: &Stated| matches!(stated, Stated::Other { kind: OtherUnit::Unknown, .. });
-            unit_of_heading(cell).is_some_and(|stated| !unknown(&stated))
-        };
         let heading = units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && !is_of_radiance(cell));
         let unit = wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength);
-        unit.map_or(Ok(()), |unit| check_stated(&wavelength_nm, unit))
-            .map_err(|problem| Error::format(name, problem))?;
-        let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
-        wavelength_nm.iter_mut().for_each(|wavelength: &mut f64| *wavelength = unit.nm(*wavelength));
-        check_order(&wavelength_nm).map_err(|problem| Error::format(name, problem))?;
-        let (wavelength_nm, values) = sorted(wavelength_nm, values);
-        check_nm(&wavelength_nm).map_err(|problem| Error::format(name, problem))?;
-        let by_wavenumber = unit == WavelengthUnit::PerCentimeter;
-        let (name, remarks, is_bare) = (name.to_owned(), comments.units, !has_header);
-        Ok(Self { name, wavelength_nm, columns, values, headings, remarks, by_wavenumber, is_bare })
+        let (wavelength_nm, values) =
+            in_nm(wavelengths, values, unit).map_err(|problem| Error::format(name, problem))?;
+        let by_wavenumber = unit == Some(WavelengthUnit::PerCentimeter);
+        let is_bare = !has_header;
+        let Comments { units: remarks, other_quantity, .. } = comments;
+        Ok(Self {
+            name: name.to_owned(),
+            wavelength_nm,
+            columns,
+            values,
+            spoiled,
+            headings,
+            remarks,
+            other_quantity,
+            by_wavenumber,
+            is_bare,
+        })
     }
 
     /// The file as messages call it.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Refuses a curve of which a cell is no number.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] naming its line and column.
+    pub fn check(&self, index: usize) -> Result<()> {
+        self.spoiled.get(&index).map_or(Ok(()), |problem| Err(Error::format(&self.name, problem.clone())))
     }
 
     /// The place of a column; the first, where none is named.
@@ -178,6 +193,7 @@ impl SpectralTable {
     /// As [`Self::column_index`], and [`Error::Format`] for values that make no curve.
     pub fn curve(&self, column: Option<&str>) -> Result<Curve> {
         let index = self.column_index(column)?;
+        self.check(index)?;
         Curve::new(self.wavelength_nm.clone(), self.values.row(index).to_vec())
             .map_err(|problem| Error::format(&self.name, problem))
     }
@@ -186,9 +202,12 @@ impl SpectralTable {
     ///
     /// # Errors
     ///
-    /// Those of [`radiance_unit::settle`].
+    /// Those of [`Self::check`] and [`radiance_unit::settle`].
     pub fn radiance_unit(&self, index: usize, given: Option<RadianceUnit>) -> Result<(RadianceUnit, Option<String>)> {
-        let heading = self.headings.get(index).and_then(Option::as_ref);
+        self.check(index)?;
+        let names_radiance = self.remarks.iter().any(|remark| matches!(remark, Stated::Radiance(_)));
+        let other = self.other_quantity.as_ref().filter(|_| !names_radiance);
+        let heading = self.headings.get(index).and_then(Option::as_ref).or(other);
         let place = "in the heading, as in `radiance (W m-2 sr-1 nm-1)`";
         if self.by_wavenumber && heading.is_none() && self.remarks.is_empty() && given.is_none() {
             let problem = "it is by wavenumber and does not say whether its radiance is per nm or per cm-1";
@@ -215,9 +234,10 @@ impl SpectralTable {
     /// The columns of which nothing says that they hold anything but radiances.
     pub fn likely_radiances(&self) -> Vec<&str> {
         let is_other =
-            |says: &Option<Stated>| matches!(says, Some(Stated::Other { kind, .. }) if kind.is_another_quantity());
-        let likely = self.columns.iter().zip(&self.headings).filter(|(_, says)| !is_other(says));
-        likely.map(|(column, _)| column.as_str()).collect()
+            |says: &Option<Stated>| matches!(says, Some(Stated::Other { kind, .. }) if kind.conversion().is_some());
+        let all = self.columns.iter().zip(&self.headings).enumerate();
+        let likely = all.filter(|(index, (_, says))| !is_other(says) && !self.spoiled.contains_key(index));
+        likely.map(|(_, (column, _))| column.as_str()).collect()
     }
 
     /// Refuses values that stand for none.
@@ -294,6 +314,7 @@ fn holds_rows_without_names(numbers: &Array2<f64>) -> bool {
 #[derive(Debug, Default)]
 struct Comments {
     units: Vec<Stated>,
+    other_quantity: Option<Stated>,
     wavelength: Option<WavelengthUnit>,
 }
 
@@ -303,6 +324,7 @@ impl Comments {
         let mut found = Self::default();
         for line in delimited::comments(text).take(MAX_COMMENTS) {
             found.units.extend(units_in(line));
+            found.other_quantity = found.other_quantity.or_else(|| other_quantity(line));
             let counts =
                 |clause: &&str| ["wavelength", "wavenumber"].iter().any(|word| clause.to_lowercase().contains(word));
             let mut clauses = line.split([',', ';']).filter(counts);
@@ -311,6 +333,17 @@ impl Comments {
         }
         found
     }
+}
+
+/// The quantity that a comment such as `Unit: %` or `units of values = counts` states, where it is no spectral radiance.
+fn other_quantity(comment: &str) -> Option<Stated> {
+    let (before, stated) = comment.split_once([':', '='])?;
+    let mut words = before.split(|c: char| !c.is_alphanumeric());
+    let states = words.any(|word| ["unit", "units"].contains(&word.to_lowercase().as_str()));
+    let is_other = |stated: &Stated| matches!(stated, Stated::Other { kind, .. } if kind.conversion().is_some());
+    states
+        .then(|| unit_of_heading(stated).or_else(|| unit_of_heading(&format!("({})", stated.trim()))))?
+        .filter(is_other)
 }
 
 /// So many comments are searched for units.
@@ -347,13 +380,47 @@ fn headings(columns: &[String], units: Option<&StringRecord>, corner: Option<&st
         let cell = units?.get(index + 1)?;
         let both = unit_of_heading(&format!("{column} ({cell})"));
         let is_contradiction = matches!(&both, Some(Stated::Other { kind: OtherUnit::Contradiction, .. }));
-        if is_contradiction { both } else { unit_of_heading(cell) }
+        let alone = || unit_of_heading(cell).or_else(|| unit_of_heading(&format!("({cell})")));
+        if is_contradiction { both } else { alone() }
     };
     let of_corner = corner.and_then(unit_of_heading);
     let one = |(index, column): (usize, &String)| {
         unit_below(index, column).or_else(|| unit_of_heading(column)).or_else(|| of_corner.clone())
     };
     columns.iter().enumerate().map(one).collect()
+}
+
+/// The names of so many columns less that of wavelengths: those of a header, or numbers from 1.
+fn names(header: Option<&StringRecord>, width: usize) -> Vec<String> {
+    match header {
+        Some(header) => header.iter().skip(1).map(ToOwned::to_owned).collect(),
+        None => (1..width).map(|column| format!("column{column}")).collect(),
+    }
+}
+
+/// Whether a heading is that of a quantity other than wavelength.
+fn is_of_radiance(heading: &str) -> bool {
+    let unknown = |stated: &Stated| matches!(stated, Stated::Other { kind: OtherUnit::Unknown, .. });
+    unit_of_heading(heading).is_some_and(|stated| !unknown(&stated))
+}
+
+/// Wavelengths of a unit, of nm where none is said, in nm and ascending, and the curves over them.
+///
+/// # Errors
+///
+/// What is wrong with them, in words.
+fn in_nm(
+    mut wavelengths: Vec<f64>,
+    values: Array2<f64>,
+    unit: Option<WavelengthUnit>,
+) -> std::result::Result<(Vec<f64>, Array2<f64>), String> {
+    unit.map_or(Ok(()), |unit| check_stated(&wavelengths, unit))?;
+    let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
+    wavelengths.iter_mut().for_each(|wavelength| *wavelength = unit.nm(*wavelength));
+    check_order(&wavelengths)?;
+    let (wavelength_nm, values) = sorted(wavelengths, values);
+    check_nm(&wavelength_nm)?;
+    Ok((wavelength_nm, values))
 }
 
 /// The unit of wavelengths that their heading names.
@@ -371,109 +438,6 @@ fn sorted(wavelength_nm: Vec<f64>, values: Array2<f64>) -> (Vec<f64>, Array2<f64
     let mut order: Vec<usize> = (0..wavelength_nm.len()).collect();
     order.sort_by(|a, b| wavelength_nm[*a].total_cmp(&wavelength_nm[*b]));
     (order.iter().map(|place| wavelength_nm[*place]).collect(), values.select(Axis(1), &order))
-}
-
-/// Refuses wavelengths of which all but one are in order, and no other could be the one: a slip that sorting would hide.
-fn check_order(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
-    /// Of fewer nobody can tell the order.
-    const LEAST: usize = 4;
-    let breaks = |is_before: fn(&f64, &f64) -> bool| {
-        let in_order = |a: usize, b: usize| is_before(&wavelength_nm[a], &wavelength_nm[b]);
-        let last = wavelength_nm.len() - 1;
-        let broken: Vec<usize> = (0..last).filter(|place| !in_order(*place, place + 1)).collect();
-        // The place left out, those on both sides must be in order, and nothing else may be broken.
-        let mends = |place: usize| {
-            let is_touched = |at: &usize| *at == place || at + 1 == place;
-            broken.iter().all(is_touched) && (place == 0 || place == last || in_order(place - 1, place + 1))
-        };
-        let places = broken.first().map_or(0..0, |at| *at..at + 2);
-        (broken.len(), places.filter(|place| mends(*place)).collect::<Vec<_>>())
-    };
-    let [up, down] = [breaks(|a, b| a < b), breaks(|a, b| a > b)];
-    let (count, places) = if up.0 <= down.0 { up } else { down };
-    match places.as_slice() {
-        [place] if count > 0 && wavelength_nm.len() >= LEAST => {
-            let nm = |place: usize| wavelength_nm.get(place).map(f64::to_string);
-            let before = place.checked_sub(1).and_then(nm);
-            let beside = match (before, nm(place + 1)) {
-                (Some(before), Some(after)) => format!("between {before} and {after}"),
-                (Some(before), None) => format!("behind {before}"),
-                (None, after) => format!("before {}", after.unwrap_or_default()),
-            };
-            Err(format!(
-                "the wavelength {} nm stands {beside} nm, and all others are in order: mend it, or put it in its place",
-                wavelength_nm[*place]
-            ))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Refuses a wavelength that stands twice among ascending ones.
-fn check_unlike(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
-    match wavelength_nm.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(format!("the wavelength {} nm stands there twice; leave out one", pair[0])),
-        None => Ok(()),
-    }
-}
-
-/// Checks that ascending wavelengths are unlike, and look like nm.
-///
-/// # Errors
-///
-/// What is wrong, in words.
-pub(super) fn check_nm(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
-    check_unlike(wavelength_nm)
-        .and_then(|()| check_wavelengths(wavelength_nm))
-        .and_then(|()| check_likely(wavelength_nm))
-}
-
-/// Below this they are no wavelengths of light in µm either.
-const SHORTEST_UM: f64 = 0.1;
-
-/// Checks that wavelengths look like nm.
-fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
-    let [first, .., last] = wavelength_nm else { return Ok(()) };
-    let range = format!("its wavelengths run from {first} to {last} nm");
-    let name = "name their unit in the heading, such as";
-    if *last < SHORTEST_UM {
-        return Err(format!("{range}, which no light has; its first column must hold wavelengths"));
-    }
-    if *last < SHORTEST_NM {
-        return Err(format!("{range}, which looks like micrometers; {name} `wavelength_um`"));
-    }
-    if *first > LONGEST_NM {
-        return Err(format!(
-            "{range}, which looks like angstroms or wavenumbers; {name} `wavelength_angstrom` or `wavenumber_cm-1`"
-        ));
-    }
-    Ok(())
-}
-
-/// Refuses wavelengths that no light has in the unit that is said of them, where all are those of light in another.
-fn check_stated(wavelengths: &[f64], stated: WavelengthUnit) -> std::result::Result<(), String> {
-    const HEADINGS: [(WavelengthUnit, &str); 5] = [
-        (WavelengthUnit::Nanometer, "wavelength_nm"),
-        (WavelengthUnit::Micrometer, "wavelength_um"),
-        (WavelengthUnit::Angstrom, "wavelength_angstrom"),
-        (WavelengthUnit::PerCentimeter, "wavenumber_cm-1"),
-        (WavelengthUnit::Meter, "wavelength_m"),
-    ];
-    let are_seen = |unit: WavelengthUnit| {
-        let is_seen = |value: &f64| (SHORTEST_NM..=LONGEST_NM).contains(&unit.nm(*value));
-        (wavelengths.iter().any(is_seen), wavelengths.iter().all(is_seen))
-    };
-    let other = HEADINGS.iter().find(|(unit, _)| are_seen(*unit).1);
-    match other.filter(|_| !are_seen(stated).0 && wavelengths.len() > 1) {
-        Some((other, heading)) => {
-            let [low, high] = wavelengths
-                .iter()
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
-            let problem = format!("its wavelengths are said to be in {stated}, but {low} to {high} look like {other}");
-            Err(format!("{problem}; mend what says so, as in the heading `{heading}`"))
-        }
-        None => Ok(()),
-    }
 }
 
 /// A heading without the unit in brackets behind it.
@@ -552,6 +516,10 @@ mod tests {
                 "nm\tL\n400,0\t0,5\n410,0\t1,25\n420,0\t3,0\n",
                 "\"400,0\",\"0,5\"\n\"410,0\",\"1,25\"\n\"420,0\",\"3,0\"\n",
                 "wavelength (nm, vacuum)\tL\n400\t0,5\n410\t1,25\n420\t3\n",
+                "400 0,5\n410 1,25\n420 3,0\n",
+                "nm L\n400 0,5\n410 1,25\n420 3\n",
+                "nm L\n400,0 0,5\n410,0 1,25\n420,0 3,0\n",
+                "wavelength (nm) L\n420 3,0\n400 0,5\n410 1,25\n",
                 "  400.000  5.000000e-01 \n  410.000  1.250000e+00 \n  420.000  3.000000e+00 \n",
                 "  400,000  5,0e-01\n  410,000  1,25\n  420,000  3,0\n",
                 " WAVELENGTH (nm)   TOTAL RAD\n 400.  0.5D+00\n 410.  0.125D+01\n 420.  3.0D0\n",
@@ -559,8 +527,12 @@ mod tests {
                 "# a, b\n; c; d\n% e\n// f\n! g\n  # h\n400 0.5\n\n410 1.25\n420 3\n",
                 "nm,L,\n400,0.5,\n410,1.25,\n420,3,\n,,\n",
                 "nm,\n400,0.5\n410,1.25\n420,3\n",
+                "nm,L\n400,0.5,\n410,1.25,\n420,3,\n",
+                "nm,L\n400,0.5\n410,1.25,\n420,3,,\n",
                 "nm;L;;\n400;0,5;;\n410;1,25;;\n420;3;;\n",
                 "id;400;410;420\nsky;0,5;1,25;3\n",
+                "id,400,410,420\n2024 05 01,0.5,1.25,3\n",
+                "id,400,410,420\nsky; noon,0.5,1.25,3\n",
                 ";400;410;420\nsky;0,5;1,25;3\n",
                 "nm,L\r400,0.5\r410,1.25\r420,3\r",
                 "nm,L\n420,3\n410,1.25\n400,0.5\n",
@@ -581,6 +553,47 @@ mod tests {
         }
         let latin1 = SpectralTable::parse("a", b"nm,L (\xB5W/cm\xB2/sr/nm)\n400,1\n").unwrap();
         assert_eq!(latin1.radiance_unit(0, None).unwrap().0, RadianceUnit::USUAL[4]);
+    }
+
+    /// What is no number spoils its own curve alone.
+    #[test]
+    fn columns_that_are_not_wanted_may_hold_anything() {
+        let values = [0.5, 1.25, 3.0];
+        for text in [
+            "nm,L,flag\n400,0.5,good\n410,1.25,\n420,3,bad\n",
+            "nm,L,flag\n400,0.5,\n410,1.25,\n420,3,\n",
+            "nm,L,flag,\n400,0.5,x,\n410,1.25,,\n420,3,,\n",
+            "nm,flag,L\n400,,0.5\n410,\"a, b\",1.25\n420,x,3\n",
+            "nm;flag;L\n400;gut;0,5\n410;schlecht, naß;1,25\n420;;3\n",
+            "nm\tL\tM\n400\t0.5\t1\n410\t1.25\t\n420\t3\t7\n",
+            "nm L flag\n400 0.5 good\n410 1.25 bad\n420 3 good\n",
+            "nm flag L\n400 gut 0,5\n410 schlecht 1,25\n420 gut 3,0\n",
+            "nm\tflag\tL\n400\tgut\t0,5\n410\tschlecht\t1,25\n420\tgut\t3\n",
+            "nm L flag\n400 0,5 good\n410 1,25 bad\n420 3,0 good\n",
+            "nm L flag\n400 0.5 (good)\n410 1.25 (bad)\n420 3 [good]\n",
+            "nm,L,M\n400,0.5,1\n410,1.25,nan\n420,3,7\n",
+            "id,400,410,420\nL,0.5,1.25,3\nflag,1,,2\n",
+        ] {
+            let table = SpectralTable::parse("a", text.as_bytes()).unwrap_or_else(|error| panic!("{text}: {error}"));
+            let curve = table.curve(Some("L")).unwrap_or_else(|error| panic!("{text}: {error}"));
+            assert_eq!([400.0, 410.0, 420.0].map(|nm| curve.at(nm)), values, "{text}");
+            let other = table.columns.iter().find(|name| *name != "L").unwrap();
+            let refused = table.curve(Some(other)).unwrap_err().to_string();
+            assert!(refused.starts_with("a: line "), "{text}: {refused}");
+            let index = table.column_index(Some(other)).unwrap();
+            assert_eq!(table.radiance_unit(index, Some(RadianceUnit::USUAL[1])).unwrap_err().to_string(), refused);
+            assert_eq!(table.likely_radiances(), ["L"]);
+        }
+        let complaint = |text: &str| SpectralTable::parse("t", text.as_bytes()).unwrap_err().to_string();
+        // Nothing is left of these.
+        assert!(complaint("nm,L,M\n400,1,x\n410,,2\n").starts_with("t: line 3, column 2 is empty"));
+        assert!(complaint("nm,L,M\n400,1,2\n41O,1,2\n").starts_with("t: line 3, column 1: `41O` is no number"));
+        // Cells that are lacking, or are too many, belong to no column.
+        assert!(complaint("nm L flag\n400 0.5 good\n410 1.25\n").starts_with("t: line 3 has 2 cells"));
+        assert_eq!(complaint("nm;L\n400;1\n410;1;2\n"), "t: line 3 has 3 cells, the rows above it have 2");
+        assert!(complaint("nm L\n360.5 0,05\n361.5 0,06\n").contains("decimal points and decimal commas"));
+        let refused = complaint("id,L\n360 0,05\n370 0,06\n");
+        assert!(refused.starts_with("t: line 1: 1 word stands above 2 columns that are parted by blanks"), "{refused}");
     }
 
     /// Planck's law per wavenumber, 2hc²ν³/(exp(hcν/kT) − 1), becomes that per wavelength, 2hc²/λ⁵/(exp(hc/λkT) − 1).
@@ -733,6 +746,52 @@ mod tests {
             assert_eq!(table.radiance_unit(0, watts).unwrap(), (watts.unwrap(), None), "{text}");
             let other = table.radiance_unit(0, Some(RadianceUnit::default())).unwrap_err().to_string();
             assert!(other.ends_with("not W cm-2 sr-1 nm-1; leave out `radiance_unit`"), "{other}");
+        }
+    }
+
+    #[test]
+    fn other_quantities_are_refused_whatever_is_said_of_their_unit() {
+        let unit = |text: &str, given| SpectralTable::parse("a", text.as_bytes()).unwrap().radiance_unit(0, given);
+        let watts = RadianceUnit::USUAL[1];
+        let given = Some(watts);
+        for given in [None, given] {
+            for (text, quantity, conversion) in [
+                (
+                    "nm,L (W m-2 sr-1)\n400,1\n",
+                    "`W m-2 sr-1`, a radiance over all",
+                    "divide the value of each band by the width",
+                ),
+                ("nm,reflectance (%)\n400,1\n", "`reflectance (%)`, a ratio", "as a fraction of 1, by the radiance"),
+                ("nm,sky\nnm,%\n400,1\n", "`%`, a ratio", "as a fraction of 1, by the radiance"),
+                ("nm,sky (counts)\n400,1\n", "`counts`, what an instrument reads", "by the calibration"),
+                ("nm,L (J m-2 sr-1 nm-1)\n400,1\n", "of energy, a radiance summed over time", "by the time in s"),
+                ("# Unit: W m-2 sr-1\nnm,L\n400,1\n", "`W m-2 sr-1`, a radiance over all", "the width of the band"),
+                ("# units of values = reflectance\nnm,L\n400,1\n", "a ratio", "as a fraction of 1, by the radiance"),
+                ("# Unit: %\nnm,L\n400,1\n", "`%`, a ratio", "as a fraction of 1, by the radiance"),
+            ] {
+                let refused = unit(text, given).unwrap_err().to_string();
+                assert!(refused.contains(quantity) && refused.contains(conversion), "{text}: {refused}");
+                assert!(!refused.contains("radiance_unit"), "{refused}");
+            }
+        }
+        // In passing comments may speak of other things.
+        for text in [
+            "# of an irradiance of 3 W m-2\nnm,L\n400,1\n",
+            "# Unit: W m-2 sr-1 nm-1, band radiance: W m-2 sr-1\nnm,L\n400,1\n",
+            "# wavelength unit: nm\nnm,L\n400,1\n",
+        ] {
+            assert_eq!(unit(text, given).unwrap().0, watts, "{text}");
+        }
+        // 1 erg is 10⁻⁷ J.
+        for text in [
+            "nm,L (erg s-1 cm-2 sr-1 nm-1)\n400,1\n",
+            "nm,L\nnm,erg/(s cm2 sr nm)\n400,1\n",
+            "# Unit: erg s-1 cm-2 sr-1 nm-1\nnm,L\n400,1\n",
+            "nm,radiance_erg_per_s_cm2_sr_nm\n400,1\n",
+        ] {
+            let found = unit(text, None).unwrap().0;
+            assert!((found.in_w_per_cm2_sr_nm(500.0) / 1e-7 - 1.0).abs() < 1e-15, "{text}");
+            assert_eq!(unit(text, RadianceUnit::parse("erg/s/cm2/sr/nm")).unwrap().0, found);
         }
     }
 

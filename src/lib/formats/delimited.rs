@@ -23,23 +23,48 @@ pub enum Separator {
 
 impl Separator {
     /// What parts the cells of `text`: what makes two or more cells of the last of its first rows, all but the first of them
-    /// numbers, or, in a table `of_numbers`, of the last that has no mistake; where nothing does, the first of comma, semicolon
-    /// and tab that the first row has.
+    /// numbers, or, in a table `of_numbers`, of the last that has no mistake, or at least begins with a number and has another; where
+    /// nothing does, the first of comma, semicolon and tab that the first row has.
     pub fn of(text: &str, of_numbers: bool) -> Self {
         let rows: Vec<&str> = rows(text).take(ROWS_LOOKED_AT).collect();
-        let makes_numbers = |row: &str, separator: &&Self| {
-            let cells: Vec<&str> = separator.cells(row);
-            let is_number =
-                |cell: &&str| number(cell).is_some() || **separator != Self::Byte(b',') && decimal(cell).is_some();
-            let filled = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
-            filled > 1 && cells[1..filled].iter().all(is_number)
-        };
         let first = rows.first().unwrap_or(&"").as_bytes();
         let in_first = || b",;\t".iter().find(|separator| first.contains(separator));
         let looked_at = if of_numbers { rows.len() } else { 1 };
-        let mut last = rows.iter().rev().take(looked_at);
-        let found = last.find_map(|row| SEPARATORS.iter().find(|separator| makes_numbers(row, separator)));
-        found.copied().unwrap_or_else(|| Self::Byte(*in_first().unwrap_or(&b',')))
+        let last = || rows.iter().rev().take(looked_at);
+        let found = last().find_map(|row| SEPARATORS.iter().find(|separator| separator.makes_numbers(row)));
+        // A column of words, or one with gaps.
+        let of_some = || {
+            let mut last = last().filter(|_| of_numbers);
+            last.find_map(|row| SEPARATORS.iter().find(|separator| separator.makes_some(row)))
+        };
+        found.or_else(of_some).copied().unwrap_or_else(|| Self::Byte(*in_first().unwrap_or(&b',')))
+    }
+
+    /// Whether a cell between such separators is a number: no comma is one of decimals where it parts cells.
+    fn is_number(self, cell: &str) -> bool {
+        number(cell).is_some() || self != Self::Byte(b',') && decimal(cell).is_some()
+    }
+
+    /// Whether a row has two cells or more, all but the first of them numbers. A comma that parts no number from them may be one of
+    /// decimals: `360 0,05`, `360;good;0,05`.
+    fn makes_numbers(self, row: &str) -> bool {
+        let cells: Vec<&str> = self.cells(row);
+        let filled = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+        let is_of_decimals = || {
+            let blanks = Self::Blanks.cells(row);
+            let fits = |cell: &&str| !cell.contains(',') || decimal(cell).is_some();
+            number(cells[0]).is_none()
+                && (cells[0].contains([';', '\t']) || Self::Blanks.makes_some(row) && blanks.iter().all(fits))
+        };
+        filled > 1
+            && cells[1..filled].iter().all(|cell| self.is_number(cell))
+            && !(self == Self::Byte(b',') && is_of_decimals())
+    }
+
+    /// Whether a row begins with a number and has another.
+    fn makes_some(self, row: &str) -> bool {
+        let cells: Vec<&str> = self.cells(row);
+        cells.first().is_some_and(|cell| self.is_number(cell)) && cells[1..].iter().any(|cell| self.is_number(cell))
     }
 
     fn cells(self, row: &str) -> Vec<&str> {
@@ -153,30 +178,37 @@ pub fn comments(text: &str) -> impl Iterator<Item = &str> {
 }
 
 /// The rows of a text, each in its line, as a reader of CSV takes them: comments emptied, cells parted by blanks now parted by
-/// tabs, and, where `trims` and rows end with separators, without these; none where it is so already.
+/// tabs, and, where it `trims`, without the separators that end rows behind the last column in which any row has something; none where
+/// it is so already.
 ///
 /// # Errors
 ///
 /// [`Error::Format`] for a line of words over columns that are parted by blanks where it is not clear which is whose.
 pub fn plain(name: &str, text: &str, separator: Separator, trims: bool) -> Result<Option<String>> {
     let row = rows(text).next();
-    let last = rows(text).take(ROWS_LOOKED_AT).last().unwrap_or_default();
-    let ends_so = |line: &str| line.trim_end_matches([' ', '\r']).as_bytes().last() == Some(&separator.byte());
-    let trims = trims && ends_so(last);
-    let is_plain = |line: &str| line.starts_with('#') || comment(line, row).is_none() && !(trims && ends_so(line));
+    let widest = match separator {
+        Separator::Byte(byte) if trims => {
+            rows(text).map(|line| Extent::of(line, byte).filled).max().unwrap_or(usize::MAX)
+        }
+        _ => usize::MAX,
+    };
+    let is_plain = |line: &str| {
+        line.starts_with('#')
+            || comment(line, row).is_none() && Extent::of(line, separator.byte()).surplus(widest).is_none()
+    };
     if matches!(separator, Separator::Byte(_)) && text.lines().all(is_plain) {
         return Ok(None);
     }
-    let width = separator.cells(last).len();
+    let width = usual_width(text, separator);
     let mut plain = String::with_capacity(text.len());
     for (index, line) in text.lines().enumerate() {
         if comment(line, row).is_none() {
             match separator {
-                Separator::Byte(byte) if trims => plain.push_str(line.trim_end_matches([' ', '\r', char::from(byte)])),
-                Separator::Byte(_) => plain.push_str(line),
+                Separator::Byte(byte) => plain.push_str(without_surplus(line, byte, widest)),
                 Separator::Blanks => push_cells(&mut plain, line, width).map_err(|words| {
+                    let stand = if words == 1 { "word stands" } else { "words stand" };
                     let problem = format!(
-                        "line {}: {words} words stand above {width} columns that are parted by blanks; part all cells by tabs, \
+                        "line {}: {words} {stand} above {width} columns that are parted by blanks; part all cells by tabs, \
                          commas or semicolons",
                         index + 1
                     );
@@ -189,8 +221,70 @@ pub fn plain(name: &str, text: &str, separator: Separator, trims: bool) -> Resul
     Ok(Some(plain))
 }
 
+/// How many cells a row has, and up to which of them there is something.
+#[derive(Clone, Copy)]
+struct Extent {
+    cells: usize,
+    filled: usize,
+}
+
+impl Extent {
+    /// Of cells between separators, of which those in quotes part nothing.
+    fn of(line: &str, separator: u8) -> Self {
+        let (mut cells, mut filled, mut is_quoted, mut before) = (1, 0, false, 0);
+        for byte in line.bytes() {
+            match byte {
+                _ if byte == separator && !is_quoted => cells += 1,
+                b' ' | b'\r' | b'\t' => {}
+                _ => {
+                    // A quote begins a cell, ends it, or, twice, stands in it.
+                    is_quoted ^= byte == b'"' && (is_quoted || filled < cells || before == b'"');
+                    filled = cells;
+                }
+            }
+            before = byte;
+        }
+        Self { cells, filled }
+    }
+
+    /// The empty cells at the end of a row that is wider than `widest`; all those of a row that has no others. None where there are none.
+    fn surplus(self, widest: usize) -> Option<usize> {
+        let kept = if self.filled == 0 { 0 } else { widest };
+        (widest < usize::MAX && self.cells > kept.max(1)).then(|| self.cells - kept.max(1))
+    }
+}
+
+/// A row without the separators of its surplus cells.
+fn without_surplus(line: &str, separator: u8, widest: usize) -> &str {
+    let mut kept = line;
+    for _ in 0..Extent::of(line, separator).surplus(widest).unwrap_or(0) {
+        let end = kept.trim_end_matches(|c: char| c.is_ascii_whitespace() && c != char::from(separator));
+        kept = end.strip_suffix(char::from(separator)).unwrap_or(end);
+    }
+    kept
+}
+
+/// How many cells most of the first rows have that begin with a number, or the last of the first where none does; of two numbers of
+/// cells that are as frequent the larger.
+fn usual_width(text: &str, separator: Separator) -> usize {
+    let mut widths: Vec<(usize, usize)> = Vec::new();
+    let mut last = 0;
+    for row in rows(text).take(ROWS_LOOKED_AT) {
+        let cells = separator.cells(row);
+        last = cells.len();
+        if cells.first().is_some_and(|cell| separator.is_number(cell)) {
+            match widths.iter_mut().find(|(width, _)| *width == last) {
+                Some((_, count)) => *count += 1,
+                None => widths.push((last, 1)),
+            }
+        }
+    }
+    widths.into_iter().max_by_key(|(width, count)| (*count, *width)).map_or(last, |(width, _)| width)
+}
+
 /// Adds the cells of a line that are parted by blanks, tabs between them. Words are parted so that there are `width` of them:
-/// by two blanks or more, or each with what stands in brackets behind it. Otherwise it gives how many there are.
+/// by two blanks or more, or each with what stands in brackets behind it; a row that begins with a number stays as it is where neither
+/// makes so many. Otherwise it gives how many there are.
 fn push_cells(plain: &mut String, line: &str, width: usize) -> std::result::Result<(), usize> {
     let cells: Vec<&str> = line.split_whitespace().collect();
     let are_numbers = cells.iter().skip(1).all(|cell| number(cell).or_else(|| decimal(cell)).is_some());
@@ -200,7 +294,10 @@ fn push_cells(plain: &mut String, line: &str, width: usize) -> std::result::Resu
     }
     let apart: Vec<&str> = line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).collect();
     let named = bracketed(line);
-    let cells = [apart, named].into_iter().find(|cells| cells.len() == width).ok_or(cells.len())?;
+    let count = cells.len();
+    // No heading begins with a number.
+    let of_row = Some(cells).filter(|cells| Separator::Blanks.is_number(cells[0]));
+    let cells = [apart, named].into_iter().find(|cells| cells.len() == width).or(of_row).ok_or(count)?;
     plain.push_str(&cells.join("\t"));
     Ok(())
 }

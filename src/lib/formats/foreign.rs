@@ -45,7 +45,10 @@ pub fn csv_complaint(name: &str, rows: &str, error: &csv::Error) -> Error {
         csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
             let line = line_of(rows, pos.as_ref());
             let cells = if *len == 1 { "cell" } else { "cells" };
-            let hint = if len > expected_len {
+            // Of cells that something else parts, commas are those of decimals already.
+            let row =
+                usize::try_from(line).ok().and_then(|line| rows.lines().nth(line.checked_sub(1)?)).unwrap_or_default();
+            let hint = if len > expected_len && row.contains(',') && !row.contains([';', '\t']) {
                 "; part columns by semicolons or tabs where commas are those of decimals"
             } else {
                 ""

@@ -78,7 +78,7 @@ impl FrameWriter {
     /// # Errors
     ///
     /// [`Error::Usage`] where options do not go together, the output is a terminal, or it or its sidecar is a file that is
-    /// read; [`Error::Disk`].
+    /// read; [`Error::Disk`], also where there is no room for it.
     pub fn create(options: &OutputOptions, header: &FrameHeader) -> Result<Self> {
         let encoding = options.encoding(header)?;
         let sample_scale = options.scale(header, encoding)?;
@@ -89,6 +89,8 @@ impl FrameWriter {
         let target = Target::open(options.path.as_deref(), needs_seek)?;
         let name = target.name().to_owned();
         let follow = options.frames_to_come > 0 && target.named_file().is_none();
+        let frames = if follow { options.frames_to_come.saturating_add(1) } else { 1 };
+        encoding.bytes(&header.geometry).map_or(Ok(()), |bytes| target.check_room(bytes.saturating_mul(frames)))?;
         header.metadata.frames_to_come = follow.then_some(options.frames_to_come);
         header.metadata.file = header.metadata.file.filter(|_| target.named_file().is_none());
         let header = &header;

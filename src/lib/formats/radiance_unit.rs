@@ -37,16 +37,17 @@ pub fn settle(says: FileSays<'_>, given: Option<RadianceUnit>) -> Result<(Radian
             });
             Ok((unit, warned))
         }
-        Some(Stated::Other { text, kind }) if kind.is_another_quantity() => {
-            let problem = is_in(text, kind.in_words());
-            Err(Error::format(
-                name,
-                format!("{problem}; spectral radiances are wanted, such as {}", RadianceUnit::USUAL[1]),
-            ))
-        }
-        Some(Stated::Other { text, kind }) => match given {
-            Some(unit) => Ok((unit, None)),
-            None => Err(Error::format(name, is_in(text, kind.in_words())).give(&["radiance_unit"])),
+        Some(Stated::Other { text, kind }) => match (kind.conversion(), given) {
+            // No name of a unit makes radiances of them.
+            (Some(conversion), _) => {
+                let problem = is_in(text, kind.in_words());
+                let wanted = RadianceUnit::USUAL[1];
+                let problem =
+                    format!("{problem}; spectral radiances are wanted, in units such as {wanted}: {conversion}");
+                Err(Error::format(name, problem))
+            }
+            (None, Some(unit)) => Ok((unit, None)),
+            (None, None) => Err(Error::format(name, is_in(text, kind.in_words())).give(&["radiance_unit"])),
         },
         None if remarks.is_empty() && given.is_none() => {
             let unit = RadianceUnit::default();

@@ -1,7 +1,8 @@
 //! Relative responses of R, G and B as tables have them, and what in them may mislead.
 
-use super::csv::{SpectralTable, check_nm};
+use super::csv::SpectralTable;
 use super::response_import::{self, Samples};
+use super::wavelengths::check_nm;
 use crate::cfa::Class;
 use crate::error::{Error, Result};
 use crate::spectrum::Curve;
@@ -45,6 +46,7 @@ impl ResponseTable {
         }
         let table = SpectralTable::parse(name, bytes)?;
         let (places, told) = places(&table, of).map_err(|problem| Error::format(name, problem))?;
+        places.iter().try_for_each(|place| table.check(*place))?;
         let values = places.map(|place| table.values.row(place).to_vec());
         let nameless = told.is_some() && !has_names(&table);
         if let Some(problem) = exchanged(&table.wavelength_nm, &values).filter(|_| nameless) {

@@ -83,7 +83,7 @@ impl SpectralChannels {
 /// A source of radiances: a table, or an image.
 pub enum Radiances {
     /// Spectra as CSV.
-    Table(SpectralTable),
+    Table(Box<SpectralTable>),
     /// A frame, which should be a spectral EXR.
     Image(Box<FrameReader>),
 }
@@ -113,7 +113,7 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
         return Ok(Radiances::Image(Box::new(FrameReader::open_file(file, &name, path, &options)?)));
     }
     let bytes = read_table(io::Cursor::new(head).chain(file), &name)?;
-    Ok(Radiances::Table(SpectralTable::parse(&name, &bytes)?))
+    Ok(Radiances::Table(Box::new(SpectralTable::parse(&name, &bytes)?)))
 }
 
 /// A complaint of a file that is not there, with the spectrum of a data directory that may be meant.

@@ -8,6 +8,7 @@ use super::png;
 use super::tiff::{TiffCompression, TiffSamples};
 use super::viewable;
 use crate::error::{Error, Result};
+use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
 use crate::names::Named;
 use crate::units::QuantityKind;
@@ -135,6 +136,23 @@ pub(super) enum Encoding {
     Dng(TiffSamples, TiffCompression),
     /// 16-bit integers, deflated.
     Png,
+}
+
+impl Encoding {
+    /// Bytes that the samples of a frame take at least; none where nobody knows before they are compressed.
+    pub(super) fn bytes(self, geometry: &Geometry) -> Option<u64> {
+        let of_sample = match self {
+            Self::Exr(ExrSamples::F32, ExrCompression::None)
+            | Self::Tiff(TiffSamples::F32, TiffCompression::None)
+            | Self::Dng(TiffSamples::F32, TiffCompression::None) => 4,
+            Self::Exr(ExrSamples::F16, ExrCompression::None)
+            | Self::Tiff(TiffSamples::U16, TiffCompression::None)
+            | Self::Dng(TiffSamples::U16, TiffCompression::None) => 2,
+            Self::Exr(..) | Self::Tiff(..) | Self::Dng(..) | Self::Png => return None,
+        };
+        let sides = [geometry.width, geometry.height, geometry.channels.len()];
+        Some(sides.into_iter().fold(of_sample, |bytes, side| bytes.saturating_mul(side as u64)))
+    }
 }
 
 impl OutputOptions {

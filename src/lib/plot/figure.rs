@@ -79,7 +79,7 @@ pub struct Axis {
 /// Numbers that belong together, and how they are shown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// What the legend says; a series without a name is not in the legend.
+    /// What the legend says; a series without a name, or with marks of which the axes show nothing, is not in the legend.
     pub name: String,
     /// The color, which also chooses the form of points.
     pub color: Color,

@@ -23,10 +23,10 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| advance(glyph(c))).sum::<f64>() * size / f64::from(FACE.units_per_em())
 }
 
-/// The words of a text in lines that are no wider, but for a single word.
+/// The words of a text in lines that are no wider; words that alone are wider are parted.
 pub(super) fn lines(text: &str, size: f64, most: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
+    for word in text.split_whitespace().flat_map(|word| parts(word, size, most)) {
         match lines.last_mut() {
             Some(line) if width(&format!("{line} {word}"), size) <= most => {
                 line.push(' ');
@@ -36,6 +36,20 @@ pub(super) fn lines(text: &str, size: f64, most: f64) -> Vec<String> {
         }
     }
     lines
+}
+
+/// A word in parts that are no wider, of a letter at least.
+fn parts(word: &str, size: f64, most: f64) -> Vec<&str> {
+    let (mut parts, mut rest) = (Vec::new(), word);
+    while width(rest, size) > most {
+        let ends = rest.char_indices().map(|(at, _)| at).skip(1);
+        let fits = ends.take_while(|end| width(&rest[..*end], size) <= most).last();
+        let Some(end) = fits.or_else(|| rest.char_indices().nth(1).map(|(at, _)| at)) else { break };
+        parts.push(&rest[..end]);
+        rest = &rest[end..];
+    }
+    parts.push(rest);
+    parts
 }
 
 /// The outlines of a text in units of the font, y upward, and the scale that gives it a size.
@@ -94,6 +108,18 @@ mod tests {
             assert!(FACE.glyph_index(c).is_some(), "{c:?}");
         }
         assert_eq!(glyph('\u{1F600}'), FACE.glyph_index('\u{FFFD}').unwrap());
+    }
+
+    #[test]
+    fn lines_are_no_wider_than_asked_for() {
+        let text = "a title of some words, and one/that/is/a/path/as/long/as/paths/of/people/are.exr";
+        for most in [1.0, 60.0, 200.0, 5000.0] {
+            let lines = lines(text, 12.0, most);
+            assert_eq!(lines.concat().replace(' ', ""), text.replace(' ', ""));
+            assert!(lines.iter().all(|line| width(line, 12.0) <= most || line.chars().count() == 1), "{lines:?}");
+        }
+        assert_eq!(lines(text, 12.0, 5000.0), [text]);
+        assert!(lines("", 12.0, 10.0).is_empty());
     }
 
     #[test]

@@ -2,28 +2,41 @@
 
 use super::drawing::{Drawing, Rect};
 use super::figure::{Anchor, Arrangement, Panel, Plot};
+use super::font;
 use super::pane::Pane;
 use super::room::Room;
-use super::style::{MARGIN, TITLE, write};
+use super::style::{MARGIN, TITLE, TITLE_LINE, write};
 
 /// Lays a plot out.
 pub(super) fn draw(plot: &Plot) -> Drawing {
     // 900 × 600 for one panel; of several, each gets somewhat less.
     let count = plot.panels.len().max(1);
-    let title_height = if plot.title.is_empty() { 0.0 } else { TITLE + 12.0 };
     let (columns, cell_width, cell_height) = match (plot.arrangement, count) {
-        (_, 1) => (1, 900.0, 600.0 - title_height - MARGIN),
+        (_, 1) => (1, 900.0, 600.0),
         (Arrangement::Stacked, _) => (1, 900.0, 400.0),
         (Arrangement::SideBySide, _) => (count, 560.0, 500.0),
         (Arrangement::Pairs, _) => (2, 520.0, 390.0),
     };
+    let width = cell_width * columns as f64;
+    let title = font::lines(&plot.title, TITLE, width - 2.0 * MARGIN);
+    let title_height = match title.len() {
+        0 => 0.0,
+        lines => TITLE + 12.0 + TITLE_LINE * (lines - 1) as f64,
+    };
+    // A single panel is as high as what the title leaves, of at most two lines.
+    let cell_height = match count {
+        1 => (cell_height - title_height - MARGIN).max(cell_height - MARGIN - TITLE - 12.0 - TITLE_LINE),
+        _ => cell_height,
+    };
     // The first panel of an odd number takes two places.
     let is_wide = |index: usize| plot.arrangement == Arrangement::Pairs && count > 1 && count % 2 == 1 && index == 0;
     let rows = (count + usize::from(is_wide(0))).div_ceil(columns);
-    let width = cell_width * columns as f64;
     let height = title_height + MARGIN + cell_height * rows as f64;
     let mut drawing = Drawing::new(width, height, &plot.title);
-    write(&mut drawing, &plot.title, [0.5 * width, MARGIN + TITLE], TITLE, Anchor::Middle);
+    for (index, line) in title.iter().enumerate() {
+        let baseline = MARGIN + TITLE + TITLE_LINE * index as f64;
+        write(&mut drawing, line, [0.5 * width, baseline], TITLE, Anchor::Middle);
+    }
 
     let width_of = |index: usize| if is_wide(index) { 2.0 * cell_width } else { cell_width };
     let panels = plot.panels.iter().enumerate();

@@ -1,9 +1,10 @@
 //! Where the legend and names of lines go: where they cover least.
 
 use super::drawing::{Drawing, Ink, Point, Rect, Stroke};
-use super::figure::{Anchor, Panel, Series};
+use super::figure::{Anchor, Marks, Panel, Series};
 use super::font;
 use super::marks::{Look, draw_swatch};
+use super::ruler::Ruler;
 use super::style::{LINE, MIDDLE, SWATCH, TEXT, write};
 
 /// Places on the canvas that are better not covered, a few pixels apart.
@@ -57,9 +58,10 @@ pub(super) struct Legend<'a> {
 }
 
 impl<'a> Legend<'a> {
-    /// The legend of a panel in one column; `None` where no series has a name.
-    pub fn of(panel: &'a Panel) -> Option<Self> {
-        let named: Vec<&Series> = panel.series.iter().filter(|series| !series.name.is_empty()).collect();
+    /// The legend of a panel on its rulers in one column, of the series that are seen there; `None` where none of them has a name.
+    pub fn of(panel: &'a Panel, x: &Ruler, y: &Ruler) -> Option<Self> {
+        let is_listed = |series: &&Series| !series.name.is_empty() && is_seen(&series.marks, x, y);
+        let named: Vec<&Series> = panel.series.iter().filter(is_listed).collect();
         let rows = named.len();
         (rows > 0).then(|| Self { widths: widths(&named, rows), named, rows })
     }
@@ -112,6 +114,43 @@ impl<'a> Legend<'a> {
             write(drawing, &series.name, baseline, TEXT, Anchor::Start);
         }
     }
+}
+
+/// Whether any of what is drawn for a series lies within the axes; what has no marks is for the legend alone.
+fn is_seen(marks: &Marks, x: &Ruler, y: &Ruler) -> bool {
+    let place = |[at_x, at_y]: &[f64; 2]| Some([x.place(*at_x)?, y.place(*at_y)?]);
+    let is_within = |place: f64| (0.0..=1.0).contains(&place);
+    match marks {
+        none if none.is_empty() => true,
+        Marks::Line(points) | Marks::Dashed(points) | Marks::LineAndPoints(points) => {
+            let places: Vec<Point> = points.iter().filter_map(place).collect();
+            places.windows(2).any(|pair| crosses(pair[0], pair[1]))
+                || places.first().is_some_and(|at| crosses(*at, *at))
+        }
+        Marks::Points(points) => points.iter().filter_map(place).any(|at| at.into_iter().all(is_within)),
+        Marks::ErrorBars(ranges) => ranges.iter().any(|[at_x, low, high]| {
+            let foot = || y.place_within(*low);
+            let ends = x.place(*at_x).zip(y.place(*low).or_else(foot)).zip(y.place(*high));
+            ends.is_some_and(|((at, low), high)| crosses([at, low], [at, high]))
+        }),
+    }
+}
+
+/// Whether a straight line touches the square from 0 to 1 [Liang and Barsky, ACM Trans. Graph. 3 (1984), 1].
+fn crosses(from: Point, to: Point) -> bool {
+    let (mut begin, mut end) = (0.0_f64, 1.0_f64);
+    for axis in 0..2 {
+        let (start, step) = (from[axis], to[axis] - from[axis]);
+        if step == 0.0 {
+            if !(0.0..=1.0).contains(&start) {
+                return false;
+            }
+            continue;
+        }
+        let [one, other] = [-start / step, (1.0 - start) / step];
+        (begin, end) = (begin.max(one.min(other)), end.min(one.max(other)));
+    }
+    begin <= end
 }
 
 /// The width of each column of so many rows.

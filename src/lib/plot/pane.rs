@@ -146,7 +146,11 @@ impl<'a> Pane<'a> {
     pub fn has_room_for_legend(&self) -> bool {
         let mut covered = self.covered();
         self.names(&mut covered);
-        Legend::of(self.panel).is_none_or(|legend| legend.place_within(self.area, &covered).is_some())
+        self.legend().is_none_or(|legend| legend.place_within(self.area, &covered).is_some())
+    }
+
+    fn legend(&self) -> Option<Legend<'a>> {
+        Legend::of(self.panel, &self.room.x, &self.room.y)
     }
 
     fn draw_legend(&self, drawing: &mut Drawing, look: Look, covered: &mut Covered) {
@@ -155,7 +159,7 @@ impl<'a> Pane<'a> {
             let left = self.area.left.min(right - width).max(self.cell.left).floor() + 0.5;
             let top = self.area.top - self.room.top + self.room.head - legend.size()[1] - 8.0;
             legend.draw(drawing, [left, top], look);
-        } else if let Some(legend) = Legend::of(self.panel)
+        } else if let Some(legend) = self.legend()
             && let Some(rect) = legend.place_within(self.area, covered)
         {
             legend.draw(drawing, [rect.left, rect.top], look);

@@ -21,8 +21,9 @@ const TITLE: f64 = 25.0;
 const BAR_GAP: f64 = 12.0;
 const BAR_WIDTH: f64 = 16.0;
 const LEAST_BAR: f64 = 80.0;
-/// First lines of captions, names, are at least so wide before they are shortened.
+/// First lines of captions, names, are at least so wide before they are shortened, and others before they are parted.
 const LEAST_NAME: f64 = 220.0;
+const LEAST_LINE: f64 = 460.0;
 
 /// Pixels, three bytes each, row by row.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -74,7 +75,7 @@ pub struct Tile {
     pub bar: Option<ScaleBar>,
     /// What it is called, the first line below it, which loses its middle where it is wider than all else; may be empty.
     pub name: String,
-    /// More lines below it.
+    /// More lines below it, parted where they are wider than the picture and than people read.
     pub caption: Vec<String>,
 }
 
@@ -139,6 +140,8 @@ struct Block<'a> {
     width: f64,
     height: f64,
     bar: Option<Bar>,
+    /// All that stands below the picture.
+    lines: Vec<String>,
 }
 
 /// A bar that knows how large it is.
@@ -167,6 +170,15 @@ impl Type {
         Stroke { width: self.scale.round(), ..FRAME }
     }
 
+    /// Lines, each in as many as it needs; empty ones stay.
+    fn parted(self, lines: &[String], width: f64) -> Vec<String> {
+        let of = |line: &String| match font::lines(line, self.of(TEXT), width) {
+            none if none.is_empty() => vec![String::new()],
+            lines => lines,
+        };
+        lines.iter().flat_map(of).collect()
+    }
+
     /// A text without its middle where it is too wide.
     fn shortened(self, text: &str, width: f64) -> String {
         let letters: Vec<char> = text.chars().collect();
@@ -181,14 +193,6 @@ impl Type {
     }
 }
 
-impl Tile {
-    /// All that stands below it.
-    fn lines(&self) -> impl Iterator<Item = &str> {
-        let name = Some(self.name.as_str()).filter(|name| !name.is_empty());
-        name.into_iter().chain(self.caption.iter().map(String::as_str))
-    }
-}
-
 impl<'a> Block<'a> {
     fn of(tile: &'a Tile, size: Type) -> Self {
         let [columns, rows] = tile.picture.size.map(|side| side as f64);
@@ -196,13 +200,17 @@ impl<'a> Block<'a> {
         let beside = bar.as_ref().map_or(0.0, |bar| bar.width);
         let title = tile.bar.as_ref().map_or(0.0, |bar| size.width(&bar.label));
         let name = size.width(&tile.name).min(size.of(LEAST_NAME));
-        let caption = tile.caption.iter().map(|line| size.width(line)).fold(name, f64::max);
-        let width = (columns + beside).max(title).max(caption);
+        let whole = (columns + beside).max(title);
+        let caption = size.parted(&tile.caption, whole.max(size.of(LEAST_LINE)));
+        let widest = caption.iter().map(|line| size.width(line)).fold(name, f64::max);
+        let width = whole.max(widest);
+        let lines: Vec<String> =
+            Some(tile.name.clone()).filter(|name| !name.is_empty()).into_iter().chain(caption).collect();
         let above = if bar.is_some() { size.of(TITLE) } else { 0.0 };
         let below = tile.bar.as_ref().and_then(|bar| bar.missing.as_ref()).map_or(0.0, |_| size.of(LINE));
         let of_bar = bar.as_ref().map_or(0.0, |bar| bar.pixels.size[1] as f64 + below + size.of(0.5 * LINE));
-        let height = above + rows.max(of_bar) + size.of(LINE) * tile.lines().count() as f64;
-        Self { tile, size, width: width.ceil(), height: height.ceil(), bar }
+        let height = above + rows.max(of_bar) + size.of(LINE) * lines.len() as f64;
+        Self { tile, size, width: width.ceil(), height: height.ceil(), bar, lines }
     }
 
     fn draw(
@@ -222,8 +230,8 @@ impl<'a> Block<'a> {
             bar.draw(drawing, pasted, meaning, [beside, top], size);
         }
         paste_framed(drawing, pasted, picture, [left, top], size);
-        let first = bottom - size.of(LINE) * self.tile.lines().count() as f64;
-        for (index, line) in self.tile.lines().enumerate() {
+        let first = bottom - size.of(LINE) * self.lines.len() as f64;
+        for (index, line) in self.lines.iter().enumerate() {
             let baseline = first + size.of(LINE * (index as f64 + 0.85));
             size.write(drawing, &size.shortened(line, width), [left, baseline], Anchor::Start);
         }

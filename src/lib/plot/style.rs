@@ -10,6 +10,8 @@ pub(super) const LABEL: f64 = 17.0;
 pub(super) const TEXT: f64 = 16.0;
 /// The distance of lines of text.
 pub(super) const LINE: f64 = 21.0;
+/// The same of the plot's title.
+pub(super) const TITLE_LINE: f64 = 25.0;
 /// From the baseline of digits to their middle, as a part of the size.
 pub(super) const MIDDLE: f64 = 0.365;
 

@@ -320,6 +320,55 @@ fn words_lie_beside_each_other_on_the_canvas() {
     }
 }
 
+/// Long titles have as many lines as they need, and panels go below.
+#[test]
+fn a_title_stays_on_the_canvas() {
+    for arrangement in [Arrangement::Stacked, Arrangement::SideBySide, Arrangement::Pairs] {
+        for count in 1..=3 {
+            let title = "a title of many words ".repeat(24) + &"of_a_path/".repeat(20);
+            let panels = vec![photon_transfer().panels[0].clone(); count];
+            let plot = Plot { title, panels, arrangement };
+            let canvas = elements(&plot).iter().find(|element| element.name == "rect").unwrap().clone();
+            let canvas = [0.0, 0.0, canvas.number("width"), canvas.number("height")];
+            for (word, bounds) in words(&plot) {
+                let corners = [[bounds[0], bounds[1]], [bounds[2], bounds[3]]];
+                assert!(corners.iter().all(|corner| within(*corner, canvas)), "{word} {bounds:?}");
+            }
+            let last = words(&plot).into_iter().find(|(word, _)| word.ends_with("of_a_path/")).unwrap().1[3];
+            assert!(frames(&plot).iter().all(|[_, top, ..]| *top > last), "{arrangement:?} {count}");
+        }
+    }
+}
+
+/// The legend lists what is seen, and what has no marks of its own; not what lies beyond the axes, or cannot be on them.
+#[test]
+fn a_legend_lists_what_is_seen() {
+    let mut panel = Panel::new(Axis::log10("x").range(1.0, 100.0), Axis::log10("y").range(1.0, 100.0));
+    for (name, marks) in [
+        ("across", Marks::Line(vec![[0.1, 10.0], [1e3, 10.0]])),
+        ("corner", Marks::Dashed(vec![[0.5, 3.0], [3.0, 0.5]])),
+        ("one", Marks::Points(vec![[0.5, 3.0], [2.0, 3.0]])),
+        ("bar", Marks::ErrorBars(vec![[2.0, 0.0, 5.0]])),
+        ("key", Marks::Dashed(Vec::new())),
+        ("below", Marks::Line(vec![[1.0, 0.1], [100.0, 0.9]])),
+        ("beside", Marks::Line(vec![[0.1, 0.5], [0.5, 90.0]])),
+        ("zero", Marks::Dashed(vec![[1.0, 0.0], [100.0, 0.0]])),
+        ("away", Marks::Points(vec![[0.5, 3.0], [200.0, 3.0]])),
+        ("short", Marks::ErrorBars(vec![[2.0, 0.1, 0.5], [200.0, 1.0, 5.0]])),
+    ] {
+        panel.add(name, Color::Blue, marks);
+    }
+    let plot = Plot::new("", panel);
+    let words: Vec<String> = words(&plot).into_iter().map(|(word, _)| word).collect();
+    let listed = |name: &str| words.iter().any(|word| word == name);
+    for name in ["across", "corner", "one", "bar", "key"] {
+        assert!(listed(name), "{name}: {words:?}");
+    }
+    for name in ["below", "beside", "zero", "away", "short"] {
+        assert!(!listed(name), "{name}: {words:?}");
+    }
+}
+
 #[test]
 fn a_legend_shows_each_named_series_and_covers_none() {
     for (name, plot) in figures() {

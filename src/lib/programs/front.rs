@@ -21,7 +21,7 @@ const PROGRAM: &str = env!("CARGO_PKG_NAME");
 /// `list [sensors|matrices|observers|spectra|illuminants|charts] [WORD]` tells which are known, or those of which a word is told:
 /// where they were found, what each is, and what sensors have and lack.
 ///
-/// `keys [sensor|matrix|metadata]` describes all keys of such files; `template sensor|matrix|metadata` prints one to begin with.
+/// `keys [sensor|matrix|metadata] [WORD]` describes all keys of such files, or those with a word in their names; `template sensor|matrix|metadata` prints one to begin with.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -30,6 +30,15 @@ struct Arguments {
     program: Option<String>,
     /// Arguments of the program
     arguments: Vec<OsString>,
+    /// `list`, as programs have their options.
+    #[arg(long, hide = true, exclusive = true, num_args = 0.., value_name = "WORD")]
+    list: Option<Vec<OsString>>,
+    /// `template`, likewise.
+    #[arg(long, hide = true, exclusive = true, num_args = 0.., value_name = "WORD")]
+    template: Option<Vec<OsString>>,
+    /// `keys`, as all programs have them.
+    #[arg(long, alias = "keys", hide = true)]
+    describe_keys: bool,
 }
 
 /// Becomes the program by whose name it was called, or the one that the first word names, or does what its own arguments say.
@@ -41,7 +50,16 @@ pub fn main() -> ExitCode {
         .unwrap_or_else(|| cli::start(PROGRAM, |_: &Arguments| cli::General::default(), |arguments, _| run(arguments)))
 }
 
-fn run(Arguments { program, arguments }: &Arguments) -> Result<()> {
+fn run(Arguments { program, arguments, list, template, describe_keys }: &Arguments) -> Result<()> {
+    if let Some(words) = list {
+        return pages::list(words);
+    }
+    if let Some(words) = template {
+        return pages::template(words);
+    }
+    if *describe_keys {
+        return pages::keys(&[]);
+    }
     match (program.as_deref(), &arguments[..]) {
         (None, _) => programs::list(),
         (Some("demo"), []) => demo::run(Path::new("cyanometer-demo")),

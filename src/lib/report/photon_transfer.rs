@@ -50,6 +50,7 @@ pub fn photon_transfer(curve: &TransferCurve) -> Plot {
     panel.add("read-out and dark signal", Color::Vermillion, Marks::Dashed(curve(&floor)));
     panel.add("shot", Color::Blue, Marks::Dashed(curve(&shot)));
     panel.add("fixed pattern", Color::Green, Marks::Dashed(curve(&pattern)));
+    panel.series.retain(|series| !series.marks.is_empty());
     let regimes = [("read", Color::Vermillion), ("shot", Color::Blue), ("fixed pattern", Color::Green)];
     let ruling = |level: &ChainPrediction| {
         let noise = [floor(level), shot(level), pattern(level)];
@@ -62,8 +63,31 @@ pub fn photon_transfer(curve: &TransferCurve) -> Plot {
     if !clipped.is_empty() {
         panel.regions.push(Region { from: clip, to: f64::INFINITY, label: "clipped".into(), color: Color::Gray });
     }
+    let of_held: Vec<[f64; 2]> = held.iter().map(|level| [level.stages[0].std[class], floor(level)]).collect();
+    if let Some((low, high)) = noise_range(levels, &of_held, class) {
+        panel.y = panel.y.range(low, high);
+    }
     panel.vertical_lines.push(ReferenceLine { at: *full_well_e, label: "full well".into() });
     Plot::new(&format!("Photon transfer of {sensor}, class {}", shown.letter()), panel)
+}
+
+/// The range of noise that matters: from below the least that is not clipped, and what read-out adds to it unless that is next to
+/// nothing, to above the largest; where all is clipped, three decades from there. None without noise.
+fn noise_range(levels: &[ChainPrediction], held: &[[f64; 2]], class: usize) -> Option<(f64, f64)> {
+    const BELOW: f64 = 7.0;
+    const ABOVE: f64 = 1.5;
+    /// Parts of the least noise, and of the largest, below which nothing matters.
+    const NEXT_TO_NOTHING: f64 = 1e-3;
+    let least = |values: &mut dyn Iterator<Item = f64>| values.filter(|value| *value > 0.0).reduce(f64::min);
+    let highest = levels.iter().map(|level| level.stages[0].std[class]).fold(0.0, f64::max);
+    let low = match least(&mut held.iter().map(|[all, _]| *all)) {
+        Some(all) => {
+            let floor = least(&mut held.iter().map(|[_, floor]| *floor)).filter(|floor| *floor > NEXT_TO_NOTHING * all);
+            floor.map_or(f64::INFINITY, |floor| floor / 2.0).min(all / BELOW)
+        }
+        None => NEXT_TO_NOTHING * highest,
+    };
+    (highest > 0.0).then_some((low, ABOVE * highest))
 }
 
 /// The levels below the first that full well clips, and the others, with the last of the former.
@@ -91,4 +115,51 @@ fn regimes_of(
         start = end;
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::requests::options::SignalLevel;
+    use crate::requests::prediction::{NoisePrediction, Sweep};
+
+    fn panel(sensor: Option<&str>, sweep: Option<&str>) -> Panel {
+        let level = SignalLevel { electrons: Some([1.0, 4.0, 2.0]), ..SignalLevel::default() };
+        let sweep = sweep.map(|text| Sweep::parse(text).unwrap());
+        let mut wanted = NoisePrediction { level, sweep, ..NoisePrediction::default() };
+        if let Some(name) = sensor {
+            wanted.subject.sensor.sensor = name.into();
+        }
+        let curve = wanted.run().unwrap().transfer_curve().unwrap();
+        photon_transfer(&curve).panels.remove(0)
+    }
+
+    /// A sensor without read noise: what full well leaves of its noise beyond is next to nothing, and no axis reaches down to it.
+    #[test]
+    fn axes_show_what_matters() {
+        for (sensor, sweep) in [
+            (None, None),
+            (Some("imx219"), None),
+            (Some("imx219"), Some("10:20000:50log")),
+            (None, Some("10:1000:50log")),
+            (None, Some("45000:90000:20lin")),
+        ] {
+            let panel = panel(sensor, sweep);
+            let (low, high) = panel.y.range.unwrap();
+            assert!(low > 1e-3 && high / low < 1e6, "{sensor:?} {sweep:?}: {low} to {high}");
+            let points = |name: &str| {
+                let series = panel.series.iter().find(|series| series.name == name);
+                series.map_or(Vec::new(), |series| match &series.marks {
+                    Marks::Line(points) | Marks::Dashed(points) => points.clone(),
+                    _ => Vec::new(),
+                })
+            };
+            for [signal, noise] in points("all") {
+                assert!((low..=high).contains(&noise), "{sensor:?} {sweep:?}: {noise} at {signal}");
+            }
+            // The read noise of the default sensor lies within.
+            let read = points("read-out and dark signal").first().map_or(f64::INFINITY, |[_, noise]| *noise);
+            assert!(read == 0.0 || low < read, "{low} {read}");
+        }
+    }
 }

@@ -13,15 +13,26 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
         Stated::Other { .. } => false,
     };
     let found = match found {
-        Stated::Other { text, kind: OtherUnit::Unknown } if names(&text, &PHOTOMETRIC) => {
-            Stated::Other { text, kind: OtherUnit::Photometric }
-        }
+        Stated::Other { text, kind: OtherUnit::Unknown } => Stated::Other { kind: by_name(&text), text },
         found => found,
     };
     Some(match contradicts {
         true => Stated::Other { text: heading.trim().to_owned(), kind: OtherUnit::Contradiction },
         false => found,
     })
+}
+
+/// What a unit, or a name, is that is made of no powers of light.
+fn by_name(text: &str) -> OtherUnit {
+    if names(text, &PHOTOMETRIC) {
+        OtherUnit::Photometric
+    } else if names(text, &READINGS) {
+        OtherUnit::Reading
+    } else if text.contains('%') || names(text, &RATIOS) {
+        OtherUnit::Ratio
+    } else {
+        OtherUnit::Unknown
+    }
 }
 
 /// Words for irradiance; all but the first are libRadtran's.
@@ -31,6 +42,20 @@ const MEANS: [&str; 6] = ["uavg", "uavgdir", "uavgdn", "uavgup", "uavgdif", "uav
 const RADIANCE: [&str; 2] = ["radiance", "radiances"];
 /// Units of light as the eye weights it.
 const PHOTOMETRIC: [&str; 10] = ["lm", "lumen", "lumens", "cd", "candela", "candelas", "lx", "lux", "nit", "nits"];
+/// Words for shares of light, and their unit.
+const RATIOS: [&str; 9] = [
+    "reflectance",
+    "reflectances",
+    "reflectivity",
+    "transmittance",
+    "transmission",
+    "albedo",
+    "absorbance",
+    "percent",
+    "pct",
+];
+/// Units of what an instrument reads.
+const READINGS: [&str; 10] = ["counts", "count", "cts", "dn", "adu", "v", "mv", "uv", "volt", "volts"];
 const PHOTONS: [&str; 3] = ["photon", "photons", "quanta"];
 
 /// Whether one of some words stands in a heading.
@@ -67,9 +92,7 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
         tokens.iter().filter_map(Token::lower).find_map(|word| match (word.as_str(), base(&word)) {
             (word, _) if IRRADIANCES.contains(&word) => named(OtherUnit::Irradiance),
             (word, _) if MEANS.contains(&word) => named(OtherUnit::Mean),
-            ("reflectance" | "reflectivity" | "transmittance" | "transmission" | "albedo", _) => {
-                named(OtherUnit::Unknown)
-            }
+            (word, _) if RATIOS.contains(&word) => named(OtherUnit::Ratio),
             (_, Some(Base::Photons)) => named(OtherUnit::Photons),
             _ => None,
         })
@@ -371,6 +394,35 @@ mod tests {
     }
 
     #[test]
+    fn ratios_readings_and_energies_are_told() {
+        use OtherUnit::{AllWavelengths, Energy, Irradiance, PerCentimeter, PerFrequency, Ratio, Reading, Unknown};
+        for (text, kind) in [
+            ("transmittance", Ratio),
+            ("reflectance (%)", Ratio),
+            ("Reflectance", Ratio),
+            ("Rrs, remote sensing reflectance (sr-1)", Ratio),
+            ("L [percent]", Ratio),
+            ("transmission, %", Ratio),
+            ("radiance (W m-2 sr-1)", AllWavelengths),
+            ("erg s-1 cm-2 sr-1", AllWavelengths),
+            ("flux (erg s-1 cm-2 A-1)", Irradiance),
+            ("erg s-1 cm-2 sr-1 Hz-1", PerFrequency),
+            ("erg s-1 cm-3 sr-1", PerCentimeter),
+            ("J m-2 sr-1 nm-1", Energy),
+            ("erg cm-2 sr-1 nm-1", Energy),
+            ("erg s-2 cm-2 sr-1 nm-1", Unknown),
+            ("sky [mV]", Reading),
+            ("sky (DN)", Reading),
+            ("sky (%)", Ratio),
+            ("sky (counts)", Reading),
+        ] {
+            let found = unit_of_heading(text);
+            assert!(matches!(&found, Some(Stated::Other { kind: found, .. }) if *found == kind), "{text}: {found:?}");
+            assert_eq!(RadianceUnit::parse(text), None, "{text}");
+        }
+    }
+
+    #[test]
     fn other_units_are_told_from_radiances() {
         use OtherUnit::{AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Scaled, Several, Unknown};
         for (text, kind) in [
@@ -383,7 +435,6 @@ mod tests {
             ("edir", Irradiance),
             ("eglo", Irradiance),
             ("Wm-2nm-1", Irradiance),
-            ("transmittance", Unknown),
             ("photons s-1 m-2 sr-1 nm-1", Photons),
             ("L (umol m-2 s-1 sr-1 nm-1)", Photons),
             ("µmol/m2/s", Photons),
@@ -399,12 +450,9 @@ mod tests {
             ("radiance (100 W cm-2 sr-1 nm-1)", Scaled),
             ("radiance (1000 W m-2 sr-1 nm-1)", Scaled),
             ("3 × 10⁻³ W m⁻² sr⁻¹ nm⁻¹", Scaled),
-            ("erg s-1 cm-2 sr-1 A-1", Unknown),
             ("W sr-1 nm-1", Unknown),
             ("radiance (MW m-2 sr-1 nm-1)", Unknown),
             ("radiance (MW/m2)", Unknown),
-            ("sky (%)", Unknown),
-            ("sky (counts)", Unknown),
             ("sky [a.u.]", Unknown),
             ("L (flick)", Unknown),
             ("radiance (W/m2/xy/nm)", Unknown),
@@ -422,6 +470,10 @@ mod tests {
             );
             assert_eq!(RadianceUnit::parse(text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn names_are_no_units() {
         for text in [
             "radiance",
             "L",

@@ -1,7 +1,7 @@
 //! Units of spectral radiance, read as people write them.
 //!
 //! `W m-2 sr-1 nm-1`, `W/(m2 sr nm)`, `W·m⁻²·sr⁻¹·nm⁻¹`, `mW m^-2 sr^-1 nm^-1`, `uW/cm2/sr/nm`, `w_per_m2_sr_nm`, in any
-//! order, alone or among other words. What follows a slash or `per` is divided by.
+//! order, alone or among other words; and with energies over time, `erg s-1 cm-2 sr-1 A-1`. What follows a slash or `per` is divided by.
 
 use super::spelling::{Base, Length, Power, Token, base, tokens};
 use super::wavelength::WavelengthUnit;
@@ -112,6 +112,12 @@ pub enum OtherUnit {
     Contradiction,
     /// Of light as the eye weights it.
     Photometric,
+    /// Energy instead of power: a radiance summed over time.
+    Energy,
+    /// A share, or a ratio to other light: reflectance, transmittance, per cent.
+    Ratio,
+    /// What an instrument reads: counts, codes, volts.
+    Reading,
     /// None that is known.
     Unknown,
 }
@@ -135,13 +141,36 @@ impl OtherUnit {
             Self::Mean => "a mean over all directions, not the radiance of one",
             Self::Contradiction => "the name of one quantity beside the unit of another, one of which is wrong",
             Self::Photometric => "of light as the eye weights it, from which no spectrum of energy follows",
+            Self::Energy => "of energy, a radiance summed over time, which has no s-1",
+            Self::Ratio => "a ratio, not the radiance itself",
+            Self::Reading => "what an instrument reads, not what that means",
             Self::Unknown => "no unit of spectral radiance that is known",
         }
     }
 
-    /// Whether the numbers cannot be spectral radiances, whatever a user says.
-    pub fn is_another_quantity(self) -> bool {
-        matches!(self, Self::Irradiance | Self::Photons | Self::PerFrequency | Self::Mean | Self::Photometric)
+    /// What makes spectral radiances of such numbers, in words; none of what may be them already.
+    pub fn conversion(self) -> Option<&'static str> {
+        Some(match self {
+            Self::Irradiance => {
+                "take those of one direction from where these come from; of a matt white surface they are the irradiance over pi"
+            }
+            Self::Mean => "take those of one direction from where these come from",
+            Self::Photons => "multiply each value by the energy of its photons, h c / wavelength",
+            Self::PerFrequency => "of a radiance per Hz multiply each value by c / wavelength^2",
+            Self::AllWavelengths => "divide the value of each band by the width of the band in nm",
+            Self::Photometric => "take the spectrum from where these come from",
+            Self::Energy => "divide each value by the time in s",
+            Self::Ratio => {
+                "multiply each value, as a fraction of 1, by the radiance that a perfect white, or no filter, has in the same light"
+            }
+            Self::Reading => "multiply each value by the calibration of the instrument",
+            Self::PerCentimeter
+            | Self::Scaled
+            | Self::BesideFactor
+            | Self::Several
+            | Self::Contradiction
+            | Self::Unknown => return None,
+        })
     }
 }
 
@@ -200,7 +229,7 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
         _ => None,
     };
     let heads =
-        |place: usize| matches!(known(place), Some((Base::Power(_) | Base::Photons | Base::Energy, None | Some(1))));
+        |place: usize| matches!(known(place), Some((Base::Power(_) | Base::Photons | Base::Energy(_), None | Some(1))));
     let is_divisor = |place: usize| known(place).is_some_and(|(_, exponent)| exponent.is_some_and(|power| power < 0));
     let mut found: Vec<Found> = Vec::new();
     for place in (0..tokens.len()).filter(|&place| heads(place)) {
@@ -246,7 +275,7 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
 
 /// What a product of factors is: a unit of spectral radiance, or what else.
 fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
-    let Dimensions { power, has_photons, has_others, per_sr, per_frequency, per_wavenumber, mut lengths } =
+    let Dimensions { power, energy, has_photons, has_others, per_sr, time, per_frequency, per_wavenumber, mut lengths } =
         Dimensions::of(tokens);
     if has_photons {
         return Err(OtherUnit::Photons);
@@ -259,7 +288,11 @@ fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
     }
     lengths.sort_by_key(|(_, exponent)| *exponent);
     let is_area = |length| matches!(length, Length::Millimeter | Length::Centimeter | Length::Meter);
-    let power = power.ok_or(OtherUnit::Unknown)?;
+    let power = match (power, energy, time) {
+        (Some(power), None, 0) | (None, Some(power), -1) => power,
+        (None, Some(_), 0) | (Some(_), None, 1) => return Err(OtherUnit::Energy),
+        _ => return Err(OtherUnit::Unknown),
+    };
     match (per_sr, lengths.as_slice()) {
         (-1, [(area, -2)]) if per_wavenumber && is_area(*area) => {
             Ok(RadianceUnit { power, area: *area, wavelength: WavelengthUnit::PerCentimeter })
@@ -295,11 +328,15 @@ fn interval(length: Length) -> Result<WavelengthUnit, OtherUnit> {
 #[derive(Default)]
 struct Dimensions {
     power: Option<Power>,
+    /// An energy, by the power that it is per second.
+    energy: Option<Power>,
     has_photons: bool,
     /// Whether there is what no unit of radiance has.
     has_others: bool,
     /// The exponent of the solid angle.
     per_sr: i32,
+    /// The exponent of the time.
+    time: i32,
     per_frequency: bool,
     per_wavenumber: bool,
     /// Each length with its exponent.
@@ -346,7 +383,9 @@ impl Dimensions {
             },
             Some(Base::SolidAngle) => self.per_sr += exponent,
             Some(Base::Frequency) => self.per_frequency = true,
-            Some(Base::Energy | Base::Time) | None => self.has_others = true,
+            Some(Base::Energy(unit)) => self.energy = Some(unit),
+            Some(Base::Time) => self.time += exponent,
+            None => self.has_others = true,
         }
     }
 }
@@ -357,7 +396,7 @@ mod tests {
     use crate::units::heading::unit_of_heading;
 
     /// Spellings, and what one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    const RADIANCES: [(&str, f64); 57] = [
+    const RADIANCES: [(&str, f64); 72] = [
         ("W cm-2 sr-1 nm-1", 1.0),
         ("W m-2 sr-1 nm-1", 1e-4),
         ("W.m^-2.sr^-1.nm^-1", 1e-4),
@@ -416,6 +455,22 @@ mod tests {
         ("W cm^-2 sr^-1 (cm^-1)^-1", 40.0),
         ("mW/(m^2 sr cm^-1)", 4e-6),
         ("mW m⁻² sr⁻¹ / cm⁻¹", 4e-6),
+        // 1 erg is 10⁻⁷ J.
+        ("erg s-1 cm-2 sr-1 nm-1", 1e-7),
+        ("ergs/s/cm2/sr/nm", 1e-7),
+        ("ergs s^-1 cm^-2 ster^-1 A^-1", 1e-6),
+        ("erg s-1 cm-2 sr-1 A-1", 1e-6),
+        ("erg/(s cm2 sr A)", 1e-6),
+        ("erg/s/cm^2/sr/Å", 1e-6),
+        ("erg/cm²/s/sr/Å", 1e-6),
+        ("erg s⁻¹ cm⁻² Å⁻¹ sr⁻¹", 1e-6),
+        ("erg/cm2/sec/micron/ster", 1e-10),
+        ("erg s-1 cm-2 sr-1 um-1", 1e-10),
+        ("erg/(s cm2 sr cm-1)", 4e-6),
+        ("erg s^-1cm^-2sr^-1nm^-1", 1e-7),
+        ("J s-1 m-2 sr-1 nm-1", 1e-4),
+        ("joules per second per square meter per steradian per nanometer", 1e-4),
+        ("J/(s m2 sr um)", 1e-7),
     ];
 
     #[test]

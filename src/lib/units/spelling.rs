@@ -8,9 +8,12 @@ pub(super) enum Power {
     Milliwatt,
     Microwatt,
     Nanowatt,
+    /// 10⁻⁷ W, that of CGS.
+    ErgPerSecond,
 }
 
 impl Power {
+    /// Those that powers of ten make of each other.
     const ALL: [Self; 5] = [Self::Kilowatt, Self::Watt, Self::Milliwatt, Self::Microwatt, Self::Nanowatt];
 
     /// The unit that is a power of ten of this one, written as `1e-3`, `10-3` or `0.001`; none for other numbers, of which
@@ -30,6 +33,7 @@ impl Power {
             Self::Milliwatt => "mW",
             Self::Microwatt => "uW",
             Self::Nanowatt => "nW",
+            Self::ErgPerSecond => "erg s-1",
         }
     }
 
@@ -40,6 +44,7 @@ impl Power {
             Self::Milliwatt => 1e-3,
             Self::Microwatt => 1e-6,
             Self::Nanowatt => 1e-9,
+            Self::ErgPerSecond => 1e-7,
         }
     }
 }
@@ -231,8 +236,8 @@ fn piece(text: &str) -> Token {
 pub(super) enum Base {
     Power(Power),
     Photons,
-    /// J, erg: of a radiance with a time, or of none.
-    Energy,
+    /// J, erg: by the power that it is per second.
+    Energy(Power),
     Length(Length),
     SolidAngle,
     Time,
@@ -252,7 +257,8 @@ pub(super) fn base(word: &str) -> Option<Base> {
         "nw" | "nanowatt" => Base::Power(Power::Nanowatt),
         "ph" | "photon" | "quanta" | "quantum" | "mol" | "mmol" | "umol" | "nmol" | "mole" | "micromole"
         | "einstein" => Base::Photons,
-        "j" | "joule" | "erg" => Base::Energy,
+        "j" | "joule" => Base::Energy(Power::Watt),
+        "erg" => Base::Energy(Power::ErgPerSecond),
         "nm" | "nanometer" | "nanometre" => Base::Length(Length::Nanometer),
         "um" | "micron" | "micrometer" | "micrometre" => Base::Length(Length::Micrometer),
         "angstrom" | "ang" => Base::Length(Length::Angstrom),

@@ -58,13 +58,24 @@ impl KeyPage {
 
     /// All keys in plain text, each over what it means, under a line that says what they are of.
     pub fn table(self) -> String {
+        self.table_of(&[]).unwrap_or_default()
+    }
+
+    /// The same of the keys in whose path one of these words stands, in any case, or all where there are no words; none where there is
+    /// no such key.
+    pub fn table_of(self, words: &[String]) -> Option<String> {
+        let is_wanted = |key: &Key| {
+            let path = key[0].to_lowercase();
+            words.is_empty() || words.iter().any(|word| path.contains(&word.to_lowercase()))
+        };
         let entry = |[path, kind, unit, default, needed, meaning]: Key| {
             let of = [("", kind), ("", unit), ("default ", default), ("needed ", needed)];
             let about = of.iter().filter(|(_, cell)| !cell.is_empty()).map(|(what, cell)| format!("{what}{cell}"));
             let head = format!("{path}: {}", about.collect::<Vec<_>>().join("; "));
             format!("{}\n{}\n", wrapped(&head, ""), wrapped(meaning, INDENT))
         };
-        format!("{}\n\n{}", self.title(), self.keys().map(entry).collect::<String>())
+        let entries = self.keys().filter(is_wanted).map(entry).collect::<String>();
+        (!entries.is_empty()).then(|| format!("{}\n\n{entries}", self.title()))
     }
 
     fn title(self) -> &'static str {

@@ -202,7 +202,7 @@ impl Shown {
         if settings.false_color {
             let is_temperature = choice.is_temperature(frame);
             let range = settings.range.unwrap_or_else(|| shade::usual_range(reduced, is_temperature));
-            let (low, high) = shade::one_range(frame, range, reduced)?;
+            let (low, high) = shade::one_range(frame, range, choice, reduced)?;
             let missing = reduced.samples.iter().any(|sample| !sample.is_finite());
             let missing = missing.then(|| (MISSING, "not finite".to_owned()));
             let scale = if is_temperature && low > 0.0 { Scale::Reciprocal } else { Scale::Linear };
@@ -213,7 +213,7 @@ impl Shown {
             shade::all_outside(frame, seen.into_iter()).into_iter().for_each(register::doubt);
             return Ok(Self { size, samples_per_pixel: 3, bytes, bar: Some(bar), scale });
         }
-        let shade = Shade::new(frame, settings.range.unwrap_or(Range::Full), reduced)?;
+        let shade = Shade::new(frame, settings.range.unwrap_or(Range::Full), choice, reduced)?;
         shade.doubt(frame, reduced).into_iter().for_each(register::doubt);
         let planes = reduced.planes;
         Ok(Self {
@@ -221,7 +221,7 @@ impl Shown {
             samples_per_pixel: planes,
             bytes: zoomed(&shade.bytes(reduced), reduced.size, planes, zoom),
             bar: None,
-            scale: shade.words(frame, &choice.names(frame)),
+            scale: shade.words(frame, choice),
         })
     }
 

@@ -76,7 +76,21 @@ impl Choice {
 
     /// Whether a single plane of color temperatures is shown.
     pub fn is_temperature(&self, frame: &FrameHeader) -> bool {
-        frame.metadata.quantity == QuantityKind::Cct && self.names(frame) == ["CCT"]
+        self.channels.len() == 1 && self.temperatures(frame) == Some(0)
+    }
+
+    /// Which of the planes that are shown has color temperatures.
+    pub fn temperatures(&self, frame: &FrameHeader) -> Option<usize> {
+        let are_there = frame.metadata.quantity == QuantityKind::Cct;
+        self.names(frame).iter().position(|name| are_there && name == "CCT")
+    }
+
+    /// The unit of what is shown; empty where it is 1 or not known.
+    pub fn unit(&self, frame: &FrameHeader) -> String {
+        match self.channels[..] {
+            [place] => unit(frame, place),
+            _ => Some(typeset(&frame.metadata.unit)).filter(|unit| !is_none(unit)).unwrap_or_default(),
+        }
     }
 
     /// What stands beside the scale of a single plane: the quantity and its unit.
@@ -165,6 +179,11 @@ fn quantity(frame: &FrameHeader, place: usize) -> String {
     }
 }
 
+/// Whether a unit says nothing.
+fn is_none(unit: &str) -> bool {
+    ["1", "unspecified"].contains(&unit)
+}
+
 /// The unit of a channel; empty where it is 1 or not known.
 fn unit(frame: &FrameHeader, place: usize) -> String {
     let channel = &frame.geometry.channels[place];
@@ -179,7 +198,7 @@ fn unit(frame: &FrameHeader, place: usize) -> String {
         _ => unit,
     };
     match typeset(own) {
-        plain if ["1", "unspecified"].contains(&plain.as_str()) => String::new(),
+        plain if is_none(&plain) => String::new(),
         unit if channel.starts_with(COVARIANCE) && unit == "relative" => "relative²".into(),
         unit if channel.starts_with(COVARIANCE) => format!("({unit})²"),
         unit => unit,

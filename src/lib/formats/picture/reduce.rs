@@ -131,6 +131,17 @@ impl Reduced {
         moments
     }
 
+    /// The same of the inverses of what is above 0, which color temperatures are seen by.
+    pub fn inverse_moments(&self, plane: usize) -> Moments {
+        let mut moments = Moments::new(1);
+        for line in self.plane(plane) {
+            let inverses: Vec<f32> =
+                line.iter().map(|sample| if *sample > 0.0 { sample.recip() } else { f32::NAN }).collect();
+            moments.add(&[&inverses]);
+        }
+        moments
+    }
+
     /// The values that have these shares of the finite pixels of a plane below them, linear between neighbors: type 7 of
     /// \[Hyndman1996]. None where no pixel is finite.
     pub fn quantiles<const N: usize>(&self, plane: usize, shares: [f64; N]) -> Option<[f64; N]> {

@@ -1,11 +1,11 @@
 //! From samples to gray and color.
 
-use super::planes::rounded;
+use super::planes::{Choice, rounded};
 use super::reduce::Reduced;
 use crate::color::{D65_XY, linear_srgb_from_xyz, srgb_decode, srgb_encode, xyz_of_chromaticity};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
-use crate::units::{QuantityKind, typeset};
+use crate::units::QuantityKind;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -14,7 +14,8 @@ use rayon::prelude::*;
 pub enum Range {
     /// What no light reads, and the most that the stage can hold.
     Full,
-    /// In each plane by itself, from so many standard deviations below its mean to as many above.
+    /// In each plane by itself, from so many standard deviations below its mean to as many above; of color temperatures, those of their
+    /// inverses.
     Deviations(f64),
     /// From the sample that this share of all is below to another such one, of all planes of a color picture together; of XYZ, of its
     /// luminances.
@@ -42,7 +43,7 @@ impl Shade {
     /// # Errors
     ///
     /// [`Error::Usage`] for a range that shows nothing; [`Error::Format`] for quantities that are no picture.
-    pub fn new(frame: &FrameHeader, range: Range, reduced: &Reduced) -> Result<Self> {
+    pub fn new(frame: &FrameHeader, range: Range, choice: &Choice, reduced: &Reduced) -> Result<Self> {
         let planes = 0..reduced.planes;
         let none = || nothing(frame);
         let is_xyz = frame.metadata.quantity == QuantityKind::Xyz && reduced.planes == 3;
@@ -55,10 +56,14 @@ impl Shade {
             Range::Values(low, high) => Self::planes(frame, vec![(low, high); reduced.planes]),
             Range::Deviations(_) | Range::Full if !reduced.has_numbers() => Err(none()),
             Range::Deviations(count) => {
-                let about = |plane| {
-                    let moments = reduced.moments(plane);
-                    let spread = count * moments.std(0).unwrap_or(0.0);
-                    (moments.mean[0] - spread, moments.mean[0] + spread)
+                let temperatures = choice.temperatures(frame);
+                let about = |plane| match temperatures == Some(plane) {
+                    true => about_inverse(reduced, plane, count),
+                    false => {
+                        let moments = reduced.moments(plane);
+                        let spread = count * moments.std(0).unwrap_or(0.0);
+                        (moments.mean[0] - spread, moments.mean[0] + spread)
+                    }
                 };
                 Self::planes(frame, planes.map(about).collect())
             }
@@ -157,9 +162,10 @@ impl Shade {
     }
 
     /// What is black and what is white, in the unit of the samples.
-    pub fn words(&self, frame: &FrameHeader, names: &[String]) -> Option<String> {
-        let unit = match typeset(&frame.metadata.unit) {
-            unit if ["1", "unspecified"].contains(&unit.as_str()) => String::new(),
+    pub fn words(&self, frame: &FrameHeader, choice: &Choice) -> Option<String> {
+        let names = choice.names(frame);
+        let unit = match choice.unit(frame) {
+            unit if unit.is_empty() => unit,
             unit => format!(" {unit}"),
         };
         match self {
@@ -225,6 +231,15 @@ fn light(frame: &FrameHeader) -> nalgebra::Matrix3<f64> {
     linear_srgb_from_xyz(
         white.map_or_else(|| xyz_of_chromaticity(D65_XY, 1.0), |white| white.map(|part| part / white[1])),
     )
+}
+
+/// The range of color temperatures from so many standard deviations of their inverses above the mean of these to as many below, where
+/// that is above 0; else to the highest.
+fn about_inverse(reduced: &Reduced, plane: usize, count: f64) -> (f64, f64) {
+    let moments = reduced.inverse_moments(plane);
+    let (mean, spread) = (moments.mean[0], count * moments.std(0).unwrap_or(0.0));
+    let high = if mean > spread { (mean - spread).recip() } else { reduced.moments(plane).max[0] };
+    ((mean + spread).recip(), high)
 }
 
 /// A complaint of a frame without numbers.
@@ -341,14 +356,14 @@ pub(super) fn beyond(reduced: &Reduced, (low, high): (f64, f64), range: Range) -
 /// # Errors
 ///
 /// [`Error::Usage`] for a range that shows nothing; [`Error::Format`] where no pixel has a number.
-pub(super) fn one_range(frame: &FrameHeader, range: Range, reduced: &Reduced) -> Result<(f64, f64)> {
+pub(super) fn one_range(frame: &FrameHeader, range: Range, choice: &Choice, reduced: &Reduced) -> Result<(f64, f64)> {
     if let (Range::Shares(..), Some([low, high])) = (range, reduced.quantiles(0, [0.0, 1.0]))
         && low == high
     {
         let room = if low == 0.0 { 1.0 } else { 0.5 * low.abs() };
         return Ok((low - room, low + room));
     }
-    match Shade::new(frame, range, reduced)? {
+    match Shade::new(frame, range, choice, reduced)? {
         Shade::Planes(ranges) => Ok(ranges[0]),
         Shade::Encoded | Shade::Xyz(..) => Ok((0.0, 1.0)),
     }

@@ -397,7 +397,9 @@ impl PredictedNoise {
         let all = Sweep { start_e: 1.0, end_e: full_well_e, count: 200, is_logarithmic: true };
         let electrons = if *electrons == [0.0; 3] { [1.0; 3] } else { *electrons };
         let mut levels: Vec<f64> = self.sweep.unwrap_or(all).levels().collect();
-        let [low, high] = [f64::min, f64::max].map(|pick| levels.iter().copied().fold(full_well_e, pick));
+        // No farther than the levels: to full well only where they reach it.
+        let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = levels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         levels.extend(near_full_well(full_well_e).filter(|level| (low..=high).contains(level)));
         levels.sort_by(f64::total_cmp);
         levels.dedup();
@@ -498,6 +500,20 @@ mod tests {
         // No step of more than a tenth of the largest noise: the drop at full well is several of its standard deviations wide.
         let highest = points.iter().map(|[_, std]| *std).fold(0.0, f64::max);
         assert!(points.windows(2).all(|pair| (pair[1][1] - pair[0][1]).abs() < 0.12 * highest));
+    }
+
+    /// Full well lies within the figure where the sweep reaches it, and nothing is drawn that was not asked for.
+    #[test]
+    fn a_curve_goes_no_farther_than_its_sweep() {
+        for (start_e, end_e) in [(10.0, 1000.0), (1000.0, 10.0), (30_000.0, 50_000.0), (60_000.0, 90_000.0)] {
+            let sweep = Some(Sweep { start_e, end_e, count: 5, is_logarithmic: true });
+            let curve = NoisePrediction { sweep, ..given([1.0, 4.0, 2.0]) }.run().unwrap().transfer_curve().unwrap();
+            let levels: Vec<f64> = curve.levels.iter().map(|level| level.electrons[1]).collect();
+            let (low, high) = (f64::min(start_e, end_e), f64::max(start_e, end_e));
+            assert_eq!((levels[0], *levels.last().unwrap()), (low, high));
+            // Levels between those of the sweep stand about full well alone.
+            assert_eq!(levels.len() > 5, (low..=high).contains(&curve.full_well_e), "{low} to {high}");
+        }
     }
 
     #[test]

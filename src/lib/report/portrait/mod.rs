@@ -1,28 +1,23 @@
 //! Figures of a region: its histogram, profiles, autocorrelation and chromaticities beside what is predicted.
 
+mod histogram;
+mod scale;
+
 use super::in_digits;
 use crate::analysis::statistics::RegionReport;
-use crate::analysis::statistics::histogram::Histogram;
-use crate::analysis::statistics::portrait::{Foreseen, Likeness, Portrait};
+use crate::analysis::statistics::portrait::{Likeness, Portrait};
 use crate::color::xyy_about;
-use crate::numerics::normal::cumulative;
 use crate::plot::{Arrangement, Axis, Color, Marks, Panel, Plot, ReferenceLine};
-use crate::units::{QuantityKind, typeset};
+use crate::units::QuantityKind;
+use histogram::histogram;
 use nalgebra::{Matrix2, Matrix3};
+use scale::{HEADROOM, Scale, color, farther, outside, reference, scales, words_of_reference};
 use std::f64::consts::TAU;
 
-/// The middle of a histogram leaves out this share of the samples at each end; what is shown reaches this part of its width
-/// beyond: of a normal law 2.6 and 5.2 standard deviations.
-const LEFT_OUT: f64 = 0.005;
-const BEYOND: f64 = 0.5;
-/// So many bins make the middle; of a normal law they are about 0.2 standard deviations wide.
-const BINS: f64 = 26.0;
 /// Rows or columns far from all others are few up to this part of them; pixels are few that are so dim that the quotients which
 /// chromaticities are scatter without end.
 const FEW_LINES: f64 = 0.05;
 const FEW_PIXELS: f64 = 0.25;
-/// How much higher an axis is than what it shows.
-const HEADROOM: f64 = 1.08;
 /// The share of a normal law of two variables within its ellipse.
 const WITHIN: f64 = 0.95;
 
@@ -70,42 +65,6 @@ fn left_out(portrait: &Portrait, region: &RegionReport) -> Option<String> {
     (!parts.is_empty()).then(|| parts.join(", "))
 }
 
-/// Classes or channels that share an axis, by their places, and its unit; empty where it is 1.
-struct Scale {
-    places: Vec<usize>,
-    unit: String,
-}
-
-impl Scale {
-    /// The unit behind words.
-    fn with_unit(&self, words: &str) -> String {
-        if self.unit.is_empty() { words.to_owned() } else { format!("{words} / {}", self.unit) }
-    }
-
-    /// The classes or channels, with the color of each.
-    fn groups<'a>(&self, portrait: &'a Portrait) -> impl Iterator<Item = (Color, &'a Likeness)> {
-        self.places.iter().map(|place| (color(portrait, *place), &portrait.groups[*place]))
-    }
-}
-
-/// One scale for all classes or channels, or for each unit.
-fn scales(portrait: &Portrait) -> Vec<Scale> {
-    let shown = |unit: &str| if ["1", "unspecified"].contains(&unit) { String::new() } else { typeset(unit) };
-    let units: Vec<&str> = portrait.unit.split(", ").collect();
-    let all = portrait.groups.len();
-    if units.len() != all {
-        return vec![Scale { places: (0..all).collect(), unit: shown(&portrait.unit) }];
-    }
-    let mut scales: Vec<Scale> = Vec::new();
-    for (place, unit) in units.into_iter().map(shown).enumerate() {
-        match scales.iter_mut().find(|scale| scale.unit == unit) {
-            Some(scale) => scale.places.push(place),
-            None => scales.push(Scale { places: vec![place], unit }),
-        }
-    }
-    scales
-}
-
 /// From where to where most values lie where a few are far off: within four times the range of their middle half about it. None
 /// where more than `part` of them are, or none.
 fn most(values: impl Iterator<Item = f64>, part: f64) -> Option<[f64; 2]> {
@@ -127,35 +86,6 @@ fn most(values: impl Iterator<Item = f64>, part: f64) -> Option<[f64; 2]> {
     ends.filter(|_| are_few && low < high).map(|(low, high)| [low, high])
 }
 
-/// What a panel says of what lies outside it.
-fn outside(count: u64, all: u64, what: &str, farthest: f64) -> String {
-    if count == 0 {
-        return String::new();
-    }
-    format!("{count} of {all} {what} beyond the axes, as far as {}", in_digits(farthest, 3).replace('-', "−"))
-}
-
-/// The color of a class or channel.
-fn color(portrait: &Portrait, index: usize) -> Color {
-    match portrait.groups.len() {
-        3 => [Color::Vermillion, Color::Green, Color::Blue][index],
-        _ => Color::of_index(index),
-    }
-}
-
-/// Where deviations of a group are counted from: the predicted mean, or that of what was seen.
-fn reference(group: &Likeness) -> Option<f64> {
-    group.predicted.as_ref().map(|predicted| predicted.mean).or_else(|| group.mean())
-}
-
-fn words_of_reference(portrait: &Portrait) -> &'static str {
-    if portrait.groups.iter().all(|group| group.predicted.is_some()) {
-        "sample − predicted mean"
-    } else {
-        "sample − mean"
-    }
-}
-
 /// Why there is no histogram; none where there is one.
 fn without_spread(portrait: &Portrait) -> Option<&'static str> {
     if portrait.groups.iter().all(|group| group.mean().is_none()) {
@@ -173,130 +103,6 @@ fn in_words(text: &str) -> Panel {
     panel.title = text.into();
     panel.has_axes = false;
     panel
-}
-
-fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
-    let density = if scale.unit.is_empty() { "density".to_owned() } else { format!("share per {}", scale.unit) };
-    let x = Axis::linear(&scale.with_unit(words_of_reference(portrait)));
-    let mut panel = Panel::new(x, Axis::linear(&density));
-    let (mut highest, mut heaped, mut laws) = (0.0_f64, 0.0_f64, Vec::new());
-    let (mut beyond, mut all, mut farthest) = (0, 0, 0.0_f64);
-    let mut piles = Vec::new();
-    for (color, group) in scale.groups(portrait) {
-        let Some(reference) = reference(group) else { continue };
-        let Some([from, to]) = group.histogram.middle(LEFT_OUT) else { continue };
-        #[expect(clippy::cast_possible_truncation, reason = "a few bins; casts saturate")]
-        let times = (((to - from) / BINS / group.histogram.width).round() as i64).max(1);
-        let bins = group.histogram.merged(times);
-        let total = bins.total();
-        let room = BEYOND * (to - from) + bins.width;
-        let is_shown = |bin: i64| (from - room..to + room).contains(&bins.begin(bin));
-        let shown: Vec<i64> = bins.counts.keys().copied().filter(|bin| is_shown(*bin)).collect();
-        let (Some(first), Some(last)) = (shown.first(), shown.last()) else { continue };
-        let (mut steps, mut predicted) = (Vec::new(), Vec::new());
-        let pile = Pile::of(&bins);
-        for bin in *first..=*last {
-            let (from, to) = (bins.begin(bin), bins.begin(bin + 1));
-            let density = bins.counts.get(&bin).copied().unwrap_or(0) as f64 / total as f64 / bins.width;
-            match pile {
-                Some(pile) if pile.bin == bin => heaped = heaped.max(density),
-                _ => highest = highest.max(density),
-            }
-            steps.extend([[from - reference, density], [to - reference, density]]);
-            if let Some(foreseen) = group.predicted.as_ref().filter(|_| pile.is_none()) {
-                let middle = 0.5 * (from + to) - reference;
-                predicted.push([middle, share_between(foreseen, portrait.is_whole, from, to) / bins.width]);
-            }
-        }
-        panel.add(&with_mean(group, reference, &scale.unit), color, Marks::Line(steps));
-        piles.extend(pile.map(|pile| pile.words(&group.name)));
-        laws.extend(
-            group
-                .predicted
-                .as_ref()
-                .filter(|_| pile.is_none())
-                .map(|foreseen| (words_of_law(foreseen, portrait.is_whole), predicted)),
-        );
-        let within: u64 = bins.counts.range(first..=last).map(|(_, count)| count).sum();
-        (beyond, all) = (beyond + total - within, all + total);
-        let ends = bins.ends.map(|end| end - reference);
-        farthest = ends.into_iter().filter(|_| within < total).fold(farthest, farther);
-    }
-    for (index, (words, predicted)) in laws.into_iter().enumerate() {
-        panel.add(if index == 0 { &words } else { "" }, Color::Black, Marks::Dashed(predicted));
-    }
-    // Heaps alone make the scale themselves.
-    if highest == 0.0 {
-        piles.clear();
-        highest = heaped;
-    }
-    if highest > 0.0 {
-        panel.y = panel.y.range(0.0, HEADROOM * highest);
-    }
-    let words = outside(beyond, all, "samples", farthest);
-    panel.title = [words].into_iter().chain(piles).filter(|words| !words.is_empty()).collect::<Vec<_>>().join("; ");
-    panel
-}
-
-/// Samples at an end of the range, such as saturated ones, so many that all others would be next to nothing beside them; they
-/// reach beyond the axis, and follow no normal law.
-#[derive(Debug, Clone, Copy)]
-struct Pile {
-    bin: i64,
-    is_highest: bool,
-    share: f64,
-}
-
-impl Pile {
-    fn of(bins: &Histogram) -> Option<Self> {
-        /// So many times as high as any other bin.
-        const HIGH: u64 = 3;
-        let (&first, &last) = (bins.counts.keys().next()?, bins.counts.keys().next_back()?);
-        let count = |bin: i64| bins.counts.get(&bin).copied().unwrap_or(0);
-        let others = |end: i64| bins.counts.iter().filter(|(bin, _)| **bin != end).map(|(_, count)| *count).max();
-        let is_high = |end: i64| others(end).is_none_or(|others| count(end) > HIGH * others);
-        let end = [last, first].into_iter().find(|end| is_high(*end))?;
-        let share = count(end) as f64 / bins.total() as f64;
-        Some(Self { bin: end, is_highest: end == last, share })
-    }
-
-    fn words(self, name: &str) -> String {
-        let end = if self.is_highest { "highest" } else { "lowest" };
-        format!("{} % of {name} in its {end} bin, beyond the axis", in_digits(100.0 * self.share, 2))
-    }
-}
-
-/// The name of a class or channel with the mean that deviations are counted from.
-fn with_mean(group: &Likeness, mean: f64, unit: &str) -> String {
-    let mean = in_digits(mean, 5).replace('-', "−");
-    format!("{}, mean {mean} {unit}", group.name).trim_end().to_owned()
-}
-
-/// Of two deviations the larger.
-fn farther(one: f64, other: f64) -> f64 {
-    if other.abs() > one.abs() { other } else { one }
-}
-
-/// What the predicted law is called.
-fn words_of_law(foreseen: &Foreseen, is_whole: bool) -> String {
-    let law = if foreseen.stds.len() > 1 { "predicted: normal by phase" } else { "predicted: normal" };
-    if is_whole { format!("{law}, rounded") } else { law.to_owned() }
-}
-
-/// The predicted share of samples between two edges: of whole numbers that of rounded ones, whose edges lie between codes; there
-/// rounding is no part of the spread before.
-fn share_between(foreseen: &Foreseen, is_whole: bool, from: f64, to: f64) -> f64 {
-    const ROUNDING: f64 = 1.0 / 12.0;
-    /// Of samples that all but round to one code.
-    const LEAST: f64 = 1e-4;
-    let below = |edge: f64| {
-        let of = |std: &f64| {
-            let variance = if is_whole { (std * std - ROUNDING).max(LEAST) } else { std * std };
-            cumulative((edge - foreseen.mean) / variance.sqrt())
-        };
-        foreseen.stds.iter().map(of).sum::<f64>() / foreseen.stds.len() as f64
-    };
-    below(to) - below(from)
 }
 
 /// Means of columns (axis 0) or rows (axis 1); nothing of a single one.
