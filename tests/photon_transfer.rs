@@ -361,3 +361,56 @@ fn light_that_is_not_as_said_is_doubted() {
     let wrong = |(place, flat): (usize, &Level)| relit(flat, &darks[0], if place % 2 == 0 { 1.0 } else { 1.05 });
     doubt(&flats.iter().enumerate().map(wrong).collect::<Vec<_>>(), "signals miss the line of the response by");
 }
+
+fn why(found: &ClassFindings, key: &str) -> String {
+    found.findings.iter().find(|finding| finding.key == key).unwrap().found.clone().unwrap_err()
+}
+
+/// Of darks that code 0 clips each number that they would tell says that, and which frames would tell it; of flats whose exposure
+/// time no dark is known to have, that.
+#[test]
+fn reasons_are_true() {
+    const OF_DARKS: [&str; 13] = [
+        "black_level_adu",
+        "dark_noise_e",
+        "row_noise_e",
+        "pixel_noise_e",
+        "threshold_e",
+        "dsnu_e",
+        "dsnu_row_e",
+        "dsnu_column_e",
+        "dsnu_pixel_e",
+        "dark_current_e_per_s",
+        "dark_current_from_variance_e_per_s",
+        "dsnu_offset_e",
+        "dcnu",
+    ];
+    let readout = camera(3, Kind::Ccd);
+    let [flats, darks] = levels(&readout, 3);
+    let clipped: Vec<Level> = darks.iter().map(|dark| Level { at_ends: [0.0, 0.3], ..dark.clone() }).collect();
+    let of_clipped = found(&flats, &clipped);
+    for key in OF_DARKS {
+        let said = why(&of_clipped, key);
+        assert!(
+            said.contains("clipped at code 0") && said.contains("black level of the camera raised"),
+            "{key}: {said}"
+        );
+    }
+    let untimed: Vec<Level> = darks[..2]
+        .iter()
+        .map(|dark| Level { condition: Condition { exposure_s: None, ..dark.condition }, ..dark.clone() })
+        .collect();
+    let of_untimed = found(&flats, &untimed);
+    for key in ["quantum_efficiency", "saturation_e", "linearity_error_max", "prnu"] {
+        let said = why(&of_untimed, key);
+        assert!(said.contains("no dark is known to have the exposure time of the flats"), "{key}: {said}");
+    }
+    assert!(of_untimed.get("row_noise_e").is_some(), "{}", why(&of_untimed, "row_noise_e"));
+    for key in OF_DARKS.into_iter().filter(|key| !key.starts_with("dark_current") && !key.starts_with("dsnu_offset")) {
+        let said = why(&found(&flats, &[]), key);
+        assert!(said.contains("two darks or more") || key == "dcnu", "{key}: {said}");
+    }
+    let full: Vec<Level> = flats[..2].iter().map(|flat| Level { at_ends: [0.5, 0.0], ..flat.clone() }).collect();
+    let said = why(&found(&full, &darks), "gain_adu_per_e");
+    assert!(said.ends_with("(of 2 levels of flats 2 reach the largest code)"), "{said}");
+}

@@ -1,9 +1,11 @@
 //! What darks tell beyond one temperature and one exposure time: how dark current rises with temperature, and how it differs from
 //! photosite to photosite.
 
+use super::curve::is_clipped;
 use super::fit::{Line, Point, variance_besides};
 use super::level::Level;
 use super::pattern::{Part, fixed};
+use super::reasons::CLIPPED;
 use crate::numerics::quantiles;
 use crate::numerics::variance_components::Interval;
 use std::f64::consts::LN_2;
@@ -30,31 +32,49 @@ fn fitted(points: &[(f64, f64, f64)]) -> Option<(Line, [f64; 2])> {
 }
 
 /// The temperature step that doubles the dark current, K, from darks at several temperatures, each at several times:
-/// log₂ I is a line over temperature \[EMVA1288, Eq. 33].
+/// log₂ I is a line over temperature \[EMVA1288, Eq. 33]. Darks that code 0 clips do not count, where the error of rounding has such a
+/// variance.
 ///
 /// # Errors
 ///
 /// Which frames would tell it.
-pub fn doubling_temperature(darks: &[Level], confidence: f64) -> Result<Interval, String> {
-    let mut temperatures: Vec<f64> = darks.iter().filter_map(|dark| dark.condition.temperature_k).collect();
-    temperatures.sort_by(f64::total_cmp);
-    temperatures.dedup();
-    let rate = |temperature: &f64| {
-        let own = darks.iter().filter(|dark| dark.condition.temperature_k == Some(*temperature));
+pub fn doubling_temperature(darks: &[Level], rounding: f64, confidence: f64) -> Result<Interval, String> {
+    let whole: Vec<&Level> = darks.iter().filter(|dark| !is_clipped(dark, rounding)).collect();
+    let of_rate = |temperature: f64| -> Option<(f64, f64)> {
+        let own = whole.iter().filter(|dark| dark.condition.temperature_k == Some(temperature));
         let points: Vec<(f64, f64, f64)> =
             own.filter_map(|dark| Some((dark.condition.exposure_s?, dark.mean, dark.mean_variance))).collect();
         let (line, [_, variance]) = fitted(&points)?;
-        // The logarithm of a rate that is not told from none tells nothing.
-        let is_told = line.slope > 3.0 * variance.sqrt();
-        is_told.then(|| (*temperature, line.slope.log2(), variance / (line.slope * LN_2).powi(2)))
+        Some((line.slope, variance))
     };
-    let rates: Vec<(f64, f64, f64)> = temperatures.iter().filter_map(rate).collect();
-    let few =
-        "it takes darks at two temperatures or more, each at two exposure times or more that tell its dark current";
-    let (line, [_, variance]) = if rates.len() < 2 { None } else { fitted(&rates) }.ok_or(few)?;
+    let mut temperatures: Vec<f64> = whole.iter().filter_map(|dark| dark.condition.temperature_k).collect();
+    temperatures.sort_by(f64::total_cmp);
+    temperatures.dedup();
+    let found: Vec<(f64, f64, f64)> = temperatures
+        .iter()
+        .filter_map(|temperature| of_rate(*temperature).map(|(slope, variance)| (*temperature, slope, variance)))
+        .collect();
+    if found.len() < 2 {
+        let few = "it takes darks at two temperatures or more, each at two exposure times or more";
+        let are_others_warmer =
+            darks.iter().any(|dark| dark.condition.temperature_k != darks[0].condition.temperature_k);
+        let is_for_clipping = are_others_warmer && whole.len() < darks.len();
+        return Err(if is_for_clipping { CLIPPED.into() } else { few.into() });
+    }
+    // The logarithm of a rate that is not told from none tells nothing.
+    let is_told = |(_, slope, variance): &&(f64, f64, f64)| *slope > 3.0 * variance.sqrt();
+    let rates: Vec<(f64, f64, f64)> = found
+        .iter()
+        .filter(is_told)
+        .map(|(temperature, slope, variance)| (*temperature, slope.log2(), variance / (slope * LN_2).powi(2)))
+        .collect();
+    let untold = "the dark current is told from none at fewer than two temperatures: darks of longer exposure, or warmer ones, would tell";
+    let (line, [_, variance]) = if rates.len() < 2 { None } else { fitted(&rates) }.ok_or(untold)?;
     let slope = Interval::normal(line.slope, variance, confidence);
     if slope.low <= 0.0 {
-        return Err("the dark current does not rise with temperature beyond chance".into());
+        return Err("the dark current does not rise with temperature beyond chance: darks of longer exposure, or at temperatures \
+                    farther apart, would tell"
+            .into());
     }
     Ok(Interval { value: 1.0 / slope.value, low: 1.0 / slope.high, high: 1.0 / slope.low })
 }

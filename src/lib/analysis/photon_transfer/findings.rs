@@ -1,11 +1,12 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
-use super::curve::{Curve, LEAST_VARIANCE, ROUNDING, Values};
+use super::curve::{Curve, ROUNDING, Values};
 use super::dark::{doubling_temperature, parted_pattern};
 use super::doubts::doubts;
 use super::level::Level;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal};
+use super::reasons::{Reasons, UNSATURATED, of_gain};
 use crate::numerics::variance_components::Interval;
 
 /// What is asked of the measurement.
@@ -95,10 +96,6 @@ impl ClassFindings {
 
 type Found = Result<Interval, String>;
 
-fn lacking(what: &str) -> String {
-    what.to_owned()
-}
-
 /// What the levels of a class tell; flats in the order of their light, darks of the flats' temperature, and all darks.
 #[allow(clippy::too_many_lines, reason = "finding after finding, as the data sheet has them")]
 pub fn of_class(
@@ -121,11 +118,8 @@ pub fn of_class(
         notes: Vec::new(),
         doubts: Vec::new(),
     };
-    let Some(curve) = Curve::of(flats, darks, rounding, photon_error) else {
-        let why = "no gain follows: it takes two flats of one light below saturation, with darks of their exposure time, or flats at \
-                   several levels";
-        return nothing(why.into());
-    };
+    let curve = Curve::of(flats, darks, rounding, photon_error).filter(|curve| curve.values().is_some());
+    let Some(curve) = curve else { return nothing(of_gain(flats, rounding)) };
     if let Some(gain) = curve.interval(|values| Some(values.gain), confidence).filter(|gain| gain.low <= 0.0) {
         return nothing(format!(
             "no gain follows: by the flats it is {:.3e} to {:.3e}, as their variance does not rise with their mean beyond chance; are \
@@ -136,18 +130,8 @@ pub fn of_class(
     let mut found = Vec::new();
     let mut add = |key: &'static str, result: Found| found.push(finding(key, result));
     let number = |of: &dyn Fn(&Values) -> Option<f64>, why: String| curve.interval(of, confidence).ok_or(why);
-    let no_darks = || {
-        if curve.are_darks_clipped {
-            lacking("darks are clipped at code 0: raise the black level of the camera")
-        } else {
-            lacking("it takes two darks or more")
-        }
-    };
-    let are_counted = flats.iter().any(|flat| flat.condition.photons.is_some());
-    let no_photons = || {
-        if are_counted { no_darks() } else { lacking("the photons per photosite of the flats are not known") }
-    };
-    let few_times = || lacking("it takes darks at three exposure times or more");
+    let reasons = Reasons { curve: &curve, flats, darks };
+    let (no_darks, no_photons) = (|| reasons.of_darks(), || reasons.of_photons());
     let gain = number(&|v| Some(v.gain), String::new());
     add("gain_adu_per_e", gain.clone());
     let responsivity = number(&|v| v.responsivity, no_photons());
@@ -158,7 +142,7 @@ pub fn of_class(
     let read_variance = |v: &Values| Some((v.dark_variance? - rounding) / (v.gain * v.gain));
     // Beneath the rounding nothing is left to tell.
     let read = number(&read_variance, no_darks());
-    let read = read.and_then(|read| if read.high > 0.0 { Ok(read) } else { Err(silent(&curve, no_darks())) });
+    let read = read.and_then(|read| if read.high > 0.0 { Ok(read) } else { Err(reasons.of_noise()) });
     add("dark_noise_e", read.map(Interval::root));
     let parts = [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)];
     let repeated: Vec<&Level> = darks.iter().filter(|dark| dark.frames >= 2).collect();
@@ -170,16 +154,17 @@ pub fn of_class(
     for (key, part) in parts {
         let (off, of) = if part == Part::Pixel { (rounding, &short) } else { (0.0, &repeated) };
         let of_part = || temporal(of, part, confidence).map(|variance| variance - off);
-        let is_told = !repeated.is_empty() && !curve.is_offset_free;
-        add(key, if is_told { over_gain(Ok(of_part())) } else { Err(silent(&curve, no_darks())) });
+        let is_told = !repeated.is_empty() && curve.tells_dark_noise();
+        add(key, if is_told { over_gain(Ok(of_part())) } else { Err(reasons.of_noise()) });
     }
     // The signal that equals its noise: ½ + √(¼ + σ²) [EMVA1288, Eq. 25].
     let threshold = |v: &Values| Some(0.5 + (0.25 + v.dark_variance?.max(0.0) / (v.gain * v.gain)).sqrt());
     let threshold_e = number(&threshold, no_darks());
     add("threshold_e", threshold_e.clone());
     let threshold_photons = |v: &Values| Some(threshold(v)? * v.gain / v.responsivity?);
-    add("threshold_photons", number(&threshold_photons, if darks.is_empty() { no_darks() } else { no_photons() }));
-    let saturation = saturation(&curve, flats, gain.clone());
+    let lacking = threshold_e.as_ref().err().or(responsivity.as_ref().err()).cloned();
+    add("threshold_photons", number(&threshold_photons, lacking.unwrap_or_default()));
+    let saturation = saturation(reasons, gain.clone());
     let [saturation_e, saturation_photons, full_well] = saturation;
     add("saturation_e", saturation_e.clone());
     add("saturation_photons", saturation_photons);
@@ -191,7 +176,7 @@ pub fn of_class(
         high: saturation.high / threshold.low,
     };
     add("dynamic_range", saturation_e.and_then(|saturation| Ok(range(saturation, threshold_e?))));
-    let straight = straightness(&curve, flats, confidence);
+    let straight = straightness(reasons, confidence);
     for (key, end) in [("linearity_error_min", 0), ("linearity_error_max", 1)] {
         add(key, straight.as_ref().map(|line| line.extremes[end]).map_err(Clone::clone));
     }
@@ -199,20 +184,22 @@ pub fn of_class(
     let [lit, dark] = stacks;
     let places =
         [lit.map(|(flat, level)| (level.place, curve.signal(flat))), dark.map(|(_, level)| (level.place, 0.0))];
-    add_patterns(&mut add, &curve, stacks, &over_gain, confidence);
+    add_patterns(&mut add, reasons, stacks, &over_gain, confidence);
     let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
-    add("dark_current_e_per_s", number(&per_second, if darks.is_empty() { no_darks() } else { few_times() }));
+    add("dark_current_e_per_s", number(&per_second, reasons.of_times()));
     let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
-    let why = || if curve.is_offset_free { silent(&curve, no_darks()) } else { few_times() };
-    add("dark_current_from_variance_e_per_s", number(&from_variance, why()));
-    add("dark_current_doubling_k", doubling_temperature(all_darks, confidence));
+    let why = if curve.is_silent { reasons.of_noise() } else { reasons.of_times() };
+    add("dark_current_from_variance_e_per_s", number(&from_variance, why));
+    add("dark_current_doubling_k", doubling_temperature(all_darks, rounding, confidence));
     let is_hidden = darks.iter().any(|dark| curve.hides(Some(dark), confidence));
-    let parted = if is_hidden { Err(silent(&curve, no_darks())) } else { parted_pattern(darks, confidence) };
+    let parted = if is_hidden { Err(reasons.of_noise()) } else { parted_pattern(darks, confidence) };
     let offset = parted.clone().map(|[offset, _]| offset);
     add("dsnu_offset_e", over_gain(offset));
     let slope = curve.interval(|values| values.dark_slope, confidence).filter(|slope| slope.low > 0.0);
     let uneven = parted.and_then(|[_, square]| {
-        let slope = slope.ok_or("the dark current is not told from none, nor is how it differs among photosites")?;
+        let slope = slope.ok_or(
+            "the dark current is not told from none, nor is how it differs among photosites: darks of longer exposure would tell",
+        )?;
         Ok(over(square.root(), slope))
     });
     add("dcnu", uneven);
@@ -243,15 +230,6 @@ pub fn of_class(
         stacks: places,
         notes,
         doubts,
-    }
-}
-
-/// Why temporal noise of darks is not parted.
-fn silent(curve: &Curve, otherwise: String) -> String {
-    if curve.is_silent && !curve.are_darks_clipped {
-        format!("darks have a temporal variance below {LEAST_VARIANCE} codes², which rounding hides")
-    } else {
-        otherwise
     }
 }
 
@@ -305,19 +283,19 @@ fn over(of: Interval, by: Interval) -> Interval {
 }
 
 /// Saturation in electrons and in photons, and full well.
-fn saturation(curve: &Curve, flats: &[Level], gain: Found) -> [Found; 3] {
+fn saturation(reasons: Reasons, gain: Found) -> [Found; 3] {
+    let Reasons { curve, flats, .. } = reasons;
     let gain = match gain {
         Ok(gain) => gain,
         Err(why) => return [Err(why.clone()), Err(why.clone()), Err(why)],
     };
     let Some(peak) = curve.saturated else {
-        let why =
-            || lacking("the variance still rises at the brightest flat: brighter ones, until it falls, would tell");
-        return [Err(why()), Err(why()), Err(why())];
+        let why = || Err(UNSATURATED.into());
+        return [why(), why(), why()];
     };
     if !curve.knows_black(peak) {
-        let why = || lacking("the black level is not known: it takes two darks or more");
-        return [Err(why()), Err(why()), Err(why())];
+        let why = || Err(reasons.of_darks());
+        return [why(), why(), why()];
     }
     // The largest variance lies between the neighbors of the level that has it.
     let [below, above] = [peak.saturating_sub(1), (peak + 1).min(flats.len() - 1)];
@@ -331,7 +309,7 @@ fn saturation(curve: &Curve, flats: &[Level], gain: Found) -> [Found; 3] {
     let last = &flats[brightest];
     let is_flat = last.variance < 0.02 * flats[peak].variance;
     let full_well = if !is_flat {
-        Err(lacking("no flat is so bright that every photosite is full"))
+        Err("no flat is so bright that every photosite is full: flats of more light would tell".into())
     } else if last.at_ends[0] > 0.5 {
         let reached = curve.signal(brightest) / gain.value;
         Err(format!("the converter ends first: it is no less than {reached:.0} e-"))
@@ -340,18 +318,23 @@ fn saturation(curve: &Curve, flats: &[Level], gain: Found) -> [Found; 3] {
     };
     [
         Ok(electrons),
-        in_photons.ok_or_else(|| lacking("the photons per photosite of the flats are not known")),
+        in_photons.ok_or_else(|| "the photons per photosite of the flats about saturation are not known".into()),
         full_well,
     ]
 }
 
 /// The deviations from a straight line, against photons, or against time where light was constant.
-fn straightness(curve: &Curve, flats: &[Level], confidence: f64) -> Result<Linearity, String> {
+fn straightness(reasons: Reasons, confidence: f64) -> Result<Linearity, String> {
+    let Reasons { curve, flats, .. } = reasons;
     let light = |level: &Level| level.condition.photons.or(level.condition.exposure_s);
-    let peak = curve.saturated.ok_or("the saturation is not known, from 5 to 95 % of which the line is fitted")?;
+    let peak = curve.saturated.ok_or(UNSATURATED)?;
+    if !curve.knows_black(peak) {
+        return Err(reasons.of_darks());
+    }
     let levels: Vec<Response> = flats
         .iter()
         .enumerate()
+        .filter(|(index, _)| curve.knows_black(*index))
         .filter_map(|(index, flat)| {
             Some(Response { light: light(flat)?, signal: curve.signal(index), variance: curve.signal_variance(index) })
         })
@@ -381,22 +364,22 @@ fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<
 
 fn add_patterns(
     add: &mut impl FnMut(&'static str, Found),
-    curve: &Curve,
+    reasons: Reasons,
     [flat, dark]: [Option<(usize, &Level)>; 2],
     over_gain: &dyn Fn(Found) -> Found,
     confidence: f64,
 ) {
-    let no_darks = || lacking("it takes two darks or more");
+    let curve = reasons.curve;
     for (key, part) in
         [("prnu", Part::Total), ("prnu_row", Part::Row), ("prnu_column", Part::Column), ("prnu_pixel", Part::Pixel)]
     {
         let result = match (flat, dark) {
-            (Some((index, flat)), Some((_, dark))) => {
+            (Some((index, flat)), Some((_, dark))) if curve.knows_black(index) => {
                 let signal = curve.signal(index);
                 Ok(of_light(flat, dark, part, confidence).root().map(|spread| spread / signal))
             }
-            (None, _) => Err(lacking("it takes two flats or more below saturation")),
-            _ => Err(no_darks()),
+            (None, _) => Err("it takes two flats or more below saturation".into()),
+            _ => Err(reasons.of_darks()),
         };
         add(key, result);
     }
@@ -408,9 +391,9 @@ fn add_patterns(
     ] {
         let hidden = || curve.hides(dark.map(|(_, dark)| dark), confidence);
         let result = match dark {
-            Some(_) if hidden() => Err(silent(curve, no_darks())),
+            Some(_) if hidden() => Err(reasons.of_noise()),
             Some((_, dark)) => over_gain(Ok(fixed(dark, part, confidence))),
-            None => Err(no_darks()),
+            None => Err(reasons.of_darks()),
         };
         add(key, result);
     }

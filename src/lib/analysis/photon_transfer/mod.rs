@@ -11,6 +11,7 @@ mod fit;
 mod level;
 mod linearity;
 mod pattern;
+mod reasons;
 mod sites;
 mod survey;
 mod tally;

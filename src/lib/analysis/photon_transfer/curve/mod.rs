@@ -119,7 +119,7 @@ impl Curve {
     /// Of flats in the order of their light, and darks of one temperature. `rounding` is the variance of the rounding error of
     /// the samples. None where no gain follows.
     pub fn of(flats: &[Level], darks: &[Level], rounding: f64, photon_error: f64) -> Option<Self> {
-        let are_darks_clipped = rounding > 0.0 && darks.iter().any(|dark| dark.at_ends[1] > FEW_AT_ENDS.max(1e-3));
+        let are_darks_clipped = darks.iter().any(|dark| is_clipped(dark, rounding));
         let is_silent = rounding > 0.0 && darks.iter().all(|dark| dark.variance < LEAST_VARIANCE);
         let hot = darks.iter().map(|dark| dark.at_ends[0]).fold(0.0, f64::max);
         let mut curve = Self {
@@ -236,6 +236,11 @@ impl Curve {
         self.no_light(flat).is_some()
     }
 
+    /// Whether the temporal variance of darks is that of their noise.
+    pub fn tells_dark_noise(&self) -> bool {
+        !self.is_silent && !self.are_darks_clipped
+    }
+
     /// Whether rounding hides what the pattern of a dark is, as temporal noise and pattern together do not spread codes enough, or
     /// code 0 cuts it off.
     pub fn hides(&self, dark: Option<&Level>, confidence: f64) -> bool {
@@ -307,7 +312,7 @@ impl Curve {
             dark_slope: lines.map(|[mean, _]| mean.slope).filter(|_| has_darks),
             dark_variance_slope: lines
                 .map(|[_, variance]| variance.slope)
-                .filter(|_| has_darks && !self.is_offset_free),
+                .filter(|_| has_darks && self.tells_dark_noise()),
         })
     }
 
@@ -349,6 +354,13 @@ impl Curve {
     pub fn signal_variance(&self, flat: usize) -> f64 {
         self.flats[flat].mean.variance + self.scatter_beneath(flat)[0]
     }
+}
+
+/// Whether code 0 cuts off what is beneath a dark, of codes whose error of rounding has such a variance.
+pub fn is_clipped(dark: &Level, rounding: f64) -> bool {
+    /// Of so few samples means and variances are those of all.
+    const FEW: f64 = 1e-3;
+    rounding > 0.0 && dark.at_ends[1] > FEW
 }
 
 /// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].
