@@ -414,3 +414,34 @@ fn reasons_are_true() {
     let said = why(&found(&full, &darks), "gain_adu_per_e");
     assert!(said.ends_with("(of 2 levels of flats 2 reach the largest code)"), "{said}");
 }
+
+/// Frames of one condition of which the second, or the third, is a copy; nearly full ones, the same but for no photosite, are none.
+#[test]
+fn copies_are_told_from_full_frames() {
+    let readout = camera(3, Kind::Ccd);
+    let mut sensor = support::sensor();
+    sensor.readout = Some(readout.clone());
+    let exposure = Exposure { exposure_s: FLAT_S, f_number: 8.0, lens_transmittance: 1.0 };
+    let head = CameraSetup::new(sensor, exposure).plane(SIZE, Scene::uniform("flat", [1000.0; 3])).unwrap();
+    let light = uniform_frame(head, [1000.0; 3]).unwrap();
+    let taken = |frame: u32| {
+        let noisy =
+            light.through(&AddNoise::new(&light.header, &NoiseSettings { frame, ..NoiseSettings::default() }).unwrap());
+        let noisy = noisy.unwrap().0;
+        let digitized = noisy.through(&Digitize::new(&noisy.header, &AdcSettings::default()).unwrap()).unwrap().0;
+        MemoryFrame::new(digitized.header, digitized.samples)
+    };
+    let full = |frame: u32| {
+        let mut frame = taken(frame);
+        let top = frame.samples.iter().copied().fold(0.0, f32::max);
+        let samples = (0..frame.samples.len()).map(|place| if place % 1000 == 7 { top - 9.0 } else { top }).collect();
+        frame = MemoryFrame::new(frame.header.clone(), samples);
+        frame
+    };
+    let copies = |mut frames: Vec<MemoryFrame>| survey(&mut frames, None, false).unwrap().sites[0].copies;
+    assert_eq!(copies(vec![taken(0), taken(1)]), None);
+    assert_eq!(copies(vec![taken(0), taken(0)]), Some([0, 1]));
+    assert_eq!(copies(vec![taken(0), taken(1), taken(2), taken(1)]), Some([1, 3]));
+    assert_eq!(copies(vec![full(0), full(1)]), None);
+    assert_eq!(copies(vec![full(0), full(1), full(2)]), None);
+}

@@ -28,6 +28,8 @@ pub struct SiteSurvey {
     pub spatial: MeanSquares,
     /// Means of the frames.
     pub frame_means: Vec<f64>,
+    /// Two frames whose samples are the same, bit by bit, though they vary from photosite to photosite.
+    pub copies: Option<[usize; 2]>,
 }
 
 impl SiteSurvey {
@@ -43,6 +45,8 @@ pub struct Tally {
     frames: usize,
     top: f64,
     at_ends: [u64; 2],
+    /// Samples of the first frame that are not those of the photosite before them in the row.
+    uneven: u64,
     /// About which ȳ is summed.
     center: f64,
     /// Σ y of each frame.
@@ -80,6 +84,7 @@ impl Tally {
             frames,
             top: top.unwrap_or(f64::INFINITY),
             at_ends: [0; 2],
+            uneven: 0,
             center: 0.0,
             frame_sums: vec![0.0; frames],
             row_squares: Vec::with_capacity(site.size[1]),
@@ -134,6 +139,8 @@ impl Tally {
             self.at_ends[0] += at_top;
             self.at_ends[1] += at_bottom;
         }
+        let first = &self.samples[..columns];
+        self.uneven += first.iter().zip(&first[1..]).map(|(one, next)| u64::from(one != next)).sum::<u64>();
     }
 
     #[inline(always)]
@@ -178,6 +185,25 @@ impl Tally {
         self.within[1] += times * times * dot(&self.squared, &self.squared);
     }
 
+    /// Two frames whose samples are the same: then all rows and columns of both depart alike, and of two frames nothing departs at
+    /// all. Frames that are one value but for few photosites, as full ones and those of no noise, may well be the same.
+    fn copies(&self) -> Option<[usize; 2]> {
+        /// Of frames of noise more of the samples differ from the next.
+        const VARIED: f64 = 0.05;
+        if self.uneven as f64 <= VARIED * (self.size[0] * self.size[1]) as f64 {
+            return None;
+        }
+        if self.frames == 2 {
+            return self.row_squares.iter().all(|square| *square == 0.0).then_some([0, 1]);
+        }
+        let column = |frame: usize| &self.column_sums[frame * self.size[0]..][..self.size[0]];
+        let are_same = |[one, other]: &[usize; 2]| {
+            let of_rows = self.row_sums.chunks_exact(self.frames).all(|sums| sums[*one] == sums[*other]);
+            of_rows && column(*one) == column(*other)
+        };
+        (1..self.frames).flat_map(|other| (0..other).map(move |one| [one, other])).find(are_same)
+    }
+
     /// Gives the second of two frames what the first departed by, to the other side.
     fn complete(&mut self) {
         let times = self.times();
@@ -192,6 +218,7 @@ impl Tally {
 
     /// What the rows tell.
     pub fn finish(mut self) -> SiteSurvey {
+        let copies = self.copies();
         self.complete();
         let [columns, rows] = self.size.map(|extent| extent as f64);
         let n = rows * columns;
@@ -250,6 +277,7 @@ impl Tally {
             temporal,
             spatial: MeanSquares::of(spatial, self.size, 1.0),
             frame_means: drifts.iter().map(|drift| mean + drift).collect(),
+            copies,
         }
     }
 

@@ -8,8 +8,7 @@ use super::notes::Note;
 use super::options::Selection;
 use super::values;
 use crate::analysis::photon_transfer::{
-    ClassFindings, Condition, Level, PatternView, Settings, Site, SiteSurvey, Survey, left_in_mean, of_class,
-    pattern_view, survey,
+    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, left_in_mean, of_class, pattern_view, survey,
 };
 use crate::error::{Error, Result};
 use crate::formats::frame_list::{self, FrameList};
@@ -195,11 +194,9 @@ fn survey_of(group: &Group, read: &Reading, top: Option<f64>, keeps: bool) -> Re
         }
         check_same_light(group, &site.frame_means, top)?;
     }
-    let within = |mean: f64| mean > 0.0 && top.is_none_or(|top| mean < top);
-    let is_same = |site: &SiteSurvey| site.variance == 0.0 && within(site.mean) && site.spatial.rest.value > 0.0;
-    if found.sites.iter().all(is_same) {
+    if let Some([one, other]) = found.sites.iter().find_map(|site| site.copies) {
         let problem =
-            format!("{} and {}: their samples are the same", group.files[0].display(), group.files[1].display());
+            format!("{} and {}: their samples are the same", group.files[one].display(), group.files[other].display());
         return Err(Error::Data(problem + "; copies of one exposure do not count as two"));
     }
     Ok(found)
