@@ -24,7 +24,8 @@ pub enum Separator {
 impl Separator {
     /// What parts the cells of `text`: what makes two or more cells of the last of its first rows, all but the first of them
     /// numbers, or, in a table `of_numbers`, of the last that has no mistake; where nothing does, the first of comma, semicolon
-    /// and tab that the first row has.
+    /// and tab that the first row has. In a table of words a comma is none where the first row has
+    /// another of these, and as many cells by it as the last.
     pub fn of(text: &str, of_numbers: bool) -> Self {
         let rows: Vec<&str> = rows(text).take(ROWS_LOOKED_AT).collect();
         let makes_numbers = |row: &str, separator: &&Self| {
@@ -36,9 +37,17 @@ impl Separator {
         };
         let first = rows.first().unwrap_or(&"").as_bytes();
         let in_first = || b",;\t".iter().find(|separator| first.contains(separator));
+        // Words before a last number with a decimal comma: `a.tiff;flat;0,02` is not the word `a.tiff;flat;0` and the number 02.
+        let as_wide = |separator: &u8| {
+            let cells = |row: &&str| Self::Byte(*separator).cells(row).len();
+            rows.first().map(cells) == rows.last().map(cells)
+        };
+        let is_of_decimals = !of_numbers && !first.contains(&b',') && in_first().is_some_and(as_wide);
+        let may_part = |separator: &&Self| !(is_of_decimals && **separator == Self::Byte(b','));
         let looked_at = if of_numbers { rows.len() } else { 1 };
         let mut last = rows.iter().rev().take(looked_at);
-        let found = last.find_map(|row| SEPARATORS.iter().find(|separator| makes_numbers(row, separator)));
+        let parts = |row: &str| SEPARATORS.iter().filter(may_part).find(|separator| makes_numbers(row, separator));
+        let found = last.find_map(|row| parts(row));
         found.copied().unwrap_or_else(|| Self::Byte(*in_first().unwrap_or(&b',')))
     }
 
