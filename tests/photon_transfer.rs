@@ -101,18 +101,61 @@ fn ccd(chance: &mut Chance) -> ReadOut {
 
 const SIZE: [usize; 2] = [96, 64];
 
+/// What frames scatter by besides noise, standard deviations.
+#[derive(Clone, Copy, Default)]
+struct Shake {
+    /// Of the light from frame to frame, relative.
+    light: f64,
+    /// Of the black level from frame to frame, in codes.
+    black_adu: f64,
+    /// Of exposure times from level to level, relative.
+    time: f64,
+}
+
+/// Temperature of further darks, beside 300 K.
+const WARM_K: f64 = 308.0;
+
+impl Shake {
+    fn is_any(self) -> bool {
+        self.light + self.black_adu + self.time > 0.0
+    }
+
+    /// What the light, the black level in codes, and the time of a frame are changed by.
+    fn drawn(self, index: u32, frame: u32, first: u32) -> [f64; 3] {
+        // The sum of 12 uniform numbers is normal enough.
+        let normal = |place: u32, which: u32| {
+            let mut chance = Chance { camera: 10_000 * (which + 1) + index, drawn: 12 * place };
+            (0..12).map(|_| chance.uniform()).sum::<f64>() - 6.0
+        };
+        [1.0 + self.light * normal(frame, 0), self.black_adu * normal(frame, 1), 1.0 + self.time * normal(first, 2)]
+    }
+}
+
 /// Frames of one condition of a camera.
-fn level(readout: &ReadOut, index: u32, condition: Condition, expected_e: f64, frames: u32, first: u32) -> Level {
-    let mut sensor = support::sensor();
-    sensor.readout = Some(readout.clone());
-    let exposure = Exposure { exposure_s: condition.exposure_s.unwrap(), f_number: 8.0, lens_transmittance: 1.0 };
-    let setup = CameraSetup::new(sensor, exposure);
-    let head = setup.plane(SIZE, Scene::uniform("flat", [expected_e; 3])).unwrap();
-    let light = uniform_frame(head, [expected_e; 3]).unwrap();
+fn level(
+    (readout, index, shake): (&ReadOut, u32, Shake),
+    condition: Condition,
+    expected_e: f64,
+    [frames, first]: [u32; 2],
+) -> Level {
     let mut taken: Vec<MemoryFrame> = (first..first + frames)
         .map(|frame| {
-            let settings =
-                NoiseSettings { seed: index.into(), sensor_seed: index.into(), frame, ..NoiseSettings::default() };
+            let [of_light, black_adu, of_time] = shake.drawn(index, frame, first);
+            let expected_e = expected_e * of_light * of_time;
+            let mut sensor = support::sensor();
+            sensor.readout = Some(ReadOut { bias_adu: readout.bias_adu + black_adu, ..readout.clone() });
+            let exposure_s = condition.exposure_s.unwrap() * of_time;
+            let exposure = Exposure { exposure_s, f_number: 8.0, lens_transmittance: 1.0 };
+            let setup = CameraSetup::new(sensor, exposure);
+            let head = setup.plane(SIZE, Scene::uniform("flat", [expected_e; 3])).unwrap();
+            let light = uniform_frame(head, [expected_e; 3]).unwrap();
+            let settings = NoiseSettings {
+                seed: index.into(),
+                sensor_seed: index.into(),
+                frame,
+                temperature_k: condition.temperature_k,
+                ..NoiseSettings::default()
+            };
             let noisy = light.through(&AddNoise::new(&light.header, &settings).unwrap()).unwrap().0;
             let digitized = noisy.through(&Digitize::new(&noisy.header, &AdcSettings::default()).unwrap()).unwrap().0;
             MemoryFrame::new(digitized.header, digitized.samples)
@@ -138,6 +181,13 @@ fn found(flats: &[Level], darks: &[Level]) -> ClassFindings {
 
 /// Flats and darks of a camera.
 fn levels(readout: &ReadOut, index: u32) -> [Vec<Level>; 2] {
+    let [flats, darks, _] = levels_of((readout, index, Shake::default()));
+    [flats, darks]
+}
+
+/// Flats and darks of a camera, and darks at [`WARM_K`].
+fn levels_of(camera: (&ReadOut, u32, Shake)) -> [Vec<Level>; 3] {
+    let readout = camera.0;
     let lit = |photons: f64| Condition {
         is_lit: true,
         exposure_s: Some(FLAT_S),
@@ -157,14 +207,19 @@ fn levels(readout: &ReadOut, index: u32) -> [Vec<Level>; 2] {
         .iter()
         .map(|share| {
             let frames = if *share == 0.5 { 8 } else { 2 };
-            level(readout, index, lit(share * end / QUANTUM_EFFICIENCY), share * end, frames, next(frames))
+            level(camera, lit(share * end / QUANTUM_EFFICIENCY), share * end, [frames, next(frames)])
         })
         .collect();
-    let darks = [(FLAT_S, 8), (0.1, 2), (0.25, 2), (0.5, 4), (1.0, 4)]
-        .iter()
-        .map(|(time, frames)| level(readout, index, dark(*time), 0.0, *frames, next(*frames)))
-        .collect();
-    [flats, darks]
+    let mut darks_at = |temperature_k: f64| -> Vec<Level> {
+        let of = |(time, frames): &(f64, u32)| {
+            let condition = Condition { temperature_k: Some(temperature_k), ..dark(*time) };
+            level(camera, condition, 0.0, [*frames, next(*frames)])
+        };
+        [(FLAT_S, 8), (0.1, 2), (0.25, 2), (0.5, 4), (1.0, 4)].iter().map(of).collect()
+    };
+    let (darks, warm) =
+        (darks_at(readout.temperature_k), if camera.2.is_any() { darks_at(WARM_K) } else { Vec::new() });
+    [flats, darks, warm]
 }
 
 /// The signal of the largest temporal variance, in electrons.
@@ -327,6 +382,66 @@ fn a_lamp_that_flickers_widens_the_responsivity() {
     let missed = missed.count();
     eprintln!("{missed} of {COUNT}");
     assert!(missed <= 10, "{missed} of {COUNT}");
+}
+
+/// Cameras whose frames scatter beyond noise, in one way or another: what means tell lies within its interval as often as is stated,
+/// and the scatter is told of. Of n cameras so many may miss by chance: 4 standard deviations beyond 5 %.
+#[test]
+fn frames_that_scatter_beyond_noise_widen_intervals() {
+    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(24, |count| count.parse().unwrap());
+    let none = Shake::default();
+    for (name, shake, words) in [
+        ("light", Shake { light: 0.001, ..none }, "light scatters by"),
+        ("black", Shake { black_adu: 0.3, ..none }, "the black level moves"),
+        ("both", Shake { light: 0.002, black_adu: 0.3, ..none }, "the black level moves"),
+        ("time", Shake { time: 0.01, ..none }, "from level to level"),
+    ] {
+        let found: Vec<_> = (0..count).into_par_iter().map(|index| shaken(index, shake, words)).collect();
+        let told = found.iter().filter(|(told, _)| *told).count();
+        for (place, key) in SHAKEN.iter().enumerate() {
+            let known: Vec<[f64; 2]> = found.iter().filter_map(|(_, held)| held[place]).collect();
+            let missed = known.iter().filter(|[off, _]| off.abs() > 1.0).count();
+            let mut widths: Vec<f64> = known.iter().map(|[_, width]| *width).collect();
+            widths.sort_by(f64::total_cmp);
+            let n = known.len() as f64;
+            let width = widths.get(known.len() / 2).copied().unwrap_or(f64::NAN);
+            eprintln!("{name}, {key}: {missed} of {n} missed, median half-width {width:.2e}; {told} of {count} told");
+            let allowed = n * (1.0 - CONFIDENCE) + 4.0 * (n * CONFIDENCE * (1.0 - CONFIDENCE)).sqrt();
+            assert!(n * 2.0 >= f64::from(count), "{name}: {key} is known of {n} of {count} cameras alone");
+            assert!(missed as f64 <= allowed, "{name}, {key}: {missed} of {n} intervals missed");
+        }
+    }
+}
+
+/// Numbers that means of frames tell.
+const SHAKEN: [&str; 6] = [
+    "linearity_error_min",
+    "linearity_error_max",
+    "dark_current_e_per_s",
+    "dark_current_doubling_k",
+    "quantum_efficiency",
+    "gain_adu_per_e",
+];
+
+/// Of a camera whose frames scatter: whether words of that are among what is told, and how far each of the numbers is off over half the
+/// width of its interval, with that.
+fn shaken(index: u32, shake: Shake, words: &str) -> (bool, [Option<[f64; 2]>; 6]) {
+    let readout = camera(index, Kind::Ccd);
+    let [flats, darks, warm] = levels_of((&readout, index, shake));
+    let all: Vec<Level> = darks.iter().chain(&warm).cloned().collect();
+    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true };
+    let found = of_class("G", &flats, &darks, &all, &settings);
+    let currents = [readout.temperature_k, WARM_K].map(|kelvin| readout.dark_current_e_per_s(kelvin));
+    let doubling = (WARM_K - readout.temperature_k) / (currents[1] / currents[0]).log2();
+    let mut truths: BTreeMap<&str, f64> = truths(&readout, index).into_iter().collect();
+    truths.insert("dark_current_doubling_k", doubling);
+    let held = SHAKEN.map(|key| {
+        let (interval, truth) = (found.get(key)?, truths[key]);
+        let width = (interval.high - interval.low) / 2.0;
+        let half = if interval.value > truth { interval.value - interval.low } else { interval.high - interval.value };
+        Some([(interval.value - truth) / half, width])
+    });
+    (found.notes.iter().chain(&found.doubts).any(|told| told.contains(words)), held)
 }
 
 /// What levels show of wrong photons and of light that drifts is told; a camera that is as it should be raises no doubt.

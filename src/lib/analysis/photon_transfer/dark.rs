@@ -2,17 +2,18 @@
 //! photosite to photosite.
 
 use super::curve::is_clipped;
-use super::fit::{Line, Point, variance_besides};
+use super::fit::{Line, Point};
 use super::level::Level;
 use super::pattern::{Part, fixed};
 use super::reasons::CLIPPED;
+use super::scatter::{Scatter, among};
 use crate::numerics::quantiles;
 use crate::numerics::variance_components::Interval;
 use std::f64::consts::LN_2;
 
-/// A line through points with what its slope and offset scatter by, variances; points miss it by no more than they scatter, or else
-/// all have one more error alike.
-fn fitted(points: &[(f64, f64, f64)]) -> Option<(Line, [f64; 2])> {
+/// A line through points with what its slope and offset scatter by, variances, for intervals of such confidence; points miss it by no
+/// more than they scatter, or else all have one more error alike.
+fn fitted(points: &[(f64, f64, f64)], confidence: f64) -> Option<(Line, [f64; 2])> {
     let weighted = |besides: f64| -> Vec<Point> {
         points
             .iter()
@@ -22,8 +23,7 @@ fn fitted(points: &[(f64, f64, f64)]) -> Option<(Line, [f64; 2])> {
     let misfit = |besides: f64| Line::through(weighted(besides)).map_or(0.0, |line| line.chi_square(weighted(besides)));
     let freedom = points.len() as f64 - 2.0;
     let largest = points.iter().map(|(_, y, _)| y * y).fold(0.0, f64::max);
-    let besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
-    let points = weighted(besides);
+    let points = weighted(among(freedom, misfit, largest).known(confidence));
     let line = Line::through(points.clone())?;
     let all: f64 = points.iter().map(|point| point.weight).sum();
     let mean = points.iter().map(|point| point.weight * point.x).sum::<f64>() / all;
@@ -32,19 +32,25 @@ fn fitted(points: &[(f64, f64, f64)]) -> Option<(Line, [f64; 2])> {
 }
 
 /// The temperature step that doubles the dark current, K, from darks at several temperatures, each at several times:
-/// log₂ I is a line over temperature \[EMVA1288, Eq. 33]. Darks that code 0 clips do not count, where the error of rounding has such a
-/// variance.
+/// log₂ I is a line over temperature \[EMVA1288, Eq. 33]. Frames scatter so beyond noise; darks that code 0 clips do not count, where the
+/// error of rounding has such a variance.
 ///
 /// # Errors
 ///
 /// Which frames would tell it.
-pub fn doubling_temperature(darks: &[Level], rounding: f64, confidence: f64) -> Result<Interval, String> {
+pub fn doubling_temperature(
+    darks: &[Level],
+    scatter: &Scatter,
+    rounding: f64,
+    confidence: f64,
+) -> Result<Interval, String> {
     let whole: Vec<&Level> = darks.iter().filter(|dark| !is_clipped(dark, rounding)).collect();
     let of_rate = |temperature: f64| -> Option<(f64, f64)> {
         let own = whole.iter().filter(|dark| dark.condition.temperature_k == Some(temperature));
+        let variance = |dark: &Level| dark.mean_variance + scatter.of_black(dark).known(confidence);
         let points: Vec<(f64, f64, f64)> =
-            own.filter_map(|dark| Some((dark.condition.exposure_s?, dark.mean, dark.mean_variance))).collect();
-        let (line, [_, variance]) = fitted(&points)?;
+            own.filter_map(|dark| Some((dark.condition.exposure_s?, dark.mean, variance(dark)))).collect();
+        let (line, [_, variance]) = fitted(&points, confidence)?;
         Some((line.slope, variance))
     };
     let mut temperatures: Vec<f64> = whole.iter().filter_map(|dark| dark.condition.temperature_k).collect();
@@ -69,7 +75,7 @@ pub fn doubling_temperature(darks: &[Level], rounding: f64, confidence: f64) -> 
         .map(|(temperature, slope, variance)| (*temperature, slope.log2(), variance / (slope * LN_2).powi(2)))
         .collect();
     let untold = "the dark current is told from none at fewer than two temperatures: darks of longer exposure, or warmer ones, would tell";
-    let (line, [_, variance]) = if rates.len() < 2 { None } else { fitted(&rates) }.ok_or(untold)?;
+    let (line, [_, variance]) = if rates.len() < 2 { None } else { fitted(&rates, confidence) }.ok_or(untold)?;
     let slope = Interval::normal(line.slope, variance, confidence);
     if slope.low <= 0.0 {
         return Err("the dark current does not rise with temperature beyond chance: darks of longer exposure, or at temperatures \
@@ -102,7 +108,7 @@ pub fn parted_pattern(darks: &[Level], confidence: f64) -> Result<[Interval; 2],
     times.sort_by(f64::total_cmp);
     times.dedup();
     let few = "it takes darks at three exposure times or more";
-    let (line, [of_offset, of_slope]) = if times.len() < 3 { None } else { fitted(&points) }.ok_or(few)?;
+    let (line, [of_offset, of_slope]) = if times.len() < 3 { None } else { fitted(&points, confidence) }.ok_or(few)?;
     let shared = |value: f64| 2.0 * value * value / freedom;
     Ok([
         Interval::normal(line.offset, of_offset + shared(line.offset), confidence),

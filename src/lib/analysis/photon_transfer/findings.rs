@@ -1,12 +1,13 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
-use super::curve::{Curve, ROUNDING, Values};
+use super::curve::{Curve, ROUNDING, Values, below_saturation};
 use super::dark::{doubling_temperature, parted_pattern};
 use super::doubts::doubts;
 use super::level::Level;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal};
 use super::reasons::{Reasons, UNSATURATED, of_gain};
+use super::scatter::Scatter;
 use crate::numerics::variance_components::Interval;
 
 /// What is asked of the measurement.
@@ -18,6 +19,13 @@ pub struct Settings {
     pub photon_error: f64,
     /// Whether samples are codes, which are rounded.
     pub are_codes: bool,
+}
+
+impl Settings {
+    /// The variance of the error of rounding, in samples².
+    pub fn rounding(&self) -> f64 {
+        if self.are_codes { ROUNDING } else { 0.0 }
+    }
 }
 
 /// A number that was measured, or why it was not.
@@ -105,8 +113,8 @@ pub fn of_class(
     all_darks: &[Level],
     settings: &Settings,
 ) -> ClassFindings {
-    let Settings { confidence, photon_error, are_codes } = *settings;
-    let rounding = if are_codes { ROUNDING } else { 0.0 };
+    let Settings { confidence, .. } = *settings;
+    let rounding = settings.rounding();
     let nothing = |why: String| ClassFindings {
         name: name.into(),
         findings: vec![finding("gain_adu_per_e", Err(why))],
@@ -118,7 +126,8 @@ pub fn of_class(
         notes: Vec::new(),
         doubts: Vec::new(),
     };
-    let curve = Curve::of(flats, darks, rounding, photon_error).filter(|curve| curve.values().is_some());
+    let scatter = Scatter::of(&below_saturation(flats), all_darks);
+    let curve = Curve::of(flats, darks, &scatter, settings).filter(|curve| curve.values().is_some());
     let Some(curve) = curve else { return nothing(of_gain(flats, rounding)) };
     if let Some(gain) = curve.interval(|values| Some(values.gain), confidence).filter(|gain| gain.low <= 0.0) {
         return nothing(format!(
@@ -176,7 +185,7 @@ pub fn of_class(
         high: saturation.high / threshold.low,
     };
     add("dynamic_range", saturation_e.and_then(|saturation| Ok(range(saturation, threshold_e?))));
-    let straight = straightness(reasons, confidence);
+    let straight = straightness(reasons, &scatter, confidence);
     for (key, end) in [("linearity_error_min", 0), ("linearity_error_max", 1)] {
         add(key, straight.as_ref().map(|line| line.extremes[end]).map_err(Clone::clone));
     }
@@ -190,7 +199,7 @@ pub fn of_class(
     let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
     let why = if curve.is_silent { reasons.of_noise() } else { reasons.of_times() };
     add("dark_current_from_variance_e_per_s", number(&from_variance, why));
-    add("dark_current_doubling_k", doubling_temperature(all_darks, rounding, confidence));
+    add("dark_current_doubling_k", doubling_temperature(all_darks, &scatter, rounding, confidence));
     let is_hidden = darks.iter().any(|dark| curve.hides(Some(dark), confidence));
     let parted = if is_hidden { Err(reasons.of_noise()) } else { parted_pattern(darks, confidence) };
     let offset = parted.clone().map(|[offset, _]| offset);
@@ -213,8 +222,12 @@ pub fn of_class(
         is_fitted: curve.fitted().contains(&flat),
     });
     let (curve_points, values) = (points.collect(), curve.values());
-    let notes = notes(&curve, flats);
-    let doubts = doubts(&curve, flats, confidence);
+    let mut notes = notes(&curve, flats);
+    let mut doubts = doubts(&curve, flats, confidence);
+    let by_levels = straight.as_ref().ok().and_then(|line| line.told.clone());
+    for (text, is_doubt) in scatter.told.iter().cloned().chain(curve.dark_told.clone()).chain(by_levels) {
+        if is_doubt { doubts.push(text) } else { notes.push(text) }
+    }
     let dark_point = |dark: &Level| DarkPoint {
         exposure_s: dark.condition.exposure_s,
         mean_adu: dark.mean,
@@ -324,7 +337,7 @@ fn saturation(reasons: Reasons, gain: Found) -> [Found; 3] {
 }
 
 /// The deviations from a straight line, against photons, or against time where light was constant.
-fn straightness(reasons: Reasons, confidence: f64) -> Result<Linearity, String> {
+fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<Linearity, String> {
     let Reasons { curve, flats, .. } = reasons;
     let light = |level: &Level| level.condition.photons.or(level.condition.exposure_s);
     let peak = curve.saturated.ok_or(UNSATURATED)?;
@@ -336,7 +349,12 @@ fn straightness(reasons: Reasons, confidence: f64) -> Result<Linearity, String> 
         .enumerate()
         .filter(|(index, _)| curve.knows_black(*index))
         .filter_map(|(index, flat)| {
-            Some(Response { light: light(flat)?, signal: curve.signal(index), variance: curve.signal_variance(index) })
+            Some(Response {
+                light: light(flat)?,
+                signal: curve.signal(index),
+                variance: curve.variance_parts(index, scatter),
+                light_variance: scatter.of_light(flat),
+            })
         })
         .collect();
     let few = "it takes three flats or more between 5 and 95 % of saturation, of known photons or exposure times";

@@ -12,6 +12,7 @@ mod level;
 mod linearity;
 mod pattern;
 mod reasons;
+mod scatter;
 mod sites;
 mod survey;
 mod tally;

@@ -12,9 +12,11 @@
 mod bend;
 mod weights;
 
+use super::findings::Settings;
 use super::fit::{Line, Point};
 use super::level::Level;
 use super::pattern::{Part, fixed};
+use super::scatter::{Component, Scatter};
 use crate::numerics::variance_components::Interval;
 
 /// Variance of the error of rounding, in codes² [EMVA1288, Sec. 2.5].
@@ -42,17 +44,28 @@ struct Point4 {
     mean: Datum,
     variance: Datum,
     photons: Option<Datum>,
+    /// What its light is uncertain by, as frames scatter: a relative variance.
+    light_variance: f64,
     freedom: f64,
+    frames: f64,
+    /// What noise makes the mean scatter by.
+    noise: f64,
 }
 
 impl Point4 {
-    fn of(level: &Level) -> Self {
+    fn of(level: &Level, scatter: &Scatter, Settings { confidence, photon_error, .. }: &Settings) -> Self {
+        let light_variance = scatter.of_light(level).known(*confidence);
+        let of_photons = |value: f64| (photon_error.powi(2) + light_variance) * value * value;
+        let of_black = scatter.of_black(level).known(*confidence);
         Self {
             exposure_s: level.condition.exposure_s,
-            mean: Datum { value: level.mean, variance: level.mean_variance },
+            mean: Datum { value: level.mean, variance: level.mean_variance + of_black },
             variance: Datum { value: level.variance, variance: level.variance_variance },
-            photons: level.condition.photons.map(|value| Datum { value, variance: 0.0 }),
+            photons: level.condition.photons.map(|value| Datum { value, variance: of_photons(value) }),
+            light_variance,
             freedom: level.freedom(),
+            frames: level.frames as f64,
+            noise: level.mean_variance,
         }
     }
 }
@@ -86,6 +99,11 @@ pub struct Curve {
     pub are_darks_clipped: bool,
     /// The share of the light that signals miss their line by, beyond what they scatter by: a standard deviation.
     pub light_error: f64,
+    /// What is to be said of darks whose means miss their line over time by more than they scatter, and whether it is a doubt.
+    pub dark_told: Option<(String, bool)>,
+    /// What means of darks miss that line by besides.
+    dark_besides: Component,
+    confidence: f64,
     rounding: f64,
     weights: Weights,
 }
@@ -116,22 +134,27 @@ pub struct Values {
 }
 
 impl Curve {
-    /// Of flats in the order of their light, and darks of one temperature. `rounding` is the variance of the rounding error of
-    /// the samples. None where no gain follows.
-    pub fn of(flats: &[Level], darks: &[Level], rounding: f64, photon_error: f64) -> Option<Self> {
+    /// Of flats in the order of their light, and darks of one temperature, whose frames scatter so beyond noise. None where no gain
+    /// follows.
+    pub fn of(flats: &[Level], darks: &[Level], scatter: &Scatter, settings: &Settings) -> Option<Self> {
+        let rounding = settings.rounding();
+        let point = |level: &Level| Point4::of(level, scatter, settings);
         let are_darks_clipped = darks.iter().any(|dark| is_clipped(dark, rounding));
         let is_silent = rounding > 0.0 && darks.iter().all(|dark| dark.variance < LEAST_VARIANCE);
         let hot = darks.iter().map(|dark| dark.at_ends[0]).fold(0.0, f64::max);
         let mut curve = Self {
             beneath: Vec::new(),
-            flats: flats.iter().map(Point4::of).collect(),
-            darks: darks.iter().map(Point4::of).collect(),
+            flats: flats.iter().map(point).collect(),
+            darks: darks.iter().map(point).collect(),
             fitted: Vec::new(),
             saturated: peak(flats),
             is_offset_free: is_silent || are_darks_clipped,
             is_silent: is_silent && !darks.is_empty(),
             are_darks_clipped,
             light_error: 0.0,
+            dark_told: None,
+            dark_besides: Component::NONE,
+            confidence: settings.confidence,
             rounding,
             weights: Weights::default(),
         };
@@ -152,11 +175,6 @@ impl Curve {
         let needed = if curve.is_offset_free { 2 } else { 1 };
         if curve.fitted.len() < needed {
             return None;
-        }
-        for flat in &mut curve.flats {
-            if let Some(photons) = &mut flat.photons {
-                photons.variance = (photon_error * photons.value).powi(2);
-            }
         }
         curve.weigh();
         Some(curve)
@@ -350,6 +368,23 @@ impl Curve {
         Some(Interval::normal(value, variance, confidence))
     }
 
+    /// What the mean above no light scatters by: noise; black levels, whose frames scatter so; and what darks miss their line by.
+    pub fn variance_parts(&self, flat: usize, scatter: &Scatter) -> [Component; 3] {
+        let own = &self.flats[flat];
+        let share = 1.0 / own.frames;
+        let [noise, frames, levels] = match self.beneath[flat] {
+            Beneath::Dark(dark) => [self.darks[dark].noise, 1.0 / self.darks[dark].frames, 1.0],
+            Beneath::Lines => {
+                let count = self.darks.len() as f64;
+                let mean = |of: fn(&Point4) -> f64| self.darks.iter().map(of).sum::<f64>() / (count * count);
+                [mean(|dark| dark.noise), mean(|dark| 1.0 / dark.frames), 1.0 / count]
+            }
+            Beneath::Unknown => [0.0; 3],
+        };
+        let noise = Component { variance: own.noise + noise, ..Component::NONE };
+        [noise, scatter.black.times(share + frames), self.dark_besides.times(1.0 + levels)]
+    }
+
     /// What the mean above no light scatters by, a variance.
     pub fn signal_variance(&self, flat: usize) -> f64 {
         self.flats[flat].mean.variance + self.scatter_beneath(flat)[0]
@@ -361,6 +396,16 @@ pub fn is_clipped(dark: &Level, rounding: f64) -> bool {
     /// Of so few samples means and variances are those of all.
     const FEW: f64 = 1e-3;
     rounding > 0.0 && dark.at_ends[1] > FEW
+}
+
+/// Flats of light that is well below saturation, so that their means follow it.
+pub fn below_saturation(flats: &[Level]) -> Vec<&Level> {
+    /// Of the mean that saturates.
+    const SHARE: f64 = 0.95;
+    /// More samples than these at the largest code, and means do not follow the light.
+    const FEW: f64 = 1e-3;
+    let reach = peak(flats).map_or(f64::INFINITY, |peak| SHARE * flats[peak].mean);
+    flats.iter().filter(|flat| flat.at_ends[0] <= FEW && flat.mean <= reach).collect()
 }
 
 /// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].
