@@ -477,6 +477,48 @@ fn light_that_is_not_as_said_is_doubted() {
     doubt(&flats.iter().enumerate().map(wrong).collect::<Vec<_>>(), "signals miss the line of the response by");
 }
 
+/// Cameras of which two in a hundred photosites are hot: dark current and patterns of the dark lie within their
+/// intervals as often as is stated. Of n cameras so many may miss by chance: 4 standard deviations beyond 5 %.
+#[test]
+fn hot_photosites_widen_intervals_of_the_dark() {
+    const OF_DARK: [&str; 4] = ["dsnu_e", "dsnu_pixel_e", "dark_current_e_per_s", "dcnu"];
+    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(40, |count| count.parse().unwrap());
+    let found: Vec<[Option<bool>; 4]> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let plain = camera(index, Kind::Ccd);
+            // No photosite is full after the longest exposure, 1 s.
+            let current = plain.dark_current_e_per_s.unwrap().min(plain.full_well_e / 50.0);
+            let (share, hot) = (0.02, 5.0 * current);
+            let readout = ReadOut {
+                dark_current_e_per_s: Some(current),
+                hot_pixel_share: share,
+                hot_pixel_dark_current_e_per_s: hot,
+                ..plain
+            };
+            let [flats, darks] = levels(&readout, index);
+            let found = found(&flats, &darks);
+            let mean = current + share * hot;
+            // An exponential law has a variance of the square of its mean.
+            let variance = (readout.dcnu * mean).powi(2) + share * (2.0 - share) * hot * hot;
+            let of_flats = variance.sqrt() * FLAT_S;
+            let truths = [of_flats, of_flats, mean, variance.sqrt() / mean];
+            let holds = |(key, truth): (&str, f64)| {
+                let interval = found.get(key)?;
+                Some((interval.low..=interval.high).contains(&truth))
+            };
+            [0, 1, 2, 3].map(|place| holds((OF_DARK[place], truths[place])))
+        })
+        .collect();
+    for (place, key) in OF_DARK.iter().enumerate() {
+        let held: Vec<bool> = found.iter().filter_map(|held| held[place]).collect();
+        let (n, missed) = (held.len() as f64, held.iter().filter(|held| !**held).count());
+        eprintln!("{key}: {missed} of {n} missed");
+        let allowed = n * (1.0 - CONFIDENCE) + 4.0 * (n * CONFIDENCE * (1.0 - CONFIDENCE)).sqrt();
+        assert!(missed as f64 <= allowed, "{key}: {missed} of {n} intervals missed");
+    }
+}
+
 fn why(found: &ClassFindings, key: &str) -> String {
     found.findings.iter().find(|finding| finding.key == key).unwrap().found.clone().unwrap_err()
 }

@@ -1,14 +1,12 @@
 //! What darks tell beyond one temperature and one exposure time: how dark current rises with temperature, and how it differs from
 //! photosite to photosite.
 
-use super::curve::is_clipped;
+use super::curve::{FEW_AT_ENDS, is_clipped};
 use super::fit::{Line, Point};
 use super::level::Level;
-use super::pattern::{Part, fixed};
 use super::reasons::CLIPPED;
 use super::scatter::{Scatter, among};
-use crate::numerics::quantiles;
-use crate::numerics::variance_components::Interval;
+use crate::numerics::variance_components::{Interval, MeanSquare, combination};
 use std::f64::consts::LN_2;
 
 /// A line through points with what its slope and offset scatter by, variances, for intervals of such confidence; points miss it by no
@@ -85,6 +83,44 @@ pub fn doubling_temperature(
     Ok(Interval { value: 1.0 / slope.value, low: 1.0 / slope.high, high: 1.0 / slope.low })
 }
 
+/// What single photosites of a dark differ by.
+struct Pattern {
+    exposure_s: f64,
+    /// The variance between them, and what the noise that is left in the mean of the frames makes it scatter by, a variance.
+    variance: f64,
+    own: f64,
+    /// Fourth cumulant of a photosite.
+    fourth: f64,
+}
+
+impl Pattern {
+    fn of(dark: &Level) -> Option<Self> {
+        let count = dark.count();
+        let mut pattern = Self { exposure_s: dark.condition.exposure_s?, variance: 0.0, own: 0.0, fourth: 0.0 };
+        for site in &dark.sites {
+            let (share, noise) = (site.count() as f64 / count, site.temporal.rest.value / dark.frames as f64);
+            let variance = site.spatial.rest.value - noise;
+            let of_means = 2.0 * (site.spatial.rest.value.powi(2) - variance.max(0.0).powi(2)) / site.count() as f64;
+            let of_noise = 2.0 * noise * noise / site.temporal.rest.freedom;
+            pattern.variance += share * variance;
+            pattern.own += share * share * (of_means.max(0.0) + of_noise);
+            pattern.fourth += share * site.fourth;
+        }
+        Some(pattern)
+    }
+}
+
+/// The interval of a variance between `count` photosites of such a fourth cumulant, whose estimate scatters by `own` besides.
+fn of_photosites(variance: f64, own: f64, fourth: f64, count: f64, confidence: f64) -> Interval {
+    let square = MeanSquare { value: variance.max(0.0), freedom: count - 1.0 }.with_tails(fourth, count);
+    let [sampled, other] = [combination(&[(1.0, square)], confidence), Interval::normal(0.0, own, confidence)];
+    Interval {
+        value: variance,
+        low: variance - (square.value - sampled.low).hypot(other.low),
+        high: variance + (sampled.high - square.value).hypot(other.high),
+    }
+}
+
 /// The fixed pattern of darks parted into what no time adds and what goes by it: variances of single photosites at no exposure, in
 /// samples², and per second².
 ///
@@ -92,26 +128,31 @@ pub fn doubling_temperature(
 ///
 /// Which frames would tell it.
 pub fn parted_pattern(darks: &[Level], confidence: f64) -> Result<[Interval; 2], String> {
-    let reach = quantiles::of_normal(f64::midpoint(1.0, confidence));
-    let freedom: f64 = darks.first().map_or(1.0, |dark| dark.sites.iter().map(|site| site.spatial.rest.freedom).sum());
-    let points: Vec<(f64, f64, f64)> = darks
-        .iter()
-        .filter_map(|dark| {
-            let found = fixed(dark, Part::Pixel, confidence);
-            let scatter = ((found.high - found.low) / (2.0 * reach)).powi(2);
-            // The pattern is the same in all of them: that it is one of many is an error that they share.
-            let own = (scatter - 2.0 * found.value.powi(2) / freedom).max(1e-3 * scatter);
-            Some((dark.condition.exposure_s?.powi(2), found.value, own))
-        })
-        .collect();
-    let mut times: Vec<f64> = points.iter().map(|(time, ..)| *time).collect();
-    times.sort_by(f64::total_cmp);
+    // Photosites that reach the largest code in longer darks alone are cut off there.
+    let stuck = darks.iter().map(|dark| dark.at_ends[0]).fold(f64::INFINITY, f64::min);
+    let is_whole = |dark: &&Level| dark.at_ends[0] <= stuck + FEW_AT_ENDS;
+    let are_all_whole = darks.iter().all(|dark| is_whole(&dark));
+    let mut patterns: Vec<Pattern> = darks.iter().filter(is_whole).filter_map(Pattern::of).collect();
+    patterns.sort_by(|a, b| a.exposure_s.total_cmp(&b.exposure_s));
+    let mut times: Vec<f64> = patterns.iter().map(|pattern| pattern.exposure_s).collect();
     times.dedup();
-    let few = "it takes darks at three exposure times or more";
-    let (line, [of_offset, of_slope]) = if times.len() < 3 { None } else { fitted(&points, confidence) }.ok_or(few)?;
-    let shared = |value: f64| 2.0 * value * value / freedom;
+    let few = if are_all_whole {
+        "it takes darks at three exposure times or more"
+    } else {
+        "hot photosites reach the largest code in the longer darks: it takes darks at three shorter exposure times or more"
+    };
+    let (true, [first, .., last]) = (times.len() >= 3, &patterns[..]) else { return Err(few.into()) };
+    // The pattern is the same in all of them: that it is one of many is an error that they share.
+    let points: Vec<(f64, f64, f64)> =
+        patterns.iter().map(|pattern| (pattern.exposure_s.powi(2), pattern.variance, pattern.own)).collect();
+    let (line, [of_offset, of_slope]) = fitted(&points, confidence).ok_or(few)?;
+    // Fourth cumulants of what no time adds and of what goes by it add up, as variances do.
+    let [short, long] = [first, last].map(|pattern| pattern.exposure_s.powi(4));
+    let of_time = ((last.fourth - first.fourth) / (long - short)).max(0.0);
+    let of_none = (first.fourth - of_time * short).max(0.0);
+    let count = darks.first().map_or(2.0, Level::count);
     Ok([
-        Interval::normal(line.offset, of_offset + shared(line.offset), confidence),
-        Interval::normal(line.slope, of_slope + shared(line.slope), confidence),
+        of_photosites(line.offset, of_offset, of_none, count, confidence),
+        of_photosites(line.slope, of_slope, of_time, count, confidence),
     ])
 }

@@ -194,14 +194,25 @@ pub fn of_class(
     let places =
         [lit.map(|(flat, level)| (level.place, curve.signal(flat))), dark.map(|(_, level)| (level.place, 0.0))];
     add_patterns(&mut add, reasons, stacks, &over_gain, confidence);
-    let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
-    add("dark_current_e_per_s", number(&per_second, reasons.of_times()));
-    let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
-    let why = if curve.is_silent { reasons.of_noise() } else { reasons.of_times() };
-    add("dark_current_from_variance_e_per_s", number(&from_variance, why));
-    add("dark_current_doubling_k", doubling_temperature(all_darks, &scatter, rounding, confidence));
     let is_hidden = darks.iter().any(|dark| curve.hides(Some(dark), confidence));
     let parted = if is_hidden { Err(reasons.of_noise()) } else { parted_pattern(darks, confidence) };
+    let photosites: f64 = darks.iter().map(Level::count).fold(f64::INFINITY, f64::min);
+    // The photosites that there are are a sample of those of the camera.
+    let sampled = |current: Interval| match (&parted, &gain) {
+        (Ok([_, of_time]), Ok(gain)) => {
+            let variance = of_time.value.max(0.0) / photosites / gain.value.powi(2);
+            let Interval { low, high, .. } = Interval::normal(0.0, variance, confidence);
+            let Interval { value, low: least, high: most } = current;
+            Interval { value, low: value - (value - least).hypot(low), high: value + (most - value).hypot(high) }
+        }
+        _ => current,
+    };
+    let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
+    add("dark_current_e_per_s", number(&per_second, reasons.of_times()).map(sampled));
+    let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
+    let why = if curve.is_silent { reasons.of_noise() } else { reasons.of_times() };
+    add("dark_current_from_variance_e_per_s", number(&from_variance, why).map(sampled));
+    add("dark_current_doubling_k", doubling_temperature(all_darks, &scatter, rounding, confidence));
     let offset = parted.clone().map(|[offset, _]| offset);
     add("dsnu_offset_e", over_gain(offset));
     let slope = curve.interval(|values| values.dark_slope, confidence).filter(|slope| slope.low > 0.0);

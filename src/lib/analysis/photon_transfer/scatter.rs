@@ -176,6 +176,8 @@ fn components(means: &[Means]) -> [f64; 2] {
 fn told(means: &[Means], [black, light]: [f64; 2]) -> Vec<(String, bool)> {
     /// Light that scatters by so large a share is doubted.
     const MUCH: f64 = 1e-3;
+    /// A black level that scatters by so much is.
+    const MUCH_ADU: f64 = 0.1;
     /// Less likely is beyond chance.
     const LEVEL: f64 = 1e-6;
     let beyond = |is_lit: bool, of: [f64; 2]| {
@@ -194,7 +196,7 @@ fn told(means: &[Means], [black, light]: [f64; 2]) -> Vec<(String, bool)> {
              intervals of black level, dark current and linearity take in",
             black.sqrt().hypot(noise)
         );
-        (text, true)
+        (text, black.sqrt() >= MUCH_ADU)
     });
     let of_light = beyond(true, [black, 0.0]).filter(|_| light > 0.0).map(|_| {
         let text = format!(

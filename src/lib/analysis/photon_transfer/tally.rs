@@ -26,6 +26,8 @@ pub struct SiteSurvey {
     pub temporal: MeanSquares,
     /// Mean squares of the mean of the frames.
     pub spatial: MeanSquares,
+    /// Fourth cumulant of the mean of the frames at single photosites, 0 or more, by the differences of neighbors: half of theirs.
+    pub fourth: f64,
     /// Means of the frames.
     pub frame_means: Vec<f64>,
     /// Two frames whose samples are the same, bit by bit, though they vary from photosite to photosite.
@@ -64,6 +66,8 @@ pub struct Tally {
     squares: f64,
     /// Σ a_k (ȳ − c) of each frame.
     products: Vec<f64>,
+    /// Σ d² and Σ d⁴, d the differences of ȳ between neighbors in a row.
+    steps: [f64; 2],
     /// Σ q and Σ q², q the sum of squares of a photosite about its row.
     within: [f64; 2],
     /// Samples of the row, `[frame][column]`, their means, and q.
@@ -95,6 +99,7 @@ impl Tally {
             column_means: vec![0.0; columns],
             squares: 0.0,
             products: vec![0.0; frames],
+            steps: [0.0; 2],
             within: [0.0; 2],
             samples: vec![0.0; columns * frames],
             means: vec![0.0; columns],
@@ -158,6 +163,12 @@ impl Tally {
         }
         self.row_means.push(sum(&self.above));
         self.squares += dot(&self.above, &self.above);
+        for (squared, pair) in self.squared.iter_mut().zip(self.above.windows(2)) {
+            *squared = (pair[1] - pair[0]).powi(2);
+        }
+        let squared = &self.squared[..columns - 1];
+        let of_steps = [sum(squared), dot(squared, squared)];
+        self.steps.iter_mut().zip(of_steps).for_each(|(sum, of_row)| *sum += of_row);
         self.squared.fill(0.0);
         let (summed, times) = (self.summed(), self.times());
         let mut all = 0.0;
@@ -183,6 +194,13 @@ impl Tally {
         self.row_squares.push(times * all);
         self.within[0] += times * sum(&self.squared);
         self.within[1] += times * times * dot(&self.squared, &self.squared);
+    }
+
+    /// Fourth cumulant of single photosites: that of differences, m₄ − 3 m₂², is twice as large.
+    fn fourth(&self) -> f64 {
+        let steps = ((self.size[0] - 1) * self.size[1]) as f64;
+        let [second, fourth] = self.steps.map(|sum| sum / steps);
+        ((fourth - 3.0 * second * second) / 2.0).max(0.0)
     }
 
     /// Two frames whose samples are the same: then all rows and columns of both depart alike, and of two frames nothing departs at
@@ -265,6 +283,9 @@ impl Tally {
             - spatial_sum * slopes.iter().map(|slope| slope * slope).sum::<f64>();
         let sums = SquareSums { all, rows: columns * by_rows, columns: rows * by_columns };
         let temporal = MeanSquares::of(sums, self.size, frames - 1.0);
+        let fourth = self.fourth();
+        let MeanSquares { rows: of_rows, columns: of_columns, rest } = MeanSquares::of(spatial, self.size, 1.0);
+        let [of_rows, of_columns, rest] = [of_rows, of_columns, rest].map(|square| square.with_tails(fourth, n));
         let variance = all.max(0.0) / ((frames - 1.0) * (n - 2.0));
         SiteSurvey {
             frames: self.frames,
@@ -275,7 +296,8 @@ impl Tally {
             variance_variance: self.variance_variance(&drifts, n),
             at_ends: self.at_ends,
             temporal,
-            spatial: MeanSquares::of(spatial, self.size, 1.0),
+            spatial: MeanSquares { rows: of_rows, columns: of_columns, rest },
+            fourth,
             frame_means: drifts.iter().map(|drift| mean + drift).collect(),
             copies,
         }

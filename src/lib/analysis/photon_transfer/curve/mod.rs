@@ -26,7 +26,7 @@ pub const LEAST_VARIANCE: f64 = 0.24;
 /// The fits end at this share of saturation [EMVA1288, Sec. 6.5].
 const HIGHEST: f64 = 0.7;
 /// So many samples at an end, beyond those that darks have there, and what is measured of the others is no longer that of all.
-const FEW_AT_ENDS: f64 = 1e-5;
+pub const FEW_AT_ENDS: f64 = 1e-5;
 /// Exposure times that differ by less are one.
 const SAME_TIME: f64 = 1e-6;
 
