@@ -171,7 +171,9 @@ fn level(
 /// What a camera is found to be.
 fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
     let [flats, darks] = levels(readout, index);
-    found(&flats, &darks)
+    let found = found(&flats, &darks);
+    assert_eq!(found.suspects, [], "{index}");
+    found
 }
 
 fn found(flats: &[Level], darks: &[Level]) -> ClassFindings {
@@ -431,6 +433,7 @@ fn shaken(index: u32, shake: Shake, words: &str) -> (bool, [Option<[f64; 2]>; 6]
     let all: Vec<Level> = darks.iter().chain(&warm).cloned().collect();
     let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true };
     let found = of_class("G", &flats, &darks, &all, &settings);
+    assert_eq!(found.suspects, [], "{index}");
     let currents = [readout.temperature_k, WARM_K].map(|kelvin| readout.dark_current_e_per_s(kelvin));
     let doubling = (WARM_K - readout.temperature_k) / (currents[1] / currents[0]).log2();
     let mut truths: BTreeMap<&str, f64> = truths(&readout, index).into_iter().collect();
@@ -601,4 +604,44 @@ fn copies_are_told_from_full_frames() {
     assert_eq!(copies(vec![taken(0), taken(1), taken(2), taken(1)]), Some([1, 3]));
     assert_eq!(copies(vec![full(0), full(1)]), None);
     assert_eq!(copies(vec![full(0), full(1), full(2)]), None);
+}
+
+/// A flat among the darks, a dark among the flats, and exposure times that are wrong are named by their level, and no other is; of
+/// levels as they should be none is.
+#[test]
+fn levels_that_are_not_what_they_are_said_to_be_are_named() {
+    let placed = |levels: Vec<Level>, first: usize| -> Vec<Level> {
+        levels.into_iter().enumerate().map(|(place, level)| Level { place: first + place, ..level }).collect()
+    };
+    let suspects = |flats: &[Level], darks: &[Level]| -> Vec<(usize, String)> {
+        found(flats, darks).suspects.into_iter().map(|suspect| (suspect.place, suspect.problem)).collect()
+    };
+    for index in 0..8 {
+        let readout = camera(index, Kind::Ccd);
+        let [flats, darks] = levels(&readout, index);
+        let (flats, darks) = (placed(flats, 0), placed(darks, 100));
+        assert_eq!(suspects(&flats, &darks), [], "{index}");
+        let only = |found: Vec<(usize, String)>, place: usize, words: &str| {
+            let [(own, problem)] = &found[..] else { panic!("{index}: {found:?}") };
+            assert!(*own == place && problem.contains(words), "{index}: {own} {problem}");
+        };
+        // A flat among the darks, with its own exposure time.
+        let mut lit = darks.clone();
+        lit[2] = Level { condition: darks[2].condition, place: 102, ..flats[4].clone() };
+        only(suspects(&flats, &lit), 102, "is it a flat");
+        // The same beside one dark alone.
+        let two = [darks[0].clone(), Level { condition: darks[0].condition, place: 103, ..flats[6].clone() }];
+        assert!(
+            suspects(&flats, &two).iter().any(|(place, problem)| *place == 103 && problem.contains("is it a flat"))
+        );
+        // A dark among the flats.
+        let mut unlit = flats.clone();
+        unlit[5] = Level { condition: flats[5].condition, place: 5, ..darks[0].clone() };
+        unlit.sort_by(|a, b| a.mean.total_cmp(&b.mean));
+        only(suspects(&unlit, &darks), 5, "is it a dark");
+        // A number of photons, and without photons an exposure time, that is wrong by a third.
+        let mut wrong = flats.clone();
+        wrong[6].condition.photons = wrong[6].condition.photons.map(|photons| photons * 1.5);
+        only(suspects(&wrong, &darks), 6, "of its number of photons: is that wrong?");
+    }
 }

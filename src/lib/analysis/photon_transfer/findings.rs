@@ -8,6 +8,7 @@ use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal};
 use super::reasons::{Reasons, UNSATURATED, of_gain};
 use super::scatter::Scatter;
+use super::suspects::{Suspect, suspects};
 use crate::numerics::variance_components::Interval;
 
 /// What is asked of the measurement.
@@ -93,6 +94,8 @@ pub struct ClassFindings {
     pub notes: Vec<String>,
     /// What may make numbers wrong.
     pub doubts: Vec<String>,
+    /// Levels that may not be what they are said to be.
+    pub suspects: Vec<Suspect>,
 }
 
 impl ClassFindings {
@@ -115,6 +118,8 @@ pub fn of_class(
 ) -> ClassFindings {
     let Settings { confidence, .. } = *settings;
     let rounding = settings.rounding();
+    let below: Vec<&Level> = below_saturation(flats).into_iter().map(|flat| &flats[flat]).collect();
+    let scatter = Scatter::of(&below, all_darks);
     let nothing = |why: String| ClassFindings {
         name: name.into(),
         findings: vec![finding("gain_adu_per_e", Err(why))],
@@ -125,8 +130,8 @@ pub fn of_class(
         stacks: [None; 2],
         notes: Vec::new(),
         doubts: Vec::new(),
+        suspects: suspects(None, flats, all_darks, &scatter),
     };
-    let scatter = Scatter::of(&below_saturation(flats), all_darks);
     let curve = Curve::of(flats, darks, &scatter, settings).filter(|curve| curve.values().is_some());
     let Some(curve) = curve else { return nothing(of_gain(flats, rounding)) };
     if let Some(gain) = curve.interval(|values| Some(values.gain), confidence).filter(|gain| gain.low <= 0.0) {
@@ -254,6 +259,7 @@ pub fn of_class(
         stacks: places,
         notes,
         doubts,
+        suspects: suspects(Some(&curve), flats, all_darks, &scatter),
     }
 }
 

@@ -15,6 +15,7 @@ mod reasons;
 mod scatter;
 mod sites;
 mod survey;
+mod suspects;
 mod tally;
 mod view;
 
@@ -27,5 +28,6 @@ pub use linearity::Linearity;
 pub use pattern::left_in_mean;
 pub use sites::Site;
 pub use survey::{Survey, survey};
+pub use suspects::Suspect;
 pub use tally::SiteSurvey;
 pub use view::{OUTSTANDING, Outlier, PatternFigure, PatternView, pattern_view};

@@ -178,8 +178,8 @@ pub fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Resul
         let (first, second) = (at(least).display(), at(most).display());
         return Err(Error::Data(if group.condition.is_lit {
             format!(
-                "{first} and {second} are taken to be of one light and exposure, and their means are {least:.4} and {most:.4}; tell \
-                 exposures apart in a list, by `exposure_s`, and levels of light by `photons` or `level`"
+                "{first} and {second} are taken to be of one light and exposure, and their means are {least:.4} and {most:.4}; one is \
+                 a dark, or a list tells exposures apart, by `exposure_s`, and levels of light by `photons` or `level`"
             )
         } else {
             format!(

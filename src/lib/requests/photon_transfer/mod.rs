@@ -8,7 +8,8 @@ use super::notes::Note;
 use super::options::Selection;
 use super::values;
 use crate::analysis::photon_transfer::{
-    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, left_in_mean, of_class, pattern_view, survey,
+    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, Suspect, left_in_mean, of_class,
+    pattern_view, survey,
 };
 use crate::error::{Error, Result};
 use crate::formats::frame_list::{self, FrameList};
@@ -121,6 +122,7 @@ impl PhotonTransfer {
             }
         }
         let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys, draws)).collect();
+        notes.extend(doubts_of_levels(&classes, &groups));
         notes.extend(classes.iter().flat_map(notes_of));
         let count = |is_lit: bool| {
             groups.iter().filter(|group| group.condition.is_lit == is_lit).map(|group| group.files.len()).sum()
@@ -159,6 +161,19 @@ impl PhotonTransfer {
         }
         Ok(())
     }
+}
+
+/// Warnings of frames that may not be what they are said to be, each level once.
+fn doubts_of_levels(classes: &[ClassFindings], groups: &[Group]) -> Vec<Note> {
+    let mut told: Vec<usize> = Vec::new();
+    let mut warnings = Vec::new();
+    for Suspect { place, problem } in classes.iter().flat_map(|class| &class.suspects) {
+        if !told.contains(place) {
+            told.push(*place);
+            warnings.push(Note::Warning(format!("{}: {problem}", groups[*place].named())));
+        }
+    }
+    warnings
 }
 
 /// What a careful user should know of what was found of a class.

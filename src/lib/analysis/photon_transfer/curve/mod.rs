@@ -398,14 +398,15 @@ pub fn is_clipped(dark: &Level, rounding: f64) -> bool {
     rounding > 0.0 && dark.at_ends[1] > FEW
 }
 
-/// Flats of light that is well below saturation, so that their means follow it.
-pub fn below_saturation(flats: &[Level]) -> Vec<&Level> {
+/// Flats of light that is well below saturation, so that their means follow it, by their places.
+pub fn below_saturation(flats: &[Level]) -> Vec<usize> {
     /// Of the mean that saturates.
     const SHARE: f64 = 0.95;
     /// More samples than these at the largest code, and means do not follow the light.
     const FEW: f64 = 1e-3;
     let reach = peak(flats).map_or(f64::INFINITY, |peak| SHARE * flats[peak].mean);
-    flats.iter().filter(|flat| flat.at_ends[0] <= FEW && flat.mean <= reach).collect()
+    let is_below = |flat: &usize| flats[*flat].at_ends[0] <= FEW && flats[*flat].mean <= reach;
+    (0..flats.len()).filter(is_below).collect()
 }
 
 /// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].
