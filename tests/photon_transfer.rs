@@ -645,3 +645,30 @@ fn levels_that_are_not_what_they_are_said_to_be_are_named() {
         only(suspects(&wrong, &darks), 6, "of its number of photons: is that wrong?");
     }
 }
+
+/// A stack at 80 % of saturation, beyond what the gain is fitted to, is what patterns are measured on; one at saturation is not, and that
+/// is said.
+#[test]
+fn patterns_are_measured_on_the_stack_below_saturation() {
+    let readout = camera(3, Kind::Ccd);
+    let [flats, darks] = levels(&readout, 3);
+    let stacked = |place: usize, first: u32| -> ClassFindings {
+        let condition = flats[place].condition;
+        let expected_e = condition.photons.unwrap() * QUANTUM_EFFICIENCY;
+        let stack = level((&readout, 3, Shake::default()), condition, expected_e, [16, first]);
+        let mut flats = flats.clone();
+        flats[place] = Level { place: 77, ..stack };
+        found(&flats, &darks)
+    };
+    let near = stacked(9, 900);
+    assert_eq!(near.stacks[0].unwrap().0, 77);
+    let [own, pairs] = [&near, &found(&flats, &darks)].map(|found| found.get("prnu_pixel").unwrap());
+    assert!(own.high - own.low < pairs.high - pairs.low, "{own:?} {pairs:?}");
+    let full = stacked(12, 950);
+    assert_ne!(full.stacks[0].unwrap().0, 77);
+    assert!(
+        full.notes.iter().any(|note| note.contains("flats of 16 frames are too near saturation")),
+        "{:?}",
+        full.notes
+    );
+}

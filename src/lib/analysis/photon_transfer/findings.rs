@@ -238,7 +238,7 @@ pub fn of_class(
         is_fitted: curve.fitted().contains(&flat),
     });
     let (curve_points, values) = (points.collect(), curve.values());
-    let mut notes = notes(&curve, flats);
+    let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames));
     let mut doubts = doubts(&curve, flats, confidence);
     let by_levels = straight.as_ref().ok().and_then(|line| line.told.clone());
     for (text, is_doubt) in scatter.told.iter().cloned().chain(curve.dark_told.clone()).chain(by_levels) {
@@ -378,7 +378,7 @@ fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<
     linearity(&levels, curve.signal(peak), confidence).ok_or_else(|| few.into())
 }
 
-/// The flat and the dark that patterns are measured on: of the most frames; of such, the flat nearest to half of saturation, and
+/// The flat and the dark that patterns are measured on: of the most frames, the flat below saturation at every photosite; of such, the flat nearest to half of saturation, and
 /// the dark nearest to its exposure time.
 fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<(usize, &'a Level)>; 2] {
     let half = curve.saturated.map_or_else(
@@ -386,10 +386,10 @@ fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<
         |peak| curve.signal(peak) / 2.0,
     );
     let most = |levels: &[Level]| levels.iter().map(|level| level.frames).max();
-    let fitted = curve.fitted().iter().copied();
-    let frames = curve.fitted().iter().map(|&flat| flats[flat].frames).max();
+    let frames = curve.patterned().iter().map(|&flat| flats[flat].frames).max();
     let off = |flat: &usize| (curve.signal(*flat) - half).abs();
-    let flat = fitted.filter(|&flat| Some(flats[flat].frames) == frames).min_by(|a, b| off(a).total_cmp(&off(b)));
+    let with_most = curve.patterned().iter().copied().filter(|&flat| Some(flats[flat].frames) == frames);
+    let flat = with_most.min_by(|a, b| off(a).total_cmp(&off(b)));
     let time = |level: &Level| level.condition.exposure_s.unwrap_or(0.0);
     let wanted = flat.map_or(0.0, |flat| time(&flats[flat]));
     let apart = |dark: &(usize, &Level)| (time(dark.1) - wanted).abs();
@@ -434,8 +434,15 @@ fn add_patterns(
     }
 }
 
-fn notes(curve: &Curve, flats: &[Level]) -> Vec<String> {
+fn notes(curve: &Curve, flats: &[Level], frames: Option<usize>) -> Vec<String> {
     let mut notes = Vec::new();
+    let most = flats.iter().map(|flat| flat.frames).max();
+    if let Some((frames, most)) = frames.zip(most).filter(|(frames, most)| frames < most) {
+        notes.push(format!(
+            "flats of {most} frames are too near saturation for patterns, which are measured on {frames}: histograms have more temporal \
+             noise of these"
+        ));
+    }
     if curve.is_offset_free {
         notes.push(
             "the variance of no light is that which the line through the flats has at no signal, as darks do not tell it".into(),

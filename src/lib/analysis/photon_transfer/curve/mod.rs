@@ -25,6 +25,8 @@ pub const ROUNDING: f64 = 1.0 / 12.0;
 pub const LEAST_VARIANCE: f64 = 0.24;
 /// The fits end at this share of saturation [EMVA1288, Sec. 6.5].
 const HIGHEST: f64 = 0.7;
+/// Patterns under light are measured to this share of saturation: few photosites see a tenth more than the mean.
+const HIGHEST_PATTERN: f64 = 0.9;
 /// So many samples at an end, beyond those that darks have there, and what is measured of the others is no longer that of all.
 pub const FEW_AT_ENDS: f64 = 1e-5;
 /// Exposure times that differ by less are one.
@@ -89,6 +91,8 @@ pub struct Curve {
     beneath: Vec<Beneath>,
     /// Flats that the fits of gain and responsivity take.
     fitted: Vec<usize>,
+    /// Flats that patterns under light may be measured on.
+    patterned: Vec<usize>,
     /// The flat whose variance is the largest, where brighter ones have less.
     pub saturated: Option<usize>,
     /// Whether the variance of no light is left to the fit, as darks are silent beneath the rounding, clipped, or absent.
@@ -147,6 +151,7 @@ impl Curve {
             flats: flats.iter().map(point).collect(),
             darks: darks.iter().map(point).collect(),
             fitted: Vec::new(),
+            patterned: Vec::new(),
             saturated: peak(flats),
             is_offset_free: is_silent || are_darks_clipped,
             is_silent: is_silent && !darks.is_empty(),
@@ -160,15 +165,17 @@ impl Curve {
         };
         curve.beneath = curve.flats.iter().map(|flat| curve.beneath(flat)).collect();
         let no_light = |index: usize| curve.no_light(index).map_or(0.0, |[mean, _]| mean);
-        let reach = curve.saturated.map_or(f64::INFINITY, |peak| HIGHEST * (flats[peak].mean - no_light(peak)));
-        curve.fitted = (0..flats.len())
-            .filter(|&index| {
+        let saturation = curve.saturated.map_or(f64::INFINITY, |peak| flats[peak].mean - no_light(peak));
+        let whole = |highest: f64| -> Vec<usize> {
+            let is_whole = |&index: &usize| {
                 let [at_top, at_bottom] = flats[index].at_ends;
                 let is_whole = at_top <= hot + FEW_AT_ENDS && (rounding <= 0.0 || at_bottom <= FEW_AT_ENDS);
                 let is_told = rounding <= 0.0 || flats[index].variance >= LEAST_VARIANCE;
-                is_whole && is_told && flats[index].mean - no_light(index) <= reach
-            })
-            .collect();
+                is_whole && is_told && flats[index].mean - no_light(index) <= highest * saturation
+            };
+            (0..flats.len()).filter(is_whole).collect()
+        };
+        (curve.fitted, curve.patterned) = (whole(HIGHEST), whole(HIGHEST_PATTERN));
         if !curve.is_offset_free && curve.fitted.iter().any(|&index| curve.beneath[index] == Beneath::Unknown) {
             curve.is_offset_free = true;
         }
@@ -183,6 +190,11 @@ impl Curve {
     /// The flats that gain and responsivity are fitted to, by their places.
     pub fn fitted(&self) -> &[usize] {
         &self.fitted
+    }
+
+    /// The flats that patterns under light may be measured on, by their places.
+    pub fn patterned(&self) -> &[usize] {
+        &self.patterned
     }
 
     fn beneath(&self, flat: &Point4) -> Beneath {
