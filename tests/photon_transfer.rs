@@ -177,7 +177,7 @@ fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
 }
 
 fn found(flats: &[Level], darks: &[Level]) -> ClassFindings {
-    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true };
+    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top: None };
     of_class("G", flats, darks, darks, &settings)
 }
 
@@ -431,7 +431,7 @@ fn shaken(index: u32, shake: Shake, words: &str) -> (bool, [Option<[f64; 2]>; 6]
     let readout = camera(index, Kind::Ccd);
     let [flats, darks, warm] = levels_of((&readout, index, shake));
     let all: Vec<Level> = darks.iter().chain(&warm).cloned().collect();
-    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true };
+    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top: None };
     let found = of_class("G", &flats, &darks, &all, &settings);
     assert_eq!(found.suspects, [], "{index}");
     let currents = [readout.temperature_k, WARM_K].map(|kelvin| readout.dark_current_e_per_s(kelvin));
@@ -671,4 +671,42 @@ fn patterns_are_measured_on_the_stack_below_saturation() {
         "{:?}",
         full.notes
     );
+}
+
+/// The saturation capacity is said to be that of the converter or of the photosites, whichever ends first; where the largest code is not
+/// known, a converter that ends is not called a full well.
+#[test]
+fn saturation_is_said_to_be_of_photosites_or_of_the_converter() {
+    let mut kinds = [0; 2];
+    for index in 0..12 {
+        let readout = camera(index, Kind::Ccd);
+        let top = f64::from((1_u32 << readout.bits) - 1);
+        let range = (top - readout.bias_adu) / readout.adu_per_e / readout.full_well_e;
+        if (0.95..1.05).contains(&range) {
+            continue;
+        }
+        let [flats, darks] = levels(&readout, index);
+        let of = |top: Option<f64>| {
+            let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top };
+            let found = of_class("G", &flats, &darks, &darks, &settings);
+            let what = found.findings.iter().find(|finding| finding.key == "saturation_e").unwrap().what;
+            (what, found)
+        };
+        let ((what, known), (guess, unknown)) = (of(Some(top)), of(None));
+        let is_converter = range < 1.0;
+        kinds[usize::from(is_converter)] += 1;
+        if is_converter {
+            assert_eq!(
+                (what, guess),
+                ("saturation capacity, of the converter", "saturation capacity, of either"),
+                "{index}"
+            );
+            assert!(why(&known, "full_well_e").starts_with(&format!("the converter ends first, at the code {top}")));
+            assert!(why(&unknown, "full_well_e").contains("--white"), "{index}");
+        } else {
+            assert_eq!([what, guess], ["saturation capacity, of the photosites"; 2], "{index}");
+            assert!(known.get("full_well_e").is_some() && unknown.get("full_well_e").is_some(), "{index}");
+        }
+    }
+    assert!(kinds.iter().all(|count| *count > 1), "{kinds:?}");
 }

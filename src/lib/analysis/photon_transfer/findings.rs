@@ -4,6 +4,7 @@ use super::curve::{Curve, ROUNDING, Values, below_saturation};
 use super::dark::{doubling_temperature, parted_pattern};
 use super::doubts::doubts;
 use super::level::Level;
+use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal};
 use super::reasons::{Reasons, UNSATURATED, of_gain};
@@ -20,6 +21,8 @@ pub struct Settings {
     pub photon_error: f64,
     /// Whether samples are codes, which are rounded.
     pub are_codes: bool,
+    /// The largest code, where it is known.
+    pub top: Option<f64>,
 }
 
 impl Settings {
@@ -178,8 +181,8 @@ pub fn of_class(
     let threshold_photons = |v: &Values| Some(threshold(v)? * v.gain / v.responsivity?);
     let lacking = threshold_e.as_ref().err().or(responsivity.as_ref().err()).cloned();
     add("threshold_photons", number(&threshold_photons, lacking.unwrap_or_default()));
-    let saturation = saturation(reasons, gain.clone());
-    let [saturation_e, saturation_photons, full_well] = saturation;
+    let limit = Limit::of(&curve, flats, settings);
+    let [saturation_e, saturation_photons, full_well] = saturation(reasons, gain.clone(), &limit);
     add("saturation_e", saturation_e.clone());
     add("saturation_photons", saturation_photons);
     add("full_well_e", full_well);
@@ -237,8 +240,11 @@ pub fn of_class(
         clipped: flats[flat].at_ends[0],
         is_fitted: curve.fitted().contains(&flat),
     });
+    for finding in found.iter_mut().filter(|finding| finding.key.starts_with("saturation_")) {
+        finding.what = limit.saturation;
+    }
     let (curve_points, values) = (points.collect(), curve.values());
-    let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames));
+    let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames), &limit);
     let mut doubts = doubts(&curve, flats, confidence);
     let by_levels = straight.as_ref().ok().and_then(|line| line.told.clone());
     for (text, is_doubt) in scatter.told.iter().cloned().chain(curve.dark_told.clone()).chain(by_levels) {
@@ -313,7 +319,7 @@ fn over(of: Interval, by: Interval) -> Interval {
 }
 
 /// Saturation in electrons and in photons, and full well.
-fn saturation(reasons: Reasons, gain: Found) -> [Found; 3] {
+fn saturation(reasons: Reasons, gain: Found, limit: &Limit) -> [Found; 3] {
     let Reasons { curve, flats, .. } = reasons;
     let gain = match gain {
         Ok(gain) => gain,
@@ -336,15 +342,9 @@ fn saturation(reasons: Reasons, gain: Found) -> [Found; 3] {
     let has_photons = [below, peak, above].into_iter().all(|flat| photons(flat).is_some());
     let in_photons = has_photons.then(|| bracket(&|flat| photons(flat).unwrap_or_default()));
     let brightest = flats.len() - 1;
-    let last = &flats[brightest];
-    let is_flat = last.variance < 0.02 * flats[peak].variance;
-    let full_well = if !is_flat {
-        Err("no flat is so bright that every photosite is full: flats of more light would tell".into())
-    } else if last.at_ends[0] > 0.5 {
-        let reached = curve.signal(brightest) / gain.value;
-        Err(format!("the converter ends first: it is no less than {reached:.0} e-"))
-    } else {
-        Ok(over(Interval::normal(curve.signal(brightest), curve.signal_variance(brightest), 0.95), gain))
+    let full_well = match limit.full_well(curve.signal(brightest) / gain.value) {
+        Ok(()) => Ok(over(Interval::normal(curve.signal(brightest), curve.signal_variance(brightest), 0.95), gain)),
+        Err(why) => Err(why),
     };
     [
         Ok(electrons),
@@ -434,8 +434,8 @@ fn add_patterns(
     }
 }
 
-fn notes(curve: &Curve, flats: &[Level], frames: Option<usize>) -> Vec<String> {
-    let mut notes = Vec::new();
+fn notes(curve: &Curve, flats: &[Level], frames: Option<usize>, limit: &Limit) -> Vec<String> {
+    let mut notes: Vec<String> = limit.told.iter().cloned().collect();
     let most = flats.iter().map(|flat| flat.frames).max();
     if let Some((frames, most)) = frames.zip(most).filter(|(frames, most)| frames < most) {
         notes.push(format!(

@@ -9,6 +9,7 @@ mod doubts;
 mod findings;
 mod fit;
 mod level;
+mod limit;
 mod linearity;
 mod pattern;
 mod reasons;
@@ -19,7 +20,7 @@ mod suspects;
 mod tally;
 mod view;
 
-pub use curve::Values;
+pub use curve::{LEAST_VARIANCE, Values};
 pub use dark::doubling_temperature;
 pub use findings::{ClassFindings, CurvePoint, DarkPoint, Finding, KEYS, Settings, of_class};
 pub use fit::Line;

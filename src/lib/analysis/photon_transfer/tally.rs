@@ -22,6 +22,8 @@ pub struct SiteSurvey {
     pub variance_variance: f64,
     /// Samples at or above the top code, and at or below 0.
     pub at_ends: [u64; 2],
+    /// The largest sample, and how many are it, where no top code is known.
+    pub largest: Option<(f64, u64)>,
     /// Mean squares of the temporal noise.
     pub temporal: MeanSquares,
     /// Mean squares of the mean of the frames.
@@ -49,6 +51,7 @@ pub struct Tally {
     at_ends: [u64; 2],
     /// Samples of the first frame that are not those of the photosite before them in the row.
     uneven: u64,
+    largest: (f64, u64),
     /// About which ȳ is summed.
     center: f64,
     /// Σ y of each frame.
@@ -89,6 +92,7 @@ impl Tally {
             top: top.unwrap_or(f64::INFINITY),
             at_ends: [0; 2],
             uneven: 0,
+            largest: (f64::NEG_INFINITY, 0),
             center: 0.0,
             frame_sums: vec![0.0; frames],
             row_squares: Vec::with_capacity(site.size[1]),
@@ -143,6 +147,12 @@ impl Tally {
             }
             self.at_ends[0] += at_top;
             self.at_ends[1] += at_bottom;
+        }
+        if self.top == f64::INFINITY {
+            let largest = self.samples.iter().copied().fold(self.largest.0, f64::max);
+            let before = if largest > self.largest.0 { 0 } else { self.largest.1 };
+            let count: u64 = self.samples.iter().map(|sample| u64::from(*sample == largest)).sum();
+            self.largest = (largest, before + count);
         }
         let first = &self.samples[..columns];
         self.uneven += first.iter().zip(&first[1..]).map(|(one, next)| u64::from(one != next)).sum::<u64>();
@@ -295,6 +305,7 @@ impl Tally {
             variance,
             variance_variance: self.variance_variance(&drifts, n),
             at_ends: self.at_ends,
+            largest: (self.top == f64::INFINITY).then_some(self.largest),
             temporal,
             spatial: MeanSquares { rows: of_rows, columns: of_columns, rest },
             fourth,

@@ -1,7 +1,7 @@
 //! What frames of a measurement must have in common, and what may be wrong with them.
 
 use super::conditions::{Group, Head};
-use crate::analysis::photon_transfer::Survey;
+use crate::analysis::photon_transfer::{LEAST_VARIANCE, SiteSurvey, Survey};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
@@ -158,6 +158,44 @@ pub fn doubt_of_codes(list: &str, head: &FrameHeader, groups: &[Group], surveys:
     shifted.into_iter().chain(ended).map(Note::Warning).collect()
 }
 
+/// The largest code by the brightest flats, of which most samples are one code that none is above, where noise of darks would spread
+/// those of photosites that are full; samples at it are counted then.
+pub fn end_of_codes(groups: &[Group], surveys: &mut [Survey]) -> Option<f64> {
+    /// Most samples.
+    const MOST: f64 = 0.5;
+    let is_lit = |place: &usize| groups[*place].condition.is_lit;
+    let noise = |survey: &Survey| survey.sites.iter().map(|site| site.variance).fold(0.0, f64::max);
+    let dark_noise =
+        (0..groups.len()).filter(|place| !is_lit(place)).map(|place| noise(&surveys[place])).fold(0.0, f64::max);
+    let lit = || (0..groups.len()).filter(is_lit).flat_map(|place| &surveys[place].sites);
+    let largest = lit().filter_map(|site| site.largest).map(|(largest, _)| largest).fold(f64::NEG_INFINITY, f64::max);
+    let is_most = |site: &SiteSurvey| {
+        let (own, count) = site.largest.unwrap_or_default();
+        own == largest && count as f64 > MOST * (site.count() * site.frames) as f64
+    };
+    if dark_noise < LEAST_VARIANCE || !lit().any(is_most) {
+        return None;
+    }
+    for site in surveys.iter_mut().flat_map(|survey| &mut survey.sites) {
+        site.at_ends[0] = site.largest.filter(|(own, _)| *own >= largest).map_or(0, |(_, count)| count);
+    }
+    Some(largest)
+}
+
+/// What is said where the largest code is not known, or taken from the brightest flats.
+pub fn doubt_of_end(list: &str, taken: Option<f64>) -> Note {
+    Note::Warning(match taken {
+        Some(largest) => format!(
+            "{list}: the largest code is not known; it is taken to be {largest}, which most samples of the brightest flats are, without \
+             the noise of darks; give --white if it is another"
+        ),
+        None => format!(
+            "{list}: the largest code is not known, so that clipped levels are told by their variance alone, and full photosites are not \
+             told from a converter that ends; give --white"
+        ),
+    })
+}
+
 /// Frames of one light whose means differ by more than this share were taken under several.
 const SAME_LIGHT: f64 = 0.1;
 
@@ -189,4 +227,42 @@ pub fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Resul
         }));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::photon_transfer::{Condition, survey};
+    use crate::stream::MemoryFrame;
+    use crate::units::QuantityKind;
+
+    /// Flats that pile up at one code, while darks are noisy, end the codes there, and samples at it count as clipped; flats of full
+    /// photosites, which are as noisy as darks, do not, nor do those beside darks without noise.
+    #[test]
+    fn the_largest_code_is_taken_from_flats_of_one_code() {
+        const SIDE: usize = 16;
+        let noise = |place: usize, frame: usize| ((place * 7919 + frame * 104_729 + place * frame * 31) % 9) as f32;
+        let of = |level: f32, scale: f32, end: f32| -> Survey {
+            let frame = |frame: usize| {
+                let geometry = Geometry::new(SIDE, SIDE, &["Y"]);
+                let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+                let sample = |place: usize| (level + scale * noise(place, frame)).min(end);
+                MemoryFrame::new(header, (0..SIDE * SIDE).map(sample).collect())
+            };
+            survey(&mut [frame(1), frame(2)], None, false).unwrap()
+        };
+        let group = |is_lit: bool| Group {
+            condition: Condition { is_lit, ..Condition::default() },
+            level: String::new(),
+            files: Vec::new(),
+        };
+        let groups = [group(false), group(true), group(true)];
+        let end_of = |surveys: &mut [Survey]| end_of_codes(&groups, surveys);
+        let mut ended = [of(10.0, 1.0, 255.0), of(100.0, 1.0, 255.0), of(254.0, 1.0, 255.0)];
+        assert_eq!(end_of(&mut ended), Some(255.0));
+        let at_end: Vec<u64> = ended.iter().map(|survey| survey.sites[0].at_ends[0]).collect();
+        assert!(at_end[..2] == [0, 0] && at_end[2] > 400, "{at_end:?}");
+        assert_eq!(end_of(&mut [of(10.0, 1.0, 255.0), of(100.0, 1.0, 255.0), of(200.0, 1.0, 255.0)]), None);
+        assert_eq!(end_of(&mut [of(10.0, 0.0, 255.0), of(100.0, 1.0, 255.0), of(254.0, 1.0, 255.0)]), None);
+    }
 }

@@ -17,7 +17,7 @@ use crate::formats::many::OneOfMany;
 use crate::metadata::FrameHeader;
 use crate::text::counted;
 use crate::units::QuantityKind;
-use checks::{check_alike, check_apart, check_array, check_same_light, doubt_of_codes};
+use checks::{check_alike, check_apart, check_array, check_same_light, doubt_of_codes, doubt_of_end, end_of_codes};
 use clap::Args;
 use conditions::{Group, Reading, grouped, in_folder};
 use rayon::prelude::*;
@@ -102,18 +102,19 @@ impl PhotonTransfer {
         }
         let top = first.metadata.white_level_adu.map(|white| white.largest());
         let are_codes = first.metadata.quantity != QuantityKind::Electrons;
-        if top.is_none() && are_codes {
-            notes.push(Note::Warning(format!(
-                "{list_name}: the largest code is not known, so that clipped levels are told by their variance alone; give --white"
-            )));
-        }
         let stacks = stacks(&groups);
         let surveys = groups.par_iter().enumerate().with_max_len(1);
         let surveys = surveys.map(|(place, group)| survey_of(group, &read, top, stacks.contains(&place)));
         let mut surveys = surveys.collect::<Result<Vec<_>>>()?;
+        let mut largest = top;
+        if top.is_none() && are_codes {
+            largest = end_of_codes(&groups, &mut surveys);
+            notes.push(doubt_of_end(&list_name, largest));
+        }
         check_array(first, &groups, &surveys)?;
         notes.extend(doubt_of_codes(&list_name, first, &groups, &surveys));
-        let settings = Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes };
+        let settings =
+            Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
         let temperature_k = main_temperature(&groups);
         let classes = classes(first, &groups, &surveys, temperature_k, &settings);
         for place in classes.iter().flat_map(|class| class.stacks).flatten().map(|(place, _)| place) {
