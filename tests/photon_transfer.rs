@@ -628,21 +628,21 @@ fn levels_that_are_not_what_they_are_said_to_be_are_named() {
         // A flat among the darks, with its own exposure time.
         let mut lit = darks.clone();
         lit[2] = Level { condition: darks[2].condition, place: 102, ..flats[4].clone() };
-        only(suspects(&flats, &lit), 102, "is it a flat");
+        only(suspects(&flats, &lit), 102, "are they flats");
         // The same beside one dark alone.
         let two = [darks[0].clone(), Level { condition: darks[0].condition, place: 103, ..flats[6].clone() }];
         assert!(
-            suspects(&flats, &two).iter().any(|(place, problem)| *place == 103 && problem.contains("is it a flat"))
+            suspects(&flats, &two).iter().any(|(place, problem)| *place == 103 && problem.contains("are they flats"))
         );
         // A dark among the flats.
         let mut unlit = flats.clone();
         unlit[5] = Level { condition: flats[5].condition, place: 5, ..darks[0].clone() };
         unlit.sort_by(|a, b| a.mean.total_cmp(&b.mean));
-        only(suspects(&unlit, &darks), 5, "is it a dark");
+        only(suspects(&unlit, &darks), 5, "are they darks");
         // A number of photons, and without photons an exposure time, that is wrong by a third.
         let mut wrong = flats.clone();
         wrong[6].condition.photons = wrong[6].condition.photons.map(|photons| photons * 1.5);
-        only(suspects(&wrong, &darks), 6, "of its number of photons: is that wrong?");
+        only(suspects(&wrong, &darks), 6, "of their number of photons: is that wrong?");
     }
 }
 

@@ -35,7 +35,8 @@ pub fn suspects(curve: Option<&Curve>, flats: &[Level], darks: &[Level], scatter
         found.extend(off_line(&own().collect::<Vec<_>>(), scatter));
         let is_of_it = |flat: &&Level| flat.condition.temperature_k.is_none_or(|kelvin| Some(kelvin) == temperature);
         let flats = || flats.iter().filter(is_of_it);
-        for suspect in own().filter_map(|dark| above_a_flat(dark, flats(), scatter)) {
+        let alone = |dark| full(dark).or_else(|| above_a_flat(dark, flats(), scatter));
+        for suspect in own().filter_map(alone) {
             if !found.iter().any(|known| known.place == suspect.place) {
                 found.push(suspect);
             }
@@ -92,12 +93,18 @@ fn off_line(darks: &[&Level], scatter: &Scatter) -> Option<Suspect> {
     };
     let farthest = timed.iter().enumerate().filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0));
     let (_, missed, place) = farthest.filter(|(far, ..)| *far > 1.0)?;
-    let (way, is_it) = if missed > 0.0 { ("above", "is it a flat, or") } else { ("below", "is") };
+    let (way, is_it) = if missed > 0.0 { ("above", "are they flats, or is") } else { ("below", "is") };
     let problem = format!(
-        "its mean stands {:.1} ADU {way} the line of the other darks over time, far beyond chance: {is_it} its exposure time wrong?",
+        "their mean stands {:.1} ADU {way} the line of the other darks over time, far beyond chance: {is_it} their exposure time wrong?",
         missed.abs()
     );
     Some(Suspect { place: timed[place].0.place, problem })
+}
+
+/// A dark most of whose samples are the largest code.
+fn full(dark: &Level) -> Option<Suspect> {
+    let problem = || "most of their samples are the largest code: are they flats?".to_owned();
+    (dark.at_ends[0] > 0.5).then(|| Suspect { place: dark.place, problem: problem() })
 }
 
 /// A dark whose mean is above that of a flat that was exposed as long or longer.
@@ -114,7 +121,7 @@ fn above_a_flat<'a>(dark: &Level, flats: impl Iterator<Item = &'a Level>, scatte
     };
     let below = flats.filter(is_as_long).find(is_below)?;
     let problem = format!(
-        "its mean, {:.1} ADU, is above that of flats that were exposed as long or longer, {:.1} ADU: is it a flat, or these darks?",
+        "their mean, {:.1} ADU, is above that of flats that were exposed as long or longer, {:.1} ADU: are they flats, or these darks?",
         dark.mean, below.mean
     );
     Some(Suspect { place: dark.place, problem })
@@ -148,9 +155,9 @@ fn off_response(curve: &Curve, flats: &[Level], scatter: &Scatter) -> Vec<Suspec
         let least = (BEYOND * by_chance).max(SHARES[0] * wanted).max(SHARES[1] * largest);
         ((signal - wanted).abs() > least).then(|| {
             let what = if is_by_photons { "number of photons" } else { "exposure time" };
-            let is_it = if signal < NONE * wanted { "is it a dark, or" } else { "is" };
+            let is_it = if signal < NONE * wanted { "are they darks, or is" } else { "is" };
             let problem = format!(
-                "its signal is {signal:.1} ADU, where the other flats make {wanted:.1} of its {what}: {is_it} that wrong?"
+                "their signal is {signal:.1} ADU, where the other flats make {wanted:.1} of their {what}: {is_it} that wrong?"
             );
             Suspect { place: flats[flat].place, problem }
         })

@@ -196,6 +196,47 @@ pub fn doubt_of_end(list: &str, taken: Option<f64>) -> Note {
     })
 }
 
+/// Warnings of frames of one condition whose means are plainly not those of one: a flat that is little above black is not far off a dark
+/// by [`check_same_light`].
+pub fn doubt_of_frames(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
+    /// Of darks no black level moves by so many standard deviations of a sample.
+    const MUCH: f64 = 5.0;
+    /// By such a share of the light flats of one light do not differ.
+    const SHARE: f64 = 0.5;
+    /// Standard deviations of a mean that are far beyond chance.
+    const BEYOND: f64 = 10.0;
+    let dark = |site: usize| {
+        let darks = groups.iter().zip(surveys).filter(|(group, _)| !group.condition.is_lit);
+        darks.map(|(_, survey)| survey.sites[site].mean).fold(f64::INFINITY, f64::min)
+    };
+    let doubt = |(group, survey): (&Group, &Survey)| {
+        survey.sites.iter().enumerate().find_map(|(index, site)| {
+            let [low, high] = ends_of(&site.frame_means);
+            let [least, most] = [low, high].map(|frame| site.frame_means[frame]);
+            let light = Some(dark(index)).filter(|dark| dark.is_finite()).map_or(most, |dark| most - dark);
+            let noise = (site.mean_variance * site.frames as f64).sqrt();
+            let allowed = if group.condition.is_lit { SHARE * light } else { MUCH * site.variance.sqrt() };
+            let is_far = most - least > allowed.max(BEYOND * noise).max(1.0);
+            let [first, second] = [low, high].map(|frame| group.files[frame].display().to_string());
+            let what = if group.condition.is_lit { "flats of one light" } else { "darks of one exposure" };
+            is_far.then(|| {
+                Note::Warning(format!(
+                    "{first} and {second} are taken to be {what}, and their means are {least:.1} and {most:.1}: is the first a dark, the \
+                     second a flat, or are they of other times?"
+                ))
+            })
+        })
+    };
+    groups.iter().zip(surveys).filter_map(doubt).collect()
+}
+
+/// Places of the least and of the largest.
+fn ends_of(means: &[f64]) -> [usize; 2] {
+    let mut order: Vec<usize> = (0..means.len()).collect();
+    order.sort_by(|a, b| means[*a].total_cmp(&means[*b]));
+    [order[0], order[order.len() - 1]]
+}
+
 /// Frames of one light whose means differ by more than this share were taken under several.
 const SAME_LIGHT: f64 = 0.1;
 
@@ -235,6 +276,36 @@ mod tests {
     use crate::analysis::photon_transfer::{Condition, survey};
     use crate::stream::MemoryFrame;
     use crate::units::QuantityKind;
+    use std::path::PathBuf;
+
+    /// A dim flat among darks of its exposure time, and a dark among dim flats, are named; a black level that moves a little is not.
+    #[test]
+    fn frames_that_are_not_of_one_condition_are_named() {
+        let frame = |level: f32, seed: usize| {
+            let geometry = Geometry::new(16, 16, &["Y"]);
+            let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+            let noise = |place: usize| ((place * 7919 + seed * 104_729 + place * seed * 31) % 9) as f32;
+            MemoryFrame::new(header, (0..256).map(|place| level + noise(place)).collect())
+        };
+        let group = |is_lit: bool| Group {
+            condition: Condition { is_lit, ..Condition::default() },
+            level: String::new(),
+            files: ["a", "b", "c"].map(PathBuf::from).to_vec(),
+        };
+        let groups = [group(false), group(true)];
+        let of = |darks: [f32; 3], flats: [f32; 3]| {
+            let surveys = [darks, flats].map(|levels| {
+                let mut frames = [frame(levels[0], 1), frame(levels[1], 2), frame(levels[2], 3)];
+                survey(&mut frames, Some(4095.0), false).unwrap()
+            });
+            doubt_of_frames(&groups, &surveys).iter().map(|note| note.text().to_owned()).collect::<Vec<_>>()
+        };
+        assert_eq!(of([100.0, 100.0, 102.0], [160.0, 164.0, 158.0]), Vec::<String>::new());
+        let told = of([100.0, 150.0, 100.0], [200.0, 200.0, 200.0]);
+        assert!(told.len() == 1 && told[0].contains(" and b are taken to be darks of one exposure"), "{told:?}");
+        let told = of([100.0, 100.0, 100.0], [200.0, 200.0, 100.0]);
+        assert!(told.len() == 1 && told[0].starts_with("c and ") && told[0].contains("flats of one light"), "{told:?}");
+    }
 
     /// Flats that pile up at one code, while darks are noisy, end the codes there, and samples at it count as clipped; flats of full
     /// photosites, which are as noisy as darks, do not, nor do those beside darks without noise.

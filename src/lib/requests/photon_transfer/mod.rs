@@ -17,7 +17,10 @@ use crate::formats::many::OneOfMany;
 use crate::metadata::FrameHeader;
 use crate::text::counted;
 use crate::units::QuantityKind;
-use checks::{check_alike, check_apart, check_array, check_same_light, doubt_of_codes, doubt_of_end, end_of_codes};
+use checks::{
+    check_alike, check_apart, check_array, check_same_light, doubt_of_codes, doubt_of_end, doubt_of_frames,
+    end_of_codes,
+};
 use clap::Args;
 use conditions::{Group, Reading, grouped, in_folder};
 use rayon::prelude::*;
@@ -112,6 +115,7 @@ impl PhotonTransfer {
             notes.push(doubt_of_end(&list_name, largest));
         }
         check_array(first, &groups, &surveys)?;
+        notes.extend(doubt_of_frames(&groups, &surveys));
         notes.extend(doubt_of_codes(&list_name, first, &groups, &surveys));
         let settings =
             Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
