@@ -29,6 +29,24 @@ fn fitted(points: &[(f64, f64, f64)], confidence: f64) -> Option<(Line, [f64; 2]
     Some((line, [1.0 / all + mean * mean / spread, 1.0 / spread]))
 }
 
+/// The same of a signal over time, where what points miss the line by may be in proportion to it besides, as of wrong times: the
+/// larger error of the slope counts.
+fn fitted_in_time(points: &[(f64, f64, f64)], confidence: f64) -> Option<(Line, [f64; 2])> {
+    let (line, variances) = fitted(points, confidence)?;
+    let share = |share: f64| -> Vec<(f64, f64, f64)> {
+        points.iter().map(|(x, y, variance)| (*x, *y, variance + share * (line.slope * x).powi(2))).collect()
+    };
+    let misfit = |of: f64| {
+        let points: Vec<Point> =
+            share(of).into_iter().map(|(x, y, variance)| Point { x, y, weight: 1.0 / variance }).collect();
+        Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
+    };
+    let found = among(points.len() as f64 - 2.0, misfit, 1.0).known(confidence);
+    // With these errors of their own the points miss the line by no more.
+    let (other, others) = fitted(&share(found), confidence)?;
+    Some(if others[1] > variances[1] { (other, others) } else { (line, variances) })
+}
+
 /// The temperature step that doubles the dark current, K, from darks at several temperatures, each at several times:
 /// log₂ I is a line over temperature \[EMVA1288, Eq. 33]. Frames scatter so beyond noise; darks that code 0 clips do not count, where the
 /// error of rounding has such a variance.
@@ -48,7 +66,7 @@ pub fn doubling_temperature(
         let variance = |dark: &Level| dark.mean_variance + scatter.of_black(dark).known(confidence);
         let points: Vec<(f64, f64, f64)> =
             own.filter_map(|dark| Some((dark.condition.exposure_s?, dark.mean, variance(dark)))).collect();
-        let (line, [_, variance]) = fitted(&points, confidence)?;
+        let (line, [_, variance]) = fitted_in_time(&points, confidence)?;
         Some((line.slope, variance))
     };
     let mut temperatures: Vec<f64> = whole.iter().filter_map(|dark| dark.condition.temperature_k).collect();
