@@ -710,3 +710,27 @@ fn saturation_is_said_to_be_of_photosites_or_of_the_converter() {
     }
     assert!(kinds.iter().all(|count| *count > 1), "{kinds:?}");
 }
+
+/// An uncertainty of all numbers of photons together is one of what they tell, however many levels there are.
+#[test]
+fn an_error_of_all_photons_does_not_average_out() {
+    let readout = camera(3, Kind::Ccd);
+    let [flats, darks] = levels(&readout, 3);
+    let of = |photon_error: f64| {
+        of_class(
+            "G",
+            &flats,
+            &darks,
+            &darks,
+            &Settings { confidence: CONFIDENCE, photon_error, are_codes: true, top: None },
+        )
+    };
+    let (exact, off) = (of(0.0), of(0.03));
+    for key in ["responsivity_adu_per_photon", "quantum_efficiency", "saturation_photons"] {
+        let [own, wide] = [&exact, &off].map(|found| found.get(key).unwrap());
+        // Errors that are independent of each other add as squares; 1.96 standard deviations of 3 %, and its square at most.
+        let wanted = (own.high - own.value).hypot(1.96 * 0.03 * own.value);
+        assert!(((wide.high - wide.value) / wanted - 1.0).abs() < 0.01, "{key}: {own:?} {wide:?}");
+    }
+    assert_eq!(exact.get("gain_adu_per_e"), off.get("gain_adu_per_e"));
+}

@@ -184,7 +184,8 @@ pub fn of_class(
     let limit = Limit::of(&curve, flats, settings);
     let [saturation_e, saturation_photons, full_well] = saturation(reasons, gain.clone(), &limit);
     add("saturation_e", saturation_e.clone());
-    add("saturation_photons", saturation_photons);
+    let off = |photons: Interval| widened(photons, (settings.photon_error * photons.value).powi(2), confidence);
+    add("saturation_photons", saturation_photons.map(off));
     add("full_well_e", full_well);
     add("snr_max", saturation_e.clone().map(Interval::root));
     let range = |saturation: Interval, threshold: Interval| Interval {
@@ -208,10 +209,7 @@ pub fn of_class(
     // The photosites that there are are a sample of those of the camera.
     let sampled = |current: Interval| match (&parted, &gain) {
         (Ok([_, of_time]), Ok(gain)) => {
-            let variance = of_time.value.max(0.0) / photosites / gain.value.powi(2);
-            let Interval { low, high, .. } = Interval::normal(0.0, variance, confidence);
-            let Interval { value, low: least, high: most } = current;
-            Interval { value, low: value - (value - least).hypot(low), high: value + (most - value).hypot(high) }
+            widened(current, of_time.value.max(0.0) / photosites / gain.value.powi(2), confidence)
         }
         _ => current,
     };
@@ -309,6 +307,12 @@ pub const KEYS: [(&str, &str, &str); 31] = [
     ("dsnu_offset_e", "dark pattern that no time adds", "e-"),
     ("dcnu", "dark current non-uniformity", ""),
 ];
+
+/// An interval of which the number has another error besides, a variance.
+fn widened(Interval { value, low, high }: Interval, variance: f64, confidence: f64) -> Interval {
+    let other = Interval::normal(0.0, variance, confidence);
+    Interval { value, low: value - (value - low).hypot(other.low), high: value + (high - value).hypot(other.high) }
+}
 
 /// An interval over another of which it is independent.
 fn over(of: Interval, by: Interval) -> Interval {

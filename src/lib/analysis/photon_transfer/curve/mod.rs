@@ -55,10 +55,10 @@ struct Point4 {
 }
 
 impl Point4 {
-    fn of(level: &Level, scatter: &Scatter, Settings { confidence, photon_error, .. }: &Settings) -> Self {
-        let light_variance = scatter.of_light(level).known(*confidence);
-        let of_photons = |value: f64| (photon_error.powi(2) + light_variance) * value * value;
-        let of_black = scatter.of_black(level).known(*confidence);
+    fn of(level: &Level, scatter: &Scatter, confidence: f64) -> Self {
+        let light_variance = scatter.of_light(level).known(confidence);
+        let of_photons = |value: f64| light_variance * value * value;
+        let of_black = scatter.of_black(level).known(confidence);
         Self {
             exposure_s: level.condition.exposure_s,
             mean: Datum { value: level.mean, variance: level.mean_variance + of_black },
@@ -108,6 +108,7 @@ pub struct Curve {
     /// What means of darks miss that line by besides.
     dark_besides: Component,
     confidence: f64,
+    photon_error: f64,
     rounding: f64,
     weights: Weights,
 }
@@ -142,7 +143,7 @@ impl Curve {
     /// follows.
     pub fn of(flats: &[Level], darks: &[Level], scatter: &Scatter, settings: &Settings) -> Option<Self> {
         let rounding = settings.rounding();
-        let point = |level: &Level| Point4::of(level, scatter, settings);
+        let point = |level: &Level| Point4::of(level, scatter, settings.confidence);
         let are_darks_clipped = darks.iter().any(|dark| is_clipped(dark, rounding));
         let is_silent = rounding > 0.0 && darks.iter().all(|dark| dark.variance < LEAST_VARIANCE);
         let hot = darks.iter().map(|dark| dark.at_ends[0]).fold(0.0, f64::max);
@@ -160,6 +161,7 @@ impl Curve {
             dark_told: None,
             dark_besides: Component::NONE,
             confidence: settings.confidence,
+            photon_error: settings.photon_error,
             rounding,
             weights: Weights::default(),
         };
@@ -377,6 +379,14 @@ impl Curve {
             add(&mut moved, &|curve| Some(&mut curve.darks[dark].mean));
             add(&mut moved, &|curve| Some(&mut curve.darks[dark].variance));
         }
+        // All numbers of photons are off alike.
+        let ends = [-1.0, 1.0].map(|sign| {
+            let mut moved = self.clone();
+            let scale = 1.0 + sign * self.photon_error;
+            moved.flats.iter_mut().filter_map(|flat| flat.photons.as_mut()).for_each(|photons| photons.value *= scale);
+            moved.values().as_ref().and_then(&of).unwrap_or(value)
+        });
+        variance += ((ends[1] - ends[0]) / 2.0).powi(2);
         Some(Interval::normal(value, variance, confidence))
     }
 
