@@ -1,6 +1,6 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
-use super::curve::{Curve, ROUNDING, Values, below_saturation};
+use super::curve::{Curve, Values, below_saturation};
 use super::dark::{doubling_temperature, parted_pattern};
 use super::doubts::doubts;
 use super::level::Level;
@@ -9,28 +9,9 @@ use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal};
 use super::reasons::{Reasons, UNSATURATED, of_gain};
 use super::scatter::Scatter;
+use super::settings::Settings;
 use super::suspects::{Suspect, suspects};
 use crate::numerics::variance_components::Interval;
-
-/// What is asked of the measurement.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Probability that an interval holds its number.
-    pub confidence: f64,
-    /// Relative standard uncertainty of all numbers of photons together.
-    pub photon_error: f64,
-    /// Whether samples are codes, which are rounded.
-    pub are_codes: bool,
-    /// The largest code, where it is known.
-    pub top: Option<f64>,
-}
-
-impl Settings {
-    /// The variance of the error of rounding, in samples².
-    pub fn rounding(&self) -> f64 {
-        if self.are_codes { ROUNDING } else { 0.0 }
-    }
-}
 
 /// A number that was measured, or why it was not.
 #[derive(Debug, Clone, PartialEq)]
@@ -382,8 +363,8 @@ fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<
     linearity(&levels, curve.signal(peak), confidence).ok_or_else(|| few.into())
 }
 
-/// The flat and the dark that patterns are measured on: of the most frames, the flat below saturation at every photosite; of such, the flat nearest to half of saturation, and
-/// the dark nearest to its exposure time.
+/// The flat and the dark that patterns are measured on: of the most frames, the flat below saturation at every photosite; of such, the
+/// flat nearest to half of saturation, and the dark nearest to its exposure time.
 fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<(usize, &'a Level)>; 2] {
     let half = curve.saturated.map_or_else(
         || curve.fitted().last().map_or(0.0, |&flat| curve.signal(flat)) / 2.0,

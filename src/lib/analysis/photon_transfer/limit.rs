@@ -1,8 +1,8 @@
 //! What saturates: photosites that are full, or the converter, which has no larger code.
 
 use super::curve::{Curve, LEAST_VARIANCE};
-use super::findings::Settings;
 use super::level::Level;
+use super::settings::Settings;
 
 /// Where flats end, and what ends there.
 #[derive(Debug, Clone)]

@@ -12,16 +12,14 @@
 mod bend;
 mod weights;
 
-use super::findings::Settings;
 use super::fit::{Line, Point};
 use super::level::Level;
 use super::pattern::{Part, fixed};
 use super::scatter::{Component, Scatter};
+use super::settings::Settings;
 use crate::numerics::variance_components::Interval;
 
-/// Variance of the error of rounding, in codes² [EMVA1288, Sec. 2.5].
-pub const ROUNDING: f64 = 1.0 / 12.0;
-/// Below this temporal variance in codes² rounding is not the even error of [`ROUNDING`] \[EMVA1288, Sec. 6.4].
+/// Below this temporal variance in codes² rounding is not the even error of [`Settings::rounding`] \[EMVA1288, Sec. 6.4].
 pub const LEAST_VARIANCE: f64 = 0.24;
 /// The fits end at this share of saturation [EMVA1288, Sec. 6.5].
 const HIGHEST: f64 = 0.7;
