@@ -101,18 +101,61 @@ fn ccd(chance: &mut Chance) -> ReadOut {
 
 const SIZE: [usize; 2] = [96, 64];
 
+/// What frames scatter by besides noise, standard deviations.
+#[derive(Clone, Copy, Default)]
+struct Shake {
+    /// Of the light from frame to frame, relative.
+    light: f64,
+    /// Of the black level from frame to frame, in codes.
+    black_adu: f64,
+    /// Of exposure times from level to level, relative.
+    time: f64,
+}
+
+/// Temperature of further darks, beside 300 K.
+const WARM_K: f64 = 308.0;
+
+impl Shake {
+    fn is_any(self) -> bool {
+        self.light + self.black_adu + self.time > 0.0
+    }
+
+    /// What the light, the black level in codes, and the time of a frame are changed by.
+    fn drawn(self, index: u32, frame: u32, first: u32) -> [f64; 3] {
+        // The sum of 12 uniform numbers is normal enough.
+        let normal = |place: u32, which: u32| {
+            let mut chance = Chance { camera: 10_000 * (which + 1) + index, drawn: 12 * place };
+            (0..12).map(|_| chance.uniform()).sum::<f64>() - 6.0
+        };
+        [1.0 + self.light * normal(frame, 0), self.black_adu * normal(frame, 1), 1.0 + self.time * normal(first, 2)]
+    }
+}
+
 /// Frames of one condition of a camera.
-fn level(readout: &ReadOut, index: u32, condition: Condition, expected_e: f64, frames: u32, first: u32) -> Level {
-    let mut sensor = support::sensor();
-    sensor.readout = Some(readout.clone());
-    let exposure = Exposure { exposure_s: condition.exposure_s.unwrap(), f_number: 8.0, lens_transmittance: 1.0 };
-    let setup = CameraSetup::new(sensor, exposure);
-    let head = setup.plane(SIZE, Scene::uniform("flat", [expected_e; 3])).unwrap();
-    let light = uniform_frame(head, [expected_e; 3]).unwrap();
+fn level(
+    (readout, index, shake): (&ReadOut, u32, Shake),
+    condition: Condition,
+    expected_e: f64,
+    [frames, first]: [u32; 2],
+) -> Level {
     let mut taken: Vec<MemoryFrame> = (first..first + frames)
         .map(|frame| {
-            let settings =
-                NoiseSettings { seed: index.into(), sensor_seed: index.into(), frame, ..NoiseSettings::default() };
+            let [of_light, black_adu, of_time] = shake.drawn(index, frame, first);
+            let expected_e = expected_e * of_light * of_time;
+            let mut sensor = support::sensor();
+            sensor.readout = Some(ReadOut { bias_adu: readout.bias_adu + black_adu, ..readout.clone() });
+            let exposure_s = condition.exposure_s.unwrap() * of_time;
+            let exposure = Exposure { exposure_s, f_number: 8.0, lens_transmittance: 1.0 };
+            let setup = CameraSetup::new(sensor, exposure);
+            let head = setup.plane(SIZE, Scene::uniform("flat", [expected_e; 3])).unwrap();
+            let light = uniform_frame(head, [expected_e; 3]).unwrap();
+            let settings = NoiseSettings {
+                seed: index.into(),
+                sensor_seed: index.into(),
+                frame,
+                temperature_k: condition.temperature_k,
+                ..NoiseSettings::default()
+            };
             let noisy = light.through(&AddNoise::new(&light.header, &settings).unwrap()).unwrap().0;
             let digitized = noisy.through(&Digitize::new(&noisy.header, &AdcSettings::default()).unwrap()).unwrap().0;
             MemoryFrame::new(digitized.header, digitized.samples)
@@ -128,16 +171,25 @@ fn level(readout: &ReadOut, index: u32, condition: Condition, expected_e: f64, f
 /// What a camera is found to be.
 fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
     let [flats, darks] = levels(readout, index);
-    found(&flats, &darks)
+    let found = found(&flats, &darks);
+    assert_eq!(found.suspects, [], "{index}");
+    found
 }
 
 fn found(flats: &[Level], darks: &[Level]) -> ClassFindings {
-    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true };
+    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top: None };
     of_class("G", flats, darks, darks, &settings)
 }
 
 /// Flats and darks of a camera.
 fn levels(readout: &ReadOut, index: u32) -> [Vec<Level>; 2] {
+    let [flats, darks, _] = levels_of((readout, index, Shake::default()));
+    [flats, darks]
+}
+
+/// Flats and darks of a camera, and darks at [`WARM_K`].
+fn levels_of(camera: (&ReadOut, u32, Shake)) -> [Vec<Level>; 3] {
+    let readout = camera.0;
     let lit = |photons: f64| Condition {
         is_lit: true,
         exposure_s: Some(FLAT_S),
@@ -157,14 +209,19 @@ fn levels(readout: &ReadOut, index: u32) -> [Vec<Level>; 2] {
         .iter()
         .map(|share| {
             let frames = if *share == 0.5 { 8 } else { 2 };
-            level(readout, index, lit(share * end / QUANTUM_EFFICIENCY), share * end, frames, next(frames))
+            level(camera, lit(share * end / QUANTUM_EFFICIENCY), share * end, [frames, next(frames)])
         })
         .collect();
-    let darks = [(FLAT_S, 8), (0.1, 2), (0.25, 2), (0.5, 4), (1.0, 4)]
-        .iter()
-        .map(|(time, frames)| level(readout, index, dark(*time), 0.0, *frames, next(*frames)))
-        .collect();
-    [flats, darks]
+    let mut darks_at = |temperature_k: f64| -> Vec<Level> {
+        let of = |(time, frames): &(f64, u32)| {
+            let condition = Condition { temperature_k: Some(temperature_k), ..dark(*time) };
+            level(camera, condition, 0.0, [*frames, next(*frames)])
+        };
+        [(FLAT_S, 8), (0.1, 2), (0.25, 2), (0.5, 4), (1.0, 4)].iter().map(of).collect()
+    };
+    let (darks, warm) =
+        (darks_at(readout.temperature_k), if camera.2.is_any() { darks_at(WARM_K) } else { Vec::new() });
+    [flats, darks, warm]
 }
 
 /// The signal of the largest temporal variance, in electrons.
@@ -329,6 +386,67 @@ fn a_lamp_that_flickers_widens_the_responsivity() {
     assert!(missed <= 10, "{missed} of {COUNT}");
 }
 
+/// Cameras whose frames scatter beyond noise, in one way or another: what means tell lies within its interval as often as is stated,
+/// and the scatter is told of. Of n cameras so many may miss by chance: 4 standard deviations beyond 5 %.
+#[test]
+fn frames_that_scatter_beyond_noise_widen_intervals() {
+    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(24, |count| count.parse().unwrap());
+    let none = Shake::default();
+    for (name, shake, words) in [
+        ("light", Shake { light: 0.001, ..none }, "light scatters by"),
+        ("black", Shake { black_adu: 0.3, ..none }, "the black level moves"),
+        ("both", Shake { light: 0.002, black_adu: 0.3, ..none }, "the black level moves"),
+        ("time", Shake { time: 0.01, ..none }, "from level to level"),
+    ] {
+        let found: Vec<_> = (0..count).into_par_iter().map(|index| shaken(index, shake, words)).collect();
+        let told = found.iter().filter(|(told, _)| *told).count();
+        for (place, key) in SHAKEN.iter().enumerate() {
+            let known: Vec<[f64; 2]> = found.iter().filter_map(|(_, held)| held[place]).collect();
+            let missed = known.iter().filter(|[off, _]| off.abs() > 1.0).count();
+            let mut widths: Vec<f64> = known.iter().map(|[_, width]| *width).collect();
+            widths.sort_by(f64::total_cmp);
+            let n = known.len() as f64;
+            let width = widths.get(known.len() / 2).copied().unwrap_or(f64::NAN);
+            eprintln!("{name}, {key}: {missed} of {n} missed, median half-width {width:.2e}; {told} of {count} told");
+            let allowed = n * (1.0 - CONFIDENCE) + 4.0 * (n * CONFIDENCE * (1.0 - CONFIDENCE)).sqrt();
+            assert!(n * 2.0 >= f64::from(count), "{name}: {key} is known of {n} of {count} cameras alone");
+            assert!(missed as f64 <= allowed, "{name}, {key}: {missed} of {n} intervals missed");
+        }
+    }
+}
+
+/// Numbers that means of frames tell.
+const SHAKEN: [&str; 6] = [
+    "linearity_error_min",
+    "linearity_error_max",
+    "dark_current_e_per_s",
+    "dark_current_doubling_k",
+    "quantum_efficiency",
+    "gain_adu_per_e",
+];
+
+/// Of a camera whose frames scatter: whether words of that are among what is told, and how far each of the numbers is off over half the
+/// width of its interval, with that.
+fn shaken(index: u32, shake: Shake, words: &str) -> (bool, [Option<[f64; 2]>; 6]) {
+    let readout = camera(index, Kind::Ccd);
+    let [flats, darks, warm] = levels_of((&readout, index, shake));
+    let all: Vec<Level> = darks.iter().chain(&warm).cloned().collect();
+    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top: None };
+    let found = of_class("G", &flats, &darks, &all, &settings);
+    assert_eq!(found.suspects, [], "{index}");
+    let currents = [readout.temperature_k, WARM_K].map(|kelvin| readout.dark_current_e_per_s(kelvin));
+    let doubling = (WARM_K - readout.temperature_k) / (currents[1] / currents[0]).log2();
+    let mut truths: BTreeMap<&str, f64> = truths(&readout, index).into_iter().collect();
+    truths.insert("dark_current_doubling_k", doubling);
+    let held = SHAKEN.map(|key| {
+        let (interval, truth) = (found.get(key)?, truths[key]);
+        let width = (interval.high - interval.low) / 2.0;
+        let half = if interval.value > truth { interval.value - interval.low } else { interval.high - interval.value };
+        Some([(interval.value - truth) / half, width])
+    });
+    (found.notes.iter().chain(&found.doubts).any(|told| told.contains(words)), held)
+}
+
 /// What levels show of wrong photons and of light that drifts is told; a camera that is as it should be raises no doubt.
 #[test]
 fn light_that_is_not_as_said_is_doubted() {
@@ -360,4 +478,259 @@ fn light_that_is_not_as_said_is_doubted() {
     doubt(&flats.iter().map(bent).collect::<Vec<_>>(), "the response bends");
     let wrong = |(place, flat): (usize, &Level)| relit(flat, &darks[0], if place % 2 == 0 { 1.0 } else { 1.05 });
     doubt(&flats.iter().enumerate().map(wrong).collect::<Vec<_>>(), "signals miss the line of the response by");
+}
+
+/// Cameras of which two in a hundred photosites are hot: dark current and patterns of the dark lie within their
+/// intervals as often as is stated. Of n cameras so many may miss by chance: 4 standard deviations beyond 5 %.
+#[test]
+fn hot_photosites_widen_intervals_of_the_dark() {
+    const OF_DARK: [&str; 4] = ["dsnu_e", "dsnu_pixel_e", "dark_current_e_per_s", "dcnu"];
+    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(40, |count| count.parse().unwrap());
+    let found: Vec<[Option<bool>; 4]> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let plain = camera(index, Kind::Ccd);
+            // No photosite is full after the longest exposure, 1 s.
+            let current = plain.dark_current_e_per_s.unwrap().min(plain.full_well_e / 50.0);
+            let (share, hot) = (0.02, 5.0 * current);
+            let readout = ReadOut {
+                dark_current_e_per_s: Some(current),
+                hot_pixel_share: share,
+                hot_pixel_dark_current_e_per_s: hot,
+                ..plain
+            };
+            let [flats, darks] = levels(&readout, index);
+            let found = found(&flats, &darks);
+            let mean = current + share * hot;
+            // An exponential law has a variance of the square of its mean.
+            let variance = (readout.dcnu * mean).powi(2) + share * (2.0 - share) * hot * hot;
+            let of_flats = variance.sqrt() * FLAT_S;
+            let truths = [of_flats, of_flats, mean, variance.sqrt() / mean];
+            let holds = |(key, truth): (&str, f64)| {
+                let interval = found.get(key)?;
+                Some((interval.low..=interval.high).contains(&truth))
+            };
+            [0, 1, 2, 3].map(|place| holds((OF_DARK[place], truths[place])))
+        })
+        .collect();
+    for (place, key) in OF_DARK.iter().enumerate() {
+        let held: Vec<bool> = found.iter().filter_map(|held| held[place]).collect();
+        let (n, missed) = (held.len() as f64, held.iter().filter(|held| !**held).count());
+        eprintln!("{key}: {missed} of {n} missed");
+        let allowed = n * (1.0 - CONFIDENCE) + 4.0 * (n * CONFIDENCE * (1.0 - CONFIDENCE)).sqrt();
+        assert!(missed as f64 <= allowed, "{key}: {missed} of {n} intervals missed");
+    }
+}
+
+fn why(found: &ClassFindings, key: &str) -> String {
+    found.findings.iter().find(|finding| finding.key == key).unwrap().found.clone().unwrap_err()
+}
+
+/// Of darks that code 0 clips each number that they would tell says that, and which frames would tell it; of flats whose exposure
+/// time no dark is known to have, that.
+#[test]
+fn reasons_are_true() {
+    const OF_DARKS: [&str; 13] = [
+        "black_level_adu",
+        "dark_noise_e",
+        "row_noise_e",
+        "pixel_noise_e",
+        "threshold_e",
+        "dsnu_e",
+        "dsnu_row_e",
+        "dsnu_column_e",
+        "dsnu_pixel_e",
+        "dark_current_e_per_s",
+        "dark_current_from_variance_e_per_s",
+        "dsnu_offset_e",
+        "dcnu",
+    ];
+    let readout = camera(3, Kind::Ccd);
+    let [flats, darks] = levels(&readout, 3);
+    let clipped: Vec<Level> = darks.iter().map(|dark| Level { at_ends: [0.0, 0.3], ..dark.clone() }).collect();
+    let of_clipped = found(&flats, &clipped);
+    for key in OF_DARKS {
+        let said = why(&of_clipped, key);
+        assert!(
+            said.contains("clipped at code 0") && said.contains("black level of the camera raised"),
+            "{key}: {said}"
+        );
+    }
+    let untimed: Vec<Level> = darks[..2]
+        .iter()
+        .map(|dark| Level { condition: Condition { exposure_s: None, ..dark.condition }, ..dark.clone() })
+        .collect();
+    let of_untimed = found(&flats, &untimed);
+    for key in ["quantum_efficiency", "saturation_e", "linearity_error_max", "prnu"] {
+        let said = why(&of_untimed, key);
+        assert!(said.contains("no dark is known to have the exposure time of the flats"), "{key}: {said}");
+    }
+    assert!(of_untimed.get("row_noise_e").is_some(), "{}", why(&of_untimed, "row_noise_e"));
+    for key in OF_DARKS.into_iter().filter(|key| !key.starts_with("dark_current") && !key.starts_with("dsnu_offset")) {
+        let said = why(&found(&flats, &[]), key);
+        assert!(said.contains("two darks or more") || key == "dcnu", "{key}: {said}");
+    }
+    let full: Vec<Level> = flats[..2].iter().map(|flat| Level { at_ends: [0.5, 0.0], ..flat.clone() }).collect();
+    let said = why(&found(&full, &darks), "gain_adu_per_e");
+    assert!(said.ends_with("(of 2 levels of flats 2 reach the largest code)"), "{said}");
+}
+
+/// Frames of one condition of which the second, or the third, is a copy; nearly full ones, the same but for no photosite, are none.
+#[test]
+fn copies_are_told_from_full_frames() {
+    let readout = camera(3, Kind::Ccd);
+    let mut sensor = support::sensor();
+    sensor.readout = Some(readout.clone());
+    let exposure = Exposure { exposure_s: FLAT_S, f_number: 8.0, lens_transmittance: 1.0 };
+    let head = CameraSetup::new(sensor, exposure).plane(SIZE, Scene::uniform("flat", [1000.0; 3])).unwrap();
+    let light = uniform_frame(head, [1000.0; 3]).unwrap();
+    let taken = |frame: u32| {
+        let noisy =
+            light.through(&AddNoise::new(&light.header, &NoiseSettings { frame, ..NoiseSettings::default() }).unwrap());
+        let noisy = noisy.unwrap().0;
+        let digitized = noisy.through(&Digitize::new(&noisy.header, &AdcSettings::default()).unwrap()).unwrap().0;
+        MemoryFrame::new(digitized.header, digitized.samples)
+    };
+    let full = |frame: u32| {
+        let mut frame = taken(frame);
+        let top = frame.samples.iter().copied().fold(0.0, f32::max);
+        let samples = (0..frame.samples.len()).map(|place| if place % 1000 == 7 { top - 9.0 } else { top }).collect();
+        frame = MemoryFrame::new(frame.header.clone(), samples);
+        frame
+    };
+    let copies = |mut frames: Vec<MemoryFrame>| survey(&mut frames, None, false).unwrap().sites[0].copies;
+    assert_eq!(copies(vec![taken(0), taken(1)]), None);
+    assert_eq!(copies(vec![taken(0), taken(0)]), Some([0, 1]));
+    assert_eq!(copies(vec![taken(0), taken(1), taken(2), taken(1)]), Some([1, 3]));
+    assert_eq!(copies(vec![full(0), full(1)]), None);
+    assert_eq!(copies(vec![full(0), full(1), full(2)]), None);
+}
+
+/// A flat among the darks, a dark among the flats, and exposure times that are wrong are named by their level, and no other is; of
+/// levels as they should be none is.
+#[test]
+fn levels_that_are_not_what_they_are_said_to_be_are_named() {
+    let placed = |levels: Vec<Level>, first: usize| -> Vec<Level> {
+        levels.into_iter().enumerate().map(|(place, level)| Level { place: first + place, ..level }).collect()
+    };
+    let suspects = |flats: &[Level], darks: &[Level]| -> Vec<(usize, String)> {
+        found(flats, darks).suspects.into_iter().map(|suspect| (suspect.place, suspect.problem)).collect()
+    };
+    for index in 0..8 {
+        let readout = camera(index, Kind::Ccd);
+        let [flats, darks] = levels(&readout, index);
+        let (flats, darks) = (placed(flats, 0), placed(darks, 100));
+        assert_eq!(suspects(&flats, &darks), [], "{index}");
+        let only = |found: Vec<(usize, String)>, place: usize, words: &str| {
+            let [(own, problem)] = &found[..] else { panic!("{index}: {found:?}") };
+            assert!(*own == place && problem.contains(words), "{index}: {own} {problem}");
+        };
+        // A flat among the darks, with its own exposure time.
+        let mut lit = darks.clone();
+        lit[2] = Level { condition: darks[2].condition, place: 102, ..flats[4].clone() };
+        only(suspects(&flats, &lit), 102, "are they flats");
+        // The same beside one dark alone.
+        let two = [darks[0].clone(), Level { condition: darks[0].condition, place: 103, ..flats[6].clone() }];
+        assert!(
+            suspects(&flats, &two).iter().any(|(place, problem)| *place == 103 && problem.contains("are they flats"))
+        );
+        // A dark among the flats.
+        let mut unlit = flats.clone();
+        unlit[5] = Level { condition: flats[5].condition, place: 5, ..darks[0].clone() };
+        unlit.sort_by(|a, b| a.mean.total_cmp(&b.mean));
+        only(suspects(&unlit, &darks), 5, "are they darks");
+        // A number of photons, and without photons an exposure time, that is wrong by a third.
+        let mut wrong = flats.clone();
+        wrong[6].condition.photons = wrong[6].condition.photons.map(|photons| photons * 1.5);
+        only(suspects(&wrong, &darks), 6, "of their number of photons: is that wrong?");
+    }
+}
+
+/// A stack at 80 % of saturation, beyond what the gain is fitted to, is what patterns are measured on; one at saturation is not, and that
+/// is said.
+#[test]
+fn patterns_are_measured_on_the_stack_below_saturation() {
+    let readout = camera(3, Kind::Ccd);
+    let [flats, darks] = levels(&readout, 3);
+    let stacked = |place: usize, first: u32| -> ClassFindings {
+        let condition = flats[place].condition;
+        let expected_e = condition.photons.unwrap() * QUANTUM_EFFICIENCY;
+        let stack = level((&readout, 3, Shake::default()), condition, expected_e, [16, first]);
+        let mut flats = flats.clone();
+        flats[place] = Level { place: 77, ..stack };
+        found(&flats, &darks)
+    };
+    let near = stacked(9, 900);
+    assert_eq!(near.stacks[0].unwrap().0, 77);
+    let [own, pairs] = [&near, &found(&flats, &darks)].map(|found| found.get("prnu_pixel").unwrap());
+    assert!(own.high - own.low < pairs.high - pairs.low, "{own:?} {pairs:?}");
+    let full = stacked(12, 950);
+    assert_ne!(full.stacks[0].unwrap().0, 77);
+    assert!(
+        full.notes.iter().any(|note| note.contains("flats of 16 frames are too near saturation")),
+        "{:?}",
+        full.notes
+    );
+}
+
+/// The saturation capacity is said to be that of the converter or of the photosites, whichever ends first; where the largest code is not
+/// known, a converter that ends is not called a full well.
+#[test]
+fn saturation_is_said_to_be_of_photosites_or_of_the_converter() {
+    let mut kinds = [0; 2];
+    for index in 0..12 {
+        let readout = camera(index, Kind::Ccd);
+        let top = f64::from((1_u32 << readout.bits) - 1);
+        let range = (top - readout.bias_adu) / readout.adu_per_e / readout.full_well_e;
+        if (0.95..1.05).contains(&range) {
+            continue;
+        }
+        let [flats, darks] = levels(&readout, index);
+        let of = |top: Option<f64>| {
+            let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top };
+            let found = of_class("G", &flats, &darks, &darks, &settings);
+            let what = found.findings.iter().find(|finding| finding.key == "saturation_e").unwrap().what;
+            (what, found)
+        };
+        let ((what, known), (guess, unknown)) = (of(Some(top)), of(None));
+        let is_converter = range < 1.0;
+        kinds[usize::from(is_converter)] += 1;
+        if is_converter {
+            assert_eq!(
+                (what, guess),
+                ("saturation capacity, of the converter", "saturation capacity, of either"),
+                "{index}"
+            );
+            assert!(why(&known, "full_well_e").starts_with(&format!("the converter ends first, at the code {top}")));
+            assert!(why(&unknown, "full_well_e").contains("--white"), "{index}");
+        } else {
+            assert_eq!([what, guess], ["saturation capacity, of the photosites"; 2], "{index}");
+            assert!(known.get("full_well_e").is_some() && unknown.get("full_well_e").is_some(), "{index}");
+        }
+    }
+    assert!(kinds.iter().all(|count| *count > 1), "{kinds:?}");
+}
+
+/// An uncertainty of all numbers of photons together is one of what they tell, however many levels there are.
+#[test]
+fn an_error_of_all_photons_does_not_average_out() {
+    let readout = camera(3, Kind::Ccd);
+    let [flats, darks] = levels(&readout, 3);
+    let of = |photon_error: f64| {
+        of_class(
+            "G",
+            &flats,
+            &darks,
+            &darks,
+            &Settings { confidence: CONFIDENCE, photon_error, are_codes: true, top: None },
+        )
+    };
+    let (exact, off) = (of(0.0), of(0.03));
+    for key in ["responsivity_adu_per_photon", "quantum_efficiency", "saturation_photons"] {
+        let [own, wide] = [&exact, &off].map(|found| found.get(key).unwrap());
+        // Errors that are independent of each other add as squares; 1.96 standard deviations of 3 %, and its square at most.
+        let wanted = (own.high - own.value).hypot(1.96 * 0.03 * own.value);
+        assert!(((wide.high - wide.value) / wanted - 1.0).abs() < 0.01, "{key}: {own:?} {wide:?}");
+    }
+    assert_eq!(exact.get("gain_adu_per_e"), off.get("gain_adu_per_e"));
 }

@@ -24,14 +24,23 @@ pub enum Separator {
 impl Separator {
     /// What parts the cells of `text`: what makes two or more cells of the last of its first rows, all but the first of them
     /// numbers, or, in a table `of_numbers`, of the last that has no mistake, or at least begins with a number and has another; where
-    /// nothing does, the first of comma, semicolon and tab that the first row has.
+    /// nothing does, the first of comma, semicolon and tab that the first row has. In a table of words a comma is none where the first
+    /// row has another of these, and as many cells by it as the last.
     pub fn of(text: &str, of_numbers: bool) -> Self {
         let rows: Vec<&str> = rows(text).take(ROWS_LOOKED_AT).collect();
         let first = rows.first().unwrap_or(&"").as_bytes();
         let in_first = || b",;\t".iter().find(|separator| first.contains(separator));
+        // Words before a last number with a decimal comma: `a.tiff;flat;0,02` is not the word `a.tiff;flat;0` and the number 02.
+        let as_wide = |separator: &u8| {
+            let cells = |row: &&str| Self::Byte(*separator).cells(row).len();
+            rows.first().map(cells) == rows.last().map(cells)
+        };
+        let is_of_decimals = !of_numbers && !first.contains(&b',') && in_first().is_some_and(as_wide);
+        let may_part = |separator: &&Self| !(is_of_decimals && **separator == Self::Byte(b','));
         let looked_at = if of_numbers { rows.len() } else { 1 };
         let last = || rows.iter().rev().take(looked_at);
-        let found = last().find_map(|row| SEPARATORS.iter().find(|separator| separator.makes_numbers(row)));
+        let parts = |row: &str| SEPARATORS.iter().filter(may_part).find(|separator| separator.makes_numbers(row));
+        let found = last().find_map(|row| parts(row));
         // A column of words, or one with gaps.
         let of_some = || {
             let mut last = last().filter(|_| of_numbers);

@@ -159,7 +159,9 @@ fn check(name: &str, frame: &ListedFrame) -> Result<()> {
 fn of_table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
     let columns = csv::columns(name, bytes)?;
     if let Some(unknown) = columns.iter().find(|column| !COLUMNS.contains(&column.trim())) {
-        let problem = format!("unknown column `{unknown}`; a list of frames has {}", COLUMNS.join(", "));
+        let are_blank = unknown.split_whitespace().all(|word| COLUMNS.contains(&word));
+        let advice = if are_blank { ", parted by commas, semicolons or tabs" } else { "" };
+        let problem = format!("unknown column `{unknown}`; a list of frames has {}{advice}", COLUMNS.join(", "));
         return Err(Error::format(name, problem));
     }
     let column = |wanted: &str| -> Result<Option<Vec<String>>> {
@@ -309,6 +311,27 @@ mod tests {
         assert_eq!(list.frames[1].kind, Some(FrameKind::Dark));
     }
 
+    /// What parts the cells, and what marks decimals, is told as in other tables, though most columns are words.
+    #[test]
+    fn tables_are_parted_as_others_are() {
+        for text in [
+            "file,kind,exposure_s\na b.tiff,flat,0.02\nc.tiff,dark,0.02\n",
+            "file;kind;exposure_s\na b.tiff;flat;0,02\nc.tiff;dark;0,02\n",
+            "file;kind;exposure_s\r\na b.tiff;flat;0.02\r\nc.tiff;dark;0.02\r\n",
+            "file\tkind\texposure_s\na b.tiff\tflat\t0,02\nc.tiff\tdark\t2e-2\n",
+            "exposure_s;kind;file\n0,02;flat;a b.tiff\n0,02;dark;c.tiff\n",
+            "# taken today\nfile;kind;photons;exposure_s\na b.tiff;flat;;0,02\nc.tiff;dark;;0,02\n",
+            "file,kind,exposure_s\n\"a b.tiff\",flat,\"0,02\"\nc.tiff,dark,\"0,02\"\n",
+            "file;exposure_s;kind\na b.tiff;0,02;flat\nc.tiff;0,02;dark\n",
+        ] {
+            let (folder, path) = written("list.csv", text);
+            let frames = read(&path).unwrap_or_else(|error| panic!("{text}: {error}")).frames;
+            let shown: Vec<_> = frames.iter().map(|frame| (frame.file.clone(), frame.kind, frame.exposure_s)).collect();
+            let frame = |file: &str, kind| (folder.path().join(file), Some(kind), Some(0.02));
+            assert_eq!(shown, [frame("a b.tiff", FrameKind::Flat), frame("c.tiff", FrameKind::Dark)], "{text}");
+        }
+    }
+
     #[test]
     fn a_frame_is_no_list_of_frames() {
         for (bytes, kind) in [(&b"\x76\x2f\x31\x01\0"[..], "an EXR"), (b"\x89PNG\r\n\x1a\n\0", "a PNG")] {
@@ -327,6 +350,12 @@ mod tests {
     fn mistakes_are_named() {
         for (file, text, wanted) in [
             ("list.csv", "name,kind\na,flat\n", "unknown column `name`"),
+            (
+                "list.csv",
+                "file kind\na flat\n",
+                "`file kind`; a list of frames has file, kind, exposure_s, photons, temperature_k, ",
+            ),
+            ("list.csv", "file kind\na flat\n", "level, parted by commas, semicolons or tabs"),
             ("list.csv", "file,kind\na,light\n", "`light` in row 1 of `kind` is neither flat nor dark"),
             ("list.csv", "file,exposure_s\na,-1\n", "`exposure_s` of a is -1; it must be above 0"),
             ("list.csv", "file,kind,photons\na,dark,5\n", "a is a dark with 5 photons"),

@@ -1,16 +1,17 @@
 //! What darks tell beyond one temperature and one exposure time: how dark current rises with temperature, and how it differs from
 //! photosite to photosite.
 
-use super::fit::{Line, Point, variance_besides};
+use super::curve::{FEW_AT_ENDS, is_clipped};
+use super::fit::{Line, Point};
 use super::level::Level;
-use super::pattern::{Part, fixed};
-use crate::numerics::quantiles;
-use crate::numerics::variance_components::Interval;
+use super::reasons::CLIPPED;
+use super::scatter::{Scatter, among};
+use crate::numerics::variance_components::{Interval, MeanSquare, combination};
 use std::f64::consts::LN_2;
 
-/// A line through points with what its slope and offset scatter by, variances; points miss it by no more than they scatter, or else
-/// all have one more error alike.
-fn fitted(points: &[(f64, f64, f64)]) -> Option<(Line, [f64; 2])> {
+/// A line through points with what its slope and offset scatter by, variances, for intervals of such confidence; points miss it by no
+/// more than they scatter, or else all have one more error alike.
+fn fitted(points: &[(f64, f64, f64)], confidence: f64) -> Option<(Line, [f64; 2])> {
     let weighted = |besides: f64| -> Vec<Point> {
         points
             .iter()
@@ -20,8 +21,7 @@ fn fitted(points: &[(f64, f64, f64)]) -> Option<(Line, [f64; 2])> {
     let misfit = |besides: f64| Line::through(weighted(besides)).map_or(0.0, |line| line.chi_square(weighted(besides)));
     let freedom = points.len() as f64 - 2.0;
     let largest = points.iter().map(|(_, y, _)| y * y).fold(0.0, f64::max);
-    let besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
-    let points = weighted(besides);
+    let points = weighted(among(freedom, misfit, largest).known(confidence));
     let line = Line::through(points.clone())?;
     let all: f64 = points.iter().map(|point| point.weight).sum();
     let mean = points.iter().map(|point| point.weight * point.x).sum::<f64>() / all;
@@ -29,34 +29,114 @@ fn fitted(points: &[(f64, f64, f64)]) -> Option<(Line, [f64; 2])> {
     Some((line, [1.0 / all + mean * mean / spread, 1.0 / spread]))
 }
 
+/// The same of a signal over time, where what points miss the line by may be in proportion to it besides, as of wrong times: the
+/// larger error of the slope counts.
+fn fitted_in_time(points: &[(f64, f64, f64)], confidence: f64) -> Option<(Line, [f64; 2])> {
+    let (line, variances) = fitted(points, confidence)?;
+    let share = |share: f64| -> Vec<(f64, f64, f64)> {
+        points.iter().map(|(x, y, variance)| (*x, *y, variance + share * (line.slope * x).powi(2))).collect()
+    };
+    let misfit = |of: f64| {
+        let points: Vec<Point> =
+            share(of).into_iter().map(|(x, y, variance)| Point { x, y, weight: 1.0 / variance }).collect();
+        Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
+    };
+    let found = among(points.len() as f64 - 2.0, misfit, 1.0).known(confidence);
+    // With these errors of their own the points miss the line by no more.
+    let (other, others) = fitted(&share(found), confidence)?;
+    Some(if others[1] > variances[1] { (other, others) } else { (line, variances) })
+}
+
 /// The temperature step that doubles the dark current, K, from darks at several temperatures, each at several times:
-/// log₂ I is a line over temperature \[EMVA1288, Eq. 33].
+/// log₂ I is a line over temperature \[EMVA1288, Eq. 33]. Frames scatter so beyond noise; darks that code 0 clips do not count, where the
+/// error of rounding has such a variance.
 ///
 /// # Errors
 ///
 /// Which frames would tell it.
-pub fn doubling_temperature(darks: &[Level], confidence: f64) -> Result<Interval, String> {
-    let mut temperatures: Vec<f64> = darks.iter().filter_map(|dark| dark.condition.temperature_k).collect();
+pub fn doubling_temperature(
+    darks: &[Level],
+    scatter: &Scatter,
+    rounding: f64,
+    confidence: f64,
+) -> Result<Interval, String> {
+    let whole: Vec<&Level> = darks.iter().filter(|dark| !is_clipped(dark, rounding)).collect();
+    let of_rate = |temperature: f64| -> Option<(f64, f64)> {
+        let own = whole.iter().filter(|dark| dark.condition.temperature_k == Some(temperature));
+        let variance = |dark: &Level| dark.mean_variance + scatter.of_black(dark).known(confidence);
+        let points: Vec<(f64, f64, f64)> =
+            own.filter_map(|dark| Some((dark.condition.exposure_s?, dark.mean, variance(dark)))).collect();
+        let (line, [_, variance]) = fitted_in_time(&points, confidence)?;
+        Some((line.slope, variance))
+    };
+    let mut temperatures: Vec<f64> = whole.iter().filter_map(|dark| dark.condition.temperature_k).collect();
     temperatures.sort_by(f64::total_cmp);
     temperatures.dedup();
-    let rate = |temperature: &f64| {
-        let own = darks.iter().filter(|dark| dark.condition.temperature_k == Some(*temperature));
-        let points: Vec<(f64, f64, f64)> =
-            own.filter_map(|dark| Some((dark.condition.exposure_s?, dark.mean, dark.mean_variance))).collect();
-        let (line, [_, variance]) = fitted(&points)?;
-        // The logarithm of a rate that is not told from none tells nothing.
-        let is_told = line.slope > 3.0 * variance.sqrt();
-        is_told.then(|| (*temperature, line.slope.log2(), variance / (line.slope * LN_2).powi(2)))
-    };
-    let rates: Vec<(f64, f64, f64)> = temperatures.iter().filter_map(rate).collect();
-    let few =
-        "it takes darks at two temperatures or more, each at two exposure times or more that tell its dark current";
-    let (line, [_, variance]) = if rates.len() < 2 { None } else { fitted(&rates) }.ok_or(few)?;
+    let found: Vec<(f64, f64, f64)> = temperatures
+        .iter()
+        .filter_map(|temperature| of_rate(*temperature).map(|(slope, variance)| (*temperature, slope, variance)))
+        .collect();
+    if found.len() < 2 {
+        let few = "it takes darks at two temperatures or more, each at two exposure times or more";
+        let are_others_warmer =
+            darks.iter().any(|dark| dark.condition.temperature_k != darks[0].condition.temperature_k);
+        let is_for_clipping = are_others_warmer && whole.len() < darks.len();
+        return Err(if is_for_clipping { CLIPPED.into() } else { few.into() });
+    }
+    // The logarithm of a rate that is not told from none tells nothing.
+    let is_told = |(_, slope, variance): &&(f64, f64, f64)| *slope > 3.0 * variance.sqrt();
+    let rates: Vec<(f64, f64, f64)> = found
+        .iter()
+        .filter(is_told)
+        .map(|(temperature, slope, variance)| (*temperature, slope.log2(), variance / (slope * LN_2).powi(2)))
+        .collect();
+    let untold = "the dark current is told from none at fewer than two temperatures: darks of longer exposure, or warmer ones, would tell";
+    let (line, [_, variance]) = if rates.len() < 2 { None } else { fitted(&rates, confidence) }.ok_or(untold)?;
     let slope = Interval::normal(line.slope, variance, confidence);
     if slope.low <= 0.0 {
-        return Err("the dark current does not rise with temperature beyond chance".into());
+        return Err("the dark current does not rise with temperature beyond chance: darks of longer exposure, or at temperatures \
+                    farther apart, would tell"
+            .into());
     }
     Ok(Interval { value: 1.0 / slope.value, low: 1.0 / slope.high, high: 1.0 / slope.low })
+}
+
+/// What single photosites of a dark differ by.
+struct Pattern {
+    exposure_s: f64,
+    /// The variance between them, and what the noise that is left in the mean of the frames makes it scatter by, a variance.
+    variance: f64,
+    own: f64,
+    /// Fourth cumulant of a photosite.
+    fourth: f64,
+}
+
+impl Pattern {
+    fn of(dark: &Level) -> Option<Self> {
+        let count = dark.count();
+        let mut pattern = Self { exposure_s: dark.condition.exposure_s?, variance: 0.0, own: 0.0, fourth: 0.0 };
+        for site in &dark.sites {
+            let (share, noise) = (site.count() as f64 / count, site.temporal.rest.value / dark.frames as f64);
+            let variance = site.spatial.rest.value - noise;
+            let of_means = 2.0 * (site.spatial.rest.value.powi(2) - variance.max(0.0).powi(2)) / site.count() as f64;
+            let of_noise = 2.0 * noise * noise / site.temporal.rest.freedom;
+            pattern.variance += share * variance;
+            pattern.own += share * share * (of_means.max(0.0) + of_noise);
+            pattern.fourth += share * site.fourth;
+        }
+        Some(pattern)
+    }
+}
+
+/// The interval of a variance between `count` photosites of such a fourth cumulant, whose estimate scatters by `own` besides.
+fn of_photosites(variance: f64, own: f64, fourth: f64, count: f64, confidence: f64) -> Interval {
+    let square = MeanSquare { value: variance.max(0.0), freedom: count - 1.0 }.with_tails(fourth, count);
+    let [sampled, other] = [combination(&[(1.0, square)], confidence), Interval::normal(0.0, own, confidence)];
+    Interval {
+        value: variance,
+        low: variance - (square.value - sampled.low).hypot(other.low),
+        high: variance + (sampled.high - square.value).hypot(other.high),
+    }
 }
 
 /// The fixed pattern of darks parted into what no time adds and what goes by it: variances of single photosites at no exposure, in
@@ -66,26 +146,31 @@ pub fn doubling_temperature(darks: &[Level], confidence: f64) -> Result<Interval
 ///
 /// Which frames would tell it.
 pub fn parted_pattern(darks: &[Level], confidence: f64) -> Result<[Interval; 2], String> {
-    let reach = quantiles::of_normal(f64::midpoint(1.0, confidence));
-    let freedom: f64 = darks.first().map_or(1.0, |dark| dark.sites.iter().map(|site| site.spatial.rest.freedom).sum());
-    let points: Vec<(f64, f64, f64)> = darks
-        .iter()
-        .filter_map(|dark| {
-            let found = fixed(dark, Part::Pixel, confidence);
-            let scatter = ((found.high - found.low) / (2.0 * reach)).powi(2);
-            // The pattern is the same in all of them: that it is one of many is an error that they share.
-            let own = (scatter - 2.0 * found.value.powi(2) / freedom).max(1e-3 * scatter);
-            Some((dark.condition.exposure_s?.powi(2), found.value, own))
-        })
-        .collect();
-    let mut times: Vec<f64> = points.iter().map(|(time, ..)| *time).collect();
-    times.sort_by(f64::total_cmp);
+    // Photosites that reach the largest code in longer darks alone are cut off there.
+    let stuck = darks.iter().map(|dark| dark.at_ends[0]).fold(f64::INFINITY, f64::min);
+    let is_whole = |dark: &&Level| dark.at_ends[0] <= stuck + FEW_AT_ENDS;
+    let are_all_whole = darks.iter().all(|dark| is_whole(&dark));
+    let mut patterns: Vec<Pattern> = darks.iter().filter(is_whole).filter_map(Pattern::of).collect();
+    patterns.sort_by(|a, b| a.exposure_s.total_cmp(&b.exposure_s));
+    let mut times: Vec<f64> = patterns.iter().map(|pattern| pattern.exposure_s).collect();
     times.dedup();
-    let few = "it takes darks at three exposure times or more";
-    let (line, [of_offset, of_slope]) = if times.len() < 3 { None } else { fitted(&points) }.ok_or(few)?;
-    let shared = |value: f64| 2.0 * value * value / freedom;
+    let few = if are_all_whole {
+        "it takes darks at three exposure times or more"
+    } else {
+        "hot photosites reach the largest code in the longer darks: it takes darks at three shorter exposure times or more"
+    };
+    let (true, [first, .., last]) = (times.len() >= 3, &patterns[..]) else { return Err(few.into()) };
+    // The pattern is the same in all of them: that it is one of many is an error that they share.
+    let points: Vec<(f64, f64, f64)> =
+        patterns.iter().map(|pattern| (pattern.exposure_s.powi(2), pattern.variance, pattern.own)).collect();
+    let (line, [of_offset, of_slope]) = fitted(&points, confidence).ok_or(few)?;
+    // Fourth cumulants of what no time adds and of what goes by it add up, as variances do.
+    let [short, long] = [first, last].map(|pattern| pattern.exposure_s.powi(4));
+    let of_time = ((last.fourth - first.fourth) / (long - short)).max(0.0);
+    let of_none = (first.fourth - of_time * short).max(0.0);
+    let count = darks.first().map_or(2.0, Level::count);
     Ok([
-        Interval::normal(line.offset, of_offset + shared(line.offset), confidence),
-        Interval::normal(line.slope, of_slope + shared(line.slope), confidence),
+        of_photosites(line.offset, of_offset, of_none, count, confidence),
+        of_photosites(line.slope, of_slope, of_time, count, confidence),
     ])
 }

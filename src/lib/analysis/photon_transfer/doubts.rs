@@ -85,12 +85,9 @@ fn missed(curve: &Curve) -> Option<String> {
 fn drifting(curve: &Curve, flats: &[Level]) -> Option<String> {
     let step = |&flat: &usize| {
         let level = &flats[flat];
-        let means = |frame: usize| {
-            let own = level.sites.iter().map(|site| site.frame_means[frame] * site.count() as f64);
-            own.sum::<f64>() / level.sites.iter().map(|site| site.count() as f64).sum::<f64>()
-        };
         let signal = curve.signal(flat);
-        (signal > 0.0).then(|| (means(level.frames - 1) - means(0)) / (level.frames - 1) as f64 / signal)
+        let risen = level.frame_mean(level.frames - 1) - level.frame_mean(0);
+        (signal > 0.0).then(|| risen / (level.frames - 1) as f64 / signal)
     };
     let steps: Vec<f64> = curve.fitted().iter().filter_map(step).collect();
     let count = steps.len() as f64;

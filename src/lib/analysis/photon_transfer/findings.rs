@@ -1,23 +1,17 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
-use super::curve::{Curve, LEAST_VARIANCE, ROUNDING, Values};
+use super::curve::{Curve, Values, below_saturation};
 use super::dark::{doubling_temperature, parted_pattern};
 use super::doubts::doubts;
 use super::level::Level;
+use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal};
+use super::reasons::{Reasons, UNSATURATED, of_gain};
+use super::scatter::Scatter;
+use super::settings::Settings;
+use super::suspects::{Suspect, suspects};
 use crate::numerics::variance_components::Interval;
-
-/// What is asked of the measurement.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Probability that an interval holds its number.
-    pub confidence: f64,
-    /// Relative standard uncertainty of all numbers of photons together.
-    pub photon_error: f64,
-    /// Whether samples are codes, which are rounded.
-    pub are_codes: bool,
-}
 
 /// A number that was measured, or why it was not.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,6 +78,8 @@ pub struct ClassFindings {
     pub notes: Vec<String>,
     /// What may make numbers wrong.
     pub doubts: Vec<String>,
+    /// Levels that may not be what they are said to be.
+    pub suspects: Vec<Suspect>,
 }
 
 impl ClassFindings {
@@ -95,10 +91,6 @@ impl ClassFindings {
 
 type Found = Result<Interval, String>;
 
-fn lacking(what: &str) -> String {
-    what.to_owned()
-}
-
 /// What the levels of a class tell; flats in the order of their light, darks of the flats' temperature, and all darks.
 #[allow(clippy::too_many_lines, reason = "finding after finding, as the data sheet has them")]
 pub fn of_class(
@@ -108,8 +100,10 @@ pub fn of_class(
     all_darks: &[Level],
     settings: &Settings,
 ) -> ClassFindings {
-    let Settings { confidence, photon_error, are_codes } = *settings;
-    let rounding = if are_codes { ROUNDING } else { 0.0 };
+    let Settings { confidence, .. } = *settings;
+    let rounding = settings.rounding();
+    let below: Vec<&Level> = below_saturation(flats).into_iter().map(|flat| &flats[flat]).collect();
+    let scatter = Scatter::of(&below, all_darks);
     let nothing = |why: String| ClassFindings {
         name: name.into(),
         findings: vec![finding("gain_adu_per_e", Err(why))],
@@ -120,12 +114,10 @@ pub fn of_class(
         stacks: [None; 2],
         notes: Vec::new(),
         doubts: Vec::new(),
+        suspects: suspects(None, flats, all_darks, &scatter),
     };
-    let Some(curve) = Curve::of(flats, darks, rounding, photon_error) else {
-        let why = "no gain follows: it takes two flats of one light below saturation, with darks of their exposure time, or flats at \
-                   several levels";
-        return nothing(why.into());
-    };
+    let curve = Curve::of(flats, darks, &scatter, settings).filter(|curve| curve.values().is_some());
+    let Some(curve) = curve else { return nothing(of_gain(flats, rounding)) };
     if let Some(gain) = curve.interval(|values| Some(values.gain), confidence).filter(|gain| gain.low <= 0.0) {
         return nothing(format!(
             "no gain follows: by the flats it is {:.3e} to {:.3e}, as their variance does not rise with their mean beyond chance; are \
@@ -136,18 +128,8 @@ pub fn of_class(
     let mut found = Vec::new();
     let mut add = |key: &'static str, result: Found| found.push(finding(key, result));
     let number = |of: &dyn Fn(&Values) -> Option<f64>, why: String| curve.interval(of, confidence).ok_or(why);
-    let no_darks = || {
-        if curve.are_darks_clipped {
-            lacking("darks are clipped at code 0: raise the black level of the camera")
-        } else {
-            lacking("it takes two darks or more")
-        }
-    };
-    let are_counted = flats.iter().any(|flat| flat.condition.photons.is_some());
-    let no_photons = || {
-        if are_counted { no_darks() } else { lacking("the photons per photosite of the flats are not known") }
-    };
-    let few_times = || lacking("it takes darks at three exposure times or more");
+    let reasons = Reasons { curve: &curve, flats, darks };
+    let (no_darks, no_photons) = (|| reasons.of_darks(), || reasons.of_photons());
     let gain = number(&|v| Some(v.gain), String::new());
     add("gain_adu_per_e", gain.clone());
     let responsivity = number(&|v| v.responsivity, no_photons());
@@ -158,7 +140,7 @@ pub fn of_class(
     let read_variance = |v: &Values| Some((v.dark_variance? - rounding) / (v.gain * v.gain));
     // Beneath the rounding nothing is left to tell.
     let read = number(&read_variance, no_darks());
-    let read = read.and_then(|read| if read.high > 0.0 { Ok(read) } else { Err(silent(&curve, no_darks())) });
+    let read = read.and_then(|read| if read.high > 0.0 { Ok(read) } else { Err(reasons.of_noise()) });
     add("dark_noise_e", read.map(Interval::root));
     let parts = [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)];
     let repeated: Vec<&Level> = darks.iter().filter(|dark| dark.frames >= 2).collect();
@@ -170,19 +152,21 @@ pub fn of_class(
     for (key, part) in parts {
         let (off, of) = if part == Part::Pixel { (rounding, &short) } else { (0.0, &repeated) };
         let of_part = || temporal(of, part, confidence).map(|variance| variance - off);
-        let is_told = !repeated.is_empty() && !curve.is_offset_free;
-        add(key, if is_told { over_gain(Ok(of_part())) } else { Err(silent(&curve, no_darks())) });
+        let is_told = !repeated.is_empty() && curve.tells_dark_noise();
+        add(key, if is_told { over_gain(Ok(of_part())) } else { Err(reasons.of_noise()) });
     }
     // The signal that equals its noise: ½ + √(¼ + σ²) [EMVA1288, Eq. 25].
     let threshold = |v: &Values| Some(0.5 + (0.25 + v.dark_variance?.max(0.0) / (v.gain * v.gain)).sqrt());
     let threshold_e = number(&threshold, no_darks());
     add("threshold_e", threshold_e.clone());
     let threshold_photons = |v: &Values| Some(threshold(v)? * v.gain / v.responsivity?);
-    add("threshold_photons", number(&threshold_photons, if darks.is_empty() { no_darks() } else { no_photons() }));
-    let saturation = saturation(&curve, flats, gain.clone());
-    let [saturation_e, saturation_photons, full_well] = saturation;
+    let lacking = threshold_e.as_ref().err().or(responsivity.as_ref().err()).cloned();
+    add("threshold_photons", number(&threshold_photons, lacking.unwrap_or_default()));
+    let limit = Limit::of(&curve, flats, settings);
+    let [saturation_e, saturation_photons, full_well] = saturation(reasons, gain.clone(), &limit);
     add("saturation_e", saturation_e.clone());
-    add("saturation_photons", saturation_photons);
+    let off = |photons: Interval| widened(photons, (settings.photon_error * photons.value).powi(2), confidence);
+    add("saturation_photons", saturation_photons.map(off));
     add("full_well_e", full_well);
     add("snr_max", saturation_e.clone().map(Interval::root));
     let range = |saturation: Interval, threshold: Interval| Interval {
@@ -191,7 +175,7 @@ pub fn of_class(
         high: saturation.high / threshold.low,
     };
     add("dynamic_range", saturation_e.and_then(|saturation| Ok(range(saturation, threshold_e?))));
-    let straight = straightness(&curve, flats, confidence);
+    let straight = straightness(reasons, &scatter, confidence);
     for (key, end) in [("linearity_error_min", 0), ("linearity_error_max", 1)] {
         add(key, straight.as_ref().map(|line| line.extremes[end]).map_err(Clone::clone));
     }
@@ -199,20 +183,30 @@ pub fn of_class(
     let [lit, dark] = stacks;
     let places =
         [lit.map(|(flat, level)| (level.place, curve.signal(flat))), dark.map(|(_, level)| (level.place, 0.0))];
-    add_patterns(&mut add, &curve, stacks, &over_gain, confidence);
-    let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
-    add("dark_current_e_per_s", number(&per_second, if darks.is_empty() { no_darks() } else { few_times() }));
-    let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
-    let why = || if curve.is_offset_free { silent(&curve, no_darks()) } else { few_times() };
-    add("dark_current_from_variance_e_per_s", number(&from_variance, why()));
-    add("dark_current_doubling_k", doubling_temperature(all_darks, confidence));
+    add_patterns(&mut add, reasons, stacks, &over_gain, confidence);
     let is_hidden = darks.iter().any(|dark| curve.hides(Some(dark), confidence));
-    let parted = if is_hidden { Err(silent(&curve, no_darks())) } else { parted_pattern(darks, confidence) };
+    let parted = if is_hidden { Err(reasons.of_noise()) } else { parted_pattern(darks, confidence) };
+    let photosites: f64 = darks.iter().map(Level::count).fold(f64::INFINITY, f64::min);
+    // The photosites that there are are a sample of those of the camera.
+    let sampled = |current: Interval| match (&parted, &gain) {
+        (Ok([_, of_time]), Ok(gain)) => {
+            widened(current, of_time.value.max(0.0) / photosites / gain.value.powi(2), confidence)
+        }
+        _ => current,
+    };
+    let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
+    add("dark_current_e_per_s", number(&per_second, reasons.of_times()).map(sampled));
+    let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
+    let why = if curve.is_silent { reasons.of_noise() } else { reasons.of_times() };
+    add("dark_current_from_variance_e_per_s", number(&from_variance, why).map(sampled));
+    add("dark_current_doubling_k", doubling_temperature(all_darks, &scatter, rounding, confidence));
     let offset = parted.clone().map(|[offset, _]| offset);
     add("dsnu_offset_e", over_gain(offset));
     let slope = curve.interval(|values| values.dark_slope, confidence).filter(|slope| slope.low > 0.0);
     let uneven = parted.and_then(|[_, square]| {
-        let slope = slope.ok_or("the dark current is not told from none, nor is how it differs among photosites")?;
+        let slope = slope.ok_or(
+            "the dark current is not told from none, nor is how it differs among photosites: darks of longer exposure would tell",
+        )?;
         Ok(over(square.root(), slope))
     });
     add("dcnu", uneven);
@@ -225,9 +219,16 @@ pub fn of_class(
         clipped: flats[flat].at_ends[0],
         is_fitted: curve.fitted().contains(&flat),
     });
+    for finding in found.iter_mut().filter(|finding| finding.key.starts_with("saturation_")) {
+        finding.what = limit.saturation;
+    }
     let (curve_points, values) = (points.collect(), curve.values());
-    let notes = notes(&curve, flats);
-    let doubts = doubts(&curve, flats, confidence);
+    let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames), &limit);
+    let mut doubts = doubts(&curve, flats, confidence);
+    let by_levels = straight.as_ref().ok().and_then(|line| line.told.clone());
+    for (text, is_doubt) in scatter.told.iter().cloned().chain(curve.dark_told.clone()).chain(by_levels) {
+        if is_doubt { doubts.push(text) } else { notes.push(text) }
+    }
     let dark_point = |dark: &Level| DarkPoint {
         exposure_s: dark.condition.exposure_s,
         mean_adu: dark.mean,
@@ -243,15 +244,7 @@ pub fn of_class(
         stacks: places,
         notes,
         doubts,
-    }
-}
-
-/// Why temporal noise of darks is not parted.
-fn silent(curve: &Curve, otherwise: String) -> String {
-    if curve.is_silent && !curve.are_darks_clipped {
-        format!("darks have a temporal variance below {LEAST_VARIANCE} codes², which rounding hides")
-    } else {
-        otherwise
+        suspects: suspects(Some(&curve), flats, all_darks, &scatter),
     }
 }
 
@@ -296,6 +289,12 @@ pub const KEYS: [(&str, &str, &str); 31] = [
     ("dcnu", "dark current non-uniformity", ""),
 ];
 
+/// An interval of which the number has another error besides, a variance.
+fn widened(Interval { value, low, high }: Interval, variance: f64, confidence: f64) -> Interval {
+    let other = Interval::normal(0.0, variance, confidence);
+    Interval { value, low: value - (value - low).hypot(other.low), high: value + (high - value).hypot(other.high) }
+}
+
 /// An interval over another of which it is independent.
 fn over(of: Interval, by: Interval) -> Interval {
     let value = of.value / by.value;
@@ -305,19 +304,19 @@ fn over(of: Interval, by: Interval) -> Interval {
 }
 
 /// Saturation in electrons and in photons, and full well.
-fn saturation(curve: &Curve, flats: &[Level], gain: Found) -> [Found; 3] {
+fn saturation(reasons: Reasons, gain: Found, limit: &Limit) -> [Found; 3] {
+    let Reasons { curve, flats, .. } = reasons;
     let gain = match gain {
         Ok(gain) => gain,
         Err(why) => return [Err(why.clone()), Err(why.clone()), Err(why)],
     };
     let Some(peak) = curve.saturated else {
-        let why =
-            || lacking("the variance still rises at the brightest flat: brighter ones, until it falls, would tell");
-        return [Err(why()), Err(why()), Err(why())];
+        let why = || Err(UNSATURATED.into());
+        return [why(), why(), why()];
     };
     if !curve.knows_black(peak) {
-        let why = || lacking("the black level is not known: it takes two darks or more");
-        return [Err(why()), Err(why()), Err(why())];
+        let why = || Err(reasons.of_darks());
+        return [why(), why(), why()];
     }
     // The largest variance lies between the neighbors of the level that has it.
     let [below, above] = [peak.saturating_sub(1), (peak + 1).min(flats.len() - 1)];
@@ -328,50 +327,54 @@ fn saturation(curve: &Curve, flats: &[Level], gain: Found) -> [Found; 3] {
     let has_photons = [below, peak, above].into_iter().all(|flat| photons(flat).is_some());
     let in_photons = has_photons.then(|| bracket(&|flat| photons(flat).unwrap_or_default()));
     let brightest = flats.len() - 1;
-    let last = &flats[brightest];
-    let is_flat = last.variance < 0.02 * flats[peak].variance;
-    let full_well = if !is_flat {
-        Err(lacking("no flat is so bright that every photosite is full"))
-    } else if last.at_ends[0] > 0.5 {
-        let reached = curve.signal(brightest) / gain.value;
-        Err(format!("the converter ends first: it is no less than {reached:.0} e-"))
-    } else {
-        Ok(over(Interval::normal(curve.signal(brightest), curve.signal_variance(brightest), 0.95), gain))
+    let full_well = match limit.full_well(curve.signal(brightest) / gain.value) {
+        Ok(()) => Ok(over(Interval::normal(curve.signal(brightest), curve.signal_variance(brightest), 0.95), gain)),
+        Err(why) => Err(why),
     };
     [
         Ok(electrons),
-        in_photons.ok_or_else(|| lacking("the photons per photosite of the flats are not known")),
+        in_photons.ok_or_else(|| "the photons per photosite of the flats about saturation are not known".into()),
         full_well,
     ]
 }
 
 /// The deviations from a straight line, against photons, or against time where light was constant.
-fn straightness(curve: &Curve, flats: &[Level], confidence: f64) -> Result<Linearity, String> {
+fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<Linearity, String> {
+    let Reasons { curve, flats, .. } = reasons;
     let light = |level: &Level| level.condition.photons.or(level.condition.exposure_s);
-    let peak = curve.saturated.ok_or("the saturation is not known, from 5 to 95 % of which the line is fitted")?;
+    let peak = curve.saturated.ok_or(UNSATURATED)?;
+    if !curve.knows_black(peak) {
+        return Err(reasons.of_darks());
+    }
     let levels: Vec<Response> = flats
         .iter()
         .enumerate()
+        .filter(|(index, _)| curve.knows_black(*index))
         .filter_map(|(index, flat)| {
-            Some(Response { light: light(flat)?, signal: curve.signal(index), variance: curve.signal_variance(index) })
+            Some(Response {
+                light: light(flat)?,
+                signal: curve.signal(index),
+                variance: curve.variance_parts(index, scatter),
+                light_variance: scatter.of_light(flat),
+            })
         })
         .collect();
     let few = "it takes three flats or more between 5 and 95 % of saturation, of known photons or exposure times";
     linearity(&levels, curve.signal(peak), confidence).ok_or_else(|| few.into())
 }
 
-/// The flat and the dark that patterns are measured on: of the most frames; of such, the flat nearest to half of saturation, and
-/// the dark nearest to its exposure time.
+/// The flat and the dark that patterns are measured on: of the most frames, the flat below saturation at every photosite; of such, the
+/// flat nearest to half of saturation, and the dark nearest to its exposure time.
 fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<(usize, &'a Level)>; 2] {
     let half = curve.saturated.map_or_else(
         || curve.fitted().last().map_or(0.0, |&flat| curve.signal(flat)) / 2.0,
         |peak| curve.signal(peak) / 2.0,
     );
     let most = |levels: &[Level]| levels.iter().map(|level| level.frames).max();
-    let fitted = curve.fitted().iter().copied();
-    let frames = curve.fitted().iter().map(|&flat| flats[flat].frames).max();
+    let frames = curve.patterned().iter().map(|&flat| flats[flat].frames).max();
     let off = |flat: &usize| (curve.signal(*flat) - half).abs();
-    let flat = fitted.filter(|&flat| Some(flats[flat].frames) == frames).min_by(|a, b| off(a).total_cmp(&off(b)));
+    let with_most = curve.patterned().iter().copied().filter(|&flat| Some(flats[flat].frames) == frames);
+    let flat = with_most.min_by(|a, b| off(a).total_cmp(&off(b)));
     let time = |level: &Level| level.condition.exposure_s.unwrap_or(0.0);
     let wanted = flat.map_or(0.0, |flat| time(&flats[flat]));
     let apart = |dark: &(usize, &Level)| (time(dark.1) - wanted).abs();
@@ -381,22 +384,22 @@ fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<
 
 fn add_patterns(
     add: &mut impl FnMut(&'static str, Found),
-    curve: &Curve,
+    reasons: Reasons,
     [flat, dark]: [Option<(usize, &Level)>; 2],
     over_gain: &dyn Fn(Found) -> Found,
     confidence: f64,
 ) {
-    let no_darks = || lacking("it takes two darks or more");
+    let curve = reasons.curve;
     for (key, part) in
         [("prnu", Part::Total), ("prnu_row", Part::Row), ("prnu_column", Part::Column), ("prnu_pixel", Part::Pixel)]
     {
         let result = match (flat, dark) {
-            (Some((index, flat)), Some((_, dark))) => {
+            (Some((index, flat)), Some((_, dark))) if curve.knows_black(index) => {
                 let signal = curve.signal(index);
                 Ok(of_light(flat, dark, part, confidence).root().map(|spread| spread / signal))
             }
-            (None, _) => Err(lacking("it takes two flats or more below saturation")),
-            _ => Err(no_darks()),
+            (None, _) => Err("it takes two flats or more below saturation".into()),
+            _ => Err(reasons.of_darks()),
         };
         add(key, result);
     }
@@ -408,16 +411,23 @@ fn add_patterns(
     ] {
         let hidden = || curve.hides(dark.map(|(_, dark)| dark), confidence);
         let result = match dark {
-            Some(_) if hidden() => Err(silent(curve, no_darks())),
+            Some(_) if hidden() => Err(reasons.of_noise()),
             Some((_, dark)) => over_gain(Ok(fixed(dark, part, confidence))),
-            None => Err(no_darks()),
+            None => Err(reasons.of_darks()),
         };
         add(key, result);
     }
 }
 
-fn notes(curve: &Curve, flats: &[Level]) -> Vec<String> {
-    let mut notes = Vec::new();
+fn notes(curve: &Curve, flats: &[Level], frames: Option<usize>, limit: &Limit) -> Vec<String> {
+    let mut notes: Vec<String> = limit.told.iter().cloned().collect();
+    let most = flats.iter().map(|flat| flat.frames).max();
+    if let Some((frames, most)) = frames.zip(most).filter(|(frames, most)| frames < most) {
+        notes.push(format!(
+            "flats of {most} frames are too near saturation for patterns, which are measured on {frames}: histograms have more temporal \
+             noise of these"
+        ));
+    }
     if curve.is_offset_free {
         notes.push(
             "the variance of no light is that which the line through the flats has at no signal, as darks do not tell it".into(),

@@ -60,9 +60,18 @@ impl Level {
         }
     }
 
+    /// Mean of all photosites of a frame.
+    pub fn frame_mean(&self, frame: usize) -> f64 {
+        self.sites.iter().map(|site| site.frame_means[frame] * site.count() as f64).sum::<f64>() / self.count()
+    }
+
     /// Independent values that its variance is an average of.
     pub fn freedom(&self) -> f64 {
-        let count: usize = self.sites.iter().map(SiteSurvey::count).sum();
-        (self.frames as f64 - 1.0) * count as f64
+        (self.frames as f64 - 1.0) * self.count()
+    }
+
+    /// Photosites.
+    pub fn count(&self) -> f64 {
+        self.sites.iter().map(|site| site.count() as f64).sum()
     }
 }

@@ -22,12 +22,18 @@ pub struct SiteSurvey {
     pub variance_variance: f64,
     /// Samples at or above the top code, and at or below 0.
     pub at_ends: [u64; 2],
+    /// The largest sample, and how many are it, where no top code is known.
+    pub largest: Option<(f64, u64)>,
     /// Mean squares of the temporal noise.
     pub temporal: MeanSquares,
     /// Mean squares of the mean of the frames.
     pub spatial: MeanSquares,
+    /// Fourth cumulant of the mean of the frames at single photosites, 0 or more, by the differences of neighbors: half of theirs.
+    pub fourth: f64,
     /// Means of the frames.
     pub frame_means: Vec<f64>,
+    /// Two frames whose samples are the same, bit by bit, though they vary from photosite to photosite.
+    pub copies: Option<[usize; 2]>,
 }
 
 impl SiteSurvey {
@@ -43,6 +49,9 @@ pub struct Tally {
     frames: usize,
     top: f64,
     at_ends: [u64; 2],
+    /// Samples of the first frame that are not those of the photosite before them in the row.
+    uneven: u64,
+    largest: (f64, u64),
     /// About which ȳ is summed.
     center: f64,
     /// Σ y of each frame.
@@ -60,6 +69,8 @@ pub struct Tally {
     squares: f64,
     /// Σ a_k (ȳ − c) of each frame.
     products: Vec<f64>,
+    /// Σ d² and Σ d⁴, d the differences of ȳ between neighbors in a row.
+    steps: [f64; 2],
     /// Σ q and Σ q², q the sum of squares of a photosite about its row.
     within: [f64; 2],
     /// Samples of the row, `[frame][column]`, their means, and q.
@@ -80,6 +91,8 @@ impl Tally {
             frames,
             top: top.unwrap_or(f64::INFINITY),
             at_ends: [0; 2],
+            uneven: 0,
+            largest: (f64::NEG_INFINITY, 0),
             center: 0.0,
             frame_sums: vec![0.0; frames],
             row_squares: Vec::with_capacity(site.size[1]),
@@ -90,6 +103,7 @@ impl Tally {
             column_means: vec![0.0; columns],
             squares: 0.0,
             products: vec![0.0; frames],
+            steps: [0.0; 2],
             within: [0.0; 2],
             samples: vec![0.0; columns * frames],
             means: vec![0.0; columns],
@@ -134,6 +148,14 @@ impl Tally {
             self.at_ends[0] += at_top;
             self.at_ends[1] += at_bottom;
         }
+        if self.top == f64::INFINITY {
+            let largest = self.samples.iter().copied().fold(self.largest.0, f64::max);
+            let before = if largest > self.largest.0 { 0 } else { self.largest.1 };
+            let count: u64 = self.samples.iter().map(|sample| u64::from(*sample == largest)).sum();
+            self.largest = (largest, before + count);
+        }
+        let first = &self.samples[..columns];
+        self.uneven += first.iter().zip(&first[1..]).map(|(one, next)| u64::from(one != next)).sum::<u64>();
     }
 
     #[inline(always)]
@@ -151,6 +173,12 @@ impl Tally {
         }
         self.row_means.push(sum(&self.above));
         self.squares += dot(&self.above, &self.above);
+        for (squared, pair) in self.squared.iter_mut().zip(self.above.windows(2)) {
+            *squared = (pair[1] - pair[0]).powi(2);
+        }
+        let squared = &self.squared[..columns - 1];
+        let of_steps = [sum(squared), dot(squared, squared)];
+        self.steps.iter_mut().zip(of_steps).for_each(|(sum, of_row)| *sum += of_row);
         self.squared.fill(0.0);
         let (summed, times) = (self.summed(), self.times());
         let mut all = 0.0;
@@ -178,6 +206,32 @@ impl Tally {
         self.within[1] += times * times * dot(&self.squared, &self.squared);
     }
 
+    /// Fourth cumulant of single photosites: that of differences, m₄ − 3 m₂², is twice as large.
+    fn fourth(&self) -> f64 {
+        let steps = ((self.size[0] - 1) * self.size[1]) as f64;
+        let [second, fourth] = self.steps.map(|sum| sum / steps);
+        ((fourth - 3.0 * second * second) / 2.0).max(0.0)
+    }
+
+    /// Two frames whose samples are the same: then all rows and columns of both depart alike, and of two frames nothing departs at
+    /// all. Frames that are one value but for few photosites, as full ones and those of no noise, may well be the same.
+    fn copies(&self) -> Option<[usize; 2]> {
+        /// Of frames of noise more of the samples differ from the next.
+        const VARIED: f64 = 0.05;
+        if self.uneven as f64 <= VARIED * (self.size[0] * self.size[1]) as f64 {
+            return None;
+        }
+        if self.frames == 2 {
+            return self.row_squares.iter().all(|square| *square == 0.0).then_some([0, 1]);
+        }
+        let column = |frame: usize| &self.column_sums[frame * self.size[0]..][..self.size[0]];
+        let are_same = |[one, other]: &[usize; 2]| {
+            let of_rows = self.row_sums.chunks_exact(self.frames).all(|sums| sums[*one] == sums[*other]);
+            of_rows && column(*one) == column(*other)
+        };
+        (1..self.frames).flat_map(|other| (0..other).map(move |one| [one, other])).find(are_same)
+    }
+
     /// Gives the second of two frames what the first departed by, to the other side.
     fn complete(&mut self) {
         let times = self.times();
@@ -192,6 +246,7 @@ impl Tally {
 
     /// What the rows tell.
     pub fn finish(mut self) -> SiteSurvey {
+        let copies = self.copies();
         self.complete();
         let [columns, rows] = self.size.map(|extent| extent as f64);
         let n = rows * columns;
@@ -238,6 +293,9 @@ impl Tally {
             - spatial_sum * slopes.iter().map(|slope| slope * slope).sum::<f64>();
         let sums = SquareSums { all, rows: columns * by_rows, columns: rows * by_columns };
         let temporal = MeanSquares::of(sums, self.size, frames - 1.0);
+        let fourth = self.fourth();
+        let MeanSquares { rows: of_rows, columns: of_columns, rest } = MeanSquares::of(spatial, self.size, 1.0);
+        let [of_rows, of_columns, rest] = [of_rows, of_columns, rest].map(|square| square.with_tails(fourth, n));
         let variance = all.max(0.0) / ((frames - 1.0) * (n - 2.0));
         SiteSurvey {
             frames: self.frames,
@@ -247,9 +305,12 @@ impl Tally {
             variance,
             variance_variance: self.variance_variance(&drifts, n),
             at_ends: self.at_ends,
+            largest: (self.top == f64::INFINITY).then_some(self.largest),
             temporal,
-            spatial: MeanSquares::of(spatial, self.size, 1.0),
+            spatial: MeanSquares { rows: of_rows, columns: of_columns, rest },
+            fourth,
             frame_means: drifts.iter().map(|drift| mean + drift).collect(),
+            copies,
         }
     }
 

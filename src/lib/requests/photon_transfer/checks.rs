@@ -1,7 +1,7 @@
 //! What frames of a measurement must have in common, and what may be wrong with them.
 
 use super::conditions::{Group, Head};
-use crate::analysis::photon_transfer::Survey;
+use crate::analysis::photon_transfer::{LEAST_VARIANCE, SiteSurvey, Survey};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
@@ -158,6 +158,85 @@ pub fn doubt_of_codes(list: &str, head: &FrameHeader, groups: &[Group], surveys:
     shifted.into_iter().chain(ended).map(Note::Warning).collect()
 }
 
+/// The largest code by the brightest flats, of which most samples are one code that none is above, where noise of darks would spread
+/// those of photosites that are full; samples at it are counted then.
+pub fn end_of_codes(groups: &[Group], surveys: &mut [Survey]) -> Option<f64> {
+    /// Most samples.
+    const MOST: f64 = 0.5;
+    let is_lit = |place: &usize| groups[*place].condition.is_lit;
+    let noise = |survey: &Survey| survey.sites.iter().map(|site| site.variance).fold(0.0, f64::max);
+    let dark_noise =
+        (0..groups.len()).filter(|place| !is_lit(place)).map(|place| noise(&surveys[place])).fold(0.0, f64::max);
+    let lit = || (0..groups.len()).filter(is_lit).flat_map(|place| &surveys[place].sites);
+    let largest = lit().filter_map(|site| site.largest).map(|(largest, _)| largest).fold(f64::NEG_INFINITY, f64::max);
+    let is_most = |site: &SiteSurvey| {
+        let (own, count) = site.largest.unwrap_or_default();
+        own == largest && count as f64 > MOST * (site.count() * site.frames) as f64
+    };
+    if dark_noise < LEAST_VARIANCE || !lit().any(is_most) {
+        return None;
+    }
+    for site in surveys.iter_mut().flat_map(|survey| &mut survey.sites) {
+        site.at_ends[0] = site.largest.filter(|(own, _)| *own >= largest).map_or(0, |(_, count)| count);
+    }
+    Some(largest)
+}
+
+/// What is said where the largest code is not known, or taken from the brightest flats.
+pub fn doubt_of_end(list: &str, taken: Option<f64>) -> Note {
+    Note::Warning(match taken {
+        Some(largest) => format!(
+            "{list}: the largest code is not known; it is taken to be {largest}, which most samples of the brightest flats are, without \
+             the noise of darks; give --white if it is another"
+        ),
+        None => format!(
+            "{list}: the largest code is not known, so that clipped levels are told by their variance alone, and full photosites are not \
+             told from a converter that ends; give --white"
+        ),
+    })
+}
+
+/// Warnings of frames of one condition whose means are plainly not those of one: a flat that is little above black is not far off a dark
+/// by [`check_same_light`].
+pub fn doubt_of_frames(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
+    /// Of darks no black level moves by so many standard deviations of a sample.
+    const MUCH: f64 = 5.0;
+    /// By such a share of the light flats of one light do not differ.
+    const SHARE: f64 = 0.5;
+    /// Standard deviations of a mean that are far beyond chance.
+    const BEYOND: f64 = 10.0;
+    let dark = |site: usize| {
+        let darks = groups.iter().zip(surveys).filter(|(group, _)| !group.condition.is_lit);
+        darks.map(|(_, survey)| survey.sites[site].mean).fold(f64::INFINITY, f64::min)
+    };
+    let doubt = |(group, survey): (&Group, &Survey)| {
+        survey.sites.iter().enumerate().find_map(|(index, site)| {
+            let [low, high] = ends_of(&site.frame_means);
+            let [least, most] = [low, high].map(|frame| site.frame_means[frame]);
+            let light = Some(dark(index)).filter(|dark| dark.is_finite()).map_or(most, |dark| most - dark);
+            let noise = (site.mean_variance * site.frames as f64).sqrt();
+            let allowed = if group.condition.is_lit { SHARE * light } else { MUCH * site.variance.sqrt() };
+            let is_far = most - least > allowed.max(BEYOND * noise).max(1.0);
+            let [first, second] = [low, high].map(|frame| group.files[frame].display().to_string());
+            let what = if group.condition.is_lit { "flats of one light" } else { "darks of one exposure" };
+            is_far.then(|| {
+                Note::Warning(format!(
+                    "{first} and {second} are taken to be {what}, and their means are {least:.1} and {most:.1}: is the first a dark, the \
+                     second a flat, or are they of other times?"
+                ))
+            })
+        })
+    };
+    groups.iter().zip(surveys).filter_map(doubt).collect()
+}
+
+/// Places of the least and of the largest.
+fn ends_of(means: &[f64]) -> [usize; 2] {
+    let mut order: Vec<usize> = (0..means.len()).collect();
+    order.sort_by(|a, b| means[*a].total_cmp(&means[*b]));
+    [order[0], order[order.len() - 1]]
+}
+
 /// Frames of one light whose means differ by more than this share were taken under several.
 const SAME_LIGHT: f64 = 0.1;
 
@@ -178,8 +257,8 @@ pub fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Resul
         let (first, second) = (at(least).display(), at(most).display());
         return Err(Error::Data(if group.condition.is_lit {
             format!(
-                "{first} and {second} are taken to be of one light and exposure, and their means are {least:.4} and {most:.4}; tell \
-                 exposures apart in a list, by `exposure_s`, and levels of light by `photons` or `level`"
+                "{first} and {second} are taken to be of one light and exposure, and their means are {least:.4} and {most:.4}; one is \
+                 a dark, or a list tells exposures apart, by `exposure_s`, and levels of light by `photons` or `level`"
             )
         } else {
             format!(
@@ -189,4 +268,72 @@ pub fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Resul
         }));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::photon_transfer::{Condition, survey};
+    use crate::stream::MemoryFrame;
+    use crate::units::QuantityKind;
+    use std::path::PathBuf;
+
+    /// A dim flat among darks of its exposure time, and a dark among dim flats, are named; a black level that moves a little is not.
+    #[test]
+    fn frames_that_are_not_of_one_condition_are_named() {
+        let frame = |level: f32, seed: usize| {
+            let geometry = Geometry::new(16, 16, &["Y"]);
+            let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+            let noise = |place: usize| ((place * 7919 + seed * 104_729 + place * seed * 31) % 9) as f32;
+            MemoryFrame::new(header, (0..256).map(|place| level + noise(place)).collect())
+        };
+        let group = |is_lit: bool| Group {
+            condition: Condition { is_lit, ..Condition::default() },
+            level: String::new(),
+            files: ["a", "b", "c"].map(PathBuf::from).to_vec(),
+        };
+        let groups = [group(false), group(true)];
+        let of = |darks: [f32; 3], flats: [f32; 3]| {
+            let surveys = [darks, flats].map(|levels| {
+                let mut frames = [frame(levels[0], 1), frame(levels[1], 2), frame(levels[2], 3)];
+                survey(&mut frames, Some(4095.0), false).unwrap()
+            });
+            doubt_of_frames(&groups, &surveys).iter().map(|note| note.text().to_owned()).collect::<Vec<_>>()
+        };
+        assert_eq!(of([100.0, 100.0, 102.0], [160.0, 164.0, 158.0]), Vec::<String>::new());
+        let told = of([100.0, 150.0, 100.0], [200.0, 200.0, 200.0]);
+        assert!(told.len() == 1 && told[0].contains(" and b are taken to be darks of one exposure"), "{told:?}");
+        let told = of([100.0, 100.0, 100.0], [200.0, 200.0, 100.0]);
+        assert!(told.len() == 1 && told[0].starts_with("c and ") && told[0].contains("flats of one light"), "{told:?}");
+    }
+
+    /// Flats that pile up at one code, while darks are noisy, end the codes there, and samples at it count as clipped; flats of full
+    /// photosites, which are as noisy as darks, do not, nor do those beside darks without noise.
+    #[test]
+    fn the_largest_code_is_taken_from_flats_of_one_code() {
+        const SIDE: usize = 16;
+        let noise = |place: usize, frame: usize| ((place * 7919 + frame * 104_729 + place * frame * 31) % 9) as f32;
+        let of = |level: f32, scale: f32, end: f32| -> Survey {
+            let frame = |frame: usize| {
+                let geometry = Geometry::new(SIDE, SIDE, &["Y"]);
+                let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+                let sample = |place: usize| (level + scale * noise(place, frame)).min(end);
+                MemoryFrame::new(header, (0..SIDE * SIDE).map(sample).collect())
+            };
+            survey(&mut [frame(1), frame(2)], None, false).unwrap()
+        };
+        let group = |is_lit: bool| Group {
+            condition: Condition { is_lit, ..Condition::default() },
+            level: String::new(),
+            files: Vec::new(),
+        };
+        let groups = [group(false), group(true), group(true)];
+        let end_of = |surveys: &mut [Survey]| end_of_codes(&groups, surveys);
+        let mut ended = [of(10.0, 1.0, 255.0), of(100.0, 1.0, 255.0), of(254.0, 1.0, 255.0)];
+        assert_eq!(end_of(&mut ended), Some(255.0));
+        let at_end: Vec<u64> = ended.iter().map(|survey| survey.sites[0].at_ends[0]).collect();
+        assert!(at_end[..2] == [0, 0] && at_end[2] > 400, "{at_end:?}");
+        assert_eq!(end_of(&mut [of(10.0, 1.0, 255.0), of(100.0, 1.0, 255.0), of(200.0, 1.0, 255.0)]), None);
+        assert_eq!(end_of(&mut [of(10.0, 0.0, 255.0), of(100.0, 1.0, 255.0), of(254.0, 1.0, 255.0)]), None);
+    }
 }

@@ -23,6 +23,18 @@ pub struct Group {
     pub files: Vec<PathBuf>,
 }
 
+impl Group {
+    /// Its files, as messages call them.
+    pub fn named(&self) -> String {
+        let name = |file: &PathBuf| file.display().to_string();
+        match &self.files[..] {
+            [one, other] => format!("{} and {}", name(one), name(other)),
+            [one, others @ ..] if !others.is_empty() => format!("{} and {} more of its level", name(one), others.len()),
+            files => files.iter().map(name).collect(),
+        }
+    }
+}
+
 /// What a frame says of itself.
 pub struct Head {
     /// As it is described.

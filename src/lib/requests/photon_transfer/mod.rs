@@ -8,7 +8,7 @@ use super::notes::Note;
 use super::options::Selection;
 use super::values;
 use crate::analysis::photon_transfer::{
-    ClassFindings, Condition, Level, PatternView, Settings, Site, SiteSurvey, Survey, left_in_mean, of_class,
+    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, Suspect, left_in_mean, of_class,
     pattern_view, survey,
 };
 use crate::error::{Error, Result};
@@ -17,7 +17,10 @@ use crate::formats::many::OneOfMany;
 use crate::metadata::FrameHeader;
 use crate::text::counted;
 use crate::units::QuantityKind;
-use checks::{check_alike, check_apart, check_array, check_same_light, doubt_of_codes};
+use checks::{
+    check_alike, check_apart, check_array, check_same_light, doubt_of_codes, doubt_of_end, doubt_of_frames,
+    end_of_codes,
+};
 use clap::Args;
 use conditions::{Group, Reading, grouped, in_folder};
 use rayon::prelude::*;
@@ -102,18 +105,20 @@ impl PhotonTransfer {
         }
         let top = first.metadata.white_level_adu.map(|white| white.largest());
         let are_codes = first.metadata.quantity != QuantityKind::Electrons;
-        if top.is_none() && are_codes {
-            notes.push(Note::Warning(format!(
-                "{list_name}: the largest code is not known, so that clipped levels are told by their variance alone; give --white"
-            )));
-        }
         let stacks = stacks(&groups);
         let surveys = groups.par_iter().enumerate().with_max_len(1);
         let surveys = surveys.map(|(place, group)| survey_of(group, &read, top, stacks.contains(&place)));
         let mut surveys = surveys.collect::<Result<Vec<_>>>()?;
+        let mut largest = top;
+        if top.is_none() && are_codes {
+            largest = end_of_codes(&groups, &mut surveys);
+            notes.push(doubt_of_end(&list_name, largest));
+        }
         check_array(first, &groups, &surveys)?;
+        notes.extend(doubt_of_frames(&groups, &surveys));
         notes.extend(doubt_of_codes(&list_name, first, &groups, &surveys));
-        let settings = Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes };
+        let settings =
+            Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
         let temperature_k = main_temperature(&groups);
         let classes = classes(first, &groups, &surveys, temperature_k, &settings);
         for place in classes.iter().flat_map(|class| class.stacks).flatten().map(|(place, _)| place) {
@@ -122,6 +127,7 @@ impl PhotonTransfer {
             }
         }
         let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys, draws)).collect();
+        notes.extend(doubts_of_levels(&classes, &groups));
         notes.extend(classes.iter().flat_map(notes_of));
         let count = |is_lit: bool| {
             groups.iter().filter(|group| group.condition.is_lit == is_lit).map(|group| group.files.len()).sum()
@@ -162,6 +168,19 @@ impl PhotonTransfer {
     }
 }
 
+/// Warnings of frames that may not be what they are said to be, each level once.
+fn doubts_of_levels(classes: &[ClassFindings], groups: &[Group]) -> Vec<Note> {
+    let mut told: Vec<usize> = Vec::new();
+    let mut warnings = Vec::new();
+    for Suspect { place, problem } in classes.iter().flat_map(|class| &class.suspects) {
+        if !told.contains(place) {
+            told.push(*place);
+            warnings.push(Note::Warning(format!("{}: {problem}", groups[*place].named())));
+        }
+    }
+    warnings
+}
+
 /// What a careful user should know of what was found of a class.
 fn notes_of(class: &ClassFindings) -> Vec<Note> {
     let beyond = class.get("quantum_efficiency").filter(|efficiency| efficiency.low > 1.0).map(|efficiency| {
@@ -195,11 +214,9 @@ fn survey_of(group: &Group, read: &Reading, top: Option<f64>, keeps: bool) -> Re
         }
         check_same_light(group, &site.frame_means, top)?;
     }
-    let within = |mean: f64| mean > 0.0 && top.is_none_or(|top| mean < top);
-    let is_same = |site: &SiteSurvey| site.variance == 0.0 && within(site.mean) && site.spatial.rest.value > 0.0;
-    if found.sites.iter().all(is_same) {
+    if let Some([one, other]) = found.sites.iter().find_map(|site| site.copies) {
         let problem =
-            format!("{} and {}: their samples are the same", group.files[0].display(), group.files[1].display());
+            format!("{} and {}: their samples are the same", group.files[one].display(), group.files[other].display());
         return Err(Error::Data(problem + "; copies of one exposure do not count as two"));
     }
     Ok(found)

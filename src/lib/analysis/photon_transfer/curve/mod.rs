@@ -15,16 +15,18 @@ mod weights;
 use super::fit::{Line, Point};
 use super::level::Level;
 use super::pattern::{Part, fixed};
+use super::scatter::{Component, Scatter};
+use super::settings::Settings;
 use crate::numerics::variance_components::Interval;
 
-/// Variance of the error of rounding, in codes² [EMVA1288, Sec. 2.5].
-pub const ROUNDING: f64 = 1.0 / 12.0;
-/// Below this temporal variance in codes² rounding is not the even error of [`ROUNDING`] \[EMVA1288, Sec. 6.4].
+/// Below this temporal variance in codes² rounding is not the even error of [`Settings::rounding`] \[EMVA1288, Sec. 6.4].
 pub const LEAST_VARIANCE: f64 = 0.24;
 /// The fits end at this share of saturation [EMVA1288, Sec. 6.5].
 const HIGHEST: f64 = 0.7;
+/// Patterns under light are measured to this share of saturation: few photosites see a tenth more than the mean.
+const HIGHEST_PATTERN: f64 = 0.9;
 /// So many samples at an end, beyond those that darks have there, and what is measured of the others is no longer that of all.
-const FEW_AT_ENDS: f64 = 1e-5;
+pub const FEW_AT_ENDS: f64 = 1e-5;
 /// Exposure times that differ by less are one.
 const SAME_TIME: f64 = 1e-6;
 
@@ -42,17 +44,28 @@ struct Point4 {
     mean: Datum,
     variance: Datum,
     photons: Option<Datum>,
+    /// What its light is uncertain by, as frames scatter: a relative variance.
+    light_variance: f64,
     freedom: f64,
+    frames: f64,
+    /// What noise makes the mean scatter by.
+    noise: f64,
 }
 
 impl Point4 {
-    fn of(level: &Level) -> Self {
+    fn of(level: &Level, scatter: &Scatter, confidence: f64) -> Self {
+        let light_variance = scatter.of_light(level).known(confidence);
+        let of_photons = |value: f64| light_variance * value * value;
+        let of_black = scatter.of_black(level).known(confidence);
         Self {
             exposure_s: level.condition.exposure_s,
-            mean: Datum { value: level.mean, variance: level.mean_variance },
+            mean: Datum { value: level.mean, variance: level.mean_variance + of_black },
             variance: Datum { value: level.variance, variance: level.variance_variance },
-            photons: level.condition.photons.map(|value| Datum { value, variance: 0.0 }),
+            photons: level.condition.photons.map(|value| Datum { value, variance: of_photons(value) }),
+            light_variance,
             freedom: level.freedom(),
+            frames: level.frames as f64,
+            noise: level.mean_variance,
         }
     }
 }
@@ -76,6 +89,8 @@ pub struct Curve {
     beneath: Vec<Beneath>,
     /// Flats that the fits of gain and responsivity take.
     fitted: Vec<usize>,
+    /// Flats that patterns under light may be measured on.
+    patterned: Vec<usize>,
     /// The flat whose variance is the largest, where brighter ones have less.
     pub saturated: Option<usize>,
     /// Whether the variance of no light is left to the fit, as darks are silent beneath the rounding, clipped, or absent.
@@ -86,6 +101,12 @@ pub struct Curve {
     pub are_darks_clipped: bool,
     /// The share of the light that signals miss their line by, beyond what they scatter by: a standard deviation.
     pub light_error: f64,
+    /// What is to be said of darks whose means miss their line over time by more than they scatter, and whether it is a doubt.
+    pub dark_told: Option<(String, bool)>,
+    /// What means of darks miss that line by besides.
+    dark_besides: Component,
+    confidence: f64,
+    photon_error: f64,
     rounding: f64,
     weights: Weights,
 }
@@ -116,47 +137,51 @@ pub struct Values {
 }
 
 impl Curve {
-    /// Of flats in the order of their light, and darks of one temperature. `rounding` is the variance of the rounding error of
-    /// the samples. None where no gain follows.
-    pub fn of(flats: &[Level], darks: &[Level], rounding: f64, photon_error: f64) -> Option<Self> {
-        let are_darks_clipped = rounding > 0.0 && darks.iter().any(|dark| dark.at_ends[1] > FEW_AT_ENDS.max(1e-3));
+    /// Of flats in the order of their light, and darks of one temperature, whose frames scatter so beyond noise. None where no gain
+    /// follows.
+    pub fn of(flats: &[Level], darks: &[Level], scatter: &Scatter, settings: &Settings) -> Option<Self> {
+        let rounding = settings.rounding();
+        let point = |level: &Level| Point4::of(level, scatter, settings.confidence);
+        let are_darks_clipped = darks.iter().any(|dark| is_clipped(dark, rounding));
         let is_silent = rounding > 0.0 && darks.iter().all(|dark| dark.variance < LEAST_VARIANCE);
         let hot = darks.iter().map(|dark| dark.at_ends[0]).fold(0.0, f64::max);
         let mut curve = Self {
             beneath: Vec::new(),
-            flats: flats.iter().map(Point4::of).collect(),
-            darks: darks.iter().map(Point4::of).collect(),
+            flats: flats.iter().map(point).collect(),
+            darks: darks.iter().map(point).collect(),
             fitted: Vec::new(),
+            patterned: Vec::new(),
             saturated: peak(flats),
             is_offset_free: is_silent || are_darks_clipped,
             is_silent: is_silent && !darks.is_empty(),
             are_darks_clipped,
             light_error: 0.0,
+            dark_told: None,
+            dark_besides: Component::NONE,
+            confidence: settings.confidence,
+            photon_error: settings.photon_error,
             rounding,
             weights: Weights::default(),
         };
         curve.beneath = curve.flats.iter().map(|flat| curve.beneath(flat)).collect();
         let no_light = |index: usize| curve.no_light(index).map_or(0.0, |[mean, _]| mean);
-        let reach = curve.saturated.map_or(f64::INFINITY, |peak| HIGHEST * (flats[peak].mean - no_light(peak)));
-        curve.fitted = (0..flats.len())
-            .filter(|&index| {
+        let saturation = curve.saturated.map_or(f64::INFINITY, |peak| flats[peak].mean - no_light(peak));
+        let whole = |highest: f64| -> Vec<usize> {
+            let is_whole = |&index: &usize| {
                 let [at_top, at_bottom] = flats[index].at_ends;
                 let is_whole = at_top <= hot + FEW_AT_ENDS && (rounding <= 0.0 || at_bottom <= FEW_AT_ENDS);
                 let is_told = rounding <= 0.0 || flats[index].variance >= LEAST_VARIANCE;
-                is_whole && is_told && flats[index].mean - no_light(index) <= reach
-            })
-            .collect();
+                is_whole && is_told && flats[index].mean - no_light(index) <= highest * saturation
+            };
+            (0..flats.len()).filter(is_whole).collect()
+        };
+        (curve.fitted, curve.patterned) = (whole(HIGHEST), whole(HIGHEST_PATTERN));
         if !curve.is_offset_free && curve.fitted.iter().any(|&index| curve.beneath[index] == Beneath::Unknown) {
             curve.is_offset_free = true;
         }
         let needed = if curve.is_offset_free { 2 } else { 1 };
         if curve.fitted.len() < needed {
             return None;
-        }
-        for flat in &mut curve.flats {
-            if let Some(photons) = &mut flat.photons {
-                photons.variance = (photon_error * photons.value).powi(2);
-            }
         }
         curve.weigh();
         Some(curve)
@@ -165,6 +190,11 @@ impl Curve {
     /// The flats that gain and responsivity are fitted to, by their places.
     pub fn fitted(&self) -> &[usize] {
         &self.fitted
+    }
+
+    /// The flats that patterns under light may be measured on, by their places.
+    pub fn patterned(&self) -> &[usize] {
+        &self.patterned
     }
 
     fn beneath(&self, flat: &Point4) -> Beneath {
@@ -234,6 +264,11 @@ impl Curve {
     /// Whether the mean of no light beneath a flat is known.
     pub fn knows_black(&self, flat: usize) -> bool {
         self.no_light(flat).is_some()
+    }
+
+    /// Whether the temporal variance of darks is that of their noise.
+    pub fn tells_dark_noise(&self) -> bool {
+        !self.is_silent && !self.are_darks_clipped
     }
 
     /// Whether rounding hides what the pattern of a dark is, as temporal noise and pattern together do not spread codes enough, or
@@ -307,7 +342,7 @@ impl Curve {
             dark_slope: lines.map(|[mean, _]| mean.slope).filter(|_| has_darks),
             dark_variance_slope: lines
                 .map(|[_, variance]| variance.slope)
-                .filter(|_| has_darks && !self.is_offset_free),
+                .filter(|_| has_darks && self.tells_dark_noise()),
         })
     }
 
@@ -342,13 +377,56 @@ impl Curve {
             add(&mut moved, &|curve| Some(&mut curve.darks[dark].mean));
             add(&mut moved, &|curve| Some(&mut curve.darks[dark].variance));
         }
+        // All numbers of photons are off alike.
+        let ends = [-1.0, 1.0].map(|sign| {
+            let mut moved = self.clone();
+            let scale = 1.0 + sign * self.photon_error;
+            moved.flats.iter_mut().filter_map(|flat| flat.photons.as_mut()).for_each(|photons| photons.value *= scale);
+            moved.values().as_ref().and_then(&of).unwrap_or(value)
+        });
+        variance += ((ends[1] - ends[0]) / 2.0).powi(2);
         Some(Interval::normal(value, variance, confidence))
+    }
+
+    /// What the mean above no light scatters by: noise; black levels, whose frames scatter so; and what darks miss their line by.
+    pub fn variance_parts(&self, flat: usize, scatter: &Scatter) -> [Component; 3] {
+        let own = &self.flats[flat];
+        let share = 1.0 / own.frames;
+        let [noise, frames, levels] = match self.beneath[flat] {
+            Beneath::Dark(dark) => [self.darks[dark].noise, 1.0 / self.darks[dark].frames, 1.0],
+            Beneath::Lines => {
+                let count = self.darks.len() as f64;
+                let mean = |of: fn(&Point4) -> f64| self.darks.iter().map(of).sum::<f64>() / (count * count);
+                [mean(|dark| dark.noise), mean(|dark| 1.0 / dark.frames), 1.0 / count]
+            }
+            Beneath::Unknown => [0.0; 3],
+        };
+        let noise = Component { variance: own.noise + noise, ..Component::NONE };
+        [noise, scatter.black.times(share + frames), self.dark_besides.times(1.0 + levels)]
     }
 
     /// What the mean above no light scatters by, a variance.
     pub fn signal_variance(&self, flat: usize) -> f64 {
         self.flats[flat].mean.variance + self.scatter_beneath(flat)[0]
     }
+}
+
+/// Whether code 0 cuts off what is beneath a dark, of codes whose error of rounding has such a variance.
+pub fn is_clipped(dark: &Level, rounding: f64) -> bool {
+    /// Of so few samples means and variances are those of all.
+    const FEW: f64 = 1e-3;
+    rounding > 0.0 && dark.at_ends[1] > FEW
+}
+
+/// Flats of light that is well below saturation, so that their means follow it, by their places.
+pub fn below_saturation(flats: &[Level]) -> Vec<usize> {
+    /// Of the mean that saturates.
+    const SHARE: f64 = 0.95;
+    /// More samples than these at the largest code, and means do not follow the light.
+    const FEW: f64 = 1e-3;
+    let reach = peak(flats).map_or(f64::INFINITY, |peak| SHARE * flats[peak].mean);
+    let is_below = |flat: &usize| flats[*flat].at_ends[0] <= FEW && flats[*flat].mean <= reach;
+    (0..flats.len()).filter(is_below).collect()
 }
 
 /// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].

@@ -1,10 +1,9 @@
 //! What the levels of a curve count in its fits.
 
 use super::super::fit::{Line, Point, variance_besides};
+use super::super::scatter::{among, few};
 use super::{Curve, Datum, Point4, Weights};
-
-/// A quantile of Student's law over that of the normal, at 95 %, is 1 plus this over its degrees of freedom.
-const FEW_LEVELS: f64 = 1.21;
+use crate::numerics::significance;
 
 impl Curve {
     /// Weights, from the first fit on at its levels; what points miss their lines by is added to what they scatter by.
@@ -82,9 +81,14 @@ impl Curve {
                 Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
             };
             let largest = self.darks.iter().map(|dark| of(dark).value.powi(2)).fold(0.0, f64::max);
-            let besides = variance_besides(freedom, misfit, largest);
+            let found = among(freedom, misfit, largest);
+            let besides = found.known(self.confidence);
             if besides <= 0.0 {
                 continue;
+            }
+            if which == 0 {
+                self.dark_besides = found;
+                self.dark_told = off_line(misfit(0.0), freedom, found.variance);
             }
             for dark in &mut self.darks {
                 let datum = if which == 0 { &mut dark.mean } else { &mut dark.variance };
@@ -106,8 +110,9 @@ impl Curve {
         }
         let weights = |besides: f64, share: f64| -> Vec<f64> {
             let own = |&flat: &usize| {
-                let scatter = self.flats[flat].mean.variance + self.scatter_beneath(flat)[0];
-                scatter + besides + share * self.signal(flat).powi(2)
+                let (point, signal) = (&self.flats[flat], self.signal(flat));
+                let scatter = point.mean.variance + self.scatter_beneath(flat)[0];
+                scatter + besides + (share + point.light_variance) * signal.powi(2)
             };
             self.fitted.iter().map(|flat| 1.0 / own(flat).max(f64::MIN_POSITIVE)).collect()
         };
@@ -129,7 +134,7 @@ impl Curve {
         // What they miss it by is an error of the light: it tells nothing of the gain. It may be alike at all levels, or in proportion
         // to them, as that of a lamp that flickers; the larger counts, and it is known from few levels.
         let Some(line) = Line::through_zero(self.response_points()) else { return };
-        let few = (1.0 + FEW_LEVELS / freedom.max(1.0)).powi(2);
+        let few = few(freedom, self.confidence);
         for flat in 0..self.flats.len() {
             let signal = self.signal(flat);
             let missed = few * besides.max(share * signal * signal);
@@ -138,6 +143,22 @@ impl Curve {
             }
         }
     }
+}
+
+/// What is said of darks whose means miss their line over time, by such a variance besides their own scatter, if that is beyond
+/// chance.
+fn off_line(misfit: f64, freedom: f64, besides: f64) -> Option<(String, bool)> {
+    /// Less likely is beyond chance.
+    const LEVEL: f64 = 1e-4;
+    let is_beyond = misfit > freedom && significance::of_chi_square(misfit, freedom) < LEVEL;
+    is_beyond.then(|| {
+        let text = format!(
+            "means of darks miss their line over exposure time by {:.2e} ADU more than their frames scatter by: the black level moves \
+             between them, or exposure times are wrong; intervals of dark current, black level and linearity take that in",
+            besides.sqrt()
+        );
+        (text, true)
+    })
 }
 
 /// Relative variance of a variance, times its freedom, over several levels: 2 of normal noise.

@@ -1,0 +1,79 @@
+//! What saturates: photosites that are full, or the converter, which has no larger code.
+
+use super::curve::{Curve, LEAST_VARIANCE};
+use super::level::Level;
+use super::settings::Settings;
+
+/// Where flats end, and what ends there.
+#[derive(Debug, Clone)]
+pub struct Limit {
+    /// What a report calls the saturation capacity.
+    pub saturation: &'static str,
+    /// What is to be said of it.
+    pub told: Option<String>,
+    what: What,
+    /// Whether the brightest flat has no noise of light left.
+    is_reached: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum What {
+    Converter(f64),
+    Photosites,
+    /// Of so many codes, one or the other.
+    Either(f64),
+    Nothing,
+}
+
+impl Limit {
+    /// As the flats from the one of the largest variance on show it.
+    pub fn of(curve: &Curve, flats: &[Level], settings: &Settings) -> Self {
+        /// Samples at the largest code beyond these are no hot photosites.
+        const MANY: f64 = 0.01;
+        /// What light adds to the variance of the brightest flat is less than such a share of the most that it adds, where it adds none.
+        const FLAT: f64 = 0.02;
+        let named = |saturation, told: Option<String>, what, is_reached| Self { saturation, told, what, is_reached };
+        let (Some(peak), Some(last)) = (curve.saturated, flats.last()) else {
+            return named("saturation capacity", None, What::Nothing, false);
+        };
+        let is_reached = curve.noise(flats.len() - 1) < FLAT * curve.noise(peak);
+        if let Some(top) = settings.top.filter(|_| settings.are_codes && last.at_ends[0] > MANY) {
+            let told = format!(
+                "saturation is that of the converter, which ends at the code {top}: photosites may hold more, which a lower gain of the \
+                 camera would tell"
+            );
+            return named("saturation capacity, of the converter", Some(told), What::Converter(top), is_reached);
+        }
+        // Noise of the read-out is left where photosites are full, and none where the converter is.
+        let is_one_code = settings.are_codes && settings.top.is_none() && last.variance < LEAST_VARIANCE;
+        if is_one_code {
+            let told = format!(
+                "whether photosites or the converter end at {:.1} ADU is not known: the largest code, given by --white, would tell",
+                last.mean
+            );
+            return named("saturation capacity, of either", Some(told), What::Either(last.mean), is_reached);
+        }
+        let told = "saturation is that of the photosites, which are full below the largest code".to_owned();
+        let told = if settings.are_codes { told } else { "saturation is that of the photosites".to_owned() };
+        named("saturation capacity, of the photosites", Some(told), What::Photosites, is_reached)
+    }
+
+    /// Whether the brightest flat tells the full well; `reached_e` is its signal in electrons.
+    ///
+    /// # Errors
+    ///
+    /// What would tell it.
+    pub fn full_well(&self, reached_e: f64) -> Result<(), String> {
+        match self.what {
+            What::Converter(top) => {
+                Err(format!("the converter ends first, at the code {top}: it is no less than {reached_e:.0} e-"))
+            }
+            What::Either(mean) => Err(format!(
+                "photosites or the converter end at {mean:.1} ADU: it is no less than {reached_e:.0} e-, and the largest code, given by \
+                 --white, would tell which"
+            )),
+            What::Photosites if self.is_reached => Ok(()),
+            _ => Err("no flat is so bright that every photosite is full: flats of more light would tell".into()),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Why a number does not follow from the levels of a class, and which frames would tell it.
+
+use super::curve::{Curve, LEAST_VARIANCE};
+use super::level::Level;
+
+/// Of darks whose noise code 0 cuts off.
+pub const CLIPPED: &str =
+    "darks are clipped at code 0: it takes frames with the black level of the camera raised above their noise";
+/// Of flats no one of which is beyond saturation.
+pub const UNSATURATED: &str =
+    "the variance still rises at the brightest flat: brighter ones, until it falls, would tell";
+
+/// The levels that reasons are told of.
+#[derive(Clone, Copy)]
+pub struct Reasons<'a> {
+    /// The curve through them.
+    pub curve: &'a Curve,
+    /// Flats.
+    pub flats: &'a [Level],
+    /// Darks of the flats' temperature.
+    pub darks: &'a [Level],
+}
+
+impl Reasons<'_> {
+    /// Why darks do not tell what no light is.
+    pub fn of_darks(self) -> String {
+        if self.darks.is_empty() {
+            "it takes two darks or more".into()
+        } else if self.curve.are_darks_clipped {
+            CLIPPED.into()
+        } else {
+            "no dark is known to have the exposure time of the flats: it takes two of it, or darks at two exposure times or more, \
+             which `exposure_s` of a list tells"
+                .into()
+        }
+    }
+
+    /// Why temporal noise of darks, or the pattern beneath it, is not told.
+    pub fn of_noise(self) -> String {
+        let Self { curve, darks, .. } = self;
+        if darks.is_empty() || curve.are_darks_clipped {
+            self.of_darks()
+        } else if curve.is_silent {
+            format!(
+                "darks have a temporal variance below {LEAST_VARIANCE} codes², which rounding hides: it takes frames at a higher gain \
+                 of the camera"
+            )
+        } else {
+            "the temporal variance of darks is not told from that of rounding: it takes more darks, or frames at a higher gain of the \
+             camera"
+                .into()
+        }
+    }
+
+    /// Why darks do not tell what goes by time.
+    pub fn of_times(self) -> String {
+        match self.darks {
+            [_, ..] if self.curve.are_darks_clipped => CLIPPED.into(),
+            _ => "it takes darks at three exposure times or more".into(),
+        }
+    }
+
+    /// Why the response to photons is not told.
+    pub fn of_photons(self) -> String {
+        let is_counted = |flat: &Level| flat.condition.photons.is_some_and(|photons| photons > 0.0);
+        if !self.flats.iter().any(is_counted) {
+            "the photons per photosite of the flats are not known".into()
+        } else if self.curve.fitted().iter().any(|&flat| is_counted(&self.flats[flat])) {
+            self.of_darks()
+        } else {
+            "the photons per photosite of the flats well below saturation are not known".into()
+        }
+    }
+}
+
+/// Why no gain follows from flats.
+pub fn of_gain(flats: &[Level], rounding: f64) -> String {
+    let is_silent = |flat: &&Level| rounding > 0.0 && flat.variance < LEAST_VARIANCE && flat.at_ends[0] == 0.0;
+    let counts = [
+        (flats.iter().filter(|flat| flat.at_ends[0] > 0.0).count(), "reach the largest code"),
+        (flats.iter().filter(is_silent).count(), "have a variance that rounding hides"),
+    ];
+    let told: Vec<String> =
+        counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
+    let left_out = match &told[..] {
+        [] => String::new(),
+        told => format!(" (of {} levels of flats {})", flats.len(), told.join(", and ")),
+    };
+    format!(
+        "no gain follows: it takes two flats of one light below saturation, with darks of their exposure time, or flats at several \
+         levels{left_out}"
+    )
+}

@@ -1,0 +1,24 @@
+//! What is asked of a measurement, and what is said of its samples.
+
+/// Variance of the error of rounding, in codes² [EMVA1288, Sec. 2.5].
+const ROUNDING: f64 = 1.0 / 12.0;
+
+/// What is asked of the measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Probability that an interval holds its number.
+    pub confidence: f64,
+    /// Relative standard uncertainty of all numbers of photons together.
+    pub photon_error: f64,
+    /// Whether samples are codes, which are rounded.
+    pub are_codes: bool,
+    /// The largest code, where it is known.
+    pub top: Option<f64>,
+}
+
+impl Settings {
+    /// The variance of the error of rounding, in samples².
+    pub fn rounding(&self) -> f64 {
+        if self.are_codes { ROUNDING } else { 0.0 }
+    }
+}

@@ -1,0 +1,173 @@
+//! Levels that stand far off what all others show: a flat among the darks, a dark among the flats, an exposure time that is wrong.
+
+use super::curve::{Curve, below_saturation};
+use super::fit::{Line, Point};
+use super::level::Level;
+use super::scatter::Scatter;
+use crate::numerics::quantiles::of_student;
+use crate::numerics::significance;
+
+/// So many standard deviations off the others is plainly off.
+const BEYOND: f64 = 10.0;
+/// A level is told from so many others, which must agree.
+const OTHERS: usize = 3;
+
+/// A level that may not be what it is said to be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Suspect {
+    /// Its condition, by its place among all.
+    pub place: usize,
+    /// What is wrong with it.
+    pub problem: String,
+}
+
+/// Flats and darks of a class that stand far off the others.
+pub fn suspects(curve: Option<&Curve>, flats: &[Level], darks: &[Level], scatter: &Scatter) -> Vec<Suspect> {
+    let mut temperatures: Vec<Option<f64>> = Vec::new();
+    for dark in darks {
+        if !temperatures.contains(&dark.condition.temperature_k) {
+            temperatures.push(dark.condition.temperature_k);
+        }
+    }
+    let mut found: Vec<Suspect> = Vec::new();
+    for temperature in temperatures {
+        let own = || darks.iter().filter(|dark| dark.condition.temperature_k == temperature);
+        found.extend(off_line(&own().collect::<Vec<_>>(), scatter));
+        let is_of_it = |flat: &&Level| flat.condition.temperature_k.is_none_or(|kelvin| Some(kelvin) == temperature);
+        let flats = || flats.iter().filter(is_of_it);
+        let alone = |dark| full(dark).or_else(|| above_a_flat(dark, flats(), scatter));
+        for suspect in own().filter_map(alone) {
+            if !found.iter().any(|known| known.place == suspect.place) {
+                found.push(suspect);
+            }
+        }
+    }
+    found.extend(curve.into_iter().flat_map(|curve| off_response(curve, flats, scatter)));
+    found
+}
+
+/// What the mean of a level scatters by, a variance.
+fn variance(level: &Level, scatter: &Scatter) -> f64 {
+    level.mean_variance + scatter.of_black(level).variance
+}
+
+/// The dark that is farthest off the line of the others over time, where these are straight.
+fn off_line(darks: &[&Level], scatter: &Scatter) -> Option<Suspect> {
+    /// Codes, and a share of the dark signal, that are worth a word.
+    const LEAST: f64 = 1.0;
+    const SHARE: f64 = 0.1;
+    /// Points that miss their line so likely by chance are straight.
+    const BY_CHANCE: f64 = 1e-3;
+    /// What is as sure is beyond chance.
+    const SURE: f64 = 0.9999;
+    let timed: Vec<(&Level, f64)> = darks.iter().filter_map(|dark| Some((*dark, dark.condition.exposure_s?))).collect();
+    if timed.len() <= OTHERS {
+        return None;
+    }
+    // The scatter of frames is that of all, the one that is off too: of the others it is what they miss their line by.
+    let off = |(place, (dark, time)): (usize, &(&Level, f64))| {
+        let others: Vec<Point> = timed
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != place)
+            .map(|(_, (other, x))| Point {
+                x: *x,
+                y: other.mean,
+                weight: 1.0 / variance(other, scatter).max(f64::MIN_POSITIVE),
+            })
+            .collect();
+        let line = Line::through(others.clone())?;
+        let (misfit, freedom) = (line.chi_square(others.iter().copied()), others.len() as f64 - 2.0);
+        // Others that miss their line by more than they scatter tell the more of it the more there are: Student's law.
+        let is_straight = misfit <= freedom || significance::of_chi_square(misfit, freedom) > BY_CHANCE;
+        let reach = if is_straight { BEYOND } else { of_student(SURE, freedom) * (misfit / freedom).sqrt() };
+        let all: f64 = others.iter().map(|point| point.weight).sum();
+        let middle = others.iter().map(|point| point.weight * point.x).sum::<f64>() / all;
+        let spread: f64 = others.iter().map(|point| point.weight * (point.x - middle).powi(2)).sum();
+        let of_line = 1.0 / all + (time - middle).powi(2) / spread;
+        let missed = dark.mean - line.at(*time);
+        // Times that are a little off all make the longest miss most.
+        let least = LEAST.max(SHARE * (line.slope * time).abs());
+        let far = missed.abs() / (variance(dark, scatter) + of_line).sqrt() / reach.max(BEYOND);
+        Some((far.min(missed.abs() / least), missed, place))
+    };
+    let farthest = timed.iter().enumerate().filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, missed, place) = farthest.filter(|(far, ..)| *far > 1.0)?;
+    let (way, is_it) = if missed > 0.0 { ("above", "are they flats, or is") } else { ("below", "is") };
+    let problem = format!(
+        "their mean stands {:.1} ADU {way} the line of the other darks over time, far beyond chance: {is_it} their exposure time wrong?",
+        missed.abs()
+    );
+    Some(Suspect { place: timed[place].0.place, problem })
+}
+
+/// A dark most of whose samples are the largest code.
+fn full(dark: &Level) -> Option<Suspect> {
+    let problem = || "most of their samples are the largest code: are they flats?".to_owned();
+    (dark.at_ends[0] > 0.5).then(|| Suspect { place: dark.place, problem: problem() })
+}
+
+/// A dark whose mean is above that of a flat that was exposed as long or longer.
+fn above_a_flat<'a>(dark: &Level, flats: impl Iterator<Item = &'a Level>, scatter: &Scatter) -> Option<Suspect> {
+    /// Codes that are worth a word.
+    const LEAST: f64 = 1.0;
+    let is_as_long = |flat: &&Level| match (flat.condition.exposure_s, dark.condition.exposure_s) {
+        (Some(flat), Some(dark)) => flat >= dark,
+        (flat, dark) => flat == dark,
+    };
+    let is_below = |flat: &&Level| {
+        let by_chance = (variance(flat, scatter) + variance(dark, scatter)).sqrt();
+        dark.mean > flat.mean + (BEYOND * by_chance).max(LEAST)
+    };
+    let below = flats.filter(is_as_long).find(is_below)?;
+    let problem = format!(
+        "their mean, {:.1} ADU, is above that of flats that were exposed as long or longer, {:.1} ADU: are they flats, or these darks?",
+        dark.mean, below.mean
+    );
+    Some(Suspect { place: dark.place, problem })
+}
+
+/// Flats whose signal over light is far off that of the others, where these agree.
+fn off_response(curve: &Curve, flats: &[Level], scatter: &Scatter) -> Vec<Suspect> {
+    /// By so large a share, and one of the largest signal, is worth a word.
+    const SHARES: [f64; 2] = [0.1, 0.005];
+    /// The median of absolute deviations of a normal law, in standard deviations.
+    const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+    /// A signal below such a share of what it should be is none.
+    const NONE: f64 = 0.05;
+    let is_by_photons = flats.iter().all(|flat| flat.condition.photons.is_some());
+    let light = |flat: &Level| if is_by_photons { flat.condition.photons } else { flat.condition.exposure_s };
+    let known: Vec<(usize, f64)> = below_saturation(flats)
+        .into_iter()
+        .filter(|&flat| curve.knows_black(flat))
+        .filter_map(|flat| Some((flat, light(&flats[flat]).filter(|light| *light > 0.0)?)))
+        .collect();
+    let ratios: Vec<f64> = known.iter().map(|(flat, light)| curve.signal(*flat) / light).collect();
+    if ratios.len() <= OTHERS {
+        return Vec::new();
+    }
+    let middle = median(ratios.clone());
+    let spread = median(ratios.iter().map(|ratio| (ratio / middle - 1.0).abs()).collect()) / NORMAL_MEDIAN;
+    let largest = known.iter().map(|(flat, _)| curve.signal(*flat)).fold(0.0, f64::max);
+    let off = |&(flat, light): &(usize, f64)| {
+        let (signal, wanted) = (curve.signal(flat), middle * light);
+        let by_chance = (variance(&flats[flat], scatter) + (spread * wanted).powi(2)).sqrt();
+        let least = (BEYOND * by_chance).max(SHARES[0] * wanted).max(SHARES[1] * largest);
+        ((signal - wanted).abs() > least).then(|| {
+            let what = if is_by_photons { "number of photons" } else { "exposure time" };
+            let is_it = if signal < NONE * wanted { "are they darks, or is" } else { "is" };
+            let problem = format!(
+                "their signal is {signal:.1} ADU, where the other flats make {wanted:.1} of their {what}: {is_it} that wrong?"
+            );
+            Suspect { place: flats[flat].place, problem }
+        })
+    };
+    let found: Vec<Suspect> = known.iter().filter_map(off).collect();
+    // Where many are off, no one is: the response is not straight, or light was not counted so.
+    if middle > 0.0 && found.len() * OTHERS < known.len() { found } else { Vec::new() }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
