@@ -5,7 +5,6 @@ use super::notes::Note;
 use super::options::{Output, WhiteChoice};
 use super::values::{self, LightColor};
 use crate::analysis::characterization::CameraMatrix;
-use crate::camera::optics::Exposure;
 use crate::color::adaptation::Adaptation;
 use crate::color::temperature::Locus;
 use crate::color::{self, Space, White, rows_of};
@@ -100,8 +99,7 @@ impl Conversion {
         }
         let Self { exposure_s, f_number, lens_transmittance, .. } = *self;
         SaidExposure { exposure_s, f_number, lens_transmittance }.apply(frame)?;
-        let long = frame.metadata.exposure.and_then(Exposure::doubt).filter(|_| self.exposure_s.is_some());
-        let mut notes: Vec<Note> = long.map(Note::Warning).into_iter().collect();
+        let mut notes = Vec::new();
         let matrix = match matrix {
             Some(matrix) => matrix,
             None => {

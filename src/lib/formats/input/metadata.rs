@@ -1,5 +1,6 @@
 //! The metadata of a frame: where they are found, and what in them is doubtful.
 
+use crate::camera::optics::doubt_of_time;
 use crate::error::{Error, Result};
 use crate::formats::files::{read_file, sidecar_path};
 use crate::formats::format::SampleReader;
@@ -60,13 +61,16 @@ fn most_trusted(reader: &dyn SampleReader, name: &str, path: Option<&Path>, give
         let metadata = from_file(path)?;
         let shown = path.display().to_string();
         yaml::check_misspelt(&shown, &metadata)?;
-        doubt_of_metadata(&shown, metadata.contradictions());
+        // Ours were looked at when they were written, and a user may have changed them since.
+        let doubts = if metadata.history.is_empty() { Vec::new() } else { metadata.doubts() };
+        doubt_of_metadata(&shown, doubts.into_iter().chain(time_alone(&metadata)).chain(metadata.contradictions()));
         return Ok(Found { metadata, sidecar: None, place: FoundIn::Given(shown) });
     }
     if let Some(sidecar) = path.map(sidecar_path).filter(|sidecar| sidecar.is_file()) {
         let (metadata, shown) = (from_file(&sidecar)?, sidecar.display().to_string());
         // Another version may have written it: what is unknown is kept.
-        doubt_of_metadata(&shown, yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()));
+        let doubts = yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()).chain(time_alone(&metadata));
+        doubt_of_metadata(&shown, doubts.chain(changed_since(&metadata, reader)));
         return Ok(Found { metadata, sidecar: Some(shown.clone()), place: FoundIn::Sidecar(shown) });
     }
     if let Some(text) = reader.embedded() {
@@ -121,6 +125,25 @@ pub(super) fn placed(
              changed one of the two; {advice}"
         ),
     ))
+}
+
+/// A warning of a time without an f-number that looks like another unit. Keywords and tags are in s by their standards.
+fn time_alone(metadata: &Metadata) -> Option<String> {
+    metadata.exposure_time_s.and_then(doubt_of_time)
+}
+
+/// Warnings of what a sidecar says otherwise than the metadata that our program wrote into the frame's file: it was changed since.
+fn changed_since(sidecar: &Metadata, reader: &dyn SampleReader) -> Vec<String> {
+    let own = reader.embedded().and_then(|text| yaml::parse_metadata("", text).ok());
+    let Some(own) = own.filter(|own| !own.history.is_empty()) else { return Vec::new() };
+    let exposure = |metadata: &Metadata| metadata.exposure.map(|told| [told.exposure_s, told.f_number]);
+    let [told, written] = [exposure(sidecar), exposure(&own)];
+    let parts = told.zip(written).into_iter().flat_map(|(told, written)| {
+        let named = ["exposure time in s", "f-number"].into_iter().zip(told.into_iter().zip(written));
+        named.filter(|(_, (told, written))| told != written).collect::<Vec<_>>()
+    });
+    let said = |(what, (told, written))| format!("its {what} is {told}, but {written} in the file of the frame; the sidecar counts");
+    parts.map(said).collect()
 }
 
 /// Warnings of what a file of metadata says.

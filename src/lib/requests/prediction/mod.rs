@@ -279,13 +279,12 @@ impl NoisePrediction {
         let observer = data::load_observer()?;
         let signals = signals(&library, &loaded.sensor, loaded.response()?, &observer, &WavelengthGrid::default())?;
         let base = self.exposure.chosen()?;
-        let long = base.doubt().filter(|_| self.level.expose_to.is_none());
         let exposing = match self.level.expose_to {
             Some(fraction) => SampleExposure::Filled { base, fraction, by: Filling::Time },
             None => SampleExposure::Fixed(base),
         };
         let mut notes: Vec<Note> =
-            warnings.into_iter().map(Note::Warning).chain(doubts).chain(long.map(Note::Warning)).collect();
+            warnings.into_iter().map(Note::Warning).chain(doubts).chain(base.doubts().map(Note::Warning)).collect();
         let color = self.color(&loaded.sensor, &mut notes)?;
         let one = |sample: usize| -> Result<SamplePrediction> {
             let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;
