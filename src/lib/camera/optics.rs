@@ -23,9 +23,8 @@ pub fn doubt_of_time(time_s: f64) -> Option<String> {
 
 /// A warning of an f-number that looks as if it were in thousandths.
 pub fn doubt_of_aperture(f_number: f64) -> Option<String> {
-    (f_number >= MOST_F_NUMBER).then(|| {
-        format!("an f-number of {f_number} is that of no lens; in thousandths it is {}", f_number / 1000.0)
-    })
+    (f_number >= MOST_F_NUMBER)
+        .then(|| format!("an f-number of {f_number} is that of no lens; in thousandths it is {}", f_number / 1000.0))
 }
 
 /// A warning of a focal length that looks as if it were in m or µm.
@@ -35,7 +34,9 @@ pub fn doubt_of_focal_length(focal_length_mm: f64) -> Option<String> {
         long if long >= MOST_FOCAL_LENGTH_MM => ("um", long / 1000.0),
         _ => return None,
     };
-    Some(format!("a focal length of {focal_length_mm} mm is that of few lenses; {focal_length_mm} {unit} is {meant} mm"))
+    Some(format!(
+        "a focal length of {focal_length_mm} mm is that of few lenses; {focal_length_mm} {unit} is {meant} mm"
+    ))
 }
 
 /// Exposure time and lens setting.

@@ -6,9 +6,11 @@
 
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
 use super::delimited;
+use super::factors::doubt_of_factor;
 use super::foreign::csv_complaint;
 use super::misread::{self, LONGEST_NM, is_units};
 use super::radiance_unit::{self, FileSays};
+use super::register;
 use crate::error::{Error, Result};
 use crate::names::place_of;
 use crate::spectrum::{Curve, SHORTEST_NM, check_wavelengths};
@@ -127,6 +129,7 @@ impl SpectralTable {
             (numbers.column(0).to_vec(), columns, values.t().to_owned())
         };
         let comments = Comments::of(&text.decoded);
+        doubt_of_factor(&text.decoded).into_iter().for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
         let headings = headings(&columns, units.as_ref(), by_rows.then_some(&first[0]));
         let is_of_radiance = |cell: &str| {
             let unknown = |stated: &Stated| matches!(stated, Stated::Other { kind: OtherUnit::Unknown, .. });

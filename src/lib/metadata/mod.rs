@@ -4,6 +4,7 @@ mod converter;
 mod correction;
 mod difference;
 mod header;
+mod levels;
 mod records;
 
 pub use converter::AdcRecord;

@@ -224,6 +224,11 @@ impl Conversion {
             let text = format!("{shown} was fitted for the sensor {of_matrix}, but the frame comes from {of_frame}");
             notes.push(Note::Warning(text));
         }
+        let sensor = frame.metadata.sensor.as_ref();
+        if let Some((file, doubt)) = self.matrix.as_ref().zip(sensor.and_then(|sensor| matrix.doubt_of_sensor(sensor)))
+        {
+            notes.push(Note::Warning(format!("{} {doubt}", file.display())));
+        }
         if let Some(doubt) = matrix.doubt_of_gain(frame.metadata.adu_per_e()) {
             let shown =
                 self.matrix.as_ref().map_or("the matrix of its sensor".into(), |file| file.display().to_string());

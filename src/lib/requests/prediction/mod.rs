@@ -366,8 +366,8 @@ impl NoisePrediction {
             notes.push(Note::Warning(text));
         }
         let adu_per_e = sensor.readout.as_ref().map(|readout| readout.adu_per_e);
-        let doubt = matrix.doubt_of_gain(adu_per_e).map(|doubt| format!("{} {doubt}", path.display()));
-        notes.extend(doubt.map(Note::Warning));
+        let doubts = matrix.doubt_of_sensor(sensor).into_iter().chain(matrix.doubt_of_gain(adu_per_e));
+        notes.extend(doubts.map(|doubt| Note::Warning(format!("{} {doubt}", path.display()))));
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
         Ok(Some(ColorSettings {
             is_relative: matrix.is_relative(),
