@@ -68,7 +68,7 @@ fn exposures_and_lenses_in_other_units_are_told_by_whatever_way_they_come() {
 #[test]
 fn a_white_level_that_the_converter_tells_is_not_forgotten() {
     let shop = Workshop::new();
-    shop.pipe("render-radiance --electrons 100000,100,100 --size 16x12 --cfa rggb --quiet | add-noise | digitize -o bright.exr --quiet");
+    shop.pipe("render-radiance --electrons 100000,100,100 --size 16x12 --cfa rggb --quiet | add-noise --quiet | digitize -o bright.exr --quiet");
     let told = "48 samples are saturated";
     assert!(shop.said("measure bright.exr", 0).contains(told));
     // White is told by the sidecar that counts, and by that alone.
@@ -255,7 +255,7 @@ fn darks_whose_bias_was_subtracted_are_told() {
 fn saturation_that_nothing_marks_is_told_by_the_share_of_its_law() {
     let shop = Workshop::new();
     shop.run("fit-matrix sky912.exr -o m.yaml", &[]);
-    shop.pipe("render-radiance --electrons 9000,15000,39000 --size 64x48 --cfa rggb --quiet | add-noise | digitize -o lit.exr --quiet");
+    shop.pipe("render-radiance --electrons 9000,15000,39000 --size 64x48 --cfa rggb --quiet | add-noise --quiet | digitize -o lit.exr --quiet");
     shop.pipe("demosaic lit.exr -o rgb.exr --quiet");
     shop.pipe("to-xyz rgb.exr --matrix m.yaml -o xyz.exr --quiet");
     for (name, whole) in [("rgb", "rgb.exr"), ("xyz", "xyz.exr")] {
