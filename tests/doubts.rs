@@ -189,7 +189,8 @@ fn samples_that_were_scaled_or_shifted_elsewhere_are_refused() {
     shop.run("correct-frame lit.exr --dark dark.exr -o less.exr --quiet", &[]);
     shop.run("demosaic lit.exr -o rgb.exr", &[]);
     shop.run("demosaic lit.exr --method shti -o hue.exr", &[]);
-    for honest in ["dark", "lit", "corrected", "less", "rgb", "hue"] {
+    shop.pipe("render-radiance --electrons 9000,15000,12000 --size 64x48 --cfa rggb | add-noise --frames 2..5 | digitize | average-frames -o mean.exr");
+    for honest in ["dark", "lit", "corrected", "less", "rgb", "hue", "mean"] {
         shop.run(&format!("measure {honest}.exr"), &[]);
     }
     let below = "by the bias and the noise of its metadata no frame averages below";
@@ -201,6 +202,8 @@ fn samples_that_were_scaled_or_shifted_elsewhere_are_refused() {
         ("corrected", 1.0, -1753.0, below),
         ("corrected", 16.0, 0.0, beyond),
         ("less", 16.0, 0.0, beyond),
+        ("mean", 16.0, 0.0, beyond),
+        ("mean", 0.5, 0.0, below),
         ("rgb", 16.0, 0.0, beyond),
         ("rgb", 1.0, -1753.0, below),
         ("hue", 16.0, 0.0, beyond),
@@ -398,4 +401,48 @@ fn places_tags_comments_and_attributes_that_contradict_are_told() {
     fs::write(shop.path("t.csv"), table).unwrap();
     let said = shop.said("render-radiance t.csv --size 8x6 -o a.exr", 0);
     assert!(said.contains("its comment `scale factor 1e-3` tells of a factor, and none is applied"), "{said}");
+}
+
+/// Replaces bytes of a file by as many others.
+#[track_caller]
+fn patch(shop: &Workshop, file: &str, to: &str, changes: &[(&[u8], &[u8])]) {
+    let mut bytes = shop.bytes(file);
+    for (from, other) in changes {
+        assert_eq!(from.len(), other.len());
+        let at = bytes.windows(from.len()).position(|window| window == *from).unwrap();
+        bytes[at..at + other.len()].copy_from_slice(other);
+    }
+    fs::write(shop.path(to), bytes).unwrap();
+}
+
+/// Another program's attributes: a time that is not that of our metadata, and the luminance of the white of a picture.
+#[test]
+fn attributes_of_files_are_heard() {
+    let shop = codes();
+    let [from, other] = [0.033_f32, 0.5].map(|time| [b"expTime\0float\0\x04\0\0\0", &time.to_le_bytes()[..]].concat());
+    patch(&shop, "plane.exr", "timed.exr", &[(&from, &other)]);
+    let said = shop.said("measure timed.exr", 0);
+    assert!(
+        said.contains(
+            "timed.exr: its exposure time in s is 0.033, but 0.5 by the tags of the file, which do not count"
+        ),
+        "{said}"
+    );
+    shop.run("fit-matrix sky912.exr -o m.yaml", &[]);
+    shop.run("demosaic plane.exr -o rgb.exr", &[]);
+    shop.run("to-xyz rgb.exr --matrix m.yaml -o xyz.exr", &[]);
+    let [from, other] =
+        [1.0_f32, 200.0].map(|white| [b"whiteLuminance\0float\0\x04\0\0\0", &white.to_le_bytes()[..]].concat());
+    let names: [(&[u8], &[u8]); 2] = [(b"chromaticities\0", b"chromaticitiez\0"), (b"cyanometer\0", b"cyanometeR\0")];
+    patch(&shop, "xyz.exr", "picture.exr", &[(&from, &other), names[0], names[1]]);
+    let told = "its white has 200 cd/m2 by its whiteLuminance";
+    let said = shop.said("render-radiance picture.exr --expose-to 0.5 -v -o a.exr", 0);
+    assert!(said.contains(told), "{said}");
+    let said = shop.said("render-radiance picture.exr --luminance 1000 --expose-to 0.5 -o a.exr", 0);
+    assert!(
+        said.contains(
+            "its white has 200 cd/m2 by its own attribute (whiteLuminance), and 1000 by --luminance, which counts"
+        ),
+        "{said}"
+    );
 }

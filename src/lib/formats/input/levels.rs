@@ -76,7 +76,7 @@ impl LevelCheck {
             None if knows_noise => Least::Unknown,
             None => black().map_or(Least::Unknown, |(black, [_, most])| Least::Black(black, most)),
         };
-        let is_made = metadata.correction.is_some() || measured.is_some();
+        let is_made = metadata.correction.is_some() || measured.is_some() || metadata.average.is_some();
         let white = metadata.white_level_adu.filter(|_| is_made).map(|white| white.largest()).zip(off);
         let by_white = white.map(|(white, [least, most])| [f64::NEG_INFINITY, OF_ONE_SCALE * (white + most) - least]);
         let samples = bounds.map(|bounds| bounds.samples).filter(|_| is_made).or(by_white);
