@@ -202,15 +202,15 @@ pub(super) fn check_size(name: &str, text: &str) -> Result<()> {
         let cells = b",;\t".map(parted_by).into_iter().fold(blanks, usize::max);
         all += cells + 1;
         widest = widest.max(cells);
-        if all >= MAX_CELLS || widest >= MAX_COLUMNS {
+        if all >= MAX_CELLS {
             break;
         }
     }
     let refuse =
         |most: usize, what: &str| Err(Error::format(name, format!("it has more than {most} {what}; no table has")));
     match () {
-        () if widest >= MAX_COLUMNS => refuse(MAX_COLUMNS, "columns"),
         () if all >= MAX_CELLS => refuse(MAX_CELLS, "numbers"),
+        () if widest >= MAX_COLUMNS => refuse(MAX_COLUMNS, "columns"),
         () if empty > MAX_EMPTY => refuse(MAX_EMPTY, "empty lines"),
         () => Ok(()),
     }
