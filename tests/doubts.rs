@@ -273,7 +273,7 @@ fn saturation_that_nothing_marks_is_told_by_the_share_of_its_law() {
             ("measure bare.exr", 0),
             ("measure bare.exr --check", BAD_DATA),
             ("preview bare.exr -o a.png", 0),
-            ("color-difference bare.exr bare.exr", 0),
+            ("color-difference bare.exr bare.exr", if name == "xyz" { 0 } else { BAD_DATA }),
         ] {
             let said = shop.said(line, status);
             assert!(said.contains(told), "{name}: {line}: {said}");

@@ -1,6 +1,5 @@
 //! Whether samples are those that metadata describe.
 
-use super::FrameReader;
 use crate::formats::digest::SamplesDigest;
 use crate::formats::register;
 
@@ -12,16 +11,16 @@ pub(super) struct DigestCheck {
     pub digest: SamplesDigest,
 }
 
-impl FrameReader {
-    /// Compares the digest, once the last row is in.
-    pub(super) fn check_digest(&mut self) {
-        let Some(DigestCheck { expected, sidecar, digest }) = self.check.take() else { return };
-        if digest.finish() != expected {
-            let name = &self.header.name;
-            let by = sidecar.as_deref().unwrap_or("its digest");
-            let text = format!("{name}: its samples are not those that {by} describes; one of the two was changed");
-            sidecar.is_some().then(|| register::doubt(text.clone()));
-            self.mismatch = Some(text);
+impl DigestCheck {
+    /// A warning of samples of the frame `name` that are others, once all are in; it is registered where a sidecar is wrong then.
+    pub(super) fn end(self, name: &str) -> Option<String> {
+        let Self { expected, sidecar, digest } = self;
+        if digest.finish() == expected {
+            return None;
         }
+        let by = sidecar.as_deref().unwrap_or("its digest");
+        let text = format!("{name}: its samples are not those that {by} describes; one of the two was changed");
+        sidecar.is_some().then(|| register::doubt(text.clone()));
+        Some(text)
     }
 }

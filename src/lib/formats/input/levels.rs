@@ -1,7 +1,6 @@
 //! Samples whose level cannot be: their mean lies below what no light reads, or, once something came off them or they were
 //! demosaicked, one of them beyond what codes can become. Another program has scaled or shifted them, or their metadata are wrong.
 
-use super::FrameReader;
 use crate::camera::levels::{BlackLevel, BlackLevels, OF_ONE_SCALE, RowBlack};
 use crate::cfa::CfaPattern;
 use crate::error::{Error, Result};
@@ -200,13 +199,6 @@ fn tell(has_doubted: &mut bool, refuses: bool, name: &str, problem: &str) -> Res
         register::doubt(format!("{name}: {problem}; one of the two is on another scale, or black came off already"));
     }
     Ok(())
-}
-
-impl FrameReader {
-    /// Takes a black level that a user says for what no light reads, where metadata tell none: a frame far below it is told.
-    pub fn expect_black(&mut self, black: BlackLevel) {
-        self.said_black = Some(black).filter(|_| self.header.metadata.black_level_adu.is_none());
-    }
 }
 
 /// Finite samples of the even and the odd columns of a line.

@@ -273,6 +273,11 @@ impl FrameReader {
         Ok(())
     }
 
+    /// Takes a black level that a user says for what no light reads, where metadata tell none: a frame far below it is told.
+    pub fn expect_black(&mut self, black: BlackLevel) {
+        self.said_black = Some(black).filter(|_| self.header.metadata.black_level_adu.is_none());
+    }
+
     /// How the file stores its samples, in a word: `u16`, `f32` …; `mixed` where channels differ.
     pub fn stored_as(&self) -> &'static str {
         self.reader.stored_as().map_or("mixed", SampleType::name)
@@ -407,7 +412,9 @@ impl FrameReader {
             None if below == 0 => self.reader.rest()?.end(&self.header.name)?,
             None => {}
         }
-        self.check_digest();
+        if let Some(check) = self.check.take() {
+            self.mismatch = check.end(&self.header.name);
+        }
         self.levels.as_mut().map_or(Ok(()), |levels| levels.end(&self.header))
     }
 }
