@@ -111,20 +111,11 @@ fn measure_all(
         Some(portrait) => tallies(&mut sitting(&mut watch, portrait), regions, &levels)?,
         None => tallies(&mut watch, regions, &levels)?,
     };
-    let untold = watch.untold();
+    let watched = watch.untold();
     let (counts, left_out) = watch.seen();
     if level.is_some() {
         check_testable(&frame)?;
-    }
-    let found = counts.iter().map(|marks| marks.saturated).find(|count| *count > 0);
-    if let (Some(_), true, Some(pixels)) = (level, left_out, found) {
-        return Err(unfair(
-            &frame,
-            &format!("{pixels} pixels used saturated samples; without them the others are no fair sample"),
-        ));
-    }
-    if let (Some(_), true, Some(pixels)) = (level, saturated == Saturated::LeftOut, &untold) {
-        return Err(unfair(&frame, &format!("{pixels}, and nothing marks which")));
+        check_unmarked(&frame, (&counts, left_out), watched.filter(|_| saturated == Saturated::LeftOut))?;
     }
     let is_fair = |marks: &Marks| marks.beyond_model + if left_out { marks.saturated } else { 0 } == 0;
     if !is_fair(&counts[0]) {
@@ -157,6 +148,19 @@ fn measure_all(
         report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted.as_deref())?);
     }
     Ok((report, portrait))
+}
+
+/// Makes sure that no pixel was left out for its value, or should be: `untold` says how many, where nothing marks which.
+fn check_unmarked(frame: &FrameHeader, (counts, left_out): (&[Marks], bool), untold: Option<String>) -> Result<()> {
+    let marked = counts.iter().map(|marks| marks.saturated).find(|count| *count > 0).filter(|_| left_out);
+    let why = match (marked, untold) {
+        (Some(pixels), _) => {
+            format!("{pixels} pixels used saturated samples; without them the others are no fair sample")
+        }
+        (None, Some(pixels)) => format!("{pixels}, and nothing marks which"),
+        (None, None) => return Ok(()),
+    };
+    Err(unfair(frame, &why))
 }
 
 /// Refuses to check a frame of which pixels are left out for their values, or should be.
