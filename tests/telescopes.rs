@@ -284,3 +284,20 @@ fn codes_that_another_program_scaled_are_no_codes() {
     let refused = shop.said("demosaic scaled.exr -o out.exr", BAD_DATA);
     assert!(refused.contains("but its white level is 4095 ADU, by its metadata"), "{refused}");
 }
+
+#[test]
+fn units_that_are_no_codes_are_refused_unless_metadata_say_so() {
+    let shop = Workshop::new();
+    for unit in ["'adu/s'", "'MJy/sr'"] {
+        write_fits(&shop, "flux.fits", [900, 1], &[("BUNIT", unit), ("EXPTIME", "2.0")]);
+        for line in ["measure flux.fits", "demosaic flux.fits --black 0 -o a.exr", "preview flux.fits -o a.png"] {
+            let said = shop.said(line, BAD_DATA);
+            let named = format!("its samples are in `{}` (BUNIT), and neither in ADU", unit.trim_matches('\''));
+            assert!(said.contains(&named) && said.contains("--metadata FILE with `quantity: adu`"), "{said}");
+        }
+    }
+    fs::write(shop.path("m.yaml"), "schema: cyanometer/1\nquantity: adu\ncfa: rggb\n").unwrap();
+    shop.run("demosaic flux.fits --metadata m.yaml --black 0 -o a.exr", &[]);
+    write_fits(&shop, "codes.fits", [900, 1], &[("BUNIT", "'counts'"), ("EXPTIME", "2.0")]);
+    shop.run("demosaic codes.fits --black 0 -o a.exr", &[]);
+}

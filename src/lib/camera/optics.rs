@@ -9,6 +9,35 @@ use std::f64::consts::PI;
 const LEAST_F_NUMBER: f64 = 0.5;
 /// Times from here on look like ms, s.
 const LONG_S: f64 = 5.0;
+/// F-numbers from here on are beyond pinholes, and look like thousandths of the smallest lenses have and more.
+const MOST_F_NUMBER: f64 = 1000.0 * LEAST_F_NUMBER;
+/// Focal lengths below look like m, mm: the lenses of endoscopes have longer ones.
+const LEAST_FOCAL_LENGTH_MM: f64 = 0.5;
+/// Focal lengths from here on look like µm, mm.
+const MOST_FOCAL_LENGTH_MM: f64 = 10_000.0;
+
+/// A warning of an exposure time that looks as if it were in ms.
+pub fn doubt_of_time(time_s: f64) -> Option<String> {
+    (time_s >= LONG_S).then(|| format!("an exposure of {time_s} s is long; {time_s} ms is {} s", time_s / 1000.0))
+}
+
+/// A warning of an f-number that looks as if it were in thousandths.
+pub fn doubt_of_aperture(f_number: f64) -> Option<String> {
+    (f_number >= MOST_F_NUMBER)
+        .then(|| format!("an f-number of {f_number} is that of no lens; in thousandths it is {}", f_number / 1000.0))
+}
+
+/// A warning of a focal length that looks as if it were in m or µm.
+pub fn doubt_of_focal_length(focal_length_mm: f64) -> Option<String> {
+    let (unit, meant) = match focal_length_mm {
+        short if short < LEAST_FOCAL_LENGTH_MM => ("m", short * 1000.0),
+        long if long >= MOST_FOCAL_LENGTH_MM => ("um", long / 1000.0),
+        _ => return None,
+    };
+    Some(format!(
+        "a focal length of {focal_length_mm} mm is that of few lenses; {focal_length_mm} {unit} is {meant} mm"
+    ))
+}
 
 /// Exposure time and lens setting.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -57,10 +86,9 @@ impl Exposure {
         Ok(self)
     }
 
-    /// A warning of a time that looks as if it were in ms.
-    pub fn doubt(self) -> Option<String> {
-        let time = self.exposure_s;
-        (time >= LONG_S).then(|| format!("an exposure of {time} s is long; {time} ms is {} s", time / 1000.0))
+    /// Warnings of what looks as if it were in another unit.
+    pub fn doubts(self) -> impl Iterator<Item = String> {
+        doubt_of_time(self.exposure_s).into_iter().chain(doubt_of_aperture(self.f_number))
     }
 
     /// Irradiance on the axis per radiance, in sr.
@@ -148,8 +176,18 @@ mod tests {
         ] {
             assert!(bad.checked().is_err());
         }
-        assert_eq!(good.doubt(), None);
-        let doubt = Exposure { exposure_s: 33.0, ..good }.doubt().unwrap();
-        assert_eq!(doubt, "an exposure of 33 s is long; 33 ms is 0.033 s");
+        assert_eq!(good.doubts().count(), 0);
+        let doubts: Vec<String> = Exposure { exposure_s: 33.0, f_number: 2800.0, ..good }.doubts().collect();
+        assert_eq!(
+            doubts,
+            [
+                "an exposure of 33 s is long; 33 ms is 0.033 s",
+                "an f-number of 2800 is that of no lens; in thousandths it is 2.8"
+            ]
+        );
+        let said = |length| doubt_of_focal_length(length).unwrap_or_default();
+        assert_eq!(said(0.05), "a focal length of 0.05 mm is that of few lenses; 0.05 m is 50 mm");
+        assert_eq!(said(50_000.0), "a focal length of 50000 mm is that of few lenses; 50000 um is 50 mm");
+        assert_eq!([said(2.0), said(50.0), said(2350.0)], [""; 3]);
     }
 }

@@ -65,6 +65,31 @@ pub struct ResponseFiles {
 }
 
 impl ResponseFiles {
+    /// What of a response differs from another, in words, as far as both tell; names of files and directories do not count.
+    pub fn other_than(&self, other: &Self) -> Option<&'static str> {
+        let contents = |of: fn(&Self) -> &Option<CurveFile>| {
+            let [own, others] = [of(self).as_ref(), of(other).as_ref()];
+            match (own, others) {
+                (Some(own), Some(others)) => match (&own.sha256, &others.sha256) {
+                    (Some(a), Some(b)) => a != b || own.column != others.column,
+                    _ => false,
+                },
+                (own, others) => own.is_some() != others.is_some(),
+            }
+        };
+        let numbers = |of: fn(&Self) -> Option<f64>| of(self).zip(of(other)).is_some_and(|(a, b)| a != b);
+        let differs = [
+            (
+                "spectral response",
+                contents(|files| &files.quantum_efficiency) || contents(|files| &files.relative_response),
+            ),
+            ("cover glass", contents(|files| &files.cover_glass)),
+            ("kind of response, per watt or per photon,", self.counts.zip(other.counts).is_some_and(|(a, b)| a != b)),
+            ("peak quantum efficiency", numbers(|files| files.peak_quantum_efficiency)),
+        ];
+        differs.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
+    }
+
     /// Checks that it is of one kind, with what belongs to that.
     ///
     /// # Errors

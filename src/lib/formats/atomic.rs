@@ -298,9 +298,15 @@ impl Write for AtomicFile {
     }
 }
 
-/// The system's error without the temporary file's name, which means nothing to the user.
+/// The system's error without the temporary file's name, which means nothing to the user. Where that is wrapped around it, its number
+/// stands in the text alone.
 fn plain(error: &io::Error) -> io::Error {
-    error.raw_os_error().map_or_else(|| io::Error::from(error.kind()), io::Error::from_raw_os_error)
+    let in_text = || {
+        let text = error.to_string();
+        let (_, number) = text.split_once("(os error ")?;
+        number.split_once(')')?.0.parse().ok()
+    };
+    error.raw_os_error().or_else(in_text).map_or_else(|| io::Error::from(error.kind()), io::Error::from_raw_os_error)
 }
 
 fn binary_to_terminal(path: Option<&Path>) -> Error {

@@ -22,6 +22,8 @@ const MAX_CELLS: usize = 1 << 25;
 pub(super) const MAX_COLUMNS: usize = 1 << 20;
 /// So many curves of a table may hold what is no number.
 const MAX_SPOILED: usize = 1 << 12;
+/// A table may have this many empty lines, each of which is gone through several times.
+const MAX_EMPTY: usize = 1 << 20;
 
 /// A finite number with a decimal point or a decimal comma, if it is one.
 pub(super) fn numeric(cell: &str) -> Option<f64> {
@@ -149,6 +151,8 @@ impl<'a> Text<'a> {
     /// The text of a table; `is_of_numbers` where separators behind the last cell of a row mean nothing.
     pub(super) fn of(name: &str, bytes: &'a [u8], is_of_numbers: bool) -> Result<Self> {
         let decoded = delimited::decoded(name, bytes)?;
+        // Before any line is looked at closely, and any cell told apart: each row is held as a whole.
+        check_size(name, &decoded)?;
         if let Some(what) = what_else(&decoded) {
             return Err(Error::format(name, format!("it is {what}")));
         }
@@ -158,8 +162,6 @@ impl<'a> Text<'a> {
         if let Some(kind) = keys::kind_of(&decoded) {
             return Err(Error::format(name, format!("it is {kind}; a table is wanted here, as CSV")));
         }
-        // Before any cell is told apart: each row is held as a whole.
-        check_size(name, &decoded)?;
         let separator = Separator::of(&decoded, is_of_numbers);
         let plain = delimited::plain(name, &decoded, separator, is_of_numbers)?;
         Ok(Self { decoded, plain, separator })
@@ -200,24 +202,35 @@ fn what_else(text: &str) -> Option<&'static str> {
     BEGINNINGS.iter().find(|(begin, _)| text.starts_with(begin)).map(|(_, what)| *what)
 }
 
-/// Refuses a text of more cells, or of more in a line, than any table has, whatever parts them.
-fn check_size(name: &str, text: &str) -> Result<()> {
-    let mut all = 0;
-    let mut widest = 0;
-    for line in text.lines().map(str::as_bytes) {
+/// Refuses a text of more cells, of more in a line, or of more lines that say nothing, than any table has, whatever parts them.
+///
+/// # Errors
+///
+/// [`Error::Format`].
+pub(super) fn check_size(name: &str, text: &str) -> Result<()> {
+    let (mut all, mut widest, mut empty) = (0, 0, 0);
+    for line in text.as_bytes().split(|byte| *byte == b'\n') {
+        if line.trim_ascii().is_empty() {
+            empty += 1;
+            continue;
+        }
         let parted_by = |mark: u8| line.iter().filter(|byte| **byte == mark).count();
         let blanks = line.windows(2).filter(|pair| pair[0] == b' ' && pair[1] != b' ').count();
         let cells = b",;\t".map(parted_by).into_iter().fold(blanks, usize::max);
-        all += cells;
+        all += cells + 1;
         widest = widest.max(cells);
+        if all >= MAX_CELLS {
+            break;
+        }
     }
-    if all >= MAX_CELLS {
-        return Err(Error::format(name, format!("it has more than {MAX_CELLS} numbers; no table has")));
+    let refuse =
+        |most: usize, what: &str| Err(Error::format(name, format!("it has more than {most} {what}; no table has")));
+    match () {
+        () if all >= MAX_CELLS => refuse(MAX_CELLS, "numbers"),
+        () if widest >= MAX_COLUMNS => refuse(MAX_COLUMNS, "columns"),
+        () if empty > MAX_EMPTY => refuse(MAX_EMPTY, "empty lines"),
+        () => Ok(()),
     }
-    if widest >= MAX_COLUMNS {
-        return Err(Error::format(name, format!("it has more than {MAX_COLUMNS} columns; no table has")));
-    }
-    Ok(())
 }
 
 /// The bytes of a table that may be gzipped.

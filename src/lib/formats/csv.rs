@@ -6,9 +6,11 @@
 
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
 use super::delimited;
+use super::factors::doubt_of_factor;
 use super::foreign::csv_complaint;
 use super::misread::{self, is_units};
 use super::radiance_unit::{self, FileSays};
+use super::register;
 use super::wavelengths::{check_nm, check_order, check_stated};
 use crate::error::{Error, Result};
 use crate::names::place_of;
@@ -130,6 +132,7 @@ impl SpectralTable {
             (numbers.column(0).to_vec(), names(has_header.then_some(&first), width), values.t().to_owned())
         };
         let comments = Comments::of(&text.decoded);
+        doubt_of_factor(&text.decoded).into_iter().for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
         let headings = headings(&columns, units.as_ref(), by_rows.then_some(&first[0]));
         let heading = units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && !is_of_radiance(cell));
         let unit = wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength);

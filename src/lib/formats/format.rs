@@ -139,6 +139,8 @@ pub struct ColorTags {
     pub primaries: Option<Primaries>,
     /// How samples, relative to full scale where they are integers, stand for linear light.
     pub encoding: Option<Encoding>,
+    /// Luminance of R = G = B = 1 in cd m⁻².
+    pub white_luminance: Option<f64>,
     /// What says more of them and is not read, as in `its color profile (iCCP)`.
     pub unread: Option<String>,
 }

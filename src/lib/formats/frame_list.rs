@@ -1,7 +1,8 @@
 //! Lists of flats and darks: a table, a YAML list, or the descriptor of an EMVA 1288 measurement.
 
 use super::files::read_file;
-use super::{csv, delimited, keys, table, yaml};
+use super::{csv, delimited, keys, register, table, yaml};
+use crate::camera::optics::doubt_of_time;
 use crate::error::{Error, Result};
 use crate::names::{Named, serde_by_name};
 use serde::{Deserialize, Serialize};
@@ -118,6 +119,7 @@ pub fn read(path: &Path) -> Result<FrameList> {
             ));
         }
     }
+    doubt_of_times(&list.frames).into_iter().for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
     let folder = path.parent().unwrap_or(Path::new(""));
     for frame in &mut list.frames {
         frame.file = folder.join(&frame.file);
@@ -129,6 +131,14 @@ fn is_yaml(path: &Path, text: &str) -> bool {
     let is_named =
         path.extension().is_some_and(|end| end.eq_ignore_ascii_case("yaml") || end.eq_ignore_ascii_case("yml"));
     is_named || text.lines().any(|line| line.starts_with("frames:") || line.starts_with("- "))
+}
+
+/// A warning of times that look as if they were in ms: the longest of flats, or, as darks may last long, the shortest of all.
+fn doubt_of_times(frames: &[ListedFrame]) -> Option<String> {
+    let is_flat = |frame: &&ListedFrame| frame.kind == Some(FrameKind::Flat);
+    let longest = frames.iter().filter(is_flat).filter_map(|frame| frame.exposure_s).reduce(f64::max);
+    let shortest = || frames.iter().filter_map(|frame| frame.exposure_s).reduce(f64::min);
+    longest.or_else(shortest).and_then(doubt_of_time)
 }
 
 fn check(name: &str, frame: &ListedFrame) -> Result<()> {
@@ -344,6 +354,19 @@ mod tests {
                 "{said}"
             );
         }
+    }
+
+    #[test]
+    fn times_in_ms_are_told_apart_from_long_darks() {
+        let doubt = |rows: &str| {
+            let (_folder, path) = written("list.csv", &format!("file,kind,exposure_s\n{rows}"));
+            doubt_of_times(&read(&path).unwrap().frames)
+        };
+        let long = Some("an exposure of 33 s is long; 33 ms is 0.033 s".to_owned());
+        assert_eq!(doubt("a,flat,1\nb,flat,33\nc,dark,60\n"), long);
+        assert_eq!(doubt("a,flat,0.01\nb,dark,60\n"), None);
+        assert_eq!(doubt("a,dark,33\nb,,60\n"), long);
+        assert_eq!(doubt("a,dark,0.01\nb,dark,60\n"), None);
     }
 
     #[test]

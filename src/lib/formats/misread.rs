@@ -1,7 +1,7 @@
 //! What a text is that is read as no table of spectra, or as another than was meant: a slip of the pen in its first row, lines above
 //! its heading, another program's form.
 
-use super::cells::{not_a_number, numeric, thousands};
+use super::cells::{check_size, not_a_number, numeric, thousands};
 use super::delimited::{self, number};
 use super::foreign::line_of;
 use super::keys;
@@ -88,6 +88,8 @@ pub(super) fn is_units(header: &StringRecord, record: &StringRecord) -> bool {
 /// What a text is that was read as no table, where that can be told.
 pub(super) fn explained(name: &str, bytes: &[u8]) -> Option<Error> {
     let decoded = delimited::decoded(name, bytes).ok()?;
+    // What is longer than any table is not gone through again.
+    check_size(name, &decoded).ok()?;
     if decoded.contains('\0') || keys::kind_of(&decoded).is_some() {
         return None;
     }

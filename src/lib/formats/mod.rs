@@ -11,6 +11,7 @@ pub mod digest;
 pub mod dng;
 pub mod exposure;
 pub mod exr;
+mod factors;
 pub mod files;
 pub mod fits;
 pub mod foreign;

@@ -164,6 +164,11 @@ pub fn same_place(a: Option<&Path>, b: Option<&Path>) -> bool {
     place(a) == place(b)
 }
 
+/// Whether a path leads to what is neither a file nor a directory, as named pipes are, on which a reader would wait.
+pub fn is_waited_on(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -173,7 +173,7 @@ pub fn announce(outputs: &[Option<&Path>]) -> Result<()> {
 }
 
 /// Notes what makes a result doubtful and was found out too late to refuse it: an image that its sidecar does not describe.
-pub(super) fn doubt(text: String) {
+pub(crate) fn doubt(text: String) {
     if let Some(register) = &mut *register() {
         register.doubts.push(text);
     }

@@ -12,7 +12,7 @@ const LEAST_SAMPLES: usize = 10;
 /// Share of a class's largest response that a table may end at: beyond, it cuts through the class.
 const MOST_AT_AN_END: f64 = 0.25;
 /// The share from which it is told.
-const TOLD_AT_AN_END: f64 = 0.01;
+pub(super) const TOLD_AT_AN_END: f64 = 0.01;
 /// Largest responses of the classes that are this close to each other look as if each were set to the same.
 const ALIKE: f64 = 1e-3;
 
@@ -98,7 +98,7 @@ impl ResponseTable {
         let mut doubts = Vec::new();
         if !cut.is_empty() {
             let cut = cut.join(", ");
-            doubts.push(format!("its response ends before it has faded, and is 0 beyond: of its largest, {cut}"));
+            doubts.push(ends_early("response", &cut));
         }
         doubts.extend(normalized(&values));
         doubts.extend(exchanged(&wavelength_nm, &values));
@@ -106,6 +106,11 @@ impl ResponseTable {
         let [red, green, blue] = values;
         Ok(Self { about: None, classes: [curve(red)?, curve(green)?, curve(blue)?], doubts })
     }
+}
+
+/// A warning of a table that ends too early, with what is left there.
+pub(super) fn ends_early(what: &str, cut: &str) -> String {
+    format!("its {what} ends before it has faded, and is 0 beyond: of its largest, {cut}")
 }
 
 /// Whether the columns of a table have names.

@@ -34,6 +34,24 @@ impl AdcRecord {
         Self { bits, bias_adu, adu_per_e, linearization: None, is_linearized: false, white_adu: None }
     }
 
+    /// Checks that it is possible.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong, in words.
+    pub fn check(&self) -> Result<(), String> {
+        if !(1..=16).contains(&self.bits) {
+            return Err(format!("a converter of {} bits is impossible here; give 1 to 16", self.bits));
+        }
+        if !self.bias_adu.is_finite() {
+            return Err(format!("a bias of {} ADU is impossible", self.bias_adu));
+        }
+        if !(self.adu_per_e > 0.0 && self.adu_per_e.is_finite()) {
+            return Err(format!("a slope of {} ADU per electron is impossible; give one above 0", self.adu_per_e));
+        }
+        Ok(())
+    }
+
     /// The converter of a sensor as the description of its read-out has it.
     pub fn of_readout(readout: &ReadOut) -> Self {
         let straight = Self::new(readout.bits, readout.bias_adu, readout.adu_per_e);

@@ -4,6 +4,7 @@ mod converter;
 mod correction;
 mod difference;
 mod header;
+mod levels;
 mod records;
 
 pub use converter::AdcRecord;
@@ -20,7 +21,7 @@ pub use records::{
 };
 
 use crate::camera::levels::{BlackLevel, WhiteLevel};
-use crate::camera::optics::Exposure;
+use crate::camera::optics::{self, Exposure};
 use crate::camera::sensor::Sensor;
 use crate::cfa::FilterArray;
 use crate::names::Named;
@@ -311,7 +312,10 @@ impl Metadata {
             format!("the black level, {black} ADU, is no less than the white level, {} ADU", white.largest())
         });
         let of_sensor = self.sensor.iter().flat_map(Sensor::doubts);
-        self.exposure.and_then(Exposure::doubt).into_iter().chain(of_levels).chain(of_sensor).collect()
+        let of_lens = self.scene.as_ref().and_then(|scene| scene.vignetting_focal_length_mm);
+        let of_lens = of_lens.and_then(optics::doubt_of_focal_length);
+        let of_exposure = self.exposure.into_iter().flat_map(Exposure::doubts);
+        of_exposure.chain(of_lens).chain(of_levels).chain(of_sensor).collect()
     }
 
     /// What it says of the same thing in two ways that do not agree: a warning each.

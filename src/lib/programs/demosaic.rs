@@ -64,6 +64,9 @@ fn demosaic(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, None)?;
     session.tell(described::doubt_of_black(reader.header(), arguments.black)?.as_slice());
+    if let Black::Level(level) = arguments.black {
+        reader.expect_black(level);
+    }
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());
     session.tell(requests::of_bent_codes(reader.header()).as_slice());

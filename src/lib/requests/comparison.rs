@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::pipe;
 use crate::formats::register::check_inputs;
-use crate::metadata::Metadata;
+use crate::metadata::{FrameHeader, Metadata};
 use crate::stream::RowSource;
 use crate::units::RELATIVE_UNIT;
 use clap::Args;
@@ -135,8 +135,25 @@ impl ColorPair {
         let is_of_frames = comparison.frames().next().is_some();
         notes.extend(white.filter(|_| is_of_frames).and_then(|white| doubt_of_white(white, is_relative)));
         notes.extend(comparison.frames().flat_map(notes::of_reader));
+        notes.extend(doubt_of_places(&comparison));
         Ok((comparison, notes))
     }
+}
+
+/// A warning of images that show other parts of the sensor, so that pixels are compared that saw other light.
+fn doubt_of_places(comparison: &Comparison<FrameReader>) -> Option<Note> {
+    let mut heads = comparison.frames().map(RowSource::header);
+    let [first, second] = [heads.next()?, heads.next()?];
+    let place = |head: &FrameHeader| format!("column {}, row {}", head.geometry.origin[0], head.geometry.origin[1]);
+    (first.geometry.origin != second.geometry.origin).then(|| {
+        Note::Warning(format!(
+            "{}: it begins at {} of the sensor, but {} at {}: pixels are compared that show other places",
+            second.name,
+            place(second),
+            first.name,
+            place(first)
+        ))
+    })
 }
 
 #[cfg(test)]

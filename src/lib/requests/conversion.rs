@@ -5,7 +5,6 @@ use super::notes::Note;
 use super::options::{Output, WhiteChoice};
 use super::values::{self, LightColor};
 use crate::analysis::characterization::CameraMatrix;
-use crate::camera::optics::Exposure;
 use crate::color::adaptation::Adaptation;
 use crate::color::temperature::Locus;
 use crate::color::{self, Space, White, rows_of};
@@ -100,8 +99,7 @@ impl Conversion {
         }
         let Self { exposure_s, f_number, lens_transmittance, .. } = *self;
         SaidExposure { exposure_s, f_number, lens_transmittance }.apply(frame)?;
-        let long = frame.metadata.exposure.and_then(Exposure::doubt).filter(|_| self.exposure_s.is_some());
-        let mut notes: Vec<Note> = long.map(Note::Warning).into_iter().collect();
+        let mut notes = Vec::new();
         let matrix = match matrix {
             Some(matrix) => matrix,
             None => {
@@ -225,6 +223,11 @@ impl Conversion {
             let shown = file.display();
             let text = format!("{shown} was fitted for the sensor {of_matrix}, but the frame comes from {of_frame}");
             notes.push(Note::Warning(text));
+        }
+        let sensor = frame.metadata.sensor.as_ref();
+        if let Some((file, doubt)) = self.matrix.as_ref().zip(sensor.and_then(|sensor| matrix.doubt_of_sensor(sensor)))
+        {
+            notes.push(Note::Warning(format!("{} {doubt}", file.display())));
         }
         if let Some(doubt) = matrix.doubt_of_gain(frame.metadata.adu_per_e()) {
             let shown =

@@ -1,6 +1,7 @@
 //! Corrections of a frame of codes before demosaicking.
 
 use super::border::measure_black;
+use super::dark_levels::{doubt_of_level, doubt_of_low, least_level, range_of};
 use super::described::{Described, doubt_of_black};
 use super::independence::{Company, Role, check_contents, check_files};
 use super::notes::Note;
@@ -98,6 +99,8 @@ pub struct OpenCorrection {
     pub notes: Vec<Note>,
     /// Black and white level of the frame, as far as darks are taken for such on trust.
     range_adu: Option<[f64; 2]>,
+    /// What the mean of dark frames is at least.
+    least_adu: Option<f64>,
 }
 
 /// The frame that is corrected, where it comes from, and what is said of it.
@@ -168,6 +171,9 @@ impl Correction {
     /// is that of codes.
     pub fn prepare(&self, reader: &mut FrameReader) -> Result<Vec<Note>> {
         let notes = self.sensor.apply(reader)?;
+        if let BlackChoice::Known(Black::Level(level)) = self.black_choice {
+            reader.expect_black(level);
+        }
         if self.linearize {
             if matches!(self.black_choice, BlackChoice::Border(_)) {
                 let problem = "the masked border tells the level of codes, not of those made proportional to charge";
@@ -336,6 +342,7 @@ impl Correction {
         let on_trust = darks.as_ref().and_then(|darks| darks.stack().taken_on_trust(frame));
         remarks.extend(on_trust.clone().filter(|text| !warnings.contains(text)));
         let range_adu = on_trust.and_then(|_| range_of(frame));
+        let least_adu = least_level(frame);
         let defects = self.defects_record(beyond, dark_limits.as_ref(), flats.is_some());
         let shares_masters = company.shares_darks().unwrap_or_else(|| {
             let problem =
@@ -350,7 +357,7 @@ impl Correction {
         warnings.extend(map.as_ref().and_then(|map| map.doubt(&list, frame)));
         notes.extend(warnings.into_iter().map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)));
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
-        Ok(OpenCorrection { stage, corrections, notes, range_adu })
+        Ok(OpenCorrection { stage, corrections, notes, range_adu, least_adu })
     }
 
     /// Makes sure that no frame beside `light` is a copy of it.
@@ -417,35 +424,6 @@ fn doubt_of_dark(frame: &FrameHeader) -> Option<String> {
     })
 }
 
-/// Black and white level of a frame, where both are known.
-fn range_of(frame: &FrameHeader) -> Option<[f64; 2]> {
-    let [black, white] = [frame.metadata.black_level_adu?.largest(), frame.metadata.white_level_adu?.largest()];
-    (white > black).then_some([black, white])
-}
-
-/// A warning of what came off a frame and cannot well be its dark signal: a mean above that of the frame, or, where nothing tells that
-/// it is one, far up on the way from black to white.
-fn doubt_of_level(name: &str, [frame, dark]: [f64; 2], range_adu: Option<[f64; 2]>) -> Option<String> {
-    /// Dark signals that drift from frame to frame differ by less, in ADU and as a share.
-    const DRIFT: [f64; 2] = [1.0, 0.01];
-    /// Dark frames are below this share of the range.
-    const MOST_OF_RANGE: f64 = 0.25;
-    if dark - frame > DRIFT[0].max(DRIFT[1] * dark.abs()) {
-        return Some(format!(
-            "{name}: its mean is {frame:.1} ADU, below that of what came off, {dark:.1} ADU; are these dark or bias frames of it?"
-        ));
-    }
-    let [black, white] = range_adu?;
-    let share = (dark - black) / (white - black);
-    (share > MOST_OF_RANGE).then(|| {
-        format!(
-            "{name}: what came off has a mean of {dark:.1} ADU, {:.0} % of the way from black to white; dark frames are darker, and nothing \
-             tells that these are such",
-            100.0 * share
-        )
-    })
-}
-
 /// A digest of a list or map of defects; none of one that cannot be read, which is told elsewhere.
 fn digest_of(path: &Path) -> Option<String> {
     read_file(path).ok().map(|bytes| format!("blake3:{}", blake3::hash(&bytes).to_hex()))
@@ -467,7 +445,9 @@ impl OpenCorrection {
             }),
         ];
         let means = darks.as_ref().and_then(DarkFrames::means);
-        let level = means.and_then(|means| doubt_of_level(&self.header().name, means, self.range_adu));
+        let name = &self.header().name;
+        let low = means.zip(self.least_adu).and_then(|([_, dark], least)| doubt_of_low(name, dark, least));
+        let level = low.or_else(|| means.and_then(|means| doubt_of_level(name, means, self.range_adu)));
         let doubt = map.as_ref().and_then(DefectMap::finding).into_iter().chain(level).map(Note::Warning);
         said.into_iter().flatten().map(Note::Remark).chain(doubt).collect()
     }

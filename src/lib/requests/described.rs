@@ -4,10 +4,11 @@ use super::notes::Note;
 use super::options::Input;
 use super::values;
 use crate::camera::levels::{BlackLevel, BlackLevels};
-use crate::camera::optics::Exposure;
+use crate::camera::optics::{Exposure, doubt_of_aperture, doubt_of_time};
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::register;
 use crate::metadata::{CorrectionRecord, FrameHeader, Metadata};
 use crate::stages::black::Black;
 use crate::units::QuantityKind;
@@ -183,6 +184,12 @@ pub struct SaidExposure {
 }
 
 impl SaidExposure {
+    /// Has a program warn of what is said and looks like another unit.
+    fn note_doubts(self) {
+        let doubts = self.exposure_s.and_then(doubt_of_time).into_iter();
+        doubts.chain(self.f_number.and_then(doubt_of_aperture)).for_each(register::doubt);
+    }
+
     /// Puts what is said into the metadata of a frame.
     ///
     /// # Errors
@@ -216,6 +223,7 @@ impl SaidExposure {
             let problem = format!("{}: an exposure is a time and an f-number, and one is not known", frame.name);
             return Err(Error::Usage(problem).give(missing));
         };
+        self.note_doubts();
         frame.metadata.exposure = Some(Exposure { exposure_s, f_number, lens_transmittance }.checked()?);
         frame.metadata.exposure_time_s = None;
         Ok(())
@@ -361,6 +369,7 @@ impl DescribedWithBlack {
         agree(frame, "f-number", other_than(f_number, known.map(|known| known.f_number)), &["f_number"])?;
         let described = Described { exposure_s: None, f_number: None, ..self.described };
         Self { described, ..*self }.apply(frame)?;
+        SaidExposure { exposure_s: said_s, f_number, lens_transmittance: None }.note_doubts();
         Ok(known_s.or(said_s))
     }
 }

@@ -22,6 +22,7 @@ pub mod border;
 pub mod comparison;
 pub mod conversion;
 pub mod correction;
+mod dark_levels;
 pub mod described;
 pub mod fit;
 pub mod independence;

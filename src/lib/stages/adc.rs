@@ -117,18 +117,7 @@ impl Digitize {
                 .or(readout.map(|r| r.adu_per_e))
                 .ok_or_else(|| needed("sensor.readout.adu_per_e"))?,
         };
-        if !(1..=16).contains(&adc.bits) {
-            return Err(Error::Usage(format!("a converter of {} bits is impossible here; give 1 to 16", adc.bits)));
-        }
-        if !adc.bias_adu.is_finite() {
-            return Err(Error::Usage(format!("a bias of {} ADU is impossible", adc.bias_adu)));
-        }
-        if !(adc.adu_per_e > 0.0 && adc.adu_per_e.is_finite()) {
-            return Err(Error::Usage(format!(
-                "a slope of {} ADU per electron is impossible; give one above 0",
-                adc.adu_per_e
-            )));
-        }
+        adc.check().map_err(Error::Usage)?;
         let taps = input.taps();
         let adcs: Vec<AdcRecord> = match taps {
             None => vec![adc],

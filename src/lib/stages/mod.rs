@@ -2,6 +2,7 @@
 //! at the wrong time.
 
 pub mod black;
+pub mod bounds;
 pub mod import;
 pub mod render;
 

@@ -190,6 +190,24 @@ pub fn samples_tell(frame: &FrameHeader) -> bool {
     is_of_photosites && is_shifted && metadata.demosaic.is_none() && metadata.average.is_none()
 }
 
+/// How many pixels of a frame were made of saturated samples, counted or expected by the law of its scene, in words, where neither
+/// their level nor, as `is_marked` says, a layer tells which. None where none are known to be, and where not one is expected in a
+/// thousand such frames.
+pub fn untold(frame: &FrameHeader, is_marked: bool) -> Option<String> {
+    const LEAST_PIXELS: f64 = 1e-3;
+    if is_marked || samples_tell(frame) {
+        return None;
+    }
+    let counted = frame.metadata.samples.as_ref().and_then(|samples| samples.saturated).filter(|count| *count > 0);
+    if let Some(count) = counted {
+        return Some(format!("{count} of its pixels were made of saturated samples, by its sidecar"));
+    }
+    let pixels = frame.geometry.width as f64 * frame.geometry.height as f64;
+    let share = frame.metadata.saturated_share.filter(|share| share * pixels >= LEAST_PIXELS)?;
+    let percent = 100.0 * share;
+    Some(format!("{percent:.2e} % of its pixels are made of saturated samples, by the law of its scene"))
+}
+
 /// The head of a frame that has the layer of marks behind its channels.
 pub fn with_mask(mut frame: FrameHeader) -> FrameHeader {
     frame.geometry.channels.push(MASK_LAYER.into());

@@ -260,7 +260,22 @@ fn reference_white(
         let range = input.metadata.white_level_adu?.less([black; 3]).classes();
         Some((xyz_from_adu * Vector3::from(range)).y)
     };
-    let luminance = settings.white_luminance.or_else(at_saturation);
+    let luminance = match (settings.white_luminance, at_saturation()) {
+        (Some(luminance), _) => Some(luminance),
+        // Without light codes are at their end already: no white saturates the camera.
+        (None, Some(luminance)) if luminance <= 0.0 => {
+            if !needs_white(settings.space) {
+                return Ok(None);
+            }
+            let white = input.metadata.white_level_adu.map_or(f64::NAN, |white| white.range_above(0.0));
+            let problem = format!(
+                "its black level, {black:.1} ADU, is no less than its white level, {white} ADU: no white saturates the camera, and \
+                 none is named; expose for a shorter time"
+            );
+            return Err(input.refuse(problem).give(&["white_luminance"]));
+        }
+        (None, luminance) => luminance,
+    };
     Ok(luminance.map(|luminance| settings.white.xyz(luminance)))
 }
 

@@ -7,7 +7,7 @@ pub mod training;
 
 use crate::camera::optics::Exposure;
 use crate::camera::response::SpectralResponse;
-use crate::camera::sensor::Sensor;
+use crate::camera::sensor::{ResponseFiles, Sensor};
 use crate::color::difference::DifferenceReport;
 use crate::error::{Error, Result};
 use crate::metadata::{MatrixResidual, RelativeMatrix};
@@ -36,6 +36,12 @@ pub struct CameraMatrix {
     /// What covers the sensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub filter: Option<String>,
+    /// The response of the sensor whose signals it was fitted to, by which others of the same name are told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub response: Option<ResponseFiles>,
+    /// Distance of neighboring photosites in µm, on whose square absolute XYZ hang.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixel_pitch_um: Option<f64>,
     /// Method of the fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
@@ -95,6 +101,16 @@ impl CameraMatrix {
         Self { sensor: Some(sensor.name.clone()), method, adu_per_e, ..Self::bare(MATRIX_UNIT, xyz_from_camera) }
     }
 
+    /// What the sensor of a frame has other than that which the matrix was fitted for, in words, whatever they are called.
+    pub fn doubt_of_sensor(&self, sensor: &Sensor) -> Option<String> {
+        let own_pitch = self.pixel_pitch_um.filter(|_| !self.is_relative());
+        let pitch = own_pitch.zip(sensor.readout.as_ref().and_then(|readout| readout.pixel_pitch_um));
+        let response = self.response.as_ref().zip(sensor.response.as_ref());
+        let differs = response.and_then(|(own, other)| own.other_than(other));
+        let differs = differs.or_else(|| pitch.filter(|(own, other)| own != other).map(|_| "pixel pitch"))?;
+        Some(format!("was fitted for another {differs} than that of the sensor {}", sensor.name))
+    }
+
     /// What XYZ are off by, in words, of codes of such a slope in ADU per e⁻; none where it is that of the matrix, or nobody knows.
     pub fn doubt_of_gain(&self, adu_per_e: Option<f64>) -> Option<String> {
         /// Slopes that differ by no more are one, written with other digits.
@@ -114,6 +130,8 @@ impl CameraMatrix {
             schema: MATRIX_SCHEMA.into(),
             sensor: None,
             filter: None,
+            response: None,
+            pixel_pitch_um: None,
             method: None,
             adu_per_e: None,
             unit: Some(unit.into()),

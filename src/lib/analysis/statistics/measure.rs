@@ -111,13 +111,11 @@ fn measure_all(
         Some(portrait) => tallies(&mut sitting(&mut watch, portrait), regions, &levels)?,
         None => tallies(&mut watch, regions, &levels)?,
     };
+    let watched = watch.untold();
     let (counts, left_out) = watch.seen();
     if level.is_some() {
         check_testable(&frame)?;
-    }
-    let saturated = counts.iter().map(|marks| marks.saturated).find(|count| *count > 0);
-    if let (Some(_), true, Some(pixels)) = (level, left_out, saturated) {
-        return Err(unfair(&frame, pixels));
+        check_unmarked(&frame, (&counts, left_out), watched.filter(|_| saturated == Saturated::LeftOut))?;
     }
     let is_fair = |marks: &Marks| marks.beyond_model + if left_out { marks.saturated } else { 0 } == 0;
     if !is_fair(&counts[0]) {
@@ -152,13 +150,22 @@ fn measure_all(
     Ok((report, portrait))
 }
 
-/// Refuses to check a frame of which pixels were left out for their values.
-fn unfair(frame: &FrameHeader, pixels: u64) -> Error {
-    let problem = format!(
-        "{}: nothing can be checked: {pixels} pixels used saturated samples; without them the others are no fair sample",
-        frame.name
-    );
-    Error::Data(problem).give(&["keep_saturated"])
+/// Makes sure that no pixel was left out for its value, or should be: `untold` says how many, where nothing marks which.
+fn check_unmarked(frame: &FrameHeader, (counts, left_out): (&[Marks], bool), untold: Option<String>) -> Result<()> {
+    let marked = counts.iter().map(|marks| marks.saturated).find(|count| *count > 0).filter(|_| left_out);
+    let why = match (marked, untold) {
+        (Some(pixels), _) => {
+            format!("{pixels} pixels used saturated samples; without them the others are no fair sample")
+        }
+        (None, Some(pixels)) => format!("{pixels}, and nothing marks which"),
+        (None, None) => return Ok(()),
+    };
+    Err(unfair(frame, &why))
+}
+
+/// Refuses to check a frame of which pixels are left out for their values, or should be.
+pub(super) fn unfair(frame: &FrameHeader, why: &str) -> Error {
+    Error::Data(format!("{}: nothing can be checked: {why}", frame.name)).give(&["keep_saturated"])
 }
 
 /// Makes sure that samples are not mixed in a way that no test knows.

@@ -14,7 +14,7 @@ use super::assessment::Assessment;
 use super::check::Verdict;
 use super::laws::Samplings;
 use super::levels::Levels;
-use super::measure::check_testable;
+use super::measure::{check_testable, unfair};
 use super::region::Region;
 use super::repeated_report::{RepeatedChannel, RepeatedRegion, RepeatedReport};
 use super::report::{ChannelReport, RegionReport, coverage};
@@ -96,6 +96,11 @@ impl OverFrames {
         let mut marks = self.seen.as_mut().map_or_else(Vec::new, |seen| std::mem::take(&mut seen.marks));
         let mut watch = Watch::new(source, self.settings.saturated, regions).keeping(&mut marks).without_layers();
         let frame = watch.header().clone();
+        let untold =
+            watch.untold().filter(|_| self.settings.level.is_some() && self.settings.saturated == Saturated::LeftOut);
+        if let Some(pixels) = untold {
+            return Err(unfair(&frame, &format!("{pixels}, and nothing marks which")));
+        }
         let seen = match &mut self.seen {
             Some(seen) => {
                 seen.exposures.take(&frame)?;

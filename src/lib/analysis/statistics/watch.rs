@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::metadata::FrameHeader;
 use crate::propagation::saturation;
 use crate::stages::saturation::{
-    BEYOND_MODEL, CORRECTED, DEFECTIVE, FullLevels, MASK_LAYER, Marked, SATURATED, bits, samples_tell,
+    BEYOND_MODEL, CORRECTED, DEFECTIVE, FullLevels, MASK_LAYER, Marked, SATURATED, bits, samples_tell, untold,
 };
 use crate::stream::RowSource;
 
@@ -97,7 +97,8 @@ impl<'a> MarkedRows<'a> {
         header
     }
 
-    fn comes_with_layer(&self) -> bool {
+    /// Whether the frame has the layer itself.
+    pub(super) fn comes_with_layer(&self) -> bool {
         self.layer.is_some() && matches!(self.source, Watched::AsTheyCome(_))
     }
 
@@ -167,6 +168,11 @@ impl<'a> Watch<'a> {
         seen.resize(geometry.width * geometry.height, 0);
         self.seen = Some(seen);
         self
+    }
+
+    /// How many pixels are made of saturated samples, in words, where nothing marks which.
+    pub fn untold(&self) -> Option<String> {
+        untold(self.source.header(), self.source.comes_with_layer())
     }
 
     /// Marked pixels of each region, and whether saturated ones were left out.

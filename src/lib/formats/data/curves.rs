@@ -3,13 +3,13 @@
 use super::places::{Place, read_beside};
 use crate::camera::response::{Scale, SpectralResponse};
 use crate::camera::sensor::{Counts, CurveFile, ResponseFiles};
-use crate::cfa::FilterArray;
+use crate::cfa::{Class, FilterArray};
 use crate::error::{Error, Result};
 use crate::formats::csv::SpectralTable;
 use crate::formats::digest::sha256;
-use crate::formats::response_table::ResponseTable;
+use crate::formats::response_table::{ResponseTable, TOLD_AT_AN_END, ends_early};
 use crate::names::Named;
-use crate::spectrum::Curve;
+use crate::spectrum::{Curve, WavelengthGrid};
 
 /// The curves of a response as they are read and checked.
 pub(super) struct Curves<'a> {
@@ -50,6 +50,8 @@ impl Curves<'_> {
             }
             None => None,
         };
+        let of_efficiencies = found.as_ref().filter(|(_, scale)| *scale == Scale::Absolute);
+        self.doubts.extend(of_efficiencies.and_then(|(classes, _)| doubt_of_ends(classes, cover_glass.as_ref())));
         Ok(found.map(|(quantum_efficiency, scale)| SpectralResponse { quantum_efficiency, cover_glass, scale }))
     }
 
@@ -86,6 +88,27 @@ impl Curves<'_> {
         self.about = table.about;
         Ok(Some(table.classes).filter(|_| self.array.is_none_or(FilterArray::has_three_classes)))
     }
+}
+
+/// A warning of efficiencies whose table ends before they have faded, inside the wavelengths that light is summed over: they are 0
+/// beyond.
+fn doubt_of_ends(classes: &[Curve; 3], cover_glass: Option<&Curve>) -> Option<String> {
+    let grid = WavelengthGrid::default();
+    let passed = |nm: f64| cover_glass.map_or(1.0, |glass| glass.at(nm));
+    let cut = Class::ALL.into_iter().zip(classes).flat_map(|(class, curve)| {
+        let all = curve.wavelengths_nm();
+        let largest = all.iter().map(|nm| curve.at(*nm) * passed(*nm)).fold(0.0, f64::max);
+        let ends = [all.first(), all.last()]
+            .into_iter()
+            .flatten()
+            .filter(move |nm| **nm > grid.start_nm && **nm < grid.end_nm);
+        let shares = ends.map(move |nm| (nm, curve.at(*nm) * passed(*nm) / largest));
+        let told = shares.filter(|(_, share)| *share > TOLD_AT_AN_END);
+        told.map(move |(nm, share)| format!("{} has {:.1} % at {nm} nm", class.letter(), 100.0 * share))
+            .collect::<Vec<_>>()
+    });
+    let cut: Vec<String> = cut.collect();
+    (!cut.is_empty()).then(|| ends_early("quantum efficiency", &cut.join(", ")))
 }
 
 /// An efficiency or a transmittance is a fraction.

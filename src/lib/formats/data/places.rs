@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::formats::files::read_file;
+use crate::formats::places::is_waited_on;
 use crate::names::nearest;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +43,7 @@ pub(super) fn read_beside(place: &Place, sensor: &str, file: &str) -> Result<(St
             let path = directory.join(file);
             let shown = path.display().to_string();
             // A named pipe, which a reader would wait on, is nothing that a user has named; what is missing, reading tells.
-            if std::fs::metadata(&path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
+            if is_waited_on(&path) {
                 return Err(Error::format(&shown, "it is no file but a pipe or a device; a table must be a file"));
             }
             let bytes = read_file(&path).map_err(|error| match error {

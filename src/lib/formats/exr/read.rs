@@ -328,7 +328,9 @@ impl SampleReader for ExrReader {
     /// Samples are linear; without the attribute `chromaticities` the primaries are those of BT.709, by the format's rules.
     fn colors(&self) -> ColorTags {
         let primaries = self.contents.tags.primaries;
-        ColorTags { primaries, encoding: Some(Encoding::Linear), unread: None }
+        let is_one = |luminance: &f64| *luminance > 0.0 && luminance.is_finite();
+        let white_luminance = self.contents.tags.white_luminance.filter(is_one);
+        ColorTags { primaries, encoding: Some(Encoding::Linear), white_luminance, unread: None }
     }
 
     fn notes(&self) -> &[String] {

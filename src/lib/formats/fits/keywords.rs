@@ -40,36 +40,16 @@ pub(super) struct Told {
 /// of ADU.
 pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     let (mut notes, mut doubts) = (Vec::new(), doubts_of_repeated(header));
-    let is_bottom_up = match header.text("ROWORDER").map(str::to_ascii_uppercase).as_deref() {
-        Some("TOP-DOWN") => false,
-        Some("BOTTOM-UP") => true,
-        other => {
-            let what =
-                other.map_or("it has no ROWORDER".to_owned(), |other| format!("its ROWORDER `{other}` is not known"));
-            notes.push(format!("{what}; its first row is taken as the top one"));
-            false
-        }
-    };
+    let is_bottom_up = is_bottom_up(header, &mut notes, &mut doubts);
     let cfa = filters(header, channels, &mut notes, &mut doubts);
-    let is_code = |unit: &str| ["adu", "dn", "count", "counts"].iter().any(|name| unit.eq_ignore_ascii_case(name));
-    let is_electron =
-        |unit: &str| ["electron", "electrons", "e-", "e"].iter().any(|name| unit.eq_ignore_ascii_case(name));
-    let unit = header.text("BUNIT");
-    let is_electrons = unit.is_some_and(is_electron);
-    let is_adu = match unit {
-        Some(unit) if is_code(unit) => true,
-        Some(unit) if is_electron(unit) => false,
-        Some(unit) => {
-            notes.push(format!("its unit `{unit}` (BUNIT) is passed over"));
-            false
-        }
-        None => cfa.is_some() && is_integer,
-    };
-    let mut metadata = Metadata::new(match (is_adu, is_electrons) {
-        (true, _) => QuantityKind::Adu,
-        (_, true) => QuantityKind::Electrons,
-        _ => QuantityKind::Unspecified,
-    });
+    let unit = header.text("BUNIT").map(str::trim).filter(|unit| !unit.is_empty());
+    let of_unit = unit.map(quantity_of_unit);
+    let of_filters = if cfa.is_some() && is_integer { QuantityKind::Adu } else { QuantityKind::Unspecified };
+    let mut metadata = Metadata::new(of_unit.unwrap_or(of_filters));
+    if let Some((unit, QuantityKind::Unspecified)) = unit.zip(of_unit) {
+        // What is not taken for codes keeps its unit, by which it is refused.
+        metadata.unit = visible(unit).into_owned();
+    }
     metadata.cfa = cfa;
     metadata.camera = header.text("INSTRUME").map(|camera| visible(camera).into_owned());
     let exposure = told_exposure(header, told_time(header, &mut doubts), &mut notes, &mut doubts);
@@ -79,6 +59,62 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     metadata.camera_settings = told_settings(header);
     note_settings(header, &mut notes);
     Told { metadata, is_bottom_up, notes, doubts }
+}
+
+/// Whether the first row of the array is the lowest of the picture. Programs write the words with a blank, a line or nothing between.
+fn is_bottom_up(header: &Header, notes: &mut Vec<String>, doubts: &mut Vec<String>) -> bool {
+    let told = header.text("ROWORDER").filter(|order| !order.trim().is_empty());
+    let letters =
+        |order: &str| order.chars().filter(char::is_ascii_alphabetic).collect::<String>().to_ascii_uppercase();
+    match (told, told.map(letters).as_deref()) {
+        (_, Some("TOPDOWN")) => false,
+        (_, Some("BOTTOMUP")) => true,
+        (Some(other), _) => {
+            let other = visible(other);
+            doubts.push(format!(
+                "its ROWORDER `{other}` is neither TOP-DOWN nor BOTTOM-UP; its first row is taken as the top one, and its filter array from \
+                 there"
+            ));
+            false
+        }
+        _ => {
+            notes.push("it has no ROWORDER; its first row is taken as the top one".into());
+            false
+        }
+    }
+}
+
+/// What samples of a unit are: ADU and electrons, per pixel or not, in the spellings that programs have; unspecified of others.
+fn quantity_of_unit(unit: &str) -> QuantityKind {
+    const ADU: [&str; 14] = [
+        "adu",
+        "adus",
+        "dn",
+        "dns",
+        "du",
+        "count",
+        "counts",
+        "ct",
+        "cts",
+        "digitalnumber",
+        "digitalnumbers",
+        "analogdigitalunit",
+        "analogtodigitalunit",
+        "analogtodigitalunits",
+    ];
+    const ELECTRONS: [&str; 7] = ["electron", "electrons", "elec", "electr", "e-", "e", "el"];
+    let lower = unit.to_ascii_lowercase();
+    let of_pixel = ["/pixel", "/pix", " pixel-1", " pix-1", " per pixel", " pixel**-1", " pix**-1"];
+    let bare = of_pixel.iter().find_map(|end| lower.strip_suffix(end)).unwrap_or(&lower);
+    let bare: String = bare.chars().filter(|letter| !" _".contains(*letter)).collect();
+    let joined = bare.replace('-', "");
+    if ADU.contains(&joined.as_str()) {
+        QuantityKind::Adu
+    } else if ELECTRONS.contains(&bare.as_str()) {
+        QuantityKind::Electrons
+    } else {
+        QuantityKind::Unspecified
+    }
 }
 
 /// The filter array of a single plane.

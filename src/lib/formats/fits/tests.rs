@@ -91,8 +91,13 @@ fn rows_come_from_the_top() {
     let (reader, samples) = both(&plane(&[])).unwrap();
     assert_eq!(samples[0], 1.0);
     assert_eq!(reader.notes(), ["it has no ROWORDER; its first row is taken as the top one"]);
-    assert!(
-        both(&plane(&[("ROWORDER", "'LEFT'")])).unwrap().0.notes()[0].starts_with("its ROWORDER `LEFT` is not known")
+    let order = |order: &str| {
+        let told = keywords::read(&Header::of(&[("ROWORDER", text(order))]), 1, true);
+        (told.is_bottom_up, told.doubts.len())
+    };
+    assert_eq!(
+        [order("bottom up"), order("BOTTOM_UP"), order("TopDown"), order("LEFT")],
+        [(true, 0), (true, 0), (false, 0), (false, 1)]
     );
 }
 
@@ -309,11 +314,22 @@ fn keywords_of_the_camera_are_used_or_told() {
     );
     assert_eq!(told(&[("BUNIT", text("ADU"))]).0.quantity, QuantityKind::Adu);
     assert_eq!(told(&[("BUNIT", text("electron")), ("BAYERPAT", text("RGGB"))]).0.quantity, QuantityKind::Electrons);
-    let (metadata, notes) = told(&[("BUNIT", text("Jy/beam")), ("BAYERPAT", text("RGGB"))]);
-    assert_eq!(
-        (metadata.quantity, notes.as_str()),
-        (QuantityKind::Unspecified, "its unit `Jy/beam` (BUNIT) is passed over")
-    );
+    let quantity = |unit: &str| told(&[("BUNIT", text(unit))]).0.quantity;
+    for (unit, wanted) in [
+        ("DN", QuantityKind::Adu),
+        ("counts", QuantityKind::Adu),
+        ("analog-to-digital units", QuantityKind::Adu),
+        ("adu/pixel", QuantityKind::Adu),
+        ("E-", QuantityKind::Electrons),
+        ("electron pix-1", QuantityKind::Electrons),
+        ("adu/s", QuantityKind::Unspecified),
+        ("electron/s", QuantityKind::Unspecified),
+        ("photon", QuantityKind::Unspecified),
+    ] {
+        assert_eq!(quantity(unit), wanted, "{unit}");
+    }
+    let (metadata, _) = told(&[("BUNIT", text("MJy/sr")), ("BAYERPAT", text("RGGB"))]);
+    assert_eq!((metadata.quantity, metadata.unit.as_str()), (QuantityKind::Unspecified, "MJy/sr"));
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! The metadata of a frame: where they are found, and what in them is doubtful.
 
+use crate::camera::optics::doubt_of_time;
+use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::formats::files::{read_file, sidecar_path};
 use crate::formats::format::SampleReader;
@@ -7,7 +9,8 @@ use crate::formats::viewable::{Scaling, is_scale};
 use crate::formats::{register, yaml, yaml_guard};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
-use crate::stages::saturation::{MASK_LAYER, samples_tell};
+use crate::stages::saturation::{MASK_LAYER, untold};
+use crate::units::QuantityKind;
 use std::path::Path;
 
 /// The metadata of a frame, and where they were found.
@@ -60,21 +63,48 @@ fn most_trusted(reader: &dyn SampleReader, name: &str, path: Option<&Path>, give
         let metadata = from_file(path)?;
         let shown = path.display().to_string();
         yaml::check_misspelt(&shown, &metadata)?;
-        doubt_of_metadata(&shown, metadata.contradictions());
+        // Ours were looked at when they were written, and a user may have changed them since.
+        let doubts = if metadata.history.is_empty() { Vec::new() } else { metadata.doubts() };
+        doubt_of_metadata(&shown, doubts.into_iter().chain(time_alone(&metadata)).chain(metadata.contradictions()));
         return Ok(Found { metadata, sidecar: None, place: FoundIn::Given(shown) });
     }
     if let Some(sidecar) = path.map(sidecar_path).filter(|sidecar| sidecar.is_file()) {
         let (metadata, shown) = (from_file(&sidecar)?, sidecar.display().to_string());
         // Another version may have written it: what is unknown is kept.
-        doubt_of_metadata(&shown, yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()));
+        let time = time_alone(&metadata).filter(|_| metadata.history.is_empty());
+        let doubts = yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()).chain(time);
+        let mut changed = changed_since(&metadata, reader);
+        if changed.is_empty() {
+            changed = tagged_otherwise(&metadata, reader);
+        }
+        doubt_of_metadata(&shown, doubts.chain(changed));
         return Ok(Found { metadata, sidecar: Some(shown.clone()), place: FoundIn::Sidecar(shown) });
     }
     if let Some(text) = reader.embedded() {
         let describes = reader.describes_samples().then(|| "its metadata".to_owned());
         let metadata = yaml::parse_metadata(name, text)?;
+        doubt_of_metadata(name, tagged_otherwise(&metadata, reader));
         return Ok(Found { metadata, sidecar: describes, place: FoundIn::Embedded });
     }
+    check_unit(reader.own_tags(), name)?;
     Ok(Found { metadata: reader.own_tags().clone(), sidecar: None, place: FoundIn::Tags })
+}
+
+/// Refuses samples that a file says are something else than codes and electrons, which most programs would take for codes.
+///
+/// # Errors
+///
+/// [`Error::Format`] naming the unit.
+fn check_unit(tags: &Metadata, name: &str) -> Result<()> {
+    if tags.quantity != QuantityKind::Unspecified || tags.unit == QuantityKind::Unspecified.unit() {
+        return Ok(());
+    }
+    let problem = format!(
+        "its samples are in `{}` (BUNIT), and neither in ADU (adu, dn, count) nor in electrons (electron, e-); if they are codes all \
+         the same, give metadata that say so, --metadata FILE with `quantity: adu`",
+        tags.unit
+    );
+    Err(Error::format(name, problem))
 }
 
 /// Where on the sensor a frame begins, of which its metadata say `told`: there, where the file itself does not say it. Where both do
@@ -123,6 +153,61 @@ pub(super) fn placed(
     ))
 }
 
+/// A warning of a time without an f-number that looks like another unit. Keywords and tags are in s by their standards.
+fn time_alone(metadata: &Metadata) -> Option<String> {
+    metadata.exposure_time_s.and_then(doubt_of_time)
+}
+
+/// Warnings of what a sidecar says otherwise than the metadata that our program wrote into the frame's file: it was changed since.
+fn changed_since(sidecar: &Metadata, reader: &dyn SampleReader) -> Vec<String> {
+    let own = reader.embedded().and_then(|text| yaml::parse_metadata("", text).ok());
+    let Some(own) = own.filter(|own| !own.history.is_empty()) else { return Vec::new() };
+    let exposure = |metadata: &Metadata| metadata.exposure.map(|told| [told.exposure_s, told.f_number]);
+    let [told, written] = [exposure(sidecar), exposure(&own)];
+    let parts = told.zip(written).into_iter().flat_map(|(told, written)| {
+        let named = ["exposure time in s", "f-number"].into_iter().zip(told.into_iter().zip(written));
+        named.filter(|(_, (told, written))| told != written).collect::<Vec<_>>()
+    });
+    let said = |(what, (told, written))| {
+        format!("its {what} is {told}, but {written} in the file of the frame; the sidecar counts")
+    };
+    parts.map(said).collect()
+}
+
+/// Warnings of tags that say another thing than the metadata of ours which come with them: another program changed one of the two.
+fn tagged_otherwise(metadata: &Metadata, reader: &dyn SampleReader) -> Vec<String> {
+    /// Tags hold numbers in few digits, and f-numbers by their names.
+    const SAME: f64 = 0.03;
+    let tags = reader.own_tags();
+    if metadata.history.is_empty() || tags == metadata {
+        return Vec::new();
+    }
+    let differ = |a: f64, b: f64| (a - b).abs() > SAME * a.abs().max(b.abs());
+    let mut found = Vec::new();
+    let mut compare = |what: &str, pair: Option<(f64, f64)>| {
+        if let Some((told, tagged)) = pair.filter(|(told, tagged)| differ(*told, *tagged)) {
+            found.push(format!("its {what} is {told}, but {tagged} by the tags of the file, which do not count"));
+        }
+    };
+    let aperture = |metadata: &Metadata| metadata.exposure.map(|exposure| exposure.f_number);
+    compare("exposure time in s", metadata.time_s().zip(tags.time_s()));
+    compare("f-number", aperture(metadata).zip(aperture(tags)));
+    // What was multiplied for viewers has other levels in the file.
+    if metadata.sample_scale.is_none() {
+        compare("black level in ADU", metadata.uniform_black_adu().zip(tags.uniform_black_adu()));
+    }
+    let first = |metadata: &Metadata, origin: [i32; 2]| {
+        let pattern = metadata.cfa.and_then(FilterArray::bayer)?;
+        Some([0, 1].map(|row| pattern.row_classes(origin, row)))
+    };
+    let own = reader.geometry().origin;
+    let classes = first(metadata, metadata.origin.unwrap_or(own)).zip(first(tags, own));
+    if classes.is_some_and(|(told, tagged)| told != tagged) {
+        found.push("its filter array is another by the tags of the file, which do not count".into());
+    }
+    found
+}
+
 /// Warnings of what a file of metadata says.
 fn doubt_of_metadata(name: &str, problems: impl IntoIterator<Item = String>) {
     problems.into_iter().for_each(|problem| register::doubt(format!("{name}: {problem}")));
@@ -153,14 +238,11 @@ pub(super) fn take_scaling(
     Ok(Scaling::of(reader.geometry().width, &reader.geometry().channels, scale))
 }
 
-/// A warning that pixels were made of saturated samples, where neither their level nor a layer tells which: TIFF has none.
+/// A warning that pixels were made of saturated samples, where neither their level nor a layer tells which: TIFF has none, and other
+/// programs drop those of EXR.
 pub(super) fn doubt_of_marks(header: &FrameHeader, stored: &Geometry) {
-    let is_told = samples_tell(header) || stored.channels.iter().any(|channel| channel == MASK_LAYER);
-    let saturated = header.metadata.samples.as_ref().and_then(|samples| samples.saturated);
-    if let Some(count) = saturated.filter(|count| *count > 0 && !is_told) {
-        register::doubt(format!(
-            "{}: {count} of its pixels were made of saturated samples, by its sidecar, and nothing marks which; EXR would",
-            header.name
-        ));
+    let is_marked = stored.channels.iter().any(|channel| channel == MASK_LAYER);
+    if let Some(pixels) = untold(header, is_marked) {
+        register::doubt(format!("{}: {pixels}, and nothing marks which; EXR would", header.name));
     }
 }

@@ -1,7 +1,9 @@
 //! Opens frames of any format, from files and pipes, with the metadata that belongs to them.
 
 mod codes;
+mod described;
 mod kept;
+mod levels;
 mod metadata;
 mod opening;
 mod options;
@@ -9,7 +11,9 @@ mod options;
 pub use options::{InputOptions, Linearizing};
 
 use self::codes::CodeCheck;
+use self::described::DigestCheck;
 use self::kept::{LEFT_OUT, cut, keep_planes, left_out, take_channel};
+use self::levels::LevelCheck;
 use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
 use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
 use super::digest::SamplesDigest;
@@ -20,6 +24,7 @@ use super::makers::{MakersReader, Worker};
 use super::sequence::Sequence;
 use super::viewable::Scaling;
 use super::{headerless, register, table, tiff};
+use crate::camera::levels::BlackLevel;
 use crate::camera::noise_profile::NoiseProfile;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
@@ -67,6 +72,8 @@ pub struct FrameReader {
     rows_read: usize,
     check: Option<DigestCheck>,
     codes: Option<CodeCheck>,
+    levels: Option<LevelCheck>,
+    said_black: Option<BlackLevel>,
     mismatch: Option<String>,
     buffer: Vec<f32>,
     /// What stored samples were multiplied with for viewers.
@@ -89,14 +96,6 @@ pub struct FrameReader {
     sequence: Option<Sequence>,
     /// Frames that follow in the same stream, at least.
     to_come: u64,
-}
-
-/// A digest to compare with once all samples are in.
-struct DigestCheck {
-    expected: String,
-    /// Who tells it, where that would be wrong.
-    sidecar: Option<String>,
-    digest: SamplesDigest,
 }
 
 impl FrameReader {
@@ -240,6 +239,8 @@ impl FrameReader {
             // A digest is one of all samples.
             check: check.filter(|_| options.crop.is_none()),
             codes: None,
+            levels: None,
+            said_black: None,
             mismatch: None,
             buffer: Vec::new(),
             scaling,
@@ -270,6 +271,11 @@ impl FrameReader {
     pub fn linearize(&mut self) -> Result<()> {
         self.linearize = Some(Linearize::of(&mut self.header)?);
         Ok(())
+    }
+
+    /// Takes a black level that a user says for what no light reads, where metadata tell none: a frame far below it is told.
+    pub fn expect_black(&mut self, black: BlackLevel) {
+        self.said_black = Some(black).filter(|_| self.header.metadata.black_level_adu.is_none());
     }
 
     /// How the file stores its samples, in a word: `u16`, `f32` …; `mixed` where channels differ.
@@ -406,19 +412,10 @@ impl FrameReader {
             None if below == 0 => self.reader.rest()?.end(&self.header.name)?,
             None => {}
         }
-        self.check_digest();
-        Ok(())
-    }
-
-    fn check_digest(&mut self) {
-        let Some(DigestCheck { expected, sidecar, digest }) = self.check.take() else { return };
-        if digest.finish() != expected {
-            let name = &self.header.name;
-            let by = sidecar.as_deref().unwrap_or("its digest");
-            let text = format!("{name}: its samples are not those that {by} describes; one of the two was changed");
-            sidecar.is_some().then(|| register::doubt(text.clone()));
-            self.mismatch = Some(text);
+        if let Some(check) = self.check.take() {
+            self.mismatch = check.end(&self.header.name);
         }
+        self.levels.as_mut().map_or(Ok(()), |levels| levels.end(&self.header))
     }
 }
 
@@ -439,7 +436,10 @@ impl RowSource for FrameReader {
         let mut buffer = std::mem::take(&mut self.buffer);
         if !self.has_begun {
             self.has_begun = true;
-            self.codes = CodeCheck::of(&self.header).filter(|_| self.linearize.is_none());
+            if self.linearize.is_none() {
+                (self.codes, self.levels) =
+                    (CodeCheck::of(&self.header), LevelCheck::of(&self.header, self.said_black));
+            }
             self.pass_over(self.corner[1], &mut buffer)?;
         }
         let stored = self.reader.geometry();
@@ -481,6 +481,7 @@ impl RowSource for FrameReader {
         }
         let header = &self.header;
         self.codes.as_mut().map_or(Ok(()), |codes| codes.look(&samples[first..], header))?;
+        self.levels.as_mut().map_or(Ok(()), |levels| levels.look(&samples[first..], header))?;
         if let Some(linearize) = &self.linearize {
             let row_samples = self.header.geometry.row_samples();
             samples[first..].chunks_exact_mut(row_samples).for_each(|row| linearize.apply(&mut row[..kept * width]));

@@ -171,6 +171,10 @@ mod tests {
             ],
             KeyPage::Matrix => vec![
                 ("", field_names::<CameraMatrix>()),
+                ("response.", field_names::<ResponseFiles>()),
+                ("response.quantum_efficiency.", field_names::<CurveFile>()),
+                ("response.relative_response.", field_names::<CurveFile>()),
+                ("response.cover_glass.", field_names::<CurveFile>()),
                 ("training.", field_names::<Training>()),
                 ("uncertainty.", field_names::<MatrixUncertainty>()),
                 // What stands in the record itself, and the four differences beside it.

@@ -221,7 +221,7 @@ fn colors(info: &Info<'_>) -> ColorTags {
     let named = |primaries: NamedPrimaries, encoding| ColorTags {
         primaries: Some(primaries.chromaticities()),
         encoding: Some(encoding),
-        unread: None,
+        ..ColorTags::default()
     };
     let unread = |what: String| ColorTags { unread: Some(what), ..ColorTags::default() };
     if let Some(code) = info.coding_independent_code_points {
@@ -259,7 +259,7 @@ fn colors(info: &Info<'_>) -> ColorTags {
     ColorTags {
         primaries: info.chrm_chunk.map(|at| [at.red, at.green, at.blue, at.white].map(point)),
         encoding: Some(exponent.filter(|power| power.is_finite()).map_or(Encoding::Srgb, Encoding::Power)),
-        unread: None,
+        ..ColorTags::default()
     }
 }
 

@@ -78,6 +78,8 @@ impl Fitting<'_> {
                 Some(column) => format!("{}, {column}", glass.file),
                 None => glass.file.clone(),
             }),
+            response: self.sensor.response.clone(),
+            pixel_pitch_um: self.sensor.readout.as_ref().and_then(|readout| readout.pixel_pitch_um),
             method: Some(self.fit.regression.name().into()),
             adu_per_e: self.sensor.readout.as_ref().map(|readout| readout.adu_per_e),
             unit: Some(MATRIX_UNIT.into()),

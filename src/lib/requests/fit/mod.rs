@@ -132,8 +132,9 @@ impl Fit {
         let fitting = Fitting { fit: self, sensor: &loaded.sensor, seen: &seen, responses, plan, exposure };
         let (fitted, trade_off) = fitting.fit()?;
         let mut notes = seen.notes.clone();
-        let long = self.exposure.exposure_s.and_then(|exposure_s| self.exposure.lens.exposed(exposure_s).ok()?.doubt());
-        notes.extend(doubts.into_iter().chain(long.map(Note::Warning)));
+        // A time that is chosen for each sample is not looked at.
+        let exposed = self.exposure.lens.exposed(self.exposure.exposure_s.unwrap_or(1.0))?;
+        notes.extend(doubts.into_iter().chain(exposed.doubts().map(Note::Warning)));
         notes.push(Note::Remark(format!(
             "fitted {} observations, condition number {:.1}",
             fitted.count, fitted.condition

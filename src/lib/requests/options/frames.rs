@@ -6,7 +6,7 @@ use crate::formats::headerless::Layout;
 use crate::formats::input::InputOptions;
 use crate::formats::output::{CompressionKind, Format, OutputOptions, SampleKind};
 use crate::formats::pipe;
-use crate::formats::places::{is_pattern, named, numbered, output_of};
+use crate::formats::places::{is_pattern, is_waited_on, named, numbered, output_of};
 use crate::formats::sequence::Sequence;
 use crate::metadata::FrameHeader;
 use crate::names::Named;
@@ -141,8 +141,7 @@ impl Output {
 
     /// Whether frames go one after another to one place: the standard output, a named pipe, a device.
     pub fn is_stream(&self) -> bool {
-        let takes_any = |path: &Path| std::fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir());
-        named(self.output.as_deref()).is_none_or(takes_any)
+        named(self.output.as_deref()).is_none_or(is_waited_on)
     }
 
     /// Makes sure that one frame, made of all that come, has one place.

@@ -116,7 +116,7 @@ pub struct PictureChoice {
     /// default
     #[arg(long, value_name = "NAME|FILE")]
     pub illuminant: Option<String>,
-    /// Luminance of R = G = B = 1 in cd/m2; 1000 by default
+    /// Luminance of R = G = B = 1 in cd/m2; by default what the file says (whiteLuminance), or 1000
     #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
     pub luminance: Option<f64>,
 }

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::formats::format::SampleType;
 use crate::formats::frame_list::{FrameKind, ListedFrame};
 use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::places::is_waited_on;
 use crate::metadata::{FrameHeader, TakenAs};
 use crate::requests::described::{Described, DescribedWithBlack};
 use crate::requests::notes::Note;
@@ -261,6 +262,11 @@ pub fn in_folder(folder: &Path) -> Result<Vec<ListedFrame>> {
         let end = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         if is_hidden || OTHERS.contains(&end.as_str()) {
             continue;
+        }
+        if is_waited_on(&path) {
+            let problem =
+                "it is neither a file nor a directory, and would be waited on; take it out of the folder of frames";
+            return Err(Error::format(&path.display().to_string(), problem));
         }
         if path.is_dir() {
             found.extend(in_folder(&path)?);

@@ -279,13 +279,12 @@ impl NoisePrediction {
         let observer = data::load_observer()?;
         let signals = signals(&library, &loaded.sensor, loaded.response()?, &observer, &WavelengthGrid::default())?;
         let base = self.exposure.chosen()?;
-        let long = base.doubt().filter(|_| self.level.expose_to.is_none());
         let exposing = match self.level.expose_to {
             Some(fraction) => SampleExposure::Filled { base, fraction, by: Filling::Time },
             None => SampleExposure::Fixed(base),
         };
         let mut notes: Vec<Note> =
-            warnings.into_iter().map(Note::Warning).chain(doubts).chain(long.map(Note::Warning)).collect();
+            warnings.into_iter().map(Note::Warning).chain(doubts).chain(base.doubts().map(Note::Warning)).collect();
         let color = self.color(&loaded.sensor, &mut notes)?;
         let one = |sample: usize| -> Result<SamplePrediction> {
             let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;
@@ -367,8 +366,8 @@ impl NoisePrediction {
             notes.push(Note::Warning(text));
         }
         let adu_per_e = sensor.readout.as_ref().map(|readout| readout.adu_per_e);
-        let doubt = matrix.doubt_of_gain(adu_per_e).map(|doubt| format!("{} {doubt}", path.display()));
-        notes.extend(doubt.map(Note::Warning));
+        let doubts = matrix.doubt_of_sensor(sensor).into_iter().chain(matrix.doubt_of_gain(adu_per_e));
+        notes.extend(doubts.map(|doubt| Note::Warning(format!("{} {doubt}", path.display()))));
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
         Ok(Some(ColorSettings {
             is_relative: matrix.is_relative(),

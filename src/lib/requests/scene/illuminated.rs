@@ -20,6 +20,9 @@ use crate::units::QuantityKind;
 /// Luminance of white where none is chosen, cd m⁻².
 const WHITE_LUMINANCE: f64 = 1000.0;
 
+/// Luminances that differ by no more are one; files hold them in 32 bits.
+const SAME_LUMINANCE: f64 = 1e-6;
+
 impl Scene {
     /// The pixels of a picture, or a chosen one, lit.
     pub(super) fn light_of_picture(&self, reader: FrameReader, sums: &Sums<'_>, found: &mut Found) -> Result<Light> {
@@ -45,11 +48,12 @@ impl Scene {
         let xyz_from_rgb = xyz_from_rgb(&primaries, upsampler.white()).ok_or_else(|| {
             header.refuse("its primaries lie on a line, or their white is none; give others with --primaries")
         })?;
-        let white_luminance = self.picture.luminance.unwrap_or(WHITE_LUMINANCE);
+        let told_luminance = reader.colors().white_luminance;
+        let white_luminance = self.picture.luminance.or(told_luminance).unwrap_or(WHITE_LUMINANCE);
         let (sampled_nm, white) = white_radiance(&light, &observer, white_luminance).ok_or_else(no_light)?;
         let seen = sums.camera(&sampled_nm, &format!("illuminant {illuminant}"), &mut found.notes)?;
         found.metadata.quadrature_error = seen.quadrature_error(&white);
-        self.tell(&header, illuminant, white_luminance, found);
+        self.tell(&header, illuminant, [self.picture.luminance, told_luminance], found);
         found.upsampling = Some(UpsamplingRecord {
             method: "jakob-hanika-2019".into(),
             encoding: encoding.to_string(),
@@ -88,7 +92,7 @@ impl Scene {
             QuantityKind::Srgb => ColorTags {
                 primaries: Some(NamedPrimaries::Srgb.chromaticities()),
                 encoding: Some(Encoding::Srgb),
-                unread: None,
+                ..ColorTags::default()
             },
             _ => {
                 let next = match header.metadata.quantity {
@@ -130,8 +134,10 @@ impl Scene {
         Ok((encoding, primaries))
     }
 
-    /// What a user should know of a scene of a picture.
-    fn tell(&self, header: &FrameHeader, illuminant: &str, white_luminance: f64, found: &mut Found) {
+    /// What a user should know of a scene of a picture; `luminances` of its white are the one chosen and the one that its file tells.
+    fn tell(&self, header: &FrameHeader, illuminant: &str, luminances: [Option<f64>; 2], found: &mut Found) {
+        let [chosen, told] = luminances;
+        let white_luminance = chosen.or(told).unwrap_or(WHITE_LUMINANCE);
         let name = &header.name;
         let others = &header.geometry.channels[3..];
         if !others.is_empty() {
@@ -144,9 +150,20 @@ impl Scene {
             "{name}: its spectra are made up by Jakob and Hanika (2019), metamers of its colors under d65; white has \
              {white_luminance} cd/m2 under {illuminant}"
         )));
-        if self.picture.luminance.is_none() {
-            let text = format!("{name}: white is taken to have {white_luminance} cd/m2; --luminance says otherwise");
-            found.notes.push(if self.level.expose_to.is_some() { Note::Remark(text) } else { Note::Warning(text) });
-        }
+        let known = match (chosen, told) {
+            (Some(chosen), Some(told)) if (chosen / told - 1.0).abs() > SAME_LUMINANCE => Some(Note::Warning(format!(
+                "{name}: its white has {told} cd/m2 by its own attribute (whiteLuminance), and {chosen} by --luminance, which counts"
+            ))),
+            (Some(_), _) => None,
+            (None, Some(told)) => {
+                Some(Note::Remark(format!("{name}: its white has {told} cd/m2 by its whiteLuminance")))
+            }
+            (None, None) => {
+                let text =
+                    format!("{name}: white is taken to have {white_luminance} cd/m2; --luminance says otherwise");
+                Some(if self.level.expose_to.is_some() { Note::Remark(text) } else { Note::Warning(text) })
+            }
+        };
+        found.notes.extend(known);
     }
 }

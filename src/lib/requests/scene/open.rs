@@ -4,7 +4,7 @@ use super::light::{ImageRows, Light, Pixels, SceneImage, brightest, checked, no_
 use super::picture;
 use super::request::Scene;
 use super::sums::{Found, Sums};
-use crate::camera::optics::Exposure;
+use crate::camera::optics::{Exposure, doubt_of_focal_length, doubt_of_time};
 use crate::camera::readout::ReadOut;
 use crate::camera::response::GridWeights;
 use crate::camera::sensor::Sensor;
@@ -43,7 +43,7 @@ impl Scene {
             exposure.exposure_s = 1.0;
         }
         let mut found = Found::none();
-        found.notes.extend(doubts.into_iter().chain(self.doubt(exposure).map(Note::Warning)));
+        found.notes.extend(doubts.into_iter().chain(self.doubts(exposure).map(Note::Warning)));
         let mut light = match self.level.given() {
             Some(electrons) => {
                 let source = if electrons == [0.0; 3] { "dark" } else { "--electrons" };
@@ -68,7 +68,7 @@ impl Scene {
             light.scale(exposure.exposure_s);
             brightest_e = Some(fraction * full_well_e);
             let text = format!("exposure {} s", exposure.exposure_s);
-            found.notes.push(match exposure.doubt() {
+            found.notes.push(match doubt_of_time(exposure.exposure_s) {
                 Some(_) => Note::Warning(format!("the scene takes an {text}; is the unit of its radiance right?")),
                 None => Note::Remark(text),
             });
@@ -78,9 +78,9 @@ impl Scene {
         Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, found })
     }
 
-    /// A warning of an exposure that was given.
-    fn doubt(&self, exposure: Exposure) -> Option<String> {
-        exposure.doubt().filter(|_| self.level.expose_to.is_none())
+    /// Warnings of an exposure and a lens that were given; a time that is to be chosen is 1 s here.
+    fn doubts(&self, exposure: Exposure) -> impl Iterator<Item = String> {
+        exposure.doubts().chain(self.vignetting_focal_length_mm().and_then(doubt_of_focal_length))
     }
 
     /// Opens the radiance at an exposure.
