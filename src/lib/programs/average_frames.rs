@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::propagation::{self, Equations};
 use crate::requests::averaging::{AverageRequest, SharedAverage};
 use crate::requests::described::DescribedInput;
-use crate::requests::independence::check_exposures;
+use crate::requests::independence::{check_copies, check_exposures};
 use crate::requests::options;
 use crate::stream::Counts;
 use clap::Parser;
@@ -40,6 +40,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     arguments.output.check_one()?;
     let frames = &arguments.input.frame;
     check_exposures(&frames.inputs)?;
+    check_copies(frames)?;
     let in_order = options::Output { makes: options::Makes::One, ..options::Output::default() };
     session.each_frame::<Arguments>(frames, &in_order, |turn| {
         // With its marks, and the layers of its uncertainty where they are the only ones.

@@ -4,6 +4,7 @@ use crate::cli;
 use crate::error::Result;
 use crate::formats::plots;
 use crate::report::{self, Findings, ReportFormat};
+use crate::requests::independence::check_copies;
 use crate::requests::options::{Makes, Output};
 use crate::requests::{self, described::DescribedInput, measurement::Measurement, values};
 use crate::stream::RowSource;
@@ -47,6 +48,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let output = arguments.output.as_deref();
     let format = report::form_of(arguments.output_format, output)?.unwrap_or(ReportFormat::Text);
     if let Some(statistics) = arguments.measurement.over_frames() {
+        check_copies(frames)?;
         let one = Output { makes: Makes::One, ..Output::default() };
         session.each_frame::<Arguments>(frames, &one, |turn| {
             let mut reader = arguments.input.with(turn.input.clone()).open_all()?;

@@ -52,6 +52,9 @@ const MOST_PEAKED: f64 = 6.0;
 /// a color is straight over it.
 const STRAIGHT: f64 = 1e-3;
 
+/// How far skewness and excess may move a variance, of itself: what further cumulants do is of the order of the square of that.
+const MOST_MOVED: f64 = 0.03;
+
 /// Why nothing is said where noise is larger.
 pub(super) const VOID: &str =
     "the noise of X, Y or Z is more than a tenth of it, too much to be propagated to a color that is curved in it";
@@ -84,6 +87,8 @@ pub(super) fn moments(
 ) -> Option<([f64; 3], Matrix3<f64>)> {
     let reference = Vector3::from(value(mean));
     let (mut first, mut second) = (Vector3::zeros(), Matrix3::zeros());
+    // The same as if all were normal.
+    let (mut normal, mut normal_square) = (Vector3::zeros(), Matrix3::zeros());
     for law in laws {
         let axes = law.covariance.symmetric_eigen();
         let largest = axes.eigenvalues.max().max(0.0);
@@ -99,18 +104,25 @@ pub(super) fn moments(
         for (x, of_x) in NODES {
             for (y, of_y) in NODES {
                 for (z, of_z) in NODES {
-                    let weight = of_x * of_y * of_z * (1.0 + shape.at([x, y, z]));
+                    let of_normal = of_x * of_y * of_z;
+                    let weight = of_normal * (1.0 + shape.at([x, y, z]));
                     let channels = Vector3::from(mean) + along * Vector3::new(x, y, z);
                     let offset = Vector3::from(value(channels.into())) - reference;
                     first += weight * offset;
                     second += weight * offset * offset.transpose();
+                    normal += of_normal * offset;
+                    normal_square += of_normal * offset * offset.transpose();
                 }
             }
         }
     }
     let count = laws.len() as f64;
     (first, second) = (first / count, second / count);
-    Some(((reference + first).into(), second - first * first.transpose()))
+    (normal, normal_square) = (normal / count, normal_square / count);
+    let covariance = second - first * first.transpose();
+    let of_normal = normal_square - normal * normal.transpose();
+    let is_told = |i: usize| (covariance[(i, i)] - of_normal[(i, i)]).abs() <= MOST_MOVED * of_normal[(i, i)];
+    (0..3).all(is_told).then(|| ((reference + first).into(), covariance))
 }
 
 /// The largest share of a channel that its noise is.

@@ -69,7 +69,7 @@ impl<'a> Ground<'a> {
             }
             _ => return Err(Unpredictable::Beyond("only electrons, ADU and what is made of them are predicted")),
         };
-        photosite.check_lines()?;
+        photosite.check_lines(true)?;
         photosite.check_level()?;
         Ok(Self { frame, photosite, smeared, quantity })
     }
@@ -122,10 +122,6 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
     let corrected = corrected(frame, codes)?;
     corrected.check_tails(expected_e)?;
     subtracted(correction.black_adu, correction.black_deltas)?;
-    let mut averages = corrected.darks.iter().flatten();
-    if averages.any(|dark| corrected.adc.is_some_and(|adc| dark.is_clipped_by_code(&adc, 0.0))) {
-        return Err(Unpredictable::Beyond(CLIPPED_BY_CODE));
-    }
     Ok(corrected)
 }
 
@@ -162,6 +158,10 @@ pub(super) fn corrected(frame: &FrameHeader, codes: Photosite) -> Predicted<Phot
     let mut corrected = codes.less_dark_frames(correction.dark_frames);
     if !correction.masters.is_empty() {
         corrected.darks = Dark::all(frame, &correction.masters, of_sensor).ok_or(unknown)?;
+    }
+    let mut averages = corrected.darks.iter().flatten();
+    if averages.any(|dark| corrected.adc.is_some_and(|adc| dark.is_clipped_by_code(&adc, 0.0))) {
+        return Err(Unpredictable::Beyond(CLIPPED_BY_CODE));
     }
     if let Some(flat) = &correction.flat {
         let adc = codes.adc.ok_or(Unpredictable::Missing("adc"))?;

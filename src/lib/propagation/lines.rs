@@ -55,7 +55,8 @@ const NO_MEANS: &str = "medians and clipped means of frames whose rows or column
 
 /// Why nothing is said of offsets that show how codes are rounded.
 const OFFSETS_SHOW: &str = "photosites have fixed offsets, and the noise of the dark frames, over less than a code, makes what they \
-                            leave of these hang on where in a code each mean lies";
+                            leave of these hang on where in a code each mean lies; more dark frames do not help, amplification before \
+                            the converter does";
 
 /// Why nothing is said of samples over a flat field.
 const NORMALIZED: &str = "it was divided by a flat field whose rows or columns share noise or gains, and how far these move its level \
@@ -118,12 +119,13 @@ impl Photosite {
         std::iter::once(&self.model).chain(self.darks.iter().flatten().chain(flat).map(|dark| &dark.model))
     }
 
-    /// Makes sure that formulas are known for what rows and columns share, and for fixed offsets.
+    /// Makes sure that formulas are known for what rows and columns share, and for fixed offsets, at a level that is known to a fraction of a
+    /// code, or is not.
     ///
     /// # Errors
     ///
     /// [`Unpredictable::Beyond`].
-    pub(super) fn check_lines(&self) -> Predicted<()> {
+    pub(super) fn check_lines(&self, is_level_known: bool) -> Predicted<()> {
         if self.models().all(|model| model.lines.is_none()) {
             return Ok(());
         }
@@ -142,7 +144,10 @@ impl Photosite {
             dark.model.offsets() > 0.0
                 && (of_dark.visible_median(dark, &adc).is_some() || self.rounds_as(&adc, 0.0, dark, &of_dark))
         };
-        if self.darks.iter().flatten().any(shows) {
+        // Those of photosites alone are integrated over.
+        let of_sites = |model: &NoiseModel| LineNoise { dsnu_e: 0.0, ..model.lines }.is_none();
+        let is_integrated = is_level_known && self.models().all(of_sites);
+        if !is_integrated && self.darks.iter().flatten().any(shows) {
             return Err(Unpredictable::Beyond(OFFSETS_SHOW));
         }
         Ok(())

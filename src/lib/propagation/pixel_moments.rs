@@ -101,6 +101,9 @@ impl PixelMoments {
     pub(super) fn curved(&self, local: &color::Local, value: impl Fn([f64; 3]) -> [f64; 3]) -> Option<Self> {
         let straight = self.through(&local.jacobian, 0.0);
         let further = self.beyond_weights();
+        if self.is_bent_by(&further) {
+            return None;
+        }
         let laws: [_; PHASES.len()] = std::array::from_fn(|phase| {
             let law = self.law(phase);
             PixelLaw { covariance: law.covariance + further, ..law }
@@ -115,6 +118,17 @@ impl PixelMoments {
         let straight = self.through(&local.jacobian, 0.0);
         let bias = local.bias(&self.covariance);
         Self { mean: [0, 1, 2].map(|i| local.value[i] + bias[i]), bias, ..straight }
+    }
+
+    /// Whether what smooth hue transition adds to the covariance in second order is so much that the third cumulants which it adds, about
+    /// three times the root of its share, show in what is curved in the channels.
+    fn is_bent_by(&self, further: &Matrix3<f64>) -> bool {
+        const SHOWS: f64 = 5e-3;
+        (0..3).any(|i| {
+            let variance = self.covariance[(i, i)].max(f64::MIN_POSITIVE);
+            let share = variance.sqrt() / self.mean[i].abs();
+            share * 3.0 * (further[(i, i)].abs() / variance).sqrt() > SHOWS
+        })
     }
 
     /// Cumulants of the channels of a pixel of one phase, by the weights.

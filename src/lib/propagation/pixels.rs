@@ -15,6 +15,7 @@ use super::repeated::average_of;
 use super::smooth_hue;
 use super::tapped::Axis;
 use super::taps;
+use crate::camera::levels::BlackLevel;
 use crate::camera::taps::Taps;
 use crate::cfa::Class;
 use crate::error::Result;
@@ -280,7 +281,7 @@ impl PixelNoise {
             places().map(|at| gains(table, at, &frame.geometry)).collect()
         };
         photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
-        photosite.check_lines().map_err(|why| frame.refuse(why.to_string()))?;
+        photosite.check_lines(false).map_err(|why| frame.refuse(why.to_string()))?;
         if photosite.drifts() {
             return Err(frame.refuse(DRIFTING));
         }
@@ -432,10 +433,32 @@ fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
         _ => {
             let adc = metadata.adc.unwrap_or_else(|| AdcRecord::of_readout(readout));
             let codes = corrected(frame, photosite.digitized(adc)).map_err(|why| frame.refuse(why.to_string()))?;
-            (codes, frame.uniform_black_adu()?)
+            let black_adu = frame.uniform_black_adu()?;
+            (codes, black_adu + dark_above(frame, &codes, &adc, black_adu))
         }
     };
     Ok(found)
+}
+
+/// What codes without light are above the black level of the metadata, in ADU. That of a camera is often the converter's, and counts no
+/// dark signal, as it is where bias frames alone came off; by the sensor of the frame's exposure, what no light reads is then known all
+/// the same. Simulated frames have it in their black level.
+fn dark_above(frame: &FrameHeader, codes: &Photosite, adc: &AdcRecord, black_adu: f64) -> f64 {
+    let metadata = &frame.metadata;
+    if metadata.noise.is_some() {
+        return 0.0;
+    }
+    let mean_of = |level: BlackLevel| level.sites().iter().sum::<f64>() / 4.0;
+    let off_adu = metadata.demosaic.as_ref().map_or(0.0, |record| mean_of(record.black))
+        + metadata.correction.as_ref().map_or(0.0, |record| mean_of(record.black_adu));
+    let unlit_adu = codes.moments(0.0).moments.mean - off_adu;
+    if codes.darks[0].is_some() {
+        return unlit_adu - black_adu;
+    }
+    // The black level is either that of the converter or that with the dark signal: the nearer of the two.
+    let converter_adu = adc.sample_at(0.0) - off_adu;
+    let is_of_converter = (black_adu - converter_adu).abs() < (black_adu - unlit_adu).abs();
+    if is_of_converter { unlit_adu - converter_adu } else { 0.0 }
 }
 
 /// The level above black below which the green of a frame demosaicked by smooth hue transition is less than

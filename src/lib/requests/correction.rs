@@ -360,7 +360,7 @@ impl Correction {
         Ok(OpenCorrection { stage, corrections, notes, range_adu, least_adu })
     }
 
-    /// Makes sure that no frame beside `light` is a copy of it.
+    /// Makes sure that no frame beside `light` is a copy of it, or of another.
     fn check_contents(&self, light: &Light) -> Result<()> {
         let kinds = [
             (Role::Dark, &self.dark),
@@ -369,8 +369,10 @@ impl Correction {
             (Role::FlatDark, &self.flat_dark),
         ];
         let beside = |role: Role| move |path: &PathBuf| (role, light.input.beside(path));
-        let others: Vec<_> = kinds.into_iter().flat_map(|(role, paths)| paths.iter().map(beside(role))).collect();
-        check_contents(&InputOptions { sequence: None, ..light.input.options() }, &others)
+        let itself = InputOptions { sequence: None, ..light.input.options() };
+        let others = kinds.into_iter().flat_map(|(role, paths)| paths.iter().map(beside(role)));
+        let files: Vec<_> = std::iter::once((Role::Light, itself)).chain(others).collect();
+        check_contents(&files)
     }
 
     /// How defective photosites are told, where they are: by a list or map, and in frames, beyond so many standard deviations.

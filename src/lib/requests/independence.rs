@@ -5,7 +5,9 @@ use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::places::place;
 use crate::metadata::{DrawnExposures, FrameHeader, TakenAs};
 use crate::random::Source;
+use crate::requests::options::Input;
 use crate::stream::RowSource;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// What a frame is taken for beside others.
@@ -64,6 +66,16 @@ impl Role {
 pub fn check_exposures(files: &[PathBuf]) -> Result<()> {
     let files: Vec<_> = files.iter().map(|file| (Role::Exposure, file.as_path())).collect();
     check_files(&files)
+}
+
+/// Makes sure that none of several exposures of a scene is a copy of another.
+///
+/// # Errors
+///
+/// Those of [`check_contents`].
+pub fn check_copies(frames: &Input) -> Result<()> {
+    let exposure = |file: &PathBuf| (Role::Exposure, frames.only(Some(file), None).options());
+    check_contents(&frames.inputs.iter().map(exposure).collect::<Vec<_>>())
 }
 
 /// Makes sure that no file is given twice where that would count as two frames.
@@ -183,38 +195,70 @@ impl Company {
 }
 
 /// Makes sure that none of some files has the very samples of another: noise is never drawn twice the same. Files whose samples are
-/// all of one level, and those whose metadata tell that they have no noise, or each its own, are alone in being alike.
+/// all of one level, and those whose metadata tell that they have no noise, or each its own, are alone in being alike. Pipes are not
+/// looked at.
 ///
 /// # Errors
 ///
 /// [`Error::Format`] for a copy; those of the files.
-pub fn check_contents(light: &InputOptions, others: &[(Role, InputOptions)]) -> Result<()> {
-    let is_file = |options: &InputOptions| options.path.as_deref().is_some_and(Path::is_file);
-    if !is_file(light) {
-        return Ok(());
-    }
-    for (role, other) in others.iter().filter(|(_, other)| is_file(other)) {
-        let [mut a, mut b] = [FrameReader::open(light)?, FrameReader::open(other)?];
-        if may_be_copies(a.header(), b.header()) && hold_the_same(&mut a, &mut b)? {
-            return Err(b.header().refuse(format!(
-                "its samples are those of {}, every one; a copy of the frame is not {}",
-                a.header().name,
-                role.in_words()
-            )));
+pub fn check_contents(files: &[(Role, InputOptions)]) -> Result<()> {
+    let mut known: HashMap<blake3::Hash, Vec<(Role, &InputOptions)>> = HashMap::new();
+    for (role, file) in files.iter().filter(|(_, file)| file.path.as_deref().is_some_and(Path::is_file)) {
+        let alike = known.entry(begin_of(file)?).or_default();
+        for (other, its) in alike.iter().filter(|(other, _)| !other.may_be(*role)) {
+            let [mut a, mut b] = [FrameReader::open(its)?, FrameReader::open(file)?];
+            if !may_be_copies(a.header(), b.header()) || !hold_the_same(&mut a, &mut b)? {
+                continue;
+            }
+            let what = match *other == Role::Light {
+                true => format!("a copy of the frame is not {}", role.in_words()),
+                false => "copies of one exposure do not count as two".into(),
+            };
+            return Err(b.header().refuse(format!("its samples are those of {}, every one; {what}", a.header().name)));
         }
+        alike.push((*role, file));
     }
     Ok(())
 }
 
-/// Whether two frames have the same samples, which are not all the same; they are read up to the first that differs.
+/// Samples by whose digest files are told apart before they are compared as a whole.
+const BEGIN_SAMPLES: usize = 1 << 16;
+
+/// A digest of the size of a frame and of its first rows.
+fn begin_of(file: &InputOptions) -> Result<blake3::Hash> {
+    let mut reader = FrameReader::open(file)?;
+    let geometry = reader.header().geometry.clone();
+    let natural = reader.natural_rows().max(1);
+    let rows = (BEGIN_SAMPLES / geometry.row_samples().max(1)).clamp(1, geometry.height.max(1));
+    let mut samples = Vec::new();
+    let mut read = 0;
+    while read < rows {
+        let step = natural.min(geometry.height - read);
+        reader.read(step, &mut samples)?;
+        read += step;
+    }
+    samples.truncate(rows * geometry.row_samples());
+    let mut digest = blake3::Hasher::new();
+    digest.update(format!("{}x{} {:?}", geometry.width, geometry.height, geometry.channels).as_bytes());
+    samples.iter().for_each(|sample| {
+        digest.update(&sample.to_bits().to_le_bytes());
+    });
+    Ok(digest.finalize())
+}
+
+/// Changes from sample to sample of exposures that are not alike by chance, which those of coarse codes without any are.
+const TELLING: usize = 16;
+
+/// Whether two frames have the same samples, which change from one to the next often enough to tell; they are read up to the first that
+/// differs.
 fn hold_the_same(a: &mut FrameReader, b: &mut FrameReader) -> Result<bool> {
     let (geometry, other) = (a.header().geometry.clone(), &b.header().geometry);
     if [geometry.width, geometry.height] != [other.width, other.height] || geometry.channels != other.channels {
         return Ok(false);
     }
     let step = geometry.step_rows(a.natural_rows().max(b.natural_rows())).max(1);
-    let (mut of_a, mut of_b, mut first, mut differs) = (Vec::new(), Vec::new(), None, false);
-    let mut read = 0;
+    let (mut of_a, mut of_b): (Vec<f32>, Vec<f32>) = (Vec::new(), Vec::new());
+    let (mut changes, mut read) = (0, 0);
     while read < geometry.height {
         let rows = step.min(geometry.height - read);
         of_a.clear();
@@ -224,11 +268,10 @@ fn hold_the_same(a: &mut FrameReader, b: &mut FrameReader) -> Result<bool> {
         if of_a != of_b {
             return Ok(false);
         }
-        let level = *first.get_or_insert(of_a[0]);
-        differs |= of_a.iter().any(|sample| *sample != level);
+        changes += of_a.windows(2).filter(|pair| pair[0] != pair[1]).count();
         read += rows;
     }
-    Ok(differs)
+    Ok(changes >= TELLING)
 }
 
 /// Exposures that differ by no more than this are the same, written with other digits.

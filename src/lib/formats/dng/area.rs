@@ -79,7 +79,7 @@ pub(super) fn active(file: &mut TiffFile, image: &RawImage) -> Result<Rectangle>
 ///
 /// # Errors
 ///
-/// When the tag is damaged.
+/// When the tag is damaged, or an area is not in the stored image.
 pub(super) fn masked(
     file: &mut TiffFile,
     image: &RawImage,
@@ -100,10 +100,16 @@ pub(super) fn masked(
         ]
     };
     let areas = given.map_or_else(beside, |given| given.as_chunks::<4>().0.to_vec());
+    let is_within = |[_, _, bottom, right]: &[u64; 4]| *bottom <= height && *right <= width;
+    if let Some([top, left, bottom, right]) = areas.iter().find(|area| !is_within(area)) {
+        return Err(file.problem(format!(
+            "it is damaged; its MaskedAreas, rows {top} to {bottom} and columns {left} to {right}, do not lie in the {width}x{height} \
+             samples that are stored"
+        )));
+    }
     let on_sensor = |[top, left, bottom, right]: [u64; 4]| {
-        let is_one = top < bottom && bottom <= height && left < right && right <= width;
         let [x, y] = [left + place[0] as u64, top + place[1] as u64];
-        is_one.then(|| [x, y, right - left, bottom - top].map(u64::cast_signed))
+        (top < bottom && left < right).then(|| [x, y, right - left, bottom - top].map(u64::cast_signed))
     };
     Ok(areas.into_iter().filter_map(on_sensor).collect())
 }

@@ -67,8 +67,8 @@ pub(super) fn doubt_of_black(image: &RawImage, active: Rectangle) -> Option<&'st
     let directory = image.directory();
     let is_masked = tags::MASKED_AREAS.is_in(directory) || active != Rectangle::whole(image.size);
     (is_masked && !tags::BLACK_LEVEL.is_in(directory)).then_some(
-        "it has masked photosites and no BlackLevel, which by DNG is then 0; look at what they read, `import-raw --crop full` and \
-         `correct-frame --black border`, or give --black",
+        "it has masked photosites and no BlackLevel, which by DNG is then 0; what they read comes off with `import-raw --crop full` and \
+         `correct-frame --black border`, and a level that is known with `correct-frame --black N`",
     )
 }
 
