@@ -60,8 +60,8 @@ pub(super) const VOID: &str =
     "the noise of X, Y or Z is more than a tenth of it, too much to be propagated to a color that is curved in it";
 
 /// Why nothing is said where a law is far from normal.
-pub(super) const FAR_FROM_NORMAL: &str = "the noise of codes, over a code or less, is too far from a normal law to be propagated to a \
-                                          color that is curved in it";
+pub(super) const FAR_FROM_NORMAL: &str = "its noise, of few codes or of hues that divide by a weak green, is too far from a normal law to \
+                                          be propagated to a color that is curved in it";
 
 /// Gauss and Hermite's nodes and weights for a standard normal variable: exact for polynomials of degree 13.
 pub(super) const NODES: [(f64, f64); 7] = [
