@@ -1,6 +1,7 @@
 """`correct-frame` against NumPy and Astropy: averages, clipping, scaling by exposure and Eq. 6, flat fields, defects."""
 
 import math
+import shutil
 import unittest
 
 import numpy as np
@@ -145,16 +146,48 @@ class Correction(ProgramCase):
             ("dark.raw", 0, 1),
             ("flat.raw", 8000, 8),
             ("flat-dark.raw", 0, 8),
+            ("even.raw", 16000, 1),
+            ("bias1.raw", 0, 1e-6),
+            ("bias2.raw", 0, 1e-6),
         ):
             expose(name, light_e, exposure)
-        words = ["--raw", "320x240:u16le", "--sensor", "own.yaml", "--dark", "dark.raw", "--flat", "flat.raw", "--flat-dark", "flat-dark.raw"]
-        self.run_program(["correct-frame", "-q", "light.raw", *words, "-o", "corrected.exr"])
-        planes = self.frame(["demosaic", "-q", "corrected.exr", "--sigma"])
-        for name, site in (("R", np.s_[::2, ::2]), ("B", np.s_[1::2, 1::2])):
-            there = planes[name][site]
-            told = np.mean(planes[f"sigma.{name}"][site].astype(float) ** 2)
-            # Five standard deviations of a variance of so many samples; the level of a pixel tells its noise to first order.
-            self.assertAlmostEqual(there.var() / told, 1, delta=5 * math.sqrt(2 / there.size) + 0.01)
+        # What bias frames or the converter's level leave of the dark signal is no light.
+        biases = ["--bias", "bias1.raw", "--bias", "bias2.raw"]
+        for words in (
+            ["--dark", "dark.raw", "--flat", "flat.raw", "--flat-dark", "flat-dark.raw"],
+            biases,
+            ["--black", bias],
+            [*biases, "--flat", "even.raw"],
+            ["--black", bias, "--flat", "even.raw"],
+        ):
+            how = ["--raw", "320x240:u16le", "--sensor", "own.yaml", *words]
+            self.run_program(["correct-frame", "-q", "light.raw", *how, "-o", "corrected.exr"])
+            planes = self.frame(["demosaic", "-q", "corrected.exr", "--sigma", "--sensor", "own.yaml"])
+            for name, site in (("R", np.s_[::2, ::2]), ("B", np.s_[1::2, 1::2])):
+                there = planes[name][site]
+                told = np.mean(planes[f"sigma.{name}"][site].astype(float) ** 2)
+                # Five standard deviations of a variance of so many samples; the level of a pixel tells its noise to first order.
+                with self.subTest(words=words, name=name):
+                    self.assertAlmostEqual(there.var() / told, 1, delta=5 * math.sqrt(2 / there.size) + 0.02)
+
+    def test_copies_are_refused(self):
+        self.codes("light.raw", 3000, 50)
+        self.many("dark", 3, 500, 12)
+        self.codes("dull1.raw", 500, 0)
+        self.codes("dull2.raw", 500, 0)
+        for end in ("", ".yaml"):
+            shutil.copy(self.directory / f"dark0.raw{end}", self.directory / f"copy.raw{end}")
+        for words in (["--dark", "dark0.raw", "--dark", "dark1.raw", "--dark", "copy.raw"], ["--bias", "dark0.raw", "--bias", "copy.raw"]):
+            failed = self.attempt(["correct-frame", "light.raw", "--raw", f"{SHAPE[1]}x{SHAPE[0]}:u16le", *words, "-o", "x.exr"])
+            self.assertEqual(failed.returncode, 1)
+            self.assertIn("copy.raw: its samples are those of dark0.raw, every one", failed.stderr.decode())
+        # Frames of one value are alike without being copies, and dark frames of frame and flats may be the same.
+        self.correct("--dark", "dull1.raw", "--dark", "dull2.raw")
+        self.many("flat", 1, 9000, 300)
+        self.correct("--dark", "dark0.raw", "--flat", "flat0.raw", "--flat-dark", "copy.raw")
+        raw = ["--raw", f"{SHAPE[1]}x{SHAPE[0]}:u16le"]
+        failed = self.attempt(["average-frames", "dark1.raw", "dark0.raw", "copy.raw", *raw, "-o", "x.exr"])
+        self.assertIn("copy.raw: its samples are those of dark0.raw, every one", failed.stderr.decode())
 
     def test_defects(self):
         light = self.codes("light.raw", 3000, 50)
