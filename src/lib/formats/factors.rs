@@ -6,7 +6,11 @@ use super::delimited;
 const MAX_COMMENTS: usize = 1000;
 
 /// What says that values are to be multiplied or divided; what was done to them is told in the past.
-const WORDS: [&str; 12] = [
+const WORDS: [&str; 16] = [
+    "values multiplied by",
+    "values scaled by",
+    "been multiplied by",
+    "in units of 10^",
     "scale factor",
     "scale_factor",
     "scalefactor",
@@ -51,6 +55,8 @@ mod tests {
             "multiply by 10",
             "values must be multiplied by 1e-3",
             "divide by 100",
+            "values multiplied by 1000",
+            "in units of 10^-4",
         ] {
             assert!(doubt_of_factor(&format!("# {line}\nnm,L\n400,1\n")).is_some(), "{line}");
         }

@@ -251,7 +251,8 @@ impl Photosite {
         let whole: f64 = budget.iter().sum();
         let told: f64 =
             Cause::ALL.iter().filter(|cause| !cause.is_fixed_pattern()).map(|cause| budget[*cause as usize]).sum();
-        let fixed = told - temporal.min(whole);
+        // What takes too long is no number, which `min` would drop.
+        let fixed = if temporal.is_nan() { temporal } else { told - temporal.min(whole) };
         if fixed.is_nan() || fixed.abs() > 1e-9 * whole {
             budget[Cause::Quantization as usize] -= fixed;
             budget[Cause::ClippedPattern as usize] += fixed;
@@ -367,7 +368,8 @@ impl Photosite {
             budget[Cause::Quantization as usize] = endless - charge;
             if !law.is_plain(adc) {
                 let patterns = sum_of(&budget, &PATTERNS) + sum_of(&budget, &OFFSETS);
-                let clipped = self.shared(adc, (expected_e, None), (self, None), false).light.min(whole) - patterns;
+                let fixed = self.shared(adc, (expected_e, None), (self, None), false).light;
+                let clipped = if fixed.is_nan() { fixed } else { fixed.min(whole) } - patterns;
                 let further = clipped - budget[Cause::ClippedPattern as usize];
                 let is_told = further.abs() > 1e-9 * patterns;
                 budget[Cause::ClippedPattern as usize] += if is_told { further } else { 0.0 };

@@ -246,11 +246,11 @@ mod tests {
         let v = p * (1.0 - p);
         let coin = Prediction::of_cumulants(p, v, v * (1.0 - 2.0 * p), v * (1.0 - 6.0 * v));
         let law = PixelLaw::of(weights.iter().map(|weights| (*weights, &coin)));
-        let mean = [0, 1, 2].map(|i| 5.0 + weights.iter().map(|weights| p * weights[i]).sum::<f64>());
+        let mean = [0, 1, 2].map(|i| 12.0 + weights.iter().map(|weights| p * weights[i]).sum::<f64>());
         let value = |[x, y, z]: [f64; 3]| [x * y, y * y, z * x];
         let (mut first, mut second) = (Vector3::zeros(), Matrix3::zeros());
         for ways in 0..64_u32 {
-            let mut channels = [5.0; 3];
+            let mut channels = [12.0; 3];
             let mut probability = 1.0;
             for (coin, weights) in weights.iter().enumerate() {
                 let shows = f64::from(ways >> coin & 1);

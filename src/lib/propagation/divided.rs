@@ -20,6 +20,19 @@ const LEAST_CODES: f64 = 0.5;
 /// Relative variance of a flat field beyond which dividing by it follows no series.
 const MOST_NOISE: f64 = 0.01;
 
+/// The same to first order, and the share of photosites at most whose flat field is noisier.
+const MOST_NOISE_AT_ALL: f64 = 0.1;
+const MOST_LEFT_OUT: f64 = 0.01;
+
+/// How far dividing by a flat field is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Series {
+    /// As [`Photosite::divided`] says.
+    Exact,
+    /// Where the flat field of few photosites is too noisy for that.
+    FirstOrder,
+}
+
 impl Photosite {
     /// Moments of the class R, G or B after division by the flat field: with A what is left of the codes and F the flat
     /// field at a photosite, ⟨F⟩ the mean of the class,
@@ -36,6 +49,11 @@ impl Photosite {
     /// The same beside what is drawn anew in each frame that is divided by one flat field, less the same dark frames; what it
     /// differs by among photosites has the noise of the flat field in it.
     pub(super) fn divided_over(&self, class: usize, expected_e: f64) -> Option<(Prediction, Temporal)> {
+        self.divided_by(class, expected_e, Series::Exact)
+    }
+
+    /// The same, exact or to first order of the noise of flat fields.
+    fn divided_by(&self, class: usize, expected_e: f64, series: Series) -> Option<(Prediction, Temporal)> {
         let (adc, flat) = (self.adc?, self.flat?);
         let light_e = flat.expected_e[class];
         let mut averages = self.darks.iter().chain(&flat.darks).flatten();
@@ -50,6 +68,7 @@ impl Photosite {
         let in_both: Vec<[Dark; 2]> = flat.in_both(&self.darks).collect();
         let [lights, darks] = [self.model.response(), self.model.dcnu].map(sensitivities);
         let mut sums = [0.0; 7];
+        let mut left_out = 0.0;
         let (mut unlike, mut of_flat_noise, mut rounding) = (UnlikeSums::default(), 0.0, 0.0);
         for (&(x, of_x), &(u, of_u)) in lights.iter().flat_map(|x| darks.iter().map(move |u| (x, u))) {
             let site = [x, u];
@@ -64,8 +83,14 @@ impl Photosite {
             }
             let f = below.mean;
             let (rho, skew) = (below.variance / (f * f), below.third / f.powi(3));
-            if rho > MOST_NOISE {
-                return None;
+            match series {
+                Series::Exact if rho > MOST_NOISE => return None,
+                // What few photosites, which their dark signal leaves hardly any light, make of the light is no ordinary pixel.
+                Series::FirstOrder if rho > MOST_NOISE_AT_ALL => {
+                    left_out += of_x * of_u;
+                    continue;
+                }
+                _ => {}
             }
             let of_both = |[a, b]: &[Dark; 2]| a.weight * b.weight * a.drawn(&adc, 0.0, site).variance;
             let both = in_both.iter().map(of_both).sum::<f64>() / f;
@@ -88,6 +113,9 @@ impl Photosite {
             }
         }
         let [weight, sums @ ..] = sums;
+        if left_out > MOST_LEFT_OUT * (weight + left_out) {
+            return None;
+        }
         let [first, square, scale, third, above, of_flat] = sums.map(|sum| sum / weight);
         let mean = first * scale;
         let variance = ((square - first * first) * scale * scale).max(0.0);
@@ -133,6 +161,9 @@ impl Photosite {
             return divided.moments.variance;
         }
         let own = self.moments(expected_e).moments.variance;
+        if let Some((divided, _)) = self.divided_by(class, expected_e, Series::FirstOrder) {
+            return divided.moments.variance;
+        }
         let (Some(adc), Some(flat)) = (self.adc, self.flat) else { return own };
         let below = flat.frames.drawn(&adc, flat.expected_e[class], [1.0; 2]).less(&flat.darks, &adc, [1.0; 2]);
         let level = expected_e * adc.adu_per_e;

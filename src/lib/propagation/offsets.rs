@@ -17,8 +17,8 @@ use crate::metadata::AdcRecord;
 use crate::numerics::normal::density;
 use crate::numerics::rounding::REACH;
 
-/// Steps at most, where there is next to no read noise.
-const MOST_STEPS: f64 = 4096.0;
+/// Steps at most; where there is next to no read noise, means follow offsets by steps of their own, and more would be needed.
+const MOST_STEPS: f64 = 16_384.0;
 
 /// Evaluations beyond which nothing is said.
 const MOST: u64 = 30_000_000;
@@ -51,13 +51,19 @@ impl Photosite {
     }
 }
 
+/// What is no number, as it takes too long.
+const TOO_LONG: Shared = Shared { light: f64::NAN, dark: f64::NAN, both: f64::NAN, median: None };
+
 /// What two laws share whose readings are off by σ z and σ' z, z normal.
 fn over_offsets(seen: &[Seen; 2], sigmas: &[f64; 2]) -> Shared {
     // Medians scatter less.
     let narrowing = |k: usize| seen[k].median_of.map_or(1.0, |count| f64::from(count).sqrt());
     let steepness = |k: usize| sigmas[k] * narrowing(k) / seen[k].law.read_noise_e.max(1e-9);
     let steepest = steepness(0).max(steepness(1));
-    let step = ((1.0 + steepest * steepest).sqrt().recip() / 1.3).max(2.0 * REACH / MOST_STEPS);
+    let step = (1.0 + steepest * steepest).sqrt().recip() / 1.3;
+    if step < 2.0 * REACH / MOST_STEPS {
+        return TOO_LONG;
+    }
     let has_patterns = seen.iter().any(|seen| seen.law.light.pattern > 0.0 || seen.law.dark.pattern > 0.0);
     let sums = effort::within(MOST, || {
         let (mut means, mut products, mut moments) = ([0.0; 2], [0.0; 3], [0.0; 4]);
@@ -88,7 +94,7 @@ fn over_offsets(seen: &[Seen; 2], sigmas: &[f64; 2]) -> Shared {
         (means, products, moments)
     });
     let Some(([light, dark], products, moments)) = sums else {
-        return Shared { light: f64::NAN, dark: f64::NAN, both: f64::NAN, median: None };
+        return TOO_LONG;
     };
     let both = products[2] - light * dark;
     let variance = |square: f64, mean: f64| (square - mean * mean).max(0.0);

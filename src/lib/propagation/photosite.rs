@@ -21,6 +21,12 @@ const MANY_CODES: f64 = 2.5;
 /// e^(−2π²σ²) of the little that they have, 2·10⁻⁴.
 const VISIBLE_IN_BOTH: f64 = 0.65;
 
+/// Codes of an electron from which counts lie at few places in a code, so that they do not blur how codes are rounded.
+const WHOLE_CODES: f64 = 0.5;
+
+/// Skewness of what is drawn anew from which a median is no longer that of a normal law.
+const SKEW: f64 = 0.15;
+
 /// What a photosite's samples follow from, but for the light that reaches it.
 ///
 /// # Examples
@@ -223,18 +229,26 @@ impl Photosite {
     /// How many dark frames a median is of that scatters over less than a code, and its photosites over few.
     pub(super) fn visible_median(&self, dark: &Dark, adc: &AdcRecord) -> Option<u32> {
         let is_median = self.equations == Equations::Exact && dark.combine == Combine::Median && dark.frames > 2;
-        let is_fine = || dark.std_codes(adc, 0.0) * dark.kept()[0].sqrt() < VISIBLE;
+        // Few electrons are no normal law either.
+        let variance = dark.std_codes(adc, 0.0).powi(2);
+        let is_skewed = self.temporal_third(adc) > SKEW * variance.powf(1.5);
+        let is_fine = || dark.std_codes(adc, 0.0) * dark.kept()[0].sqrt() < VISIBLE || is_skewed;
         (is_median && is_fine() && adc.adu_per_e * self.dark_pattern().sqrt() < MANY_CODES).then_some(dark.frames)
     }
 
     /// Whether roundings of its codes and of those of dark frames have something in common: neither scatters over codes from
     /// exposure to exposure, nor does light from photosite to photosite.
     pub(super) fn rounds_as(&self, adc: &AdcRecord, expected_e: f64, dark: &Dark, of_dark: &Self) -> bool {
-        let own = Dark::mean_of(self.model, 1).std_codes(adc, expected_e);
+        // Whole electrons that are codes or more do not blur them: what does is read noise.
+        let blur = |site: &Self, std_codes: f64| match adc.adu_per_e < WHOLE_CODES {
+            true => std_codes,
+            false => adc.adu_per_e * site.model.read_noise(),
+        };
+        let own = blur(self, Dark::mean_of(self.model, 1).std_codes(adc, expected_e));
         let light = adc.adu_per_e * self.pattern(self.model.response()).sqrt() * expected_e;
         self.equations == Equations::Exact
             && (of_dark.model.dark_e * of_dark.model.dcnu > 0.0 || of_dark.model.offsets() > 0.0)
-            && own.hypot(dark.std_codes(adc, 0.0)) < VISIBLE_IN_BOTH
+            && own.hypot(blur(of_dark, dark.std_codes(adc, 0.0))) < VISIBLE_IN_BOTH
             && light < MANY_CODES / 2.0
     }
 

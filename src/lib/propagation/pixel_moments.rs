@@ -104,10 +104,10 @@ impl PixelMoments {
         if self.is_bent_by(&further) {
             return None;
         }
-        let laws: [_; PHASES.len()] = std::array::from_fn(|phase| {
-            let law = self.law(phase);
-            PixelLaw { covariance: law.covariance + further, ..law }
-        });
+        // What rows and columns share is in the covariance alone: it is normal.
+        let covariances = self.phase_covariances();
+        let laws: [_; PHASES.len()] =
+            std::array::from_fn(|phase| PixelLaw { covariance: covariances[phase], ..self.law(phase) });
         let (mean, covariance) = curved::moments(self.mean, &laws, value)?;
         Some(Self { mean, bias: [0, 1, 2].map(|i| mean[i] - local.value[i]), covariance, ..straight })
     }
@@ -131,7 +131,7 @@ impl PixelMoments {
         })
     }
 
-    /// Cumulants of the channels of a pixel of one phase, by the weights.
+    /// Cumulants of the channels of a pixel of one phase, by the weights, as if all photosites were drawn apart.
     fn law(&self, phase: usize) -> PixelLaw {
         let offsets = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| [x, y]));
         PixelLaw::of(offsets.map(|offset| {

@@ -455,10 +455,10 @@ fn dark_above(frame: &FrameHeader, codes: &Photosite, adc: &AdcRecord, black_adu
     if codes.darks[0].is_some() {
         return unlit_adu - black_adu;
     }
-    // The black level is either that of the converter or that with the dark signal: the nearer of the two.
-    let converter_adu = adc.sample_at(0.0) - off_adu;
-    let is_of_converter = (black_adu - converter_adu).abs() < (black_adu - unlit_adu).abs();
-    if is_of_converter { unlit_adu - converter_adu } else { 0.0 }
+    // A level from that of the converter on, or a little below it, up to that with the dark signal counts not all of this.
+    let dark_adu = unlit_adu - (adc.sample_at(0.0) - off_adu);
+    let short_adu = unlit_adu - black_adu;
+    if (0.0..=1.5 * dark_adu).contains(&short_adu) { short_adu } else { 0.0 }
 }
 
 /// The level above black below which the green of a frame demosaicked by smooth hue transition is less than

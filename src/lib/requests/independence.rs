@@ -246,8 +246,10 @@ fn begin_of(file: &InputOptions) -> Result<blake3::Hash> {
     Ok(digest.finalize())
 }
 
-/// Changes from sample to sample of exposures that are not alike by chance, which those of coarse codes without any are.
+/// Changes from sample to sample of exposures that are not alike by chance: so many, and such a share of all samples. Those of coarse
+/// codes, whose changes are stuck photosites and patterns, may be.
 const TELLING: usize = 16;
+const TELLING_SHARE: f64 = 0.05;
 
 /// Whether two frames have the same samples, which change from one to the next often enough to tell; they are read up to the first that
 /// differs.
@@ -271,7 +273,8 @@ fn hold_the_same(a: &mut FrameReader, b: &mut FrameReader) -> Result<bool> {
         changes += of_a.windows(2).filter(|pair| pair[0] != pair[1]).count();
         read += rows;
     }
-    Ok(changes >= TELLING)
+    let samples = (geometry.row_samples() * geometry.height) as f64;
+    Ok(changes >= TELLING && changes as f64 >= TELLING_SHARE * samples)
 }
 
 /// Exposures that differ by no more than this are the same, written with other digits.

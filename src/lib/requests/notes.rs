@@ -91,7 +91,10 @@ pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
     );
     let remarks = std::iter::once(found).chain(reader.notes().iter().cloned()).map(Note::Remark);
     // Where a program of ours wrote the metadata, it has warned already.
-    let doubts = if header.metadata.history.is_empty() { header.metadata.doubts() } else { Vec::new() };
+    let mut said = header.metadata.clone();
+    // Seconds of tags are seconds.
+    said.exposure = said.exposure.filter(|exposure| reader.tagged_exposure() != Some(*exposure));
+    let doubts = if said.history.is_empty() { said.doubts() } else { Vec::new() };
     let doubts = doubts.into_iter().map(|doubt| format!("{}: {doubt}", header.name));
     remarks.chain(doubts.map(Note::Warning)).chain(of_levels(header)).collect()
 }

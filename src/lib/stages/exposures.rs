@@ -1,7 +1,7 @@
 //! Exposures of one scene by one camera: whether frames that come one after another are.
 
 use crate::error::{Error, Result};
-use crate::metadata::{Difference, DrawnExposures, ExposureSet, FrameHeader, Metadata};
+use crate::metadata::{Difference, DrawnExposures, ExposureSet, FrameHeader, Metadata, SamplesRecord};
 use std::collections::HashMap;
 
 /// What is known of exposures that came so far.
@@ -156,7 +156,9 @@ fn blacks(frame: &FrameHeader) -> Metadata {
 
 /// The digest of samples with noise, where the sidecar tells it.
 fn digest(frame: &FrameHeader) -> Option<String> {
-    frame.metadata.samples.as_ref().filter(|_| frame.is_noisy()).map(|samples| samples.digest.clone())
+    // Numbers of exposures that were drawn tell them apart, and samples of one value tell nothing.
+    let is_told = |samples: &&SamplesRecord| frame.is_noisy() && frame.metadata.noise.is_none() && !samples.one_value;
+    frame.metadata.samples.as_ref().filter(is_told).map(|samples| samples.digest.clone())
 }
 
 /// The error of fewer than two.

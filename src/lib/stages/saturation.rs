@@ -198,14 +198,15 @@ pub fn untold(frame: &FrameHeader, is_marked: bool) -> Option<String> {
     if is_marked || samples_tell(frame) {
         return None;
     }
-    let counted = frame.metadata.samples.as_ref().and_then(|samples| samples.saturated).filter(|count| *count > 0);
-    if let Some(count) = counted {
-        return Some(format!("{count} of its pixels were made of saturated samples, by its sidecar"));
+    if let Some(samples) = &frame.metadata.samples {
+        let counted = samples.saturated.filter(|count| *count > 0)?;
+        return Some(format!("{counted} of its pixels were made of saturated samples, by its sidecar"));
     }
     let pixels = frame.geometry.width as f64 * frame.geometry.height as f64;
     let share = frame.metadata.saturated_share.filter(|share| share * pixels >= LEAST_PIXELS)?;
     let percent = 100.0 * share;
-    Some(format!("{percent:.2e} % of its pixels are made of saturated samples, by the law of its scene"))
+    let percent = if percent >= 0.1 { format!("{percent:.1}") } else { format!("{percent:.1e}") };
+    Some(format!("{percent} % of its pixels are made of saturated samples, by the law of its scene"))
 }
 
 /// The head of a frame that has the layer of marks behind its channels.

@@ -103,7 +103,7 @@ fn quantity_of_unit(unit: &str) -> QuantityKind {
         "analogtodigitalunits",
     ];
     const ELECTRONS: [&str; 7] = ["electron", "electrons", "elec", "electr", "e-", "e", "el"];
-    let lower = unit.to_ascii_lowercase();
+    let lower = unit.to_ascii_lowercase().replace(" / ", "/").replace("/ ", "/").replace(" /", "/");
     let of_pixel = ["/pixel", "/pix", " pixel-1", " pix-1", " per pixel", " pixel**-1", " pix**-1"];
     let bare = of_pixel.iter().find_map(|end| lower.strip_suffix(end)).unwrap_or(&lower);
     let bare: String = bare.chars().filter(|letter| !" _".contains(*letter)).collect();

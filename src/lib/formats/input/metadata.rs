@@ -195,6 +195,9 @@ fn tagged_otherwise(metadata: &Metadata, reader: &dyn SampleReader) -> Vec<Strin
     // What was multiplied for viewers has other levels in the file.
     if metadata.sample_scale.is_none() {
         compare("black level in ADU", metadata.uniform_black_adu().zip(tags.uniform_black_adu()));
+        let white = |metadata: &Metadata| metadata.white_level_adu.map(|white| white.largest());
+        let are_codes = metadata.quantity == QuantityKind::Adu && metadata.correction.is_none();
+        compare("white level in ADU", white(metadata).zip(white(tags)).filter(|_| are_codes));
     }
     let first = |metadata: &Metadata, origin: [i32; 2]| {
         let pattern = metadata.cfa.and_then(FilterArray::bayer)?;

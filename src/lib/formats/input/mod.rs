@@ -26,6 +26,7 @@ use super::viewable::Scaling;
 use super::{headerless, register, table, tiff};
 use crate::camera::levels::BlackLevel;
 use crate::camera::noise_profile::NoiseProfile;
+use crate::camera::optics::Exposure;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
@@ -286,6 +287,11 @@ impl FrameReader {
     /// The type of the stored samples; none where channels differ in it.
     pub fn sample_type(&self) -> Option<SampleType> {
         self.reader.stored_as()
+    }
+
+    /// The exposure by the file's own tags, whose units are the format's.
+    pub fn tagged_exposure(&self) -> Option<Exposure> {
+        self.reader.own_tags().exposure
     }
 
     /// What the file's tags say of its colors.
