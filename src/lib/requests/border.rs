@@ -56,11 +56,10 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     let above = |of_line: &[(usize, f32)], off: f64| -> Vec<f32> {
         of_line.iter().map(|(site, sample)| to_sample(f64::from(*sample) - levels[*site] - off)).collect()
     };
-    let off = |of_line: &Vec<(usize, f32)>| match border {
-        Border::Whole => Some(0.0),
-        _ => (!of_line.is_empty()).then(|| average(Combine::Clipped, &mut above(of_line, 0.0), CLIP).0),
+    let offs: Vec<Option<f64>> = match border {
+        Border::Whole => vec![Some(0.0); lines.len()],
+        _ => offs_of(&lines.iter().map(|of_line| above(of_line, 0.0)).collect::<Vec<_>>()),
     };
-    let offs: Vec<Option<f64>> = lines.iter().map(off).collect();
     let noise = noise(border, counts, &lines, |line| above(&lines[line], offs[line].unwrap_or_default()));
     // Counted from the sensor's corner.
     let deltas = |first: i32, what: &str| {
@@ -138,6 +137,28 @@ impl Masked {
     }
 }
 
+/// What lines are off by: the mean of what lies within [`CLIP`] standard deviations of their median; none of an empty one. The deviation
+/// is that of the photosites of all lines about the medians of theirs: of few photosites none lies far out by its own, which a hot one
+/// makes.
+fn offs_of(lines: &[Vec<f32>]) -> Vec<Option<f64>> {
+    let median = |line: &Vec<f32>| (!line.is_empty()).then(|| average(Combine::Median, &mut line.clone(), CLIP).0);
+    let medians: Vec<Option<f64>> = lines.iter().map(median).collect();
+    let about = |(line, median): (&Vec<f32>, &Option<f64>)| -> Vec<f32> {
+        median.iter().flat_map(|median| line.iter().map(move |sample| to_sample(f64::from(*sample) - median))).collect()
+    };
+    let mut left: Vec<f32> = lines.iter().zip(&medians).flat_map(about).collect();
+    let told = medians.iter().flatten().count();
+    let degrees = left.len().saturating_sub(told).max(1) as f64 / left.len().max(1) as f64;
+    let reach = CLIP * (clipped_variance(&mut left, CLIP) / degrees).sqrt();
+    let off = |(line, median): (&Vec<f32>, &Option<f64>)| {
+        let median = (*median)?;
+        let near: Vec<f64> =
+            line.iter().map(|sample| f64::from(*sample)).filter(|sample| (sample - median).abs() <= reach).collect();
+        Some(if near.is_empty() { median } else { near.iter().sum::<f64>() / near.len() as f64 })
+    };
+    lines.iter().zip(&medians).map(off).collect()
+}
+
 /// What such a black level is uncertain by: samples scatter about the level of their site and what their line is off, which is
 /// none of it.
 fn noise(
@@ -173,4 +194,27 @@ fn range_of(off: &[f64]) -> String {
     let [low, high] =
         off.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], off| [low.min(*off), high.max(*off)]);
     format!("{low:.3} to {high:.3} ADU")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One hot photosite among eight of a line; lines without any.
+    #[test]
+    fn a_hot_photosite_moves_no_line() {
+        let noise = |line: usize, x: usize| to_sample(((line * 37 + x * 101) % 13) as f64 - 6.0);
+        let mut lines: Vec<Vec<f32>> = (0..40).map(|line| (0..8).map(|x| noise(line, x)).collect()).collect();
+        let plain = offs_of(&lines);
+        for (line, off) in plain.iter().enumerate() {
+            let mean = lines[line].iter().map(|sample| f64::from(*sample)).sum::<f64>() / 8.0;
+            assert!((off.unwrap() - mean).abs() < 1e-12);
+        }
+        lines[20][3] = 1300.0;
+        lines.push(Vec::new());
+        let found = offs_of(&lines);
+        let others: f64 = [0, 1, 2, 4, 5, 6, 7].iter().map(|x| f64::from(noise(20, *x))).sum::<f64>() / 7.0;
+        assert!((found[20].unwrap() - others).abs() < 1e-12, "{:?}", found[20]);
+        assert_eq!((found[19], found[40]), (plain[19], None));
+    }
 }
