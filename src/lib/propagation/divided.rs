@@ -17,13 +17,6 @@ pub(super) const NARROW: &str = "what was divided by a flat field, or the flat f
 /// 4σ² e^(−2π²σ²), 1 % of it, and less where patterns spread it.
 const LEAST_CODES: f64 = 0.5;
 
-/// Relative variance of a flat field beyond which dividing by it follows no series.
-const MOST_NOISE: f64 = 0.01;
-
-/// The same to first order, and the share of photosites at most whose flat field is noisier.
-const MOST_NOISE_AT_ALL: f64 = 0.1;
-const MOST_LEFT_OUT: f64 = 0.01;
-
 /// How far dividing by a flat field is followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Series {
@@ -31,6 +24,25 @@ enum Series {
     Exact,
     /// Where the flat field of few photosites is too noisy for that.
     FirstOrder,
+}
+
+impl Series {
+    /// Relative variance of a flat field beyond which dividing by it follows no series.
+    fn most_noise(self) -> f64 {
+        match self {
+            Self::Exact => 0.01,
+            Self::FirstOrder => 0.1,
+        }
+    }
+
+    /// The share of photosites at most whose flat field is noisier: what they, which their dark signal leaves hardly any light, make of
+    /// the light is no ordinary pixel.
+    fn most_left_out(self) -> f64 {
+        match self {
+            Self::Exact => 0.0,
+            Self::FirstOrder => 0.01,
+        }
+    }
 }
 
 impl Photosite {
@@ -56,13 +68,7 @@ impl Photosite {
     fn divided_by(&self, class: usize, expected_e: f64, series: Series) -> Option<(Prediction, Temporal)> {
         let (adc, flat) = (self.adc?, self.flat?);
         let light_e = flat.expected_e[class];
-        let mut averages = self.darks.iter().chain(&flat.darks).flatten();
-        let is_smooth = |dark: &Dark, expected_e: f64| self.of_dark(dark).is_smooth(dark, &adc, expected_e);
-        let is_open = self.is_open(&adc, expected_e)
-            && self.of_dark(&flat.frames).is_open(&adc, light_e)
-            && is_smooth(&flat.frames, light_e)
-            && averages.all(|dark| self.of_dark(dark).is_open(&adc, 0.0) && is_smooth(dark, 0.0));
-        if !is_open {
+        if !self.is_all_open(&adc, &flat, [expected_e, light_e]) {
             return None;
         }
         let in_both: Vec<[Dark; 2]> = flat.in_both(&self.darks).collect();
@@ -83,14 +89,9 @@ impl Photosite {
             }
             let f = below.mean;
             let (rho, skew) = (below.variance / (f * f), below.third / f.powi(3));
-            match series {
-                Series::Exact if rho > MOST_NOISE => return None,
-                // What few photosites, which their dark signal leaves hardly any light, make of the light is no ordinary pixel.
-                Series::FirstOrder if rho > MOST_NOISE_AT_ALL => {
-                    left_out += of_x * of_u;
-                    continue;
-                }
-                _ => {}
+            if rho > series.most_noise() {
+                left_out += of_x * of_u;
+                continue;
             }
             let of_both = |[a, b]: &[Dark; 2]| a.weight * b.weight * a.drawn(&adc, 0.0, site).variance;
             let both = in_both.iter().map(of_both).sum::<f64>() / f;
@@ -113,7 +114,7 @@ impl Photosite {
             }
         }
         let [weight, sums @ ..] = sums;
-        if left_out > MOST_LEFT_OUT * (weight + left_out) {
+        if left_out > series.most_left_out() * (weight + left_out) {
             return None;
         }
         let [first, square, scale, third, above, of_flat] = sums.map(|sum| sum / weight);
@@ -135,6 +136,17 @@ impl Photosite {
             lines: LineCovariance::default(),
         };
         Some((Prediction { common: off / flat.photosites[class].max(1.0), ..prediction }, temporal))
+    }
+
+    /// Whether codes of the frame, of its flats and of what came off both, at so many electrons in frame and flats, are charge and a
+    /// uniform error.
+    fn is_all_open(&self, adc: &AdcRecord, flat: &Flat, [expected_e, light_e]: [f64; 2]) -> bool {
+        let is_smooth = |dark: &Dark, expected_e: f64| self.of_dark(dark).is_smooth(dark, adc, expected_e);
+        let mut averages = self.darks.iter().chain(&flat.darks).flatten();
+        self.is_open(adc, expected_e)
+            && self.of_dark(&flat.frames).is_open(adc, light_e)
+            && is_smooth(&flat.frames, light_e)
+            && averages.all(|dark| self.of_dark(dark).is_open(adc, 0.0) && is_smooth(dark, 0.0))
     }
 
     /// The variance, in ADU², of the fixed offsets that darks leave of the codes and of the flat field, which counts by the
