@@ -63,7 +63,8 @@ fn the_border_of_a_frame_tells_its_black_level() {
     let sample = |frame: u16, i: u16| 300 + 50 * frame + i * i % 97;
     for frame in 0..2 {
         let strip: Vec<u8> = (0..120).flat_map(|i| sample(frame, i).to_le_bytes()).collect();
-        let areas: [(u16, &[u32]); 3] = [(50717, &[4000]), (50829, &[0, 4, 10, 12]), (50830, &[0, 0, 10, 4])];
+        let areas: [(u16, &[u32]); 4] =
+            [(50714, &[0]), (50717, &[4000]), (50829, &[0, 4, 10, 12]), (50830, &[0, 0, 10, 4])];
         fs::write(shop.path(&format!("raw{frame}.dng")), dng([12, 10], 16, 1, &strip, &areas)).unwrap();
     }
     shop.run("import-raw raw0.dng raw1.dng --crop full -o {stem}.exr", &[]);
@@ -81,6 +82,22 @@ fn the_border_of_a_frame_tells_its_black_level() {
             assert!((f64::from(*sample) - (whole[i] - level(of_site(i)))).abs() < 1e-4, "{frame} {i}");
         }
     }
+}
+
+/// Its black level is 0 by the specification, and what its border reads is something else as likely as not.
+#[test]
+fn masked_photosites_without_a_black_level_are_told() {
+    let shop = Workshop::new();
+    let strip: Vec<u8> = (0..120_u16).flat_map(|i| (300 + i).to_le_bytes()).collect();
+    let said = |name: &str, areas: &[(u16, &[u32])]| {
+        fs::write(shop.path(name), dng([12, 10], 16, 1, &strip, areas)).unwrap();
+        String::from_utf8(shop.attempt(&format!("import-raw {name} -o out.exr"), &[]).stderr).unwrap()
+    };
+    let (white, active, masked): (_, (u16, &[u32]), (u16, &[u32])) =
+        ((50717, &[4000][..]), (50829, &[0, 4, 10, 12]), (50830, &[0, 0, 10, 4]));
+    assert!(said("masked.dng", &[white, active, masked]).contains("it has masked photosites and no BlackLevel"));
+    assert_eq!(said("told.dng", &[(50714, &[256]), white, active, masked]), "");
+    assert_eq!(said("whole.dng", &[white]), "");
 }
 
 /// What is made of the raw itself is what is made of the import.
