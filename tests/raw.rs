@@ -93,8 +93,8 @@ fn masked_photosites_without_a_black_level_are_told() {
         fs::write(shop.path(name), dng([12, 10], 16, 1, &strip, areas)).unwrap();
         String::from_utf8(shop.attempt(&format!("import-raw {name} -o out.exr"), &[]).stderr).unwrap()
     };
-    let (white, active, masked): (_, (u16, &[u32]), (u16, &[u32])) =
-        ((50717, &[4000][..]), (50829, &[0, 4, 10, 12]), (50830, &[0, 0, 10, 4]));
+    let [white, active, masked]: [(u16, &[u32]); 3] =
+        [(50717, &[4000]), (50829, &[0, 4, 10, 12]), (50830, &[0, 0, 10, 4])];
     assert!(said("masked.dng", &[white, active, masked]).contains("it has masked photosites and no BlackLevel"));
     assert_eq!(said("told.dng", &[(50714, &[256]), white, active, masked]), "");
     assert_eq!(said("whole.dng", &[white]), "");
