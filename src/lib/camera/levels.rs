@@ -67,6 +67,11 @@ impl BlackLevel {
         self.sites().into_iter().fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// The mean over the sites.
+    pub fn mean(self) -> f64 {
+        self.sites().into_iter().sum::<f64>() / 4.0
+    }
+
     /// The same with another value in place of each.
     #[must_use]
     pub fn map(self, f: impl Fn(f64) -> f64) -> Self {

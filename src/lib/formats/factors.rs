@@ -5,7 +5,7 @@ use super::delimited;
 /// So many comments are searched.
 const MAX_COMMENTS: usize = 1000;
 
-/// What says that values are to be multiplied or divided; what was done to them is told in the past.
+/// What says that values are to be multiplied or divided, or that those of the file were; `multiplied by` alone tells of a step before.
 const WORDS: [&str; 16] = [
     "values multiplied by",
     "values scaled by",

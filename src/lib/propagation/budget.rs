@@ -251,8 +251,7 @@ impl Photosite {
         let whole: f64 = budget.iter().sum();
         let told: f64 =
             Cause::ALL.iter().filter(|cause| !cause.is_fixed_pattern()).map(|cause| budget[*cause as usize]).sum();
-        // What takes too long is no number, which `min` would drop.
-        let fixed = if temporal.is_nan() { temporal } else { told - temporal.min(whole) };
+        let fixed = told - at_most(temporal, whole);
         if fixed.is_nan() || fixed.abs() > 1e-9 * whole {
             budget[Cause::Quantization as usize] -= fixed;
             budget[Cause::ClippedPattern as usize] += fixed;
@@ -369,7 +368,7 @@ impl Photosite {
             if !law.is_plain(adc) {
                 let patterns = sum_of(&budget, &PATTERNS) + sum_of(&budget, &OFFSETS);
                 let fixed = self.shared(adc, (expected_e, None), (self, None), false).light;
-                let clipped = if fixed.is_nan() { fixed } else { fixed.min(whole) } - patterns;
+                let clipped = at_most(fixed, whole) - patterns;
                 let further = clipped - budget[Cause::ClippedPattern as usize];
                 let is_told = further.abs() > 1e-9 * patterns;
                 budget[Cause::ClippedPattern as usize] += if is_told { further } else { 0.0 };
@@ -382,4 +381,9 @@ impl Photosite {
         }
         budget
     }
+}
+
+/// The lesser of two; a `value` that is no number, as what takes too long, stays none, which `min` would drop.
+fn at_most(value: f64, most: f64) -> f64 {
+    if value > most { most } else { value }
 }

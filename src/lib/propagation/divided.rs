@@ -17,33 +17,20 @@ pub(super) const NARROW: &str = "what was divided by a flat field, or the flat f
 /// 4σ² e^(−2π²σ²), 1 % of it, and less where patterns spread it.
 const LEAST_CODES: f64 = 0.5;
 
-/// How far dividing by a flat field is followed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Series {
-    /// As [`Photosite::divided`] says.
-    Exact,
-    /// Where the flat field of few photosites is too noisy for that.
-    FirstOrder,
+/// How noisy flat fields may be for the series of the quotient.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    /// Relative variance of a flat field at most.
+    noise: f64,
+    /// The share of photosites at most that are noisier, and left out: what they, which their dark signal leaves hardly any light, make
+    /// of the light is no ordinary pixel.
+    left_out: f64,
 }
 
-impl Series {
-    /// Relative variance of a flat field beyond which dividing by it follows no series.
-    fn most_noise(self) -> f64 {
-        match self {
-            Self::Exact => 0.01,
-            Self::FirstOrder => 0.1,
-        }
-    }
-
-    /// The share of photosites at most whose flat field is noisier: what they, which their dark signal leaves hardly any light, make of
-    /// the light is no ordinary pixel.
-    fn most_left_out(self) -> f64 {
-        match self {
-            Self::Exact => 0.0,
-            Self::FirstOrder => 0.01,
-        }
-    }
-}
+/// Where the series is good to 10⁻³.
+const STRICT: Limits = Limits { noise: 0.01, left_out: 0.0 };
+/// Where it is good to about a tenth.
+const WIDE: Limits = Limits { noise: 0.1, left_out: 0.01 };
 
 impl Photosite {
     /// Moments of the class R, G or B after division by the flat field: with A what is left of the codes and F the flat
@@ -61,11 +48,11 @@ impl Photosite {
     /// The same beside what is drawn anew in each frame that is divided by one flat field, less the same dark frames; what it
     /// differs by among photosites has the noise of the flat field in it.
     pub(super) fn divided_over(&self, class: usize, expected_e: f64) -> Option<(Prediction, Temporal)> {
-        self.divided_by(class, expected_e, Series::Exact)
+        self.divided_within(class, expected_e, STRICT)
     }
 
-    /// The same, exact or to first order of the noise of flat fields.
-    fn divided_by(&self, class: usize, expected_e: f64, series: Series) -> Option<(Prediction, Temporal)> {
+    /// The same of flat fields within such limits.
+    fn divided_within(&self, class: usize, expected_e: f64, limits: Limits) -> Option<(Prediction, Temporal)> {
         let (adc, flat) = (self.adc?, self.flat?);
         let light_e = flat.expected_e[class];
         if !self.is_all_open(&adc, &flat, [expected_e, light_e]) {
@@ -89,7 +76,7 @@ impl Photosite {
             }
             let f = below.mean;
             let (rho, skew) = (below.variance / (f * f), below.third / f.powi(3));
-            if rho > series.most_noise() {
+            if rho > limits.noise {
                 left_out += of_x * of_u;
                 continue;
             }
@@ -114,7 +101,7 @@ impl Photosite {
             }
         }
         let [weight, sums @ ..] = sums;
-        if left_out > series.most_left_out() * (weight + left_out) {
+        if left_out > limits.left_out * (weight + left_out) {
             return None;
         }
         let [first, square, scale, third, above, of_flat] = sums.map(|sum| sum / weight);
@@ -173,7 +160,7 @@ impl Photosite {
             return divided.moments.variance;
         }
         let own = self.moments(expected_e).moments.variance;
-        if let Some((divided, _)) = self.divided_by(class, expected_e, Series::FirstOrder) {
+        if let Some((divided, _)) = self.divided_within(class, expected_e, WIDE) {
             return divided.moments.variance;
         }
         let (Some(adc), Some(flat)) = (self.adc, self.flat) else { return own };

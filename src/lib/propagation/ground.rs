@@ -166,7 +166,7 @@ pub(super) fn corrected(frame: &FrameHeader, codes: Photosite) -> Predicted<Phot
     if let Some(flat) = &correction.flat {
         let adc = codes.adc.ok_or(Unpredictable::Missing("adc"))?;
         let mut flat = Flat::of(frame, flat, &adc, of_sensor).ok_or(unknown)?;
-        let black_adu = correction.black_adu.sites().iter().sum::<f64>() / 4.0;
+        let black_adu = correction.black_adu.mean();
         flat.levels_adu[0] = black_adu - adc.bias_adu * (1.0 - corrected.weight());
         corrected.flat = Some(flat);
     }

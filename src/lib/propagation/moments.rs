@@ -69,6 +69,19 @@ impl Prediction {
         Self::of_cumulants(center + m1, variance, third, fourth)
     }
 
+    /// Moments 1 to 4 about a center, from which [`Self::about`] makes it.
+    pub(super) fn moments_about(&self, center: f64) -> [f64; 4] {
+        let MeanVariance { mean, variance } = self.moments;
+        let (mean, third) = (mean - center, self.third);
+        let square = mean * mean;
+        [
+            mean,
+            square + variance,
+            mean * (square + 3.0 * variance) + third,
+            square * (square + 6.0 * variance) + 4.0 * mean * third + 3.0 * variance * variance + self.fourth(),
+        ]
+    }
+
     /// Fourth cumulant.
     pub fn fourth(&self) -> f64 {
         self.excess_kurtosis * self.moments.variance.powi(2)

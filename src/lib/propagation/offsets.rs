@@ -74,13 +74,14 @@ fn over_offsets(seen: &[Seen; 2], sigmas: &[f64; 2]) -> Shared {
             let off = [0, 1].map(|k| Seen { reading: seen[k].reading.off_by(sigmas[k] * z), ..seen[k] });
             let medians = off.map(|seen| seen.median_of.and_then(|_| Shared::of(seen, seen).median));
             let mean = |k: usize| match &medians[k] {
-                Some(median) => median.moments.mean - seen[k].reading.center,
+                Some(median) => median.moments.mean - off[k].reading.center,
                 None => off[k].law.expect(&off[k].reading)[0],
             };
             let [light, dark] = [mean(0), mean(1)];
             means = [means[0] + weight * light, means[1] + weight * dark];
             if let Some(median) = &medians[1] {
-                moments.iter_mut().zip(about(dark, median)).for_each(|(sum, moment)| *sum += weight * moment);
+                let about = median.moments_about(off[1].reading.center);
+                moments.iter_mut().zip(about).for_each(|(sum, moment)| *sum += weight * moment);
             }
             let within =
                 has_patterns.then(|| Shared::of(off[0], off[1])).map_or([0.0; 3], |s| [s.light, s.dark, s.both]);
@@ -100,18 +101,6 @@ fn over_offsets(seen: &[Seen; 2], sigmas: &[f64; 2]) -> Shared {
     let variance = |square: f64, mean: f64| (square - mean * mean).max(0.0);
     let median = seen[1].median_of.map(|_| Prediction::about(seen[1].reading.center, &moments));
     Shared { light: variance(products[0], light), dark: variance(products[1], dark), both, median }
-}
-
-/// Moments 1 to 4 of a law whose mean is `mean`.
-fn about(mean: f64, law: &Prediction) -> [f64; 4] {
-    let (variance, third) = (law.moments.variance, law.third);
-    let square = mean * mean;
-    [
-        mean,
-        square + variance,
-        mean * (square + 3.0 * variance) + third,
-        square * (square + 6.0 * variance) + 4.0 * mean * third + 3.0 * variance * variance + law.fourth(),
-    ]
 }
 
 #[cfg(test)]

@@ -24,8 +24,8 @@ const VISIBLE_IN_BOTH: f64 = 0.65;
 /// Codes of an electron from which counts lie at few places in a code, so that they do not blur how codes are rounded.
 const WHOLE_CODES: f64 = 0.5;
 
-/// Skewness of what is drawn anew from which a median is no longer that of a normal law.
-const SKEW: f64 = 0.15;
+/// Skewness of what is drawn anew beyond which a median keeps another share than of normal samples.
+pub(super) const SKEW: f64 = 0.15;
 
 /// What a photosite's samples follow from, but for the light that reaches it.
 ///

@@ -15,7 +15,6 @@ use super::repeated::average_of;
 use super::smooth_hue;
 use super::tapped::Axis;
 use super::taps;
-use crate::camera::levels::BlackLevel;
 use crate::camera::taps::Taps;
 use crate::cfa::Class;
 use crate::error::Result;
@@ -448,9 +447,8 @@ fn dark_above(frame: &FrameHeader, codes: &Photosite, adc: &AdcRecord, black_adu
     if metadata.noise.is_some() {
         return 0.0;
     }
-    let mean_of = |level: BlackLevel| level.sites().iter().sum::<f64>() / 4.0;
-    let off_adu = metadata.demosaic.as_ref().map_or(0.0, |record| mean_of(record.black))
-        + metadata.correction.as_ref().map_or(0.0, |record| mean_of(record.black_adu));
+    let off_adu = metadata.demosaic.as_ref().map_or(0.0, |record| record.black.mean())
+        + metadata.correction.as_ref().map_or(0.0, |record| record.black_adu.mean());
     let unlit_adu = codes.moments(0.0).moments.mean - off_adu;
     if codes.darks[0].is_some() {
         return unlit_adu - black_adu;

@@ -15,7 +15,7 @@ use super::lines::{blur_e, nodes};
 use super::masters::{Dark, kept};
 use super::memory::Memory;
 use super::moments::Prediction;
-use super::photosite::Photosite;
+use super::photosite::{Photosite, SKEW};
 use super::reading::{Moments, Reading, codes_of};
 use super::unlike::{Unlike, UnlikeSums};
 use crate::metadata::{AdcRecord, AverageRecord, PoissonKind};
@@ -38,9 +38,6 @@ const VISIBLE: f64 = 0.6;
 
 /// Codes over which photosites scatter so that each place in a code is as frequent as any other.
 const MANY_CODES: f64 = 2.5;
-
-/// Skewness of what is drawn anew beyond which a median keeps another share than of normal samples.
-const SKEW: f64 = 0.15;
 
 /// Read noise, e⁻, below which every count moves beyond an edge by itself, by more than e^(−2π²σ²) or 2 % of what it counts; and the
 /// least that is told apart.

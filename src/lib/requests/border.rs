@@ -147,9 +147,7 @@ fn offs_of(lines: &[Vec<f32>]) -> Vec<Option<f64>> {
         median.iter().flat_map(|median| line.iter().map(move |sample| to_sample(f64::from(*sample) - median))).collect()
     };
     let mut left: Vec<f32> = lines.iter().zip(&medians).flat_map(about).collect();
-    let told = medians.iter().flatten().count();
-    let degrees = left.len().saturating_sub(told).max(1) as f64 / left.len().max(1) as f64;
-    let reach = CLIP * (clipped_variance(&mut left, CLIP) / degrees).sqrt();
+    let reach = CLIP * scatter(&mut left, medians.iter().flatten().count()).sqrt();
     let off = |(line, median): (&Vec<f32>, &Option<f64>)| {
         let median = (*median)?;
         let near: Vec<f64> =
@@ -157,6 +155,12 @@ fn offs_of(lines: &[Vec<f32>]) -> Vec<Option<f64>> {
         Some(if near.is_empty() { median } else { near.iter().sum::<f64>() / near.len() as f64 })
     };
     lines.iter().zip(&medians).map(off).collect()
+}
+
+/// The variance of masked photosites about what so many lines are off.
+fn scatter(left: &mut [f32], lines: usize) -> f64 {
+    let degrees = left.len().saturating_sub(lines).max(1) as f64 / left.len().max(1) as f64;
+    clipped_variance(left, CLIP) / degrees
 }
 
 /// What such a black level is uncertain by: samples scatter about the level of their site and what their line is off, which is
@@ -169,8 +173,7 @@ fn noise(
 ) -> BlackNoise {
     let mut left: Vec<f32> = (0..lines.len()).flat_map(left_of).collect();
     let told = lines.iter().filter(|of_line| !of_line.is_empty()).count();
-    let degrees = left.len().saturating_sub(told).max(1) as f64 / left.len().max(1) as f64;
-    let scatter = clipped_variance(&mut left, CLIP) / degrees;
+    let scatter = scatter(&mut left, told);
     // Of a mean of so many, the fewest that one has.
     let of_mean = |count: usize| scatter / count.max(1) as f64;
     let of_lines = |kind: Border| {

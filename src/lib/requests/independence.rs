@@ -1,6 +1,7 @@
 //! Whether frames that count as independent are: noise that stands in two of them counts as if it were drawn twice.
 
 use crate::error::{Error, Result};
+use crate::formats::digest::SamplesDigest;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::places::place;
 use crate::metadata::{DrawnExposures, FrameHeader, TakenAs};
@@ -202,7 +203,7 @@ impl Company {
 ///
 /// [`Error::Format`] for a copy; those of the files.
 pub fn check_contents(files: &[(Role, InputOptions)]) -> Result<()> {
-    let mut known: HashMap<blake3::Hash, Vec<(Role, &InputOptions)>> = HashMap::new();
+    let mut known: HashMap<_, Vec<(Role, &InputOptions)>> = HashMap::new();
     for (role, file) in files.iter().filter(|(_, file)| file.path.as_deref().is_some_and(Path::is_file)) {
         let alike = known.entry(begin_of(file)?).or_default();
         for (other, its) in alike.iter().filter(|(other, _)| !other.may_be(*role)) {
@@ -224,26 +225,21 @@ pub fn check_contents(files: &[(Role, InputOptions)]) -> Result<()> {
 /// Samples by whose digest files are told apart before they are compared as a whole.
 const BEGIN_SAMPLES: usize = 1 << 16;
 
-/// A digest of the size of a frame and of its first rows.
-fn begin_of(file: &InputOptions) -> Result<blake3::Hash> {
+/// Sides and channels of a frame, and a digest of its first rows.
+fn begin_of(file: &InputOptions) -> Result<([usize; 2], Vec<String>, String)> {
     let mut reader = FrameReader::open(file)?;
     let geometry = reader.header().geometry.clone();
     let natural = reader.natural_rows().max(1);
     let rows = (BEGIN_SAMPLES / geometry.row_samples().max(1)).clamp(1, geometry.height.max(1));
-    let mut samples = Vec::new();
-    let mut read = 0;
+    let (mut samples, mut read) = (Vec::new(), 0);
     while read < rows {
         let step = natural.min(geometry.height - read);
         reader.read(step, &mut samples)?;
         read += step;
     }
-    samples.truncate(rows * geometry.row_samples());
-    let mut digest = blake3::Hasher::new();
-    digest.update(format!("{}x{} {:?}", geometry.width, geometry.height, geometry.channels).as_bytes());
-    samples.iter().for_each(|sample| {
-        digest.update(&sample.to_bits().to_le_bytes());
-    });
-    Ok(digest.finalize())
+    let mut digest = SamplesDigest::new();
+    digest.update(&samples[..rows * geometry.row_samples()]);
+    Ok(([geometry.width, geometry.height], geometry.channels, digest.finish()))
 }
 
 /// Changes from sample to sample of exposures that are not alike by chance: so many, and such a share of all samples. Those of coarse

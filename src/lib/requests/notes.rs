@@ -2,7 +2,7 @@
 
 use crate::analysis::statistics::{RepeatedReport, Report};
 use crate::formats::input::FrameReader;
-use crate::metadata::{AdcRecord, FrameHeader};
+use crate::metadata::{AdcRecord, FrameHeader, Metadata};
 use crate::stream::RowSource;
 use crate::text::counted;
 
@@ -91,10 +91,12 @@ pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
     );
     let remarks = std::iter::once(found).chain(reader.notes().iter().cloned()).map(Note::Remark);
     // Where a program of ours wrote the metadata, it has warned already.
-    let mut said = header.metadata.clone();
-    // Seconds of tags are seconds.
-    said.exposure = said.exposure.filter(|exposure| reader.tagged_exposure() != Some(*exposure));
-    let doubts = if said.history.is_empty() { said.doubts() } else { Vec::new() };
+    let mut doubts = Vec::new();
+    if header.metadata.history.is_empty() {
+        // Seconds of tags are seconds.
+        let exposure = header.metadata.exposure.filter(|exposure| reader.tagged_exposure() != Some(*exposure));
+        doubts = Metadata { exposure, ..header.metadata.clone() }.doubts();
+    }
     let doubts = doubts.into_iter().map(|doubt| format!("{}: {doubt}", header.name));
     remarks.chain(doubts.map(Note::Warning)).chain(of_levels(header)).collect()
 }
