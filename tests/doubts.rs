@@ -446,3 +446,22 @@ fn attributes_of_files_are_heard() {
         "{said}"
     );
 }
+
+/// Black levels of sites in the metadata of a DNG whose tags tell one level.
+#[test]
+fn black_levels_by_site_are_held_against_tags() {
+    let shop = Workshop::new();
+    shop.pipe("render-radiance --electrons 1000,2000,3000 --size 16x12 --cfa rggb | add-noise | digitize -o plane.dng");
+    let mut bytes = shop.bytes("plane.dng");
+    let key = b"black_level_adu: ";
+    let first = bytes.windows(key.len()).position(|window| window == key).unwrap() + key.len();
+    let last = first + bytes[first..].iter().position(|byte| *byte == b'\n').unwrap();
+    let told = b"[1757,1757,60,60]";
+    bytes[first..last].fill(b' ');
+    bytes[first..first + told.len()].copy_from_slice(told);
+    fs::write(shop.path("changed.dng"), bytes).unwrap();
+    let said = shop.said("measure changed.dng", 0);
+    let told = "changed.dng: its black levels in ADU are [1757.0, 1757.0, 60.0, 60.0], but [1757.30";
+    assert!(said.contains(told) && said.contains("by the tags of the file, which do not count"), "{said}");
+    assert!(!shop.said("measure plane.dng", 0).contains("by the tags"));
+}

@@ -243,6 +243,12 @@ fn a_clipped_blue_is_known_to_the_end() {
         let sidecar = String::from_utf8(shop.bytes(&format!("{name}.yaml"))).unwrap();
         assert!(sidecar.contains("saturated: 1200"), "{sidecar}");
     }
+    // One channel brings its marks.
+    for line in ["measure rgb.exr --channel R", "measure xyz.exr --channel Z", "measure xyz.exr --channel sigma.Z"] {
+        let report = json(&said(&format!("{line} --output-format json"), "1200"));
+        let region = &report["regions"][0];
+        assert_eq!((&region["saturated"], &region["count"]), (&Value::from(1200), &Value::from(0)), "{line}");
+    }
     let refused = shop.attempt("measure xyz.exr --check", &[]);
     let text = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(BAD_DATA));

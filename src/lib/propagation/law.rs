@@ -120,9 +120,9 @@ impl Law {
     }
 
     /// Goes through the normal laws that make up that of the charge, as many as a sum over them needs that is smooth on the scale
-    /// of `noise_e` beside their own spread.
-    fn each_node(&self, noise_e: f64, mut of: impl FnMut(Node)) {
-        if let Some(nodes) = self.nodes_of_sum(noise_e) {
+    /// of `noise_e` beside their own spread; `added_e` is what comes to the charge before it is read.
+    fn each_node(&self, noise_e: f64, added_e: f64, mut of: impl FnMut(Node)) {
+        if let Some(nodes) = self.nodes_of_sum(noise_e, added_e) {
             effort::spend(nodes.len() as u64);
             return nodes.into_iter().for_each(of);
         }
@@ -174,18 +174,20 @@ impl Law {
 
     /// The same by the sum n of both counts, where they are many pairs: given n each is binomial, and the variance over photosites,
     /// σ₁² n₁² + σ₂² n₂², which has its mean for all pairs of one sum, scatters by so small a share δ of all variance that moments
-    /// change by δ²/8, 10⁻⁷, and by next to nothing from one count to the next.
-    fn nodes_of_sum(&self, noise_e: f64) -> Option<Vec<Node>> {
+    /// change by δ²/8, 10⁻⁷, and by next to nothing from one count to the next: patterns or what is added blur counts, or leave each apart.
+    fn nodes_of_sum(&self, noise_e: f64, added_e: f64) -> Option<Vec<Node>> {
         const MANY_PAIRS: f64 = 1000.0;
         const MOST_SCATTER: f64 = 1e-3;
-        const LEAST_SPREAD_E: f64 = 2.0;
+        const BLURRED_E: f64 = 2.0;
+        const APART_E: f64 = 0.1;
         let both = [&self.light, &self.dark];
         let is_counted = |charge: &Charge| charge.shot == Some(PoissonKind::Exact) && charge.shot_std() > 0.0;
         let is_cut = |charge: &Charge| charge.is_rectified(self.full_well_e);
         let spread_e = self.least_pattern_std();
+        let widest_e = (self.light.pattern * self.light.rate).hypot(self.dark.pattern * self.dark.rate);
         if !both.into_iter().all(is_counted)
             || both.into_iter().any(is_cut)
-            || spread_e < LEAST_SPREAD_E
+            || spread_e.max(added_e) < BLURRED_E && widest_e > APART_E
             || self.has_floors()
         {
             return None;
@@ -264,7 +266,7 @@ impl Law {
                 near.push(node);
             }
         };
-        self.each_node(if is_full_far { reading.noise_e } else { 0.0 }, &mut put);
+        self.each_node(if is_full_far { reading.noise_e } else { 0.0 }, reading.noise_e, &mut put);
         if !is_full_far {
             signed_nodes(self).into_iter().for_each(put);
         }
@@ -327,6 +329,15 @@ impl Law {
     pub fn is_read_from(&self, level_e: f64) -> f64 {
         // A level that a count reaches counts as reached, whatever its last bits.
         let below = level_e - 1e-12 * level_e.abs().max(1.0);
+        // Where none or all lie beyond, there is nothing to sum.
+        let [least, most] = self.extent().map(|charge| charge.min(self.full_well_e));
+        let reach = REACH * self.read_noise_e + self.trap_e;
+        if most + reach < below {
+            return 0.0;
+        }
+        if least - reach > below {
+            return 1.0;
+        }
         self.expect(&Reading::beyond(self.read_noise_e, below))[0].clamp(0.0, 1.0)
     }
 

@@ -140,6 +140,14 @@ fn telling(share: f64) -> f64 {
     (0_u32..).map(f64::from).take_while(|r| *r < REACH).find(|r| is_beyond(*r)).unwrap_or(REACH)
 }
 
+/// The standard deviation of what blurs codes, in codes, from which such a share of the photosites shows nothing of how they are
+/// rounded: of the ripple, e^(−2π²σ²), it leaves less than 10⁻¹⁰ of a code.
+fn smooth_for(share: f64) -> f64 {
+    const LEFT: f64 = 1e-10;
+    let two_pi_squares = 2.0 * std::f64::consts::PI * std::f64::consts::PI;
+    ((share / LEFT).ln().max(0.0) / two_pi_squares).sqrt().min(SMOOTH)
+}
+
 /// For photosites that are hot and have a trap: exact for polynomials of degree 9.
 static FEW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(5));
 
@@ -160,8 +168,10 @@ fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
     ends.push(REACH);
     for knee in near {
         ends.push(knee.at);
-        let mut distance = 2.5 * knee.width.max(NARROWEST);
-        while distance < REACH {
+        let width = knee.width.max(NARROWEST);
+        let mut distance = 2.5 * width;
+        // Farther off nothing is left of the bend.
+        while distance < REACH.min(24.0 * width) {
             ends.extend([knee.at - distance, knee.at + distance]);
             distance *= 3.0;
         }
@@ -331,10 +341,13 @@ impl Photosite {
         std::iter::once((&self.model, expected_e)).chain(darks)
     }
 
-    /// Charges at which what is read bends: full well, and the ends of the codes.
+    /// Charges at which what is read bends: full well, and the ends of the codes that it does not hide.
     fn levels_e(&self) -> impl Iterator<Item = f64> {
         let ends = self.adc.map(|adc| [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code)));
-        std::iter::once(self.model.full_well_e).chain(ends.into_iter().flatten()).filter(|level| level.is_finite())
+        let full_e = self.model.full_well_e;
+        let most_e = full_e + 12.0 * self.model.added() + REACH * self.most(|tails| tails.rts_e);
+        let ends = ends.into_iter().flatten().filter(move |level| *level <= most_e);
+        std::iter::once(full_e).chain(ends).filter(|level| level.is_finite())
     }
 
     /// Amplitudes of hot photosites; where `is_fine` as many as tell how codes are rounded.
@@ -356,7 +369,8 @@ impl Photosite {
             let Some(adc) = self.adc.filter(|_| is_fine) else { continue };
             let law = Law::of(model, light_e);
             let blur_e = model.added().hypot(law.least_pattern_std());
-            if adc.adu_per_e * blur_e >= SMOOTH || !adc.is_bent() && law.counts_hide(&adc) {
+            let smooth = smooth_for(model.tails.hot_share);
+            if adc.adu_per_e * blur_e >= smooth || !adc.is_bent() && law.counts_hide(&adc) {
                 continue;
             }
             // Shot noise blurs codes beyond so many electrons.

@@ -86,13 +86,15 @@ impl DescribedInput {
         Ok((described.open(&frame.options())?, array))
     }
 
-    /// The same with all channels.
+    /// The same with all channels; with the layer of marks behind one that is asked for.
     ///
     /// # Errors
     ///
     /// Those of [`DescribedWithBlack::open`].
     pub fn open_all(&self) -> Result<FrameReader> {
-        self.described.open(&self.frame.options_for_all())
+        let mut reader = self.described.open(&self.frame.options_for_all())?;
+        reader.keep_mask();
+        Ok(reader)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The metadata of a frame: where they are found, and what in them is doubtful.
 
+use crate::camera::levels::BlackLevel;
 use crate::camera::optics::doubt_of_time;
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
@@ -202,11 +203,26 @@ fn tagged_otherwise(metadata: &Metadata, reader: &dyn SampleReader) -> Vec<Strin
         let is_comparable = |(told, tagged): &(f64, f64)| are_codes && (tagged > told || !may_be_full_well);
         compare("white level in ADU", white(metadata).zip(white(tags)).filter(is_comparable));
     }
+    let own = reader.geometry().origin;
+    // Levels of sites, from the frame's first photosite on.
+    let sites = |metadata: &Metadata, origin: [i32; 2]| {
+        let corner = origin.map(|first| usize::from(first.rem_euclid(2) == 1));
+        metadata.black_level_adu.map(|black| black.beginning_at(corner))
+    };
+    let blacks = sites(metadata, metadata.origin.unwrap_or(own)).zip(sites(tags, own));
+    let are_by_site = |(told, tagged): &(BlackLevel, BlackLevel)| told.uniform().and(tagged.uniform()).is_none();
+    if let Some((told, tagged)) = blacks.filter(are_by_site).filter(|_| metadata.sample_scale.is_none()) {
+        let [told, tagged] = [told, tagged].map(BlackLevel::sites);
+        if told.iter().zip(tagged).any(|(told, tagged)| differ(*told, tagged)) {
+            found.push(format!(
+                "its black levels in ADU are {told:?}, but {tagged:?} by the tags of the file, which do not count"
+            ));
+        }
+    }
     let first = |metadata: &Metadata, origin: [i32; 2]| {
         let pattern = metadata.cfa.and_then(FilterArray::bayer)?;
         Some([0, 1].map(|row| pattern.row_classes(origin, row)))
     };
-    let own = reader.geometry().origin;
     let classes = first(metadata, metadata.origin.unwrap_or(own)).zip(first(tags, own));
     if classes.is_some_and(|(told, tagged)| told != tagged) {
         found.push("its filter array is another by the tags of the file, which do not count".into());
