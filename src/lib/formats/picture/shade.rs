@@ -1,6 +1,6 @@
 //! From samples to gray and color.
 
-use super::planes::{Choice, rounded};
+use super::planes::{Choice, level, rounded};
 use super::reduce::Reduced;
 use crate::color::{D65_XY, linear_srgb_from_xyz, srgb_decode, srgb_encode, xyz_of_chromaticity};
 use crate::error::{Error, Result};
@@ -140,7 +140,7 @@ impl Shade {
         match ranges.iter().find(|(low, high)| !(low < high && (high - low).is_finite())) {
             None => Ok(Self::Planes(ranges)),
             Some((low, high)) => Err(Error::Usage(format!(
-                "{}: a range from {low} to {high} shows nothing; give another with --range",
+                "{}: a range from {low} to {high} shows nothing; --range takes black first and then white, which is larger",
                 frame.name
             ))),
         }
@@ -171,17 +171,16 @@ impl Shade {
         match self {
             Self::Planes(ranges) if ranges.iter().all(|range| *range == ranges[0]) => {
                 let (low, high) = ranges[0];
-                Some(format!("black {}, white {}{unit}", rounded(low), rounded(high)))
+                Some(format!("black {}, white {}{unit}", level(low), level(high)))
             }
             Self::Planes(ranges) => {
-                let range = |(name, (low, high)): (&String, &(f64, f64))| {
-                    format!("{name} {} to {}", rounded(*low), rounded(*high))
-                };
+                let range =
+                    |(name, (low, high)): (&String, &(f64, f64))| format!("{name} {} to {}", level(*low), level(*high));
                 let ranges: Vec<String> = names.iter().zip(ranges).map(range).collect();
                 Some(format!("black to white: {}{unit}", ranges.join(", ")))
             }
             Self::Xyz(_, (low, high)) if (*low, *high) != (0.0, 1.0) => {
-                Some(format!("black {}, white {}{unit}", rounded(*low), rounded(*high)))
+                Some(format!("black {}, white {}{unit}", level(*low), level(*high)))
             }
             Self::Xyz(..) | Self::Encoded => {
                 let white = frame.metadata.color.as_ref()?.white?;
@@ -267,8 +266,8 @@ pub(super) fn all_outside(
         "{}: all numbers, from {least} to {most}, lie outside the range from {} to {}, which shows nothing of them; give another \
          with --range",
         frame.name,
-        rounded(low),
-        rounded(high)
+        level(low),
+        level(high)
     ))
 }
 
