@@ -19,7 +19,7 @@ fn told(shop: &Workshop, line: &str) -> String {
 fn uncertainties_are_no_spectra() {
     let shop = Workshop::new();
     let rows = |with: bool| -> String {
-        let row = |nm: u32| format!("{nm},{}{}\n", f64::from(nm) * 1e-8, if with { ",3.5" } else { "" });
+        let row = |nm: u32| format!("{nm},{}{}\n", f64::from(nm) * 1e-9, if with { ",3.5" } else { "" });
         (36..=83).map(|ten| row(10 * ten)).collect()
     };
     let unit = "radiance (W cm-2 sr-1 nm-1)";

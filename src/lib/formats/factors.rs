@@ -70,24 +70,32 @@ fn is_denied(before: &str, rest: &str) -> bool {
         || rest.iter().filter(|word| !word.is_empty()).take(3).any(is_one)
 }
 
-/// Whether a factor stands behind its sign, as in `x10^-3`, `× 1000` or `* 1e-6`, none that a unit begins with, and none that is the
-/// second side of something.
+/// Whether a factor stands behind its sign, as in `x10^-3`, `× 1000` or `* 1e-6`: none that a unit begins with, none that is the
+/// second side of something, and no coordinate (`x 0.23`).
 fn has_sign(line: &str) -> bool {
     const POWERS: [&str; 7] = ["w", "mw", "uw", "µw", "kw", "nw", "erg"];
-    let signs = line.char_indices().filter(|(_, letter)| "x×*".contains(*letter));
-    signs.into_iter().any(|(at, sign)| {
-        let (before, behind) = (&line[..at], line[at + sign.len_utf8()..].trim_start());
+    let mut signs = line.char_indices().filter(|(_, letter)| "x×*".contains(*letter));
+    signs.any(|(at, sign)| {
+        let (before, rest) = (&line[..at], &line[at + sign.len_utf8()..]);
+        let behind = rest.trim_start();
         if before.chars().next_back().is_some_and(|letter| letter.is_alphanumeric() || "*^".contains(letter)) {
             return false;
         }
         let end = behind.find(|letter: char| !(letter.is_numeric() || ".^+-−⁻e{}".contains(letter)));
-        let (factor, rest) = behind.split_at(end.unwrap_or(behind.len()));
+        let (factor, rest_of_line) = behind.split_at(end.unwrap_or(behind.len()));
         let exponent = factor.strip_prefix("10").unwrap_or_default();
         let is_power = exponent.starts_with(['^', '-', '−', '⁻', '²', '³', '⁴', '⁵', '⁶']);
-        let is_large = factor.parse::<f64>().is_ok_and(|factor| factor >= 10.0 || factor > 0.0 && factor < 1.0);
-        let is_side = before.trim_end().ends_with(|letter: char| letter.is_numeric());
-        let next = rest.trim_start().split(|letter: char| !letter.is_alphanumeric()).next().unwrap_or_default();
-        (is_power || is_large && !is_side) && !POWERS.contains(&next)
+        let number = factor.parse::<f64>().ok().filter(|factor| *factor >= 10.0 || *factor > 0.0 && *factor < 1.0);
+        let last = before.trim_end().chars().next_back();
+        let is_side = last.is_some_and(char::is_numeric);
+        let is_apart = behind.len() < rest.len();
+        // A letter apart from its number is a coordinate, but behind what it multiplies.
+        let is_of_ten = number.is_some_and(|factor| (factor.log10() - factor.log10().round()).abs() < 1e-9);
+        let multiplies = sign != 'x' || last.is_some_and(|letter| letter.is_alphabetic() || letter == ')');
+        let is_number =
+            number.is_some() && !is_side && if is_apart { is_of_ten && multiplies } else { sign != '*' || is_of_ten };
+        let next = rest_of_line.trim_start().split(|letter: char| !letter.is_alphanumeric()).next().unwrap_or_default();
+        (is_power || is_number) && !POWERS.contains(&next)
     })
 }
 
@@ -110,6 +118,7 @@ mod tests {
             "values × 10⁻⁶",
             "L * 1e-6",
             "x100",
+            "values x 1000",
             "Scale: 1000",
             "scale = 0.01",
             "1 x 10^-3",
@@ -130,6 +139,9 @@ mod tests {
             "640x480",
             "Unit: x10^-3 W m-2 sr-1 nm-1",
             "x and y of the sun",
+            "Color (CIE 1931): x 0.23224, y 0.233, Y 1002.51 cd m-2.",
+            "x 0.1, y 0.3",
+            "id = y * 80 + x of the pixel",
             "flux 10",
         ] {
             assert_eq!(doubt_of_factor(&format!("# {line}\nnm,L\n400,1\n")), None, "{line}");

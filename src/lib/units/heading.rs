@@ -438,7 +438,9 @@ mod tests {
 
     #[test]
     fn other_units_are_told_from_radiances() {
-        use OtherUnit::{AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Scaled, Several, Unknown};
+        use OtherUnit::{
+            AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Relative, Scaled, Several, Unknown,
+        };
         for (text, kind) in [
             ("irradiance (W m-2 nm-1)", Irradiance),
             ("E [W/m2/nm]", Irradiance),
@@ -467,7 +469,9 @@ mod tests {
             ("W sr-1 nm-1", Unknown),
             ("radiance (MW m-2 sr-1 nm-1)", Unknown),
             ("radiance (MW/m2)", Unknown),
-            ("sky [a.u.]", Unknown),
+            ("sky [a.u.]", Relative),
+            ("L (arb. units)", Relative),
+            ("lamp (relative)", Relative),
             ("L (flick)", Unknown),
             ("radiance (W/m2/xy/nm)", Unknown),
             ("MW m-2 sr-1 nm-1", Unknown),

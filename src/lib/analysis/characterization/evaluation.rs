@@ -1,6 +1,6 @@
 //! How well a matrix does: color differences of each sample of a library, without noise and through the noisy shot.
 
-use super::Signals;
+use super::{Signals, saturating};
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::CfaPattern;
@@ -290,40 +290,14 @@ impl Evaluator<'_> {
                 .map_err(|_| Error::Data("so many patches do not fit a sensor".into()))?;
         }
         let stages = setup.stages(&plane)?;
-        let white_luminance = match settings.color.white_luminance {
-            None => self.saturation(stages.demosaic.header())?,
-            given => given,
+        let white_luminance = match (settings.color.white_luminance, settings.color.white) {
+            (None, White::Absolute(_)) => None,
+            (None, _) => saturating::luminance(self.sensor, stages.demosaic.header())?,
+            (given, _) => given,
         };
         let made = |space| stages.to_xyz(&ColorSettings { space, white_luminance, ..settings.color.clone() });
         let (xyz, lab) = (made(Space::Xyz)?, made(Space::Lab)?.header().clone());
         Ok(Shot { exposure, electrons, plane, stages, xyz, lab })
-    }
-
-    /// The luminance at which equal signals reach the top code, by the matrix of the sensor's own file: a matrix that is
-    /// judged shall not set the white that it is judged by. None for a sensor without one, and a white of its own.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Data`] where the dark signal of the exposure leaves no codes for light.
-    fn saturation(&self, camera: &FrameHeader) -> Result<Option<f64>> {
-        if matches!(self.settings.color.white, White::Absolute(_)) {
-            return Ok(None);
-        }
-        let metadata = &camera.metadata;
-        let levels = metadata.white_level_adu.zip(metadata.uniform_black_adu());
-        let range = levels.map(|(white, black)| white.less([black; 3]).classes());
-        let (Some(range), Some(own), Some(exposure)) = (range, self.sensor.xyz_from_camera, metadata.exposure) else {
-            return Ok(None);
-        };
-        let luminance = (matrix(&own) / exposure.exposure_s_sr() * Vector3::from(range)).y;
-        if luminance > 0.0 {
-            return Ok(Some(luminance));
-        }
-        let problem = format!(
-            "in {} s the dark signal fills the range of the codes, and no white saturates the camera; expose for a shorter time",
-            exposure.exposure_s
-        );
-        Err(Error::Data(problem).give(&["white_luminance"]))
     }
 
     fn sample(&self, sample: usize) -> Result<SampleEvaluation> {

@@ -183,9 +183,16 @@ impl Shade {
                 Some(format!("black {}, white {}{unit}", level(*low), level(*high)))
             }
             Self::Xyz(..) | Self::Encoded => {
-                let white = frame.metadata.color.as_ref()?.white?;
-                let [_, luminance, _] = white;
-                Some(format!("white {} cd m⁻²", rounded(luminance)))
+                let color = frame.metadata.color.as_ref()?;
+                let [_, luminance, _] = color.white?;
+                // Relative XYZ have no luminance.
+                let is_relative = color.range_adu.is_some() || frame.metadata.unit == "relative";
+                let luminance = level(luminance);
+                Some(if is_relative {
+                    format!("white Y = {luminance}")
+                } else {
+                    format!("white {luminance} cd m⁻²")
+                })
             }
         }
     }
@@ -371,6 +378,8 @@ pub(super) fn one_range(frame: &FrameHeader, range: Range, choice: &Choice, redu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::Geometry;
+    use crate::metadata::{ColorRecord, Metadata};
 
     #[test]
     fn the_table_gives_the_codes_of_the_curve() {
@@ -380,5 +389,18 @@ mod tests {
             assert_eq!(curve.code(value), code(srgb_encode(value)), "{value}");
         }
         assert_eq!([f64::NAN, -1.0, f64::INFINITY, f64::NEG_INFINITY].map(|value| curve.code(value)), [0, 0, 255, 0]);
+    }
+
+    #[test]
+    fn the_white_of_relative_colors_has_no_luminance() {
+        let words = |range_adu| {
+            let mut metadata = Metadata::new(QuantityKind::Srgb);
+            let white = Some([0.95, 1.0, 1.09]);
+            metadata.color = Some(ColorRecord { white, range_adu, ..ColorRecord::of_xyz() });
+            let frame = FrameHeader { name: "f".into(), geometry: Geometry::new(4, 4, &["R", "G", "B"]), metadata };
+            let choice = Choice::of(&frame, None, false).unwrap();
+            Shade::Encoded.words(&frame, &choice).unwrap()
+        };
+        assert_eq!([None, Some([900.0; 3])].map(words), ["white 1 cd m⁻²", "white Y = 1"]);
     }
 }
