@@ -162,10 +162,10 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
                 for y in band.rows() {
                     let lines: Vec<&[f32]> =
                         spectral.channels.iter().map(|&channel| window.row(y.cast_signed(), channel)).collect();
-                    for x in 0..geometry.width {
-                        let values = between.values(|channel| f64::from(lines[channel][x]));
-                        radiance.extend(values.into_iter().zip(&factors).map(|(value, factor)| value * factor));
-                    }
+                    let pixel = |x: usize| between.values(|channel| f64::from(lines[channel][x]));
+                    (0..geometry.width).for_each(|x| {
+                        radiance.extend(pixel(x).into_iter().zip(&factors).map(|(value, factor)| value * factor));
+                    });
                 }
                 Ok(())
             })?;
