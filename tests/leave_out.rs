@@ -10,7 +10,7 @@ use cyanometer::formats::data::load_sensor;
 use cyanometer::frame::Geometry;
 use cyanometer::numerics::planes::{WeightedPlane, weighted_sums};
 use cyanometer::propagation::{self, Equations, FramePrediction};
-use cyanometer::spectrum::WavelengthGrid;
+use cyanometer::spectrum::{Along, Between, WavelengthGrid};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
@@ -89,7 +89,8 @@ fn wavelengths_that_no_class_responds_to_add_nothing() {
     // The same of the planes of a spectral image.
     let (camera, _) = kept.camera(&all_nm);
     let channels: Vec<usize> = (0..all_nm.len()).collect();
-    let planes = camera.planes(&channels, &vec![1.0; channels.len()]);
+    let between = Between::new(&all_nm, Along::Wavelength, false);
+    let planes = camera.planes(&channels, &between, &vec![1.0; channels.len()]);
     assert_eq!(planes.len(), kept.wavelengths_nm.len());
     let width = 37;
     let samples: Vec<f32> = (0..all_nm.len() * width).map(|i| 1e-6 * scatter(i, i / width, 0)).collect();

@@ -278,7 +278,14 @@ fn units_and_single_rows_have_the_panels_that_they_can_have() {
     // Profiles name what their colors are, as correlations do; the histogram has the mean as well.
     shop.run("measure noisy.exr --plot plot.svg", &[]);
     let svg = String::from_utf8(shop.bytes("plot.svg")).unwrap();
-    assert_eq!((svg.matches(">G</text>").count(), svg.matches(">G, mean 273.21 e⁻</text>").count()), (4, 1));
+    let report: serde_json::Value =
+        serde_json::from_slice(&shop.run("measure noisy.exr --output-format json", &[])).unwrap();
+    let green = &report["regions"][0]["channels"][1];
+    let mean = green["mean"].as_f64().unwrap();
+    let predicted = green["predicted_mean"].as_f64().unwrap();
+    let told = format!(">G, mean {mean:.2} e⁻, predicted {predicted:.2}</text>");
+    assert!((mean - predicted).abs() > 0.01, "{mean} {predicted}");
+    assert_eq!((svg.matches(">G</text>").count(), svg.matches(&told).count()), (4, 1), "{told}");
 }
 
 /// Frames that have no histogram: uniform expected electrons, and one that is saturated throughout.

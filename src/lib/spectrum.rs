@@ -1,5 +1,9 @@
 //! Sampled spectra: curves, libraries of radiances, and sums over wavelength.
 
+mod between;
+
+pub use between::{Along, Between};
+
 use crate::error::{Error, Result};
 use crate::numerics::quadrature::{self, Rule};
 use ndarray::{Array1, Array2, ArrayView1, Axis};

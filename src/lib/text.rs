@@ -68,6 +68,50 @@ pub fn counted(count: u64, what: &str) -> String {
     format!("1 {}", one.replace("that it is large", "that they are large"))
 }
 
+/// A number in so many significant digits, as people write it: 7.08, 0.0012, 1234, and 1.2e-5 where zeros would hide it.
+pub fn in_digits(value: f64, significant: u8) -> String {
+    let after_first = significant.max(1) - 1;
+    match value.abs() {
+        0.0 => "0".into(),
+        1e-3..1e7 => {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a value within 0..9")]
+            let digits = (f64::from(after_first) - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+            format!("{value:.digits$}")
+        }
+        _ => format!("{value:.*e}", usize::from(after_first)),
+    }
+}
+
+/// A number rounded to so many significant digits: 40000 of 39 871 in one or two.
+pub fn about(value: f64, significant: u8) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return in_digits(value, significant);
+    }
+    let unit = 10f64.powf(value.abs().log10().floor() - f64::from(significant.max(1) - 1));
+    in_digits((value / unit).round() * unit, significant)
+}
+
+/// A number with so many decimals at most, none that say nothing: 4095, 0, -0.5.
+pub fn in_decimals(value: f64, most: usize) -> String {
+    let shown = format!("{value:.most$}");
+    let short = if shown.contains('.') { shown.trim_end_matches('0').trim_end_matches('.') } else { &shown };
+    if short == "-0" { "0".into() } else { short.to_owned() }
+}
+
+/// How many bytes, in words: all of them where they are few, else in three digits of what disks are sold by.
+pub fn bytes_in_words(bytes: u64) -> String {
+    const UNITS: [&str; 6] = ["kB", "MB", "GB", "TB", "PB", "EB"];
+    if bytes < 10_000 {
+        return counted(bytes, "bytes");
+    }
+    let (mut value, mut unit) = (bytes as f64 / 1e3, 0);
+    while value >= 999.5 && unit + 1 < UNITS.len() {
+        (value, unit) = (value / 1e3, unit + 1);
+    }
+    let more = if bytes == u64::MAX { "more than " } else { "" };
+    format!("{more}{} {}", in_digits(value, 3), UNITS[unit])
+}
+
 /// Escapes what steers a terminal, directions of writing included, but for what is `plain`.
 fn escaped(text: &str, plain: impl Fn(char) -> bool) -> Cow<'_, str> {
     let steers = |c: char| {
@@ -104,6 +148,38 @@ mod tests {
             "\\u{1b}[2J\\u{9b}1m\\u{7f}\\r\\u{202e}x\\u{2028}"
         );
         assert_eq!(one_line("a\tb\nµ"), "a\\tb\\nµ");
+    }
+
+    #[test]
+    fn numbers_are_written_as_people_do() {
+        for (value, digits, wanted) in [
+            (7.08, 3, "7.08"),
+            (0.001_234, 2, "0.0012"),
+            (1234.5, 2, "1234"),
+            (-0.0, 2, "0"),
+            (1.23e-5, 2, "1.2e-5"),
+            (3.2e9, 2, "3.2e9"),
+        ] {
+            assert_eq!(in_digits(value, digits), wanted);
+        }
+        for (value, wanted) in [(39_871.0, "40000"), (1.543, "1.5"), (0.0, "0"), (9.96e-4, "0.0010"), (2.34e8, "2.3e8")]
+        {
+            assert_eq!(about(value, 2), wanted);
+        }
+        for (value, wanted) in [(-0.04, "0"), (4095.0, "4095"), (-0.5, "-0.5"), (100.0, "100"), (f64::INFINITY, "inf")]
+        {
+            assert_eq!(in_decimals(value, 1), wanted);
+        }
+        for (bytes, wanted) in [
+            (1, "1 byte"),
+            (9_999, "9999 bytes"),
+            (12_345, "12.3 kB"),
+            (1_000_000, "1.00 MB"),
+            (3_000_000_000, "3.00 GB"),
+            (u64::MAX, "more than 18.4 EB"),
+        ] {
+            assert_eq!(bytes_in_words(bytes), wanted);
+        }
     }
 
     #[test]

@@ -121,6 +121,25 @@ class RadianceToElectrons(ProgramCase):
                         planes, self.sensor.electrons(radiance, start=start, end=end, step=step, rule=rule)
                     )
 
+    def test_coarse_tables_are_straight_along_what_they_count(self):
+        nm = np.arange(360, 831)
+        # By wavenumber, by wavelength per wavenumber, and per nm by wavenumber: W cm-2 sr-1 over cm-1 or nm.
+        for rows, heading, values, per_cm in [
+            ([12_000, 20_000, 28_000], "nu (cm-1),L (W cm-2 sr-1 / cm-1)", [1e-7, 9e-7, 2e-7], True),
+            ([12_000, 18_500, 28_000], "nu (cm-1),L (W cm-2 sr-1 nm-1)", [4e-6, 1e-6, 9e-6], False),
+            ([350, 500, 850], "nm,L (W cm-2 sr-1 / cm-1)", [2e-7, 9e-7, 1e-7], True),
+        ]:
+            with self.subTest(heading=heading, per_cm=per_cm):
+                lines = [heading, *(f"{row},{value!r}" for row, value in zip(rows, values))]
+                (self.directory / "coarse.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+                along = 1e7 / nm if heading.startswith("nu") else nm
+                radiance = np.interp(along, rows, values) * (1e7 / nm**2.0 if per_cm else 1)
+                self.compare_within(self.render("coarse.csv", "--size", "2x2"), self.sensor.electrons(radiance), 1e-5)
+
+    def compare_within(self, planes, expected, tolerance):
+        for name in "RGB":
+            self.assertLess(abs(planes[name].flat[0] / expected[name] - 1), tolerance, name)
+
     def test_single_spectra_of_the_sample_data(self):
         for path in sorted(sample_data("skies").glob("*.csv")):
             if path.name.endswith("_meta.csv"):

@@ -4,7 +4,7 @@ use crate::camera::optics::Exposure;
 use crate::camera::sensor::{Counts, Sensor};
 use crate::error::{Error, Result};
 use crate::numerics::planes::WeightedPlane;
-use crate::spectrum::{Curve, WavelengthGrid, fold};
+use crate::spectrum::{Between, Curve, WavelengthGrid, fold};
 use crate::units::{LIGHT_M_PER_S, M_PER_NM, PLANCK_J_S};
 
 /// How the curves of a response stand to quantum efficiencies.
@@ -205,11 +205,14 @@ impl Camera {
         self.weights.each_ref().map(|weights| weights.iter().zip(radiance).map(|(w, l)| w * l).collect())
     }
 
-    /// The planes of a spectral image that this camera sees, `channels` the place of each wavelength and `factors` the W
-    /// cm⁻² sr⁻¹ nm⁻¹ of a sample of 1 there. Planes to which no class responds are left out: they would add zeros.
-    pub fn planes(&self, channels: &[usize], factors: &[f64]) -> Vec<WeightedPlane> {
-        let weights =
-            factors.iter().enumerate().map(|(i, factor)| self.weights.each_ref().map(|class| class[i] * factor));
+    /// The planes of a spectral image that this camera sees, `channels` the places that its wavelengths lie `between`, and `factors`
+    /// the W cm⁻² sr⁻¹ nm⁻¹ of a sample of 1 at each of these. Planes to which no class responds are left out: they would add zeros.
+    pub fn planes(&self, channels: &[usize], between: &Between, factors: &[f64]) -> Vec<WeightedPlane> {
+        let of_class = |class: &Vec<f64>| {
+            between.folded(class.iter().zip(factors).map(|(weight, factor)| weight * factor).collect(), channels.len())
+        };
+        let classes = self.weights.each_ref().map(of_class);
+        let weights = (0..channels.len()).map(|i| classes.each_ref().map(|class| class[i]));
         let planes = channels.iter().zip(weights).map(|(&plane, weights)| WeightedPlane { plane, weights });
         planes.filter(|plane| plane.weights != [0.0; 3]).collect()
     }

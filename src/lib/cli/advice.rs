@@ -1,6 +1,7 @@
 //! What to do about an error, in the options of the program that met it.
 
 use crate::error::Error;
+use crate::names::nearest;
 use clap::Command;
 use std::ffi::OsString;
 use std::io;
@@ -39,7 +40,7 @@ pub(super) fn advised(error: &Error, command: &Command) -> String {
         }
         Error::Disk { file, action: "open", source } if source.kind() == io::ErrorKind::NotFound => {
             let words: Vec<OsString> = std::env::args_os().skip(1).collect();
-            let hint = misplaced(file, command, &in_text(&words));
+            let hint = misplaced(file, command, &in_text(&words)).or_else(|| near_file(Path::new(file)));
             hint.map_or_else(|| error.to_string(), |hint| format!("{error}; {hint}"))
         }
         _ => error.to_string(),
@@ -63,6 +64,24 @@ fn misplaced(word: &str, command: &Command, words: &[String]) -> Option<String> 
     let option = command.get_arguments().find(|argument| argument.get_long() == Some(long));
     let takes_behind = option.is_some_and(clap::Arg::is_require_equals_set);
     takes_behind.then(|| format!("a value of --{long} stands behind `=`, as in `--{long}={word}`"))
+}
+
+/// The file in the same directory whose name is nearest to one that is not there.
+fn near_file(path: &Path) -> Option<String> {
+    /// A letter for so many may be off, and so many of an ending.
+    const LETTERS: usize = 5;
+    const ENDING: usize = 4;
+    /// So many files are looked at.
+    const LOOKED_AT: usize = 10_000;
+    let typed = path.file_name()?.to_str()?;
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let files = directory.unwrap_or(Path::new(".")).read_dir().ok()?.take(LOOKED_AT).flatten();
+    let mut names: Vec<String> = files.filter_map(|file| file.file_name().into_string().ok()).collect();
+    names.sort_unstable();
+    let is_same_stem = |known: &str| Path::new(known).file_stem() == path.file_stem();
+    let farthest = |known: &str| if is_same_stem(known) { ENDING } else { known.len().min(typed.len()) / LETTERS };
+    let near = nearest(typed, names.iter().map(String::as_str), farthest)?;
+    Some(format!("did you mean `{}`?", path.with_file_name(near).display()))
 }
 
 /// How an output is named, where a word that is none of an option looks like one and no output is named otherwise.
@@ -121,6 +140,19 @@ mod tests {
         let command = Command::new("test").arg(output).arg(Arg::new("form").long("output-format"));
         assert_eq!(output_hint("c.exr", &command, &[]), None);
         assert_eq!(output_hint("c.json", &command, &[]).as_deref(), Some("for an output write `-o c.json`"));
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_may_be_another() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in ["clear_zenith.csv", "a.exr", "b.exr"] {
+            std::fs::write(directory.path().join(name), "").unwrap();
+        }
+        let told = |name: &str| near_file(&directory.path().join(name));
+        let wanted = format!("did you mean `{}`?", directory.path().join("clear_zenith.csv").display());
+        assert_eq!(told("clear_zenit.csv"), Some(wanted));
+        assert!(["a.ex", "a.tiff"].iter().all(|name| told(name).unwrap().ends_with("a.exr`?")));
+        assert_eq!([told("hazy.csv"), told("dark.exr"), told("nodir/a.exr")], [None, None, None]);
     }
 
     #[test]

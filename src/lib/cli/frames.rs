@@ -116,7 +116,9 @@ impl Session {
         let one = |session: &Self, index: usize| {
             let job = &jobs[index / drawn];
             let exposure = exposures.clone().and_then(|mut range| range.nth(index % drawn));
-            let output = Output { index: (index % drawn) as u64, ..output.clone() };
+            let files_left = if index.is_multiple_of(drawn) { drawn as u64 - 1 } else { 0 };
+            let following = Following { files_left, ..Following::default() };
+            let output = Output { index: (index % drawn) as u64, following, ..output.clone() };
             session.on(job.input.as_deref()).frames(job, input, &output, &[exposure], &work)
         };
         session.all::<A>(jobs.len() * drawn, "frames", Order::Any, one)
@@ -166,6 +168,9 @@ impl Session {
                     sequence.again();
                 }
                 output.following.exposures_left = exposed - round - 1;
+                if exposed > 1 {
+                    output.following.files_left = if round == 0 { exposed - 1 } else { 0 };
+                }
                 work(&Turn { session: self, input: &input, output: &output, exposure: *exposure })?;
                 self.warn_of_doubts();
                 output.index += 1;

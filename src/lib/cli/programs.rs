@@ -4,6 +4,7 @@ use super::documents::SUMMARY;
 pub use super::roster::{APART, OWN, PROGRAMS};
 use super::{complain, show};
 use crate::error::{Error, Result};
+use crate::names::nearest;
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::os::unix::process::CommandExt;
@@ -55,18 +56,43 @@ pub fn hand_over(front: &'static str) -> Option<ExitCode> {
     if program == "help" {
         // `cyanometer help measure`, as other front doors have it.
         help = Some(OsString::from("--help"));
-        program =
-            words.next().filter(|word| PROGRAMS.into_iter().any(|known| OsStr::new(known) == word)).unwrap_or_default();
-        if program.is_empty() {
+        program = words.next().unwrap_or_default();
+        let is_other =
+            program.to_string_lossy().starts_with('-') || OWN.into_iter().any(|known| OsStr::new(known) == program);
+        if program.is_empty() || is_other {
             let error = std::env::current_exe().map(|this| Command::new(this).arg0(front).args(help).exec());
             complain(front, &Error::disk(front, "run", error.unwrap_or_else(|error| error)).to_string());
             return Some(ExitCode::FAILURE);
         }
     }
-    let program = PROGRAMS.into_iter().find(|known| OsStr::new(known) == program)?;
-    let error = become_program(program, help.into_iter().chain(words));
+    let Some(known) = PROGRAMS.into_iter().find(|known| OsStr::new(known) == program) else {
+        return unknown(&program.to_string_lossy()).map(|problem| {
+            complain(front, &problem);
+            ExitCode::from(2)
+        });
+    };
+    let error = become_program(known, help.into_iter().chain(words));
     complain(front, &error.to_string());
     Some(ExitCode::from(error.exit_status()))
+}
+
+/// A complaint of a word where a program is wanted, if it is none that is known and no option.
+fn unknown(word: &str) -> Option<String> {
+    /// Letters of a name in which it may be off, one for so many.
+    const LETTERS: usize = 3;
+    if word.starts_with('-') || word.is_empty() || OWN.contains(&word) {
+        return None;
+    }
+    let bare = word.to_ascii_lowercase().replace(['_', ' '], "-");
+    let known = || PROGRAMS.into_iter().chain(OWN);
+    // A part of a name is meant rather than one that looks like it.
+    let begins = |known: &&str| bare.len() >= LETTERS && known.split('-').any(|part| part == bare);
+    let meant = known().find(begins).or_else(|| nearest(&bare, known(), |known| known.len().div_ceil(LETTERS)));
+    let told = meant.map_or_else(
+        || format!("; `{}` alone lists the programs", env!("CARGO_PKG_NAME")),
+        |meant| format!("; did you mean `{meant}`?"),
+    );
+    Some(format!("there is no program `{word}`{told}"))
 }
 
 /// Gives the process to a program; comes back where that is impossible.
@@ -101,4 +127,30 @@ fn summary(program: &str) -> String {
     let said = command(program).ok().and_then(ask).filter(|done| done.status.success());
     let said = said.map(|done| String::from_utf8_lossy(&done.stdout).trim_end().to_owned());
     said.unwrap_or_else(|| "(it is not beside this program, or does not run)".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn programs_that_are_not_there_are_told_by_their_nearest() {
+        for (word, meant) in [
+            ("measur", Some("measure")),
+            ("Measure", Some("measure")),
+            ("render", Some("render-radiance")),
+            ("add_noise", Some("add-noise")),
+            ("noise", Some("add-noise")),
+            ("digitise", Some("digitize")),
+            ("lst", Some("list")),
+            ("sky.csv", None),
+        ] {
+            let told = unknown(word).unwrap();
+            let wanted = meant.map_or("; `cyanometer` alone lists the programs".to_owned(), |meant| {
+                format!("; did you mean `{meant}`?")
+            });
+            assert_eq!(told, format!("there is no program `{word}`{wanted}"));
+        }
+        assert_eq!(["--version", "list", ""].map(unknown), [None, None, None]);
+    }
 }

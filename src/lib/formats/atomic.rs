@@ -394,13 +394,13 @@ impl Target {
         self.path.as_deref()
     }
 
-    /// Refuses an output of so many bytes where a file that it goes to has no room for it.
+    /// Refuses an output of so many bytes, and as many `others` beside it, where a file that it goes to has no room for all.
     ///
     /// # Errors
     ///
     /// Those of [`free_space::check`].
-    pub fn check_room(&self, bytes: u64) -> Result<()> {
-        let check = |file: &File| free_space::check(file, &self.name, bytes);
+    pub fn check_room(&self, bytes: u64, others: u64) -> Result<()> {
+        let check = |file: &File| free_space::check(file, &self.name, bytes, others);
         match &self.kind {
             Kind::Named(file) => check(file.output.get_ref()),
             Kind::Stream(output) => check(output.get_ref()),

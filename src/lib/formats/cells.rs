@@ -17,7 +17,7 @@ const MAX_BYTES: u64 = 256 << 20;
 const MAX_EXPANSION: u64 = 64;
 const SMALL_BYTES: u64 = 16 << 20;
 /// A table may have this many numbers: 256 MiB of them.
-const MAX_CELLS: usize = 1 << 25;
+pub(super) const MAX_CELLS: usize = 1 << 25;
 /// A table may have this many columns: as text they take many times the memory of their numbers.
 pub(super) const MAX_COLUMNS: usize = 1 << 20;
 /// So many curves of a table may hold what is no number.

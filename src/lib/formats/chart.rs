@@ -108,8 +108,7 @@ fn reflectances(name: String, bytes: &[u8]) -> Result<Reference> {
     (0..table.columns.len()).try_for_each(|index| table.check(index)).map_err(told)?;
     let mut curves = Vec::with_capacity(table.columns.len());
     for (index, column) in table.columns.iter().enumerate() {
-        let curve = Curve::new(table.wavelength_nm.clone(), table.values.row(index).to_vec());
-        let curve = curve.map_err(|problem| Error::format(&name, problem))?;
+        let curve = table.curve_at(index)?;
         let (low, high) = curve.extremes();
         if low < 0.0 || high > 1.5 {
             let problem = format!("`{column}` runs from {low} to {high}; a reflectance is a fraction of 1");

@@ -11,11 +11,14 @@ use super::foreign::csv_complaint;
 use super::misread::{self, is_units};
 use super::radiance_unit::{self, FileSays};
 use super::register;
+use super::remarks::{Comments, MAX_COMMENTS};
+use super::uncertainties;
 use super::wavelengths::{check_nm, check_order, check_stated};
 use crate::error::{Error, Result};
 use crate::names::place_of;
-use crate::spectrum::{Curve, SHORTEST_NM};
-use crate::units::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
+use crate::spectrum::{Along, Between, Curve, SHORTEST_NM};
+use crate::text::about;
+use crate::units::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading};
 use csv::StringRecord;
 use ndarray::{Array2, Axis};
 use std::collections::BTreeMap;
@@ -141,7 +144,7 @@ impl SpectralTable {
         let by_wavenumber = unit == Some(WavelengthUnit::PerCentimeter);
         let is_bare = !has_header;
         let Comments { units: remarks, other_quantity, .. } = comments;
-        Ok(Self {
+        let table = Self {
             name: name.to_owned(),
             wavelength_nm,
             columns,
@@ -152,7 +155,22 @@ impl SpectralTable {
             other_quantity,
             by_wavenumber,
             is_bare,
-        })
+        };
+        Ok(table.without_uncertainties())
+    }
+
+    /// Itself without curves that are uncertainties of others, which are told.
+    fn without_uncertainties(self) -> Self {
+        let Some(kept) = uncertainties::others(&self.columns) else { return self };
+        register::doubt(uncertainties::told(&self.name, &self.columns, &kept));
+        let place = |index: &usize| kept.iter().position(|kept| kept == index);
+        Self {
+            columns: kept.iter().map(|index| self.columns[*index].clone()).collect(),
+            values: self.values.select(Axis(0), &kept),
+            spoiled: self.spoiled.iter().filter_map(|(index, said)| Some((place(index)?, said.clone()))).collect(),
+            headings: kept.iter().map(|index| self.headings[*index].clone()).collect(),
+            ..self
+        }
     }
 
     /// The file as messages call it.
@@ -195,10 +213,49 @@ impl SpectralTable {
     ///
     /// As [`Self::column_index`], and [`Error::Format`] for values that make no curve.
     pub fn curve(&self, column: Option<&str>) -> Result<Curve> {
-        let index = self.column_index(column)?;
+        self.curve_at(self.column_index(column)?)
+    }
+
+    /// The same of a column by its place: between rows straight in wavelength, or in wavenumber where that is what they have.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for values that make no curve.
+    pub fn curve_at(&self, index: usize) -> Result<Curve> {
         self.check(index)?;
-        Curve::new(self.wavelength_nm.clone(), self.values.row(index).to_vec())
-            .map_err(|problem| Error::format(&self.name, problem))
+        let between = Between::new(&self.wavelength_nm, self.along(), false);
+        let values = between.values(|row| self.values[(index, row)]);
+        Curve::new(between.wavelength_nm, values).map_err(|problem| Error::format(&self.name, problem))
+    }
+
+    /// What its rows go along.
+    fn along(&self) -> Along {
+        if self.by_wavenumber { Along::Wavenumber } else { Along::Wavelength }
+    }
+
+    /// The wavelengths at which its radiances are taken, `given` the unit that the user says they have: those of its rows, and more
+    /// where they are no straight lines in nm between these.
+    pub fn between(&self, given: Option<RadianceUnit>) -> Between {
+        let of_file = self.headings.iter().flatten().chain(&self.remarks);
+        let of_file = of_file.filter_map(|says| match says {
+            Stated::Radiance(unit) => Some(*unit),
+            Stated::Other { .. } => None,
+        });
+        let is_bent = given.into_iter().chain(of_file).any(RadianceUnit::is_per_wavenumber);
+        Between::new(&self.wavelength_nm, self.along(), is_bent)
+    }
+
+    /// A curve of radiances in W cm⁻² sr⁻¹ nm⁻¹ at the wavelengths of [`Self::between`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::radiance_unit`].
+    pub fn radiances(&self, index: usize, given: Option<RadianceUnit>, between: &Between) -> Result<Vec<f64>> {
+        let (unit, _) = self.radiance_unit(index, given)?;
+        let mut radiances = between.values(|row| self.values[(index, row)]);
+        let of_nm = between.wavelength_nm.iter().map(|nm| unit.in_w_per_cm2_sr_nm(*nm));
+        radiances.iter_mut().zip(of_nm).for_each(|(value, factor)| *value *= factor);
+        Ok(radiances)
     }
 
     /// The unit of a curve of radiances, with a warning where it is assumed; `given` is what the user says.
@@ -226,12 +283,13 @@ impl SpectralTable {
         let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
         let (unit, assumed) = radiance_unit::settle(says, given)?;
         let Some(times) = self.times_white(index, unit) else { return Ok((unit, assumed)) };
-        let bright = format!("in {unit} it would be {times:.1e} times as bright as a white cloud in the sun");
-        if assumed.is_some() {
+        let times = about(times, 2);
+        let bright = format!("in {unit} it would be {times} times as bright as a white cloud in the sun");
+        if assumed.is_some() && given.is_none() {
             let problem = format!("it does not say the unit of its radiance; {bright}");
             return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
         }
-        Ok((unit, Some(format!("{}: {bright}: is that its unit?", self.name))))
+        Ok((unit, Some(assumed.unwrap_or_else(|| format!("{}: {bright}: is that its unit?", self.name)))))
     }
 
     /// The columns of which nothing says that they hold anything but radiances.
@@ -276,7 +334,9 @@ impl SpectralTable {
     ///
     /// [`Error::Format`] where it is by wavenumber, or for values that make no curve.
     pub fn light(&self) -> Result<Curve> {
-        if self.by_wavenumber {
+        let is_per_wavenumber =
+            matches!(self.headings.first(), Some(Some(Stated::Radiance(unit))) if unit.is_per_wavenumber());
+        if self.by_wavenumber || is_per_wavenumber {
             return Err(Error::format(
                 &self.name,
                 "a light by wavenumber is not read; give its power per nm by wavelength",
@@ -312,45 +372,6 @@ fn holds_rows_without_names(numbers: &Array2<f64>) -> bool {
         && first.iter().all(|nm| *nm >= SHORTEST_NM)
         && below.iter().all(|value| *value < SHORTEST_NM)
 }
-
-/// What comments say about units.
-#[derive(Debug, Default)]
-struct Comments {
-    units: Vec<Stated>,
-    other_quantity: Option<Stated>,
-    wavelength: Option<WavelengthUnit>,
-}
-
-impl Comments {
-    /// Those of a table.
-    fn of(text: &str) -> Self {
-        let mut found = Self::default();
-        for line in delimited::comments(text).take(MAX_COMMENTS) {
-            found.units.extend(units_in(line));
-            found.other_quantity = found.other_quantity.or_else(|| other_quantity(line));
-            let counts =
-                |clause: &&str| ["wavelength", "wavenumber"].iter().any(|word| clause.to_lowercase().contains(word));
-            let mut clauses = line.split([',', ';']).filter(counts);
-            let unit = clauses.find_map(|clause| WavelengthUnit::of_heading(clause.trim()).ok().flatten());
-            found.wavelength = found.wavelength.or(unit);
-        }
-        found
-    }
-}
-
-/// The quantity that a comment such as `Unit: %` or `units of values = counts` states, where it is no spectral radiance.
-fn other_quantity(comment: &str) -> Option<Stated> {
-    let (before, stated) = comment.split_once([':', '='])?;
-    let mut words = before.split(|c: char| !c.is_alphanumeric());
-    let states = words.any(|word| ["unit", "units"].contains(&word.to_lowercase().as_str()));
-    let is_other = |stated: &Stated| matches!(stated, Stated::Other { kind, .. } if kind.conversion().is_some());
-    states
-        .then(|| unit_of_heading(stated).or_else(|| unit_of_heading(&format!("({})", stated.trim()))))?
-        .filter(is_other)
-}
-
-/// So many comments are searched for units.
-const MAX_COMMENTS: usize = 1000;
 
 /// The record below the header, if there is one.
 fn record_below(name: &str, text: &str, reader: &mut csv::Reader<&[u8]>) -> Result<Option<StringRecord>> {
@@ -617,7 +638,7 @@ mod tests {
         let (unit, warning) = table.radiance_unit(0, None).unwrap();
         assert_eq!(unit.to_string(), "mW m-2 sr-1 / cm-1");
         // As the disk of the sun is.
-        assert!(warning.unwrap().contains("4.0e4 times as bright as a white cloud in the sun: is that its unit?"));
+        assert!(warning.unwrap().contains("40000 times as bright as a white cloud in the sun: is that its unit?"));
         for (value, nm) in table.values.row(0).iter().zip(&table.wavelength_nm) {
             let meters = nm * 1e-9;
             // W m⁻² sr⁻¹ per m is 10⁻¹³ W cm⁻² sr⁻¹ nm⁻¹.
@@ -625,6 +646,35 @@ mod tests {
             let found = value * unit.in_w_per_cm2_sr_nm(*nm);
             assert!((found / wanted - 1.0).abs() < 1e-12, "{nm}: {found} {wanted}");
         }
+        // Between the rows it is straight in wavenumber, and then turned: of few rows as of all that lie on the same lines.
+        let between = table.between(None);
+        let found = table.radiances(0, None, &between).unwrap();
+        let per_cm1 = table.values.row(0);
+        for (nm, radiance) in between.wavelength_nm.iter().zip(&found) {
+            let per_cm = 1e7 / nm;
+            let (row, share) =
+                if per_cm > 20_000.0 { (0, (25_000.0 - per_cm) / 5_000.0) } else { (1, (20_000.0 - per_cm) / 7_500.0) };
+            let line = per_cm1[row] + share * (per_cm1[row + 1] - per_cm1[row]);
+            // mW m⁻² sr⁻¹ per cm⁻¹ are 10⁻⁷ W cm⁻², and ν²/10⁷ cm⁻¹ a nm.
+            let wanted = line * 1e-7 * per_cm * per_cm / 1e7;
+            assert!((radiance / wanted - 1.0).abs() < 1e-12, "{nm}: {radiance} {wanted}");
+        }
+        assert_eq!(between.wavelength_nm.len(), 401);
+        // Radiances per wavenumber that stand by wavelength are straight in that.
+        let by_nm = SpectralTable::parse("a", b"nm,L (mW/(m2 sr cm-1))\n400,1\n800,3\n").unwrap();
+        let between = by_nm.between(None);
+        let middle = by_nm.radiances(0, None, &between).unwrap()[200];
+        assert!(
+            (between.wavelength_nm[200], (middle / (2.0 * 1e-7 * 1e7 / 600f64.powi(2)) - 1.0).abs() < 1e-12)
+                == (600.0, true)
+        );
+        let given = RadianceUnit::parse("mW/(m2 sr cm-1)");
+        let by_nm = SpectralTable::parse("a", b"nm,L\n400,1\n800,3\n").unwrap();
+        assert_eq!(by_nm.between(given).wavelength_nm.len(), 401);
+        assert_eq!(by_nm.between(None).wavelength_nm, [400.0, 800.0]);
+        // So is a curve of wavenumbers.
+        let curve = SpectralTable::parse("a", b"nu (cm-1),T\n12500,0\n25000,1\n").unwrap().curve(None).unwrap();
+        assert!((curve.at(500.0) - 0.6).abs() < 1e-12);
         let silent = SpectralTable::parse("a", b"nu (cm-1),L\n20000,1\n25000,1\n").unwrap();
         let refused = silent.radiance_unit(0, None).unwrap_err().to_string();
         assert!(refused.contains("whether its radiance is per nm or per cm-1; give `radiance_unit`"), "{refused}");
@@ -837,7 +887,7 @@ mod tests {
         assert!(warning.unwrap().contains("taken as W cm-2 sr-1 nm-1"));
         assert_eq!(unit("nm,L\n400,1\n", given).unwrap(), (watts, None));
         // A clear sky in W m⁻² sr⁻¹ nm⁻¹.
-        assert!(refused("nm,L\n400,0.1\n", None).contains("1.5e3 times as bright as a white cloud in the sun"));
+        assert!(refused("nm,L\n400,0.1\n", None).contains("1500 times as bright as a white cloud in the sun"));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! each of their complaints in earnest.
 
 use crate::error::Error;
+use crate::text::in_decimals;
 use exr::error::Error as ExrError;
 use image::ImageError;
 use std::io;
@@ -92,7 +93,7 @@ fn not_yaml(text: &str) -> Option<String> {
         ("did not find expected ',' or ']'", "a list in brackets lacks a comma or its `]`", true),
         ("did not find expected ',' or '}'", "keys in braces lack a comma or their `}`", true),
         ("did not find expected '-' indicator", "an entry of the list, which begins with `- `, is wanted", false),
-        ("could not find expected ':'", "a key lacks its colon", false),
+        ("could not find expected ':'", "a key lacks its colon, or the blank behind it, at or above this place", false),
         ("did not find expected node content", "a value is missing, or brackets are not closed", false),
         (
             "cannot start any token",
@@ -172,8 +173,46 @@ fn misfit(text: &str) -> Option<String> {
         }
         "invalid length " => format!("{key} has {found} entries, not {}{place}", wanted(expected)),
         "data did not match any variant" => format!("{key} has none of the forms that are read{place}"),
-        _ => format!("{key} is {}, not {}{place}", given(found), wanted(expected)),
+        _ => {
+            let hint = remedy(found, expected).map_or(String::new(), |hint| format!("; {hint}"));
+            format!("{key} is {}, not {}{place}{hint}", given(found), wanted(expected))
+        }
     })
+}
+
+/// What to write instead of a value that `serde` found, where that can be told: a number with a comma, a unit, a per cent sign or quotes,
+/// a name of a file where keys are wanted.
+fn remedy(found: &str, expected: &str) -> Option<String> {
+    let text = found.strip_prefix("string \"").and_then(|text| text.strip_suffix('"'));
+    match (text, expected) {
+        (Some(text), "f32" | "f64" | "u8" | "u16" | "u32" | "u64" | "usize") => {
+            let is_number = |text: &str| text.parse::<f64>().is_ok_and(f64::is_finite);
+            let share = text.strip_suffix('%').map(str::trim).and_then(|text| text.parse::<f64>().ok());
+            let end = text.rfind(|c: char| c.is_ascii_digit()).map_or(0, |last| last + 1);
+            let (number, unit) = text.split_at(end);
+            let point = text.replacen(',', ".", 1);
+            match share {
+                Some(percent) => Some(format!("write it as a fraction of 1, {}", in_decimals(percent / 100.0, 9))),
+                None if is_number(text) => Some("leave out its quotes".into()),
+                None if is_number(&point) => Some(format!("write {point}")),
+                None if is_number(number) => {
+                    Some(format!("write {number}, in the unit of the key, without `{}`", unit.trim()))
+                }
+                None => None,
+            }
+        }
+        (None, "u8" | "u16" | "u32" | "u64" | "usize") => {
+            let number = found.split_once('`')?.1.strip_suffix('`')?;
+            let value: f64 = number.parse().ok()?;
+            (value >= 0.0 && value.fract() == 0.0).then(|| format!("write {value}"))
+        }
+        (Some(text), other)
+            if other.starts_with("struct") && text.rsplit_once('.').is_some_and(|(_, end)| end.len() < 5) =>
+        {
+            Some(format!("a file is named so: {{file: {text}}}"))
+        }
+        _ => None,
+    }
 }
 
 /// What `serde` found, in our words.
@@ -363,6 +402,12 @@ mod tests {
         let refused = |text: &str| parse_strict::<Sensor>("s.yaml", text.as_bytes()).unwrap_err().to_string();
         for (text, wanted) in [
             ("bits: many\n", "`bits` is `many`, not a whole number from 0 on (line 1, column 7)"),
+            ("bits: \"12\"\n", "`bits` is `12`, not a whole number from 0 on (line 1, column 7); leave out its quotes"),
+            ("bits: 12.0\n", "`bits` is `12.0`, not a whole number from 0 on (line 1, column 7); write 12"),
+            (
+                "bits: 12 bit\n",
+                "`bits` is `12 bit`, not a whole number from 0 on (line 1, column 7); write 12, in the unit of the key, without `bit`",
+            ),
             ("bits: -1\n", "`bits` is `-1`, not a whole number from 0 on (line 1, column 7)"),
             ("bits: [1]\n", "`bits` is a list, not a whole number from 0 on (line 1, column 7)"),
             ("bits: {a: 1}\n", "`bits` is a list of keys and values, not a whole number from 0 on (line 1, column 7)"),
@@ -376,9 +421,29 @@ mod tests {
                 "it is no valid YAML: a colon and a blank stand within a value, or a key is indented more than those above it; put \
                  the value in quotes, or indent keys alike (line 1, column 8)",
             ),
-            ("bits: 12\nwidth 3\n", "it is no valid YAML: a key lacks its colon (line 3, column 1)"),
+            (
+                "bits: 12\nwidth 3\n",
+                "it is no valid YAML: a key lacks its colon, or the blank behind it, at or above this place (line 3, column 1)",
+            ),
         ] {
             assert_eq!(refused(text), format!("s.yaml: {wanted}"));
+        }
+    }
+
+    #[test]
+    fn values_of_yaml_are_told_as_they_should_be() {
+        let told = |text: &str, expected| remedy(&format!("string \"{text}\""), expected);
+        for (text, expected, wanted) in [
+            ("15,7", "f64", Some("write 15.7")),
+            ("15.7 e-", "f64", Some("write 15.7, in the unit of the key, without `e-`")),
+            ("33ms", "f64", Some("write 33, in the unit of the key, without `ms`")),
+            ("0.8%", "f64", Some("write it as a fraction of 1, 0.008")),
+            ("1.5", "f64", Some("leave out its quotes")),
+            ("qe.csv", "struct CurveFile", Some("a file is named so: {file: qe.csv}")),
+            ("many", "f64", None),
+            ("rggb", "a boolean", None),
+        ] {
+            assert_eq!(told(text, expected).as_deref(), wanted, "{text}");
         }
     }
 

@@ -89,8 +89,8 @@ impl FrameWriter {
         let target = Target::open(options.path.as_deref(), needs_seek)?;
         let name = target.name().to_owned();
         let follow = options.frames_to_come > 0 && target.named_file().is_none();
-        let frames = if follow { options.frames_to_come.saturating_add(1) } else { 1 };
-        encoding.bytes(&header.geometry).map_or(Ok(()), |bytes| target.check_room(bytes.saturating_mul(frames)))?;
+        let others = if follow { options.frames_to_come } else { options.files_to_come };
+        encoding.bytes(&header.geometry).map_or(Ok(()), |bytes| target.check_room(bytes, others))?;
         header.metadata.frames_to_come = follow.then_some(options.frames_to_come);
         header.metadata.file = header.metadata.file.filter(|_| target.named_file().is_none());
         let header = &header;

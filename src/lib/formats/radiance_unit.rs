@@ -1,7 +1,7 @@
 //! The unit of a file's radiances: what the file says, what the user says, and what is assumed where nobody says anything.
 
 use crate::error::{Error, Result};
-use crate::units::{RadianceUnit, Stated};
+use crate::units::{OtherUnit, RadianceUnit, Stated};
 
 /// What a file says about the unit of its radiances.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +46,15 @@ pub fn settle(says: FileSays<'_>, given: Option<RadianceUnit>) -> Result<(Radian
                     format!("{problem}; spectral radiances are wanted, in units such as {wanted}: {conversion}");
                 Err(Error::format(name, problem))
             }
-            (None, Some(unit)) => Ok((unit, None)),
+            (None, Some(unit)) => {
+                let warned = (*kind == OtherUnit::Relative).then(|| {
+                    format!(
+                        "{name}: {}; they count as {unit}, as --radiance-unit says: signals and XYZ are then of no scale either",
+                        is_in(text, kind.in_words())
+                    )
+                });
+                Ok((unit, warned))
+            }
             (None, None) => Err(Error::format(name, is_in(text, kind.in_words())).give(&["radiance_unit"])),
         },
         None if remarks.is_empty() && given.is_none() => {

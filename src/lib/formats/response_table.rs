@@ -53,7 +53,10 @@ impl ResponseTable {
             let problem = format!("its columns have no names, and {problem}; name them R, G and B");
             return Err(Error::format(name, problem));
         }
-        let mut checked = Self::checked(name, table.wavelength_nm, values)?;
+        let mut checked = Self::checked(name, table.wavelength_nm.clone(), values)?;
+        for (class, place) in checked.classes.iter_mut().zip(places) {
+            *class = table.curve_at(place)?;
+        }
         checked.doubts.extend(told);
         Ok(checked)
     }

@@ -1,6 +1,7 @@
 //! Spectral images: EXR channels named `S0.<nm>nm`, decimal comma, as in `S0.550,000000nm` \[Fichet2021], or by bins of
 //! wavelength, as in `400.00-410.00nm`.
 
+use super::cells::MAX_CELLS;
 use super::csv::SpectralTable;
 use super::data::{near_spectrum, spectrum_file};
 use super::files::{named, open_named, read_table, spool};
@@ -10,10 +11,12 @@ use super::radiance_unit::{self, FileSays};
 use super::table;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
-use crate::spectrum::{SpectralLibrary, channel_bin_nm, channel_wavelength_nm, chart_columns, check_wavelengths};
+use crate::spectrum::{
+    Along, Between, SpectralLibrary, channel_bin_nm, channel_wavelength_nm, chart_columns, check_wavelengths,
+};
 use crate::stream::{RowSource, fold};
 use crate::units::{Any, OtherUnit, RadianceUnit, Stated, unit_of_heading};
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1};
 use std::io::{self, Read, Seek};
 use std::path::Path;
 
@@ -74,9 +77,15 @@ impl SpectralChannels {
         Ok(Self { channels, wavelength_nm, unit, warning })
     }
 
-    /// What a sample of 1 is in W cm⁻² sr⁻¹ nm⁻¹, by channel.
-    pub fn factors(&self) -> Vec<f64> {
-        self.wavelength_nm.iter().map(|nm| self.unit.in_w_per_cm2_sr_nm(*nm)).collect()
+    /// The wavelengths at which its radiances are taken: those of its channels, and more where they are per interval of wavenumber,
+    /// no straight lines in nm.
+    pub fn between(&self) -> Between {
+        Between::new(&self.wavelength_nm, Along::Wavelength, self.unit.is_per_wavenumber())
+    }
+
+    /// What a sample of 1 is in W cm⁻² sr⁻¹ nm⁻¹, by wavelength.
+    pub fn factors(&self, between: &Between) -> Vec<f64> {
+        between.wavelength_nm.iter().map(|nm| self.unit.in_w_per_cm2_sr_nm(*nm)).collect()
     }
 }
 
@@ -142,7 +151,8 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
     let library = match open(&options)? {
         Radiances::Image(mut reader) => {
             let spectral = SpectralChannels::of(reader.header(), unit)?;
-            let factors = spectral.factors();
+            let between = spectral.between();
+            let factors = spectral.factors(&between);
             warnings.extend(spectral.warning);
             let geometry = reader.header().geometry.clone();
             // A header may declare any size: memory is taken as rows come.
@@ -152,29 +162,35 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
                 for y in band.rows() {
                     let lines: Vec<&[f32]> =
                         spectral.channels.iter().map(|&channel| window.row(y.cast_signed(), channel)).collect();
-                    for x in 0..geometry.width {
-                        radiance.extend(lines.iter().zip(&factors).map(|(line, factor)| f64::from(line[x]) * factor));
-                    }
+                    let pixel = |x: usize| between.values(|channel| f64::from(lines[channel][x]));
+                    (0..geometry.width).for_each(|x| {
+                        radiance.extend(pixel(x).into_iter().zip(&factors).map(|(value, factor)| value * factor));
+                    });
                 }
                 Ok(())
             })?;
-            let samples = radiance.len() / spectral.channels.len();
-            let radiance = Array2::from_shape_vec((samples, spectral.channels.len()), radiance)
+            let samples = radiance.len() / factors.len();
+            let radiance = Array2::from_shape_vec((samples, factors.len()), radiance)
                 .map_err(|_| Error::format(&name, "its rows differ in length"))?;
-            SpectralLibrary { wavelength_nm: spectral.wavelength_nm, radiance, columns: geometry.width }
+            SpectralLibrary { wavelength_nm: between.wavelength_nm, radiance, columns: geometry.width }
         }
         Radiances::Table(table) => {
-            let mut radiance = table.values.clone();
-            for (index, mut curve) in radiance.rows_mut().into_iter().enumerate() {
-                let (unit, warning) = table.radiance_unit(index, unit)?;
-                curve
-                    .iter_mut()
-                    .zip(&table.wavelength_nm)
-                    .for_each(|(value, nm)| *value *= unit.in_w_per_cm2_sr_nm(*nm));
-                warnings.extend(warning.into_iter().filter(|_| index == 0));
+            let between = table.between(unit);
+            let (samples, wavelengths) = (table.columns.len(), between.wavelength_nm.len());
+            if samples.saturating_mul(wavelengths) > MAX_CELLS {
+                let problem = format!(
+                    "taken at every nm its {samples} spectra by wavenumber would have more than {MAX_CELLS} numbers; part it \
+                     into smaller tables"
+                );
+                return Err(Error::format(&name, problem));
             }
-            let columns = chart_columns(radiance.nrows());
-            SpectralLibrary { wavelength_nm: table.wavelength_nm, radiance, columns }
+            let mut radiance = Array2::zeros((samples, wavelengths));
+            for (index, mut curve) in radiance.rows_mut().into_iter().enumerate() {
+                curve.assign(&ArrayView1::from(&table.radiances(index, unit, &between)?));
+                warnings.extend(table.radiance_unit(index, unit)?.1.filter(|_| index == 0));
+            }
+            let columns = chart_columns(samples);
+            SpectralLibrary { wavelength_nm: between.wavelength_nm, radiance, columns }
         }
     };
     match library.radiance.indexed_iter().find(|(_, value)| !value.is_finite()) {
@@ -215,7 +231,11 @@ mod tests {
         assert_eq!((found.channels, found.wavelength_nm), (vec![4, 3], vec![400.0, 500.0]));
         let per_wavenumber = seen(&names, "W/(m2 sr cm-1)", None).unwrap();
         // 10⁷/λ² cm⁻¹ per nm: 62.5 at 400 nm, 40 at 500 nm.
-        for (factor, wanted) in per_wavenumber.factors().into_iter().zip([62.5e-4, 40e-4]) {
+        for (factor, wanted) in per_wavenumber
+            .factors(&Between::new(&per_wavenumber.wavelength_nm, Along::Wavelength, false))
+            .into_iter()
+            .zip([62.5e-4, 40e-4])
+        {
             assert!((factor / wanted - 1.0).abs() < 1e-12);
         }
     }

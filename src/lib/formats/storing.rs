@@ -126,6 +126,8 @@ pub struct OutputOptions {
     pub separates_layers: bool,
     /// Frames that follow in the same stream, at least; a named file does not tell.
     pub frames_to_come: u64,
+    /// Files of as much that are made besides in the same run and are not there yet, at least.
+    pub files_to_come: u64,
 }
 
 /// How a frame is encoded, once all options are settled.

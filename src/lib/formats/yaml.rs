@@ -2,6 +2,7 @@
 
 use super::foreign::{yaml_complaint, yaml_problem};
 use super::keys::{KINDS, KeyPage};
+use super::other_keys;
 use super::settings::{self, Settings};
 use super::{yaml_guard, yaml_writer};
 use crate::analysis::characterization::CameraMatrix;
@@ -287,6 +288,9 @@ fn check_keys(name: &str, raw: &Mapping, fields: Keys, parts: &[(&str, Keys)]) -
         known.iter().partition(|known| known.strip_suffix(&last(known)) == Some(part));
     let ordered: Vec<&String> = same.into_iter().chain(other).collect();
     let names: Vec<String> = ordered.iter().map(|known| last(known)).collect();
+    if let Some(here) = other_keys::here(&typed, &names) {
+        return Err(Error::format(name, format!("unknown key `{key}`; {here}")));
+    }
     let found = nearest(&typed, names.iter().map(String::as_str), |_| typed.len().div_ceil(2));
     let place = found.and_then(|found| names.iter().position(|name| name == found));
     let nearest = place.map_or(String::new(), |place| format!("; did you mean `{}`?", ordered[place]));

@@ -115,12 +115,18 @@ impl Pattern<'_> {
             let law_name = if self.classes.len() == 1 { "normal law" } else { "" };
             plain.add(name, *color, Marks::Points(scaled(&figure.histogram, [*scale, 1.0])));
             let normal = figure.normal.iter().filter(|[_, count]| *count > LEAST_COUNT).copied().collect::<Vec<_>>();
-            plain.add(law_name, law, Marks::Line(scaled(&normal, [*scale, 1.0])));
+            plain.add(law_name, law, Marks::Dashed(scaled(&normal, [*scale, 1.0])));
             accumulated.add(name, *color, Marks::Points(scaled(&figure.accumulated, [*scale, 100.0])));
             let least = figure.accumulated.first().map_or(0.0, |[_, share]| *share * LEAST_COUNT);
             let normal = figure.normal_accumulated.iter().filter(|[_, share]| *share > least).copied();
             let normal = normal.collect::<Vec<_>>();
-            accumulated.add(law_name, law, Marks::Line(scaled(&normal, [*scale, 100.0])));
+            accumulated.add(law_name, law, Marks::Dashed(scaled(&normal, [*scale, 100.0])));
+        }
+        if self.classes.len() > 1 {
+            for panel in [&mut plain, &mut accumulated] {
+                // For the legend: each class has its own, in its color.
+                panel.add("normal law", Color::Black, Marks::Dashed(Vec::new()));
+            }
         }
         [plain, accumulated]
     }

@@ -216,6 +216,6 @@ fn reason(classes: &[ClassFindings], key: &str) -> String {
 }
 
 fn shown(interval: Interval) -> String {
-    let digits = |value: f64| super::in_digits(value, 4);
+    let digits = |value: f64| crate::text::in_digits(value, 4);
     format!("{} to {}", digits(interval.low), digits(interval.high))
 }

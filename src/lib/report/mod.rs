@@ -35,7 +35,7 @@ use crate::error::{Error, Result};
 use crate::formats::places::named;
 use crate::formats::yaml_writer;
 use crate::names::Named;
-use crate::text::visible;
+use crate::text::{in_digits, visible};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -284,20 +284,6 @@ fn shown(key: &str, value: Option<f64>) -> String {
         "snr_db" | "z_mean" | "z_std" => format!("{value:.2}"),
         "mean_error" | "std_error" => in_digits(value, 2),
         _ => in_digits(value, 6),
-    }
-}
-
-/// A number in so many significant digits.
-fn in_digits(value: f64, significant: u8) -> String {
-    let after_first = significant - 1;
-    match value.abs() {
-        0.0 => "0".into(),
-        1e-3..1e7 => {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a value within 0..9")]
-            let digits = (f64::from(after_first) - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-            format!("{value:.digits$}")
-        }
-        _ => format!("{value:.*e}", usize::from(after_first)),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Reports of noise budgets.
 
 use super::photon_transfer::photon_transfer;
-use super::{ReportFormat, finished, form_of, shown, table, unwritable};
+use super::{ReportFormat, finished, form_of, in_digits, shown, table, unwritable};
 use crate::camera::optics::Exposure;
 use crate::chain::{ChainPrediction, ChainStage, StagePrediction};
 use crate::error::Result;
@@ -199,7 +199,8 @@ fn text(found: &ChainPrediction, quadrature_error: Option<[f64; 3]>) -> String {
     let [red, green, blue] = found.electrons.map(|e| shown("mean", Some(e)));
     let _ = writeln!(out, "expected signal: R {red}, G {green}, B {blue} e-");
     if let Some([red, green, blue]) = quadrature_error {
-        let _ = writeln!(out, "relative error of the sum over wavelengths: R {red:.1e}, G {green:.1e}, B {blue:.1e}");
+        let [red, green, blue] = [red, green, blue].map(|error| in_digits(error, 2));
+        let _ = writeln!(out, "relative error of the sum over wavelengths: R {red}, G {green}, B {blue}");
     }
     for stage in &found.stages {
         stage_text(stage, &mut out);

@@ -4,7 +4,7 @@ use crate::analysis::statistics::{RepeatedReport, Report};
 use crate::formats::input::FrameReader;
 use crate::metadata::{AdcRecord, FrameHeader, Metadata};
 use crate::stream::RowSource;
-use crate::text::counted;
+use crate::text::{counted, in_decimals};
 
 /// Something that came up; whoever asked decides what to do with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -106,8 +106,9 @@ pub fn of_levels(frame: &FrameHeader) -> Option<Note> {
     let metadata = &frame.metadata;
     let (black, white) = (metadata.uniform_black_adu()?, metadata.white_level_adu?.largest());
     let problem = if white < 0.0 {
-        format!("what is subtracted exceeds its white level by {} ADU: no sample is above 0", -white)
+        format!("what is subtracted exceeds its white level by {} ADU: no sample is above 0", in_decimals(-white, 1))
     } else if black >= white {
+        let [black, white] = [black, white].map(|level| in_decimals(level, 1));
         format!("its black level, {black} ADU, is not below its white level, {white} ADU: no sample tells of light")
     } else {
         return None;

@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::frame::{Geometry, Rows, Window, mirror, to_sample};
 use crate::metadata::{AdcRecord, CorrectionRecord, FrameHeader};
 use crate::stream::{Counts, Footprint, RowSink, RowSource, Stage};
+use crate::text::in_digits;
 use crate::units::QuantityKind;
 
 /// The channel that marks pixels.
@@ -205,7 +206,7 @@ pub fn untold(frame: &FrameHeader, is_marked: bool) -> Option<String> {
     let pixels = frame.geometry.width as f64 * frame.geometry.height as f64;
     let share = frame.metadata.saturated_share.filter(|share| share * pixels >= LEAST_PIXELS)?;
     let percent = 100.0 * share;
-    let percent = if percent >= 0.1 { format!("{percent:.1}") } else { format!("{percent:.1e}") };
+    let percent = if percent >= 0.1 { format!("{percent:.1}") } else { in_digits(percent, 2) };
     Some(format!("{percent} % of its pixels are made of saturated samples, by the law of its scene"))
 }
 

@@ -8,6 +8,7 @@ use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{ColorRecord, FrameHeader, MatrixResidual};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use crate::stream::{Counts, Stage};
+use crate::text::in_decimals;
 use crate::units::{Adu, QuantityKind, Tristimulus};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
@@ -268,8 +269,9 @@ fn reference_white(
                 return Ok(None);
             }
             let white = input.metadata.white_level_adu.map_or(f64::NAN, |white| white.range_above(0.0));
+            let [black, white] = [black, white].map(|level| in_decimals(level, 1));
             let problem = format!(
-                "its black level, {black:.1} ADU, is no less than its white level, {white} ADU: no white saturates the camera, and \
+                "its black level, {black} ADU, is no less than its white level, {white} ADU: no white saturates the camera, and \
                  none is named; expose for a shorter time"
             );
             return Err(input.refuse(problem).give(&["white_luminance"]));

@@ -30,9 +30,20 @@ fn by_name(text: &str) -> OtherUnit {
         OtherUnit::Reading
     } else if text.contains('%') || names(text, &RATIOS) {
         OtherUnit::Ratio
+    } else if is_relative(text) {
+        OtherUnit::Relative
     } else {
         OtherUnit::Unknown
     }
+}
+
+/// Whether a text says that numbers have no scale: `a.u.`, `arb. units`, `relative`.
+fn is_relative(text: &str) -> bool {
+    const WORDS: [&str; 9] =
+        ["au", "arb", "arbitrary", "rel", "relative", "norm", "normalized", "normalised", "unitless"];
+    let letters: String = text.to_lowercase().chars().filter(char::is_ascii_alphabetic).collect();
+    let bare = ["units", "unit"].iter().find_map(|word| letters.strip_suffix(word)).unwrap_or(&letters);
+    WORDS.contains(&bare) || bare == "arbu" || bare == "relu"
 }
 
 /// Words for irradiance; all but the first are libRadtran's.
@@ -290,7 +301,10 @@ fn looks_like_a_unit(text: &str) -> bool {
     let is_power =
         |token: &Token| !has_numbers && matches!(token, Token::Per | Token::Factor { exponent: Some(_), .. });
     let is_named = |token: &Token| token.lower().is_some_and(|word| NAMED.contains(&word.as_str()));
-    text.contains('%') || text == "a.u." || tokens.iter().any(is_power) || tokens.first().is_some_and(is_named)
+    text.contains('%')
+        || text.eq_ignore_ascii_case("a.u.")
+        || tokens.iter().any(is_power)
+        || tokens.first().is_some_and(is_named)
 }
 
 #[cfg(test)]
@@ -424,7 +438,9 @@ mod tests {
 
     #[test]
     fn other_units_are_told_from_radiances() {
-        use OtherUnit::{AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Scaled, Several, Unknown};
+        use OtherUnit::{
+            AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Relative, Scaled, Several, Unknown,
+        };
         for (text, kind) in [
             ("irradiance (W m-2 nm-1)", Irradiance),
             ("E [W/m2/nm]", Irradiance),
@@ -453,7 +469,9 @@ mod tests {
             ("W sr-1 nm-1", Unknown),
             ("radiance (MW m-2 sr-1 nm-1)", Unknown),
             ("radiance (MW/m2)", Unknown),
-            ("sky [a.u.]", Unknown),
+            ("sky [a.u.]", Relative),
+            ("L (arb. units)", Relative),
+            ("lamp (relative)", Relative),
             ("L (flick)", Unknown),
             ("radiance (W/m2/xy/nm)", Unknown),
             ("MW m-2 sr-1 nm-1", Unknown),

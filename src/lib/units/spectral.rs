@@ -118,6 +118,8 @@ pub enum OtherUnit {
     Ratio,
     /// What an instrument reads: counts, codes, volts.
     Reading,
+    /// Of no scale: arbitrary units, relative values.
+    Relative,
     /// None that is known.
     Unknown,
 }
@@ -144,6 +146,7 @@ impl OtherUnit {
             Self::Energy => "of energy, a radiance summed over time, which has no s-1",
             Self::Ratio => "a ratio, not the radiance itself",
             Self::Reading => "what an instrument reads, not what that means",
+            Self::Relative => "of no scale, which does not tell how bright the light is",
             Self::Unknown => "no unit of spectral radiance that is known",
         }
     }
@@ -169,6 +172,7 @@ impl OtherUnit {
             | Self::BesideFactor
             | Self::Several
             | Self::Contradiction
+            | Self::Relative
             | Self::Unknown => return None,
         })
     }

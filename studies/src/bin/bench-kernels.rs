@@ -21,7 +21,7 @@ use cyanometer::numerics::planes::weighted_sums;
 use cyanometer::numerics::vectors::{self, Instructions};
 use cyanometer::random::Source;
 use cyanometer::random::philox::philox4x32_10;
-use cyanometer::spectrum::WavelengthGrid;
+use cyanometer::spectrum::{Along, Between, WavelengthGrid};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
@@ -158,7 +158,8 @@ fn spectral(width: usize, height: usize) -> Result<Workload> {
     let (camera, _) = weights.camera(&wavelengths_nm);
     let bands = wavelengths_nm.len();
     let samples = spectral_samples(width, height, bands);
-    let planes = camera.planes(&(0..bands).collect::<Vec<usize>>(), &vec![1.0; bands]);
+    let between = Between::new(&wavelengths_nm, Along::Wavelength, false);
+    let planes = camera.planes(&(0..bands).collect::<Vec<usize>>(), &between, &vec![1.0; bands]);
     let mut output = Vec::with_capacity(width * height);
     Ok(Box::new(move || {
         output.clear();

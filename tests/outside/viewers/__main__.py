@@ -28,11 +28,14 @@ def main():
     for viewer in VIEWERS:
         if viewer not in viewers:
             print(f"{viewer.name} is not installed, and left out", file=sys.stderr)
-    made = frames.make_all(directory)
-    rows = [(frame, [shown(viewer, frame, directory) for viewer in viewers]) for frame in made]
-    page = table(viewers, rows)
-    (directory / "table.md").write_text(page, encoding="utf-8")
-    print(page)
+    lines = []
+    with (directory / "table.md").open("w", encoding="utf-8") as file:
+        # Rows as they come: a viewer that hangs, or an end by hand, keeps those before.
+        for line in table(viewers, frames.make_all(directory), directory):
+            lines.append(line)
+            print(line, flush=True)
+            print(line, file=file, flush=True)
+    page = "\n".join(lines)
     if settings.document:
         text = settings.document.read_text(encoding="utf-8")
         before, after = text.split(BEGIN)[0], text.split(END)[1]
@@ -65,13 +68,14 @@ def shown(viewer, frame, directory):
     return f"other ({nearest} {distances[nearest]:.3f})"
 
 
-def table(viewers, rows):
+def table(viewers, made, directory):
+    """The lines of the table, each as soon as its frame was shown."""
     heads = ["frame", *(f"{viewer.name} {viewer.version()}" for viewer in viewers)]
-    lines = ["| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
-    for frame, cells in rows:
+    yield "| " + " | ".join(heads) + " |"
+    yield "|" + " --- |" * len(heads)
+    for frame in made:
         name = f"{frame.words}, {frame.path.suffix[1:].upper()}{', `--viewable`' if frame.viewable else ''}"
-        lines.append("| " + " | ".join([name, *cells]) + " |")
-    return "\n".join(lines)
+        yield "| " + " | ".join([name, *(shown(viewer, frame, directory) for viewer in viewers)]) + " |"
 
 
 if __name__ == "__main__":

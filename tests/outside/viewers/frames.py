@@ -46,7 +46,7 @@ def ours(command, directory):
 
 
 def make_all(directory):
-    """Makes the frames; gives them with their readings."""
+    """Makes the frames; gives each with its readings as soon as it is there."""
     ours(["fit-matrix", SAMPLE_DATA / "skies/sky912.exr", "-o", "matrix.yaml"], directory)
     for name, _, command in STAGES:
         ours([str(word).format(**{stage: f"{stage}.exr" for stage, _, _ in STAGES}) for word in command]
@@ -54,7 +54,6 @@ def make_all(directory):
     picture = patches_of_file(directory, "srgb.tiff")
     profile = oiio.ImageInput.open(str(directory / "srgb.tiff")).spec().getattribute("ICCProfile")
     (directory / PROFILE).write_bytes(bytes(profile))
-    frames = []
     for name, words, command in STAGES:
         previewed = preview(directory, f"{name}.{'tiff' if name == 'srgb' else 'exr'}")
         formats = ["tiff"] if name == "srgb" else ["exr", "tiff"]
@@ -67,8 +66,7 @@ def make_all(directory):
                 stored = np.clip(patches_of_file(directory, path.name), 0, 1)
                 managed = of_camera(directory, previewed) if name in ("codes", "rgb") else picture
                 readings = {"as preview": previewed, "managed": managed, "no curve": stored, "curve": encode(stored)}
-                frames.append(Frame(path, words, viewable, readings))
-    return frames
+                yield Frame(path, words, viewable, readings)
 
 
 def preview(directory, name):

@@ -1,6 +1,6 @@
 //! How well a matrix does: color differences of each sample of a library, without noise and through the noisy shot.
 
-use super::Signals;
+use super::{Signals, saturating};
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::CfaPattern;
@@ -290,22 +290,14 @@ impl Evaluator<'_> {
                 .map_err(|_| Error::Data("so many patches do not fit a sensor".into()))?;
         }
         let stages = setup.stages(&plane)?;
-        let white_luminance = settings.color.white_luminance.or_else(|| self.saturation(stages.demosaic.header()));
+        let white_luminance = match (settings.color.white_luminance, settings.color.white) {
+            (None, White::Absolute(_)) => None,
+            (None, _) => saturating::luminance(self.sensor, stages.demosaic.header())?,
+            (given, _) => given,
+        };
         let made = |space| stages.to_xyz(&ColorSettings { space, white_luminance, ..settings.color.clone() });
         let (xyz, lab) = (made(Space::Xyz)?, made(Space::Lab)?.header().clone());
         Ok(Shot { exposure, electrons, plane, stages, xyz, lab })
-    }
-
-    /// The luminance at which equal signals reach the top code, by the matrix of the sensor's own file: a matrix that is
-    /// judged shall not set the white that it is judged by. None for a sensor without one, and a white of its own.
-    fn saturation(&self, camera: &FrameHeader) -> Option<f64> {
-        if matches!(self.settings.color.white, White::Absolute(_)) {
-            return None;
-        }
-        let metadata = &camera.metadata;
-        let range = metadata.white_level_adu?.less([metadata.uniform_black_adu()?; 3]).classes();
-        let xyz_from_adu = matrix(&self.sensor.xyz_from_camera?) / metadata.exposure?.exposure_s_sr();
-        Some((xyz_from_adu * Vector3::from(range)).y)
     }
 
     fn sample(&self, sample: usize) -> Result<SampleEvaluation> {

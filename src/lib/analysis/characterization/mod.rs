@@ -3,6 +3,7 @@
 pub mod evaluation;
 pub mod noise_aware;
 pub mod regression;
+mod saturating;
 pub mod training;
 
 use crate::camera::optics::Exposure;

@@ -12,6 +12,7 @@ use super::scatter::Scatter;
 use super::settings::Settings;
 use super::suspects::{Suspect, suspects};
 use crate::numerics::variance_components::Interval;
+use crate::text::in_digits;
 
 /// A number that was measured, or why it was not.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,9 +121,10 @@ pub fn of_class(
     let Some(curve) = curve else { return nothing(of_gain(flats, rounding)) };
     if let Some(gain) = curve.interval(|values| Some(values.gain), confidence).filter(|gain| gain.low <= 0.0) {
         return nothing(format!(
-            "no gain follows: by the flats it is {:.3e} to {:.3e}, as their variance does not rise with their mean beyond chance; are \
+            "no gain follows: by the flats it is {} to {}, as their variance does not rise with their mean beyond chance; are \
              they exchanged with the darks, or all saturated?",
-            gain.low, gain.high
+            in_digits(gain.low, 4),
+            in_digits(gain.high, 4)
         ));
     }
     let mut found = Vec::new();

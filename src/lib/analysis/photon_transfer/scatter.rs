@@ -16,6 +16,7 @@ use super::fit::variance_besides;
 use super::level::Level;
 use crate::numerics::quantiles::{of_normal, of_student};
 use crate::numerics::significance;
+use crate::text::in_digits;
 
 /// A variance, and of how many values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -192,9 +193,10 @@ fn told(means: &[Means], [black, light]: [f64; 2]) -> Vec<(String, bool)> {
     };
     let of_black = beyond(false, [0.0; 2]).filter(|_| black > 0.0).map(|noise| {
         let text = format!(
-            "means of darks scatter by {:.2e} ADU from frame to frame, of which noise explains {noise:.2e}: the black level moves, which \
+            "means of darks scatter by {} ADU from frame to frame, of which noise explains {}: the black level moves, which \
              intervals of black level, dark current and linearity take in",
-            black.sqrt().hypot(noise)
+            in_digits(black.sqrt().hypot(noise), 3),
+            in_digits(noise, 3)
         );
         (text, black.sqrt() >= MUCH_ADU)
     });

@@ -30,8 +30,15 @@ pub fn load_matrix(path: &Path) -> Result<CameraMatrix> {
     let shown = path.display().to_string();
     let bytes = read_file(path).map_err(|error| match error {
         Error::Disk { file, source, .. } if source.kind() == io::ErrorKind::NotFound => {
-            let problem =
-                "there is no such file; `fit-matrix` makes a matrix, as in `fit-matrix sky912.exr -o matrix.yaml`";
+            let problem = match load_sensor(&file) {
+                Ok(_) => format!(
+                    "that is a sensor, and a file of a matrix is wanted; `fit-matrix sky912.exr --sensor {file} -o matrix.yaml` makes one \
+                     for it"
+                ),
+                Err(_) => {
+                    "there is no such file; `fit-matrix` makes a matrix, as in `fit-matrix sky912.exr -o matrix.yaml`".into()
+                }
+            };
             Error::format(&file, problem)
         }
         other => other,

@@ -4,7 +4,7 @@ use super::header::{Header, whole};
 use crate::cfa::FilterArray;
 use crate::formats::exposure::{self, ToldExposure};
 use crate::metadata::{CameraSettings, Metadata, TakenAs};
-use crate::text::visible;
+use crate::text::{in_digits, visible};
 use crate::units::{QuantityKind, kelvin};
 use std::ops::RangeInclusive;
 
@@ -236,11 +236,31 @@ fn told_exposure(
     notes: &mut Vec<String>,
     doubts: &mut Vec<String>,
 ) -> Option<ToldExposure> {
-    let ratio = || Some(header.number("FOCALLEN")? / header.number("APTDIA").filter(|diameter| *diameter > 0.0)?);
-    let told =
-        [("FOCALLEN and APTDIA", ratio().filter(|number| *number > 0.0)), ("FOCRATIO", header.number("FOCRATIO"))];
+    let told = [("FOCALLEN and APTDIA", told_ratio(header, doubts)), ("FOCRATIO", header.number("FOCRATIO"))];
     let f_number = first_of("f-number", &told, SAME_APERTURE, doubts);
     exposure::of_parts(exposure_s, f_number, ["EXPTIME", "FOCALLEN and APTDIA, or FOCRATIO"], notes)
+}
+
+/// The focal length over the diameter of the aperture, both in mm as programs write them; none of what no lens has, which is told.
+fn told_ratio(header: &Header, doubts: &mut Vec<String>) -> Option<f64> {
+    /// f-numbers that lenses and telescopes have.
+    const LENSES: RangeInclusive<f64> = 0.3..=1000.0;
+    let [length, diameter] = ["FOCALLEN", "APTDIA"].map(|key| header.number(key).filter(|mm| *mm > 0.0));
+    let (length, diameter) = (length?, diameter?);
+    let ratio = length / diameter;
+    if LENSES.contains(&ratio) {
+        return Some(ratio);
+    }
+    let in_meters = [("FOCALLEN", 1e3 * ratio), ("APTDIA", ratio / 1e3)];
+    let likely = in_meters.iter().find(|(_, ratio)| LENSES.contains(ratio)).map_or(String::new(), |(key, ratio)| {
+        format!(": {key} looks like m, with which it is {}", in_digits(*ratio, 3))
+    });
+    doubts.push(format!(
+        "its FOCALLEN of {length} mm and APTDIA of {diameter} mm make an f-number of {}, which no lens has{likely}; they do not count, \
+         --f-number tells it",
+        in_digits(ratio, 3)
+    ));
+    None
 }
 
 /// What the camera was set to; none where no keyword tells.

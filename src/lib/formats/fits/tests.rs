@@ -266,6 +266,22 @@ fn patterns_are_those_of_the_picture() {
 }
 
 #[test]
+fn lenses_in_meters_are_told() {
+    let number = Value::Number;
+    // In m they are no mm, and of no lens.
+    let cards = |length: f64, diameter: f64| {
+        let cards = [("EXPTIME", number(0.5)), ("FOCALLEN", number(length)), ("APTDIA", number(diameter))];
+        keywords::read(&Header::of(&cards), 1, true)
+    };
+    let (meters, millimeters) = (cards(0.4, 100.0), cards(400.0, 100.0));
+    assert_eq!((meters.metadata.exposure, meters.metadata.exposure_time_s), (None, Some(0.5)));
+    let wanted = "make an f-number of 0.00400, which no lens has: FOCALLEN looks like m, with which it is 4.00; they do not count";
+    assert!(meters.doubts[0].contains(wanted), "{:?}", meters.doubts);
+    assert!(cards(400.0, 0.1).doubts[0].contains("APTDIA looks like m"));
+    assert!(millimeters.doubts.is_empty() && cards(0.4, 0.1).metadata.exposure == millimeters.metadata.exposure);
+}
+
+#[test]
 fn keywords_of_the_camera_are_used_or_told() {
     let number = Value::Number;
     let told = |cards: &[(&str, Value)]| {

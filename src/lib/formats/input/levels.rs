@@ -8,6 +8,7 @@ use crate::formats::register;
 use crate::metadata::FrameHeader;
 use crate::numerics::vectors::{self, Kernel};
 use crate::stages::bounds::{Bounds, taken_off};
+use crate::text::in_decimals;
 use crate::units::QuantityKind;
 
 /// So much of a black level, and of what came off, frames of cameras may be darker: black levels are told to a few per cent.
@@ -157,7 +158,9 @@ impl LevelCheck {
         let mean = sum / count;
         let problem = match &self.least {
             Least::Known(least) if mean < *least => format!(
-                "its samples average {mean:.1} ADU, and by the bias and the noise of its metadata no frame averages below {least:.1}"
+                "its samples average {} ADU, and by the bias and the noise of its metadata no frame averages below {}",
+                in_decimals(mean, 1),
+                in_decimals(*least, 1)
             ),
             Least::Black(_, off) => {
                 let (level, above) = (black / count, mean - black / count);
@@ -167,7 +170,8 @@ impl LevelCheck {
                 if above >= -allowed {
                     return Ok(());
                 }
-                format!("its samples average {mean:.1} ADU, far below what no light reads, {level:.1} ADU")
+                let [mean, level] = [mean, level].map(|adu| in_decimals(adu, 1));
+                format!("its samples average {mean} ADU, far below what no light reads, {level} ADU")
             }
             _ => return Ok(()),
         };
@@ -177,9 +181,10 @@ impl LevelCheck {
 
 /// What is wrong with a sample.
 fn sample_beyond(wrong: f64, [low, high]: [f64; 2]) -> String {
+    let [from, to] = [low, high].map(|adu| in_decimals(adu, 1));
     let range = match low.is_finite() {
-        true => format!("codes less what came off are {low:.1} to {high:.1} ADU"),
-        false => format!("codes less what came off are {high:.1} ADU at most"),
+        true => format!("codes less what came off are {from} to {to} ADU"),
+        false => format!("codes less what came off are {to} ADU at most"),
     };
     format!("it has a sample of {wrong}, and {range}")
 }

@@ -128,7 +128,7 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
     let mut tally = Tally::new(&frame, &source, region, &choice);
     let reduced = Reduced::read(&mut source, &reduction, &choice, Some(&mut tally))?;
     let shown = Shown::paint(&frame, &settings, &choice, &reduced)?;
-    let scale = scale(&settings, &reduction, &shown);
+    let scale = scale(&settings, reduction.in_words(choice.filter), &shown);
     if let Some(words) = settings.caption.filter(|words| !words.is_empty()) {
         return Ok(shown.tile(String::new(), words.lines().map(str::to_owned).chain(scale).collect()));
     }
@@ -148,14 +148,12 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
 }
 
 /// What black, white and a pixel of the picture are.
-fn scale(settings: &PictureSettings, reduction: &Reduction, shown: &Shown) -> Option<String> {
-    let [columns, rows] = reduction.samples_per_pixel();
-    let pixel = match (settings.zoom, [columns, rows]) {
-        (2.., _) => Some(format!("each sample {0} × {0} pixels", settings.zoom)),
-        (_, [1, 1]) => None,
-        _ => Some(format!("each pixel the mean of {columns} × {rows} samples")),
-    };
-    let parts: Vec<String> = shown.scale.iter().cloned().chain(pixel).collect();
+fn scale(settings: &PictureSettings, pixel: Option<String>, shown: &Shown) -> Option<String> {
+    let zoomed = (settings.zoom > 1).then(|| match &pixel {
+        Some(_) => format!("shown as {0} × {0}", settings.zoom),
+        None => format!("each sample {0} × {0} pixels", settings.zoom),
+    });
+    let parts: Vec<String> = shown.scale.iter().cloned().chain(pixel).chain(zoomed).collect();
     (!parts.is_empty()).then(|| parts.join("; "))
 }
 

@@ -216,6 +216,15 @@ pub(super) fn stage(frame: &FrameHeader, choice: &Choice, [width, height]: [usiz
     format!("{}{unit}, {width} × {height}", frame.holds())
 }
 
+/// A level in five digits at most: 4095 where that is all of it.
+pub(super) fn level(value: f64) -> String {
+    let shown = rounded(value);
+    match shown.contains('.') && !shown.contains('e') {
+        true => shown.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => shown,
+    }
+}
+
 /// A number in five digits.
 pub(super) fn rounded(value: f64) -> String {
     const DIGITS: i32 = 5;
@@ -294,6 +303,11 @@ mod tests {
         assert_eq!(label(QuantityKind::ColorDifference, &MAP_CHANNELS, "delta_e_76"), "ΔE*ab");
         for (number, wanted) in [(0.0, "0"), (2730.123, "2730.1"), (-0.001_234_56, "−0.0012346"), (1e9, "1.0000e9")] {
             assert_eq!(rounded(number), wanted);
+        }
+        for (number, wanted) in
+            [(4095.0, "4095"), (1757.31, "1757.3"), (-0.5, "−0.5"), (40_000.0, "40000"), (1e9, "1.0000e9")]
+        {
+            assert_eq!(level(number), wanted);
         }
         let frame = frame(QuantityKind::Xyy, &["R", "G", "B"]);
         let (all, one) = (Choice::of(&frame, None, false).unwrap(), Choice::leading(&frame));

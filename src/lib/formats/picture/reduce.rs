@@ -20,6 +20,8 @@ pub(super) struct Reduction {
     step: [usize; 2],
     /// Whether squares that the region's edge cuts are left out: some may lack the class that is shown.
     is_whole: bool,
+    /// The samples of each square that are shown: all, or those of a class.
+    shown: usize,
 }
 
 /// The pixels of a picture.
@@ -46,7 +48,12 @@ impl Reduction {
         };
         // Pixels stay square.
         let side = (least..).find(|side| period.iter().all(|period| side.is_multiple_of(*period))).unwrap_or(least);
-        Self { region, step: [side; 2], is_whole: choice.filter.is_some() }
+        let of_period = |columns: usize, rows: usize| {
+            let seen = Seen::of(frame, region, choice);
+            seen.sites.iter().flatten().filter(|is_seen| **is_seen).count() * (side / columns) * (side / rows)
+        };
+        let shown = if choice.filter.is_some() { of_period(period[0], period[1]) } else { side * side };
+        Self { region, step: [side; 2], is_whole: choice.filter.is_some(), shown }
     }
 
     /// Columns and rows of the picture.
@@ -58,9 +65,17 @@ impl Reduction {
 }
 
 impl Reduction {
-    /// Columns and rows of samples that make one pixel.
-    pub fn samples_per_pixel(&self) -> [usize; 2] {
-        self.step
+    /// What makes a pixel, in words; none where that is a sample. `filter` is the class that is shown alone.
+    pub fn in_words(&self, filter: Option<char>) -> Option<String> {
+        let [columns, rows] = self.step;
+        match (filter, self.shown) {
+            (_, 1) if self.step == [1, 1] => None,
+            (None, _) => Some(format!("each pixel the mean of {columns} × {rows} samples")),
+            (Some(filter), 1) => Some(format!("each pixel the {filter} of {columns} × {rows} photosites")),
+            (Some(filter), shown) => {
+                Some(format!("each pixel the mean of the {shown} {filter} of {columns} × {rows} photosites"))
+            }
+        }
     }
 }
 
@@ -386,6 +401,23 @@ mod tests {
             let made = reduced(&["Y"], [9, 6], None, Some(class), value);
             assert_eq!(made.size, [4, 3]);
             assert_eq!(made.samples[..4], [level, level + 1.0, level + 2.0, level + 3.0], "{class}");
+        }
+        let words = |fit: Option<usize>, class: Option<&str>| {
+            let mut metadata = Metadata::new(QuantityKind::Adu);
+            metadata.cfa = Some("grbg".parse().unwrap());
+            let geometry = Geometry { origin: [3, 1], ..Geometry::new(12, 12, &["Y"]) };
+            let frame = FrameHeader { name: "f".into(), geometry, metadata };
+            let choice = Choice::of(&frame, class, false).unwrap();
+            Reduction::new(&frame, Region::whole(&frame), fit, &choice).in_words(choice.filter)
+        };
+        for (fit, class, wanted) in [
+            (None, None, None),
+            (Some(3), None, Some("each pixel the mean of 4 × 4 samples")),
+            (None, Some("R"), Some("each pixel the R of 2 × 2 photosites")),
+            (None, Some("G"), Some("each pixel the mean of the 2 G of 2 × 2 photosites")),
+            (Some(3), Some("B"), Some("each pixel the mean of the 4 B of 4 × 4 photosites")),
+        ] {
+            assert_eq!(words(fit, class).as_deref(), wanted);
         }
         // Squares are whole periods: no class counts more in one than in another.
         let made = reduced(&["Y"], [12, 12], Some(4), None, |x, y, _| {

@@ -1,6 +1,6 @@
 //! From samples to gray and color.
 
-use super::planes::{Choice, rounded};
+use super::planes::{Choice, level, rounded};
 use super::reduce::Reduced;
 use crate::color::{D65_XY, linear_srgb_from_xyz, srgb_decode, srgb_encode, xyz_of_chromaticity};
 use crate::error::{Error, Result};
@@ -140,7 +140,7 @@ impl Shade {
         match ranges.iter().find(|(low, high)| !(low < high && (high - low).is_finite())) {
             None => Ok(Self::Planes(ranges)),
             Some((low, high)) => Err(Error::Usage(format!(
-                "{}: a range from {low} to {high} shows nothing; give another with --range",
+                "{}: a range from {low} to {high} shows nothing; --range takes black first and then white, which is larger",
                 frame.name
             ))),
         }
@@ -171,22 +171,28 @@ impl Shade {
         match self {
             Self::Planes(ranges) if ranges.iter().all(|range| *range == ranges[0]) => {
                 let (low, high) = ranges[0];
-                Some(format!("black {}, white {}{unit}", rounded(low), rounded(high)))
+                Some(format!("black {}, white {}{unit}", level(low), level(high)))
             }
             Self::Planes(ranges) => {
-                let range = |(name, (low, high)): (&String, &(f64, f64))| {
-                    format!("{name} {} to {}", rounded(*low), rounded(*high))
-                };
+                let range =
+                    |(name, (low, high)): (&String, &(f64, f64))| format!("{name} {} to {}", level(*low), level(*high));
                 let ranges: Vec<String> = names.iter().zip(ranges).map(range).collect();
                 Some(format!("black to white: {}{unit}", ranges.join(", ")))
             }
             Self::Xyz(_, (low, high)) if (*low, *high) != (0.0, 1.0) => {
-                Some(format!("black {}, white {}{unit}", rounded(*low), rounded(*high)))
+                Some(format!("black {}, white {}{unit}", level(*low), level(*high)))
             }
             Self::Xyz(..) | Self::Encoded => {
-                let white = frame.metadata.color.as_ref()?.white?;
-                let [_, luminance, _] = white;
-                Some(format!("white {} cd m⁻²", rounded(luminance)))
+                let color = frame.metadata.color.as_ref()?;
+                let [_, luminance, _] = color.white?;
+                // Relative XYZ have no luminance.
+                let is_relative = color.range_adu.is_some() || frame.metadata.unit == "relative";
+                let luminance = level(luminance);
+                Some(if is_relative {
+                    format!("white Y = {luminance}")
+                } else {
+                    format!("white {luminance} cd m⁻²")
+                })
             }
         }
     }
@@ -267,8 +273,8 @@ pub(super) fn all_outside(
         "{}: all numbers, from {least} to {most}, lie outside the range from {} to {}, which shows nothing of them; give another \
          with --range",
         frame.name,
-        rounded(low),
-        rounded(high)
+        level(low),
+        level(high)
     ))
 }
 
@@ -372,6 +378,8 @@ pub(super) fn one_range(frame: &FrameHeader, range: Range, choice: &Choice, redu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::Geometry;
+    use crate::metadata::{ColorRecord, Metadata};
 
     #[test]
     fn the_table_gives_the_codes_of_the_curve() {
@@ -381,5 +389,18 @@ mod tests {
             assert_eq!(curve.code(value), code(srgb_encode(value)), "{value}");
         }
         assert_eq!([f64::NAN, -1.0, f64::INFINITY, f64::NEG_INFINITY].map(|value| curve.code(value)), [0, 0, 255, 0]);
+    }
+
+    #[test]
+    fn the_white_of_relative_colors_has_no_luminance() {
+        let words = |range_adu| {
+            let mut metadata = Metadata::new(QuantityKind::Srgb);
+            let white = Some([0.95, 1.0, 1.09]);
+            metadata.color = Some(ColorRecord { white, range_adu, ..ColorRecord::of_xyz() });
+            let frame = FrameHeader { name: "f".into(), geometry: Geometry::new(4, 4, &["R", "G", "B"]), metadata };
+            let choice = Choice::of(&frame, None, false).unwrap();
+            Shade::Encoded.words(&frame, &choice).unwrap()
+        };
+        assert_eq!([None, Some([900.0; 3])].map(words), ["white 1 cd m⁻²", "white Y = 1"]);
     }
 }

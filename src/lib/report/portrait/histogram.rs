@@ -1,11 +1,11 @@
 //! Histograms of classes or channels beside the laws that are predicted of them.
 
-use super::scale::{HEADROOM, Scale, farther, outside, reference, words_of_reference};
+use super::scale::{HEADROOM, Scale, apart, farther, outside, reference, words_of_reference};
 use crate::analysis::statistics::histogram::Histogram;
 use crate::analysis::statistics::portrait::{Foreseen, Likeness, Portrait};
 use crate::numerics::normal::cumulative;
 use crate::plot::{Axis, Color, Marks, Panel};
-use crate::report::in_digits;
+use crate::text::in_digits;
 
 /// The middle of a histogram leaves out this share of the samples at each end; what is shown reaches this part of its width
 /// beyond: of a normal law 2.6 and 5.2 standard deviations.
@@ -38,7 +38,7 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
                 _ => highest = highest.max(bins.density(bin)),
             }
         }
-        let name = with_mean(bins.group, bins.reference, &scale.unit);
+        let name = with_means(bins.group, &scale.unit);
         panel.add(&name, bins.color, Marks::Line(bins.steps(window)));
         piles.extend(pile.map(|pile| pile.words(&bins.group.name)));
         if let Some(foreseen) = bins.group.predicted.as_ref().filter(|_| pile.is_none()) {
@@ -49,8 +49,10 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
         let far = if outside > 0 { bins.farthest(window) } else { 0.0 };
         farthest = farther(farthest, far);
     }
-    for (index, (words, predicted)) in laws.into_iter().enumerate() {
-        panel.add(if index == 0 { &words } else { "" }, Color::Black, Marks::Dashed(predicted));
+    let words = laws.first().map_or_else(String::new, |(words, _): &(String, _)| words.clone());
+    let laws = laws.into_iter().map(|(_, law)| (Color::Black, law)).collect();
+    for (index, (color, law)) in apart(laws, highest).into_iter().enumerate() {
+        panel.add(if index == 0 { &words } else { "" }, color, Marks::Dashed(law));
     }
     // Heaps alone make the scale themselves.
     if highest == 0.0 {
@@ -187,10 +189,13 @@ impl Pile {
     }
 }
 
-/// The name of a class or channel with the mean that deviations are counted from.
-fn with_mean(group: &Likeness, mean: f64, unit: &str) -> String {
-    let mean = in_digits(mean, 5).replace('-', "−");
-    format!("{}, mean {mean} {unit}", group.name).trim_end().to_owned()
+/// The name of a class or channel with its mean, and that which is predicted, where one is: deviations are counted from that.
+fn with_means(group: &Likeness, unit: &str) -> String {
+    let shown = |mean: f64| in_digits(mean, 5).replace('-', "−");
+    let mean =
+        group.mean().map_or(String::new(), |mean| format!(", mean {} {unit}", shown(mean)).trim_end().to_owned());
+    let predicted = group.predicted.as_ref().map_or(String::new(), |law| format!(", predicted {}", shown(law.mean)));
+    format!("{}{mean}{predicted}", group.name)
 }
 
 /// What the predicted law is called.

@@ -3,15 +3,15 @@
 mod histogram;
 mod scale;
 
-use super::in_digits;
 use crate::analysis::statistics::RegionReport;
 use crate::analysis::statistics::portrait::{Likeness, Portrait};
 use crate::color::xyy_about;
 use crate::plot::{Arrangement, Axis, Color, Marks, Panel, Plot, ReferenceLine};
+use crate::text::in_digits;
 use crate::units::QuantityKind;
 use histogram::histogram;
 use nalgebra::{Matrix2, Matrix3};
-use scale::{HEADROOM, Scale, color, farther, outside, reference, scales, words_of_reference};
+use scale::{HEADROOM, Scale, apart, color, farther, outside, reference, scales, words_of_reference};
 use std::f64::consts::TAU;
 
 /// Rows or columns far from all others are few up to this part of them; pixels are few that are so dim that the quotients which
@@ -141,10 +141,12 @@ fn profile(portrait: &Portrait, scale: &Scale, axis: usize) -> Panel {
         // For the legend: each class or channel has its own, in its color.
         panel.add("predicted ±σ of a mean", Color::Black, Marks::Dashed(Vec::new()));
     }
-    for (color, std, [first, last]) in bands {
-        for bound in [std, -std] {
-            panel.add("", color, Marks::Dashed(vec![[first, bound], [last, bound]]));
-        }
+    let widest = bands.iter().map(|(_, std, _)| *std).fold(0.0, f64::max);
+    let upper = bands.into_iter().map(|(color, std, [first, last])| (color, vec![[first, std], [last, std]])).collect();
+    for (color, line) in apart(upper, widest) {
+        let lower = line.iter().map(|[at, std]| [*at, -std]).collect();
+        panel.add("", color, Marks::Dashed(line));
+        panel.add("", color, Marks::Dashed(lower));
     }
     panel
 }
@@ -186,7 +188,7 @@ fn correlation(portrait: &Portrait, axis: usize) -> Panel {
     if !lines.is_empty() {
         panel.add("predicted", Color::Black, Marks::Dashed(Vec::new()));
     }
-    for (color, line) in lines {
+    for (color, line) in apart(lines, high - low) {
         panel.add("", color, Marks::Dashed(line));
     }
     panel.y = panel.y.range(low - 0.05 * (high - low), low + HEADROOM * (high - low));

@@ -3,7 +3,7 @@
 
 use crate::analysis::statistics::portrait::{Likeness, Portrait};
 use crate::plot::Color;
-use crate::report::in_digits;
+use crate::text::in_digits;
 use crate::units::typeset;
 
 /// How much higher an axis is than what it shows.
@@ -74,7 +74,56 @@ pub(super) fn words_of_reference(portrait: &Portrait) -> &'static str {
     }
 }
 
+/// A line of a color.
+pub(super) type Colored = (Color, Vec<[f64; 2]>);
+
+/// Lines less those that lie on others but for a hundredth of a height: dashes over dashes look solid. What stands for several is black.
+pub(super) fn apart(lines: Vec<Colored>, height: f64) -> Vec<Colored> {
+    const SAME: f64 = 0.01;
+    let lies_on = |one: &[[f64; 2]], other: &[[f64; 2]]| {
+        one.iter().all(|[x, y]| (y - between(other, *x)).abs() <= SAME * height.abs())
+    };
+    let mut kept: Vec<Colored> = Vec::new();
+    for (color, line) in lines {
+        match kept.iter_mut().find(|(_, other)| lies_on(&line, other) && lies_on(other, &line)) {
+            Some((color, _)) => *color = Color::Black,
+            None => kept.push((color, line)),
+        }
+    }
+    kept
+}
+
+/// The height of a line at a place; 0 beyond its ends, as of what fades.
+fn between(line: &[[f64; 2]], x: f64) -> f64 {
+    let pair = line.windows(2).find(|pair| (pair[0][0]..=pair[1][0]).contains(&x));
+    match pair {
+        Some([[from, low], [to, high]]) if to > from => low + (x - from) / (to - from) * (high - low),
+        _ => line.iter().find(|[at, _]| *at == x).map_or(0.0, |[_, y]| *y),
+    }
+}
+
 /// Of two deviations the larger.
 pub(super) fn farther(one: f64, other: f64) -> f64 {
     if other.abs() > one.abs() { other } else { one }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_on_others_are_drawn_once() {
+        let law = |shift: f64, scale: f64| -> Vec<[f64; 2]> {
+            (0..40).map(f64::from).map(|x| x + shift).map(|x| [x, scale * (-0.02 * (x - 20.0).powi(2)).exp()]).collect()
+        };
+        let lines = vec![
+            (Color::Vermillion, law(0.0, 1.0)),
+            (Color::Green, law(0.5, 1.005)),
+            (Color::Blue, law(0.0, 1.2)),
+            (Color::Purple, vec![[3.0, 0.0], [9.0, 0.0]]),
+        ];
+        let kept = apart(lines, 1.2);
+        let colors: Vec<Color> = kept.iter().map(|(color, _)| *color).collect();
+        assert_eq!(colors, [Color::Black, Color::Blue, Color::Purple]);
+    }
 }

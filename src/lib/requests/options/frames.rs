@@ -179,9 +179,22 @@ impl Output {
             Some(file) => output_of(&path, file, self.extension()),
             None => path,
         };
-        let numbered = |path: PathBuf| numbered(&path, exposure.unwrap_or(self.index), self.index).unwrap_or(path);
-        let frames_to_come = self.following.frames();
-        OutputOptions { path: options.path.map(named).map(numbered), frames_to_come, ..options }
+        let pattern = options.path.map(named);
+        let ahead = |path: &Path, count: u64| {
+            numbered(path, exposure.unwrap_or(self.index).saturating_add(count), self.index.saturating_add(count))
+        };
+        let files_to_come = pattern.as_deref().map_or(0, |path| self.missing(|count| ahead(path, count)));
+        let path = pattern.map(|path| ahead(&path, 0).unwrap_or(path));
+        OutputOptions { path, frames_to_come: self.following.frames(), files_to_come, ..options }
+    }
+
+    /// How many of the files that the exposures behind this one get are not there yet, of the first of them: a file that is
+    /// there gives its room when it is replaced.
+    fn missing(&self, path: impl Fn(u64) -> Option<PathBuf>) -> u64 {
+        /// So many are looked for.
+        const LOOKED_FOR: u64 = 100_000;
+        let all = if self.is_stream() { 0 } else { self.following.files_left.min(LOOKED_FOR) };
+        (1..=all).filter(|count| path(*count).is_some_and(|path| !path.exists())).count() as u64
     }
 
     /// Where and how to write.
@@ -194,6 +207,7 @@ impl Output {
             is_viewable: self.viewable,
             separates_layers: self.separate_layers,
             frames_to_come: 0,
+            files_to_come: 0,
         }
     }
 }
@@ -219,6 +233,8 @@ pub struct Following {
     pub exposures: u64,
     /// Those of the same scene that are left.
     pub exposures_left: u64,
+    /// Those that get files of their own, where this is the first.
+    pub files_left: u64,
     /// Inputs that are left.
     pub inputs_left: u64,
 }

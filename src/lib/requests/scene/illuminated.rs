@@ -3,7 +3,7 @@
 use super::light::{ImageRows, Light, Pixels, SceneImage, no_sample};
 use super::picture::{Decoding, Picture, white_radiance};
 use super::request::Scene;
-use super::sums::{Found, Sums};
+use super::sums::{Found, Sums, gap};
 use crate::color::rgb::{Encoding, NamedPrimaries, Primaries, xyz_from_rgb};
 use crate::color::upsampling::{SmoothWeights, Upsampler};
 use crate::error::{Error, Result};
@@ -51,7 +51,9 @@ impl Scene {
         let told_luminance = reader.colors().white_luminance;
         let white_luminance = self.picture.luminance.or(told_luminance).unwrap_or(WHITE_LUMINANCE);
         let (sampled_nm, white) = white_radiance(&light, &observer, white_luminance).ok_or_else(no_light)?;
-        let seen = sums.camera(&sampled_nm, &format!("illuminant {illuminant}"), &mut found.notes)?;
+        let light_name = format!("illuminant {illuminant}");
+        let seen = sums.camera(&sampled_nm, &light_name, &mut found.notes)?;
+        found.notes.extend(gap(&sampled_nm, &light_name));
         found.metadata.quadrature_error = seen.quadrature_error(&white);
         self.tell(&header, illuminant, [self.picture.luminance, told_luminance], found);
         found.upsampling = Some(UpsamplingRecord {

@@ -135,8 +135,10 @@ impl Pixels {
 /// The radiance of a pixel, W cm⁻² sr⁻¹ nm⁻¹.
 fn radiance(band: &Band, y: usize, x: usize, spectral: &SpectralChannels) -> Vec<f64> {
     let window = band.window::<Any>(0);
-    let sample = |&channel: &usize| f64::from(window.row(y.cast_signed(), channel)[x]);
-    spectral.channels.iter().zip(spectral.factors()).map(|(channel, factor)| sample(channel) * factor).collect()
+    let sample = |index: usize| f64::from(window.row(y.cast_signed(), spectral.channels[index])[x]);
+    let between = spectral.between();
+    let factors = spectral.factors(&between);
+    between.values(sample).into_iter().zip(factors).map(|(value, factor)| value * factor).collect()
 }
 
 /// The place of the brightest of some pixels.

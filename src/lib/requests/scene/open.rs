@@ -3,7 +3,7 @@
 use super::light::{ImageRows, Light, Pixels, SceneImage, brightest, checked, no_sample};
 use super::picture;
 use super::request::Scene;
-use super::sums::{Found, Sums};
+use super::sums::{Found, Sums, gap};
 use crate::camera::optics::{Exposure, doubt_of_focal_length, doubt_of_time};
 use crate::camera::readout::ReadOut;
 use crate::camera::response::GridWeights;
@@ -18,6 +18,7 @@ use crate::frame::Geometry;
 use crate::requests::notes::{self, Note};
 use crate::spectrum::{SpectralLibrary, chart_columns};
 use crate::stream::RowSource;
+use crate::text::in_digits;
 use std::path::Path;
 
 /// Error of a sum over wavelengths from which it is a warning.
@@ -107,13 +108,11 @@ impl Scene {
     /// The chosen spectrum of a table, or all of them as a chart.
     fn light_of_table(&self, table: &SpectralTable, sums: &Sums<'_>, found: &mut Found) -> Result<Light> {
         let name = table.name().to_owned();
-        let seen = sums.camera(&table.wavelength_nm, &name, &mut found.notes)?;
         let given = self.spectrum.radiance_unit;
-        let radiance_of = |index: usize| -> Result<Vec<f64>> {
-            let (unit, _) = table.radiance_unit(index, given)?;
-            let samples = table.values.row(index).into_iter().zip(&table.wavelength_nm);
-            Ok(samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).collect())
-        };
+        let between = table.between(given);
+        let seen = sums.camera(&between.wavelength_nm, &name, &mut found.notes)?;
+        found.notes.extend(gap(&table.wavelength_nm, &name));
+        let radiance_of = |index: usize| table.radiances(index, given, &between);
         let electrons_of = |index: usize| checked(seen.camera.electrons(&radiance_of(index)?), &name);
         let warn = |index: usize, notes: &mut Vec<Note>| -> Result<()> {
             let (_, assumed) = table.radiance_unit(index, given)?;
@@ -135,7 +134,7 @@ impl Scene {
         let electrons = electrons_of(index)?;
         let radiance = radiance_of(index)?;
         found.metadata.quadrature_error = seen.quadrature_error(&radiance);
-        found.radiance = Some(SpectralLibrary::of_one(table.wavelength_nm.clone(), radiance));
+        found.radiance = Some(SpectralLibrary::of_one(between.wavelength_nm, radiance));
         let source = if count > 1 { format!("{name}: {}", table.columns[index]) } else { name };
         Ok(Light::Uniform { electrons, source })
     }
@@ -149,8 +148,10 @@ impl Scene {
         let header = reader.header().clone();
         let spectral = SpectralChannels::of(&header, self.spectrum.radiance_unit)?;
         found.notes.extend(spectral.warning.clone().map(Note::Warning));
-        let seen = sums.camera(&spectral.wavelength_nm, &header.name, &mut found.notes)?;
-        let planes = seen.camera.planes(&spectral.channels, &spectral.factors());
+        let between = spectral.between();
+        let seen = sums.camera(&between.wavelength_nm, &header.name, &mut found.notes)?;
+        found.notes.extend(gap(&spectral.wavelength_nm, &header.name));
+        let planes = seen.camera.planes(&spectral.channels, &between, &spectral.factors(&between));
         let all = spectral.channels.len();
         if planes.len() < all {
             let what = format!("{} of {all} spectral planes", all - planes.len());
@@ -169,7 +170,7 @@ impl Scene {
         }
         let (electrons, radiance) = image.pixel([sample % width, sample / width], &spectral)?;
         found.metadata.quadrature_error = seen.quadrature_error(&radiance);
-        found.radiance = Some(SpectralLibrary::of_one(spectral.wavelength_nm.clone(), radiance));
+        found.radiance = Some(SpectralLibrary::of_one(between.wavelength_nm, radiance));
         Ok(Light::Uniform { electrons, source: format!("{}: sample {sample}", header.name) })
     }
 
@@ -238,9 +239,9 @@ fn overfull(light: &Light, readout: Option<&ReadOut>, expose_to: Option<f64>) ->
 
 /// What the sum over wavelengths is off by, of R, G and B.
 fn inexact([red, green, blue]: [f64; 3]) -> Note {
+    let [r, g, b] = [red, green, blue].map(|error| in_digits(error, 2));
     let text = format!(
-        "the sum over wavelengths is off by {red:.1e} of R, {green:.1e} of G, {blue:.1e} of B from the integral between \
-         all samples"
+        "the sum over wavelengths is off by {r} of R, {g} of G, {b} of B from the integral between all samples"
     );
     if [red, green, blue].iter().any(|error| *error > TOLD_ERROR) {
         Note::Warning(format!("{text}; a smaller step of --wavelengths, or its default, brings it closer"))

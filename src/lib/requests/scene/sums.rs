@@ -92,7 +92,6 @@ impl<'a> Sums<'a> {
             // What rounds to none is no reason to warn.
             notes.push(if uncovered < 5e-5 { Note::Remark(text) } else { Note::Warning(text) });
         }
-        notes.extend(gap(sampled_nm, name).map(Note::Warning));
         Ok(Seen { camera: if is_followed { exact.clone() } else { of_sum }, exact })
     }
 }
@@ -108,7 +107,7 @@ pub(in crate::requests) fn own_xyz(radiance: &SpectralLibrary) -> Result<[f64; 3
 }
 
 /// A warning of wavelengths that are missing: steps much wider than most.
-fn gap(sampled_nm: &[f64], name: &str) -> Option<String> {
+pub(super) fn gap(sampled_nm: &[f64], name: &str) -> Option<Note> {
     /// Times as wide as most, and nm, from which it is told.
     const WIDE: f64 = 10.0;
     const WIDE_NM: f64 = 20.0;
@@ -116,11 +115,11 @@ fn gap(sampled_nm: &[f64], name: &str) -> Option<String> {
     steps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (usual, (widest, from)) = (steps.get(steps.len() / 2)?.0, *steps.last()?);
     (widest > WIDE * usual && widest >= WIDE_NM).then(|| {
-        format!(
+        Note::Warning(format!(
             "{name}: nothing lies between {from} and {} nm, where its samples are otherwise {usual:.3} nm apart; a straight line is \
              taken there",
             from + widest
-        )
+        ))
     })
 }
 
@@ -130,7 +129,11 @@ mod tests {
 
     #[test]
     fn missing_wavelengths_are_told() {
-        let told = |nm: &[f64]| gap(nm, "sky.csv");
+        let told = |nm: &[f64]| {
+            gap(nm, "sky.csv").map(|note| match note {
+                Note::Warning(text) | Note::Remark(text) => text,
+            })
+        };
         let (low, high) = (360..=480, 620..=830);
         let with_gap: Vec<f64> = low.chain(high).map(f64::from).collect();
         assert!(told(&with_gap).unwrap().starts_with("sky.csv: nothing lies between 480 and 620 nm"));

@@ -111,7 +111,8 @@ pub fn primaries(text: &str) -> Result<Primaries, String> {
 pub fn radiance_unit(text: &str) -> Result<RadianceUnit, String> {
     RadianceUnit::parse(text).ok_or_else(|| {
         let names: Vec<String> = RadianceUnit::USUAL.iter().map(ToString::to_string).collect();
-        let what = match unit_of_heading(text) {
+        let found = unit_of_heading(text).or_else(|| unit_of_heading(&format!("({text})")));
+        let what = match found {
             Some(Stated::Other { kind, .. }) if kind != OtherUnit::Unknown => format!("that is {}; ", kind.in_words()),
             _ => String::new(),
         };
@@ -144,6 +145,10 @@ mod tests {
         assert!(said("W m-2 nm-1").starts_with("that is an irradiance, which has no sr-1; known units are W cm-2"));
         assert!(said("W cm-2 sr-1 cm-1").contains("per cm-1 of wavenumber is `/ cm-1`"));
         assert!(said("bananas").starts_with("known units are "));
+        assert!(
+            said("a.u.").starts_with("that is of no scale, which does not tell how bright the light is; known units")
+        );
+        assert!(said("%").starts_with("that is a ratio"));
     }
 
     #[test]

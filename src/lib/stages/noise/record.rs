@@ -5,6 +5,7 @@ use crate::camera::readout::ReadOut;
 use crate::error::{Error, Result};
 use crate::metadata::{FrameHeader, Metadata, NoiseRecord};
 use crate::random::Source;
+use crate::text::in_digits;
 
 /// The dark signal is left out where its variance is below this share of that of the read noise: the total standard
 /// deviation changes by less than half of it.
@@ -38,7 +39,7 @@ pub(super) fn of(input: &FrameHeader, settings: &NoiseSettings, metadata: &mut M
     if dark_variance > 0.0 && dark_variance < NEGLIGIBLE_DARK * read_variance {
         metadata.leave_out(
             "add-noise",
-            format!("dark signal of {:.1e} e-", dark_e + hot_share * hot_pixel_e),
+            format!("dark signal of {} e-", in_digits(dark_e + hot_share * hot_pixel_e, 2)),
             format!("its variance is below {NEGLIGIBLE_DARK:e} of that of the read noise"),
         );
         (dark_e, hot_pixel_e) = (0.0, 0.0);

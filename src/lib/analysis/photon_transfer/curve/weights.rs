@@ -4,6 +4,7 @@ use super::super::fit::{Line, Point, variance_besides};
 use super::super::scatter::{among, few};
 use super::{Curve, Datum, Point4, Weights};
 use crate::numerics::significance;
+use crate::text::in_digits;
 
 impl Curve {
     /// Weights, from the first fit on at its levels; what points miss their lines by is added to what they scatter by.
@@ -153,9 +154,9 @@ fn off_line(misfit: f64, freedom: f64, besides: f64) -> Option<(String, bool)> {
     let is_beyond = misfit > freedom && significance::of_chi_square(misfit, freedom) < LEVEL;
     is_beyond.then(|| {
         let text = format!(
-            "means of darks miss their line over exposure time by {:.2e} ADU more than their frames scatter by: the black level moves \
+            "means of darks miss their line over exposure time by {} ADU more than their frames scatter by: the black level moves \
              between them, or exposure times are wrong; intervals of dark current, black level and linearity take that in",
-            besides.sqrt()
+            in_digits(besides.sqrt(), 3)
         );
         (text, true)
     })

@@ -1,0 +1,76 @@
+//! Columns of tables of spectra that are no spectra but how sure others are.
+
+/// What such columns are called, alone or with what they are of.
+const WORDS: [&str; 17] = [
+    "uncertainty",
+    "uncertainties",
+    "uncert",
+    "unc",
+    "std",
+    "stdev",
+    "stddev",
+    "stderr",
+    "sd",
+    "sem",
+    "sigma",
+    "σ",
+    "error",
+    "errors",
+    "err",
+    "deviation",
+    "rmse",
+];
+
+/// The places of the curves that are none; nothing where all are spectra, or none is.
+pub(super) fn others(columns: &[String]) -> Option<Vec<usize>> {
+    let kept: Vec<usize> = (0..columns.len()).filter(|index| !is_one(&columns[*index])).collect();
+    (!kept.is_empty() && kept.len() < columns.len()).then_some(kept)
+}
+
+/// What is said of the others.
+pub(super) fn told(name: &str, columns: &[String], kept: &[usize]) -> String {
+    const SHOWN: usize = 4;
+    let left: Vec<&str> =
+        (0..columns.len()).filter(|index| !kept.contains(index)).map(|index| columns[index].as_str()).collect();
+    let shown: Vec<String> = left.iter().take(SHOWN).map(|column| format!("`{column}`")).collect();
+    let more = if left.len() > SHOWN { ", …" } else { "" };
+    let are = if left.len() == 1 {
+        "is an uncertainty, no spectrum, and does"
+    } else {
+        "are uncertainties, no spectra, and do"
+    };
+    format!("{name}: by its name {}{more} {are} not count; under another name it would be a spectrum", shown.join(", "))
+}
+
+/// Whether a heading, without its unit, has such a word.
+fn is_one(heading: &str) -> bool {
+    let bare = heading.split(['(', '[']).next().unwrap_or_default().to_lowercase();
+    bare.split(|letter: char| !letter.is_alphanumeric()).any(|word| WORDS.contains(&word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::csv::SpectralTable;
+
+    #[test]
+    fn uncertainties_are_no_spectra() {
+        for heading in ["uncertainty (%)", "std", "L_std", "Sigma [W m-2 sr-1 nm-1]", "σ", "radiance error", "u unc."]
+        {
+            assert!(is_one(heading), "{heading}");
+        }
+        for heading in ["radiance (W m-2 sr-1 nm-1)", "standard white", "sky", "sdss", "x (std)", "30"] {
+            assert!(!is_one(heading), "{heading}");
+        }
+        let text = "nm,L,std,M,uncertainty (%)\n400,1,x,2,5\n500,3,0.1,4,5\n";
+        let table = SpectralTable::parse("t", text.as_bytes()).unwrap();
+        assert_eq!((table.columns.join(" "), table.curve(Some("M")).unwrap().at(450.0)), ("L M".into(), 3.0));
+        // Where nothing else is there they are what is wanted.
+        assert_eq!(SpectralTable::parse("t", b"nm,sigma\n400,1\n500,2\n").unwrap().columns, ["sigma"]);
+        let columns = ["L", "std"].map(str::to_owned);
+        assert_eq!(
+            told("t", &columns, &[0]),
+            "t: by its name `std` is an uncertainty, no spectrum, and does not count; under another name it would be a spectrum"
+        );
+    }
+}

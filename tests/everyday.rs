@@ -1,0 +1,138 @@
+//! Everyday use: tables as people have them, and what is said where a word would help.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use std::fs;
+use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
+
+/// What a program says of a run that ends well.
+fn told(shop: &Workshop, line: &str) -> String {
+    let done = shop.attempt(line, &[]);
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{line}: {said}");
+    said
+}
+
+#[test]
+fn uncertainties_are_no_spectra() {
+    let shop = Workshop::new();
+    let rows = |with: bool| -> String {
+        let row = |nm: u32| format!("{nm},{}{}\n", f64::from(nm) * 1e-9, if with { ",3.5" } else { "" });
+        (36..=83).map(|ten| row(10 * ten)).collect()
+    };
+    let unit = "radiance (W cm-2 sr-1 nm-1)";
+    fs::write(shop.path("plain.csv"), format!("nm,{unit}\n{}", rows(false))).unwrap();
+    fs::write(shop.path("with.csv"), format!("nm,{unit},uncertainty (%)\n{}", rows(true))).unwrap();
+    let line = |name: &str| format!("render-radiance {name}.csv --size 4x4 -o {name}.exr");
+    assert_eq!(told(&shop, &line("plain")), "");
+    assert!(
+        told(&shop, &line("with")).contains("with.csv: by its name `uncertainty (%)` is an uncertainty, no spectrum")
+    );
+    assert_eq!(shop.frame("plain.exr").samples, shop.frame("with.exr").samples);
+}
+
+#[test]
+fn relative_radiances_are_warned_of() {
+    let shop = Workshop::new();
+    fs::write(shop.path("lamp.csv"), "nm,lamp (a.u.)\n360,1e-3\n830,2e-3\n").unwrap();
+    let refused = shop.said("render-radiance lamp.csv --size 4x4 -o a.exr", BAD_DATA);
+    assert!(
+        refused.contains("`a.u.`, of no scale, which does not tell how bright the light is; give --radiance-unit"),
+        "{refused}"
+    );
+    let line = "render-radiance lamp.csv --radiance-unit W/m2/sr/nm --expose-to 0.5 --size 4x4 -o a.exr";
+    let said = told(&shop, line);
+    assert!(said.contains("they count as W m-2 sr-1 nm-1, as --radiance-unit says"), "{said}");
+    let refused = shop.said("render-radiance lamp.csv --radiance-unit a.u. --size 4x4 -o a.exr", BAD_USAGE);
+    assert!(refused.contains("that is of no scale"), "{refused}");
+}
+
+#[test]
+fn a_light_by_wavenumber_is_refused_whatever_its_rows_are() {
+    let shop = Workshop::with_frames();
+    shop.run("to-xyz rgb.exr --space srgb -o picture.tiff", &[]);
+    fs::write(shop.path("lamp.csv"), "nm,L (mW/(m2 sr cm-1))\n360,1\n830,2\n").unwrap();
+    let refused = shop.said("render-radiance picture.tiff --illuminant lamp.csv -o a.exr", BAD_DATA);
+    assert!(refused.contains("a light by wavenumber is not read; give its power per nm by wavelength"), "{refused}");
+}
+
+#[test]
+fn what_is_typed_wrong_is_told_what_it_may_be() {
+    let shop = Workshop::with_frames();
+    for (line, status, wanted) in [
+        (
+            "cyanometer measur codes.exr --plot a.svg",
+            BAD_USAGE,
+            "there is no program `measur`; did you mean `measure`?",
+        ),
+        ("cyanometer help digitise", BAD_USAGE, "there is no program `digitise`; did you mean `digitize`?"),
+        ("cyanometer sky.csv", BAD_USAGE, "there is no program `sky.csv`; `cyanometer` alone lists the programs"),
+        ("measure codes.ex", BAD_DATA, "codes.ex: cannot open: no such file or directory; did you mean `codes.exr`?"),
+        (
+            "to-xyz rgb.exr --matrix kaf-5101ce -o x.exr",
+            BAD_DATA,
+            "kaf-5101ce: that is a sensor, and a file of a matrix is wanted; `fit-matrix sky912.exr --sensor kaf-5101ce -o matrix.yaml` \
+             makes one for it",
+        ),
+        (
+            "preview codes.exr --range 9,1 -o a.png",
+            BAD_USAGE,
+            "codes.exr: a range from 9 to 1 shows nothing; --range takes black first and then white, which is larger",
+        ),
+        (
+            "preview codes.exr noisy.exr --caption -o a.png",
+            BAD_USAGE,
+            "the frames of a sheet have captions, which say what each is; leave out --caption=TEXT",
+        ),
+    ] {
+        let said = shop.said(line, status);
+        assert!(said.contains(wanted), "{line}: {said}");
+    }
+}
+
+/// In 33 s the dark signal of the default sensor fills its codes.
+#[test]
+fn an_exposure_without_codes_for_light_is_told() {
+    let shop = Workshop::new();
+    let line = "fit-matrix SAMPLES/skies/sky912.exr --exposure 33 --evaluate SAMPLES/skies/sky912.exr -o m.yaml";
+    let said = shop.said(line, BAD_DATA);
+    let wanted = "in 33 s the dark signal fills the range of the codes, and no white saturates the camera; expose for a shorter time; \
+                  give --white-luminance";
+    assert!(said.contains(wanted), "{said}");
+}
+
+/// Keys and values of sensor files as people write them first.
+#[test]
+fn sensor_files_are_told_what_to_write() {
+    let shop = Workshop::new();
+    shop.run("render-radiance --electrons 900,900,900 --size 4x4 -o e.exr", &[]);
+    let whole = fs::read_to_string(format!("{}/sample_data/sensors/kaf-5101ce.yaml", support::TREE)).unwrap();
+    for (from, to, wanted) in [
+        ("read_noise_e: 15.7", "read_noise_e: 15,7", "is `15,7`, not a number (line 29, column 15); write 15.7"),
+        (
+            "prnu: 0.008",
+            "prnu: 0.8%",
+            "is `0.8%`, not a number (line 25, column 7); write it as a fraction of 1, 0.008",
+        ),
+        ("bits: 12", "bits: 12.0", "; write 12"),
+        ("bits: 12", "bits:12", "a key lacks its colon, or the blank behind it, at or above this place"),
+        ("adu_per_e:", "e_per_adu:", "unknown key `e_per_adu`; here it is `adu_per_e`, its inverse"),
+        (
+            "temperature_k: 333",
+            "temperature_c: 60",
+            "here it is `temperature_k`, in K, 273.15 more than degrees Celsius",
+        ),
+        (
+            "quantum_efficiency: {file: kaf5101ce_est_qe_1nm.csv}",
+            "quantum_efficiency: qe.csv",
+            "not a list of keys and values (line 17, column 21); a file is named so: {file: qe.csv}",
+        ),
+    ] {
+        assert!(whole.contains(from), "{from}");
+        fs::write(shop.path("s.yaml"), whole.replacen(from, to, 1)).unwrap();
+        let said = shop.said("add-noise e.exr --sensor s.yaml -o n.exr", BAD_DATA);
+        assert!(said.contains(wanted), "{to}: {said}");
+    }
+}
