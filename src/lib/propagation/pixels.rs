@@ -482,14 +482,16 @@ pub fn dim_green_below(frame: &FrameHeader) -> Option<f64> {
 fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
     let readout = frame.readout()?;
     let temperature_k = frame.metadata.sensor_temperature_k.unwrap_or(readout.temperature_k);
+    let charges_e = readout.dark_charges_e(temperature_k, frame.metadata.time_s());
+    let [dark_e, hot_pixel_e] = charges_e.ok_or_else(|| frame.missing("exposure_time_s"))?;
     Ok(NoiseRecord {
         sources: Source::ALL.to_vec(),
         seed: 0,
         sensor_seed: 0,
         frame: 0,
         temperature_k,
-        dark_e: readout.dark_current_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
-        hot_pixel_e: readout.hot_pixel_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
+        dark_e,
+        hot_pixel_e,
         poisson: crate::metadata::PoissonKind::Exact,
         cte: None,
         smear_per_row: 0.0,
