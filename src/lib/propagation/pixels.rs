@@ -279,8 +279,8 @@ impl PixelNoise {
         let gains = |gains: fn(&WeightTable, [usize; 2], &Geometry) -> PixelGains| -> Vec<PixelGains> {
             places().map(|at| gains(table, at, &frame.geometry)).collect()
         };
-        photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
-        photosite.check_lines(false).map_err(|why| frame.refuse(why.to_string()))?;
+        let is_followed = photosite.check_tails([0.0; 3]).and_then(|()| photosite.check_lines(false));
+        is_followed.and_then(|()| photosite.check_flat()).map_err(|why| frame.refuse(why.to_string()))?;
         if photosite.drifts() {
             return Err(frame.refuse(DRIFTING));
         }
