@@ -467,6 +467,21 @@ fn dim_flat_fields_are_followed_or_refused() {
     }
 }
 
+/// Of a camera's frame, that records no noise, what no light reads is that of its sensor where the black level is a little off.
+#[test]
+fn black_levels_a_little_below_the_bias_are_no_light() {
+    let camera = quiet_camera(0.01, 2.0);
+    let plane = camera.expose([2.0; 3], 1e-6, 260.0);
+    for black_adu in [397.0, 398.0, 399.0, 400.0] {
+        let mut header = plane.header.clone();
+        (header.metadata.noise, header.metadata.scene, header.metadata.adc) = (None, None, None);
+        header.metadata.set_black_adu(Some(black_adu.into()));
+        let [sigma, std] = green(&plane, header).unwrap();
+        // 48 000 pixels, of which half are sums of four: 0.5 %. Three electrons more would be 25 % of the variance.
+        assert!((sigma / std - 1.0).abs() < 0.03, "{black_adu}: {sigma} {std}");
+    }
+}
+
 /// Rows may be asked for in any steps, and made on any threads: not a bit changes. A crop is corrected as the whole is,
 /// where nothing hangs on means over the frame.
 #[test]

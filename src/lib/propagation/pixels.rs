@@ -453,10 +453,11 @@ fn dark_above(frame: &FrameHeader, codes: &Photosite, adc: &AdcRecord, black_adu
     if codes.darks[0].is_some() {
         return unlit_adu - black_adu;
     }
-    // A level from that of the converter on, or a little below it, up to that with the dark signal counts not all of this.
+    // A level from that of the converter on, or 1 % below it, up to that with the dark signal counts not all of this.
     let dark_adu = unlit_adu - (adc.sample_at(0.0) - off_adu);
     let short_adu = unlit_adu - black_adu;
-    if (0.0..=1.5 * dark_adu).contains(&short_adu) { short_adu } else { 0.0 }
+    let most_adu = dark_adu + (0.5 * dark_adu).max(0.01 * adc.sample_at(0.0));
+    if (0.0..=most_adu).contains(&short_adu) { short_adu } else { 0.0 }
 }
 
 /// The level above black below which the green of a frame demosaicked by smooth hue transition is less than
