@@ -104,6 +104,7 @@ impl Described {
     /// Those of [`FrameReader::open`] and [`Self::apply`].
     pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
         let mut reader = FrameReader::open(options)?;
+        reader.tell_top();
         self.apply(reader.header_mut())?;
         Ok(reader)
     }
@@ -324,6 +325,7 @@ impl DescribedWithBlack {
     /// Those of [`FrameReader::open`] and [`Self::apply`].
     pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
         let mut reader = FrameReader::open(options)?;
+        reader.tell_top();
         self.apply(reader.header_mut())?;
         Ok(reader)
     }
