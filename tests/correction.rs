@@ -422,6 +422,66 @@ fn demosaicked_frames_have_the_noise_that_is_predicted() {
     }
 }
 
+/// A camera of little noise and next to no dark signal.
+fn quiet_camera(prnu: f64, read_noise_e: f64) -> Camera {
+    let noise = ReadOut { prnu, dcnu: 0.0, read_noise_e, ..support::readout() };
+    let readout = ReadOut { adu_per_e: 1.0, bits: 14, bias_adu: 400.0, ..noise };
+    Camera { readout, size: [240, 200], cfa: Some(CfaPattern::Rggb), seed: 5, frames: 0.into() }
+}
+
+/// The root mean square of the standard deviations of green, and its scatter, of a corrected plane.
+fn green(plane: &MemoryFrame, header: FrameHeader) -> Result<[f64; 2], String> {
+    let demosaic = Demosaic::new(&header, Method::Bilinear, Black::Auto, None).unwrap();
+    let stage = WithSigma::of_demosaicking(demosaic).map_err(|error| error.to_string())?;
+    let source = MemoryFrame::new(header, plane.samples.clone());
+    let mut made = through(&source, &stage);
+    let report = measure(&mut made, &[], Saturated::Kept, Equations::Exact, None).unwrap();
+    let channels = &report.regions[0].channels;
+    Ok([channels[4].mean.unwrap().hypot(channels[4].std.unwrap()), channels[1].std.unwrap()])
+}
+
+/// Light of 3000 e⁻ over flats of 30 e⁻ and a read noise of 6 e⁻: their noise, relative variance ρ = 0.073 of one, is all there is. Of
+/// two and more the standard deviations of pixels hold, of one they are refused; predictions say that it is the noise of the flat field.
+#[test]
+fn dim_flat_fields_are_followed_or_refused() {
+    let camera = quiet_camera(0.01, 6.0);
+    for count in [1, 2, 4] {
+        let kit = Kit {
+            biases: camera.darks(16, 1e-6, 260.0),
+            flats: (0..count).map(|_| camera.expose([30.0; 3], 1e-6, 260.0)).collect(),
+            ..Default::default()
+        };
+        let corrected = kit.correct(&camera.expose([3000.0; 3], 1e-6, 260.0));
+        let mut source = MemoryFrame::new(corrected.header.clone(), corrected.samples.clone());
+        let report = measure(&mut source, &[], Saturated::LeftOut, Equations::Exact, None).unwrap();
+        assert!(report.unpredicted.is_some_and(|why| why.to_string().starts_with("the flat field is so noisy")));
+        let mut header = corrected.header.clone();
+        header.geometry.channels.truncate(1);
+        let width = header.geometry.width;
+        let samples = corrected.samples.chunks_exact(2 * width).flat_map(|rows| rows[..width].to_vec()).collect();
+        match green(&MemoryFrame::new(header.clone(), samples), header) {
+            Err(why) => assert!(count == 1 && why.contains("the flat field is so noisy"), "{count}: {why}"),
+            // Levels of pixels scatter by √ρ, so that the mean square of their deviations is larger by ρ, 4 % of two.
+            Ok([sigma, std]) => assert!(count > 1 && (sigma / std - 1.0).abs() < 0.04, "{count}: {sigma} {std}"),
+        }
+    }
+}
+
+/// Of a camera's frame, that records no noise, what no light reads is that of its sensor where the black level is a little off.
+#[test]
+fn black_levels_a_little_below_the_bias_are_no_light() {
+    let camera = quiet_camera(0.01, 2.0);
+    let plane = camera.expose([2.0; 3], 1e-6, 260.0);
+    for black_adu in [397.0, 398.0, 399.0, 400.0] {
+        let mut header = plane.header.clone();
+        (header.metadata.noise, header.metadata.scene, header.metadata.adc) = (None, None, None);
+        header.metadata.set_black_adu(Some(black_adu.into()));
+        let [sigma, std] = green(&plane, header).unwrap();
+        // 48 000 pixels, of which half are sums of four: 0.5 %. Three electrons more would be 25 % of the variance.
+        assert!((sigma / std - 1.0).abs() < 0.03, "{black_adu}: {sigma} {std}");
+    }
+}
+
 /// Rows may be asked for in any steps, and made on any threads: not a bit changes. A crop is corrected as the whole is,
 /// where nothing hangs on means over the frame.
 #[test]

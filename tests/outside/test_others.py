@@ -364,7 +364,10 @@ class Described(Others):
         saturated = int(np.count_nonzero(codes >= 4000))
         self.assertIn(f"{saturated} samples are saturated", done.stderr.decode())
         self.assertIn("a CFA plane of ADU", done.stderr.decode())
-        self.refused(["measure", "in.png", "--exposure", "0.5"], "give --f-number", status=BAD_USAGE)
+        self.refused(["measure", "in.png", "--f-number", "4"], "give --exposure", status=BAD_USAGE)
+        # A time alone tells dark signals.
+        self.run_program(["demosaic", *words[:-2], "--cfa", "gbrg", "--black", "64", "-o", "timed.exr", "-q"])
+        self.assertIn("exposure_time_s: 0.5", (self.directory / "timed.exr.yaml").read_text())
 
 
 if __name__ == "__main__":

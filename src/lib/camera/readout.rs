@@ -379,6 +379,14 @@ impl ReadOut {
             measured => measured * dark_current_law(temperature_k) / dark_current_law(self.temperature_k),
         }
     }
+
+    /// Mean dark charge of a photosite and mean excess of hot ones in an exposure, e⁻. None where there is dark current and nobody knows
+    /// for how long; without any no time matters.
+    pub fn dark_charges_e(&self, temperature_k: f64, exposure_s: Option<f64>) -> Option<[f64; 2]> {
+        let rates = [self.dark_current_e_per_s(temperature_k), self.hot_pixel_e_per_s(temperature_k)];
+        let time_s = exposure_s.or((rates == [0.0; 2]).then_some(0.0))?;
+        Some(rates.map(|rate| rate * time_s))
+    }
 }
 
 /// What Eq. 6 of \[HP2005] makes of temperature: T^1.5 exp(−E_g / 2kT), T in K.

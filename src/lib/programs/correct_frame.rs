@@ -42,7 +42,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
 
 fn correct(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     let cli::Turn { session, input, output, .. } = *turn;
-    let mut reader = arguments.described.open_light(&input.options())?;
+    let mut reader = arguments.described.open(&input.options())?;
     session.tell(&arguments.correction.prepare(&mut reader)?);
     let mut correction = arguments.correction.open(reader.header_mut(), input, &arguments.described)?;
     let header = correction.stage.header_mut();

@@ -57,6 +57,7 @@ fn convert(
 ) -> Result<()> {
     let cli::Turn { session, input, output, .. } = *turn;
     let mut reader = FrameReader::open(&input.options())?;
+    reader.tell_top();
     session.tell(&sensor.apply(&mut reader)?);
     let holds_layers = output.options().holds_layers()?;
     if let Some(mut stage) = conversion.stage_of_xyz(&mut reader, *sigma, holds_layers)? {

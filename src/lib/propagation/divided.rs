@@ -5,13 +5,18 @@ use super::masters::{Dark, Drawn, Flat};
 use super::moments::{LineCovariance, Prediction};
 use super::photosite::Photosite;
 use super::unlike::{Temporal, Unlike, UnlikeSums};
+use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::AdcRecord;
 use crate::numerics::averages::Combine;
 use crate::stages::noise::{LineNoise, NoiseModel};
 
 /// Why nothing is predicted of samples that were divided by a flat field.
-pub(super) const NARROW: &str = "what was divided by a flat field, or the flat field, reaches full well or an end of the codes, or \
+const NARROW: &str = "what was divided by a flat field, or the flat field, reaches full well or an end of the codes, or \
                                  scatters over less than a code";
+
+/// Why nothing is said of samples that were divided by noise.
+pub(super) const NOISY: &str = "the flat field is so noisy that what is divided by it follows no series here (standard deviations beyond \
+                                10 % of its level; beyond 22 % not even those of --sigma); average more flats, or brighter ones";
 
 /// The least standard deviation, in codes, of which rounding is a uniform error: what else it does to the variance is below
 /// 4σ² e^(−2π²σ²), 1 % of it, and less where patterns spread it.
@@ -29,8 +34,8 @@ struct Limits {
 
 /// Where the series is good to 10⁻³.
 const STRICT: Limits = Limits { noise: 0.01, left_out: 0.0 };
-/// Where it is good to about a tenth.
-const WIDE: Limits = Limits { noise: 0.1, left_out: 0.01 };
+/// Where it is good to a few hundredths, and a normal flat field near zero, 4.5 standard deviations off, adds as little.
+const WIDE: Limits = Limits { noise: 0.05, left_out: 0.01 };
 
 impl Photosite {
     /// Moments of the class R, G or B after division by the flat field: with A what is left of the codes and F the flat
@@ -153,8 +158,27 @@ impl Photosite {
         adc.adu_per_e * adc.adu_per_e * sum
     }
 
-    /// The variance after division by the flat field; where [`Self::divided`] gives none, to first order: that of the codes
-    /// less the pattern of the response, and what the noise of the flat field adds.
+    /// Makes sure that the flat field of no class is too noisy for the variance of what is divided by it; that has none where the flat
+    /// field reaches zero.
+    pub(super) fn check_flat(&self) -> Predicted<()> {
+        let (Some(adc), Some(flat)) = (self.adc, self.flat) else { return Ok(()) };
+        let is_quiet = |light_e: f64| {
+            let mut below = flat.frames.drawn(&adc, light_e, [1.0; 2]).less(&flat.darks, &adc, [1.0; 2]);
+            below.mean -= flat.levels_adu[1];
+            below.mean > 0.0 && below.variance <= WIDE.noise * below.mean.powi(2)
+        };
+        if flat.expected_e.into_iter().all(is_quiet) { Ok(()) } else { Err(Unpredictable::Beyond(NOISY)) }
+    }
+
+    /// Why [`Self::divided`] gives nothing of a class.
+    pub(super) fn why_not_divided(&self, class: usize, expected_e: f64) -> Unpredictable {
+        let is_open =
+            |(adc, flat): (AdcRecord, Flat)| self.is_all_open(&adc, &flat, [expected_e, flat.expected_e[class]]);
+        Unpredictable::Beyond(if self.adc.zip(self.flat).is_some_and(is_open) { NOISY } else { NARROW })
+    }
+
+    /// The variance after division by the flat field; where [`Self::divided`] gives none, to second order at the mean sensitivities: that
+    /// of the codes less the pattern of the response, and what the noise of the flat field adds.
     pub(super) fn variance_divided(&self, class: usize, expected_e: f64) -> f64 {
         if let Some(divided) = self.divided(class, expected_e) {
             return divided.moments.variance;
@@ -164,9 +188,13 @@ impl Photosite {
             return divided.moments.variance;
         }
         let (Some(adc), Some(flat)) = (self.adc, self.flat) else { return own };
-        let below = flat.frames.drawn(&adc, flat.expected_e[class], [1.0; 2]).less(&flat.darks, &adc, [1.0; 2]);
+        let mut below = flat.frames.drawn(&adc, flat.expected_e[class], [1.0; 2]).less(&flat.darks, &adc, [1.0; 2]);
+        below.mean -= flat.levels_adu[1];
         let level = expected_e * adc.adu_per_e;
-        (own - (self.model.response() * level).powi(2)).max(0.0) + below.variance * (level / below.mean).powi(2)
+        let codes = (own - (self.model.response() * level).powi(2)).max(0.0);
+        let rho = below.variance / below.mean.powi(2);
+        // E[1/F²], and its excess over E[1/F]².
+        codes * (1.0 + 3.0 * rho) + level * level * rho * (1.0 + 8.0 * rho)
     }
 
     /// Whether rounding is a uniform error of an average of such codes: averages, or photosites, scatter.

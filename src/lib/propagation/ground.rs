@@ -1,7 +1,6 @@
 //! What the photosites of a frame follow from, read off its head: their noise, their converter, what came off, and the light.
 
 use super::columns::{Smeared, check_wells};
-use super::divided::NARROW;
 use super::masters::{Dark, Flat};
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
@@ -144,7 +143,7 @@ fn moments_of_codes(frame: &FrameHeader, codes: &Photosite, expected_e: [f64; 3]
     let mut classes = [Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0); 3];
     for (class, prediction) in classes.iter_mut().enumerate() {
         let found = codes.divided(class, expected_e[class]);
-        *prediction = found.ok_or(Unpredictable::Beyond(NARROW))?;
+        *prediction = found.ok_or_else(|| codes.why_not_divided(class, expected_e[class]))?;
     }
     Ok(classes)
 }

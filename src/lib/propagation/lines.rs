@@ -54,9 +54,9 @@ const NO_MEANS: &str = "medians and clipped means of frames whose rows or column
                         `--combine mean`";
 
 /// Why nothing is said of offsets that show how codes are rounded.
-const OFFSETS_SHOW: &str = "photosites have fixed offsets, and the noise of the dark frames, over less than a code, makes what they \
-                            leave of these hang on where in a code each mean lies; more dark frames do not help, amplification before \
-                            the converter does";
+const OFFSETS_SHOW: &str = "photosites have fixed offsets, and the noise of the dark or bias frames, over less than a code, makes \
+                            what they leave of these hang on where in a code each mean lies; more of them do not help, amplification \
+                            before the converter does";
 
 /// Why nothing is said of samples over a flat field.
 const NORMALIZED: &str = "it was divided by a flat field whose rows or columns share noise or gains, and how far these move its level \

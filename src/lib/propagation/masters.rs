@@ -79,7 +79,7 @@ impl Dark {
                     MasterKind::Bias => record.exposure_s.or(Some(0.0)),
                     MasterKind::Dark => record.exposure_s.or_else(|| frame.metadata.time_s()),
                 };
-                model_at(frame, exposure_s?, record.temperature_k, of_sensor?)?
+                model_at(frame, exposure_s, record.temperature_k, of_sensor?)?
             }
         };
         let AverageRecord { frames, combine, clip } = record.average;
@@ -146,18 +146,19 @@ impl Dark {
     }
 }
 
-/// The noise of frames that is that of the sensor, of another exposure, and temperature where it is known.
+/// The noise of frames that is that of the sensor, of another exposure, and temperature where it is known; none where dark current makes
+/// it hang on an exposure that nobody knows.
 fn model_at(
     frame: &FrameHeader,
-    exposure_s: f64,
+    exposure_s: Option<f64>,
     temperature_k: Option<f64>,
     of_sensor: NoiseModel,
 ) -> Option<NoiseModel> {
     let readout = frame.readout().ok()?;
     let temperature_k = temperature_k.unwrap_or(readout.temperature_k);
-    let hot_e = readout.hot_pixel_e_per_s(temperature_k) * exposure_s;
+    let [dark_e, hot_e] = readout.dark_charges_e(temperature_k, exposure_s)?;
     let tails = Tails { hot_e, ..of_sensor.tails };
-    Some(NoiseModel { dark_e: readout.dark_current_e_per_s(temperature_k) * exposure_s, tails, ..of_sensor })
+    Some(NoiseModel { dark_e, tails, ..of_sensor })
 }
 
 /// A flat field.
@@ -228,7 +229,7 @@ impl Flat {
         let model = match &record.noise {
             Some(noise) => NoiseModel::of(frame, &noise.record()).ok()?,
             None => match record.exposure_s.or_else(|| frame.metadata.time_s()) {
-                Some(exposure_s) => model_at(frame, exposure_s, record.temperature_k, of_sensor?)?,
+                Some(exposure_s) => model_at(frame, Some(exposure_s), record.temperature_k, of_sensor?)?,
                 None => of_sensor?,
             },
         };

@@ -279,8 +279,8 @@ impl PixelNoise {
         let gains = |gains: fn(&WeightTable, [usize; 2], &Geometry) -> PixelGains| -> Vec<PixelGains> {
             places().map(|at| gains(table, at, &frame.geometry)).collect()
         };
-        photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
-        photosite.check_lines(false).map_err(|why| frame.refuse(why.to_string()))?;
+        let is_followed = photosite.check_tails([0.0; 3]).and_then(|()| photosite.check_lines(false));
+        is_followed.and_then(|()| photosite.check_flat()).map_err(|why| frame.refuse(why.to_string()))?;
         if photosite.drifts() {
             return Err(frame.refuse(DRIFTING));
         }
@@ -453,10 +453,11 @@ fn dark_above(frame: &FrameHeader, codes: &Photosite, adc: &AdcRecord, black_adu
     if codes.darks[0].is_some() {
         return unlit_adu - black_adu;
     }
-    // A level from that of the converter on, or a little below it, up to that with the dark signal counts not all of this.
+    // A level from that of the converter on, or 1 % below it, up to that with the dark signal counts not all of this.
     let dark_adu = unlit_adu - (adc.sample_at(0.0) - off_adu);
     let short_adu = unlit_adu - black_adu;
-    if (0.0..=1.5 * dark_adu).contains(&short_adu) { short_adu } else { 0.0 }
+    let most_adu = dark_adu + (0.5 * dark_adu).max(0.01 * adc.sample_at(0.0));
+    if (0.0..=most_adu).contains(&short_adu) { short_adu } else { 0.0 }
 }
 
 /// The level above black below which the green of a frame demosaicked by smooth hue transition is less than
@@ -482,14 +483,16 @@ pub fn dim_green_below(frame: &FrameHeader) -> Option<f64> {
 fn whole_noise(frame: &FrameHeader) -> Result<NoiseRecord> {
     let readout = frame.readout()?;
     let temperature_k = frame.metadata.sensor_temperature_k.unwrap_or(readout.temperature_k);
+    let charges_e = readout.dark_charges_e(temperature_k, frame.metadata.time_s());
+    let [dark_e, hot_pixel_e] = charges_e.ok_or_else(|| frame.missing("exposure_time_s"))?;
     Ok(NoiseRecord {
         sources: Source::ALL.to_vec(),
         seed: 0,
         sensor_seed: 0,
         frame: 0,
         temperature_k,
-        dark_e: readout.dark_current_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
-        hot_pixel_e: readout.hot_pixel_e_per_s(temperature_k) * frame.exposure()?.exposure_s,
+        dark_e,
+        hot_pixel_e,
         poisson: crate::metadata::PoissonKind::Exact,
         cte: None,
         smear_per_row: 0.0,

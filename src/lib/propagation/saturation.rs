@@ -6,12 +6,15 @@ use super::law::Law;
 use super::moments::{Equations, Prediction};
 use super::taps;
 use crate::cfa::CfaPattern;
+use crate::frame::to_sample;
 use crate::metadata::{AdcRecord, FrameHeader, Scene};
 use crate::names::Named;
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::PHASES;
 use crate::stages::demosaic::weights::WeightTable;
-use crate::stages::saturation::FullLevels;
+use crate::stages::noise::NoiseModel;
+use crate::stages::saturation::{FullLevels, least_full_e};
+use crate::stages::transfer::uniform_share;
 use crate::units::QuantityKind;
 
 /// Standard deviations below the level at which no sample of any frame reaches it: beyond 12 a normal variable lies in one
@@ -45,20 +48,20 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
     !moments.into_iter().all(|moments| levels.classes().into_iter().zip(moments).all(is_beyond))
 }
 
-/// The expected shares of the samples of R, G and B that are full; of electrons, of photosites whose charge reaches full
-/// well, before read noise. None where the scene is not uniform, or the samples are not those of photosites.
+/// The expected shares of the samples of R, G and B that count as full: that are read from [`least_full_e`] on. None where the
+/// scene is not uniform, or the samples are not those of photosites.
 pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
+    let least_e = least_full_e(frame)?;
     if frame.taps().is_some() {
-        return shares_of_taps(frame);
+        return shares_of_taps(frame, least_e);
     }
-    shares_from(frame, f64::INFINITY)
+    shares_from(frame, least_e, f64::INFINITY)
 }
 
 /// The same of a sensor that is read through several amplifiers, the lowest of whose full codes counts for all.
-fn shares_of_taps(frame: &FrameHeader) -> Option<[f64; 3]> {
+fn shares_of_taps(frame: &FrameHeader, least_e: f64) -> Option<[f64; 3]> {
     let parts = taps::parts(frame);
-    let full_well_e = frame.readout().ok()?.full_well_e;
-    let full_code = |adc: AdcRecord| adc.full_code(full_well_e);
+    let full_code = |adc: AdcRecord| adc.full_code(least_e);
     let lowest = match (frame.metadata.adc, frame.taps()) {
         (Some(adc), Some(taps)) => {
             (0..taps.count()).map(|tap| full_code(adc.of_tap(taps, tap))).fold(f64::INFINITY, f64::min)
@@ -67,7 +70,7 @@ fn shares_of_taps(frame: &FrameHeader) -> Option<[f64; 3]> {
     };
     let [mut sums, mut counts] = [[0.0; 3]; 2];
     for part in parts {
-        let of_part = shares_from(&part.frame, lowest)?;
+        let of_part = shares_from(&part.frame, least_e, lowest)?;
         for k in 0..3 {
             sums[k] += part.counts[k] * of_part[k];
             counts[k] += part.counts[k];
@@ -76,29 +79,28 @@ fn shares_of_taps(frame: &FrameHeader) -> Option<[f64; 3]> {
     Some([0, 1, 2].map(|k| if counts[k] > 0.0 { sums[k] / counts[k] } else { 0.0 }))
 }
 
-/// The shares of samples that are full or reach a code.
-fn shares_from(frame: &FrameHeader, code: f64) -> Option<[f64; 3]> {
+/// The shares of samples that are read from a charge on, or reach a code.
+fn shares_from(frame: &FrameHeader, least_e: f64, code: f64) -> Option<[f64; 3]> {
     // Which exposures of an average a full photosite was full in is not told.
     let Sites { photosite, expected_e, .. } =
         Sites::of(frame, Equations::Exact).ok().filter(|_| frame.metadata.average.is_none())?;
-    let full_well_e = photosite.model.full_well_e;
-    let share = |expected_e: f64, of: &dyn Fn(&Law) -> f64| {
+    // Charges are those before transfer.
+    let left = frame.metadata.noise.as_ref().and_then(|noise| noise.cte).map_or(1.0, uniform_share);
+    let first_e = match (quantity_of_sites(frame), photosite.adc) {
+        (QuantityKind::Electrons, _) => f64::from(to_sample(least_e)),
+        (QuantityKind::Adu, Some(adc)) => adc.electrons_at(adc.full_code(least_e).min(code) - 0.5),
+        _ => return None,
+    } / left;
+    let share = |expected_e: f64| {
+        let of = |model: &NoiseModel| Law::of(model, expected_e).is_read_from(first_e);
         if photosite.has_tails() {
-            return photosite.mean_of(expected_e, |site| of(&Law::of(&site.model, expected_e)));
+            return photosite.mean_of(expected_e, |site| of(&site.model));
         }
-        of(&Law::of(&photosite.model, expected_e))
+        of(&photosite.model)
     };
-    let of_charge = |expected_e: f64| share(expected_e, &|law| law.reaches(full_well_e));
+    let shares = expected_e.map(share);
     // What takes too long is no number.
-    let known = |shares: [f64; 3]| shares.iter().all(|share| !share.is_nan()).then_some(shares);
-    match (quantity_of_sites(frame), photosite.adc) {
-        (QuantityKind::Electrons, _) => known(expected_e.map(of_charge)),
-        (QuantityKind::Adu, Some(adc)) => {
-            let first_full_e = adc.electrons_at(adc.full_code(full_well_e).min(code) - 0.5);
-            known(expected_e.map(|expected_e| share(expected_e, &|law| law.is_read_from(first_full_e))))
-        }
-        _ => None,
-    }
+    shares.iter().all(|share| !share.is_nan()).then_some(shares)
 }
 
 /// The expected share of the pixels of a demosaicked frame that used a full sample; of a frame far from its edges.

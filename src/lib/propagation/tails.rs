@@ -48,7 +48,7 @@ const TOO_FINE: &str = "hot pixels or random telegraph signals go over many code
 
 /// Why nothing is said of dark frames that show how codes are rounded.
 const FINE_DARKS: &str =
-    "dark frames of less than a code of noise came off a frame with hot pixels or random telegraph signals";
+    "dark or bias frames of less than a code of noise came off a frame with hot pixels or random telegraph signals";
 
 /// Why nothing is said of what is curved.
 pub(super) const CURVED: &str = "hot pixels and random telegraph signals reach too far for the series of what is curved in the \

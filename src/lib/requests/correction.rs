@@ -1,13 +1,13 @@
 //! Corrections of a frame of codes before demosaicking.
 
 use super::border::measure_black;
-use super::dark_levels::{doubt_of_level, doubt_of_low, least_level, range_of};
+use super::dark_levels::{doubt_of_level, doubt_of_low, doubt_of_misfit, doubt_of_scale, least_level, range_of};
 use super::described::{Described, doubt_of_black};
 use super::independence::{Company, Role, check_contents, check_files};
 use super::notes::Note;
 use super::options::{Input, SensorChoice};
 use super::values::{self, BlackChoice};
-use crate::camera::levels::BlackLevels;
+use crate::camera::levels::{BlackLevel, BlackLevels};
 use crate::error::{Error, Result};
 use crate::formats::files::read_file;
 use crate::formats::input::{FrameReader, InputOptions, Linearizing};
@@ -101,6 +101,8 @@ pub struct OpenCorrection {
     range_adu: Option<[f64; 2]>,
     /// What the mean of dark frames is at least.
     least_adu: Option<f64>,
+    /// The black level of a camera's frame whose dark signal no sensor tells.
+    black_adu: Option<f64>,
 }
 
 /// The frame that is corrected, where it comes from, and what is said of it.
@@ -342,7 +344,7 @@ impl Correction {
         let on_trust = darks.as_ref().and_then(|darks| darks.stack().taken_on_trust(frame));
         remarks.extend(on_trust.clone().filter(|text| !warnings.contains(text)));
         let range_adu = on_trust.and_then(|_| range_of(frame));
-        let least_adu = least_level(frame);
+        let least_adu = least_level(frame, darks.as_ref().is_some_and(|darks| darks.stack().is_bias()));
         let defects = self.defects_record(beyond, dark_limits.as_ref(), flats.is_some());
         let shares_masters = company.shares_darks().unwrap_or_else(|| {
             let problem =
@@ -357,7 +359,8 @@ impl Correction {
         warnings.extend(map.as_ref().and_then(|map| map.doubt(&list, frame)));
         notes.extend(warnings.into_iter().map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)));
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
-        Ok(OpenCorrection { stage, corrections, notes, range_adu, least_adu })
+        let black_adu = frame.metadata.black_level_adu.filter(|_| frame.metadata.adc.is_none()).map(BlackLevel::mean);
+        Ok(OpenCorrection { stage, corrections, notes, range_adu, least_adu, black_adu })
     }
 
     /// Makes sure that no frame beside `light` is a copy of it, or of another.
@@ -450,6 +453,9 @@ impl OpenCorrection {
         let name = &self.header().name;
         let low = means.zip(self.least_adu).and_then(|([_, dark], least)| doubt_of_low(name, dark, least));
         let level = low.or_else(|| means.and_then(|means| doubt_of_level(name, means, self.range_adu)));
+        let misfit = || darks.as_ref().and_then(DarkFrames::misfit).map(|misfit| doubt_of_misfit(name, misfit));
+        let scale = || means.and_then(|[_, dark]| doubt_of_scale(name, dark, self.black_adu));
+        let level = level.or_else(misfit).or_else(scale);
         let doubt = map.as_ref().and_then(DefectMap::finding).into_iter().chain(level).map(Note::Warning);
         said.into_iter().flatten().map(Note::Remark).chain(doubt).collect()
     }

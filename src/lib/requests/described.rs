@@ -106,27 +106,8 @@ impl Described {
     /// Those of [`FrameReader::open`] and [`Self::apply`].
     pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
         let mut reader = FrameReader::open(options)?;
+        reader.tell_top();
         self.apply(reader.header_mut())?;
-        Ok(reader)
-    }
-
-    /// Opens a frame that dark frames come off, as it is described: of its exposure the time may be said alone.
-    ///
-    /// # Errors
-    ///
-    /// As [`Self::open`], but a time needs no f-number.
-    pub fn open_light(&self, options: &InputOptions) -> Result<FrameReader> {
-        let mut reader = FrameReader::open(options)?;
-        let frame = reader.header_mut();
-        match self.exposure_s.filter(|_| self.f_number.is_none() && frame.metadata.exposure.is_none()) {
-            Some(said_s) => {
-                let known_s = frame.metadata.exposure_time_s;
-                agree(frame, "exposure time in s", other_than(Some(said_s), known_s), &["exposure"])?;
-                Self { exposure_s: None, ..*self }.apply(frame)?;
-                frame.metadata.exposure_time_s = known_s.or(Some(said_s));
-            }
-            None => self.apply(frame)?,
-        }
         Ok(reader)
     }
 
@@ -135,7 +116,8 @@ impl Described {
     /// # Errors
     ///
     /// [`Error::Usage`] where the metadata say another thing, for an array of a frame that has several planes, for levels of
-    /// what is not ADU, for an exposure time or an f-number without the other, and for impossible ones.
+    /// what is not ADU, for an f-number without an exposure time, and for impossible ones. A time may be said alone: dark signals need no
+    /// f-number.
     pub fn apply(&self, frame: &mut FrameHeader) -> Result<()> {
         if let Some(cfa) = either(self.cfa, self.pattern)? {
             // Advice is about the name that was used.
@@ -169,7 +151,15 @@ impl Described {
             frame.metadata.white_level_adu = Some(white.into());
         }
         let Self { exposure_s, f_number, .. } = *self;
-        SaidExposure { exposure_s, f_number, lens_transmittance: None }.apply(frame)
+        let said = SaidExposure { exposure_s, f_number, lens_transmittance: None };
+        let Some(said_s) = exposure_s.filter(|_| f_number.is_none() && frame.metadata.exposure.is_none()) else {
+            return said.apply(frame);
+        };
+        let known_s = frame.metadata.exposure_time_s;
+        agree(frame, "exposure time in s", other_than(exposure_s, known_s), &["exposure"])?;
+        said.note_doubts();
+        frame.metadata.exposure_time_s = known_s.or(Some(said_s));
+        Ok(())
     }
 }
 
@@ -337,6 +327,7 @@ impl DescribedWithBlack {
     /// Those of [`FrameReader::open`] and [`Self::apply`].
     pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
         let mut reader = FrameReader::open(options)?;
+        reader.tell_top();
         self.apply(reader.header_mut())?;
         Ok(reader)
     }
@@ -476,11 +467,20 @@ mod tests {
     fn what_cannot_be_is_refused() {
         let said = |described: Described, frame: &mut FrameHeader| described.apply(frame).unwrap_err().to_string();
         let mut plane = frame(QuantityKind::Unspecified, &["Y"]);
-        let time = Described { exposure_s: Some(1.0), ..Described::default() };
+        let aperture = Described { f_number: Some(4.0), ..Described::default() };
         assert_eq!(
-            said(time, &mut plane),
-            "in: an exposure is a time and an f-number, and one is not known; give `f_number`"
+            said(aperture, &mut plane),
+            "in: an exposure is a time and an f-number, and one is not known; give `exposure`"
         );
+        // A time is said alone, and once; an f-number may come later.
+        let time = |exposure_s| Described { exposure_s: Some(exposure_s), ..Described::default() };
+        time(1.0).apply(&mut plane).unwrap();
+        assert_eq!((plane.metadata.exposure, plane.metadata.time_s()), (None, Some(1.0)));
+        let rest = "by its metadata, which --metadata FILE can replace; leave out `exposure`";
+        assert_eq!(said(time(2.0), &mut plane), format!("in: the exposure time in s is 1 {rest}"));
+        aperture.apply(&mut plane).unwrap();
+        let exposure = Exposure { exposure_s: 1.0, f_number: 4.0, lens_transmittance: 1.0 };
+        assert_eq!((plane.metadata.exposure, plane.metadata.exposure_time_s), (Some(exposure), None));
         let mut three = frame(QuantityKind::Electrons, &["R", "G", "B"]);
         let cfa = Described { cfa: Some("rggb".parse().unwrap()), ..Described::default() };
         assert_eq!(

@@ -9,6 +9,8 @@ use crate::cfa::{CfaPattern, FilterArray};
 use crate::error::Result;
 use crate::frame::{Geometry, Rows, Window, mirror, to_sample};
 use crate::metadata::{AdcRecord, CorrectionRecord, FrameHeader};
+use crate::random::Source;
+use crate::stages::transfer::uniform_share;
 use crate::stream::{Counts, Footprint, RowSink, RowSource, Stage};
 use crate::text::in_digits;
 use crate::units::QuantityKind;
@@ -36,6 +38,42 @@ pub const MASK_BITS: [(u32, &str); 4] = [
     (BEYOND_MODEL, "beyond the model of a correction"),
 ];
 
+/// By so many standard deviations of what is added to it may a full charge be read lower: normal noise takes one in 31 600 below.
+const READ_LOWER: f64 = 4.0;
+
+/// The charge from which on samples count as full, in e⁻: that of full well, less what read-out may take off it. None without a
+/// read-out.
+///
+/// s N − 4 σ, but N/2 at least        N full well, s what charge transfer leaves of uniform light, σ rms of what is added
+///
+/// A photosite whose charge is within 8 σ below full well may be marked too: its reading cannot be told from that of a full one.
+pub fn least_full_e(frame: &FrameHeader) -> Option<f64> {
+    let full_well_e = frame.metadata.sensor.as_ref()?.readout.as_ref()?.full_well_e;
+    let left = frame.metadata.noise.as_ref().and_then(|noise| noise.cte).map_or(1.0, uniform_share);
+    Some((left * full_well_e - READ_LOWER * added_to_charge_e(frame)).max(0.5 * full_well_e))
+}
+
+/// All that is added to charge when it is read, rms e⁻: what was drawn, or of frames that no noise is recorded of that of their
+/// sensor, through the amplifier of the largest noise; none of codes that were made of no noise.
+fn added_to_charge_e(frame: &FrameHeader) -> f64 {
+    let metadata = &frame.metadata;
+    let Some(readout) = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref()) else { return 0.0 };
+    let is_of_camera = metadata.adc.is_none() && metadata.quantity != QuantityKind::ExpectedElectrons;
+    let is_added = |source| metadata.noise.as_ref().map_or(is_of_camera, |noise| noise.sources.contains(&source));
+    let parts = [
+        (Source::Ron, readout.read_noises_e().fold(0.0, f64::max)),
+        (Source::RowNoise, readout.row_noise_e),
+        (Source::ColumnNoise, readout.column_noise_e),
+        (Source::BlackDrift, readout.black_drift_e),
+        (Source::Dsnu, readout.dsnu_e),
+        (Source::DsnuRow, readout.dsnu_row_e),
+        (Source::DsnuColumn, readout.dsnu_column_e),
+        // ½ E a² of exponential amplitudes a is the square of their mean.
+        (Source::Rts, readout.rts_share.sqrt() * readout.rts_amplitude_e),
+    ];
+    parts.into_iter().filter(|(source, _)| is_added(*source)).fold(0.0, |sum: f64, (_, part)| sum.hypot(part))
+}
+
 /// The levels from which samples are full, by class.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FullLevels {
@@ -47,13 +85,12 @@ pub struct FullLevels {
 }
 
 impl FullLevels {
-    /// The levels of the frame's samples: full well of electrons; of ADU the white level of the class, or the code of full
-    /// well where that is smaller, the least of several amplifiers. None where the metadata do not know, and of colors.
+    /// The levels of the frame's samples: of electrons [`least_full_e`]; of ADU the white level of the class, or the code of that
+    /// charge where it is smaller, the least of several amplifiers. None where the metadata do not know, and of colors.
     pub fn of(frame: &FrameHeader) -> Option<Self> {
         let metadata = &frame.metadata;
-        let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
         let levels = match metadata.quantity {
-            QuantityKind::Electrons | QuantityKind::ExpectedElectrons => [readout?.full_well_e; 3],
+            QuantityKind::Electrons | QuantityKind::ExpectedElectrons => [least_full_e(frame)?; 3],
             QuantityKind::Adu | QuantityKind::Unspecified => levels_of_codes(frame)?,
             _ => return None,
         };
@@ -145,23 +182,28 @@ fn levels_of_codes(frame: &FrameHeader) -> Option<[f64; 3]> {
         None => level(adc),
         Some(taps) => (0..taps.count()).map(|tap| level(adc.of_tap(taps, tap))).fold(f64::INFINITY, f64::min),
     };
+    let least_e = least_full_e(frame).unwrap_or(f64::INFINITY);
     if let Some(adc) = metadata.adc {
         // Both levels are shifted alike by what was subtracted.
-        let full_well_e = readout.map_or(f64::INFINITY, |readout| readout.full_well_e);
-        let above_white = of_taps(adc, &|adc| -adc.full_below_white(full_well_e));
+        let above_white = of_taps(adc, &|adc| -adc.full_below_white(least_e));
         return Some(white?.map(|level| level + above_white));
     }
     // Frames of cameras do not tell their converter: that of the sensor which is named counts.
     let Some((readout, off)) = readout.zip(taken_off(frame)) else { return white };
-    let full = of_taps(AdcRecord::of_readout(readout), &|adc| adc.full_code(readout.full_well_e));
+    let adc = AdcRecord::of_readout(readout);
     let pattern = metadata.cfa.and_then(FilterArray::bayer);
-    let of_class = |class: usize| {
-        let off = most_of_class(off, pattern, if pattern.is_some() { class } else { 0 });
-        full - off
+    let off = |class: usize| most_of_class(off, pattern, if pattern.is_some() { class } else { 0 });
+    let full = of_taps(adc, &|adc| adc.full_code(readout.full_well_e));
+    let least = of_taps(adc, &|adc| adc.full_code(least_e));
+    // Where full well is no less than the largest code, or than white, it is these that saturate, and nothing is read behind them.
+    let of_class = |class: usize, white: f64| match full - off(class) {
+        full_code if full_code < white && full < adc.top_code().into() => least - off(class),
+        full_code => white.min(full_code),
     };
     match white {
-        Some(white) => Some([0, 1, 2].map(|class| white[class].min(of_class(class)))),
-        None => (metadata.quantity == QuantityKind::Adu && samples_tell(frame)).then(|| [0, 1, 2].map(of_class)),
+        Some(white) => Some([0, 1, 2].map(|class| of_class(class, white[class]))),
+        None => (metadata.quantity == QuantityKind::Adu && samples_tell(frame))
+            .then(|| [0, 1, 2].map(|class| of_class(class, f64::INFINITY))),
     }
 }
 
@@ -402,9 +444,10 @@ mod tests {
     use super::*;
     use crate::camera::levels::BlackLevel;
     use crate::camera::sensor::tests::kaf5101ce;
-    use crate::metadata::Metadata;
+    use crate::metadata::{Metadata, NoiseRecord, PoissonKind};
 
-    /// Codes of a camera that tells no converter, whose sensor is named: full well is at 1753 + 0.058824 · 20000 = 2929.48 ADU.
+    /// Codes of a camera that tells no converter, whose sensor is named: full well is at 1753 + 0.058824 · 20000 = 2929.48 ADU, and four
+    /// standard deviations of 15.7 e⁻ lower at 2925.79 ADU.
     fn codes() -> FrameHeader {
         let mut metadata = Metadata::new(QuantityKind::Adu);
         metadata.cfa = Some(CfaPattern::Rggb.into());
@@ -419,19 +462,19 @@ mod tests {
     fn the_full_well_of_a_sensor_that_is_named_counts() {
         let mut frame = codes();
         let full = |frame: &FrameHeader| FullLevels::of(frame).map(|levels| levels.classes());
-        assert_eq!(full(&frame), Some([2929.0; 3]));
+        assert_eq!(full(&frame), Some([2925.0; 3]));
         frame.metadata.white_level_adu = Some(WhiteLevel::Classes([2900.0, 3000.0, 4095.0]));
-        assert_eq!(full(&frame), Some([2900.0, 2929.0, 2929.0]));
+        assert_eq!(full(&frame), Some([2900.0, 2925.0, 2925.0]));
         // A frame that does not say its white level has that of the sensor.
         frame.metadata.white_level_adu = None;
-        assert_eq!(full(&frame), Some([2929.0; 3]));
+        assert_eq!(full(&frame), Some([2925.0; 3]));
         frame.metadata.quantity = QuantityKind::Unspecified;
         assert_eq!(full(&frame), None);
         // What came off lowers both.
         let mut less = codes();
         less.metadata.correction = Some(CorrectionRecord::of_black(100.0.into(), false));
         less.metadata.white_level_adu = Some(3995.0.into());
-        assert_eq!(full(&less), Some([2829.0; 3]));
+        assert_eq!(full(&less), Some([2825.0; 3]));
         // How much dark frames took off is not known.
         let dark = CorrectionRecord { dark_frames: 1, ..CorrectionRecord::of_black(0.0.into(), false) };
         less.metadata.correction = Some(dark);
@@ -446,6 +489,47 @@ mod tests {
             let adc = AdcRecord::of_readout(readout);
             assert_eq!(AdcRecord { bits: 16, ..adc }.full_code(readout.full_well_e), 4095.0);
         }
+        // Nothing is read behind the largest code, nor behind a white level that is no higher than full well.
+        made.metadata.white_level_adu = None;
+        assert_eq!(full(&made), Some([4095.0; 3]));
+        frame = codes();
+        frame.metadata.white_level_adu = Some(2929.0.into());
+        assert_eq!(full(&frame), Some([2929.0; 3]));
+    }
+
+    /// What is drawn counts, of electrons and of codes; of what nothing is drawn nothing.
+    #[test]
+    fn what_is_added_to_full_well_lowers_the_level() {
+        let mut frame = codes();
+        let readout = frame.metadata.sensor.as_mut().unwrap().readout.as_mut().unwrap();
+        (readout.read_noise_e, readout.row_noise_e, readout.dsnu_e) = (12.0, 4.0, 3.0);
+        let full = |frame: &FrameHeader| FullLevels::of(frame).map(|levels| levels.classes()[0]);
+        frame.metadata.quantity = QuantityKind::Electrons;
+        // √(12² + 4² + 3²) = 13.
+        assert_eq!(full(&frame), Some(20_000.0 - 4.0 * 13.0));
+        frame.metadata.quantity = QuantityKind::ExpectedElectrons;
+        assert_eq!(full(&frame), Some(20_000.0));
+        frame.metadata.quantity = QuantityKind::Adu;
+        frame.metadata.adc = Some(AdcRecord::new(12, 1000.0, 0.1));
+        assert_eq!(full(&frame), Some(3000.0));
+        frame.metadata.noise = Some(NoiseRecord {
+            sources: vec![Source::Ssn, Source::RowNoise, Source::Dsnu],
+            seed: 0,
+            sensor_seed: 0,
+            frame: 0,
+            temperature_k: 300.0,
+            dark_e: 0.0,
+            hot_pixel_e: 0.0,
+            poisson: PoissonKind::Exact,
+            cte: None,
+            smear_per_row: 0.0,
+        });
+        assert_eq!(full(&frame), Some(2998.0));
+        frame.metadata.noise.as_mut().unwrap().cte = Some(0.999);
+        assert_eq!(full(&frame), Some((1000.0_f32 + 2000.0 * 0.998_001 - 2.0).floor()));
+        // Converters that are full before the photosite saturate at their last code.
+        frame.metadata.adc = Some(AdcRecord::new(12, 2200.0, 0.1));
+        assert_eq!(full(&frame), Some(4095.0));
     }
 
     /// Two greens of different black levels: what is full in one is lower than in the other, once these are off.

@@ -1,5 +1,6 @@
 //! Opens frames of any format, from files and pipes, with the metadata that belongs to them.
 
+mod checks;
 mod codes;
 mod described;
 mod kept;
@@ -7,13 +8,13 @@ mod levels;
 mod metadata;
 mod opening;
 mod options;
+mod top;
 
 pub use options::{InputOptions, Linearizing};
 
-use self::codes::CodeCheck;
+use self::checks::Checks;
 use self::described::DigestCheck;
 use self::kept::{LEFT_OUT, cut, keep_planes, left_out, take_channel};
-use self::levels::LevelCheck;
 use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
 use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
 use super::digest::SamplesDigest;
@@ -72,9 +73,9 @@ pub struct FrameReader {
     header: FrameHeader,
     rows_read: usize,
     check: Option<DigestCheck>,
-    codes: Option<CodeCheck>,
-    levels: Option<LevelCheck>,
-    said_black: Option<BlackLevel>,
+    checks: Checks,
+    /// Whether a file is read, and no pipe, whose first program has told what is to be told.
+    is_of_file: bool,
     mismatch: Option<String>,
     buffer: Vec<f32>,
     /// What stored samples were multiplied with for viewers.
@@ -240,9 +241,8 @@ impl FrameReader {
             rows_read: 0,
             // A digest is one of all samples.
             check: check.filter(|_| options.crop.is_none()),
-            codes: None,
-            levels: None,
-            said_black: None,
+            checks: Checks::default(),
+            is_of_file: path.is_some(),
             mismatch: None,
             buffer: Vec::new(),
             scaling,
@@ -277,7 +277,12 @@ impl FrameReader {
 
     /// Takes a black level that a user says for what no light reads, where metadata tell none: a frame far below it is told.
     pub fn expect_black(&mut self, black: BlackLevel) {
-        self.said_black = Some(black).filter(|_| self.header.metadata.black_level_adu.is_none());
+        self.checks.said_black = Some(black).filter(|_| self.header.metadata.black_level_adu.is_none());
+    }
+
+    /// Has a heap of samples at the largest value told, where nothing else tells that they are saturated.
+    pub fn tell_top(&mut self) {
+        self.checks.tells_top = self.is_of_file;
     }
 
     /// How the file stores its samples, in a word: `u16`, `f32` …; `mixed` where channels differ.
@@ -422,7 +427,7 @@ impl FrameReader {
         if let Some(check) = self.check.take() {
             self.mismatch = check.end(&self.header.name);
         }
-        self.levels.as_mut().map_or(Ok(()), |levels| levels.end(&self.header))
+        self.checks.end(&self.header)
     }
 }
 
@@ -443,10 +448,7 @@ impl RowSource for FrameReader {
         let mut buffer = std::mem::take(&mut self.buffer);
         if !self.has_begun {
             self.has_begun = true;
-            if self.linearize.is_none() {
-                (self.codes, self.levels) =
-                    (CodeCheck::of(&self.header), LevelCheck::of(&self.header, self.said_black));
-            }
+            self.checks.begin(&self.header, self.mask.is_some(), self.linearize.is_none());
             self.pass_over(self.corner[1], &mut buffer)?;
         }
         let stored = self.reader.geometry();
@@ -486,9 +488,7 @@ impl RowSource for FrameReader {
                 }
             }
         }
-        let header = &self.header;
-        self.codes.as_mut().map_or(Ok(()), |codes| codes.look(&samples[first..], header))?;
-        self.levels.as_mut().map_or(Ok(()), |levels| levels.look(&samples[first..], header))?;
+        self.checks.look(&samples[first..], &self.header)?;
         if let Some(linearize) = &self.linearize {
             let row_samples = self.header.geometry.row_samples();
             samples[first..].chunks_exact_mut(row_samples).for_each(|row| linearize.apply(&mut row[..kept * width]));

@@ -1,9 +1,11 @@
 //! Dark frames that are read in step with the frame that they come off.
 
+use super::fitness::{Fitness, Misfit};
 use super::stack::{DarkSettings, DarkStack, Master};
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
+use crate::numerics::averages::Combine;
 use crate::numerics::vectors::{self, Kernel};
 use crate::stages::defects::{Survey, add};
 use crate::stages::masters::{Averaging, Frames};
@@ -25,6 +27,7 @@ pub struct DarkFrames<S> {
     sums: [f64; 2],
     /// How many samples these are.
     summed: u64,
+    fitness: Fitness,
 }
 
 impl<S: RowSource> DarkFrames<S> {
@@ -67,6 +70,7 @@ impl<S: RowSource> DarkFrames<S> {
             found: [0; 2],
             sums: [0.0; 2],
             summed: 0,
+            fitness: Fitness::default(),
         }
     }
 
@@ -100,6 +104,25 @@ impl<S: RowSource> DarkFrames<S> {
     /// The mean of what they came off so far, and of what came off; none of none.
     pub fn means(&self) -> Option<[f64; 2]> {
         (self.summed > 0).then(|| self.sums.map(|sum| sum / self.summed as f64))
+    }
+
+    /// Why they cannot well be dark frames of what they came off so far.
+    pub fn misfit(&self) -> Option<Misfit> {
+        self.fitness.misfit()
+    }
+
+    /// What makes whole numbers of what comes off: the number of frames of a mean, 2 of a median; none of several averages, of scaled
+    /// and of clipped ones.
+    fn factor(&self) -> Option<f64> {
+        let [Master { record, .. }] = self.stack.masters.as_slice() else { return None };
+        let frames = record.average.frames;
+        match record.average.combine {
+            _ if record.weight != 1.0 || self.stack.level.is_some() => None,
+            _ if frames == 1 => Some(1.0),
+            Combine::Mean => Some(frames.into()),
+            Combine::Median => Some(2.0),
+            Combine::Clipped => None,
+        }
     }
 
     /// Samples of theirs that were clipped so far.
@@ -316,10 +339,18 @@ impl<S: RowSource> RowSource for LessDarks<'_, S> {
         let of_frame = self.frame.header().geometry.row_samples();
         let of_dark = self.darks.stack.head.geometry.row_samples();
         let mut seen = TakenOff::default();
+        let (factor, first, width) = (self.darks.factor(), self.darks.rows_made, self.frame.header().geometry.width);
+        let mut fitness = self.darks.fitness;
         let darks = self.darks.next(rows)?;
-        for (row, darks) in samples[start..].chunks_exact_mut(of_frame).zip(darks.chunks_exact(of_dark)) {
+        let rows_of_both = samples[start..].chunks_exact_mut(of_frame).zip(darks.chunks_exact(of_dark));
+        for (y, (row, darks)) in rows_of_both.enumerate() {
+            if Fitness::looks_at(first + y) {
+                let planes = row.chunks_exact(width).zip(darks.chunks_exact(width));
+                planes.for_each(|(frame, darks)| fitness.take(frame, darks, factor));
+            }
             vectors::run(TakeOff { row, darks, seen: &mut seen });
         }
+        self.darks.fitness = fitness;
         self.darks.add_means(&seen);
         self.mark(self.darks.rows_made - rows, &mut samples[start..]);
         Ok(())

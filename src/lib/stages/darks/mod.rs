@@ -1,9 +1,11 @@
 //! Dark and bias frames that count as one: what they make of it comes off a frame while its rows are read.
 
 mod alike;
+mod fitness;
 mod frames;
 mod stack;
 
 pub(super) use alike::{check_alike, check_codes, check_setting};
+pub use fitness::{DRIFT, Misfit};
 pub use frames::{DarkFrames, DarkLimits, LessDarks};
 pub use stack::{DarkSettings, DarkStack};

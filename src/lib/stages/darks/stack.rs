@@ -261,7 +261,7 @@ impl DarkStack {
     }
 
     /// Whether they tell the bias alone.
-    pub(in crate::stages) fn is_bias(&self) -> bool {
+    pub fn is_bias(&self) -> bool {
         self.masters.iter().all(|master| master.record.kind == MasterKind::Bias)
     }
 

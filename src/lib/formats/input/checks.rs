@@ -1,0 +1,53 @@
+//! What is looked for in the samples of a frame while they are read.
+
+use super::codes::CodeCheck;
+use super::levels::LevelCheck;
+use super::top::TopCheck;
+use crate::camera::levels::BlackLevel;
+use crate::error::Result;
+use crate::metadata::FrameHeader;
+
+/// Checks of samples against metadata.
+#[derive(Debug, Default)]
+pub(super) struct Checks {
+    /// The black level that a user says.
+    pub said_black: Option<BlackLevel>,
+    /// Whether samples that are heaped at the top are told.
+    pub tells_top: bool,
+    codes: Option<CodeCheck>,
+    levels: Option<LevelCheck>,
+    top: Option<TopCheck>,
+}
+
+impl Checks {
+    /// Makes ready for the rows of a frame, whose layer of marks comes with them where `is_marked`; those of codes only where they are
+    /// given as they are stored.
+    pub fn begin(&mut self, frame: &FrameHeader, is_marked: bool, are_stored: bool) {
+        if are_stored {
+            (self.codes, self.levels) = (CodeCheck::of(frame), LevelCheck::of(frame, self.said_black));
+            self.top = TopCheck::of(frame).filter(|_| self.tells_top && !is_marked);
+        }
+    }
+
+    /// Looks at rows of the frame.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`CodeCheck::look`] and [`LevelCheck::look`].
+    pub fn look(&mut self, rows: &[f32], frame: &FrameHeader) -> Result<()> {
+        self.codes.as_mut().map_or(Ok(()), |codes| codes.look(rows, frame))?;
+        self.levels.as_mut().map_or(Ok(()), |levels| levels.look(rows, frame))?;
+        self.top.iter_mut().for_each(|top| top.look(rows, frame));
+        Ok(())
+    }
+
+    /// Judges the whole, once all rows were looked at.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`LevelCheck::end`].
+    pub fn end(&mut self, frame: &FrameHeader) -> Result<()> {
+        self.top.take().iter().for_each(|top| top.end(frame));
+        self.levels.as_mut().map_or(Ok(()), |levels| levels.end(frame))
+    }
+}

@@ -1,0 +1,228 @@
+//! Whether what comes off a frame can be dark frames of it, by the samples of both.
+//!
+//! A dark frame has no light, and the noise and the scale of the frame. So nowhere is its mean above that of the frame, nowhere does it
+//! scatter more, and where its codes are multiples of some step, so are those of the frame. Means and scatters are those of stretches of
+//! the even or the odd columns of a row, in one row pair of [`PAIRS`].
+
+/// Samples of a stretch.
+const STRETCH: usize = 64;
+/// One pair of rows in so many is looked at.
+const PAIRS: usize = 4;
+/// A mean is above that of the frame by so many of its standard deviations at least, beside [`DRIFT`].
+const DEVIATIONS: f64 = 6.0;
+/// Dark signals that drift from frame to frame differ by less, in ADU and as a share.
+pub const DRIFT: [f64; 2] = [1.0, 0.01];
+/// Scatter of a stretch of the frame to that of the dark frame: of normal ones of one law it is lower in one of 10³ stretches.
+const SCATTER: f64 = 0.6;
+/// The least scatter of the darks that is compared, in ADU: that of less than a code hangs on where in a code they lie.
+const LEAST_SCATTER: f64 = 1.1;
+/// The share of a stretch of the frame at its largest value from which it is cut off there.
+const CUT: usize = 8;
+/// Codes that differ by so many steps tell the step.
+const TELLING: i64 = 16;
+
+/// The step of whole numbers: the largest power of two that all differences are multiples of.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Steps {
+    range: Option<[i64; 2]>,
+    bits: u64,
+    has_others: bool,
+}
+
+impl Steps {
+    fn take(&mut self, samples: impl Iterator<Item = f64>) {
+        for sample in samples {
+            let whole = sample.round();
+            if (sample - whole).abs() > 1e-3 || whole.abs() > 1e15 {
+                self.has_others |= sample.is_finite();
+                continue;
+            }
+            #[expect(clippy::cast_possible_truncation, reason = "not beyond 10¹⁵")]
+            let whole = whole as i64;
+            let [low, high] = self.range.unwrap_or([whole; 2]);
+            self.bits |= whole.abs_diff(low);
+            self.range = Some([low.min(whole), high.max(whole)]);
+        }
+    }
+
+    /// The step; none of few numbers, and where some are not whole.
+    fn step(&self) -> Option<u64> {
+        let [low, high] = self.range?;
+        let step = 1_u64 << self.bits.trailing_zeros().min(32);
+        let is_told = high.abs_diff(low) >= step.saturating_mul(TELLING.unsigned_abs());
+        (is_told && !self.has_others).then_some(step)
+    }
+}
+
+/// What was seen of a frame and of what came off it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Fitness {
+    /// Stretches that were looked at.
+    stretches: u64,
+    /// Those whose mean is below that of what came off.
+    below: u64,
+    /// Those that could scatter less than what came off, and those that do.
+    scattering: [u64; 2],
+    steps: [Steps; 2],
+}
+
+/// Why what came off cannot well be dark frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Misfit {
+    /// Of such a share of the frame the mean is below that of what came off.
+    Below(f64),
+    /// Its codes are multiples of a step, and those of the frame of another.
+    Step([u64; 2]),
+    /// In such a share of the frame it scatters more.
+    Scatters(f64),
+}
+
+impl Fitness {
+    /// Whether a row is looked at.
+    pub(super) fn looks_at(y: usize) -> bool {
+        (y / 2).is_multiple_of(PAIRS)
+    }
+
+    /// Looks at a row of one plane of a frame and at what comes off it, `factor` times which are sums of codes; none where these are
+    /// scaled, and their noise is not that of one frame or less.
+    pub(super) fn take(&mut self, frame: &[f32], darks: &[f64], factor: Option<f64>) {
+        if let Some(factor) = factor {
+            self.steps[0].take(frame.iter().map(|sample| f64::from(*sample)));
+            self.steps[1].take(darks.iter().map(|dark| factor * dark));
+        }
+        for (frame, darks) in frame.chunks_exact(2 * STRETCH).zip(darks.chunks_exact(2 * STRETCH)) {
+            for parity in 0..2 {
+                let of_frame: [f64; STRETCH] = std::array::from_fn(|i| f64::from(frame[2 * i + parity]));
+                let of_darks: [f64; STRETCH] = std::array::from_fn(|i| darks[2 * i + parity]);
+                if of_frame.iter().chain(&of_darks).all(|sample| sample.is_finite()) {
+                    self.compare(&of_frame, &of_darks, factor.is_some());
+                }
+            }
+        }
+    }
+
+    fn compare(&mut self, frame: &[f64; STRETCH], darks: &[f64; STRETCH], has_noise_of_one: bool) {
+        let n = STRETCH as f64;
+        let mean = |samples: &[f64; STRETCH]| samples.iter().sum::<f64>() / n;
+        // Differences of neighbors, which slopes of the light leave alone; of normal noise 1.13 standard deviations.
+        let scatter =
+            |samples: &[f64; STRETCH]| samples.windows(2).map(|two| (two[1] - two[0]).abs()).sum::<f64>() / (n - 1.0);
+        let [a, b] = [frame, darks].map(mean);
+        let [of_frame, of_darks] = [frame, darks].map(scatter);
+        let margin = DEVIATIONS * of_frame.hypot(of_darks) / n.sqrt() + DRIFT[0].max(DRIFT[1] * b.abs());
+        self.stretches += 1;
+        self.below += u64::from(b - a > margin);
+        if !has_noise_of_one || of_darks < LEAST_SCATTER {
+            return;
+        }
+        let is_less = of_frame < SCATTER * of_darks;
+        if is_less {
+            let largest = frame.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if frame.iter().filter(|sample| **sample == largest).count() >= CUT {
+                return;
+            }
+        }
+        self.scattering[0] += 1;
+        self.scattering[1] += u64::from(is_less);
+    }
+
+    /// Why what came off cannot well be dark frames of the frame; none where nothing speaks against it.
+    pub fn misfit(&self) -> Option<Misfit> {
+        /// Shares of a frame below which it is a spot.
+        const SPOT: f64 = 0.01;
+        const SPOTS: f64 = 0.05;
+        /// Stretches that tell anything.
+        const LEAST: u64 = 8;
+        let share = |few: u64, all: u64| if all == 0 { 0.0 } else { few as f64 / all as f64 };
+        let below = share(self.below, self.stretches);
+        let scatters = share(self.scattering[1], self.scattering[0]);
+        let [frame, darks] = self.steps.map(|steps| steps.step());
+        // Coarse codes of bright light alone are those of cameras whose steps rise with level.
+        match frame.zip(darks).filter(|(frame, darks)| darks > frame) {
+            Some((frame, darks)) => Some(Misfit::Step([frame, darks])),
+            None if below >= SPOT && self.below >= LEAST => Some(Misfit::Below(below)),
+            None if scatters >= SPOTS && self.scattering[1] >= LEAST => Some(Misfit::Scatters(scatters)),
+            None => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Run, RunWords, Source};
+
+    /// Normal numbers of a row of a frame.
+    fn normals(frame: u32, row: i32) -> Vec<f64> {
+        let mut words = RunWords::default();
+        let of_run = |column: i32| {
+            let run = Run { seed: 1, sensor_seed: 0, frame, place: [column, row], classes: [0; 2], length: 128 };
+            let mut normals = [0.0; 128];
+            run.make_temporal(&mut words);
+            run.normals(&words, Source::Ron, &mut normals);
+            normals
+        };
+        (0..16).map(|run| 128 * run).flat_map(of_run).map(f64::from).collect()
+    }
+
+    /// A frame of a level that rises along rows, and a dark frame of its camera, of bias 400 and a read noise of 3 ADU, times `scale`, of
+    /// `gain` times the noise.
+    fn seen(levels: [f64; 2], scale: f64, gain: f64) -> Fitness {
+        let mut fitness = Fitness::default();
+        for row in 0..16_i32 {
+            let slope = (levels[1] - levels[0]) / 2048.0;
+            let light = normals(0, row).into_iter().enumerate().map(|(x, z)| {
+                let level = levels[0] + slope * x as f64;
+                crate::frame::to_sample((400.0 + level + z * (9.0 + 0.3 * level).sqrt()).round())
+            });
+            let dark = normals(1, row).into_iter().map(|z| scale * (400.0 + 3.0 * gain * z).round());
+            fitness.take(&light.collect::<Vec<_>>(), &dark.collect::<Vec<_>>(), Some(1.0));
+        }
+        fitness
+    }
+
+    #[test]
+    fn dark_frames_of_a_camera_fit() {
+        for levels in [[0.0, 0.0], [0.0, 50.0], [0.0, 9000.0], [500.0, 3000.0]] {
+            assert_eq!(seen(levels, 1.0, 1.0).misfit(), None, "{levels:?}");
+        }
+    }
+
+    #[test]
+    fn dark_frames_of_another_scale_are_told_by_the_step_of_their_codes() {
+        assert_eq!(seen([500.0, 3000.0], 4.0, 1.0).misfit(), Some(Misfit::Step([1, 4])));
+        let mut few = Steps::default();
+        few.take([400.0, 404.0, 408.0].into_iter());
+        assert_eq!(few.step(), None);
+        few.take([464.0, 402.5].into_iter());
+        assert_eq!(few.step(), None);
+    }
+
+    #[test]
+    fn dark_frames_that_were_scaled_are_brighter_than_a_part_of_the_frame() {
+        // 4.01 times codes are no whole numbers.
+        let found = seen([0.0, 3000.0], 4.01, 1.0).misfit();
+        assert!(matches!(found, Some(Misfit::Below(share)) if (0.3..0.5).contains(&share)), "{found:?}");
+        assert_eq!(seen([1500.0, 3000.0], 4.01, 1.0).misfit(), None);
+    }
+
+    #[test]
+    fn dark_frames_of_another_gain_scatter_more_than_the_dim_part_of_a_frame() {
+        let found = seen([0.0, 300.0], 1.0, 4.0).misfit();
+        assert!(matches!(found, Some(Misfit::Scatters(share)) if (0.1..0.9).contains(&share)), "{found:?}");
+    }
+
+    /// A sky that is cut off at the white level, in all or in most of its samples, scatters by little there.
+    #[test]
+    fn saturated_parts_are_not_compared() {
+        for above in [60.0, 300.0] {
+            let mut fitness = Fitness::default();
+            for row in 0..16_i32 {
+                let light = normals(0, row).into_iter().map(|z| (16_383.0 + above + 60.0 * z).round().min(16_383.0));
+                let dark: Vec<f64> = normals(1, row).into_iter().map(|z| (400.0 + 30.0 * z).round()).collect();
+                fitness.take(&light.map(crate::frame::to_sample).collect::<Vec<_>>(), &dark, Some(1.0));
+            }
+            assert_eq!(fitness.misfit(), None, "{above}");
+        }
+    }
+}

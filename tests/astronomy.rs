@@ -1,0 +1,178 @@
+//! Frames of cameras that tell little of themselves: dark and bias frames that cannot be theirs, samples that are saturated where nothing
+//! tells, and standard deviations that need no more than is used.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use std::fs;
+use support::workshop::{BAD_DATA, Workshop};
+
+const SIZE: [u32; 2] = [384, 32];
+
+/// A FITS of the codes `of` column and row, with these cards beside those that all have.
+fn write(shop: &Workshop, name: &str, cards: &[(&str, &str)], of: impl Fn(u32, u32) -> f64) {
+    let [width, height] = SIZE.map(|side| side.to_string());
+    let always = [
+        ("SIMPLE", "T"),
+        ("BITPIX", "16"),
+        ("NAXIS", "2"),
+        ("NAXIS1", &width),
+        ("NAXIS2", &height),
+        ("BZERO", "32768"),
+        ("ROWORDER", "'TOP-DOWN'"),
+        ("BAYERPAT", "'RGGB'"),
+        ("INSTRUME", "'A'"),
+    ];
+    let cards = always.iter().chain(cards).map(|(key, value)| format!("{:<80}", format!("{key:<8}= {value}")));
+    let mut bytes: Vec<u8> = cards.chain([format!("{:<80}", "END")]).collect::<String>().into_bytes();
+    bytes.resize(bytes.len().next_multiple_of(2880), b' ');
+    for [x, y] in (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| [x, y])) {
+        #[expect(clippy::cast_possible_truncation, reason = "codes of 16 bits")]
+        let code = of(x, y).round().clamp(0.0, 65_535.0) as i64;
+        bytes.extend(i16::try_from(code - 32_768).unwrap().to_be_bytes());
+    }
+    bytes.resize(bytes.len().next_multiple_of(2880), 0);
+    fs::write(shop.path(name), bytes).unwrap();
+}
+
+/// A number between -1 and 1 of variance 1/6: the sum of two evenly spread ones.
+fn chance(x: u32, y: u32, seed: u64) -> f64 {
+    let mut state = (u64::from(x) << 32 | u64::from(y)).wrapping_add(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut next = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut mixed = state;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (mixed ^ (mixed >> 31)) as f64 / 2_f64.powi(64)
+    };
+    next() - next()
+}
+
+/// A sky that rises from `low` to `high` ADU along the rows, over a bias of 500 ADU and a read noise of 5 ADU.
+fn sky(low: f64, high: f64, seed: u64) -> impl Fn(u32, u32) -> f64 {
+    move |x, y| {
+        let signal = low + (high - low) * f64::from(x) / f64::from(SIZE[0]);
+        500.0 + signal + (6.0 * (25.0 + 0.5 * signal)).sqrt() * chance(x, y, seed)
+    }
+}
+
+#[test]
+fn darks_of_another_scale_or_gain_are_told() {
+    let shop = Workshop::new();
+    let darks: [(&str, f64, f64, Option<&str>); 5] = [
+        ("good", 1.0, 1.0, None),
+        ("shifted", 4.0, 1.0, Some("its codes are multiples of 1, those of what came off of 4")),
+        ("scaled", 4.01, 1.0, Some("of it its mean is below that of what came off")),
+        ("loud", 1.0, 5.0, Some("what came off scatters more than it in")),
+        ("doubled", 2.02, 1.0, Some("2 times its black level")),
+    ];
+    for (name, scale, gain, told) in darks {
+        let bright = name == "doubled";
+        write(&shop, "light.fits", &[], if bright { sky(3000.0, 9000.0, 1) } else { sky(0.0, 9000.0, 1) });
+        if name == "loud" {
+            write(&shop, "light.fits", &[], sky(0.0, 300.0, 1));
+        }
+        // Factors that are no whole numbers leave no step, where codes are not rounded first.
+        let whole = move |code: f64| if scale.fract() == 0.0 { code.round() } else { code };
+        let codes = move |seed| move |x, y| scale * whole(500.0 + gain * 5.0 * 6_f64.sqrt() * chance(x, y, seed));
+        write(&shop, "dark.fits", &[], codes(2));
+        write(&shop, "other.fits", &[], codes(3));
+        for more in ["", "--dark other.fits", "--dark other.fits --combine median"] {
+            let line = format!("correct-frame light.fits --white 16383 -o out.exr --dark dark.fits {more}");
+            let said = shop.said(line.trim_end(), 0);
+            // Nothing but a black level tells it of light that is bright throughout, as a mean of two is of less noise.
+            match told.filter(|_| !bright) {
+                Some(told) => assert!(said.contains(told), "{name} {more}: {said}"),
+                None => assert_eq!(said, "", "{name} {more}"),
+            }
+        }
+        let metadata =
+            "schema: cyanometer/1\nquantity: adu\ncamera: A\ncfa: rggb\nblack_level_adu: 500\nwhite_level_adu: 16383\n";
+        fs::write(shop.path("light.fits.yaml"), metadata).unwrap();
+        let said = shop.said("correct-frame light.fits --dark dark.fits -o out.exr", 0);
+        assert!(told.map_or(said.is_empty(), |told| said.contains(told)), "{name}: {said}");
+        fs::remove_file(shop.path("light.fits.yaml")).unwrap();
+    }
+}
+
+/// A black level of the masked border counts the dark signal of a long exposure, 300 ADU here, which bias frames lack.
+#[test]
+fn bias_frames_beside_a_black_level_with_dark_signal_are_not_doubted() {
+    let shop = Workshop::new();
+    let metadata =
+        "schema: cyanometer/1\nquantity: adu\ncamera: A\ncfa: rggb\nblack_level_adu: 800\nwhite_level_adu: 16383\n";
+    fs::write(shop.path("light.fits.yaml"), metadata).unwrap();
+    write(&shop, "light.fits", &[], sky(300.0, 9000.0, 1));
+    write(&shop, "bias.fits", &[("IMAGETYP", "'Bias Frame'")], sky(0.0, 0.0, 2));
+    assert_eq!(shop.said("correct-frame light.fits --bias bias.fits -o out.exr", 0), "");
+    // Dark frames have that signal; and what is next to nothing has lost its bias.
+    write(&shop, "dark.fits", &[("IMAGETYP", "'Dark Frame'")], sky(0.0, 0.0, 2));
+    let told = "are these of another converter, or was their bias subtracted?";
+    assert!(shop.said("correct-frame light.fits --dark dark.fits -o out.exr", 0).contains(told));
+    write(&shop, "bias.fits", &[("IMAGETYP", "'Bias Frame'")], |x, y| 20.0 + 5.0 * chance(x, y, 3));
+    assert!(shop.said("correct-frame light.fits --bias bias.fits -o out.exr", 0).contains(told));
+}
+
+fn sensor(shop: &Workshop, dark_current_e_per_s: f64) {
+    let readout = format!(
+        "width: {}, height: {}, cfa: rggb, full_well_e: 60000, dark_current_e_per_s: {dark_current_e_per_s}, temperature_k: 263, \
+         dcnu: 0.1, prnu: 0.01, read_noise_e: 3, bits: 16, bias_adu: 500, adu_per_e: 1",
+        SIZE[0], SIZE[1]
+    );
+    fs::write(shop.path("s.yaml"), format!("schema: cyanometer-sensor/2\nname: s\nreadout: {{{readout}}}\n")).unwrap();
+}
+
+#[test]
+fn standard_deviations_need_the_time_of_dark_current_alone() {
+    let shop = Workshop::new();
+    write(&shop, "light.fits", &[], sky(300.0, 9000.0, 1));
+    write(&shop, "dark.fits", &[("IMAGETYP", "'Dark Frame'")], sky(0.0, 0.0, 2));
+    let line = "demosaic light.fits --black 500 --sensor s.yaml --sigma -o out.exr";
+    sensor(&shop, 0.5);
+    let missing = shop.said(line, BAD_DATA);
+    assert!(missing.contains("`exposure_time_s`") && missing.ends_with("give --exposure S\n"), "{missing}");
+    shop.said(&format!("{line} --exposure 120"), 0);
+    assert_eq!(shop.sidecar("out.exr").exposure_time_s, Some(120.0));
+    write(&shop, "light.fits", &[("EXPTIME", "120.0")], sky(300.0, 9000.0, 1));
+    let by_option = shop.read("out.exr").0;
+    shop.said(line, 0);
+    assert_eq!(shop.read("out.exr").0, by_option);
+    // Without dark current no time counts, neither of the frame nor of darks.
+    sensor(&shop, 0.0);
+    write(&shop, "light.fits", &[], sky(300.0, 9000.0, 1));
+    shop.said(line, 0);
+    shop.said("correct-frame light.fits --dark dark.fits --sensor s.yaml -o c.exr", 0);
+    shop.said("demosaic c.exr --sigma -o out.exr", 0);
+}
+
+#[test]
+fn samples_heaped_at_the_top_are_told_where_nothing_else_tells_them() {
+    let shop = Workshop::new();
+    write(&shop, "light.fits", &[], |x, y| sky(300.0, 9000.0, 1)(x, y).min(8000.0));
+    let heap = "of its samples are at the largest value, 8000, as saturated ones are";
+    for line in [
+        "demosaic light.fits --black 500 -o rgb.tiff",
+        "correct-frame light.fits --black 500 -o c.exr",
+        "measure light.fits",
+        "preview light.fits -o a.png",
+    ] {
+        let said = shop.said(line, 0);
+        assert!(said.contains(heap) && said.contains("no white level tells that they are"), "{line}: {said}");
+        assert_eq!(said.matches("largest value").count(), 1, "{said}");
+    }
+    let said = shop.said("demosaic light.fits --black 500 --white 16383 -o rgb.tiff", 0);
+    assert!(said.contains(heap) && said.contains("their white level, 16383, is above it"), "{said}");
+    // Parted from its sidecar, which knows nothing of it either.
+    fs::remove_file(shop.path("rgb.tiff.yaml")).unwrap();
+    let said = shop.said("measure rgb.tiff", 0);
+    assert!(
+        said.contains("at the largest value, 7500") && said.contains("nothing marks which pixels used them"),
+        "{said}"
+    );
+    // What a level marks is told by that.
+    let said = shop.said("demosaic light.fits --black 500 --white 8000 -o rgb.exr", 0);
+    assert!(said.contains("pixels were made of saturated samples") && !said.contains("largest value"), "{said}");
+    write(&shop, "light.fits", &[], sky(300.0, 9000.0, 1));
+    assert_eq!(shop.said("demosaic light.fits --black 500 -o rgb.exr", 0), "");
+}
