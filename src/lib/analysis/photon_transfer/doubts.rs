@@ -17,13 +17,13 @@ pub fn doubts(curve: &Curve, flats: &[Level], confidence: f64) -> Vec<String> {
     let other_time = curve.other_time().map(|([least, most], flat)| {
         let darks = if least < most { format!("the line through darks of {least} to {most} s") } else { format!("darks of {least} s") };
         format!(
-            "flats of {flat} s stand above {darks}, as there are none of their exposure: black level and dark noise are those of the \
-             darks"
+            "flats of {flat} s stand above {darks}, as there are none of their exposure: black level and dark noise beneath them are taken \
+             from these"
         )
     });
     let unknown_time = curve.is_time_unknown().then(|| {
-        "flats stand above darks of which one tells its exposure time and the other does not: black level and dark noise are those of \
-         the darks"
+        "flats stand above darks of which one tells its exposure time and the other does not: black level and dark noise beneath them \
+         are taken from these"
             .to_owned()
     });
     let falls = curve.interval(|values| values.dark_slope, confidence).is_some_and(|slope| slope.high < 0.0);

@@ -1,6 +1,6 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
-use super::curve::{Curve, Values, below_saturation, stuck_shares, without_stuck};
+use super::curve::{Curve, SAME_TIME, Values, below_saturation, stuck_shares, without_stuck};
 use super::dark::{doubling_temperature, parted_pattern, pixel_noise};
 use super::doubts::doubts;
 use super::level::Level;
@@ -241,6 +241,15 @@ pub fn of_class(
     let (curve_points, values) = (points.collect(), curve.values());
     let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames), &limit);
     let mut doubts = doubts(&curve, flats, confidence);
+    if let [Some((_, lit)), Some((_, dark))] = stacks
+        && !is_same_time(lit, dark)
+        && let Some((flat_s, dark_s)) = lit.condition.exposure_s.zip(dark.condition.exposure_s)
+    {
+        doubts.push(format!(
+            "patterns under light, of flats of {flat_s} s, are told from those of darks of {dark_s} s, as there are none of their \
+             exposure: the pattern that dark current has in that time counts as one of light, or against it"
+        ));
+    }
     let by_levels = straight.as_ref().ok().and_then(|line| line.told.clone());
     for (text, is_doubt) in scatter.told.iter().cloned().chain(curve.dark_told.clone()).chain(by_levels) {
         if is_doubt { doubts.push(text) } else { notes.push(text) }
@@ -316,6 +325,14 @@ pub fn over(of: Interval, by: Interval) -> Interval {
     Interval { value, low: (value - low).max(0.0), high: value + high }
 }
 
+/// Whether exposure times of two levels are one, or neither is known.
+fn is_same_time(a: &Level, b: &Level) -> bool {
+    match (a.condition.exposure_s, b.condition.exposure_s) {
+        (Some(a), Some(b)) => (a - b).abs() <= SAME_TIME * a.abs(),
+        (a, b) => a == b,
+    }
+}
+
 /// The deviations from a straight line, against photons, or against time where light was constant.
 fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<Linearity, String> {
     let Reasons { curve, flats, .. } = reasons;
@@ -342,13 +359,12 @@ fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<
 }
 
 /// The flat and the dark that patterns are measured on: of the most frames, the flat below saturation at every photosite; of such, the
-/// flat nearest to half of saturation, and the dark nearest to its exposure time.
+/// flat nearest to half of saturation, and the dark of its exposure time, or, where there is none, the one nearest to that.
 fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<(usize, &'a Level)>; 2] {
     let half = curve.saturated.map_or_else(
         || curve.fitted().last().map_or(0.0, |&flat| curve.signal(flat)) / 2.0,
         |peak| curve.signal(peak) / 2.0,
     );
-    let most = |levels: &[Level]| levels.iter().map(|level| level.frames).max();
     let frames = curve.patterned().iter().map(|&flat| flats[flat].frames).max();
     let off = |flat: &usize| (curve.signal(*flat) - half).abs();
     let with_most = curve.patterned().iter().copied().filter(|&flat| Some(flats[flat].frames) == frames);
@@ -356,7 +372,10 @@ fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<
     let time = |level: &Level| level.condition.exposure_s.unwrap_or(0.0);
     let wanted = flat.map_or(0.0, |flat| time(&flats[flat]));
     let apart = |dark: &(usize, &Level)| (time(dark.1) - wanted).abs();
-    let dark = darks.iter().enumerate().filter(|(_, dark)| Some(dark.frames) == most(darks));
+    let of_time = |dark: &Level| flat.is_some_and(|flat| is_same_time(dark, &flats[flat]));
+    let is_any = darks.iter().any(of_time);
+    let most = darks.iter().filter(|dark| of_time(dark) == is_any).map(|dark| dark.frames).max();
+    let dark = darks.iter().enumerate().filter(|(_, dark)| of_time(dark) == is_any && Some(dark.frames) == most);
     [flat.map(|flat| (flat, &flats[flat])), dark.min_by(|a, b| apart(a).total_cmp(&apart(b)))]
 }
 

@@ -7,6 +7,7 @@
 //!
 //! k from 1 on, as the error of rounding is a sawtooth of the sample. Where between two codes m lies differs from photosite to
 //! photosite and is not known: what both sums may be at most is an error that does not average out, and no more frames take it away.
+//! Noise is taken to be normal: shot noise of few electrons, each of half a code or more, has steps that smooth less.
 
 use crate::numerics::quantiles::of_normal;
 use std::f64::consts::PI;

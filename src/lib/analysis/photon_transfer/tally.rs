@@ -182,7 +182,9 @@ impl Tally {
         let share = 1.0 / self.frames as f64;
         self.means.iter_mut().for_each(|mean| *mean *= share);
         let (full, _) = self.full;
-        self.full.1 += self.means.iter().map(|mean| u64::from(*mean >= full)).sum::<u64>();
+        if full < f64::INFINITY {
+            self.full.1 += self.means.iter().map(|mean| u64::from(*mean >= full)).sum::<u64>();
+        }
         if self.row_means.is_empty() {
             self.center = sum(&self.means) / count;
         }

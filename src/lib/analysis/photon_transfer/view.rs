@@ -310,7 +310,9 @@ mod tests {
     fn neighbors_of_what_stands_out_do_not() {
         const SIDE: usize = 40;
         let site = Site { class: "Y".into(), plane: 0, first: [0, 0], step: [1, 1], size: [SIDE, SIDE] };
-        let noise = |index: usize| f64::from(philox4x32_10([index as u32, 0, 0, 0], [1, 2])[0]) / 4_294_967_296.0 - 0.5;
+        let noise = |index: usize| {
+            f64::from(philox4x32_10([u32::try_from(index).unwrap(), 0, 0, 0], [1, 2])[0]) / 4_294_967_296.0 - 0.5
+        };
         let at = |index: usize| match index {
             820 => 100.0,
             822 => -20.0,

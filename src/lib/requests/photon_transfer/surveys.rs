@@ -143,8 +143,11 @@ impl<'a> Surveys<'a> {
             class.stuck = self.stuck.of_class(&class.name);
             let share = all.share(&class.name);
             if !class.stuck.is_empty() {
-                let text = "hold one value with light and without, and are left out of all numbers";
-                class.notes.push(format!("{} {text}", crate::text::counted(class.stuck.len() as u64, "photosites")));
+                let count = class.stuck.len();
+                class.notes.push(format!(
+                    "photosites that hold one value with light and without are left out of all numbers: {count}, which `defects.stuck` of \
+                     the JSON names"
+                ));
             } else if share > 0.0 {
                 class.doubts.push(format!(
                     "{:.1} % of the photosites do not follow the light, which are too many to be left out: they count in all numbers",

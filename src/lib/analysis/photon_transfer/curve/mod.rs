@@ -33,7 +33,7 @@ const HIGHEST: f64 = 0.7;
 /// Patterns under light are measured to this share of saturation: few photosites see a tenth more than the mean.
 const HIGHEST_PATTERN: f64 = 0.9;
 /// Exposure times that differ by less are one.
-const SAME_TIME: f64 = 1e-6;
+pub const SAME_TIME: f64 = 1e-6;
 
 /// Where the dark signal beneath a flat is known from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
