@@ -82,7 +82,11 @@ impl Limit {
         let has_photons = [below, peak, above].into_iter().all(|flat| photons(flat).is_some());
         let in_photons = has_photons.then(|| bracket(&|flat| photons(flat).unwrap_or_default()));
         let why = || if curve.are_darks_clipped { CLIPPED.into() } else { reasons.of_darks() };
-        let reached = curve.charge(flats.len() - 1).map(|charge| over(charge, gain)).ok_or_else(why);
+        let in_electrons = |(charge, room): (Interval, f64)| {
+            let charge = over(charge, gain);
+            Interval { high: charge.high + room / gain.value, ..charge }
+        };
+        let reached = curve.charge(flats.len() - 1).map(in_electrons).ok_or_else(why);
         [
             Ok(electrons),
             in_photons.ok_or_else(|| "the photons per photosite of the flats about saturation are not known".into()),

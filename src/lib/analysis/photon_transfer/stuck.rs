@@ -159,7 +159,7 @@ fn middle(site: &Site, of: impl Fn(usize, usize) -> f64) -> f64 {
     const ENOUGH: usize = 4096;
     let [columns, _] = site.size;
     // An odd step takes all columns.
-    let step = site.count() / ENOUGH | 1;
+    let step = (site.count() / ENOUGH) | 1;
     let mut values: Vec<f64> = (0..site.count()).step_by(step).map(|at| of(at / columns, at % columns)).collect();
     let half = values.len() / 2;
     *values.select_nth_unstable_by(half, f64::total_cmp).1

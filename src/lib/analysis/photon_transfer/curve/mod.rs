@@ -254,23 +254,22 @@ impl Curve {
         self.darks.iter().any(|dark| !dark.is_whole)
     }
 
-    /// The whole charge of a flat, in samples: its mean above no light and no time. Where darks of one time alone are there the dark
-    /// signal is what their variance has room for, at most; none where darks tell no black level.
-    pub fn charge(&self, flat: usize) -> Option<Interval> {
+    /// The whole charge of a flat, in samples: its mean above no light and no time; and how much more it may be, at most: where darks of
+    /// one time alone are there, the dark signal that their variance has room for. None where darks tell no black level.
+    pub fn charge(&self, flat: usize) -> Option<(Interval, f64)> {
         let mean = &self.flats[flat].mean;
         let Interval { value, low, high } = Interval::normal(mean.value, mean.scatter(), self.confidence);
-        let black = self.interval(|values| values.black, self.confidence);
-        if let Some(black) = black {
-            let [below, above] =
-                [(value - low).hypot(black.high - black.value), (high - value).hypot(black.value - black.low)];
+        if let Some(black) = self.interval(|values| values.black, self.confidence) {
+            let below = (value - low).hypot(black.high - black.value);
+            let above = (high - value).hypot(black.value - black.low);
             let value = value - black.value;
-            return Some(Interval { value, low: value - below, high: value + above });
+            return Some((Interval { value, low: value - below, high: value + above }, 0.0));
         }
         let values = self.values()?;
         let (dark, variance) = (self.no_light(flat)?[0], values.dark_variance?);
         // Shot noise of so much charge is all that darks are uncertain by.
         let room = (variance - self.rounding).max(0.0) / values.gain;
-        Some(Interval { value: value - dark, low: low - dark, high: high - dark + room })
+        Some((Interval { value: value - dark, low: low - dark, high: high - dark }, room))
     }
 
     /// Whether the mean of no light beneath a flat is known.
